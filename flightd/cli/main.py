@@ -1,0 +1,47 @@
+"""The `flightd` command: every subcommand hangs here, errors become one line and an exit code.
+
+Exit 0 on success, 1 for a failed run, 2 for bad input, configuration or a resource that cannot be had.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from flightd import __version__
+from flightd.core.errors import FlightdError, InputError, UnavailableError
+
+app = typer.Typer(
+    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"flightd {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def flightd(
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Print the version."
+    ),
+) -> None:
+    """Fly a camera drone along the painted guide lines of a warehouse floor."""
+
+
+def main() -> None:
+    """Entry point of the `flightd` script."""
+    try:
+        app()
+    except (InputError, UnavailableError) as err:
+        print(f"flightd: {err}", file=sys.stderr)
+        raise SystemExit(2) from None
+    except FlightdError as err:
+        print(f"flightd: {err}", file=sys.stderr)
+        raise SystemExit(1) from None
+    except KeyboardInterrupt:
+        print("flightd: interrupted", file=sys.stderr)
+        raise SystemExit(130) from None

@@ -1,0 +1,244 @@
+"""The messages that flow between the stages, as frozen dataclasses with the unit in each name.
+
+Angles are radians, lengths metres or pixels as named, times integer nanoseconds of one monotonic
+clock.  Every message carries the time at which its *content* was true (for a picture: mid-exposure),
+never the time at which it was handed on.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Image: TypeAlias = NDArray[np.uint8]
+"""(H, W, 3) BGR or (H, W) single channel, uint8."""
+
+VERTICAL_LIMIT_RAD = math.radians(30.0)
+"""Lines within this of theta = 0 (mod pi) are `vertical` (paper, eq. 7)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One picture: (H, W, 3) uint8, BGR, read-only; `stamp_ns` is mid-exposure."""
+
+    seq: int
+    stamp_ns: int
+    bgr: Image
+
+    def __post_init__(self) -> None:
+        if self.bgr.ndim != 3 or self.bgr.shape[2] != 3 or self.bgr.dtype != np.uint8:
+            raise ValueError(f"frame {self.seq} is {self.bgr.shape} {self.bgr.dtype}, not (H, W, 3) uint8")
+
+
+class LineKind(enum.StrEnum):
+    """The paper's two classes (eq. 7): vertical runs up the picture, horizontal across it."""
+
+    VERTICAL = "vertical"
+    HORIZONTAL = "horizontal"
+
+
+def line_kind(theta_rad: float) -> LineKind:
+    """Class of a line by its normal's angle, theta in [0, pi)."""
+    vertical = theta_rad < VERTICAL_LIMIT_RAD or theta_rad > math.pi - VERTICAL_LIMIT_RAD
+    return LineKind.VERTICAL if vertical else LineKind.HORIZONTAL
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A thick line's centre line in Hessian normal form about the image centre.
+
+    x cos(theta) + y sin(theta) = rho with x right, y down, origin ((W-1)/2, (H-1)/2), theta in
+    [0, pi), rho signed.  The visible span runs from `start_px` to `end_px` along the direction
+    (-sin(theta), cos(theta)), measured from the foot of the normal.  `support` is the part of the
+    span that is really painted, 0..1.  The sigmas are standard deviations; `rho_theta_cov` (px rad)
+    is the covariance of the two errors, which is what remains when only one end of a line is seen.
+    """
+
+    rho_px: float
+    theta_rad: float
+    width_px: float
+    start_px: float
+    end_px: float
+    support: float
+    sigma_rho_px: float
+    sigma_theta_rad: float
+    rho_theta_cov: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.theta_rad < math.pi:
+            raise ValueError(f"theta {self.theta_rad} outside [0, pi)")
+        if not self.end_px >= self.start_px:
+            raise ValueError(f"span ends at {self.end_px} before its start {self.start_px}")
+
+    @property
+    def span_px(self) -> float:
+        return self.end_px - self.start_px
+
+    @property
+    def kind(self) -> LineKind:
+        return line_kind(self.theta_rad)
+
+    def point_at(self, along_px: float) -> tuple[float, float]:
+        """Centred image coordinates (x, y) of the point `along_px` from the foot of the normal."""
+        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
+        return self.rho_px * c - along_px * s, self.rho_px * s + along_px * c
+
+
+class JunctionKind(enum.StrEnum):
+    CROSS = "cross"
+    TEE = "tee"
+    CORNER = "corner"
+    END = "end"
+
+
+@dataclass(frozen=True, slots=True)
+class Junction:
+    """Where lines meet or one ends, in centred image coordinates; `arms_rad` are the directions
+    (atan2(y, x), image axes) in which paint leaves it: 4 for a cross, 3, 2, 1."""
+
+    kind: JunctionKind
+    x_px: float
+    y_px: float
+    arms_rad: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class LineSet:
+    """What vision saw in one frame.  Lines are in pixels of a distortion-free pinhole camera when a
+    lens was given to the detector.  `timings_ms` names each stage's time."""
+
+    frame_seq: int
+    stamp_ns: int
+    width_px: int
+    height_px: int
+    lines: tuple[Line, ...]
+    junctions: tuple[Junction, ...]
+    method: str
+    timings_ms: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    """Body to level frame: roll + right side down, pitch + nose up, yaw + clockwise from above."""
+
+    stamp_ns: int
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+
+
+class LandedState(enum.StrEnum):
+    UNKNOWN = "unknown"
+    ON_GROUND = "on_ground"
+    IN_AIR = "in_air"
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleState:
+    """The newest that the vehicle told, each group with its own time.
+
+    `in_control` says that the autopilot is in the mode in which it obeys our setpoints *and* that we
+    asked for that mode: False means hands off.  `height_m` is above the floor below, along the
+    vertical; NaN when no range finder speaks.
+    """
+
+    attitude: Attitude
+    height_m: float
+    height_stamp_ns: int
+    climb_mps: float
+    mode: str
+    in_control: bool
+    armed: bool
+    landed: LandedState
+    battery_frac: float
+    battery_v: float
+    heartbeat_ns: int
+    refusal: str = ""
+
+
+class Demand(enum.StrEnum):
+    """What the mission wants of the vehicle; the adapter works towards it and retries by itself."""
+
+    HANDS_OFF = "hands_off"
+    STANDBY = "standby"
+    FLY = "fly"
+    LAND = "land"
+    DISARM = "disarm"
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeSetpoint:
+    """Roll + right side down, pitch + nose up, yaw rate + clockwise from above, climb + up."""
+
+    stamp_ns: int
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    yaw_rate_radps: float = 0.0
+    climb_mps: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not all(map(math.isfinite, (self.roll_rad, self.pitch_rad, self.yaw_rate_radps, self.climb_mps))):
+            raise ValueError(f"setpoint is not finite: {self}")
+
+
+@dataclass(frozen=True, slots=True)
+class GridPose:
+    """Where the drone is on the warehouse grid.
+
+    Map frame: x along the aisles, y to the right of x seen from above, yaw clockwise from x.
+    `node` is the nearest node; `along_m`, `across_m` are the offset from it in x and y.  `covariance`
+    is that of (x, y, yaw), row-major 3x3.  `integrity` is the probability that the node is right.
+    """
+
+    stamp_ns: int
+    node: str
+    along_m: float
+    across_m: float
+    yaw_rad: float
+    x_m: float
+    y_m: float
+    vx_mps: float
+    vy_mps: float
+    height_m: float
+    covariance: tuple[float, ...]
+    integrity: float
+
+
+class EventLevel(enum.StrEnum):
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something a person or a log reader should know, at the time it happened."""
+
+    stamp_ns: int
+    level: EventLevel
+    name: str
+    text: str
+
+
+class CommandKind(enum.StrEnum):
+    START = "start"
+    PAUSE = "pause"
+    RESUME = "resume"
+    GOTO = "goto"
+    HOME = "home"
+    LAND = "land"
+    STOP = "stop"
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """An operator's order; `node` only with GOTO."""
+
+    id: str
+    kind: CommandKind
+    node: str = ""

@@ -1,0 +1,62 @@
+"""What the daemon needs of the world; each port has real and simulated peers behind it."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import Protocol
+
+from flightd.core.types import Attitude, AttitudeSetpoint, Command, Demand, Event, VehicleState
+
+
+class Clock(Protocol):
+    """Monotonic time of the running event loop (real, scaled or virtual)."""
+
+    def now_ns(self) -> int: ...
+
+
+class Vehicle(Protocol):
+    """One flying machine on one link.
+
+    `run` owns the link: it connects, keeps it, reconnects for ever and, cancelled, hands the vehicle
+    back.  Everything else is synchronous and never blocks: `state` is the newest telemetry (None until
+    heartbeat and attitude were heard), `attitudes` drains the attitude samples since the last call,
+    oldest first, `demand` states what the mission wants now (level, not edge: the adapter repeats
+    what the vehicle refused and passes the reason on in `VehicleState.refusal`), `send` puts one
+    setpoint on the wire and says whether it went out (never while the vehicle is not ours).
+    """
+
+    async def run(self) -> None: ...
+
+    def state(self) -> VehicleState | None: ...
+
+    def attitudes(self) -> list[Attitude]: ...
+
+    def demand(self, demand: Demand) -> None: ...
+
+    def send(self, setpoint: AttitudeSetpoint) -> bool: ...
+
+    def notify(self, event: Event) -> None:
+        """Show an event to the pilot's ground station (best effort)."""
+        ...
+
+
+class FrameSlot(Protocol):
+    """A picture that lies in shared memory: workers read it by name, the daemon never copies it."""
+
+    @property
+    def seq(self) -> int: ...
+
+    @property
+    def stamp_ns(self) -> int: ...
+
+
+class CommandSource(Protocol):
+    """Operator commands, in order."""
+
+    def commands(self) -> AsyncIterator[Command]: ...
+
+
+class EventSink(Protocol):
+    """Takes events; never blocks."""
+
+    def event(self, event: Event) -> None: ...

@@ -1,0 +1,25 @@
+# Sourced: make_venv EXTRA builds .venv with flightd[EXTRA] from the pinned constraints, once.
+
+make_venv() {
+    local extra=$1 python stamp
+    python=$(command -v python3 || true)
+    [ -n "$python" ] || { echo "flightd needs Python 3.11 or newer: sudo apt install python3 python3-venv" >&2; exit 2; }
+    "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || {
+        echo "flightd needs Python 3.11 or newer; $python is $("$python" -V 2>&1): install python3.11 and python3.11-venv" >&2
+        exit 2
+    }
+    "$python" -c 'import ensurepip, venv' 2>/dev/null || {
+        echo "Python's venv module is missing: sudo apt install python3-venv" >&2
+        exit 2
+    }
+    stamp=.venv/installed-$extra-$(cat pyproject.toml constraints.txt | cksum | cut -d' ' -f1)
+    [ -e "$stamp" ] && return
+    [ -x .venv/bin/python ] || "$python" -m venv .venv
+    echo "== installing flightd[$extra] into .venv"
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check \
+        --constraint constraints.txt --editable ".[$extra]" || {
+        echo "installing failed: the lines above say why (no network? no space?); run this again when it is mended" >&2
+        exit 2
+    }
+    touch "$stamp"
+}
