@@ -101,7 +101,8 @@ class Mount:
 
     def body_from_image(self) -> Matrix:
         """(3, 3) rotation from image axes (right, down, optical) to body axes."""
-        return heading_rotation(self.yaw_rad) @ _IMAGE_TO_BODY
+        rotation: Matrix = heading_rotation(self.yaw_rad) @ _IMAGE_TO_BODY
+        return rotation
 
 
 def ground_homography(lens: Lens, mount: Mount, roll_rad: float, pitch_rad: float) -> Matrix:
