@@ -242,3 +242,43 @@ class Command:
     id: str
     kind: CommandKind
     node: str = ""
+
+
+class Phase(enum.StrEnum):
+    """What the mission is doing; the words of log, status and report."""
+
+    PREFLIGHT = "preflight"
+    ARMING = "arming"
+    TAKE_OFF = "take_off"
+    ACQUIRE = "acquire"
+    FOLLOW = "follow"
+    HOVER = "hover"
+    TURN = "turn"
+    HOLD = "hold"
+    LAND = "land"
+    DONE = "done"
+    ABORTED = "aborted"
+    PILOT = "pilot"
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """The daemon at one glance, made at each tick.
+
+    `latency_ms` are the newest frame's stages: capture, transport, detection, track (each from its
+    predecessor), and total (mid-exposure to setpoint on the wire).
+    """
+
+    stamp_ns: int
+    phase: Phase
+    reason: str
+    node: str
+    goal: str
+    nodes_done: int
+    nodes_planned: int
+    battery_frac: float
+    height_m: float
+    frames: int
+    frames_dropped: int
+    fps: float
+    latency_ms: dict[str, float]

@@ -1,0 +1,26 @@
+"""The true motion of the simulated airframe, which only the simulator and its score may see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Kinematics:
+    """Pose and motion at one instant, in the warehouse map frame (x along the aisles, y right of x seen
+    from above, yaw clockwise from x); `height_m` of the body origin above the floor; velocities of the
+    map frame (`climb_mps` + up); attitude and body rates as in `core.types.Attitude`."""
+
+    stamp_ns: int
+    x_m: float
+    y_m: float
+    height_m: float
+    vx_mps: float
+    vy_mps: float
+    climb_mps: float
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+    roll_rate_radps: float
+    pitch_rate_radps: float
+    yaw_rate_radps: float
