@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
+from contextlib import AbstractContextManager
 from typing import Protocol
 
 from flightd.core.types import Attitude, AttitudeSetpoint, Command, Demand, Event, VehicleState
@@ -12,6 +13,10 @@ class Clock(Protocol):
     """Monotonic time of the running event loop (real, scaled or virtual)."""
 
     def now_ns(self) -> int: ...
+
+    def hold(self) -> AbstractContextManager[None]:
+        """Entered while work outside the loop is awaited: virtual time stands still, real time cannot."""
+        ...
 
 
 class Vehicle(Protocol):
