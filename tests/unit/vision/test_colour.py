@@ -1,0 +1,128 @@
+"""Colour profiles: the table, its normalisation and region growing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from flightd.core.errors import InputError
+from flightd.core.types import Image
+from flightd.vision.colour import (
+    SHIPPED,
+    STRONG,
+    ColourProfile,
+    classify,
+    floor_light,
+    grow,
+    load_profile,
+    relight,
+    save_profile,
+)
+
+PAINT_BGR = {
+    "yellow": (30, 190, 225),
+    "white": (225, 228, 230),
+    "red": (40, 35, 190),
+    "blue": (180, 90, 35),
+    "green": (70, 150, 40),
+    "black": (22, 22, 24),
+}
+
+
+def band(colour: str, floor: tuple[int, int, int] = (108, 112, 114)) -> tuple[Image, NDArray[np.bool_]]:
+    picture = np.full((90, 160, 3), floor, np.uint8)
+    picture[40:56] = PAINT_BGR[colour]
+    inside = np.zeros((90, 160), bool)
+    inside[40:56] = True
+    return picture, inside
+
+
+@pytest.mark.parametrize("colour", SHIPPED)
+def test_each_shipped_profile_finds_its_paint_and_nothing_on_the_floor(colour: str) -> None:
+    picture, inside = band(colour)
+    assert np.array_equal(grow(classify(picture, load_profile(colour))) == 255, inside)
+
+
+@pytest.mark.parametrize("colour", SHIPPED)
+@pytest.mark.parametrize("exposure", [0.25, 0.5, 1.0, 2.0, 4.0])
+def test_a_factor_sixteen_of_brightness_does_not_lose_the_line(colour: str, exposure: float) -> None:
+    """The floor is dark enough that fourfold exposure does not saturate it."""
+    picture, inside = band(colour, (50, 52, 53))
+    if colour != "black":
+        picture[inside] = (np.array(PAINT_BGR[colour]) * 0.47).astype(np.uint8)
+    else:
+        picture[inside] = 8
+    lit = np.clip(picture * exposure, 0, 255).astype(np.uint8)
+    mask = grow(classify(lit, load_profile(colour))) == 255
+    assert (mask == inside).mean() > 0.995
+
+
+@pytest.mark.parametrize("colour", SHIPPED)
+@pytest.mark.parametrize("cast", [(1.35, 1.0, 0.75), (0.75, 1.0, 1.35), (0.9, 1.15, 0.9)])
+def test_a_colour_cast_does_not_lose_the_line(colour: str, cast: tuple[float, float, float]) -> None:
+    picture, inside = band(colour)
+    tinted = np.clip(picture * np.array(cast), 0, 255).astype(np.uint8)
+    mask = grow(classify(tinted, load_profile(colour))) == 255
+    assert (mask == inside).mean() > 0.995
+
+
+def test_a_frame_full_of_paint_keeps_its_colour() -> None:
+    picture = np.full((90, 160, 3), PAINT_BGR["yellow"], np.uint8)
+    assert (classify(picture, load_profile("yellow")) == STRONG).all()
+
+
+def test_relighting_the_table_equals_multiplying_the_pixels() -> None:
+    profile = load_profile("yellow")
+    gain = (1.4, 1.0, 0.7)
+    index = np.arange(65536)
+    axes = np.stack([index & 31, (index >> 5) & 63, index >> 11])
+    limits = np.array([31, 63, 31])[:, None]
+    gained = np.clip(((axes + 0.5) * np.array(gain)[:, None]).astype(int), 0, limits)
+    expected = profile.lut[gained[0] | gained[1] << 5 | gained[2] << 11]
+    assert np.array_equal(relight(profile.lut, gain), expected)
+
+
+def test_the_floor_light_makes_a_tinted_floor_neutral() -> None:
+    luma, gains = floor_light(np.full((40, 60, 3), (59, 69, 79), np.uint8))
+    assert np.allclose(np.array((60, 70, 80)) * gains, luma)
+
+
+def test_growing_keeps_weak_pixels_only_where_they_touch_strong_ones() -> None:
+    levels = np.array([[0, 1, 1, 2, 0, 0, 1], [0, 0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 1, 0, 0]], np.uint8)
+    levels[1, 4] = 1  # diagonal neighbour of the strong pixel
+    kept = grow(levels)
+    assert kept[0].tolist() == [0, 255, 255, 255, 0, 0, 0]
+    assert kept[1].tolist() == [0, 0, 0, 0, 255, 0, 0]
+    assert kept[2].tolist() == [0, 0, 0, 0, 255, 0, 0]
+
+
+def test_a_profile_survives_its_file_and_the_file_is_small(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    profile = ColourProfile("mine", rng.integers(0, 3, 65536).astype(np.uint8), "yellow", "abc", 0.97)
+    save_profile(profile, tmp_path / "mine.npz")
+    again = load_profile(tmp_path / "mine.npz")
+    assert np.array_equal(again.lut, profile.lut)
+    assert (again.name, again.colour, again.training_hash, again.score) == ("mine", "yellow", "abc", 0.97)
+    assert (tmp_path / "mine.npz").stat().st_size < 200_000
+
+
+def test_the_same_profile_is_written_as_the_same_bytes(tmp_path: Path) -> None:
+    save_profile(load_profile("red"), tmp_path / "a.npz")
+    save_profile(load_profile("red"), tmp_path / "b.npz")
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+@pytest.mark.parametrize("content", [b"", b"not a profile", b"PK\x03\x04rest"])
+def test_a_file_that_is_no_profile_is_named(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "bad.npz"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"bad\.npz"):
+        load_profile(path)
+
+
+def test_an_unknown_name_lists_the_shipped_ones() -> None:
+    with pytest.raises(InputError, match=r"purple.*yellow, white"):
+        load_profile("purple")
