@@ -1,0 +1,54 @@
+"""PID with a clamped integral, the derivative on the measurement, and a limited output (paper, eq. 10)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class PidGains:
+    """`kp` per unit of error, `ki` per unit second, `kd` per unit of the measurement's rate.
+    `integral_limit` bounds the integral's share of the output, `output_limit` the whole."""
+
+    kp: float
+    ki: float
+    kd: float
+    integral_limit: float
+    output_limit: float
+
+    def __post_init__(self) -> None:
+        if min(self.kp, self.ki, self.kd) < 0 or self.integral_limit < 0 or not self.output_limit > 0:
+            raise ValueError(f"PID gains must not be negative: {self}")
+
+
+class Pid:
+    """One loop.  The derivative acts on the measured rate, so a jump of the set point does not kick."""
+
+    def __init__(self, gains: PidGains) -> None:
+        self._gains = gains
+        self._integral = 0.0
+
+    @property
+    def integral(self) -> float:
+        """The integral's present share of the output."""
+        return self._integral
+
+    def reset(self, integral: float = 0.0) -> None:
+        limit = self._gains.integral_limit
+        self._integral = min(max(integral, -limit), limit)
+
+    def step(self, error: float, rate: float, dt_s: float, feed_forward: float = 0.0) -> float:
+        """Output for this `error` (set point minus measurement) and measured `rate`.
+
+        The integral stands still while the output is at its limit and the error would drive it further
+        (conditional integration), and never exceeds its own limit.
+        """
+        g = self._gains
+        direct = g.kp * error - g.kd * rate + feed_forward
+        candidate = self._integral + g.ki * error * dt_s
+        candidate = min(max(candidate, -g.integral_limit), g.integral_limit)
+        output = direct + candidate
+        if abs(output) <= g.output_limit or output * error < 0:
+            self._integral = candidate
+        output = direct + self._integral
+        return min(max(output, -g.output_limit), g.output_limit)

@@ -1,0 +1,187 @@
+"""Line tracks on the floor: from each frame's lines to smooth offsets, velocities and heading.
+
+The filters live at the capture time of the newest frame, where the measured attitude of that moment is
+known; `at` carries them on to the present with the attitude flown since.  So a late picture costs
+prediction, never truth.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+from flightd.core.geometry import Lens, Mount, wrap_pi
+from flightd.core.types import Attitude, LineSet
+from flightd.tracking.attitude import AttitudeHistory
+from flightd.tracking.motion import AxisTracker, HeadingTracker, MotionNoise, TrackedLine
+from flightd.tracking.tilt import FloorView, GroundLine, TiltCompensation, ground_lines
+
+GRAVITY_MPS2 = 9.80665
+_STEP_NS = 20_000_000
+_PARALLEL_RAD = math.radians(20.0)
+
+
+@dataclass(frozen=True, slots=True)
+class TrackerParams:
+    """How the down camera sees and how far to trust it; metres, radians, seconds."""
+
+    lens: Lens
+    mount: Mount
+    compensation: TiltCompensation = TiltCompensation.EXACT
+    sigma_tilt_rad: float = math.radians(0.3)
+    min_sigma_m: float = 0.004
+    gate_m: float = 0.35
+    forget_s: float = 2.5
+    start_yaw_sigma_rad: float = math.radians(5.0)
+    noise: MotionNoise = field(default_factory=MotionNoise)
+
+
+@dataclass(frozen=True, slots=True)
+class TrackSet:
+    """The tracks at one time, in grid axes (x along the aisles, y to the right of x).
+
+    `across_x` are the lines that cross the x axis (parallel to y), offsets in x; `across_y` the others.
+    `lines_ns` is the capture time of the newest frame in which any line was taken.
+    """
+
+    stamp_ns: int
+    lines_ns: int
+    yaw_rad: float
+    yaw_sigma_rad: float
+    vx_mps: float
+    vy_mps: float
+    ax_mps2: float
+    ay_mps2: float
+    across_x: tuple[TrackedLine, ...]
+    across_y: tuple[TrackedLine, ...]
+
+
+class LineTracker:
+    """Feed `attitude` and `frame`, read `at`.  Before the first frame `at` gives None."""
+
+    def __init__(self, params: TrackerParams, start_yaw_rad: float) -> None:
+        self._params = params
+        self._start_yaw_rad = start_yaw_rad
+        self._history = AttitudeHistory()
+        self._heading: HeadingTracker | None = None
+        forget_ns = round(params.forget_s * 1e9)
+        self._x = AxisTracker(params.noise, params.gate_m, forget_ns)
+        self._y = AxisTracker(params.noise, params.gate_m, forget_ns)
+        self._stamp_ns = 0
+        self._lines_ns = 0
+        self.rejected = 0
+
+    def attitude(self, sample: Attitude) -> None:
+        self._history.add(sample)
+        if self._heading is None:
+            offset = wrap_pi(self._start_yaw_rad - sample.yaw_rad)
+            self._heading = HeadingTracker(offset, self._params.start_yaw_sigma_rad)
+
+    def on_ground(self) -> None:
+        """Standing still: no velocity, no wind felt."""
+        self._x.reset_motion()
+        self._y.reset_motion()
+
+    def frame(self, lines: LineSet, height_m: float) -> bool:
+        """Take the lines of one frame seen at `height_m`; False when it could not be used (older than
+        the last, no attitude at its exposure, no height)."""
+        attitude = self._history.at(lines.stamp_ns)
+        if attitude is None or self._heading is None or not height_m > 0 or lines.stamp_ns <= self._stamp_ns:
+            self.rejected += 1
+            return False
+        self._advance(lines.stamp_ns)
+        params = self._params
+        view = FloorView(
+            params.lens, params.mount, attitude, height_m, params.compensation, params.sigma_tilt_rad
+        )
+        on_floor = ground_lines(lines.lines, view)
+        yaw = self._turn(on_floor, attitude)
+        across_x: list[tuple[float, float, float]] = []
+        across_y: list[tuple[float, float, float]] = []
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        for line in on_floor:
+            sigma = max(line.sigma_m, params.min_sigma_m)
+            x = cos * line.forward_m - sin * line.right_m
+            y = sin * line.forward_m + cos * line.right_m
+            direction = line.theta_rad + yaw
+            if abs(math.sin(direction)) < math.sin(_PARALLEL_RAD):
+                across_y.append((y, math.hypot(sigma, x * self._heading.sigma_rad), line.width_m))
+            elif abs(math.cos(direction)) < math.sin(_PARALLEL_RAD):
+                across_x.append((x, math.hypot(sigma, y * self._heading.sigma_rad), line.width_m))
+        self._x.update(across_x, lines.stamp_ns)
+        self._y.update(across_y, lines.stamp_ns)
+        if across_x or across_y:
+            self._lines_ns = lines.stamp_ns
+        return True
+
+    def at(self, now_ns: int) -> TrackSet | None:
+        """The tracks carried on to `now_ns`, or None before the first frame."""
+        if self._heading is None or self._stamp_ns == 0:
+            return None
+        newest = self._history.at(now_ns) or self._history.newest
+        assert newest is not None
+        yaw = wrap_pi(newest.yaw_rad + self._heading.offset_rad)
+        moved_x = moved_y = 0.0
+        vx, vy = self._x.velocity_mps, self._y.velocity_mps
+        ax = ay = 0.0
+        stamp_ns = self._stamp_ns
+        while stamp_ns < now_ns:
+            step_ns = min(_STEP_NS, now_ns - stamp_ns)
+            ax, ay = self._accel(stamp_ns + step_ns // 2)
+            dt_s = step_ns * 1e-9
+            ax += self._x.disturbance_mps2 - self._x.drag_per_s * vx
+            ay += self._y.disturbance_mps2 - self._y.drag_per_s * vy
+            moved_x += vx * dt_s + 0.5 * ax * dt_s * dt_s
+            moved_y += vy * dt_s + 0.5 * ay * dt_s * dt_s
+            vx += ax * dt_s
+            vy += ay * dt_s
+            stamp_ns += step_ns
+        return TrackSet(
+            now_ns,
+            self._lines_ns,
+            yaw,
+            self._heading.sigma_rad,
+            vx,
+            vy,
+            ax,
+            ay,
+            tuple(replace(line, offset_m=line.offset_m - moved_x) for line in self._x.lines()),
+            tuple(replace(line, offset_m=line.offset_m - moved_y) for line in self._y.lines()),
+        )
+
+    def _advance(self, stamp_ns: int) -> None:
+        """Carry the filters from the last frame to this one."""
+        assert self._heading is not None
+        if self._stamp_ns:
+            while self._stamp_ns < stamp_ns:
+                step_ns = min(2 * _STEP_NS, stamp_ns - self._stamp_ns)
+                ax, ay = self._accel(self._stamp_ns + step_ns // 2)
+                self._x.predict(step_ns * 1e-9, ax)
+                self._y.predict(step_ns * 1e-9, ay)
+                self._heading.predict(step_ns * 1e-9)
+                self._stamp_ns += step_ns
+        self._stamp_ns = stamp_ns
+
+    def _accel(self, stamp_ns: int) -> tuple[float, float]:
+        """Acceleration along the grid axes that the attitude makes at constant height, g tan(tilt)."""
+        attitude = self._history.at(stamp_ns) or self._history.newest
+        assert attitude is not None
+        assert self._heading is not None
+        yaw = attitude.yaw_rad + self._heading.offset_rad
+        forward = -GRAVITY_MPS2 * math.tan(attitude.pitch_rad)
+        right = GRAVITY_MPS2 * math.tan(attitude.roll_rad)
+        return math.cos(yaw) * forward - math.sin(yaw) * right, math.sin(yaw) * forward + math.cos(
+            yaw
+        ) * right
+
+    def _turn(self, on_floor: list[GroundLine], attitude: Attitude) -> float:
+        """Correct the heading by every line near a grid direction; return the yaw at exposure."""
+        assert self._heading is not None
+        for line in on_floor:
+            yaw = attitude.yaw_rad + self._heading.offset_rad
+            # a line of the grid has direction -yaw or 90 deg - yaw in the level frame
+            innovation = (-line.theta_rad - yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4
+            sigma = max(line.sigma_theta_rad, math.radians(0.2))
+            if abs(innovation) < max(math.radians(4.0), 4.0 * math.hypot(self._heading.sigma_rad, sigma)):
+                self._heading.update(innovation, sigma)
+        return attitude.yaw_rad + self._heading.offset_rad

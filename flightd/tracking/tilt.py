@@ -1,0 +1,118 @@
+"""From lines in the picture to lines on the floor, with the camera's tilt taken out.
+
+Three ways are selectable.  EXACT maps the line by the homography of the ground plane, l' = H.T l.
+FIRST_ORDER is the paper's (eqs. 8, 9): scale by height, then subtract H tan(roll) from a vertical and
+H tan(pitch) from a horizontal line; it is the exact form's first-order limit.  NONE only scales.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flightd.core.geometry import Lens, Matrix, Mount, ground_homography, level_from_body, normalise_line
+from flightd.core.types import Attitude, Line
+
+_MAX_TILT_RAD = math.radians(45.0)
+
+
+class TiltCompensation(enum.StrEnum):
+    EXACT = "exact"
+    FIRST_ORDER = "first_order"
+    NONE = "none"
+
+
+@dataclass(frozen=True, slots=True)
+class GroundLine:
+    """A line on the floor in the level frame of the body (core.geometry: right cos(theta) - forward
+    sin(theta) = rho), with the middle of its visible part (forward, right) and the standard
+    deviations of the offset there and of theta."""
+
+    rho_m: float
+    theta_rad: float
+    forward_m: float
+    right_m: float
+    sigma_m: float
+    sigma_theta_rad: float
+    width_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class FloorView:
+    """How the floor was seen in one frame: attitude at exposure and height of the body above the floor.
+
+    `sigma_tilt_rad` is what one does not know of roll and pitch; it moves every line alike.
+    """
+
+    lens: Lens
+    mount: Mount
+    attitude: Attitude
+    height_m: float
+    compensation: TiltCompensation
+    sigma_tilt_rad: float
+
+
+def ground_lines(lines: Sequence[Line], view: FloorView) -> list[GroundLine]:
+    """The lines as they lie on the floor, without those that the view cannot place (horizon, no height)."""
+    roll, pitch = view.attitude.roll_rad, view.attitude.pitch_rad
+    if abs(roll) > _MAX_TILT_RAD or abs(pitch) > _MAX_TILT_RAD:
+        return []
+    if view.compensation is not TiltCompensation.EXACT:
+        roll = pitch = 0.0
+    lever: Matrix = level_from_body(roll, pitch) @ np.array(view.mount.offset_m, dtype=np.float64)
+    camera_height_m = view.height_m - float(lever[2])
+    if not camera_height_m > 0.02:
+        return []
+    homography = ground_homography(view.lens, view.mount, roll, pitch)
+    inverse: Matrix = np.linalg.inv(homography)
+    centre = view.lens.centre_px
+    placed = (_place(line, view, homography, inverse, centre, camera_height_m, lever) for line in lines)
+    return [line for line in placed if line is not None]
+
+
+def _place(
+    line: Line,
+    view: FloorView,
+    homography: Matrix,
+    inverse: Matrix,
+    centre: tuple[float, float],
+    height_m: float,
+    lever: Matrix,
+) -> GroundLine | None:
+    a, b = math.cos(line.theta_rad), math.sin(line.theta_rad)
+    c = -(line.rho_px + a * centre[0] + b * centre[1])
+    on_floor = homography.T @ np.array([a, b, c])  # l' = H.T l on the floor at unit distance
+    forward, right, offset = float(on_floor[0]), float(on_floor[1]), float(on_floor[2])
+    norm = math.hypot(forward, right)
+    middle_px = (line.start_px + line.end_px) / 2
+    x, y = line.point_at(middle_px)
+    point = inverse @ np.array([x + centre[0], y + centre[1], 1.0])
+    if norm < 1e-12 or point[2] < 0.2:  # the horizon, or nearly
+        return None
+    mid_forward, mid_right = float(point[0] / point[2]) * height_m, float(point[1] / point[2]) * height_m
+    # the normal (right, -forward) = (cos, sin) and its offset in metres
+    rho, theta = normalise_line(-offset / norm * height_m, math.atan2(-forward, right))
+    tan_shift = 0.0
+    if view.compensation is TiltCompensation.FIRST_ORDER:
+        tan_roll, tan_pitch = math.tan(view.attitude.roll_rad), math.tan(view.attitude.pitch_rad)
+        tan_shift = height_m * (tan_roll * math.cos(theta) + tan_pitch * math.sin(theta))
+        mid_right -= height_m * tan_roll
+        mid_forward += height_m * tan_pitch
+    lever_rho = float(lever[1]) * math.cos(theta) - float(lever[0]) * math.sin(theta)
+    metres_per_px = height_m / view.lens.fx_px / float(point[2]) ** 2
+    variance_px = (
+        line.sigma_rho_px**2 - 2 * middle_px * line.rho_theta_cov + (middle_px * line.sigma_theta_rad) ** 2
+    )
+    return GroundLine(
+        rho - tan_shift + lever_rho,
+        theta,
+        mid_forward + float(lever[0]),
+        mid_right + float(lever[1]),
+        math.hypot(math.sqrt(max(variance_px, 1e-4)) * metres_per_px, height_m * view.sigma_tilt_rad),
+        math.hypot(line.sigma_theta_rad, view.sigma_tilt_rad * 0.5),
+        line.width_px * metres_per_px,
+    )
