@@ -1,0 +1,196 @@
+"""Site files: the warehouse map as TOML, read with every mistake named, and written back.
+
+    [site]
+    name = "demo"                # any text
+    line_width_m = 0.075         # 0.05..0.10
+    line_colour = "yellow"       # yellow, white, red, blue
+    ceiling_m = 6.0
+
+    [[aisle]]                    # one straight line along x
+    id = "A"                     # its nodes are A1, A2, …
+    x_m = 0.0                    # first node
+    y_m = 0.0
+    spacing_m = [1.5, 1.8]       # to each next node: n distances, n + 1 nodes
+    cross_half_m = 0.5           # painted half-length of each node's own cross line
+    overrun_m = 0.4              # how far the line runs past its end nodes
+    shelves = ["left", "right"]  # seen along +x
+    shelf_distance_m = 1.2       # from the line to the shelf front
+    shelf_height_m = 3.0
+
+    [[cross]]                    # a painted line between two aisles, at right angles to both
+    nodes = ["A1", "B1"]
+
+    [[pad]]
+    id = "home"                  # missions start and end here
+    node = "A1"
+    size_m = 0.5
+
+Map frame: x along the aisles, y to the right of x seen from above, metres.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from flightd.core.errors import InputError
+from flightd.grid.layout import LayoutError, lay_out
+from flightd.grid.site import Aisle, LineColour, Pad, Side, Site
+
+_Metres = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+_Coordinate = Annotated[float, Field(ge=-10_000, le=10_000, allow_inf_nan=False)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class _SiteTable(_Table):
+    name: str = Field(min_length=1, max_length=80)
+    line_width_m: float = Field(0.075, ge=0.05, le=0.10)
+    line_colour: LineColour = LineColour.YELLOW
+    ceiling_m: _Metres = 6.0
+
+
+class _AisleTable(_Table):
+    id: str = Field(pattern=r"^[A-Z]{1,3}$")
+    x_m: _Coordinate
+    y_m: _Coordinate
+    spacing_m: tuple[_Metres, ...] = Field(min_length=1, max_length=1000)
+    cross_half_m: _Metres = 0.5
+    overrun_m: float = Field(0.4, ge=0, le=10)
+    shelves: tuple[Side, ...] = (Side.LEFT, Side.RIGHT)
+    shelf_distance_m: _Metres = 1.2
+    shelf_height_m: _Metres = 3.0
+
+
+class _CrossTable(_Table):
+    nodes: tuple[str, str]
+
+
+class _PadTable(_Table):
+    id: str = Field(min_length=1, max_length=40)
+    node: str
+    size_m: float = Field(0.5, ge=0.2, le=3)
+
+
+class _SiteFile(_Table):
+    site: _SiteTable
+    aisle: tuple[_AisleTable, ...] = Field(min_length=1)
+    cross: tuple[_CrossTable, ...] = ()
+    pad: tuple[_PadTable, ...] = Field(min_length=1)
+
+
+def load_site(path: Path) -> Site:
+    """Read a site file.  Raises InputError naming the file, the key and what to do."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as err:
+        raise InputError(f"{path}: cannot read the site file: {err.strerror or err}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a UTF-8 text file; a site file is TOML") from None
+    return parse_site(text, str(path))
+
+
+def parse_site(text: str, source: str) -> Site:
+    """Make a site from the text of a site file; `source` names it in errors (InputError)."""
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as err:
+        raise InputError(f"{source}: not valid TOML: {err}") from None
+    try:
+        file = _SiteFile.model_validate(tables)
+    except ValidationError as err:
+        raise InputError(f"{source}: {_first_mistake(err, tables)}") from None
+    try:
+        return lay_out(
+            file.site.name,
+            [Aisle(**dict(aisle)) for aisle in file.aisle],
+            [cross.nodes for cross in file.cross],
+            [Pad(pad.id, pad.node, pad.size_m) for pad in file.pad],
+            line_width_m=file.site.line_width_m,
+            line_colour=file.site.line_colour,
+            ceiling_m=file.site.ceiling_m,
+        )
+    except LayoutError as err:
+        raise InputError(f"{source}: {err}") from None
+
+
+def site_toml(site: Site) -> str:
+    """The site as a site file; `parse_site` makes an equal site of it."""
+    parts = [
+        "[site]",
+        f"name = {_quoted(site.name)}",
+        f"line_width_m = {site.line_width_m!r}",
+        f"line_colour = {_quoted(site.line_colour)}",
+        f"ceiling_m = {site.ceiling_m!r}",
+    ]
+    for aisle in site.aisles:
+        parts += ["", "[[aisle]]", f"id = {_quoted(aisle.id)}"]
+        parts += [f"x_m = {aisle.x_m!r}", f"y_m = {aisle.y_m!r}"]
+        parts += [f"spacing_m = [{', '.join(map(repr, aisle.spacing_m))}]"]
+        parts += [f"cross_half_m = {aisle.cross_half_m!r}", f"overrun_m = {aisle.overrun_m!r}"]
+        parts += [f"shelves = [{', '.join(map(_quoted, aisle.shelves))}]"]
+        parts += [f"shelf_distance_m = {aisle.shelf_distance_m!r}"]
+        parts += [f"shelf_height_m = {aisle.shelf_height_m!r}"]
+    for cross in site.crosses:
+        parts += ["", "[[cross]]", f"nodes = [{_quoted(cross.a)}, {_quoted(cross.b)}]"]
+    for pad in site.pads:
+        parts += ["", "[[pad]]", f"id = {_quoted(pad.id)}", f"node = {_quoted(pad.node)}"]
+        parts += [f"size_m = {pad.size_m!r}"]
+    return "\n".join(parts) + "\n"
+
+
+def _quoted(text: str) -> str:
+    # a JSON string is a TOML basic string, but TOML wants the DEL character escaped too
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _first_mistake(err: ValidationError, tables: dict[str, Any]) -> str:
+    """The first thing wrong, as `key: what, what to do`."""
+    # a misspelt key also leaves one missing: the misspelling is what helps
+    first = min(err.errors(), key=lambda mistake: mistake["type"] != "extra_forbidden")
+    key = _key(first["loc"], tables)
+    match first["type"]:
+        case "missing":
+            return f"{key}: missing; add it"
+        case "extra_forbidden":
+            parent = _fields(first["loc"])
+            return f"{key}: unknown key; known here: {', '.join(parent)}"
+        case "string_pattern_mismatch" if key.endswith(".id"):
+            return f"{key}: {first['input']!r}: an aisle's id is one to three capital letters"
+        case _:
+            given = first["input"]
+            shown = f" (it is {given!r})" if isinstance(given, str | int | float | bool) else ""
+            return f"{key}: {first['msg']}{shown}"
+
+
+def _key(location: tuple[int | str, ...], tables: dict[str, Any]) -> str:
+    """`aisle[1] (B).spacing_m[0]`: the place as a person finds it in the file."""
+    key = ""
+    here: Any = tables
+    for part in location:
+        if isinstance(part, int):
+            key += f"[{part}]"
+            here = here[part] if isinstance(here, list) and part < len(here) else None
+            if isinstance(here, dict) and isinstance(here.get("id"), str):
+                key += f" ({here['id']})"
+        else:
+            key += f".{part}" if key else part
+            here = here.get(part) if isinstance(here, dict) else None
+    return key
+
+
+def _fields(location: tuple[int | str, ...]) -> list[str]:
+    tables: dict[str, type[_Table]] = {
+        "site": _SiteTable,
+        "aisle": _AisleTable,
+        "cross": _CrossTable,
+        "pad": _PadTable,
+    }
+    table = tables[cast(str, location[0])] if len(location) > 1 else _SiteFile
+    return list(table.model_fields)

@@ -1,0 +1,229 @@
+"""The warehouse as the drone knows it: nodes on painted lines, pads, shelves, and the ways between.
+
+Map frame: x along the aisles, y to the right of x seen from above, both in metres on the floor; angles
+clockwise from x.  A `Site` is made by `flightd.grid.layout.lay_out` from its aisles, never by hand.
+"""
+
+from __future__ import annotations
+
+import enum
+import heapq
+import itertools
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+
+class LineColour(enum.StrEnum):
+    """Colour of the guide paint."""
+
+    YELLOW = "yellow"
+    WHITE = "white"
+    RED = "red"
+    BLUE = "blue"
+
+
+class Side(enum.StrEnum):
+    """Side of an aisle for someone who looks along +x: left is -y, right is +y."""
+
+    LEFT = "left"
+    RIGHT = "right"
+
+
+@dataclass(frozen=True, slots=True)
+class Aisle:
+    """One straight aisle line and its nodes: the first at (`x_m`, `y_m`), each next one `spacing_m`
+    further along x.  The aisle line runs `overrun_m` past its end nodes; the node's own cross line
+    reaches `cross_half_m` to both sides.  A shelf's face stands `shelf_distance_m` from the line."""
+
+    id: str
+    x_m: float
+    y_m: float
+    spacing_m: tuple[float, ...]
+    cross_half_m: float = 0.5
+    overrun_m: float = 0.4
+    shelves: tuple[Side, ...] = (Side.LEFT, Side.RIGHT)
+    shelf_distance_m: float = 1.2
+    shelf_height_m: float = 3.0
+
+    @property
+    def size(self) -> int:
+        """Number of nodes."""
+        return len(self.spacing_m) + 1
+
+    @property
+    def end_x_m(self) -> float:
+        """x of the last node."""
+        return self.x_m + math.fsum(self.spacing_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A crossing of painted lines; `index` counts from 1 along the aisle, `id` is aisle and index."""
+
+    id: str
+    x_m: float
+    y_m: float
+    aisle: str
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A painted line between two neighbouring nodes, flown both ways."""
+
+    a: str
+    b: str
+
+
+@dataclass(frozen=True, slots=True)
+class PaintedLine:
+    """Centre line and width of one straight stroke of paint with square ends."""
+
+    x0_m: float
+    y0_m: float
+    x1_m: float
+    y1_m: float
+    width_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Pad:
+    """A square start and charge mat, its centre on a node."""
+
+    id: str
+    node: str
+    size_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Shelf:
+    """One unbroken shelf front: a vertical rectangle over y = `y_m` from `x0_m` to `x1_m`, floor to
+    `height_m`, facing its aisle."""
+
+    aisle: str
+    side: Side
+    x0_m: float
+    x1_m: float
+    y_m: float
+    height_m: float
+
+
+@dataclass(frozen=True)
+class Site:
+    """A whole warehouse floor; immutable, connected, every edge on paint."""
+
+    name: str
+    aisles: tuple[Aisle, ...]
+    crosses: tuple[Edge, ...]
+    nodes: Mapping[str, Node]
+    edges: tuple[Edge, ...]
+    lines: tuple[PaintedLine, ...]
+    pads: tuple[Pad, ...]
+    shelves: tuple[Shelf, ...]
+    line_width_m: float
+    line_colour: LineColour
+    ceiling_m: float
+
+    @cached_property
+    def _neighbours(self) -> dict[str, tuple[str, ...]]:
+        found: dict[str, list[str]] = {node: [] for node in self.nodes}
+        for edge in self.edges:
+            found[edge.a].append(edge.b)
+            found[edge.b].append(edge.a)
+        return {node: tuple(sorted(others, key=self._order)) for node, others in found.items()}
+
+    def _order(self, node: str) -> tuple[float, float, str]:
+        there = self.nodes[node]
+        return there.y_m, there.x_m, node
+
+    @property
+    def home(self) -> Pad:
+        """The pad missions start from and come back to: the one called `home`, else the first."""
+        return next((pad for pad in self.pads if pad.id == "home"), self.pads[0])
+
+    def neighbours(self, node: str) -> tuple[str, ...]:
+        """Nodes one edge away, in a fixed order.  KeyError for an unknown node."""
+        return self._neighbours[node]
+
+    def distance_m(self, a: str, b: str) -> float:
+        """Straight distance of two nodes."""
+        return math.hypot(self.nodes[a].x_m - self.nodes[b].x_m, self.nodes[a].y_m - self.nodes[b].y_m)
+
+    def nearest(self, x_m: float, y_m: float) -> Node:
+        """The node closest to a point of the floor; ties go to the first in the map."""
+        return min(self.nodes.values(), key=lambda node: math.hypot(node.x_m - x_m, node.y_m - y_m))
+
+    def aisle_nodes(self, aisle: str) -> tuple[Node, ...]:
+        """The nodes of one aisle by rising x.  Empty for an unknown aisle."""
+        return tuple(node for node in self.nodes.values() if node.aisle == aisle)
+
+    def aisle_order(self) -> tuple[Aisle, ...]:
+        """The aisles from left to right (rising y)."""
+        return tuple(sorted(self.aisles, key=lambda aisle: (aisle.y_m, aisle.x_m)))
+
+    def bounds(self) -> tuple[float, float, float, float]:
+        """(x_min, y_min, x_max, y_max) of everything painted and every shelf front."""
+        xs = [x for line in self.lines for x in (line.x0_m, line.x1_m)]
+        ys = [y for line in self.lines for y in (line.y0_m, line.y1_m)]
+        xs += [x for shelf in self.shelves for x in (shelf.x0_m, shelf.x1_m)]
+        ys += [shelf.y_m for shelf in self.shelves]
+        return min(xs), min(ys), max(xs), max(ys)
+
+    def path(self, start: str, goal: str) -> tuple[str, ...]:
+        """Shortest way along the edges in metres, both ends included (Dijkstra).
+
+        Raises KeyError for an unknown node; a site is connected, so a way always exists."""
+        if start not in self.nodes or goal not in self.nodes:
+            raise KeyError(start if start not in self.nodes else goal)
+        came_from: dict[str, str] = {}
+        best = {start: 0.0}
+        queue = [(0.0, start)]
+        while queue:
+            travelled_m, here = heapq.heappop(queue)
+            if here == goal:
+                break
+            if travelled_m > best[here]:
+                continue
+            for there in self._neighbours[here]:
+                total_m = travelled_m + self.distance_m(here, there)
+                if total_m < best.get(there, math.inf):
+                    best[there] = total_m
+                    came_from[there] = here
+                    heapq.heappush(queue, (total_m, there))
+        way = [goal]
+        while way[-1] != start:
+            way.append(came_from[way[-1]])
+        return tuple(reversed(way))
+
+    def length_m(self, way: Iterable[str]) -> float:
+        """Metres flown along a list of nodes, each reached by the shortest way from the one before."""
+        stops = self.expand(way)
+        return math.fsum(self.distance_m(a, b) for a, b in itertools.pairwise(stops))
+
+    def expand(self, goals: Iterable[str]) -> tuple[str, ...]:
+        """The goals joined by shortest ways: a list in which consecutive nodes are neighbours."""
+        full: list[str] = []
+        for goal in goals:
+            full.extend(self.path(full[-1], goal)[1:] if full else (goal,))
+        return tuple(full)
+
+    def serpentine_route(self) -> tuple[str, ...]:
+        """Every node once, aisle by aisle from the home pad, and home again at the end.
+
+        Consecutive goals of one aisle are neighbours; between aisles and on the way home other nodes
+        may have to be passed (`expand` gives them).  Each aisle is entered at its nearer end; the
+        aisles on the home aisle's shorter side come first."""
+        order = [aisle.id for aisle in self.aisle_order()]
+        home = self.home.node
+        at = order.index(self.nodes[home].aisle)
+        before, after = order[:at][::-1], order[at + 1 :]
+        sides = (before, after) if len(before) <= len(after) else (after, before)
+        goals = [home]
+        for aisle in [order[at], *sides[0], *sides[1]]:
+            sweep = [node.id for node in self.aisle_nodes(aisle)]
+            if self.length_m((goals[-1], sweep[-1])) < self.length_m((goals[-1], sweep[0])):
+                sweep.reverse()
+            goals += [node for node in sweep if node != home]
+        return (*goals, home) if goals[-1] != home else tuple(goals)
