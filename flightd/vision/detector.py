@@ -1,0 +1,120 @@
+"""One detector for all methods: frame in, lines and junctions out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import cv2
+import numpy as np
+
+from flightd.core.errors import InputError
+from flightd.core.geometry import Lens
+from flightd.core.types import Image, LineSet
+from flightd.vision import centroid, combine, junctions, naive, skeleton
+from flightd.vision.colour import ColourProfile, classify, grow, load_profile
+from flightd.vision.plane import Plane
+from flightd.vision.refine import refine
+from flightd.vision.sampling import Grid, grid_for, sample
+from flightd.vision.strip import Strip
+
+METHODS = ("centroid", "skeleton", "combined", "naive")
+
+_MIN_SIDE_PX = 16
+_MIN_ASPECT = 1.6
+_MIN_LENGTH = 0.12
+"""Shortest line reported, as a part of the picture's shorter side."""
+_MIN_SUPPORT = 0.35
+
+
+class Detector:
+    """Finds the painted lines of one colour in frame after frame.
+
+    `method` is one of METHODS; `profile` a colour profile or the name of one.  With a `lens` the lines
+    are those of a distortion-free camera.  `now_ns`, when given, times the stages.  Not thread-safe: one
+    detector for each worker.
+    """
+
+    def __init__(
+        self,
+        method: str = "combined",
+        profile: ColourProfile | str = "yellow",
+        lens: Lens | None = None,
+        *,
+        zhang_suen: bool = False,
+        now_ns: Callable[[], int] | None = None,
+    ) -> None:
+        if method not in METHODS:
+            raise InputError(f"method {method}: unknown; choose one of {', '.join(METHODS)}")
+        self.method = method
+        self.profile = load_profile(profile) if isinstance(profile, str) else profile
+        self._lens = lens
+        self._zhang_suen = zhang_suen
+        self._now_ns = now_ns or _no_clock
+
+    def detect(self, bgr: Image, seq: int = 0, stamp_ns: int = 0) -> LineSet:
+        """Lines and junctions of a (H, W, 3) uint8 BGR picture.
+
+        Raises InputError for any other shape or type, and for pictures too small to hold a line.
+        """
+        _check(bgr)
+        marks = [("start", self._now_ns())]
+        height, width = bgr.shape[:2]
+        plane = self._plane(width, height)
+        grid = grid_for(width, height)
+        mask = grow(classify(sample(bgr, grid), self.profile))
+        marks.append(("colour", self._now_ns()))
+        guesses = self._guess(mask, grid, plane)
+        marks.append(("guess", self._now_ns()))
+        if self.method == "combined":
+            guesses = refine(np.ascontiguousarray(bgr), guesses, plane, reach_px=1.5 * grid.step + 1)
+            guesses = combine.without_repeats(guesses)
+            marks.append(("refine", self._now_ns()))
+        lines = tuple(strip.to_line() for strip in guesses)
+        found = junctions.find(lines, mask, grid, plane)
+        marks.append(("junctions", self._now_ns()))
+        timings = {name: (end - begin) / 1e6 for (_, begin), (name, end) in pairwise(marks)}
+        return LineSet(seq, stamp_ns, width, height, lines, found, self.method, timings)
+
+    def _plane(self, width: int, height: int) -> Plane:
+        lens = self._lens
+        if lens is not None and (lens.width_px, lens.height_px) != (width, height):
+            lens = lens.scaled(width, height)
+        return Plane(width, height, lens)
+
+    def _guess(self, mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
+        if not cv2.countNonZero(mask):
+            return []
+        if self.method == "naive":
+            return naive.find(mask, grid, plane)
+        groups = []
+        if self.method in ("centroid", "combined"):
+            groups.append(_plausible(centroid.find(mask, grid, plane), plane))
+        if self.method in ("skeleton", "combined"):
+            groups.append(_plausible(skeleton.find(mask, grid, plane, zhang_suen=self._zhang_suen), plane))
+        return combine.without_repeats(combine.fuse(groups))
+
+
+def _plausible(strips: list[Strip], plane: Plane) -> list[Strip]:
+    shortest = _MIN_LENGTH * min(plane.width_px, plane.height_px)
+    return combine.without_repeats(
+        [
+            s
+            for s in strips
+            if s.length_px >= max(shortest, _MIN_ASPECT * s.width_px) and s.support >= _MIN_SUPPORT
+        ]
+    )
+
+
+def _check(bgr: Image) -> None:
+    shape, dtype = np.shape(bgr), getattr(bgr, "dtype", None)
+    if len(shape) != 3 or shape[2] != 3 or dtype != np.uint8:
+        raise InputError(f"picture is {shape} {dtype}, not (height, width, 3) uint8 BGR; convert it first")
+    if min(shape[:2]) < _MIN_SIDE_PX:
+        raise InputError(
+            f"picture of {shape[1]}x{shape[0]} px is too small; at least {_MIN_SIDE_PX} px a side"
+        )
+
+
+def _no_clock() -> int:
+    return 0
