@@ -65,3 +65,15 @@ class EventSink(Protocol):
     """Takes events; never blocks."""
 
     def event(self, event: Event) -> None: ...
+
+
+class Recorder(Protocol):
+    """The black box: takes what is worth keeping, never blocks, counts what it had to drop.
+
+    `message` is a dataclass of plain fields or a dict of JSON values; topics and their types are in
+    `core.topics`.  Stamps are the flight clock's.
+    """
+
+    def record(self, topic: str, stamp_ns: int, message: object) -> None: ...
+
+    def image(self, topic: str, stamp_ns: int, seq: int, jpeg: bytes) -> None: ...

@@ -1,0 +1,375 @@
+"""An MCAP file that is whole on disk after every flush and can be taken up again after a kill.
+
+The records are those of the `mcap` package; its own writer cannot close a chunk on request, which is
+what keeps the loss after `kill -9` to the last second.  Schemas and channels are written outside the
+chunks, so that mending a file needs to unpack none but the last of them.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO, Self, TypeAlias
+
+import zstandard
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+
+from flightd.core.errors import InputError
+
+MAGIC = b"\x89MCAP0\r\n"
+CHUNK_BYTES = 1 << 20
+"""A chunk is closed when it holds this much, or sooner by `flush`."""
+
+_LIBRARY = "flightd"
+_RECORD_HEAD = 9
+_MESSAGE = struct.Struct("<BQHIQQ")
+"""Opcode, length of what follows, channel, sequence, log time, publish time; then the payload."""
+_MESSAGE_FIELDS = _MESSAGE.size - _RECORD_HEAD
+
+
+class McapFile:
+    """One log file open for writing; `create` a new one or `resume` one that was cut off.
+
+    Every method that writes raises OSError when the disk refuses; the file then still ends with the
+    last chunk that was written whole, and `flush` has given up the messages of the failed one.
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self._end = 0
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._chunks: list[ChunkIndex] = []
+        self._metadata: list[MetadataIndex] = []
+        self._counts: Counter[int] = Counter()
+        self._undeclared: list[McapRecord] = []
+        self._open_chunk = _OpenChunk()
+        self._compressor = zstandard.ZstdCompressor(level=1)
+
+    @classmethod
+    def create(cls, path: Path) -> Self:
+        """A new file at `path`; what was there is replaced."""
+        file = cls(path.open("wb+", buffering=0))
+        file._begin()
+        return file
+
+    @classmethod
+    def resume(cls, path: Path) -> Self:
+        """Open `path` to write on behind its last whole record; InputError if it is not an MCAP file."""
+        try:
+            stream = path.open("rb+", buffering=0)
+        except OSError as err:
+            raise InputError(f"{path}: cannot open the log: {err.strerror}") from None
+        start = stream.read(len(MAGIC))
+        if not MAGIC.startswith(start):
+            stream.close()
+            raise InputError(f"{path}: not a flight log (no MCAP header)")
+        file = cls(stream)
+        try:
+            if len(start) < len(MAGIC):
+                file._begin()
+            else:
+                file._recover()
+        except BaseException:
+            stream.close()
+            raise
+        return file
+
+    @property
+    def size(self) -> int:
+        """Bytes on disk."""
+        return self._end
+
+    @property
+    def messages(self) -> int:
+        """Messages on disk."""
+        return self._counts.total()
+
+    @property
+    def pending(self) -> int:
+        """Messages taken but not yet on disk."""
+        return self._open_chunk.messages
+
+    def add_channel(self, channel_id: int, topic: str, schema_name: str, schema: str) -> None:
+        """Introduce a channel (id > 0) of JSON messages; nothing happens if the file has it already.
+
+        It is written by the next flush, ahead of the messages."""
+        if channel_id in self._channels:
+            return
+        described = Schema(id=channel_id, data=schema.encode(), encoding="jsonschema", name=schema_name)
+        channel = Channel(
+            id=channel_id, topic=topic, message_encoding="json", metadata={}, schema_id=channel_id
+        )
+        self._schemas[channel_id], self._channels[channel_id] = described, channel
+        self._undeclared += [described, channel]
+
+    def add_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
+        record = _packed(Metadata(name=name, metadata=dict(metadata)))
+        self._metadata.append(MetadataIndex(offset=self._end, length=len(record), name=name))
+        try:
+            self._append(record)
+        except OSError:
+            self._metadata.pop()
+            raise
+
+    def add_message(self, channel_id: int, stamp_ns: int, payload: bytes) -> None:
+        """Take one message into the open chunk."""
+        self._open_chunk.add(channel_id, stamp_ns, payload)
+        if self._open_chunk.size >= CHUNK_BYTES:
+            self.flush()
+
+    def flush(self) -> None:
+        """Close the open chunk and write it."""
+        taken, self._open_chunk = self._open_chunk, _OpenChunk()
+        if self._undeclared:
+            self._append(_packed(*self._undeclared))
+            self._undeclared.clear()
+        if not taken.messages:
+            return
+        content = taken.content()
+        chunk = Chunk(
+            compression="zstd",
+            data=self._compressor.compress(content),
+            message_start_time=taken.first_ns,
+            message_end_time=taken.last_ns,
+            uncompressed_crc=zlib.crc32(content),
+            uncompressed_size=len(content),
+        )
+        packed = _packed(chunk)
+        indexes, index = _indexes(chunk, taken.index, self._end, len(packed))
+        self._append(packed + indexes)
+        self._chunks.append(index)
+        self._counts.update({channel: len(entries) for channel, entries in taken.index.items()})
+
+    def sync(self) -> None:
+        """Make what was flushed survive a loss of power."""
+        os.fdatasync(self._stream.fileno())
+
+    def close(self) -> None:
+        """Flush, write the index that makes the file quick to search, close."""
+        try:
+            self.flush()
+            self._append(self._summary())
+        finally:
+            self._stream.close()
+
+    def _begin(self) -> None:
+        self._append(MAGIC + _packed(Header(profile="", library=_LIBRARY)))
+
+    def _append(self, data: bytes) -> None:
+        """Write at the end, wholly or not at all."""
+        view = memoryview(data)
+        try:
+            self._stream.seek(self._end)
+            while view:
+                view = view[self._stream.write(view) :]
+        except OSError:
+            self._stream.truncate(self._end)
+            raise
+        self._end += len(data)
+
+    def _summary(self) -> bytes:
+        builder = RecordBuilder()
+        DataEnd(data_section_crc=0).write(builder)
+        data_end: bytes = builder.end()
+        start = self._end + len(data_end)
+        groups: dict[Opcode, Sequence[McapRecord]] = {
+            Opcode.SCHEMA: list(self._schemas.values()),
+            Opcode.CHANNEL: list(self._channels.values()),
+            Opcode.STATISTICS: [self._statistics()],
+            Opcode.CHUNK_INDEX: self._chunks,
+            Opcode.METADATA_INDEX: self._metadata,
+        }
+        offsets: list[SummaryOffset] = []
+        for opcode, records in groups.items():
+            before = builder.count
+            for record in records:
+                record.write(builder)
+            if builder.count > before:
+                offsets.append(SummaryOffset(opcode, start + before, builder.count - before))
+        offsets_start = start + builder.count
+        for offset in offsets:
+            offset.write(builder)
+        summary: bytes = builder.end()
+        Footer(summary_start=start, summary_offset_start=offsets_start, summary_crc=0).write(builder)
+        footer: bytes = builder.end()
+        crc = zlib.crc32(footer[:-4], zlib.crc32(summary))
+        return data_end + summary + footer[:-4] + crc.to_bytes(4, "little") + MAGIC
+
+    def _statistics(self) -> Statistics:
+        return Statistics(
+            attachment_count=0,
+            channel_count=len(self._channels),
+            channel_message_counts=dict(self._counts),
+            chunk_count=len(self._chunks),
+            message_count=self._counts.total(),
+            message_start_time=min((chunk.message_start_time for chunk in self._chunks), default=0),
+            message_end_time=max((chunk.message_end_time for chunk in self._chunks), default=0),
+            metadata_count=len(self._metadata),
+            schema_count=len(self._schemas),
+        )
+
+    def _recover(self) -> None:
+        """Rebuild the index from the records on disk and drop what is not whole."""
+        records = self._records()
+        self._check_origin(next(records, None))
+        for offset, opcode, content in records:
+            stream = ReadDataStream(BytesIO(content))
+            if opcode == Opcode.DATA_END:
+                break
+            self._end = offset + _RECORD_HEAD + len(content)
+            if opcode == Opcode.SCHEMA:
+                schema = Schema.read(stream)
+                self._schemas[schema.id] = schema
+            elif opcode == Opcode.CHANNEL:
+                channel = Channel.read(stream)
+                self._channels[channel.id] = channel
+            elif opcode == Opcode.METADATA:
+                name = Metadata.read(stream).name
+                self._metadata.append(MetadataIndex(offset, _RECORD_HEAD + len(content), name))
+            elif opcode == Opcode.CHUNK:
+                self._recover_chunk(offset, Chunk.read(stream))
+        self._stream.truncate(self._end)
+
+    def _check_origin(self, first: tuple[int, int, bytes] | None) -> None:
+        if first is None:
+            self._begin()
+            return
+        offset, opcode, content = first
+        if opcode != Opcode.HEADER or Header.read(ReadDataStream(BytesIO(content))).library != _LIBRARY:
+            raise InputError(
+                f"{self._stream.name}: written by another program; only flightd's logs are mended"
+            )
+        self._end = offset + _RECORD_HEAD + len(content)
+
+    def _recover_chunk(self, offset: int, chunk: Chunk) -> None:
+        """Index a chunk anew (its message indexes may be cut off); a damaged one stays unindexed."""
+        try:
+            content = zstandard.decompress(chunk.data, chunk.uncompressed_size)
+        except zstandard.ZstdError:
+            return
+        if zlib.crc32(content) != chunk.uncompressed_crc:
+            return
+        entries = _message_offsets(content)
+        indexes, index = _indexes(chunk, entries, offset, self._end - offset)
+        if os.pread(self._stream.fileno(), len(indexes), self._end) == indexes:
+            self._end += len(indexes)
+        else:
+            self._append(indexes)
+        self._chunks.append(index)
+        self._counts.update({channel: len(found) for channel, found in entries.items()})
+
+    def _records(self) -> Iterator[tuple[int, int, bytes]]:
+        """Offset, opcode and content of each whole record from the start of the file."""
+        descriptor = self._stream.fileno()
+        size = os.fstat(descriptor).st_size
+        offset = len(MAGIC)
+        while offset + _RECORD_HEAD <= size:
+            head = os.pread(descriptor, _RECORD_HEAD, offset)
+            length = int.from_bytes(head[1:], "little")
+            start = offset + _RECORD_HEAD
+            if start + length > size:
+                return
+            yield offset, head[0], os.pread(descriptor, length, start)
+            offset = start + length
+
+
+def repair(path: Path) -> None:
+    """Make a log whole that was cut off by a kill, a full disk or a loss of power, in place.
+
+    What comes before the cut stays as it is; a log that is whole already stays as it is, too.
+    Raises InputError if the file cannot be opened or is not one of flightd's logs.
+    """
+    McapFile.resume(path).close()
+
+
+_Entries: TypeAlias = dict[int, list[tuple[int, int]]]
+"""Channel to the (stamp, offset in the chunk) of its messages."""
+
+
+class _OpenChunk:
+    """The messages of the chunk that is being filled."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+        self.size = 0
+        self.messages = 0
+        self.index: _Entries = {}
+        self.first_ns = 0
+        self.last_ns = 0
+
+    def add(self, channel_id: int, stamp_ns: int, payload: bytes) -> None:
+        head = _MESSAGE.pack(
+            Opcode.MESSAGE, _MESSAGE_FIELDS + len(payload), channel_id, 0, stamp_ns, stamp_ns
+        )
+        self.index.setdefault(channel_id, []).append((stamp_ns, self.size))
+        self._parts += (head, payload)
+        self.size += len(head) + len(payload)
+        self.first_ns = min(self.first_ns, stamp_ns) if self.messages else stamp_ns
+        self.last_ns = max(self.last_ns, stamp_ns)
+        self.messages += 1
+
+    def content(self) -> bytes:
+        return b"".join(self._parts)
+
+
+def _message_offsets(content: bytes) -> _Entries:
+    entries: _Entries = {}
+    offset = 0
+    while offset < len(content):
+        opcode, length, channel_id, _, stamp_ns, _ = _MESSAGE.unpack_from(content, offset)
+        if opcode == Opcode.MESSAGE:
+            entries.setdefault(channel_id, []).append((stamp_ns, offset))
+        offset += _RECORD_HEAD + length
+    return entries
+
+
+def _indexes(chunk: Chunk, entries: _Entries, offset: int, length: int) -> tuple[bytes, ChunkIndex]:
+    """The message index records that follow the chunk of `length` bytes at `offset`, and its own index."""
+    builder = RecordBuilder()
+    positions = {}
+    for channel_id, found in entries.items():
+        positions[channel_id] = offset + length + builder.count
+        MessageIndex(channel_id=channel_id, records=found).write(builder)
+    packed: bytes = builder.end()
+    index = ChunkIndex(
+        chunk_length=length,
+        chunk_start_offset=offset,
+        compression=chunk.compression,
+        compressed_size=len(chunk.data),
+        message_end_time=chunk.message_end_time,
+        message_index_length=len(packed),
+        message_index_offsets=positions,
+        message_start_time=chunk.message_start_time,
+        uncompressed_size=chunk.uncompressed_size,
+    )
+    return packed, index
+
+
+def _packed(*records: McapRecord) -> bytes:
+    builder = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    packed: bytes = builder.end()
+    return packed

@@ -1,0 +1,72 @@
+"""The flight log's topics: one name and one message type for each, shared by who writes and who reads."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from flightd.core.types import (
+    AttitudeSetpoint,
+    Command,
+    Event,
+    GridPose,
+    LineSet,
+    Status,
+    VehicleState,
+)
+
+
+class Topic(enum.StrEnum):
+    """Names of the streams in `flight.mcap`; TRUTH and SCENARIO are in the simulator's `truth.mcap`."""
+
+    LINES = "/lines"
+    POSE = "/pose"
+    VEHICLE = "/vehicle"
+    SETPOINT = "/setpoint"
+    STATUS = "/status"
+    EVENT = "/event"
+    COMMAND = "/command"
+    FRAME = "/frame"
+    CONFIG = "/config"
+    MAP = "/map"
+    TRUTH = "/truth"
+    SCENARIO = "/scenario"
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A compressed picture of the down camera; `stamp_ns` is mid-exposure, `seq` the frame's number."""
+
+    seq: int
+    stamp_ns: int
+    jpeg: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A text that the flight was flown with: the configuration, the site map, the scenario (TOML)."""
+
+    text: str
+
+
+RETAINED = frozenset({Topic.CONFIG, Topic.MAP, Topic.SCENARIO})
+"""Topics whose newest message holds for the whole flight, so that every log file must carry it."""
+
+MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(
+    {
+        Topic.LINES: LineSet,
+        Topic.POSE: GridPose,
+        Topic.VEHICLE: VehicleState,
+        Topic.SETPOINT: AttitudeSetpoint,
+        Topic.STATUS: Status,
+        Topic.EVENT: Event,
+        Topic.COMMAND: Command,
+        Topic.FRAME: Picture,
+        Topic.CONFIG: Document,
+        Topic.MAP: Document,
+        Topic.SCENARIO: Document,
+    }
+)
+"""What a topic's messages are decoded to; a topic not named here holds plain JSON objects."""

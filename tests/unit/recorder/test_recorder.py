@@ -1,0 +1,316 @@
+from __future__ import annotations
+
+import asyncio
+import math
+import os
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flightd.adapters.recorder.recorder import Recorder
+from flightd.core.errors import TransientError, UnavailableError
+from flightd.core.topics import Document, Picture, Topic
+from flightd.core.types import (
+    Attitude,
+    AttitudeSetpoint,
+    Command,
+    CommandKind,
+    Event,
+    EventLevel,
+    GridPose,
+    Junction,
+    JunctionKind,
+    LandedState,
+    Line,
+    LineSet,
+    Phase,
+    Status,
+    VehicleState,
+)
+from flightd.ports import Recorder as RecorderPort
+from flightd.replay.log import read_log
+
+LINE = Line(12.5, 0.1, 31.0, -170.0, 180.0, 0.93, 0.12, 0.0011, 1e-5)
+LINES = LineSet(
+    7,
+    5_000_000_001,
+    640,
+    360,
+    (LINE, LINE),
+    (Junction(JunctionKind.TEE, 3.0, -4.0, (0.0, 1.5)),),
+    "combined",
+    {"hypothesise": 1.25},
+)
+POSE = GridPose(10, "A1", 0.1, -0.2, 0.01, 3.1, 2.8, 0.4, 0.0, 1.5, tuple(float(i) for i in range(9)), 0.99)
+VEHICLE = VehicleState(
+    Attitude(11, 0.01, -0.02, 3.0),
+    1.5,
+    10,
+    0.1,
+    "GUIDED_NOGPS",
+    True,
+    True,
+    LandedState.IN_AIR,
+    0.8,
+    15.2,
+    9,
+    "no",
+)
+STATUS = Status(12, Phase.FOLLOW, "", "A1", "A2", 1, 6, 0.8, 1.5, 300, 2, 29.9, {"total": 71.0})
+
+MESSAGES = [
+    (Topic.LINES, 1, LINES),
+    (Topic.POSE, 2, POSE),
+    (Topic.VEHICLE, 3, VEHICLE),
+    (Topic.SETPOINT, 4, AttitudeSetpoint(4, 0.1, -0.1, 0.2, 0.3)),
+    (Topic.STATUS, 5, STATUS),
+    (Topic.EVENT, 6_500_000_000, Event(6_500_000_000, EventLevel.WARNING, "wind", "gusts of 3 m/s")),
+    (Topic.COMMAND, 7, Command("c-1", CommandKind.GOTO, "B3")),
+    (Topic.MAP, 8, Document("[site]\n")),
+    (Topic.TRUTH, 9, {"stamp_ns": 9, "x_m": 1.5}),
+]
+
+
+@pytest.mark.parametrize(("topic", "stamp_ns", "message"), MESSAGES)
+def test_every_message_comes_back_as_it_was(
+    tmp_path: Path, topic: Topic, stamp_ns: int, message: object
+) -> None:
+    path = tmp_path / "flight.mcap"
+    with Recorder(path, metadata={"site": "demo"}) as recorder:
+        recorder.record(topic, stamp_ns, message)
+    log = read_log(path)
+    assert [(entry.topic, entry.stamp_ns, entry.message) for entry in log.entries] == [
+        (topic, stamp_ns, message)
+    ]
+    assert log.damage == ""
+    assert log.metadata["site"] == "demo"
+    assert log.metadata["version"]
+    assert (recorder.written, recorder.dropped) == (1, 0)
+
+
+def test_a_picture_comes_back_byte_for_byte(tmp_path: Path) -> None:
+    jpeg = bytes(range(256)) * 100
+    with Recorder(tmp_path / "flight.mcap") as recorder:
+        recorder.image(Topic.FRAME, 1_234_567_890_123, 42, jpeg)
+    (entry,) = read_log(tmp_path / "flight.mcap").entries
+    assert entry.message == Picture(42, 1_234_567_890_123, jpeg)
+
+
+def test_a_height_nobody_measured_comes_back_as_nan(tmp_path: Path) -> None:
+    unknown = VehicleState(
+        Attitude(11, 0.0, 0.0, 0.0), math.nan, 0, 0.0, "", False, False, LandedState.UNKNOWN, 1.0, 15.0, 9
+    )
+    with Recorder(tmp_path / "flight.mcap") as recorder:
+        recorder.record(Topic.VEHICLE, 1, unknown)
+    (vehicle,) = read_log(tmp_path / "flight.mcap").messages(VehicleState)
+    assert math.isnan(vehicle.height_m)
+    assert vehicle.battery_v == 15.0
+
+
+def test_numpy_numbers_are_written_as_numbers(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "flight.mcap") as recorder:
+        recorder.record("/extra", 1, {"a": np.float64(0.5), "b": np.arange(3)})
+    (entry,) = read_log(tmp_path / "flight.mcap").entries
+    assert entry.message == {"a": 0.5, "b": [0, 1, 2]}
+
+
+def test_what_has_no_json_form_is_refused_at_once(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "flight.mcap") as recorder, pytest.raises(TypeError, match="cannot be recorded"):
+        recorder.record("/extra", 1, {"a": object()})
+
+
+def test_the_recorder_is_the_port(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "flight.mcap") as recorder:
+        port: RecorderPort = recorder
+        port.record(Topic.POSE, 2, POSE)
+    assert len(read_log(tmp_path / "flight.mcap").messages(GridPose)) == 1
+
+
+def test_a_place_that_cannot_be_written_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UnavailableError, match=r"flight\.mcap: cannot write the flight log"):
+        Recorder(tmp_path / "file" / "flight.mcap")
+
+
+def test_nothing_is_lost_in_a_clean_close_under_load(tmp_path: Path) -> None:
+    count = 20_000
+    with Recorder(tmp_path / "flight.mcap", queue_bytes=1 << 16, lossless=True) as recorder:
+        for index in range(count):
+            recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index, 0.01))
+    assert (recorder.written, recorder.dropped) == (count, 0)
+    setpoints = read_log(tmp_path / "flight.mcap").messages(AttitudeSetpoint)
+    assert [setpoint.stamp_ns for setpoint in setpoints] == list(range(count))
+
+
+def test_a_full_queue_drops_and_counts_instead_of_waiting(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "flight.mcap", queue_bytes=100_000)
+    recorder.record(Topic.SETPOINT, 0, AttitudeSetpoint(0))
+    os.kill(recorder._child.pid, signal.SIGSTOP)
+    for index in range(1, 20_000):
+        recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index, 0.01))
+    dropped = recorder.dropped
+    assert dropped > 1_000
+    assert len(recorder._queue) <= 100_000
+    os.kill(recorder._child.pid, signal.SIGCONT)
+    recorder.close()
+    assert recorder.dropped == dropped
+    assert recorder.written == 20_000 - dropped
+    assert len(read_log(tmp_path / "flight.mcap").entries) == recorder.written
+
+
+def test_pictures_are_lost_before_decisions(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "flight.mcap", queue_bytes=1_000_000)
+    os.kill(recorder._child.pid, signal.SIGSTOP)
+    for seq in range(50):
+        recorder.image(Topic.FRAME, seq, seq, b"x" * 50_000)
+    for index in range(1_000):
+        recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
+    os.kill(recorder._child.pid, signal.SIGCONT)
+    recorder.close()
+    log = read_log(tmp_path / "flight.mcap")
+    assert len(log.messages(AttitudeSetpoint)) == 1_000
+    assert 0 < len(log.messages(Picture)) < 50
+
+
+def _wait_for(path: Path, count: int) -> None:
+    """Until `count` messages can be read from a file that is still being written."""
+    deadline_s = time.monotonic() + 30
+    while len(read_log(path).entries) < count:
+        assert time.monotonic() < deadline_s
+        time.sleep(0.05)
+
+
+def test_the_log_is_readable_after_kill_9_and_goes_on_in_the_same_file(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+
+    async def fly() -> Recorder:
+        recorder = Recorder(path)
+        recorder.record(Topic.MAP, 0, Document("map"))
+        for index in range(100):
+            recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
+        running = asyncio.create_task(recorder.run())
+        await asyncio.to_thread(_wait_for, path, 101)
+        recorder._child.kill()
+        with pytest.raises(TransientError, match="started again"):
+            await running
+        for index in range(100, 200):
+            recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
+        recorder.close()
+        return recorder
+
+    recorder = asyncio.run(fly())
+    log = read_log(path)
+    assert log.damage == ""
+    assert [setpoint.stamp_ns for setpoint in log.messages(AttitudeSetpoint)] == list(range(200))
+    assert log.messages(Document)[-1] == Document("map")
+    assert recorder.restarts == 1
+    assert recorder.written == len(log.entries)
+    assert recorder.dropped == 0
+
+
+def test_what_died_with_the_writer_is_counted_as_dropped(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "flight.mcap")
+    os.kill(recorder._child.pid, signal.SIGSTOP)
+    for index in range(10):
+        recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
+    recorder._child.kill()
+    recorder._child.wait()
+    recorder.close()
+    assert (recorder.written, recorder.dropped) == (0, 10)
+
+
+def test_the_log_is_finished_when_the_daemon_is_killed(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+    recorder = Recorder(path)
+    recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
+    recorder._push()
+    recorder._link.close()  # what the kernel does to a killed process
+    recorder._child.wait(30)
+    log = read_log(path)
+    assert log.damage == ""
+    assert len(log.entries) == 1
+
+
+def test_a_stop_of_the_service_does_not_stop_the_writer(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+    with Recorder(path) as recorder:
+        recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
+        recorder._push()
+        _wait_for(path, 1)
+        for name in (signal.SIGTERM, signal.SIGINT):
+            os.kill(recorder._child.pid, name)
+        recorder.record(Topic.SETPOINT, 2, AttitudeSetpoint(2))
+    assert recorder.written == 2
+    assert recorder.restarts == 0
+
+
+def test_a_full_disk_costs_messages_and_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file-size limit stands for the disk that is full."""
+    real = subprocess.Popen
+
+    def limited(arguments: list[str], **kwargs: Any) -> Any:
+        shell = ["/bin/sh", "-c", 'ulimit -f 64; exec "$@"', "sh"]
+        return real([*shell, *map(str, arguments)], **kwargs)
+
+    monkeypatch.setattr(subprocess, "Popen", limited)
+    noise = np.random.default_rng(1)
+    with Recorder(tmp_path / "flight.mcap", lossless=True) as recorder:
+        for seq in range(100):
+            recorder.image(Topic.FRAME, seq, seq, noise.bytes(40_000))
+    assert recorder.written + recorder.dropped == 100
+    assert recorder.dropped > 0
+    assert "large" in recorder.error.lower()
+    assert len(read_log(tmp_path / "flight.mcap").entries) == recorder.written
+
+
+def test_the_foxglove_reader_of_the_format_reads_it(tmp_path: Path) -> None:
+    from mcap.reader import make_reader
+
+    path = tmp_path / "flight.mcap"
+    with Recorder(path) as recorder:
+        for topic, stamp_ns, message in MESSAGES:
+            recorder.record(topic, stamp_ns, message)
+        recorder.image(Topic.FRAME, 10, 1, b"jpeg")
+    with path.open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert summary.statistics.message_count == len(MESSAGES) + 1
+        names = {
+            channel.topic: summary.schemas[channel.schema_id].name for channel in summary.channels.values()
+        }
+        assert names[Topic.EVENT] == "foxglove.Log"
+        assert names[Topic.FRAME] == "foxglove.CompressedImage"
+        assert names[Topic.LINES] == "flightd.LineSet"
+        assert all(b'"$ref"' not in schema.data for schema in summary.schemas.values())
+        found = [channel.topic for _, channel, _ in reader.iter_messages(topics=[Topic.POSE])]
+        assert found == [Topic.POSE]
+
+
+def test_run_hands_over_what_waits_without_further_messages(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+
+    async def fly() -> None:
+        with Recorder(path) as recorder:
+            recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
+            running = asyncio.create_task(recorder.run())
+            await asyncio.to_thread(_wait_for, path, 1)
+            running.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await running
+
+    asyncio.run(fly())
+
+
+def test_close_can_be_called_twice(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "flight.mcap")
+    recorder.close()
+    recorder.close()
+    assert isinstance(recorder._link, socket.socket)
