@@ -1,0 +1,170 @@
+"""One pure step of flying: what came in since the last tick -> what goes out now.
+
+The same step flies, simulates and replays: it reads no clock, opens nothing and keeps all its state in
+itself.  Order: telemetry and lines into the tracks, tracks to a pose on the grid, the mission decides,
+control turns its reference into a set point, the limits have the last word.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from flightd.control.flight import FlightController, FlightGains, Motion
+from flightd.control.limits import Limiter, Limits
+from flightd.core.types import (
+    Attitude,
+    AttitudeSetpoint,
+    Command,
+    Demand,
+    Event,
+    GridPose,
+    LineSet,
+    Phase,
+    VehicleState,
+)
+from flightd.grid.localise import GridLocaliser
+from flightd.grid.site import Site
+from flightd.mission.guidance import Guide, MissionParams, Senses
+from flightd.mission.mission import Mission
+from flightd.mission.plan import FlightPlan, Heading
+from flightd.tracking.height import HeightHistory
+from flightd.tracking.lines import LineTracker, TrackerParams, TrackSet
+
+_FRAMES_ARRIVE_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class PilotParams:
+    """Everything that tunes flying, in SI units."""
+
+    tracker: TrackerParams
+    gains: FlightGains
+    limits: Limits
+    mission: MissionParams
+    max_sigma_m: float = 0.6
+    start_sigma_m: float = 0.15
+
+
+@dataclass(frozen=True, slots=True)
+class TickInput:
+    """What arrived since the last tick, oldest first.  `vehicle` is the newest state, None until there
+    is one."""
+
+    now_ns: int
+    lines: tuple[LineSet, ...] = ()
+    vehicle: VehicleState | None = None
+    attitudes: tuple[Attitude, ...] = ()
+    commands: tuple[Command, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TickOutput:
+    """What goes out.  `setpoint` is None when nothing may be sent (hands off, or not flying)."""
+
+    setpoint: AttitudeSetpoint | None
+    demand: Demand
+    phase: Phase
+    reason: str
+    goal: str
+    visited: int
+    planned: int
+    pose: GridPose | None
+    tracks: TrackSet | None
+    events: tuple[Event, ...] = field(default=())
+
+
+class Pilot:
+    """The whole flying state of one mission."""
+
+    def __init__(self, site: Site, plan: FlightPlan, heading: Heading, params: PilotParams) -> None:
+        self._params = params
+        self._plan = plan
+        self._tracker = LineTracker(params.tracker, plan.start_yaw_rad)
+        self._heights = HeightHistory()
+        self._localiser = GridLocaliser(site, plan.start, params.start_sigma_m)
+        self._mission = Mission(site, plan, heading, params.mission)
+        self._control = FlightController(params.gains)
+        self._limiter = Limiter(params.limits)
+        self._last_ns: int | None = None
+        self._last_yaw: float | None = None
+        self._yaw_rate = 0.0
+        self._frame_ns = -math.inf
+
+    @property
+    def mission(self) -> Mission:
+        return self._mission
+
+    def step(self, tick: TickInput) -> TickOutput:
+        """Fly one tick."""
+        now_ns = tick.now_ns
+        dt_s = 0.02 if self._last_ns is None else max((now_ns - self._last_ns) * 1e-9, 1e-3)
+        self._last_ns = now_ns
+        self._take(tick)
+        height_m = self._heights.at(now_ns)
+        tracks = self._tracker.at(now_ns)
+        pose = None if tracks is None else self._localiser.step(tracks, height_m)
+        for command in tick.commands:
+            self._mission.command(command, now_ns)
+        guidance = self._mission.step(self._senses(tick, dt_s, tracks, pose, height_m))
+        motion = self._motion(pose, height_m, dt_s)
+        if guidance.guide is Guide.NONE:
+            self._control.reset()
+            setpoint = None
+        elif guidance.guide is Guide.LEVEL or pose is None:
+            setpoint = self._limiter.apply(self._control.level(now_ns, motion, guidance.reference, dt_s))
+        else:
+            setpoint = self._limiter.apply(self._control.step(now_ns, motion, guidance.reference, dt_s))
+        mission = self._mission
+        return TickOutput(
+            setpoint=setpoint,
+            demand=guidance.demand,
+            phase=mission.phase,
+            reason=mission.reason,
+            goal=mission.goal.node,
+            visited=len(mission.visited),
+            planned=self._plan.visits,
+            pose=pose,
+            tracks=tracks,
+            events=mission.drain_events(),
+        )
+
+    def _take(self, tick: TickInput) -> None:
+        """Telemetry first: a frame needs the attitude and height of its exposure."""
+        for sample in tick.attitudes:
+            self._tracker.attitude(sample)
+        if tick.vehicle is not None:
+            v = tick.vehicle
+            self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
+            if not v.armed:
+                self._tracker.on_ground()
+        for lines in tick.lines:
+            self._frame_ns = max(self._frame_ns, lines.stamp_ns)
+            self._tracker.frame(lines, self._heights.at(lines.stamp_ns))
+
+    def _senses(
+        self, tick: TickInput, dt_s: float, tracks: TrackSet | None, pose: GridPose | None, height_m: float
+    ) -> Senses:
+        now_ns, v = tick.now_ns, tick.vehicle
+        lines_age_s = math.inf if tracks is None or not tracks.lines_ns else (now_ns - tracks.lines_ns) * 1e-9
+        known = pose is not None and max(pose.covariance[0], pose.covariance[4]) < self._params.max_sigma_m**2
+        return Senses(
+            now_ns=now_ns,
+            dt_s=dt_s,
+            pose=pose,
+            localised=known and all(self._localiser.ever_matched),
+            height_m=height_m,
+            frames_arrive=(now_ns - self._frame_ns) * 1e-9 < _FRAMES_ARRIVE_S,
+            lines_age_s=lines_age_s,
+            telemetry_age_s=math.inf if v is None else (now_ns - v.attitude.stamp_ns) * 1e-9,
+            vehicle=v,
+        )
+
+    def _motion(self, pose: GridPose | None, height_m: float, dt_s: float) -> Motion:
+        if pose is None:
+            return Motion(0.0, 0.0, 0.0, 0.0, self._plan.start_yaw_rad, 0.0, height_m)
+        if self._last_yaw is not None:
+            turned = math.remainder(pose.yaw_rad - self._last_yaw, math.tau)
+            self._yaw_rate += min(1.0, dt_s / 0.05) * (turned / dt_s - self._yaw_rate)
+        self._last_yaw = pose.yaw_rad
+        return Motion(pose.x_m, pose.y_m, pose.vx_mps, pose.vy_mps, pose.yaw_rad, self._yaw_rate, height_m)

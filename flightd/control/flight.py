@@ -77,9 +77,9 @@ class FlightController:
         return self._tilted(now_ns, ax, ay, motion, reference, dt_s)
 
     def level(self, now_ns: int, motion: Motion, reference: Reference, dt_s: float) -> AttitudeSetpoint:
-        """Height and yaw held, horizontally only what the integrals have learnt (wind, trim): the drone
-        keeps station for a moment without seeing the floor."""
-        return self._tilted(now_ns, self._x.integral, self._y.integral, motion, reference, dt_s)
+        """Level and straight, height held: what is flown without a view of the floor.  The integrals
+        stand still, ready for when the view comes back."""
+        return AttitudeSetpoint(now_ns, 0.0, 0.0, 0.0, self._climb(motion, reference, dt_s))
 
     def _tilted(
         self, now_ns: int, ax: float, ay: float, motion: Motion, reference: Reference, dt_s: float
@@ -92,5 +92,11 @@ class FlightController:
             math.atan2(right, GRAVITY_MPS2),
             -math.atan2(forward, GRAVITY_MPS2),
             self._yaw.step(yaw_error, motion.yaw_rate_radps, dt_s, reference.yaw_rate_radps),
-            self._height.step(reference.height_m - motion.height_m, 0.0, dt_s, reference.climb_mps),
+            self._climb(motion, reference, dt_s),
         )
+
+    def _climb(self, motion: Motion, reference: Reference, dt_s: float) -> float:
+        """Height loop; without a height only the climb rate that is fed forward."""
+        if math.isnan(motion.height_m):
+            return reference.climb_mps
+        return self._height.step(reference.height_m - motion.height_m, 0.0, dt_s, reference.climb_mps)

@@ -63,12 +63,12 @@ def ground_lines(lines: Sequence[Line], view: FloorView) -> list[GroundLine]:
         return []
     if view.compensation is not TiltCompensation.EXACT:
         roll = pitch = 0.0
-    lever: Matrix = level_from_body(roll, pitch) @ np.array(view.mount.offset_m, dtype=np.float64)
+    lever: Matrix = np.asarray(level_from_body(roll, pitch) @ np.array(view.mount.offset_m), dtype=np.float64)
     camera_height_m = view.height_m - float(lever[2])
     if not camera_height_m > 0.02:
         return []
     homography = ground_homography(view.lens, view.mount, roll, pitch)
-    inverse: Matrix = np.linalg.inv(homography)
+    inverse: Matrix = np.asarray(np.linalg.inv(homography), dtype=np.float64)
     centre = view.lens.centre_px
     placed = (_place(line, view, homography, inverse, centre, camera_height_m, lever) for line in lines)
     return [line for line in placed if line is not None]

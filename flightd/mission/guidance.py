@@ -1,0 +1,78 @@
+"""What the mission knows, is told to do, and wants: its parameters, senses and guidance."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+from flightd.control.flight import Reference
+from flightd.core.types import Demand, GridPose, Phase, VehicleState
+
+
+@dataclass(frozen=True, slots=True)
+class MissionParams:
+    """Speeds, distances and waiting times of the mission; SI units, radians."""
+
+    height_m: float = 1.5
+    speed_mps: float = 0.8
+    accel_mps2: float = 0.5
+    climb_mps: float = 0.6
+    climb_accel_mps2: float = 0.6
+    turn_rate_radps: float = 0.6
+    turn_accel_radps2: float = 1.0
+    dwell_s: float = 2.0
+    settle_s: float = 0.5
+    arrive_m: float = 0.08
+    arrive_mps: float = 0.10
+    arrive_yaw_rad: float = math.radians(4.0)
+    height_reached_m: float = 0.15
+    steer_above_m: float = 0.45
+    land_mps: float = 0.35
+    touch_mps: float = 0.20
+    touch_below_m: float = 0.35
+    lines_hold_s: float = 0.25
+    lines_land_s: float = 6.0
+    telemetry_hold_s: float = 0.3
+    telemetry_land_s: float = 3.0
+    arm_timeout_s: float = 60.0
+    phase_timeout_s: float = 40.0
+    battery_start_frac: float = 0.3
+    battery_home_frac: float = 0.2
+    battery_land_frac: float = 0.1
+    max_lead_m: float = 0.35
+    autostart: bool = True
+
+
+class Guide(enum.Enum):
+    """What control is to do: nothing at all, level with height held, or steer to the reference."""
+
+    NONE = "none"
+    LEVEL = "level"
+    STEER = "steer"
+
+
+@dataclass(frozen=True, slots=True)
+class Senses:
+    """All that the mission knows at one tick.  `pose` is None before the floor was seen; ages in
+    seconds, infinite when there never was any."""
+
+    now_ns: int
+    dt_s: float
+    pose: GridPose | None
+    localised: bool
+    height_m: float
+    frames_arrive: bool
+    lines_age_s: float
+    telemetry_age_s: float
+    vehicle: VehicleState | None
+
+
+@dataclass(frozen=True, slots=True)
+class Guidance:
+    """What the mission wants: guide, reference (grid axes), demand on the vehicle."""
+
+    phase: Phase
+    guide: Guide
+    reference: Reference
+    demand: Demand

@@ -1,0 +1,304 @@
+"""The mission: what to do now, from what is known now.  Pure: time and data in, guidance out."""
+
+from __future__ import annotations
+
+import math
+
+from flightd.control.flight import Reference
+from flightd.control.profile import Profile
+from flightd.core.geometry import wrap_pi
+from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, LandedState, Phase
+from flightd.grid.site import Site
+from flightd.mission.guidance import Guidance, Guide, MissionParams, Senses
+from flightd.mission.plan import FlightPlan, Heading, Stop, make_plan
+from flightd.mission.table import Trigger, next_phase
+
+_DEMANDS = {
+    Phase.PREFLIGHT: Demand.STANDBY,
+    Phase.DONE: Demand.DISARM,
+    Phase.ABORTED: Demand.DISARM,
+    Phase.PILOT: Demand.HANDS_OFF,
+}
+_TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
+
+
+class Mission:
+    """One flight of one plan: call `step` at a fixed rate, `drain_events` for what happened."""
+
+    def __init__(self, site: Site, plan: FlightPlan, heading: Heading, params: MissionParams) -> None:
+        self._site = site
+        self._plan = plan
+        self._heading = heading
+        self._params = params
+        self._stops: list[Stop] = list(plan.stops)
+        self._next = 0
+        start = site.nodes[plan.start]
+        self._anchor = (start.x_m, start.y_m)
+        self.phase = Phase.PREFLIGHT
+        self.reason = ""
+        self.visited: list[str] = []
+        self._aborting = False
+        self._returning = False
+        self._on_pad_leg = False
+        self._paused = False
+        self._started = params.autostart
+        self._ordered: Trigger | None = None
+        self._since_ns = 0
+        self._settled_ns: int | None = None
+        self._steering = False
+        self._events: list[Event] = []
+        self._x = Profile(start.x_m, params.speed_mps, params.accel_mps2)
+        self._y = Profile(start.y_m, params.speed_mps, params.accel_mps2)
+        self._yaw = Profile(plan.start_yaw_rad, params.turn_rate_radps, params.turn_accel_radps2)
+        self._height = Profile(0.0, params.climb_mps, params.climb_accel_mps2)
+
+    @property
+    def goal(self) -> Stop:
+        """The stop flown to or hovered at."""
+        return self._stops[min(self._next, len(self._stops) - 1)]
+
+    @property
+    def airborne(self) -> bool:
+        """The mission believes the drone to fly and answers for it."""
+        return self.phase not in {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE, Phase.ABORTED, Phase.PILOT}
+
+    @property
+    def completed(self) -> bool:
+        return self.phase is Phase.DONE
+
+    def drain_events(self) -> tuple[Event, ...]:
+        events, self._events = tuple(self._events), []
+        return events
+
+    def command(self, command: Command, now_ns: int) -> None:
+        """Take an operator's order; it acts at the next step."""
+        kind = command.kind
+        self._event(now_ns, EventLevel.INFO, "command", f"{kind.value} {command.node}".strip())
+        if kind is CommandKind.START:
+            self._started = True
+        elif kind is CommandKind.PAUSE:
+            self._paused = True
+        elif kind is CommandKind.RESUME:
+            self._paused = False
+        elif kind is CommandKind.HOME:
+            self._go_home(now_ns, "ordered home")
+        elif kind is CommandKind.GOTO:
+            self._go_to(now_ns, command.node)
+        else:
+            self._ordered = Trigger.LAND_HERE if kind is CommandKind.LAND else Trigger.STOP
+
+    def step(self, senses: Senses) -> Guidance:
+        """Advance by one tick."""
+        phase, trigger = next_phase(self.phase, self._triggers(senses))
+        if trigger is not None:
+            self._change(senses, phase, trigger)
+        return self._guide(senses)
+
+    # What has happened
+
+    def _triggers(self, s: Senses) -> set[Trigger]:
+        p, v = self._params, s.vehicle
+        found = self._progress(s)
+        in_phase_s = (s.now_ns - self._since_ns) * 1e-9
+        if self._ordered is not None:
+            found.add(self._ordered)
+        if self._paused:
+            found.add(Trigger.HOLD)
+        if v is not None and self.airborne:
+            if not v.armed:
+                found.add(Trigger.DISARMED)
+            elif not v.in_control:
+                found.add(Trigger.PILOT_TOOK)
+            if v.battery_frac < p.battery_land_frac:
+                found.add(Trigger.BATTERY_CRITICAL)
+            elif v.battery_frac < p.battery_home_frac and not self._returning:
+                self._go_home(s.now_ns, "battery low")
+        if s.telemetry_age_s > p.telemetry_land_s:
+            found.add(Trigger.TELEMETRY_LOST)
+        if in_phase_s > (p.arm_timeout_s if self.phase is Phase.ARMING else p.phase_timeout_s):
+            found.add(Trigger.TIMED_OUT)
+        if s.lines_age_s > p.lines_hold_s or not s.localised:
+            found.add(Trigger.LINES_LOST)
+            if in_phase_s > p.lines_land_s:
+                found.add(Trigger.LINES_LOST_LONG)
+        elif in_phase_s > p.lines_hold_s and not self._paused:
+            found.add(Trigger.LINES_FOUND)
+        return found
+
+    def _progress(self, s: Senses) -> set[Trigger]:
+        """The trigger by which the present phase reaches its end, if it has."""
+        p, v, goal = self._params, s.vehicle, self.goal
+        match self.phase:
+            case Phase.PREFLIGHT:
+                done, trigger = self._started and not self._not_ready(s), Trigger.READY
+            case Phase.ARMING:
+                done, trigger = v is not None and v.armed and v.in_control, Trigger.ARMED
+            case Phase.TAKE_OFF:
+                done, trigger = s.height_m > p.height_m - p.height_reached_m, Trigger.AT_HEIGHT
+            case Phase.ACQUIRE:
+                done, trigger = (
+                    self._settled(s, s.localised and _speed(s) < 2 * p.arrive_mps),
+                    Trigger.ACQUIRED,
+                )
+            case Phase.TURN:
+                turned = s.pose is not None and abs(wrap_pi(goal.yaw_rad - s.pose.yaw_rad)) < p.arrive_yaw_rad
+                done, trigger = self._settled(s, turned), Trigger.TURNED
+            case Phase.FOLLOW:
+                there = _distance(s, (goal.x_m, goal.y_m)) < p.arrive_m and _speed(s) < p.arrive_mps
+                done, trigger = self._settled(s, there), Trigger.ARRIVED
+            case Phase.HOVER:
+                dwell_s = p.dwell_s if goal.visit else 0.0
+                done = (s.now_ns - self._since_ns) * 1e-9 >= dwell_s
+                last = self._next + 1 >= len(self._stops)
+                trigger = Trigger.ROUTE_DONE if last else Trigger.DWELLED
+            case _:
+                return set()
+        return {trigger} if done else set()
+
+    def _not_ready(self, s: Senses) -> str:
+        """Why the flight cannot start, or an empty text."""
+        p, v = self._params, s.vehicle
+        if v is None or s.telemetry_age_s > p.telemetry_hold_s:
+            return "no telemetry from the vehicle"
+        if v.armed:
+            return "the vehicle is armed already: disarm it first"
+        if math.isnan(v.height_m):
+            return "no height from the vehicle's range finder"
+        if v.battery_frac < p.battery_start_frac:
+            return f"battery at {v.battery_frac:.0%}, {p.battery_start_frac:.0%} needed to start"
+        if not s.frames_arrive:
+            return "no picture from the down camera"
+        return ""
+
+    def _settled(self, s: Senses, condition: bool) -> bool:
+        """True once `condition` has held for the settling time."""
+        if not condition:
+            self._settled_ns = None
+        elif self._settled_ns is None:
+            self._settled_ns = s.now_ns
+        return self._settled_ns is not None and (s.now_ns - self._settled_ns) * 1e-9 >= self._params.settle_s
+
+    # Changing phase
+
+    def _change(self, s: Senses, phase: Phase, trigger: Trigger) -> None:
+        before, self.phase = self.phase, phase
+        planned = trigger is Trigger.ROUTE_DONE or before is Phase.LAND
+        if before is Phase.HOVER and trigger in {Trigger.DWELLED, Trigger.ROUTE_DONE}:
+            self._note_visit(s)
+        if trigger is Trigger.DWELLED:
+            self._next += 1
+        if trigger is Trigger.ARRIVED:
+            self._anchor = (self.goal.x_m, self.goal.y_m)
+        if phase is Phase.HOLD or (phase is Phase.LAND and not planned):
+            self._anchor = (s.pose.x_m, s.pose.y_m) if s.pose is not None else self._anchor
+        self._on_pad_leg = phase is Phase.LAND and planned
+        unplanned = phase in {Phase.LAND, Phase.ABORTED, Phase.PILOT} and not planned
+        if phase is Phase.DONE:
+            self.phase = Phase.ABORTED if self._aborting else Phase.DONE
+            self.reason = self.reason if self._aborting else "landed on the pad"
+        else:
+            refused = trigger is Trigger.TIMED_OUT and s.vehicle is not None and s.vehicle.refusal
+            self.reason = f"{trigger.value}: {s.vehicle.refusal}" if refused and s.vehicle else trigger.value
+        self._aborting |= unplanned
+        level = EventLevel.WARNING if unplanned or phase is Phase.HOLD else EventLevel.INFO
+        self._event(s.now_ns, level, "phase", f"{before.value} -> {self.phase.value}: {self.reason}")
+        self._since_ns = s.now_ns
+        self._settled_ns = None
+        if phase is Phase.TAKE_OFF:
+            self._height.reset(s.height_m)
+
+    def _note_visit(self, s: Senses) -> None:
+        if self.goal.visit:
+            self.visited.append(self.goal.node)
+            self._event(s.now_ns, EventLevel.INFO, "visited", self.goal.node)
+
+    def _go_home(self, now_ns: int, reason: str) -> None:
+        self._returning = True
+        self._aborting = True
+        self._event(now_ns, EventLevel.WARNING, "home", reason)
+        self._replan(self._plan.home, visit=False)
+
+    def _go_to(self, now_ns: int, node: str) -> None:
+        if node in self._site.nodes:
+            self._replan(node, visit=True)
+        else:
+            self._event(now_ns, EventLevel.WARNING, "command", f"no node {node!r} on site {self._site.name}")
+
+    def _replan(self, node: str, visit: bool) -> None:
+        """Finish the present leg, then fly to `node` and, from there, home."""
+        here = self.goal
+        wanted = [node] if visit else []
+        onward = make_plan(self._site, wanted, here.node, self._plan.home, self._heading, here.yaw_rad)
+        self._stops[self._next + 1 :] = onward.stops
+
+    # What to do
+
+    def _guide(self, s: Senses) -> Guidance:
+        demand = _DEMANDS.get(self.phase, Demand.FLY)
+        if self.phase is Phase.PREFLIGHT:
+            self.reason = self._not_ready(s) or "waiting for the start command"
+        if not self.airborne:
+            return Guidance(self.phase, Guide.NONE, self._reference(0.0), demand)
+        if self.phase is Phase.LAND:
+            climb, demand = self._descend(s)
+        else:
+            self._height.step(self._params.height_m, s.dt_s)
+            climb = self._height.velocity
+        guide = Guide.STEER if self._steer(s) else Guide.LEVEL
+        self._steering = guide is Guide.STEER
+        return Guidance(self.phase, guide, self._reference(climb), demand)
+
+    def _descend(self, s: Senses) -> tuple[float, Demand]:
+        """Climb rate and demand of a landing: down until the vehicle says that it stands, then disarm."""
+        p, v = self._params, s.vehicle
+        height = 0.0 if math.isnan(s.height_m) else s.height_m
+        rate = p.touch_mps if height < p.touch_below_m else p.land_mps
+        self._height.reset(height, -rate)
+        standing = v is not None and v.landed is LandedState.ON_GROUND
+        blind = s.telemetry_age_s > p.telemetry_land_s
+        return -rate, Demand.DISARM if standing else Demand.LAND if blind else Demand.FLY
+
+    def _steer(self, s: Senses) -> bool:
+        """Move the reference towards where the phase wants it; False when the floor cannot be relied on."""
+        p, pose = self._params, s.pose
+        too_low = self.phase is Phase.TAKE_OFF and s.height_m < p.steer_above_m
+        stale = s.lines_age_s > p.lines_hold_s or s.telemetry_age_s > p.telemetry_hold_s
+        if pose is None or stale or too_low or not s.localised:
+            return False
+        if not self._steering:
+            self._x.reset(pose.x_m, pose.vx_mps)
+            self._y.reset(pose.y_m, pose.vy_mps)
+            self._yaw.reset(pose.yaw_rad)
+        to_goal = self.phase in _TO_GOAL or self._on_pad_leg
+        x, y = (self.goal.x_m, self.goal.y_m) if to_goal else self._anchor
+        if math.hypot(self._x.position - pose.x_m, self._y.position - pose.y_m) < p.max_lead_m:
+            self._x.step(x, s.dt_s)
+            self._y.step(y, s.dt_s)
+        if to_goal or self.phase is Phase.TURN:
+            self._yaw.step(self._yaw.position + wrap_pi(self.goal.yaw_rad - self._yaw.position), s.dt_s)
+        return True
+
+    def _reference(self, climb_mps: float) -> Reference:
+        return Reference(
+            x_m=self._x.position,
+            y_m=self._y.position,
+            yaw_rad=self._yaw.position,
+            height_m=self._height.position,
+            vx_mps=self._x.velocity,
+            vy_mps=self._y.velocity,
+            ax_mps2=self._x.acceleration,
+            ay_mps2=self._y.acceleration,
+            yaw_rate_radps=self._yaw.velocity,
+            climb_mps=climb_mps,
+        )
+
+    def _event(self, now_ns: int, level: EventLevel, name: str, text: str) -> None:
+        self._events.append(Event(now_ns, level, name, text))
+
+
+def _distance(s: Senses, to: tuple[float, float]) -> float:
+    return math.inf if s.pose is None else math.hypot(s.pose.x_m - to[0], s.pose.y_m - to[1])
+
+
+def _speed(s: Senses) -> float:
+    return math.inf if s.pose is None else math.hypot(s.pose.vx_mps, s.pose.vy_mps)

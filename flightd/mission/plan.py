@@ -1,0 +1,96 @@
+"""The flight plan: where to stop, in what order, facing where.
+
+Heading policies: ALONG flies with the nose in the direction of travel; SHELF keeps the nose (the front
+camera) to the shelf of the aisle and flies sideways.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flightd.core.errors import InputError
+from flightd.grid.site import Site
+
+
+class Heading(enum.StrEnum):
+    ALONG = "along"
+    SHELF = "shelf"
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A node to stop at.  `yaw_rad` is flown from the stop before up to here; `visit` says that the node
+    is one of the wanted ones (dwell, scan), not just a corner on the way."""
+
+    node: str
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    visit: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FlightPlan:
+    """Stops in order, the last one above the pad.  `start_yaw_rad` is the heading on the pad."""
+
+    start: str
+    home: str
+    start_yaw_rad: float
+    stops: tuple[Stop, ...]
+
+    @property
+    def visits(self) -> int:
+        return sum(stop.visit for stop in self.stops)
+
+
+def make_plan(
+    site: Site, visits: Sequence[str], start: str, home: str, heading: Heading, start_yaw_rad: float = 0.0
+) -> FlightPlan:
+    """Plan a flight from `start` over `visits` in the given order to `home`, along painted lines.
+
+    Corners on the way become stops of their own.  Raises InputError for a node that the site lacks.
+    """
+    for node in (start, home, *visits):
+        if node not in site.nodes:
+            raise InputError(
+                f"site {site.name}: no node {node!r}; nodes are named like {next(iter(site.nodes))}"
+            )
+    stops: list[Stop] = []
+    here, yaw = start, start_yaw_rad
+    for goal, visit in [*((node, True) for node in visits), (home, False)]:
+        path = site.path(here, goal)
+        for i, node in enumerate(path[1:], start=1):
+            corner = i + 1 < len(path) and not _straight(site, path[i - 1], node, path[i + 1])
+            yaw = _leg_yaw(site, path[i - 1], node, heading, yaw)
+            if corner or node == goal:
+                stops.append(_stop(site, node, yaw, visit and node == goal))
+        if len(path) == 1:
+            stops.append(_stop(site, goal, yaw, visit))
+        here = goal
+    return FlightPlan(start, home, start_yaw_rad, tuple(stops))
+
+
+def _stop(site: Site, node: str, yaw_rad: float, visit: bool) -> Stop:
+    at = site.nodes[node]
+    return Stop(node, at.x_m, at.y_m, yaw_rad, visit)
+
+
+def _direction(site: Site, a: str, b: str) -> float:
+    one, two = site.nodes[a], site.nodes[b]
+    return math.atan2(two.y_m - one.y_m, two.x_m - one.x_m)
+
+
+def _straight(site: Site, a: str, b: str, c: str) -> bool:
+    return abs(math.sin((_direction(site, a, b) - _direction(site, b, c)) / 2)) < 1e-6
+
+
+def _leg_yaw(site: Site, a: str, b: str, heading: Heading, yaw_before: float) -> float:
+    if heading is Heading.ALONG:
+        return _direction(site, a, b)
+    sides = [shelf.side for shelf in site.shelves if shelf.aisle == site.nodes[b].aisle]
+    if not sides or site.nodes[a].aisle != site.nodes[b].aisle:
+        return yaw_before
+    return math.pi / 2 if "right" in sides else -math.pi / 2

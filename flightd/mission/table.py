@@ -1,0 +1,77 @@
+"""The mission's transition table: every phase against every trigger, as data.
+
+`TABLE[phase][trigger]` is the next phase; a trigger that a phase does not list leaves it as it is.
+Triggers are tried in the order of the enum: what keeps people safe stands first.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+
+from flightd.core.types import Phase
+
+
+class Trigger(enum.Enum):
+    """What can happen, most urgent first."""
+
+    PILOT_TOOK = "the pilot took control"
+    DISARMED = "the vehicle disarmed"
+    STOP = "stop ordered"
+    TELEMETRY_LOST = "vehicle telemetry lost"
+    BATTERY_CRITICAL = "battery critical"
+    LAND_HERE = "landing ordered"
+    LINES_LOST_LONG = "lines lost for too long"
+    TIMED_OUT = "the phase took too long"
+    LINES_LOST = "lines lost"
+    HOLD = "pause ordered"
+    LINES_FOUND = "lines found"
+    READY = "ready"
+    ARMED = "armed"
+    AT_HEIGHT = "at flying height"
+    ACQUIRED = "position acquired"
+    ARRIVED = "arrived"
+    DWELLED = "dwell over"
+    TURN_DUE = "turn due"
+    TURNED = "turned"
+    ROUTE_DONE = "route done"
+
+
+_SAFETY = {
+    Trigger.PILOT_TOOK: Phase.PILOT,
+    Trigger.DISARMED: Phase.ABORTED,
+    Trigger.STOP: Phase.LAND,
+    Trigger.TELEMETRY_LOST: Phase.LAND,
+    Trigger.BATTERY_CRITICAL: Phase.LAND,
+    Trigger.LAND_HERE: Phase.LAND,
+}
+_ON_LINES = _SAFETY | {Trigger.LINES_LOST: Phase.HOLD, Trigger.HOLD: Phase.HOLD}
+
+TABLE: Mapping[Phase, Mapping[Trigger, Phase]] = {
+    Phase.PREFLIGHT: {Trigger.READY: Phase.ARMING},
+    Phase.ARMING: {
+        Trigger.STOP: Phase.ABORTED,
+        Trigger.LAND_HERE: Phase.ABORTED,
+        Trigger.TIMED_OUT: Phase.ABORTED,
+        Trigger.ARMED: Phase.TAKE_OFF,
+    },
+    Phase.TAKE_OFF: _SAFETY | {Trigger.TIMED_OUT: Phase.LAND, Trigger.AT_HEIGHT: Phase.ACQUIRE},
+    Phase.ACQUIRE: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.ACQUIRED: Phase.TURN},
+    Phase.FOLLOW: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.ARRIVED: Phase.HOVER},
+    Phase.HOVER: _ON_LINES | {Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
+    Phase.TURN: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.TURNED: Phase.FOLLOW},
+    Phase.HOLD: _SAFETY | {Trigger.LINES_LOST_LONG: Phase.LAND, Trigger.LINES_FOUND: Phase.ACQUIRE},
+    Phase.LAND: {Trigger.PILOT_TOOK: Phase.PILOT, Trigger.DISARMED: Phase.DONE},
+    Phase.DONE: {},
+    Phase.ABORTED: {},
+    Phase.PILOT: {},
+}
+
+
+def next_phase(phase: Phase, triggers: set[Trigger]) -> tuple[Phase, Trigger | None]:
+    """The phase that follows and the trigger that made it so (None when nothing changes)."""
+    row = TABLE[phase]
+    for trigger in Trigger:
+        if trigger in triggers and trigger in row:
+            return row[trigger], trigger
+    return phase, None
