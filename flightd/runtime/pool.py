@@ -15,9 +15,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, TypeAlias
 
-from flightd.core.errors import TransientError, UnavailableError
+import cv2
+
+from flightd.core.errors import InputError, TransientError, UnavailableError
 from flightd.core.types import Image, LineSet
 from flightd.ports import Clock
 from flightd.runtime.ring import FrameRing, FrameTicket
@@ -32,6 +34,12 @@ class Detect(Protocol):
     def detect(self, bgr: Image, seq: int = 0, stamp_ns: int = 0) -> LineSet: ...
 
 
+class Detectors(Protocol):
+    """Pictures in, lines out, somewhere else."""
+
+    async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None: ...
+
+
 @dataclass(frozen=True, slots=True)
 class Detection:
     """Lines with the clock times of their way: taken by the worker, answered by it."""
@@ -40,6 +48,7 @@ class Detection:
     lines: LineSet
     started_ns: int
     finished_ns: int
+    jpeg: bytes | None = None
 
 
 def worker_context() -> BaseContext:
@@ -48,6 +57,10 @@ def worker_context() -> BaseContext:
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(_PRELOAD)
     return context
+
+
+_Answer: TypeAlias = "tuple[LineSet, bytes | None] | str"
+"""Lines and the JPEG if one was wanted, or why there are none."""
 
 
 class _Rings:
@@ -74,16 +87,18 @@ def _work(conn: Connection, make: Callable[[], Detect]) -> None:
     conn.send("ready")
     while True:
         try:
-            ticket: FrameTicket = conn.recv()
+            ticket, with_jpeg = conn.recv()
         except (EOFError, OSError):
             return
-        answer: LineSet | str
+        answer: _Answer
         try:
             ring = rings.of(ticket)
             ring.check(ticket.slot, ticket.seq)
-            answer = detector.detect(ring.pixels(ticket.slot), ticket.seq, ticket.stamp_ns)
+            pixels = ring.pixels(ticket.slot)
+            lines = detector.detect(pixels, ticket.seq, ticket.stamp_ns)
+            answer = lines, cv2.imencode(".jpg", pixels)[1].tobytes() if with_jpeg else None
             ring.check(ticket.slot, ticket.seq)
-        except (TransientError, UnavailableError, ValueError) as err:
+        except (TransientError, UnavailableError, InputError, ValueError) as err:
             answer = str(err)
         with contextlib.suppress(BrokenPipeError):
             conn.send(answer)
@@ -108,7 +123,7 @@ class _Worker:
         self.process.start()
         child.close()
         self.alive = True
-        self._answer: asyncio.Future[LineSet | str] | None = None
+        self._answer: asyncio.Future[_Answer] | None = None
         self._loop.add_reader(self.conn.fileno(), self._readable)
 
     def _readable(self) -> None:
@@ -122,10 +137,10 @@ class _Worker:
         elif self._answer is not None and not self._answer.done():
             self._answer.set_result(answer)
 
-    async def ask(self, ticket: FrameTicket) -> LineSet | str:
+    async def ask(self, ticket: FrameTicket, with_jpeg: bool) -> _Answer:
         self._answer = self._loop.create_future()
         try:
-            self.conn.send(ticket)
+            self.conn.send((ticket, with_jpeg))
         except OSError:
             self.kill()
         return await self._answer
@@ -184,13 +199,13 @@ class DetectorPool:
         with self._clock.hold():
             self._idle.put_nowait(await self._idle.get())
 
-    async def detect(self, ticket: FrameTicket) -> Detection | None:
-        """Lines of one picture, or None when it was lost (the reason is counted in `lost`)."""
+    async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None:
+        """Lines of one picture (and its JPEG if wanted), or None when it was lost (counted in `lost`)."""
         worker = await self._take()
         started_ns = self._clock.now_ns()
         try:
             async with asyncio.timeout(self._timeout_s):
-                answer = await worker.ask(ticket)
+                answer = await worker.ask(ticket, with_jpeg)
         except TimeoutError:
             answer = "the detector process hung"
             worker.kill()
@@ -202,7 +217,8 @@ class DetectorPool:
         if isinstance(answer, str):
             self.lost[answer.split(":", maxsplit=1)[0]] += 1
             return None
-        return Detection(ticket, answer, started_ns, self._clock.now_ns())
+        lines, jpeg = answer
+        return Detection(ticket, lines, started_ns, self._clock.now_ns(), jpeg)
 
     async def _take(self) -> _Worker:
         """An idle worker that lives (one that died while idle has been replaced already)."""

@@ -1,0 +1,253 @@
+"""The daemon's configuration: one frozen, typed tree; unknown keys are refused, every key says its unit
+and range.  Angles are degrees in the file (`_deg`) and radians wherever the tree is used."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from flightd.control.flight import FlightGains
+from flightd.control.limits import Limits
+from flightd.control.pid import PidGains
+from flightd.core.errors import InputError
+from flightd.core.geometry import Lens, Mount
+from flightd.mission.guidance import MissionParams
+from flightd.mission.plan import Heading
+from flightd.pilot import PilotParams
+from flightd.tracking.lines import TrackerParams
+from flightd.tracking.tilt import TiltCompensation
+
+_Positive = Annotated[float, Field(gt=0, le=1e4, allow_inf_nan=False)]
+_Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+_Offset = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class CameraConfig(_Section):
+    """The down camera: where its pictures come from, its lens and how it is mounted."""
+
+    url: str = Field(
+        "udp://127.0.0.1:5600",
+        description="udp://HOST:PORT (notices of pictures in shared memory), device:/dev/videoN, "
+        "file:PATH (a video), folder:PATH (pictures)",
+    )
+    width_px: int = Field(640, ge=16, le=7680, description="picture width")
+    height_px: int = Field(360, ge=16, le=4320, description="picture height")
+    fps: float = Field(30.0, gt=0, le=240, description="frame rate asked for")
+    fx_px: float = Field(381.4, gt=1, le=20000, description="focal length in x (80 deg across 640 px)")
+    fy_px: float = Field(381.4, gt=1, le=20000, description="focal length in y")
+    cx_px: float | None = Field(None, description="principal point x; the picture's middle when left out")
+    cy_px: float | None = Field(None, description="principal point y; the picture's middle when left out")
+    distortion: tuple[float, float, float, float, float] = Field(
+        (0.0, 0.0, 0.0, 0.0, 0.0), description="k1 k2 p1 p2 k3, OpenCV's order"
+    )
+    mount_yaw_deg: float = Field(0.0, ge=-180, le=180, description="turn of the camera, clockwise from above")
+    mount_offset_m: tuple[_Offset, _Offset, _Offset] = Field(
+        (0.0, 0.0, 0.0), description="camera from the range finder's origin: forward, right, down"
+    )
+    latency_s: float = Field(
+        0.060, ge=0, le=1, description="from mid-exposure to arrival, least delay of the path"
+    )
+
+    def lens(self) -> Lens:
+        cx = (self.width_px - 1) / 2 if self.cx_px is None else self.cx_px
+        cy = (self.height_px - 1) / 2 if self.cy_px is None else self.cy_px
+        return Lens(self.width_px, self.height_px, self.fx_px, self.fy_px, cx, cy, self.distortion)
+
+    def mount(self) -> Mount:
+        return Mount(math.radians(self.mount_yaw_deg), self.mount_offset_m)
+
+
+class VisionConfig(_Section):
+    """How lines are found, and by how many processes."""
+
+    method: Literal["combined", "centroid", "skeleton", "naive"] = Field(
+        "combined", description="line detector"
+    )
+    profile: str = Field("yellow", description="colour profile: a shipped name or a file")
+    workers: int = Field(2, ge=1, le=16, description="detector processes")
+    timeout_s: float = Field(
+        0.5, gt=0.01, le=5, description="a detector that takes longer is killed and replaced"
+    )
+
+
+class VehicleConfig(_Section):
+    """The link to the autopilot."""
+
+    kind: Literal["ardupilot", "px4", "ardrone", "mavsdk"] = Field(
+        "ardupilot", description="which adapter flies"
+    )
+    url: str = Field(
+        "udpin://127.0.0.1:14550", description="udpin://, udpout://, tcp://HOST:PORT or serial:///dev/X:BAUD"
+    )
+    system_id: int = Field(1, ge=1, le=255, description="MAVLink system id of the vehicle")
+
+
+class PidConfig(_Section):
+    kp: float = Field(ge=0, le=100)
+    ki: float = Field(ge=0, le=100)
+    kd: float = Field(ge=0, le=100)
+    integral_limit: float = Field(ge=0, le=100, description="largest share of the integral, in output units")
+    output_limit: float = Field(gt=0, le=100, description="largest output")
+
+    def gains(self) -> PidGains:
+        return PidGains(self.kp, self.ki, self.kd, self.integral_limit, self.output_limit)
+
+
+class ControlConfig(_Section):
+    """Loops and limits; the limits have the last word before the wire."""
+
+    horizontal: PidConfig = Field(
+        PidConfig(kp=2.2, ki=0.5, kd=2.6, integral_limit=0.8, output_limit=1.7), description="m/s^2 per m"
+    )
+    yaw: PidConfig = Field(
+        PidConfig(kp=1.5, ki=0.1, kd=0.1, integral_limit=0.1, output_limit=0.8), description="rad/s per rad"
+    )
+    height: PidConfig = Field(
+        PidConfig(kp=1.0, ki=0.1, kd=0.0, integral_limit=0.1, output_limit=0.8), description="m/s per m"
+    )
+    max_tilt_deg: float = Field(10.0, gt=0, le=30, description="roll and pitch, each")
+    max_tilt_rate_degps: float = Field(60.0, gt=0, le=360, description="change of a tilt set point")
+    max_yaw_rate_degps: float = Field(45.0, gt=0, le=180)
+    max_climb_mps: float = Field(0.8, gt=0, le=3)
+    max_descend_mps: float = Field(0.6, gt=0, le=3)
+    tilt_compensation: TiltCompensation = Field(
+        TiltCompensation.EXACT, description="exact, first_order or none"
+    )
+
+    def limits(self) -> Limits:
+        return Limits(
+            math.radians(self.max_tilt_deg),
+            math.radians(self.max_tilt_rate_degps),
+            math.radians(self.max_yaw_rate_degps),
+            self.max_climb_mps,
+            self.max_descend_mps,
+        )
+
+
+class MissionConfig(_Section):
+    """What to fly and how fast.  Lengths in m, times in s."""
+
+    site: Path = Field(description="site file, relative to this file")
+    nodes: tuple[str, ...] = Field(
+        (), description="nodes to visit in order; empty: every node, aisle by aisle"
+    )
+    heading: Heading = Field(
+        Heading.ALONG, description="along: nose in flight direction; shelf: nose to the shelf"
+    )
+    start_yaw_deg: float = Field(
+        0.0, ge=-180, le=180, description="heading on the pad, clockwise from the aisles"
+    )
+    height_m: float = Field(1.6, ge=0.5, le=20)
+    speed_mps: float = Field(0.8, gt=0, le=3)
+    accel_mps2: float = Field(0.5, gt=0, le=2)
+    climb_mps: float = Field(0.6, gt=0, le=2)
+    land_mps: float = Field(0.35, gt=0, le=1)
+    turn_rate_degps: float = Field(35.0, gt=0, le=120)
+    dwell_s: float = Field(2.0, ge=0, le=600, description="hover at each node")
+    settle_s: float = Field(0.4, ge=0, le=10)
+    arrive_m: float = Field(0.08, gt=0, le=0.5)
+    lines_hold_s: float = Field(0.25, gt=0, le=2, description="lines older than this: level and hold")
+    lines_land_s: float = Field(6.0, gt=0, le=60, description="held for so long: land")
+    telemetry_hold_s: float = Field(0.3, gt=0, le=2)
+    telemetry_land_s: float = Field(3.0, gt=0, le=30)
+    battery_start: _Share = Field(0.30, description="least charge to start")
+    battery_home: _Share = Field(0.20, description="fly home below")
+    battery_land: _Share = Field(0.10, description="land at once below")
+    autostart: bool = Field(False, description="start without waiting for the start command")
+
+    def params(self) -> MissionParams:
+        return MissionParams(
+            height_m=self.height_m,
+            speed_mps=self.speed_mps,
+            accel_mps2=self.accel_mps2,
+            climb_mps=self.climb_mps,
+            turn_rate_radps=math.radians(self.turn_rate_degps),
+            dwell_s=self.dwell_s,
+            settle_s=self.settle_s,
+            arrive_m=self.arrive_m,
+            land_mps=self.land_mps,
+            lines_hold_s=self.lines_hold_s,
+            lines_land_s=self.lines_land_s,
+            telemetry_hold_s=self.telemetry_hold_s,
+            telemetry_land_s=self.telemetry_land_s,
+            battery_start_frac=self.battery_start,
+            battery_home_frac=self.battery_home,
+            battery_land_frac=self.battery_land,
+            autostart=self.autostart,
+        )
+
+    @model_validator(mode="after")
+    def _batteries_in_order(self) -> Self:
+        if not self.battery_land < self.battery_home <= self.battery_start:
+            raise ValueError("battery_land < battery_home <= battery_start is required")
+        return self
+
+
+class RecorderConfig(_Section):
+    """The black box."""
+
+    folder: Path | None = Field(None, description="where flights are recorded; none: not at all")
+    picture_fps: float = Field(2.0, ge=0, le=60, description="pictures recorded per second")
+
+
+class Config(_Section):
+    """The whole file."""
+
+    mission: MissionConfig
+    camera: CameraConfig = CameraConfig()
+    vision: VisionConfig = VisionConfig()
+    vehicle: VehicleConfig = VehicleConfig()
+    control: ControlConfig = ControlConfig()
+    recorder: RecorderConfig = RecorderConfig()
+
+    def pilot_params(self) -> PilotParams:
+        return PilotParams(
+            tracker=TrackerParams(self.camera.lens(), self.camera.mount(), self.control.tilt_compensation),
+            gains=FlightGains(
+                self.control.horizontal.gains(), self.control.yaw.gains(), self.control.height.gains()
+            ),
+            limits=self.control.limits(),
+            mission=self.mission.params(),
+        )
+
+
+def load_config(path: Path) -> Config:
+    """Read and check a configuration file.  Raises InputError naming the file, the key and the remedy."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as err:
+        raise InputError(f"config {path}: {err.strerror}; give the path of a TOML file") from err
+    except UnicodeDecodeError as err:
+        raise InputError(f"config {path}: not UTF-8 text") from err
+    except tomllib.TOMLDecodeError as err:
+        raise InputError(f"config {path}: not TOML: {err}") from err
+    config = parse_config(table, str(path))
+    site = (path.parent / config.mission.site).resolve()
+    return config.model_copy(update={"mission": config.mission.model_copy(update={"site": site})})
+
+
+def parse_config(table: dict[str, Any], name: str) -> Config:
+    """Check a table that was read from `name`."""
+    try:
+        return Config.model_validate(table)
+    except ValidationError as err:
+        first = err.errors()[0]
+        key = ".".join(str(part) for part in first["loc"]) or "(top level)"
+        more = f" (and {len(err.errors()) - 1} more)" if len(err.errors()) > 1 else ""
+        raise InputError(f"config {name}: {key}: {_remedy(first['type'], first['msg'])}{more}") from err
+
+
+def _remedy(kind: str, message: str) -> str:
+    if kind == "extra_forbidden":
+        return "unknown key; take it out or correct its spelling"
+    if kind == "missing":
+        return "is missing; add it"
+    return message[0].lower() + message[1:]
