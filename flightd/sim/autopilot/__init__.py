@@ -1,0 +1,1 @@
+"""Simulated autopilots: peers on real UDP that speak MAVLink 2 and fly the airframe."""

@@ -1,0 +1,295 @@
+"""ArduCopter's semantics: modes, arming, attitude flight without position, landing, time-outs.
+
+Measured on ArduCopter 4.5.6 where it says so, otherwise read in its sources: set-points are obeyed in
+GUIDED_NOGPS only and dropped in silence elsewhere; 0.5 thrust holds the height; after GUID_TIMEOUT the
+vehicle levels and holds, it does not land; on the floor with nothing asked it disarms after DISARM_DELAY.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.ports import Clock
+from flightd.sim.airframe import Airframe, AirframeCommand
+from flightd.sim.autopilot.guided import AngleTarget
+from flightd.sim.autopilot.link import Message
+from flightd.sim.autopilot.parameters import COPTER_PARAMETERS
+from flightd.sim.autopilot.peer import AutopilotPeer, PeerConfig
+from flightd.sim.autopilot.telemetry import LANDED_AIR, LANDED_GROUND, LANDED_LANDING
+from flightd.sim.climb_loop import ClimbGains, ClimbLoop
+
+_THRUST_IS_COLLECTIVE = 8
+_IDLE_COLLECTIVE = 0.05
+_LAND_DETECT_S = 1.0
+_FORCE = 21196
+
+
+class CopterMode(enum.IntEnum):
+    """custom_mode of the modes this vehicle, which has no position, can be asked for."""
+
+    STABILIZE = 0
+    ALT_HOLD = 2
+    AUTO = 3
+    GUIDED = 4
+    LOITER = 5
+    RTL = 6
+    LAND = 9
+    POSHOLD = 16
+    BRAKE = 17
+    GUIDED_NOGPS = 20
+
+
+_NEEDS_POSITION = frozenset(
+    {
+        CopterMode.AUTO,
+        CopterMode.GUIDED,
+        CopterMode.LOITER,
+        CopterMode.RTL,
+        CopterMode.POSHOLD,
+        CopterMode.BRAKE,
+    }
+)
+_NOT_ARMABLE = frozenset({CopterMode.LAND, CopterMode.RTL, CopterMode.BRAKE})
+
+
+@dataclass(frozen=True, slots=True)
+class Sticks:
+    """The pilot's wishes in the modes he flies himself: angles, yaw rate and climb rate."""
+
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    yaw_rate_radps: float = 0.0
+    climb_mps: float = 0.0
+
+
+class ArduCopterPeer(AutopilotPeer):
+    """A copter on the floor, disarmed, in STABILIZE, until somebody talks to it."""
+
+    def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
+        super().__init__(clock, airframe, config or PeerConfig(), COPTER_PARAMETERS)
+        self.mode = CopterMode.STABILIZE
+        self.armed = False
+        self.landed = True
+        self.sticks = Sticks()
+        self.arming_block = ""
+        """A sensor fault: the reason with which arming is refused while it is not empty."""
+        self._target = AngleTarget()
+        self._climb = ClimbLoop(ClimbGains(hover_guess=self.parameters["MOT_THST_HOVER"]))
+        self._stick_yaw_rad = 0.0
+        self._idle_s = 0.0
+        self._settled_s = 0.0
+        self._low_battery_told = False
+
+    def pilot_mode(self, mode: CopterMode, sticks: Sticks | None = None) -> bool:
+        """The pilot moves his mode switch; False when the autopilot refuses."""
+        self.advance(self._clock.now_ns())
+        self.sticks = sticks or Sticks()
+        return self._set_mode(mode) == int(dialect.MAV_RESULT_ACCEPTED)
+
+    def pilot_disarm(self) -> None:
+        """The pilot's disarm switch: motors stop at once, wherever the vehicle is."""
+        self.advance(self._clock.now_ns())
+        self._disarm()
+
+    def reboot(self) -> None:
+        super().reboot()
+        self._disarm()
+        self.mode = CopterMode.STABILIZE
+        self._target = AngleTarget()
+        self.link.broadcast(self._heartbeat())
+
+    # Commands
+
+    def _set_mode(self, custom_mode: int) -> int:
+        try:
+            mode = CopterMode(custom_mode)
+        except ValueError:
+            self.say(dialect.MAV_SEVERITY_WARNING, f"No such mode {custom_mode}")
+            return int(dialect.MAV_RESULT_FAILED)
+        if self.armed and mode in _NEEDS_POSITION:
+            text = f"Mode change to {mode.name} failed: requires position"
+            self.say(dialect.MAV_SEVERITY_WARNING, text)
+            return int(dialect.MAV_RESULT_FAILED)
+        if mode != self.mode:
+            self.mode = mode
+            self._target = AngleTarget(yaw_rad=self.sensors.yaw_rad)
+            self._stick_yaw_rad = self.sensors.yaw_rad
+            self._climb.reset(self.sensors.height_m)
+            self.link.broadcast(self._heartbeat())
+        return int(dialect.MAV_RESULT_ACCEPTED)
+
+    def _command(self, command: int, params: tuple[float, ...]) -> int:
+        match command:
+            case dialect.MAV_CMD_COMPONENT_ARM_DISARM:
+                return self._arm_or_disarm(params[0], forced=params[1] == _FORCE)
+            case dialect.MAV_CMD_NAV_TAKEOFF:
+                return int(dialect.MAV_RESULT_FAILED)  # flies in GUIDED with a position only
+            case dialect.MAV_CMD_NAV_LAND:
+                return self._set_mode(CopterMode.LAND)
+            case dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN:
+                if params[0] != 1 or self.armed:
+                    return int(dialect.MAV_RESULT_DENIED)
+                self.reboot()
+                return int(dialect.MAV_RESULT_ACCEPTED)
+            case _:
+                return int(dialect.MAV_RESULT_UNSUPPORTED)
+
+    def _arm_or_disarm(self, arm: float, *, forced: bool) -> int:
+        if arm == 1:
+            return self._arm()
+        if arm != 0:
+            return int(dialect.MAV_RESULT_DENIED)
+        if not self.landed and not forced:
+            return int(dialect.MAV_RESULT_FAILED)
+        self._disarm()
+        return int(dialect.MAV_RESULT_ACCEPTED)
+
+    def _arm(self) -> int:
+        if self.armed:
+            return int(dialect.MAV_RESULT_ACCEPTED)
+        reason = self._arming_refusal()
+        if reason:
+            self.say(dialect.MAV_SEVERITY_CRITICAL, reason)
+            return int(dialect.MAV_RESULT_FAILED)
+        self.armed = True
+        self.landed = True
+        self._idle_s = 0.0
+        self._climb.reset(self.sensors.height_m)
+        self.say(dialect.MAV_SEVERITY_INFO, "Arming motors")
+        self.link.broadcast(self._heartbeat())
+        return int(dialect.MAV_RESULT_ACCEPTED)
+
+    def _arming_refusal(self) -> str:
+        if not self.is_ready:
+            return "PreArm: Gyros still settling"
+        if self.arming_block:
+            return f"PreArm: {self.arming_block}"
+        if self.airframe.battery_v < self.parameters["BATT_LOW_VOLT"]:
+            return "PreArm: Battery 1 below minimum arming voltage"
+        if self.mode in _NOT_ARMABLE:
+            return f"Arm: {self.mode.name} mode not armable"
+        if self.mode in _NEEDS_POSITION:
+            return "PreArm: Need Position Estimate"
+        return ""
+
+    def _disarm(self) -> None:
+        if self.armed:
+            self.armed = False
+            self.landed = True
+            self.say(dialect.MAV_SEVERITY_INFO, "Disarming motors")
+            self.link.broadcast(self._heartbeat())
+
+    def _setpoint(self, message: Message) -> None:
+        if self.mode == CopterMode.GUIDED_NOGPS:
+            self._target.take(message)
+
+    # Flight code
+
+    def _control(self, dt_s: float) -> AirframeCommand:
+        self._target.step(dt_s, max(0.1, self.parameters["GUID_TIMEOUT"]))
+        self._watch_battery()
+        if not self.armed:
+            return AirframeCommand()
+        roll, pitch, yaw, yaw_rate, climb_mps = self._wishes(dt_s)
+        raw = self._raw_collective()
+        if raw is not None:
+            climb_mps = 1.0 if raw > self.parameters["MOT_THST_HOVER"] else -1.0
+        if self.landed and climb_mps <= 0.0:
+            return self._stand(dt_s)
+        self.landed = False
+        self._idle_s = 0.0
+        sensors = self.sensors
+        held = self._climb.step(
+            dt_s,
+            climb_mps,
+            height_m=sensors.height_m,
+            speed_mps=sensors.climb_mps,
+            tilt_cos=math.cos(sensors.roll_rad) * math.cos(sensors.pitch_rad),
+        )
+        collective = held if raw is None else raw
+        self._detect_landing(dt_s, climb_mps, collective)
+        return AirframeCommand(
+            motors=True,
+            roll_rad=roll - sensors.roll_error_rad,
+            pitch_rad=pitch - sensors.pitch_error_rad,
+            yaw_rad=yaw - sensors.yaw_error_rad,
+            yaw_rate_radps=yaw_rate,
+            collective=collective,
+        )
+
+    def _wishes(self, dt_s: float) -> tuple[float, float, float, float, float]:
+        """Roll, pitch, yaw, yaw rate and climb rate of the present mode."""
+        if self.mode == CopterMode.GUIDED_NOGPS:
+            target = self._target
+            up_mps = self.parameters["WPNAV_SPEED_UP"] / 100.0
+            down_mps = self.parameters["WPNAV_SPEED_DN"] / 100.0
+            climb_mps = target.climb_mps(up_mps, down_mps)
+            return target.roll_rad, target.pitch_rad, target.yaw_rad, target.yaw_rate_radps, climb_mps
+        if self.mode == CopterMode.LAND:
+            return 0.0, 0.0, self._stick_yaw_rad, 0.0, -self.parameters["LAND_SPEED"] / 100.0
+        sticks = self.sticks
+        self._stick_yaw_rad += sticks.yaw_rate_radps * dt_s
+        return sticks.roll_rad, sticks.pitch_rad, self._stick_yaw_rad, sticks.yaw_rate_radps, sticks.climb_mps
+
+    def _raw_collective(self) -> float | None:
+        """The setpoint's thrust where GUID_OPTIONS makes it collective, None where the height loop flies."""
+        raw = int(self.parameters["GUID_OPTIONS"]) & _THRUST_IS_COLLECTIVE
+        if self.mode == CopterMode.GUIDED_NOGPS and raw and not self._target.holding:
+            return max(0.0, self._target.thrust)
+        return None
+
+    def _stand(self, dt_s: float) -> AirframeCommand:
+        """Armed on the floor: motors idle, targets follow the vehicle, and the disarm delay runs."""
+        self._climb.reset(self.sensors.height_m)
+        self._stick_yaw_rad = self.sensors.yaw_rad
+        if self._target.holding:
+            self._target.yaw_rad = self.sensors.yaw_rad
+        self._idle_s += dt_s
+        delay_s = self.parameters["DISARM_DELAY"]
+        if self.mode == CopterMode.LAND or (delay_s > 0 and self._idle_s >= delay_s):
+            self._disarm()
+        return AirframeCommand(motors=True, collective=_IDLE_COLLECTIVE, yaw_rad=self.airframe.yaw_rad)
+
+    def _detect_landing(self, dt_s: float, climb_mps: float, collective: float) -> None:
+        """Down is wanted, the motors are near their minimum and nothing moves: for a second."""
+        low = collective < 0.6 * self.parameters["MOT_THST_HOVER"]
+        still = abs(self.sensors.climb_mps) < 0.15
+        self._settled_s = self._settled_s + dt_s if climb_mps < 0.0 and low and still else 0.0
+        if self._settled_s >= _LAND_DETECT_S:
+            self.landed = True
+            self._settled_s = 0.0
+
+    def _watch_battery(self) -> None:
+        if self._low_battery_told or not self.armed:
+            return
+        if self.airframe.battery_v < self.parameters["BATT_LOW_VOLT"]:
+            self._low_battery_told = True
+            self.say(dialect.MAV_SEVERITY_CRITICAL, f"Battery 1 is low {self.airframe.battery_v:.2f}V")
+            if self.parameters["BATT_FS_LOW_ACT"] == 1:
+                self._set_mode(CopterMode.LAND)
+
+    # Reports
+
+    def _refresh(self, now_ns: int) -> None:
+        super()._refresh(now_ns)
+        self.instruments.armed = self.armed
+        if self.landed:
+            self.instruments.landed_state = LANDED_GROUND
+        else:
+            landing = self.mode == CopterMode.LAND
+            self.instruments.landed_state = LANDED_LANDING if landing else LANDED_AIR
+
+    def _heartbeat(self) -> Message:
+        base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
+        if self.mode == CopterMode.GUIDED_NOGPS:
+            base |= dialect.MAV_MODE_FLAG_GUIDED_ENABLED
+        if self.armed:
+            base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        active = dialect.MAV_STATE_ACTIVE if self.armed and not self.landed else dialect.MAV_STATE_STANDBY
+        return dialect.MAVLink_heartbeat_message(
+            dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, base, self.mode, active, 3
+        )

@@ -1,0 +1,99 @@
+"""The autopilot's side of MAVLink over UDP: one channel for each address that speaks to it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+Address: TypeAlias = tuple[str, int]
+Message: TypeAlias = Any
+"""An instance of one of the dialect's generated message classes."""
+
+_CHANNELS_MAX = 8
+
+
+class Channel:
+    """One peer address: its own sequence numbers and message intervals, as an autopilot's serial port."""
+
+    def __init__(self, address: Address, system_id: int, component_id: int) -> None:
+        self.address = address
+        self._packer = dialect.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
+        self.intervals_ns: dict[int, int] = {}
+        self.due_ns: dict[int, int] = {}
+
+    def pack(self, message: Message) -> bytes:
+        frame: bytes = message.pack(self._packer)
+        self._packer.seq = (self._packer.seq + 1) % 256
+        return frame
+
+    def stream(self, message_id: int, period_ns: int, now_ns: int) -> None:
+        """Send the message every `period_ns` from now on; 0 or less stops it."""
+        if period_ns > 0:
+            self.intervals_ns[message_id] = period_ns
+            self.due_ns[message_id] = now_ns + period_ns
+        else:
+            self.intervals_ns.pop(message_id, None)
+            self.due_ns.pop(message_id, None)
+
+
+class UdpLink(asyncio.DatagramProtocol):
+    """A bound UDP socket.  `received(channel, message)` is called for every sound message."""
+
+    def __init__(
+        self, system_id: int, component_id: int, received: Callable[[Channel, Message], None]
+    ) -> None:
+        self._system_id = system_id
+        self._component_id = component_id
+        self._received = received
+        self._parser = dialect.MAVLink(None)
+        self._parser.robust_parsing = True
+        self._transport: asyncio.DatagramTransport | None = None
+        self.channels: dict[Address, Channel] = {}
+        self.muted = False
+        """A cut cable: nothing goes out, nothing comes in."""
+
+    async def open(self, host: str, port: int) -> Address:
+        """Bind; port 0 takes a free one.  Returns the address bound."""
+        loop = asyncio.get_running_loop()
+        transport, _ = await loop.create_datagram_endpoint(lambda: self, local_addr=(host, port))
+        self._transport = transport
+        name: Address = transport.get_extra_info("sockname")[:2]
+        return name
+
+    def close(self) -> None:
+        if self._transport is not None:
+            self._transport.close()
+            self._transport = None
+
+    def channel(self, address: Address) -> Channel | None:
+        """The channel of that address, made at its first use; None when too many have spoken."""
+        channel = self.channels.get(address)
+        if channel is None and len(self.channels) < _CHANNELS_MAX:
+            channel = self.channels[address] = Channel(address, self._system_id, self._component_id)
+        return channel
+
+    def send(self, channel: Channel, message: Message) -> None:
+        if self._transport is not None and not self.muted:
+            self._transport.sendto(channel.pack(message), channel.address)
+
+    def broadcast(self, message: Message) -> None:
+        for channel in self.channels.values():
+            self.send(channel, message)
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:
+        if self.muted:
+            return
+        self._parser.buf = bytearray()
+        self._parser.buf_index = 0
+        for message in self._parser.parse_buffer(data) or ():
+            if message.get_type().startswith(("BAD_DATA", "UNKNOWN")):
+                continue
+            channel = self.channel((addr[0], addr[1]))
+            if channel is not None:
+                self._received(channel, message)
+
+    def error_received(self, exc: Exception) -> None:
+        """A remote port is closed: it may open later."""

@@ -1,0 +1,95 @@
+"""Parameters over MAVLink: read, list, set."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.sim.autopilot.link import Message
+
+COPTER_PARAMETERS: dict[str, float] = {
+    "SYSID_THISMAV": 1,
+    "SYSID_MYGCS": 255,
+    "AHRS_EKF_TYPE": 3,
+    "EK2_ENABLE": 0,
+    "EK3_ENABLE": 1,
+    "EK3_SRC1_POSXY": 0,
+    "EK3_SRC1_VELXY": 0,
+    "EK3_SRC1_POSZ": 1,
+    "EK3_SRC1_VELZ": 0,
+    "EK3_SRC1_YAW": 1,
+    "GPS_TYPE": 0,
+    "VISO_TYPE": 0,
+    "FLOW_TYPE": 0,
+    "RNGFND1_TYPE": 20,
+    "PLND_ENABLED": 0,
+    "ARMING_CHECK": 1,
+    "DISARM_DELAY": 10,
+    "FS_THR_ENABLE": 1,
+    "FS_GCS_ENABLE": 0,
+    "FS_GCS_TIMEOUT": 5,
+    "FS_EKF_ACTION": 1,
+    "FS_EKF_THRESH": 0.8,
+    "RC_OPTIONS": 32,
+    "BATT_LOW_VOLT": 10.5,
+    "BATT_FS_LOW_ACT": 0,
+    "GUID_OPTIONS": 0,
+    "GUID_TIMEOUT": 3,
+    "WPNAV_SPEED_UP": 250,
+    "WPNAV_SPEED_DN": 150,
+    "LAND_SPEED": 50,
+    "ANGLE_MAX": 3000,
+    "MOT_THST_HOVER": 0.34,
+}
+"""ArduCopter 4.5's names and units, set up for flight without position."""
+
+
+class ParameterServer:
+    """A table that answers PARAM_REQUEST_READ, PARAM_REQUEST_LIST and PARAM_SET.
+
+    As on ArduPilot an unknown name is answered by silence, and a value that is not finite is not taken.
+    """
+
+    def __init__(self, values: dict[str, float]) -> None:
+        too_long = [name for name in values if len(name) > 16]
+        if too_long:
+            raise ValueError(f"parameter names longer than 16 characters: {too_long}")
+        self._values = dict(values)
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[name]
+
+    def __setitem__(self, name: str, value: float) -> None:
+        if name not in self._values:
+            raise KeyError(name)
+        self._values[name] = value
+
+    def answer(self, message: Message, reply: Callable[[Message], None]) -> None:
+        """Serve one PARAM_* message, sending what it asks for by `reply`."""
+        kind = message.get_type()
+        if kind == "PARAM_REQUEST_LIST":
+            for name in self._values:
+                reply(self._value(name))
+            return
+        if kind == "PARAM_REQUEST_READ" and message.param_index >= 0:
+            names = list(self._values)
+            if message.param_index < len(names):
+                reply(self._value(names[message.param_index]))
+            return
+        name = str(message.param_id)
+        if name not in self._values:
+            return
+        if kind == "PARAM_SET" and math.isfinite(message.param_value):
+            self._values[name] = message.param_value
+        reply(self._value(name))
+
+    def _value(self, name: str) -> Message:
+        return dialect.MAVLink_param_value_message(
+            name.encode(),
+            self._values[name],
+            dialect.MAV_PARAM_TYPE_REAL32,
+            len(self._values),
+            list(self._values).index(name),
+        )

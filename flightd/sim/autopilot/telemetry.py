@@ -1,0 +1,141 @@
+"""The messages an autopilot streams, made from its instruments."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.sim.airframe import Airframe
+from flightd.sim.autopilot.link import Message
+from flightd.sim.sensors import Sensors
+
+LANDED_GROUND = dialect.MAV_LANDED_STATE_ON_GROUND
+LANDED_AIR = dialect.MAV_LANDED_STATE_IN_AIR
+LANDED_LANDING = dialect.MAV_LANDED_STATE_LANDING
+
+_RANGE_PERIOD_MS = 40
+_CELLS = 3
+_NO_CELL = 65535
+_BUILD = (4 << 24) | (5 << 16) | (6 << 8) | 255
+
+DATA_STREAMS: dict[int, tuple[int, ...]] = {
+    dialect.MAV_DATA_STREAM_EXTENDED_STATUS: (dialect.MAVLINK_MSG_ID_SYS_STATUS,),
+    dialect.MAV_DATA_STREAM_POSITION: (dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,),
+    dialect.MAV_DATA_STREAM_EXTRA1: (dialect.MAVLINK_MSG_ID_ATTITUDE,),
+    dialect.MAV_DATA_STREAM_EXTRA2: (dialect.MAVLINK_MSG_ID_VFR_HUD,),
+    dialect.MAV_DATA_STREAM_EXTRA3: (
+        dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR,
+        dialect.MAVLINK_MSG_ID_BATTERY_STATUS,
+    ),
+}
+"""What a ground station's REQUEST_DATA_STREAM overwrites, by stream."""
+
+
+class Instruments:
+    """Telemetry of one vehicle.  The peer keeps `boot_ms`, `armed` and `landed_state` up to date."""
+
+    def __init__(self, airframe: Airframe, sensors: Sensors) -> None:
+        self._airframe = airframe
+        self._sensors = sensors
+        self.boot_ms = 0
+        self.armed = False
+        self.healthy = False
+        self.landed_state = LANDED_GROUND
+        self._range_m = 0.0
+        self._ranged_ms = -_RANGE_PERIOD_MS
+        self._builders: dict[int, Callable[[], Message]] = {
+            dialect.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
+            dialect.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
+            dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position,
+            dialect.MAVLINK_MSG_ID_VFR_HUD: self._vfr_hud,
+            dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR: self._distance,
+            dialect.MAVLINK_MSG_ID_BATTERY_STATUS: self._battery,
+            dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_state,
+            dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self._version,
+        }
+
+    def knows(self, message_id: int) -> bool:
+        return message_id in self._builders
+
+    def message(self, message_id: int) -> Message:
+        """The message with the present readings; KeyError for one it does not know."""
+        return self._builders[message_id]()
+
+    def reboot(self) -> None:
+        self._ranged_ms = -_RANGE_PERIOD_MS
+
+    def _attitude(self) -> Message:
+        sensors, airframe = self._sensors, self._airframe
+        return dialect.MAVLink_attitude_message(
+            self.boot_ms,
+            sensors.roll_rad,
+            sensors.pitch_rad,
+            sensors.noisy_yaw_rad(),
+            airframe.roll_speed_radps,
+            airframe.pitch_speed_radps,
+            airframe.yaw_speed_radps,
+        )
+
+    def _distance(self) -> Message:
+        if self.boot_ms - self._ranged_ms >= _RANGE_PERIOD_MS:
+            self._ranged_ms = self.boot_ms
+            self._range_m = self._sensors.range_m(self._airframe)
+        params = self._sensors.params
+        return dialect.MAVLink_distance_sensor_message(
+            self.boot_ms,
+            round(params.range_min_m * 100),
+            round(params.range_max_m * 100),
+            round(self._range_m * 100),
+            dialect.MAV_DISTANCE_SENSOR_LASER,
+            0,
+            dialect.MAV_SENSOR_ROTATION_PITCH_270,
+            0,
+        )
+
+    def _global_position(self) -> Message:
+        """Without a position latitude and longitude stay 0; height and climb are the barometer's."""
+        sensors = self._sensors
+        height_mm = round(sensors.height_m * 1000)
+        heading_cdeg = round(math.degrees(sensors.yaw_rad % math.tau) * 100) % 36000
+        return dialect.MAVLink_global_position_int_message(
+            self.boot_ms, 0, 0, height_mm, height_mm, 0, 0, -round(sensors.climb_mps * 100), heading_cdeg
+        )
+
+    def _vfr_hud(self) -> Message:
+        """Its altitude freezes without a position, as measured on ArduCopter in GUIDED_NOGPS."""
+        heading_deg = round(math.degrees(self._sensors.yaw_rad)) % 360
+        throttle_pc = round(self._airframe.collective * 100)
+        climb_mps = self._sensors.climb_mps
+        return dialect.MAVLink_vfr_hud_message(0.0, 0.0, heading_deg, throttle_pc, 0.0, climb_mps)
+
+    def _battery(self) -> Message:
+        airframe = self._airframe
+        cell_mv = round(airframe.battery_v * 1000 / _CELLS)
+        cells = [cell_mv] * _CELLS + [_NO_CELL] * (10 - _CELLS)
+        used_mah = round((1.0 - airframe.battery_frac) * airframe.params.battery_capacity_ah * 1000)
+        current_ca, remaining_pc = round(airframe.current_a * 100), round(airframe.battery_frac * 100)
+        return dialect.MAVLink_battery_status_message(
+            0, 0, dialect.MAV_BATTERY_TYPE_LIPO, 32767, cells, current_ca, used_mah, -1, remaining_pc
+        )
+
+    def _sys_status(self) -> Message:
+        airframe = self._airframe
+        sensors = dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO | dialect.MAV_SYS_STATUS_PREARM_CHECK
+        healthy = sensors if self.healthy else dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO
+        millivolt, centiampere = round(airframe.battery_v * 1000), round(airframe.current_a * 100)
+        remaining_pc = round(airframe.battery_frac * 100)
+        return dialect.MAVLink_sys_status_message(
+            sensors, sensors, healthy, 200, millivolt, centiampere, remaining_pc, 0, 0, 0, 0, 0, 0
+        )
+
+    def _extended_state(self) -> Message:
+        return dialect.MAVLink_extended_sys_state_message(dialect.MAV_VTOL_STATE_UNDEFINED, self.landed_state)
+
+    def _version(self) -> Message:
+        capabilities = dialect.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+        none = [0] * 8
+        return dialect.MAVLink_autopilot_version_message(
+            capabilities, _BUILD, 0, 0, 0, none, none, none, 0, 0, 0
+        )

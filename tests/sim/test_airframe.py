@@ -1,0 +1,194 @@
+"""The simulated airframe responds as measured on a real autopilot, and repeats itself."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+
+import pytest
+
+from flightd.sim.airframe import Airframe, AirframeCommand, AirframeParams
+from flightd.sim.climb_loop import ClimbLoop
+from flightd.sim.kinematics import Kinematics
+from flightd.sim.sensors import SensorParams, Sensors
+from flightd.sim.truth import TruthHistory
+from flightd.sim.wind import Draught, Wind
+
+DT_S = 0.0025
+CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
+EXACT = SensorParams(
+    heading_offset_rad=0.0, tilt_bias_rad=0.0, tilt_wander_rad=0.0, baro_wander_m=0.0, climb_noise_mps=0.0
+)
+
+
+def fly(
+    airframe: Airframe,
+    duration_s: float,
+    wish: Callable[[float], tuple[float, float, float]],
+    sensors: SensorParams = EXACT,
+) -> list[Kinematics]:
+    """Fly `wish(t) -> roll, pitch, climb` for a while; the truth after each step."""
+    eyes, climb = Sensors(sensors, 1), ClimbLoop()
+    eyes.update(DT_S, airframe)
+    path = []
+    for i in range(round(duration_s / DT_S)):
+        roll, pitch, climb_mps = wish(i * DT_S)
+        collective = climb.step(
+            DT_S,
+            climb_mps,
+            height_m=eyes.height_m,
+            speed_mps=eyes.climb_mps,
+            tilt_cos=airframe.tilt_cos,
+        )
+        airframe.step(
+            DT_S, AirframeCommand(motors=True, roll_rad=roll, pitch_rad=pitch, collective=collective)
+        )
+        eyes.update(DT_S, airframe)
+        path.append(airframe.kinematics(round((i + 1) * DT_S * 1e9)))
+    return path
+
+
+def at(path: list[Kinematics], t_s: float) -> Kinematics:
+    return path[round(t_s / DT_S) - 1]
+
+
+def test_a_roll_step_follows_the_measured_response() -> None:
+    airframe = Airframe(draught=CALM)
+    start_s = 5.0
+    path = fly(
+        airframe,
+        9.0,
+        lambda t: (math.radians(8.0) if t >= start_s else 0.0, 0.0, 0.5 if t < 3.0 else 0.0),
+    )
+    assert math.degrees(at(path, start_s + 0.25).roll_rad) == pytest.approx(5.9, abs=0.1)
+    assert math.degrees(at(path, start_s + 0.5).roll_rad) == pytest.approx(7.8, abs=0.1)
+    assert math.degrees(at(path, start_s + 2.0).roll_rad) == pytest.approx(8.0, abs=0.05)
+    assert at(path, start_s + 3.0).vy_mps == pytest.approx(2.5, abs=0.1)
+    heights = [k.height_m for k in path if k.stamp_ns > start_s * 1e9]
+    assert max(heights) - min(heights) < 0.04
+
+
+def test_the_climb_rate_settles_within_half_a_second_and_zero_holds_the_height() -> None:
+    path = fly(Airframe(draught=CALM), 10.0, lambda t: (0.0, 0.0, 0.5 if t < 4.0 else 0.0))
+    assert at(path, 0.5).climb_mps > 0.4
+    assert at(path, 3.0).climb_mps == pytest.approx(0.5, abs=0.03)
+    assert abs(at(path, 4.5).climb_mps) < 0.1
+    held = [k.height_m for k in path if k.stamp_ns > 6e9]
+    assert max(held) - min(held) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("roll", "pitch", "yaw", "x", "y"),
+    [
+        (5, 0, 0, 0, 1),
+        (-5, 0, 0, 0, -1),
+        (0, -5, 0, 1, 0),
+        (0, 5, 0, -1, 0),
+        (0, -5, 90, 0, 1),
+        (5, 0, 90, -1, 0),
+    ],
+)
+def test_tilt_accelerates_in_its_direction(roll: float, pitch: float, yaw: float, x: float, y: float) -> None:
+    airframe = Airframe(AirframeParams(yaw_gain_per_s=0.0), CALM, yaw_rad=math.radians(yaw))
+
+    def wish(t: float) -> tuple[float, float, float]:
+        tilted = t > 2.0
+        return math.radians(roll) * tilted, math.radians(pitch) * tilted, 0.5
+
+    path = fly(airframe, 3.5, wish)
+    reached = 9.80665 * math.tan(math.radians(5.0))  # m/s after one second without drag
+    for speed, sign in ((path[-1].vx_mps, x), (path[-1].vy_mps, y)):
+        assert speed == pytest.approx(sign * reached, abs=0.3 * reached if sign else 0.02)
+
+
+def test_yaw_turns_to_the_target_and_a_rate_alone_only_shifts_it() -> None:
+    airframe = Airframe(draught=CALM)
+    airframe.height_m, airframe.on_floor = 2.0, False
+    hover = airframe.params.hover_collective
+    for _ in range(800):
+        airframe.step(DT_S, AirframeCommand(motors=True, collective=hover, yaw_rad=math.radians(40.0)))
+    assert math.degrees(airframe.yaw_rad) == pytest.approx(40.0, abs=0.5)
+    fixed = AirframeCommand(
+        motors=True, collective=hover, yaw_rad=math.radians(40.0), yaw_rate_radps=math.radians(30.0)
+    )
+    for _ in range(800):
+        airframe.step(DT_S, fixed)
+    assert math.degrees(airframe.yaw_rad) == pytest.approx(46.0, abs=1.0)  # measured: about 6 degrees
+
+
+def test_the_floor_stops_the_fall_and_rubs_off_the_speed() -> None:
+    airframe = Airframe(draught=CALM)
+    airframe.height_m, airframe.on_floor = 0.5, False
+    airframe.vx_mps = 1.0
+    for _ in range(800):
+        airframe.step(DT_S, AirframeCommand())
+        assert airframe.height_m >= airframe.params.rest_height_m
+    assert airframe.on_floor
+    assert airframe.touchdown_mps == pytest.approx(math.sqrt(2 * 9.8 * 0.4), rel=0.05)
+    assert airframe.vx_mps == 0.0
+    assert airframe.climb_mps == 0.0
+
+
+def test_the_battery_drains_with_thrust_and_its_end_stops_the_motors() -> None:
+    airframe = Airframe(AirframeParams(battery_capacity_ah=0.02), CALM)
+    full_v = airframe.battery_v
+    fly(airframe, 3.0, lambda t: (0.0, 0.0, 0.3))
+    assert airframe.battery_frac < 0.6
+    assert airframe.battery_v < full_v
+    fly(airframe, 10.0, lambda t: (0.0, 0.0, 0.3))
+    assert airframe.battery_frac == 0.0
+    assert airframe.on_floor
+
+
+def test_the_same_seed_flies_the_same_flight_and_another_seed_does_not() -> None:
+    def end(seed: int) -> Kinematics:
+        return fly(Airframe(seed=seed), 5.0, lambda t: (0.0, 0.0, 0.3), SensorParams())[-1]
+
+    assert end(3) == end(3)
+    assert end(3) != end(4)
+
+
+def test_gusts_have_the_asked_strength_whatever_the_step() -> None:
+    for dt_s in (0.0025, 0.1):
+        wind = Wind(Draught(mean_x_mps=1.0, gust_rms_mps=0.3), seed=5)
+        samples = []
+        for _ in range(20_000):
+            wind.step(dt_s)
+            samples.append(wind.x_mps - 1.0)
+        if dt_s == 0.1:  # 2000 s: a thousand correlation times
+            assert math.sqrt(sum(s * s for s in samples) / len(samples)) == pytest.approx(0.3, rel=0.15)
+        steps = [b - a for a, b in itertools.pairwise(samples)]
+        rms = math.sqrt(sum(s * s for s in steps) / len(steps))
+        assert rms == pytest.approx(0.3 * math.sqrt(2 * (1 - math.exp(-dt_s / 2.0))), rel=0.05)
+
+
+def test_the_range_finder_counts_centimetres_along_the_body_and_drops_out() -> None:
+    airframe = Airframe(draught=CALM)
+    airframe.height_m, airframe.roll_rad = 2.0, math.radians(20.0)
+    sensors = Sensors(SensorParams(range_dropout=0.1), seed=2)
+    samples = [sensors.range_m(airframe) for _ in range(1000)]
+    heard = [s for s in samples if s > 0]
+    assert 0.05 < 1 - len(heard) / len(samples) < 0.15
+    assert sum(heard) / len(heard) == pytest.approx(2.0 / math.cos(math.radians(20.0)), abs=0.002)
+    assert all(abs(s * 100 - round(s * 100)) < 1e-6 for s in heard)
+    airframe.height_m = 30.0
+    assert sensors.range_m(airframe) == 0.0
+
+
+def test_truth_is_read_between_its_samples_across_the_turn_of_yaw() -> None:
+    history = TruthHistory(3)
+    with pytest.raises(LookupError):
+        history.latest()
+    for i in range(5):
+        yaw = math.radians(178.0 + 2.0 * i)
+        yaw = yaw - math.tau if yaw >= math.pi else yaw
+        history.add(Kinematics(i * 10, float(i), 0, 0, 0, 0, 0, 0, 0, yaw, 0, 0, 0))
+    middle = history.at(35)
+    assert middle.stamp_ns == 35
+    assert middle.x_m == 3.5
+    assert middle.yaw_rad == pytest.approx(math.radians(185.0 - 360.0))
+    assert history.at(0).x_m == 2.0  # older than the record
+    assert history.at(99).x_m == 4.0
+    with pytest.raises(ValueError, match="not after"):
+        history.add(history.latest())
