@@ -44,6 +44,10 @@ def run(test: Callable[[], Awaitable[Any]]) -> Any:
         return runner.run(main())
 
 
+def armed(peer: ArduCopterPeer) -> bool:
+    return peer.armed
+
+
 async def hovering(peer: ArduCopterPeer, client: RawClient, height_m: float = 1.5) -> float:
     """Take off by thrust; the vehicle's yaw as it reports it."""
     await client.arm_guided()
@@ -163,7 +167,7 @@ def test_commands_of_others_are_ignored_and_unknown_ones_unsupported() -> None:
             await client.arm_guided()
             assert await client.command(22, 0, 0, 0, 0, 0, 0, 1.5) == 4  # NAV_TAKEOFF in GUIDED_NOGPS
             assert await client.command(400, math.nan) == 2
-            assert peer.armed
+            assert armed(peer)
 
     run(test)
 
@@ -173,15 +177,15 @@ def test_half_thrust_on_the_floor_disarms_after_the_delay_and_more_takes_off() -
         async with pair() as (peer, client):
             await client.arm_guided()
             await client.fly(9.5)
-            assert peer.armed
+            assert armed(peer)
             await client.fly(1.0)
-            assert not peer.armed
+            assert not armed(peer)
             assert peer.truth().height_m == pytest.approx(0.1)
             await client.arm_guided()
             await client.fly(2.0, thrust=0.6, yaw_rad=0.7)
             assert peer.truth().height_m > 0.5
             assert await client.command(400, 0) == 4  # no disarming in the air
-            assert peer.armed
+            assert armed(peer)
 
     run(test)
 
@@ -224,7 +228,7 @@ def test_roll_turns_level_only_after_the_time_out_and_nothing_lands() -> None:
             await asyncio.sleep(1.2)
             assert math.degrees(peer.truth().roll_rad) == pytest.approx(0, abs=0.6)
             await asyncio.sleep(20.0)
-            assert peer.armed
+            assert armed(peer)
             assert peer.truth().height_m == pytest.approx(height_m, abs=0.1)
 
     run(test)
@@ -290,16 +294,16 @@ def test_sinking_lands_and_disarms_by_the_delay_and_land_mode_at_once() -> None:
             assert client.last("EXTENDED_SYS_STATE").landed_state == 2
             await client.fly(8.0, yaw_rad=yaw, thrust=0.4)
             assert client.last("EXTENDED_SYS_STATE").landed_state == 1
-            assert peer.armed
+            assert armed(peer)
             await client.fly(11.0, yaw_rad=yaw, thrust=0.4)
-            assert not peer.armed
+            assert not armed(peer)
             await hovering(peer, client)
             assert await client.command(21) == 0
             assert peer.mode == CopterMode.LAND
             await asyncio.sleep(1.0)
             assert client.last("EXTENDED_SYS_STATE").landed_state == 4
             await asyncio.sleep(6.0)
-            assert not peer.armed
+            assert not armed(peer)
             assert peer.truth().height_m == pytest.approx(0.1)
             assert await client.command(400, 1) == 4  # LAND is not armable
             assert "LAND mode not armable" in client.last("STATUSTEXT").text
