@@ -8,7 +8,6 @@ python tools/make_dataset.py out/empty --level hard --layout negative
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from rich.console import Console

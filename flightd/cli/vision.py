@@ -1,0 +1,121 @@
+"""The vision commands: detect, evaluate.  What they do is imported when they run, so `--help` is quick."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeAlias
+
+import typer
+
+from flightd.core.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_METHODS = ("centroid", "skeleton", "combined", "naive")
+_TABLE_ORDER = ("naive", "centroid", "skeleton", "combined")
+_NARROWEST = 170
+
+_PROFILE_HELP = "Colour profile: yellow, white, red, blue, green, black, or a file of `flightd train-colour`."
+
+AsJson: TypeAlias = Annotated[
+    bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else.")
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Hang the vision commands on `app`."""
+    app.command("detect")(detect)
+    app.command("evaluate")(evaluate)
+
+
+def _stdout() -> Console:
+    """Where tables go; wide enough for them when it is a file or a pipe."""
+    from rich.console import Console
+
+    console = Console()
+    return console if console.is_terminal else Console(width=_NARROWEST)
+
+
+def _check_methods(methods: tuple[str, ...]) -> None:
+    for method in methods:
+        if method not in _METHODS:
+            raise InputError(f"--method {method}: unknown; choose one of {', '.join(_METHODS)}")
+
+
+def detect(
+    paths: Annotated[
+        list[Path], typer.Argument(metavar="PATH…", help="Images, folders of them, and videos.")
+    ],
+    method: Annotated[str, typer.Option(help="centroid, skeleton, combined or naive.")] = "combined",
+    profile: Annotated[str, typer.Option(help=_PROFILE_HELP)] = "yellow",
+    overlay: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write each picture with its lines here.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find the painted lines in pictures.
+
+    rho is measured from the image centre, theta is the normal's angle (x right, y down).
+
+    \b
+    flightd detect floor.jpg
+    flightd detect frames/ flight.mp4 --profile white --overlay out/
+    flightd detect floor.jpg --method skeleton --json
+    """
+    _check_methods((method,))
+    from flightd.cli import detect as command
+
+    found = command.detect(paths, method, profile, overlay)
+    if as_json:
+        sys.stdout.write(command.as_json(list(found)) + "\n")
+        return
+    console = _stdout()
+    for entry in found:
+        command.print_found(entry, console)
+
+
+def evaluate(
+    dataset: Annotated[Path, typer.Argument(help="A folder with images and a labels.json.")],
+    methods: Annotated[
+        list[str] | None, typer.Option("--method", help="Only this method; repeatable. Default: all four.")
+    ] = None,
+    profile: Annotated[
+        str | None, typer.Option(help=f"{_PROFILE_HELP} Default: each picture's own colour.")
+    ] = None,
+    gate_rho: Annotated[float, typer.Option(min=0.01, help="Farthest match, percent of the width.")] = 5.0,
+    gate_theta: Annotated[float, typer.Option(min=0.01, max=90.0, help="Farthest match, degrees.")] = 5.0,
+    overlay: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write each picture that went wrong here.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Measure all methods on a labelled folder: the paper's Table II.
+
+    A detection matches a labelled line when it passes within the gate of the middle of its visible span;
+    the errors are those of rho (about the image centre) and theta.  `minor` lines are neither missed nor
+    false; false lines are counted on pictures labelled `complete`, as a part of the detections there.
+
+    \b
+    labels.json: {"images": [{"file": "a.jpg", "width": 1920, "height": 1080, "line_colour": "yellow",
+      "complete": true, "negative": false, "lines": [{"x1": 0, "y1": 188.5, "x2": 102.4, "y2": 120.4,
+      "thickness": 11.5, "grade": "main"}], "nodes": [{"x": 231.2, "y": 157.1, "kind": "+"}]}]}
+    Points are pixels from the centre of the top-left pixel; grade main or minor; kind +, T, L, end, bend.
+
+    \b
+    flightd evaluate photographs/
+    flightd evaluate out/hard --method combined --overlay out/failures
+    """
+    wanted = tuple(methods or _TABLE_ORDER)
+    _check_methods(wanted)
+    from flightd.cli import evaluate as command
+    from flightd.vision.score import Gate
+
+    gate = Gate(gate_rho / 100.0, math.radians(gate_theta))
+    scores, failures, count = command.evaluate(dataset, wanted, profile, gate, overlay)
+    if as_json:
+        sys.stdout.write(command.as_json(dataset, gate, scores, failures, count) + "\n")
+    else:
+        command.print_table(dataset, scores, count, _stdout())
