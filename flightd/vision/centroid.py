@@ -16,27 +16,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
+from flightd.vision.fit import bow, fit_line
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
-from flightd.vision.strip import Array, LinearFit, Strip, bisector
+from flightd.vision.strip import Array, Strip, bisector
 
-TRIALS = 256
+TRIALS = 128
 MAX_SLOPE = 1.25
 """dv/du of a band described along its own axis; a little beyond the diagonal so that none falls between."""
 
-_RANDOM = np.random.default_rng(20190909).random((2, TRIALS))
-"""The same draws for every frame: one frame, one answer."""
+_MIN_CUTS = 5
+_NEAR_SLABS, _FAR_SLABS = (3, 6), (14, 30)
+_SLAB_KEY = 1e6
 
-Indices = NDArray[np.intp]
+_RANDOM = np.random.default_rng(20190909).random((3, TRIALS))
+"""The same draws for every frame: one frame, one answer."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cuts:
-    """Where slabs cut bands: slab position `u`, edges `low` < `high`, all in centred frame pixels.
+    """Where slabs cut bands: slab number, its position `u`, edges `low` < `high`, centred frame pixels.
 
     `whole` is False where the picture's border cuts the band off.
     """
 
+    slab: NDArray[np.intp]
     u: Array
     low: Array
     high: Array
@@ -46,7 +50,7 @@ class Cuts:
 
 def slab_spacing(coverage: float) -> int:
     """Samples between slabs: little paint (thin or far lines) needs many slabs, much paint few."""
-    return 1 if coverage < 0.04 else 2 if coverage < 0.15 else 3
+    return 2 if coverage < 0.06 else 3 if coverage < 0.2 else 4
 
 
 def cut(mask: Image, grid: Grid, *, steep: bool, spacing: int) -> Cuts:
@@ -58,12 +62,12 @@ def cut(mask: Image, grid: Grid, *, steep: bool, spacing: int) -> Cuts:
     padded[:, 1:-1] = slabs
     flat = padded.ravel()
     changes = np.flatnonzero(flat[1:] != flat[:-1])
-    starts, ends = changes[0::2], changes[1::2]
-    row = starts // (length + 2)
-    start, end = starts - row * (length + 2), ends - row * (length + 2)
+    row, place = np.divmod(changes, length + 2)
+    slab, start, end = row[0::2], place[0::2], place[1::2]
     along, across = (grid.y, grid.x) if steep else (grid.x, grid.y)
     return Cuts(
-        u=along(row * spacing + first),
+        slab=slab,
+        u=along(slab * spacing + first),
         low=across(start - 0.5),
         high=across(end - 0.5),
         whole=(start > 0) & (end < length),
@@ -72,7 +76,7 @@ def cut(mask: Image, grid: Grid, *, steep: bool, spacing: int) -> Cuts:
 
 
 def find(mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
-    """Straight bands in the mask, best supported first, each described along its own axis."""
+    """Straight bands in the mask, each described along its own axis."""
     spacing = slab_spacing(cv2.countNonZero(mask) / mask.size)
     strips: list[Strip] = []
     for steep in (True, False):
@@ -90,95 +94,103 @@ def _straightened(cuts: Cuts, plane: Plane, *, steep: bool) -> Cuts:
     else:
         u_low, low = plane.ideal(cuts.u, cuts.low)
         u_high, high = plane.ideal(cuts.u, cuts.high)
-    return Cuts((u_low + u_high) / 2, low, high, cuts.whole, cuts.spacing_px)
+    return Cuts(cuts.slab, (u_low + u_high) / 2, low, high, cuts.whole, cuts.spacing_px)
 
 
 def _bands(cuts: Cuts, step: int, *, steep: bool) -> list[Strip]:
-    """Sequential RANSAC: one matrix of hypotheses against centroids serves all lines of a direction."""
-    usable = np.flatnonzero(cuts.whole)
-    if len(usable) < 4:
+    """Sequential RANSAC: one matrix of hypotheses against centroids serves all bands of a direction."""
+    whole = cuts.whole
+    if whole.sum() < _MIN_CUTS:
         return []
-    u, low, high = cuts.u[usable], cuts.low[usable], cuts.high[usable]
+    slab, u, low, high = cuts.slab[whole], cuts.u[whole], cuts.low[whole], cuts.high[whole]
     middle, width = (low + high) / 2, high - low
-    n = len(u)
-    i = (_RANDOM[0] * n).astype(np.intp)
-    # Centroids are ordered along u: a partner within a third of them is likely on the same band.
-    j = np.minimum(i + 1 + (_RANDOM[1] * max(2.0, n / 3)).astype(np.intp), n - 1)
-    du = u[j] - u[i]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        b = (middle[j] - middle[i]) / du
-        width_b = (width[j] - width[i]) / du
-    good = (
-        (du >= 3 * cuts.spacing_px)
-        & (np.abs(b) <= MAX_SLOPE)
-        & (np.abs(width[j] - width[i]) <= 0.25 * (width[j] + width[i]) + 2 * step)
-    )
+    i, j = _pairs(slab, u, middle)
+    b = (middle[j] - middle[i]) / (u[j] - u[i])
+    width_b = (width[j] - width[i]) / (u[j] - u[i])
+    good = (np.abs(b) <= MAX_SLOPE) & (np.abs(width[j] - width[i]) <= 0.25 * (width[j] + width[i]) + 2 * step)
     if not good.any():
         return []
     i, b, width_b = i[good], b[good], width_b[good]
-    a, width_a = middle[i] - b * u[i], width[i] - width_b * u[i]
-    expected_width = width_a[:, None] + width_b[:, None] * u
-    tolerance = step + 0.08 * expected_width
-    inlier = (np.abs(middle - a[:, None] - b[:, None] * u) <= tolerance) & (
-        np.abs(width - expected_width) <= 2 * step + 0.25 * expected_width
+    du = (u - u[i][:, None]).astype(np.float32)
+    off = np.abs(middle.astype(np.float32) - middle[i][:, None] - b[:, None].astype(np.float32) * du)
+    expected = width[i][:, None].astype(np.float32) + width_b[:, None].astype(np.float32) * du
+    inlier = (off <= step + 0.08 * expected) & (
+        np.abs(width.astype(np.float32) - expected) <= 2 * step + 0.25 * expected
     )
     strips: list[Strip] = []
-    free = np.ones(n, np.bool_)
-    scores = inlier.sum(axis=1)
+    free = np.ones(len(u), np.bool_)
+    votes = inlier.astype(np.float32)
+    scores = votes.sum(axis=1)
     while True:
         best = int(scores.argmax())
-        if scores[best] < 4:
-            break
-        members = np.flatnonzero(inlier[best] & free)
-        strip = _fit_band(u, low, high, members, step, cuts.spacing_px, steep=steep)
+        if scores[best] < _MIN_CUTS:
+            return strips
         taken = inlier[best] & free
+        strip = _fit_band(u, low, high, np.flatnonzero(taken), step, cuts.spacing_px, steep=steep)
         if strip is not None:
             strips.append(strip)
             reach = step + 0.15 * (strip.high.at(0.0) - strip.low.at(0.0))
             taken |= np.abs(middle - strip.centre.a - strip.centre.b * u) <= reach
         free &= ~taken
-        scores = inlier @ free.astype(np.int32)
-    return strips
+        scores = votes @ free.astype(np.float32)
+
+
+def _pairs(slab: NDArray[np.intp], u: Array, middle: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Random centroids, each with a partner far along the band it seems to belong to.
+
+    A nearby slab gives the local slope, which says where to look in a slab further on: nearly every pair
+    lies on one band, where blind pairs on k bands would agree once in k.
+    """
+    n = len(u)
+    i = (_RANDOM[0] * n).astype(np.intp) if n > TRIALS else np.arange(n)
+    draws = _RANDOM[:, : len(i)]
+    key = slab * _SLAB_KEY + middle
+    ahead = np.where(slab[i] - slab[0] < (slab[-1] - slab[0]) / 2, 1, -1)
+    near = ahead * np.rint(_NEAR_SLABS[0] + draws[1] * (_NEAR_SLABS[1] - _NEAR_SLABS[0])).astype(np.intp)
+    j, same = _nearest(key, slab, middle, slab[i] + near, middle[i])
+    i, ahead, j, draw = i[same], ahead[same], j[same], draws[2][same]
+    slope = (middle[j] - middle[i]) / (slab[j] - slab[i])
+    far = ahead * np.rint(_FAR_SLABS[0] + draw * (_FAR_SLABS[1] - _FAR_SLABS[0])).astype(np.intp)
+    k, same = _nearest(key, slab, middle, slab[i] + far, middle[i] + slope * far)
+    return i, np.where(same, k, j)
+
+
+def _nearest(
+    key: Array, slab: NDArray[np.intp], middle: Array, wanted_slab: NDArray[np.intp], wanted: Array
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Index of the centroid nearest to `wanted` in `wanted_slab`, and whether that slab has one."""
+    at = np.searchsorted(key, wanted_slab * _SLAB_KEY + wanted)
+    after, before = np.minimum(at, len(key) - 1), np.maximum(at - 1, 0)
+    after_ok, before_ok = slab[after] == wanted_slab, slab[before] == wanted_slab
+    nearer = np.abs(middle[after] - wanted) < np.abs(middle[before] - wanted)
+    use_after = after_ok & (nearer | ~before_ok)
+    return np.where(use_after, after, before), after_ok | before_ok
 
 
 def _fit_band(
-    u: Array, low: Array, high: Array, members: Indices, step: int, spacing_px: float, *, steep: bool
+    u: Array, low: Array, high: Array, members: NDArray[np.intp], step: int, spacing_px: float, *, steep: bool
 ) -> Strip | None:
-    """Straight edges through the members' ends; None when they are too few or too short for a line."""
+    """Straight edges through the members' ends; None when they are too few, too short, or bent."""
+    noise = step / math.sqrt(12)
     for _ in range(2):
-        if len(members) < 4:
+        if len(members) < _MIN_CUTS:
             return None
-        low_fit = fit_line(u[members], low[members], step / math.sqrt(12))
-        high_fit = fit_line(u[members], high[members], step / math.sqrt(12))
-        centre = bisector(low_fit, high_fit)
+        low_fit = fit_line(u[members], low[members], noise)
+        high_fit = fit_line(u[members], high[members], noise)
         # Once more through all cuts that agree with both edges.
         off_low = np.abs(low - low_fit.a - low_fit.b * u)
         off_high = np.abs(high - high_fit.a - high_fit.b * u)
-        width = high_fit.at(0.0) - low_fit.at(0.0)
-        limit = 1.2 * step + 0.05 * abs(width)
+        limit = 1.2 * step + 0.05 * abs(high_fit.at(0.0) - low_fit.at(0.0))
         members = np.flatnonzero((off_low <= limit) & (off_high <= limit))
-    if len(members) < 4:
+    if len(members) < _MIN_CUTS:
         return None
-    ends = u[members]
-    u0, u1 = float(ends.min()), float(ends.max())
+    centre = bisector(low_fit, high_fit)
+    inside = u[members]
+    if abs(centre.b) > MAX_SLOPE or bow(inside, (low[members] + high[members]) / 2, noise):
+        return None
+    u0, u1 = float(inside.min()), float(inside.max())
     slabs = max(1.0, (u1 - u0) / spacing_px + 1)
     strip = Strip(
         steep, centre, low_fit, high_fit, u0 - spacing_px / 2, u1 + spacing_px / 2, len(members) / slabs
     )
-    if abs(centre.b) > MAX_SLOPE or strip.width_px <= 0:
-        return None
-    return strip
-
-
-def fit_line(u: Array, v: Array, sigma: float, weight: Array | None = None) -> LinearFit:
-    """Least squares v = a + b u, each v good to at least `sigma`; the covariance follows the scatter."""
-    w = np.ones_like(u) if weight is None else weight
-    sw = float(w.sum())
-    mean_u, mean_v = float(w @ u) / sw, float(w @ v) / sw
-    du, dv = u - mean_u, v - mean_v
-    suu = float(w @ (du * du))
-    b = float(w @ (du * dv)) / suu if suu > 0 else 0.0
-    scatter = dv - b * du
-    variance = max(sigma * sigma, float(w @ (scatter * scatter)) / max(1.0, sw - 2))
-    var_b = variance / suu if suu > 0 else variance
-    return LinearFit(mean_v - b * mean_u, b, variance / sw + mean_u * mean_u * var_b, var_b, -mean_u * var_b)
+    return strip if strip.width_px > 0 else None

@@ -11,7 +11,7 @@ import numpy as np
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
 from flightd.core.types import Image, LineSet
-from flightd.vision import centroid, combine, junctions, naive, skeleton
+from flightd.vision import centroid, combine, evidence, junctions, naive, skeleton
 from flightd.vision.colour import ColourProfile, classify, grow, load_profile
 from flightd.vision.plane import Plane
 from flightd.vision.refine import refine
@@ -21,10 +21,10 @@ from flightd.vision.strip import Strip
 METHODS = ("centroid", "skeleton", "combined", "naive")
 
 _MIN_SIDE_PX = 16
-_MIN_ASPECT = 1.6
-_MIN_LENGTH = 0.12
-"""Shortest line reported, as a part of the picture's shorter side."""
-_MIN_SUPPORT = 0.35
+_CLOSING = np.ones((11, 11), np.uint8)
+_SMALL_CLOSING = np.ones((5, 5), np.uint8)
+_WORN = 1.03
+"""Closing that adds more than this to the paint shows worn paint: then lines are looked for in it too."""
 
 
 class Detector:
@@ -83,27 +83,22 @@ class Detector:
         return Plane(width, height, lens)
 
     def _guess(self, mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
-        if not cv2.countNonZero(mask):
+        painted = cv2.countNonZero(mask)
+        if not painted:
             return []
         if self.method == "naive":
             return naive.find(mask, grid, plane)
-        groups = []
+        closed = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _CLOSING), np.uint8)
+        worn = cv2.countNonZero(closed) > _WORN * painted
+        guesses: list[Strip] = []
         if self.method in ("centroid", "combined"):
-            groups.append(_plausible(centroid.find(mask, grid, plane), plane))
+            guesses += centroid.find(mask, grid, plane)
+            if worn:
+                guesses += centroid.find(closed, grid, plane)
         if self.method in ("skeleton", "combined"):
-            groups.append(_plausible(skeleton.find(mask, grid, plane, zhang_suen=self._zhang_suen), plane))
-        return combine.without_repeats(combine.fuse(groups))
-
-
-def _plausible(strips: list[Strip], plane: Plane) -> list[Strip]:
-    shortest = _MIN_LENGTH * min(plane.width_px, plane.height_px)
-    return combine.without_repeats(
-        [
-            s
-            for s in strips
-            if s.length_px >= max(shortest, _MIN_ASPECT * s.width_px) and s.support >= _MIN_SUPPORT
-        ]
-    )
+            guesses += skeleton.find(closed if worn else mask, grid, plane, zhang_suen=self._zhang_suen)
+        filled = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _SMALL_CLOSING), np.uint8)
+        return evidence.select(evidence.weigh(guesses, filled, grid, plane), evidence.shortest_length(plane))
 
 
 def _check(bgr: Image) -> None:

@@ -87,16 +87,12 @@ def _assemble(strip: Strip, low: LinearFit | None, high: LinearFit | None) -> St
         width = strip.high.at(0.0) - strip.low.at(0.0)
         spread = strip.low.var_a + strip.high.var_a
         if low is not None:
-            high, centre = _moved(low, width, spread), _moved(low, width / 2, spread / 4)
+            high, centre = low.shifted(width, spread), low.shifted(width / 2, spread / 4)
         elif high is not None:
-            low, centre = _moved(high, -width, spread), _moved(high, -width / 2, spread / 4)
+            low, centre = high.shifted(-width, spread), high.shifted(-width / 2, spread / 4)
         else:
             return None
     return Strip(strip.steep, centre, low, high, strip.u0, strip.u1, strip.support)
-
-
-def _moved(fit: LinearFit, by: float, variance: float) -> LinearFit:
-    return LinearFit(fit.a + by, fit.b, fit.var_a + variance, fit.var_b, fit.cov_ab)
 
 
 def _fit(u: Array, weight: Array, a: float, b: float, sigma: float) -> LinearFit | None:

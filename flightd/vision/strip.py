@@ -33,6 +33,10 @@ class LinearFit:
     def at(self, u: float) -> float:
         return self.a + self.b * u
 
+    def shifted(self, by: float, variance: float = 0.0) -> LinearFit:
+        """The parallel `by` further along v, itself known to `variance`."""
+        return LinearFit(self.a + by, self.b, self.var_a + variance, self.var_b, self.cov_ab)
+
     def sigma_at(self, u: float) -> float:
         """Standard deviation of v at `u`."""
         return math.sqrt(max(0.0, self.var_a + 2 * u * self.cov_ab + u * u * self.var_b))
