@@ -1,0 +1,224 @@
+"""What goes to the drone next: REF and PCMD out of demand, setpoint and telemetry.
+
+Pure: time is an argument, commands are the result.  The rules:
+
+- Before the first navdata, and on the ground in HANDS_OFF, only COMWDG keeps the link awake: a daemon that
+  starts beside a flying drone must not land it by accident.
+- FLY: flat trim once, then REF with the fly bit, repeated, until the drone leaves LANDED.  STANDBY never
+  changes what the drone does: its fly bit follows the telemetry.  LAND and DISARM land; a flying drone's
+  motors are never cut.
+- HANDS_OFF in the air: one hover command, then silence.  Any command of ours would outrun the numbers of
+  whoever takes over; if nobody does, the drone lands itself after `general:com_watchdog` seconds.
+- A mission lands by sinking: below `land_below_m` a descent becomes REF's landing order, since this drone
+  touches down only by its own landing.
+- A flight that the drone ended by itself (battery, lost link, emergency) is over: nothing takes off again
+  until FLY has been demanded anew.  The same after `link_lost_s` without navdata: by then it lands itself.
+- Setpoints or telemetry that are late turn into hover at once, because the drone holds the last PCMD.
+"""
+
+from __future__ import annotations
+
+from flightd.adapters.vehicle.ardrone import at
+from flightd.adapters.vehicle.ardrone.at import AtCommand
+from flightd.adapters.vehicle.ardrone.navdata import DroneState, Major
+from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
+from flightd.adapters.vehicle.ardrone.telemetry import Telemetry
+from flightd.core.types import AttitudeSetpoint, Demand
+
+_TRIM_REPEATS = 3
+_PRESS_NS = 1_000_000_000
+_RELEASE_NS = 300_000_000
+_DESCENT_MPS = 0.05
+_HOVER_CLIMB_MPS = 0.05
+
+
+class Limits:
+    """Full scale of PCMD's arguments, as the drone has them in force."""
+
+    def __init__(self, settings: ArDroneSettings) -> None:
+        self.tilt_rad = settings.tilt_max_rad
+        self.climb_mps = settings.climb_max_mps
+        self.yaw_rate_radps = settings.yaw_rate_max_radps
+
+    def take(self, values: dict[str, str]) -> None:
+        """Scale by what the drone says it does, where it says so."""
+        for key, name, unit in (
+            ("control:euler_angle_max", "tilt_rad", 1.0),
+            ("control:control_vz_max", "climb_mps", 1e-3),
+            ("control:control_yaw", "yaw_rate_radps", 1.0),
+        ):
+            try:
+                value = float(values[key]) * unit
+            except (KeyError, ValueError):
+                continue
+            if 0.0 < value < 100.0:
+                setattr(self, name, value)
+
+
+class FlightLogic:
+    """Decides REF and PCMD at each beat; see the module's rules."""
+
+    def __init__(self, settings: ArDroneSettings, telemetry: Telemetry) -> None:
+        self._settings = settings
+        self._telemetry = telemetry
+        self.limits = Limits(settings)
+        self.configured = False
+        self.demand = Demand.HANDS_OFF
+        self._setpoint: AttitudeSetpoint | None = None
+        self._setpoint_ns = 0
+        self._trims_left = _TRIM_REPEATS
+        self._asked_ns: int | None = None
+        self._press_ns: int | None = None
+        self._flew = False
+        self._sinking = False
+        self._hushed = False
+        self._over = ""
+
+    # what others say
+
+    def want(self, demand: Demand) -> None:
+        """The mission's demand; a change gives the drone a new chance after a flight that ended itself."""
+        if demand == self.demand:
+            return
+        self._hushed = demand is Demand.HANDS_OFF and self._telemetry.airborne
+        self.demand = demand
+        self._flew = self._sinking = False
+        self._over = ""
+        self._asked_ns = self._press_ns = self._setpoint = None
+
+    def steer(self, setpoint: AttitudeSetpoint, now_ns: int) -> None:
+        self._setpoint, self._setpoint_ns = setpoint, now_ns
+
+    # what the daemon sees
+
+    @property
+    def silent(self) -> bool:
+        """Someone else may be flying: not a word from us."""
+        return self._hushed
+
+    @property
+    def heard(self) -> bool:
+        return self._telemetry.demo is not None
+
+    def linked(self, now_ns: int) -> bool:
+        """Whether telemetry is fresh enough to fly by."""
+        return self.heard and now_ns - self._telemetry.arrival_ns <= self._settings.telemetry_stale_s * 1e9
+
+    def in_control(self, now_ns: int) -> bool:
+        """The drone obeys setpoints or will once airborne, and we want it to."""
+        telemetry = self._telemetry
+        landing = telemetry.major == Major.LANDING and self.demand is Demand.FLY and not self._sinking
+        return (
+            self.demand in (Demand.FLY, Demand.LAND)
+            and self.configured
+            and self.linked(now_ns)
+            and not self._over
+            and not landing
+            and not telemetry.state & (DroneState.EMERGENCY | DroneState.COM_LOST)
+        )
+
+    def refusal(self, now_ns: int) -> str:
+        """Why the drone does not do what is demanded, or an empty text."""
+        if not self.heard:
+            return "no navdata from the drone"
+        if self._telemetry.emergency:
+            return f"emergency: {self._telemetry.emergency}"
+        if self._over or self.demand is not Demand.FLY:
+            return self._over
+        return self._take_off_refusal(now_ns)
+
+    def _take_off_refusal(self, now_ns: int) -> str:
+        if not self.configured:
+            return "the drone is still being configured"
+        waited_s = 0.0 if self._asked_ns is None else (now_ns - self._asked_ns) / 1e9
+        if self._telemetry.airborne or waited_s <= self._settings.take_off_patience_s:
+            return ""
+        battery = f"battery at {self._telemetry.battery_percent} %"
+        return f"the drone stays landed and does not say why; {battery} (below about 20 % it refuses)"
+
+    # what goes out
+
+    def commands(self, now_ns: int) -> list[AtCommand]:
+        """The commands of this beat; none at all means radio silence."""
+        telemetry = self._telemetry
+        if self._hushed:
+            return []
+        if not self.heard or (self.demand is Demand.HANDS_OFF and not telemetry.airborne):
+            return [at.comwdg()]
+        self._follow(now_ns)
+        commands = [at.comwdg()] if telemetry.state & DroneState.COM_WATCHDOG else []
+        if self._may_take_off(now_ns) and self._trims_left:
+            self._trims_left -= 1
+            return [*commands, at.ref(fly=False), at.ftrim(), at.hover()]
+        fly = self._fly(now_ns)
+        return [*commands, at.ref(fly=fly, emergency=self._press(now_ns)), self._stick(now_ns)]
+
+    def hush(self) -> list[AtCommand]:
+        """The last word before silence."""
+        return [at.ref(fly=self._telemetry.airborne), at.hover()]
+
+    def _follow(self, now_ns: int) -> None:
+        """Notice that the drone took off, or ended the flight by itself."""
+        telemetry = self._telemetry
+        if self.demand is not Demand.FLY or self._over:
+            return
+        if telemetry.airborne:
+            self._flew = True
+        if not self._flew:
+            return
+        silent_s = (now_ns - telemetry.arrival_ns) / 1e9
+        setpoint = self._setpoint
+        if telemetry.height_m < self._settings.land_below_m and setpoint is not None:
+            self._sinking |= setpoint.climb_mps < -_DESCENT_MPS
+        if telemetry.state & DroneState.EMERGENCY:
+            self._over = f"emergency in flight: {telemetry.emergency}"
+        elif silent_s > self._settings.link_lost_s:
+            self._over = f"no navdata for {self._settings.link_lost_s:g} s in flight: landing"
+        elif not self._sinking and telemetry.major in (Major.LANDING, Major.LANDED):
+            self._over = f"the drone landed by itself, battery at {telemetry.battery_percent} %"
+
+    def _may_take_off(self, now_ns: int) -> bool:
+        telemetry = self._telemetry
+        landed = telemetry.major in (Major.LANDED, Major.INIT, Major.DEFAULT)
+        ready = self.configured and self.linked(now_ns) and not telemetry.state & DroneState.EMERGENCY
+        return self.demand is Demand.FLY and landed and ready and not (self._over or self._flew)
+
+    def _fly(self, now_ns: int) -> bool:
+        telemetry = self._telemetry
+        if self.demand is Demand.FLY:
+            starting = self._may_take_off(now_ns)
+            if starting and self._asked_ns is None:
+                self._asked_ns = now_ns
+            going_up = telemetry.airborne and not self._over and not self._sinking
+            return starting or going_up
+        mirrored = self.demand in (Demand.STANDBY, Demand.HANDS_OFF)
+        return mirrored and telemetry.airborne and telemetry.major != Major.LANDING
+
+    def _press(self, now_ns: int) -> bool:
+        """The emergency bit: held until the drone leaves the emergency, let go and pressed anew if it
+        does not, and only on FLY demanded after the emergency came."""
+        fresh = self.demand is Demand.FLY and not self._over
+        if not fresh or not self._telemetry.state & DroneState.EMERGENCY:
+            self._press_ns = None
+            return False
+        if self._press_ns is None or now_ns - self._press_ns >= _PRESS_NS + _RELEASE_NS:
+            self._press_ns = now_ns
+        return now_ns - self._press_ns < _PRESS_NS
+
+    def _stick(self, now_ns: int) -> AtCommand:
+        setpoint = self._setpoint
+        late = now_ns - self._setpoint_ns > self._settings.setpoint_timeout_s * 1e9
+        free = self.demand is Demand.FLY and not self._sinking and not self._over and self.linked(now_ns)
+        if setpoint is None or late or not free:
+            return at.hover()
+        tilted = setpoint.roll_rad != 0.0 or setpoint.pitch_rad != 0.0
+        moving = setpoint.yaw_rate_radps != 0.0 or abs(setpoint.climb_mps) >= _HOVER_CLIMB_MPS
+        if not tilted and not moving:
+            return at.hover()
+        limits = self.limits
+        return at.pcmd(
+            roll=setpoint.roll_rad / limits.tilt_rad,
+            pitch=setpoint.pitch_rad / limits.tilt_rad,
+            gaz=setpoint.climb_mps / limits.climb_mps,
+            yaw=setpoint.yaw_rate_radps / limits.yaw_rate_radps,
+        )

@@ -1,0 +1,73 @@
+"""What the adapter has to know about the drone and how it should be flown."""
+
+from __future__ import annotations
+
+import enum
+import math
+import zlib
+from dataclasses import dataclass
+
+
+class Camera(enum.IntEnum):
+    """Values of `video:video_channel`; only one camera is streamed at a time."""
+
+    FRONT = 0
+    DOWN = 1
+
+
+def profile_id(name: str) -> str:
+    """Eight hex digits for a session, user or application, made from its name as Parrot's SDK does."""
+    return f"{zlib.crc32(name.encode()):08x}"
+
+
+@dataclass(frozen=True, slots=True)
+class ArDroneSettings:
+    """Address, limits and times.
+
+    The limits are what the drone's own loops are set to; setpoints travel as fractions of them.  Indoor
+    defaults are the drone's own (12 deg, 0.7 m/s, 100 deg/s).  `full_navdata` asks for 200 packets a
+    second with all options instead of 15 short ones: fresher attitude for a hundred times the air time.
+    """
+
+    host: str = "192.168.1.1"
+    at_port: int = 5556
+    navdata_port: int = 5554
+    video_port: int = 5555
+    control_port: int = 5559
+
+    tilt_max_rad: float = math.radians(12.0)
+    climb_max_mps: float = 0.7
+    yaw_rate_max_radps: float = math.radians(100.0)
+    height_max_m: float = 6.0
+    camera: Camera = Camera.DOWN
+    video_bitrate_kbps: int = 4000
+    full_navdata: bool = False
+
+    session: str = profile_id("flightd session")
+    user: str = profile_id("flightd user")
+    application: str = profile_id("flightd application")
+
+    period_s: float = 0.030
+    setpoint_timeout_s: float = 0.15
+    attitude_latency_s: float = 0.0
+    telemetry_stale_s: float = 0.5
+    link_lost_s: float = 2.0
+    take_off_patience_s: float = 3.0
+    land_below_m: float = 0.35
+    video_latency_s: float = 0.0
+    camera_settle_s: float = 0.3
+
+    def __post_init__(self) -> None:
+        bounds = {
+            "tilt_max_rad": (0.0, 0.52),
+            "climb_max_mps": (0.2, 2.0),
+            "yaw_rate_max_radps": (0.7, 6.11),
+            "height_max_m": (0.5, 100.0),
+            "period_s": (0.005, 0.045),
+            "setpoint_timeout_s": (0.02, 1.0),
+            "link_lost_s": (0.5, 10.0),
+        }
+        for name, (low, high) in bounds.items():
+            value = getattr(self, name)
+            if not low <= value <= high or value == 0.0:
+                raise ValueError(f"{name} = {value} outside {low}..{high}")

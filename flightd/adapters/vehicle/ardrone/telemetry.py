@@ -1,0 +1,111 @@
+"""From navdata to what the daemon knows of the vehicle."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from flightd.adapters.vehicle.ardrone.navdata import Demo, DroneState, Major, Navdata
+from flightd.adapters.vehicle.ardrone.stamps import RemoteClock
+from flightd.core.types import Attitude
+
+CLOCK_WRAP_NS = 2048 * 1_000_000_000
+AIRBORNE = frozenset(
+    {Major.FLYING, Major.HOVERING, Major.TAKE_OFF, Major.GO_TO_FIX, Major.LANDING, Major.LOOPING}
+)
+
+_MAX_ATTITUDES = 1000
+_CLIMB_LAG_S = 0.2
+_JUMP_M = 0.5
+_JUMP_PATIENCE_NS = 300_000_000
+
+EMERGENCIES = {
+    DroneState.CUTOUT: "cut-out, a propeller was blocked",
+    DroneState.ANGLES_OUT_OF_RANGE: "tilted too far",
+    DroneState.MOTORS: "motor problem",
+    DroneState.SOFTWARE_FAULT: "software fault",
+    DroneState.VBAT_LOW: "battery low",
+    DroneState.USER_EMERGENCY_LANDING: "emergency landing by the user",
+}
+
+
+class Telemetry:
+    """The newest of each quantity with its own time, and the attitude samples not yet drained.
+
+    Heights that leap farther than a drone can climb are sonar echoes of something else: they are passed
+    over until they have persisted for 0.3 s.  `state` and `major` are those of the newest packet.
+    """
+
+    def __init__(self, latency_ns: int) -> None:
+        self._latency_ns = latency_ns
+        self._clock = RemoteClock(CLOCK_WRAP_NS)
+        self._attitudes: deque[Attitude] = deque(maxlen=_MAX_ATTITUDES)
+        self.state = DroneState(0)
+        self.demo: Demo | None = None
+        self.attitude: Attitude | None = None
+        self.arrival_ns = 0
+        self.height_m = math.nan
+        self.height_ns = 0
+        self.climb_mps = 0.0
+        self.battery_v = math.nan
+
+    @property
+    def major(self) -> int:
+        return self.demo.major if self.demo is not None else Major.DEFAULT
+
+    @property
+    def airborne(self) -> bool:
+        return self.major in AIRBORNE
+
+    @property
+    def battery_percent(self) -> int:
+        return self.demo.battery_percent if self.demo is not None else 0
+
+    @property
+    def emergency(self) -> str:
+        """Why the motors are cut, or an empty text."""
+        if not self.state & DroneState.EMERGENCY:
+            return ""
+        causes = [text for bit, text in EMERGENCIES.items() if self.state & bit]
+        return ", ".join(causes) or "cause not told"
+
+    def observe(self, packet: Navdata, now_ns: int) -> None:
+        """Take one packet that arrived now."""
+        self.state = packet.state
+        self.arrival_ns = now_ns
+        if packet.battery_v is not None:
+            self.battery_v = packet.battery_v
+        if packet.demo is None:
+            return
+        self.demo = demo = packet.demo
+        stamp_ns = now_ns
+        if packet.clock_us is not None:
+            stamp_ns = self._clock.stamp_ns(packet.clock_us * 1000, now_ns)
+        stamp_ns -= self._latency_ns
+        if self.attitude is not None:
+            stamp_ns = max(stamp_ns, self.attitude.stamp_ns + 1)
+        self.attitude = Attitude(stamp_ns, demo.roll_rad, demo.pitch_rad, demo.yaw_rad)
+        self._attitudes.append(self.attitude)
+        self._observe_height(demo.height_m, packet.climb_mps, stamp_ns)
+
+    def drain(self) -> list[Attitude]:
+        """The attitude samples since the last call, oldest first."""
+        drained = list(self._attitudes)
+        self._attitudes.clear()
+        return drained
+
+    def _observe_height(self, height_m: float, climb_mps: float | None, stamp_ns: int) -> None:
+        if self.state & DroneState.ULTRASOUND:
+            self.height_m, self.climb_mps = math.nan, 0.0
+            return
+        past_s = (stamp_ns - self.height_ns) / 1e9
+        known = not math.isnan(self.height_m)
+        leap = known and abs(height_m - self.height_m) > _JUMP_M
+        if leap and self.airborne and stamp_ns - self.height_ns < _JUMP_PATIENCE_NS:
+            return
+        if climb_mps is not None:
+            self.climb_mps = climb_mps
+        elif known and not leap and past_s > 0.0:
+            measured = (height_m - self.height_m) / past_s
+            self.climb_mps += (measured - self.climb_mps) * min(1.0, past_s / _CLIMB_LAG_S)
+        self.height_m, self.height_ns = height_m, stamp_ns

@@ -1,0 +1,186 @@
+"""The emulated drone on its four ports, on the time of the running event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+from flightd.core.types import Image
+from flightd.ports import Clock
+from flightd.sim.ardrone.drone import Drone
+from flightd.sim.ardrone.video import Channel, Encoder, Packer, is_idr
+
+STEP_NS = 5_000_000
+_VIDEO_BACKLOG_BYTES = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class Ports:
+    """Where the drone listens; 0 takes any free port."""
+
+    host: str = "127.0.0.1"
+    at: int = 5556
+    navdata: int = 5554
+    video: int = 5555
+    control: int = 5559
+
+
+class ArDroneServer:
+    """Serves one `Drone`: `async with ArDroneServer(...) as server` listens, `run` lets its time pass.
+
+    `radio` False loses everything in both directions, as out of range; `video_radio` only the pictures.
+    Pictures come from outside: `show` takes one of the camera that `channel` names.
+    """
+
+    def __init__(
+        self, drone: Drone, clock: Clock, ports: Ports | None = None, *, video_header_bytes: int = 64
+    ) -> None:
+        self.drone = drone
+        self.ports = ports or Ports()
+        self.radio = True
+        self.video_radio = True
+        self._clock = clock
+        self._video_header_bytes = video_header_bytes
+        self._at: asyncio.DatagramTransport | None = None
+        self._navdata: asyncio.DatagramTransport | None = None
+        self._client: Any = None
+        self._servers: list[asyncio.Server] = []
+        self._watchers: dict[asyncio.StreamWriter, _Stream] = {}
+        self._readers: list[asyncio.StreamWriter] = []
+        self._pending_configuration: list[bytes] = []
+        drone.send_configuration = self._send_configuration
+
+    @property
+    def channel(self) -> Channel:
+        """The camera whose pictures the client asked for."""
+        bottom = int(self.drone.configuration.number("video:video_channel")) in (1, 3)
+        return Channel.BOTTOM if bottom else Channel.FRONT
+
+    @property
+    def watched(self) -> bool:
+        """Whether anyone is connected to the video."""
+        return bool(self._watchers)
+
+    async def __aenter__(self) -> Self:
+        loop = asyncio.get_running_loop()
+        host = self.ports.host
+        self._at, _ = await loop.create_datagram_endpoint(
+            lambda: _Receiver(self._command), local_addr=(host, self.ports.at)
+        )
+        self._navdata, _ = await loop.create_datagram_endpoint(
+            lambda: _Receiver(self._wake), local_addr=(host, self.ports.navdata)
+        )
+        video = await asyncio.start_server(self._watch_video, host, self.ports.video)
+        control = await asyncio.start_server(self._read_configuration, host, self.ports.control)
+        self._servers = [video, control]
+        self.ports = replace(
+            self.ports,
+            at=self._at.get_extra_info("sockname")[1],
+            navdata=self._navdata.get_extra_info("sockname")[1],
+            video=video.sockets[0].getsockname()[1],
+            control=control.sockets[0].getsockname()[1],
+        )
+        return self
+
+    async def __aexit__(self, *_error: object) -> None:
+        for endpoint in (self._at, self._navdata):
+            if endpoint is not None:
+                endpoint.close()
+        for writer in [*self._watchers, *self._readers]:
+            writer.transport.abort()
+        for server in self._servers:
+            server.close()
+            await server.wait_closed()
+
+    async def run(self) -> None:
+        """Step the drone every 5 ms of the loop's time and send its navdata, for ever."""
+        due_ns = self._clock.now_ns()
+        while True:
+            due_ns += STEP_NS
+            await asyncio.sleep((due_ns - self._clock.now_ns()) / 1e9)
+            self.drone.step(due_ns, STEP_NS / 1e9)
+            packet = self.drone.navdata(due_ns)
+            if packet is not None and self._client is not None and self._navdata is not None and self.radio:
+                self._navdata.sendto(packet, self._client)
+
+    def reboot(self) -> None:
+        """Power the drone off and on: everyone is disconnected and forgotten."""
+        self.drone.reboot()
+        self._client = None
+        for writer in [*self._watchers, *self._readers]:
+            writer.transport.abort()
+
+    def show(self, bgr: Image) -> None:
+        """Stream one picture of the camera in use to whoever watches; (H, W, 3) of any size."""
+        if not self.video_radio or not self.radio:
+            return
+        timestamp_ms = self._clock.now_ns() // 1_000_000
+        for writer, stream in list(self._watchers.items()):
+            room = writer.transport.get_write_buffer_size() <= _VIDEO_BACKLOG_BYTES
+            data = stream.frame(bgr, timestamp_ms, room=room)
+            if data and not writer.is_closing():
+                writer.write(data)
+
+    def _command(self, datagram: bytes, _sender: Any) -> None:
+        if self.radio:
+            self.drone.command(datagram, self._clock.now_ns())
+
+    def _wake(self, _datagram: bytes, sender: Any) -> None:
+        if self.radio:
+            self._client = sender
+            self.drone.wake()
+
+    async def _watch_video(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._watchers[writer] = _Stream(self._video_header_bytes)
+        with contextlib.suppress(ConnectionError):
+            while await reader.read(4096):
+                pass
+        del self._watchers[writer]
+        writer.close()
+
+    async def _read_configuration(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._readers.append(writer)
+        if self._pending_configuration:
+            self._send_configuration(self._pending_configuration.pop())
+        with contextlib.suppress(ConnectionError):
+            while await reader.read(4096):
+                pass
+        self._readers.remove(writer)
+        writer.close()
+
+    def _send_configuration(self, text: bytes) -> None:
+        """To all who read the control port, or to the next who connects (its SYN may still be on the way)."""
+        self._pending_configuration = [] if self._readers else [text]
+        for writer in self._readers:
+            if not writer.is_closing() and self.radio:
+                writer.write(text)
+
+
+class _Stream:
+    """One connection's pictures."""
+
+    def __init__(self, header_bytes: int) -> None:
+        self._encoder = Encoder()
+        self._packer = Packer(header_bytes)
+        self._begun = False
+
+    def frame(self, bgr: Image, timestamp_ms: int, *, room: bool) -> bytes:
+        """The next frame's bytes, or none: the encoder's first IDR was before this client's time."""
+        units = self._encoder.encode(bgr)
+        if not self._begun and is_idr(units):
+            self._begun = True
+            return b""
+        if not room:
+            self._packer.skip()
+            return b""
+        return self._packer.pack(units, timestamp_ms)
+
+
+class _Receiver(asyncio.DatagramProtocol):
+    def __init__(self, receive: Any) -> None:
+        self._receive = receive
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:
+        self._receive(data, addr)
