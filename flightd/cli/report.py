@@ -1,0 +1,36 @@
+"""`flightd report`: the HTML report of a recorded flight.  It is imported when it runs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Hang `report` on `app`."""
+    app.command("report")(report)
+
+
+def report(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="A flight log (flight.mcap).")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="F", help="Where to write the page; report.html beside LOG.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
+) -> None:
+    """Make a report of a flight: one HTML file that needs nothing else.
+
+    truth.mcap and summary.json are used if they lie beside LOG.
+
+    \b
+    flightd report out/flight.mcap
+    flightd report /var/lib/flightd/flight.mcap --out flight.html
+    """
+    from flightd.replay.report.page import write_report
+
+    page = out if out is not None else log.with_name("report.html")
+    write_report(log, page)
+    print(json.dumps({"report": str(page)}) if as_json else page)

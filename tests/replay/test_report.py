@@ -1,0 +1,296 @@
+from __future__ import annotations
+
+import base64
+import itertools
+import json
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flightd.adapters.recorder.recorder import Recorder
+from flightd.config.site_file import parse_site
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.topics import Document, Topic
+from flightd.core.types import Event, EventLevel, GridPose, Phase, Status
+from flightd.replay.report.charts import Line, Strip
+from flightd.replay.report.figures import key_figures, outcome
+from flightd.replay.report.flight import load_flight
+from flightd.replay.report.markup import clock, number, path_data, thin, ticks
+from flightd.replay.report.page import render, write_report
+from tests.replay.synthetic_flight import SITE_TOML, SUMMARY, legs, write_flight
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A whole flight with truth and summary beside it."""
+    return write_flight(tmp_path_factory.mktemp("flight"))
+
+
+@pytest.fixture(scope="module")
+def bare_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same flight as a drone brings it home: no truth, no summary."""
+    return write_flight(tmp_path_factory.mktemp("bare"), truth=False, summary=False)
+
+
+@pytest.fixture(scope="module")
+def page(log: Path) -> str:
+    return render(load_flight(log))
+
+
+class _Outline(HTMLParser):
+    """Checks that every element is closed, and gathers what the page would load."""
+
+    VOID = frozenset({"meta", "img", "br", "link", "input", "hr"})
+    DRAWN = frozenset({"rect", "line", "path", "circle"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.loaded: list[str] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.loaded += [value or "" for name, value in attrs if name in {"src", "href", "srcset", "data"}]
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.loaded += [value or "" for name, value in attrs if name in {"src", "href"}]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+def _outline(page: str) -> _Outline:
+    outline = _Outline()
+    outline.feed(page)
+    assert outline.open == []
+    return outline
+
+
+def test_the_page_is_whole_and_loads_nothing_from_anywhere(page: str) -> None:
+    outline = _outline(page)
+    assert outline.loaded
+    assert all(source.startswith("data:image/jpeg;base64,") for source in outline.loaded)
+    without_pictures = re.sub(r"data:image/jpeg;base64,[\w+/=]+", "", page)
+    assert not re.search(r"https?:|//[a-z]|@import|url\(|<link", without_pictures)
+
+
+def test_the_page_shows_what_the_flight_was(page: str) -> None:
+    for part in (
+        "Mission completed",
+        "demo",
+        "Cross-track",
+        "Height",
+        "Battery",
+        "p99",
+        "gusts up to 1.9 m/s",
+    ):
+        assert part in page
+    assert page.count('class="shot"') == 6
+    assert 'class="centre vertical"' in page
+    assert 'class="flown truth"' in page
+    assert 'class="flown estimate"' in page
+
+
+def test_every_stop_is_in_the_list_in_order(log: Path) -> None:
+    flight = load_flight(log)
+    planned = [leg.node for leg in legs(parse_site(SITE_TOML, "demo")) if leg.phase == Phase.HOVER]
+    assert [visit.node for visit in flight.visits] == planned
+    assert all(2.3 < visit.dwell_s < 2.7 for visit in flight.visits)
+    assert all(visit.true_error_m < 0.15 for visit in flight.visits)
+
+
+def test_phases_cover_the_flight_without_gaps(log: Path) -> None:
+    phases = load_flight(log).phases
+    assert phases[0].phase == Phase.PREFLIGHT
+    assert phases[-1].phase == Phase.DONE
+    assert all(a.end_s == b.start_s for a, b in itertools.pairwise(phases))
+
+
+def test_the_summary_decides_the_key_figures(log: Path) -> None:
+    figures = {figure.label: figure for figure in key_figures(load_flight(log))}
+    assert figures["Cross-track"].value == "2.1"
+    assert figures["Landing error"].value == "6.1"
+    assert figures["Codes read"].tone == "good"
+    assert (figures["Nodes visited"].value, figures["Nodes visited"].tone) == ("12", "good")
+
+
+def test_a_log_alone_makes_a_report_too(bare_log: Path) -> None:
+    flight = load_flight(bare_log)
+    page = render(flight)
+    _outline(page)
+    assert 'class="flown truth"' not in page
+    figures = {figure.label: figure for figure in key_figures(flight)}
+    assert "estimated" in figures["Cross-track"].note
+    assert 0.5 < float(figures["Cross-track"].value) < 10
+    assert "Landing error" not in figures
+    assert outcome(flight).headline == "Mission completed"
+
+
+def test_an_aborted_mission_says_so_and_why(bare_log: Path) -> None:
+    summary = bare_log.with_name("summary.json")
+    summary.write_text(json.dumps(SUMMARY | {"mission": "aborted", "reason": "line lost for 5 s"}))
+    try:
+        ending = outcome(load_flight(bare_log))
+    finally:
+        summary.unlink()
+    assert (ending.headline, ending.detail, ending.tone) == ("Mission aborted", "line lost for 5 s", "bad")
+
+
+def test_an_empty_log_makes_a_page_that_says_so(tmp_path: Path) -> None:
+    Recorder(tmp_path / "flight.mcap").close()
+    page = render(load_flight(tmp_path / "flight.mcap"))
+    _outline(page)
+    assert "No flight in this log" in page
+
+
+def test_a_log_of_one_status_makes_a_page(tmp_path: Path) -> None:
+    status = Status(5, Phase.TAKE_OFF, "", "", "", 0, 3, 0.9, 0.1, 0, 0, 0.0, {})
+    with Recorder(tmp_path / "flight.mcap") as recorder:
+        recorder.record(Topic.STATUS, 5, status)
+    flight = load_flight(tmp_path / "flight.mcap")
+    _outline(render(flight))
+    assert outcome(flight).detail == "the log ends in phase take off"
+
+
+def test_a_log_cut_off_in_flight_makes_a_page_that_says_so(log: Path, tmp_path: Path) -> None:
+    content = log.read_bytes()
+    (tmp_path / "flight.mcap").write_bytes(content[: len(content) // 2])
+    flight = load_flight(tmp_path / "flight.mcap")
+    page = render(flight)
+    _outline(page)
+    assert "cut off" in page
+    assert outcome(flight).tone == "open"
+
+
+def test_hostile_text_stays_text(tmp_path: Path) -> None:
+    attack = '</script><script>alert(1)</script><img src="x">'
+    with Recorder(tmp_path / "flight.mcap", metadata={"vehicle": attack}) as recorder:
+        recorder.record(Topic.EVENT, 1, Event(1, EventLevel.ERROR, attack, attack))
+        recorder.record(Topic.CONFIG, 1, Document(attack))
+    (tmp_path / "summary.json").write_text(
+        json.dumps({"mission": "aborted", "reason": attack, attack: attack})
+    )
+    page = render(load_flight(tmp_path / "flight.mcap"))
+    _outline(page)
+    assert attack not in page
+    assert page.count("<script>") == 1
+
+
+def test_a_picture_that_is_none_is_left_out(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "flight.mcap") as recorder:
+        recorder.image(Topic.FRAME, 1, 1, b"this is no JPEG")
+    page = render(load_flight(tmp_path / "flight.mcap"))
+    assert base64.b64encode(b"this is no JPEG").decode() not in page
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "expected_m"),
+    [((0.0, 1.0, 2.0), (0.1, 0.1, 0.1), 0.1), ((0.05, 0.05, 0.05), (0.6, 1.5, 2.4), 0.05)],
+)
+def test_cross_track_is_measured_from_the_way_that_is_flown(
+    tmp_path: Path, x_m: tuple[float, ...], y_m: tuple[float, ...], expected_m: float
+) -> None:
+    with Recorder(tmp_path / "flight.mcap") as recorder:
+        recorder.record(Topic.MAP, 0, Document(SITE_TOML))
+        for index, (x, y) in enumerate(zip(x_m, y_m, strict=True)):
+            stamp_ns = index * 1_000_000_000
+            status = Status(stamp_ns, Phase.FOLLOW, "", "A1", "A2", 0, 1, 1.0, 1.0, 0, 0, 0.0, {})
+            pose = GridPose(stamp_ns, "A1", x, y, 0.0, x, y, 0.0, 0.0, 1.0, (0.0,) * 9, 1.0)
+            recorder.record(Topic.STATUS, stamp_ns, status)
+            recorder.record(Topic.POSE, stamp_ns, pose)
+    flight = load_flight(tmp_path / "flight.mcap")
+    assert flight.cross_track_m(flight.estimate) == pytest.approx([expected_m] * 3)
+
+
+def test_thinning_keeps_every_peak() -> None:
+    t_s = np.linspace(0, 100, 50_000)
+    values = np.sin(t_s)
+    values[12_345] = 40.0
+    values[23_456] = -40.0
+    thin_t, thin_values = thin(t_s, values)
+    assert len(thin_t) <= 1_800
+    assert thin_values.max() == 40.0
+    assert thin_values.min() == -40.0
+    assert (np.diff(thin_t) > 0).all()
+
+
+def test_a_gap_lifts_the_pen() -> None:
+    nan = float("nan")
+    assert path_data([0, 1, 2, 3, 4], [1, 2, nan, 4, 5]) == "M0,1L1,2M3,4L4,5"
+
+
+def test_ticks_are_round_and_inside() -> None:
+    assert ticks(-1.3, 1.3, 4) == [-1.0, 0.0, 1.0]
+    assert ticks(0.0, 1.62, 4) == [0.0, 0.5, 1.0, 1.5]
+    assert ticks(3.0, 3.0, 4) == [3.0]
+
+
+def test_numbers_are_short() -> None:
+    assert [number(value) for value in (1.0, 0.125, -0.001, 1200.0)] == ["1", "0.12", "0", "1200"]
+    assert [clock(value) for value in (0.0, 65.2, 3600.0)] == ["0:00", "1:05", "60:00"]
+
+
+def test_a_strip_shows_all_of_its_values() -> None:
+    line = Line("x", "plain", np.arange(3.0), np.array([-0.5, float("nan"), 3.0]))
+    for strip in (
+        Strip("a", "m", (line,)),
+        Strip("b", "m", (line,), symmetric=True),
+        Strip("c", "m", (line,), zero=True, least_span=10.0),
+    ):
+        low, high = strip.range()
+        assert low <= -0.5
+        assert high >= 3.0
+
+
+def test_a_summary_that_is_no_json_is_told(tmp_path: Path) -> None:
+    Recorder(tmp_path / "flight.mcap").close()
+    (tmp_path / "summary.json").write_text("{")
+    with pytest.raises(InputError, match=r"summary\.json: not a readable summary"):
+        load_flight(tmp_path / "flight.mcap")
+
+
+def test_a_page_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    Recorder(tmp_path / "flight.mcap").close()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UnavailableError, match="cannot write the report"):
+        write_report(tmp_path / "flight.mcap", tmp_path / "file" / "report.html")
+
+
+def _run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "flightd", "report", *map(str, arguments)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def test_the_command_writes_the_page_and_tells_where(tmp_path: Path) -> None:
+    Recorder(tmp_path / "flight.mcap").close()
+    result = _run(tmp_path / "flight.mcap", "--json")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert json.loads(result.stdout) == {"report": str(tmp_path / "report.html")}
+    assert (tmp_path / "report.html").read_text().startswith("<!doctype html>")
+
+
+@pytest.mark.parametrize("content", [None, b"", b"\x00" * 100, b"PK\x03\x04 not a log"])
+def test_a_bad_file_is_one_line_and_exit_2(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "flight.mcap"
+    if content is not None:
+        path.write_bytes(content)
+    result = _run(path)
+    if content == b"":
+        assert result.returncode == 0  # a log that was killed before its first byte
+        return
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert len(result.stderr.splitlines()) == 1
+    assert str(path) in result.stderr
