@@ -59,20 +59,19 @@ class Detector:
         """
         _check(bgr)
         marks = [("start", self._now_ns())]
+
+        def mark(stage: str) -> None:
+            marks.append((stage, self._now_ns()))
+
         height, width = bgr.shape[:2]
         plane = self._plane(width, height)
         grid = grid_for(width, height)
         mask = grow(classify(sample(bgr, grid), self.profile))
-        marks.append(("colour", self._now_ns()))
-        guesses = self._guess(mask, grid, plane)
-        marks.append(("guess", self._now_ns()))
-        if self.method == "combined":
-            guesses = refine(np.ascontiguousarray(bgr), guesses, plane, reach_px=1.5 * grid.step + 1)
-            guesses = combine.without_repeats(guesses)
-            marks.append(("refine", self._now_ns()))
-        lines = tuple(strip.to_line() for strip in guesses)
+        mark("colour")
+        strips = self._find(bgr, mask, grid, plane, mark)
+        lines = tuple(strip.to_line() for strip in strips)
         found = junctions.find(lines, mask, grid, plane)
-        marks.append(("junctions", self._now_ns()))
+        mark("junctions")
         timings = {name: (end - begin) / 1e6 for (_, begin), (name, end) in pairwise(marks)}
         return LineSet(seq, stamp_ns, width, height, lines, found, self.method, timings)
 
@@ -82,14 +81,35 @@ class Detector:
             lens = lens.scaled(width, height)
         return Plane(width, height, lens)
 
-    def _guess(self, mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
-        painted = cv2.countNonZero(mask)
-        if not painted:
+    def _find(
+        self, bgr: Image, mask: Image, grid: Grid, plane: Plane, mark: Callable[[str], None]
+    ) -> list[Strip]:
+        if not cv2.countNonZero(mask):
             return []
         if self.method == "naive":
             return naive.find(mask, grid, plane)
+        guesses = self._guess(mask, grid, plane)
+        mark("guess")
+        shortest = evidence.shortest_length(plane)
+        if self.method != "combined":
+            return evidence.select(guesses, shortest, [])
+        frame = np.ascontiguousarray(bgr)
+        found: list[Strip] = []
+        while strips := evidence.select(guesses, shortest, found):
+            refined = refine(frame, strips, plane, reach_px=1.5 * grid.step + 1)
+            found += [strip for strip in refined if strip is not None]
+            # What hid behind a guess that turned out to be no line gets its own chance.
+            tried = {id(strip) for strip in strips}
+            guesses = [g for g in guesses if id(g.strip) not in tried]
+            if None not in refined:
+                break
+        mark("refine")
+        return combine.without_repeats(found)
+
+    def _guess(self, mask: Image, grid: Grid, plane: Plane) -> list[evidence.Evidence]:
+        """Everything that may be a band, with its evidence."""
         closed = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _CLOSING), np.uint8)
-        worn = cv2.countNonZero(closed) > _WORN * painted
+        worn = cv2.countNonZero(closed) > _WORN * cv2.countNonZero(mask)
         guesses: list[Strip] = []
         if self.method in ("centroid", "combined"):
             guesses += centroid.find(mask, grid, plane)
@@ -98,7 +118,7 @@ class Detector:
         if self.method in ("skeleton", "combined"):
             guesses += skeleton.find(closed if worn else mask, grid, plane, zhang_suen=self._zhang_suen)
         filled = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _SMALL_CLOSING), np.uint8)
-        return evidence.select(evidence.weigh(guesses, filled, grid, plane), evidence.shortest_length(plane))
+        return evidence.weigh(guesses, filled, grid, plane)
 
 
 def _check(bgr: Image) -> None:

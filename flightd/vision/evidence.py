@@ -123,16 +123,18 @@ def _span(filled: NDArray[np.bool_], band: Array) -> tuple[int, int] | None:
     return int(places[starts[best]]), int(places[ends[best]]) + 1
 
 
-def select(found: list[Evidence], shortest_px: float) -> list[Strip]:
-    """The bands that explain the paint: largest first, each one's paint counted once."""
+def select(found: list[Evidence], shortest_px: float, known: list[Strip]) -> list[Strip]:
+    """The bands that explain the paint: largest first, each one's paint counted once.
+
+    Bands that `known` ones explain are left out.
+    """
     kept: list[Strip] = []
     for evidence in sorted(found, key=lambda e: -e.score):
         strip = evidence.strip
         if evidence.length_px < max(shortest_px, 1.3 * strip.width_px):
             continue
-        if kept and _explained(strip, kept) > 0.5:
-            continue
-        kept.append(strip)
+        if _explained(strip, known + kept) <= 0.5:
+            kept.append(strip)
     return kept
 
 

@@ -1,82 +1,73 @@
-"""Sub-pixel edges on the full frame, only where a band was guessed.
-
-All bands' edges are measured at once: arrays are (edge, station, tap), a station being a whole pixel row
-(steep band) or column (shallow band), a tap one pixel of it.  No interpolation: pixels are taken as
-they are, projected on the colour difference between paint and floor, and an edge is located by area,
-which is exact for any symmetric blur.
-"""
+"""Bands with their edges found on the full frame, and whether those edges are a painted line's."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TypeAlias
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flightd.core.types import Image
+from flightd.vision.edges import FINE, MIN_CONTRAST, locate, rough, take
+from flightd.vision.fit import RobustLines, robust_lines
 from flightd.vision.plane import Plane
 from flightd.vision.strip import Array, LinearFit, Strip, bisector
 
-Floats: TypeAlias = NDArray[np.float32]
-Indices: TypeAlias = NDArray[np.intp]
-
-STATIONS = 384
-"""Shared among all edges of a frame."""
-_MIN_STATIONS, _MAX_STATIONS = 32, 128
-_FINE = 4
-"""Half width of the window in which an edge is located by area, in pixels."""
-_MIN_CONTRAST = 6.0
-
-
-@dataclass(frozen=True, slots=True)
-class Taps:
-    """Pixels across the guessed edges: (E, S) places, (E, S, T) taps from floor to paint.
-
-    `row` counts along u and `base` along v in raw pixels; tap t of an edge is pixel base + sign (t - half).
-    """
-
-    steep: NDArray[np.bool_]
-    sign: Indices
-    row: Indices
-    base: Indices
-    half: int
-    inside: NDArray[np.bool_]
-    profile: Floats
-    contrast: Array
+_MIN_POINTS = 6.0
+_MIN_WIDTH_PX = 2.5
+_MIN_SHARE = 0.42
+"""Part of the painted stations at which both edges are where the straight edge should be."""
+_WORST_SUPPORT = 0.6
+"""Gaps in the paint excuse missing edges down to this support; a chain of blobs has less."""
+_COMPACT_ASPECT, _COMPACT_SHARE = 3.5, 0.20
+"""Below this length to width a blob may pass for a band: each unit less asks for that much more share."""
+_FRAYED_PX, _FRAYED_SHARE = 0.7, 0.5
+"""So does each pixel of scatter beyond this; points all over the window, on no edge at all, have 1.4."""
+_MAX_BOW = 0.006
+_MIN_BOW_PX = 1.2
 
 
-@dataclass(frozen=True, slots=True)
-class Edges:
-    """Located edge points (E, S) in the distortion-free plane with their weights (0 where none)."""
-
-    u: Array
-    v: Array
-    weight: Array
-
-
-def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> list[Strip]:
-    """The same bands with their edges located on the frame; bands whose edges are not there are dropped.
+def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> list[Strip | None]:
+    """Each band with its edges located on the frame, or None where they are not a line's.
 
     `reach_px` is how far the guess may be off, measured along v.
     """
     if not strips:
         return []
-    taps = _take(bgr, strips, plane, math.ceil(reach_px) + _FINE + 1)
-    rough_a, rough_b = _rough(taps)
-    edges = _locate(taps, rough_a, rough_b, plane)
-    a, b, weight, sigma = robust_lines(edges.u, edges.v, edges.weight)
-    refined = []
+    taps = take(bgr, strips, plane, math.ceil(reach_px) + FINE + 1)
+    found = locate(taps, *rough(taps), plane)
+    lines = robust_lines(found.u, found.v, found.weight)
+    stations = taps.row.shape[1]
+    # An edge that leaves the picture is judged by the part of it that could be seen.
+    visible = np.maximum(taps.inside[:, :, taps.half].sum(axis=1), stations / 2)
+    refined: list[Strip | None] = []
     for k, strip in enumerate(strips):
-        low, high = (
-            _fit(edges.u[e], weight[e], a[e], b[e], sigma[e]) if taps.contrast[e] > _MIN_CONTRAST else None
+        edges = [
+            e if taps.contrast[e] > MIN_CONTRAST and lines.points[e] >= _MIN_POINTS else None
             for e in (2 * k, 2 * k + 1)
-        )
-        new = _assemble(strip, low, high)
-        if new is not None:
-            refined.append(new)
+        ]
+        if _is_line(strip, lines, visible, edges):
+            low, high = (None if e is None else lines.fit(e) for e in edges)
+            refined.append(_assemble(strip, low, high))
+        else:
+            refined.append(None)
     return refined
+
+
+def _is_line(strip: Strip, lines: RobustLines, visible: Array, edges: list[int | None]) -> bool:
+    """Two straight edges, or one that is seen all along."""
+    seen = [e for e in edges if e is not None]
+    if not seen:
+        return False
+    share = sum(float(lines.points[e] / visible[e]) for e in seen) / 2
+    aspect = strip.length_px / max(strip.width_px, 1.0)
+    frayed = max(float(lines.scatter[e]) for e in seen) - _FRAYED_PX
+    need = _MIN_SHARE + _COMPACT_SHARE * max(0.0, _COMPACT_ASPECT - aspect) + _FRAYED_SHARE * max(0.0, frayed)
+    if share < need * max(_WORST_SUPPORT, strip.support):
+        return False
+    # A curve bends both edges the same way.
+    bow = sum(float(lines.bow[e]) for e in seen) / len(seen)
+    return abs(bow) <= max(_MIN_BOW_PX, _MAX_BOW * strip.length_px)
 
 
 def _assemble(strip: Strip, low: LinearFit | None, high: LinearFit | None) -> Strip | None:
@@ -92,129 +83,5 @@ def _assemble(strip: Strip, low: LinearFit | None, high: LinearFit | None) -> St
             low, centre = high.shifted(-width, spread), high.shifted(-width / 2, spread / 4)
         else:
             return None
-    return Strip(strip.steep, centre, low, high, strip.u0, strip.u1, strip.support)
-
-
-def _fit(u: Array, weight: Array, a: float, b: float, sigma: float) -> LinearFit | None:
-    sw = float(weight.sum())
-    if sw < 6:
-        return None
-    mean = float(weight @ u) / sw
-    suu = float(weight @ (u - mean) ** 2)
-    if suu <= 0:
-        return None
-    variance = sigma * sigma
-    var_b = variance / suu
-    return LinearFit(float(a), float(b), variance / sw + mean * mean * var_b, var_b, -mean * var_b)
-
-
-def robust_lines(u: Array, v: Array, weight: Array) -> tuple[Array, Array, Array, Array]:
-    """Fit v = a + b u to each row of (E, S) points; returns a, b (E,), the robust weights and the scatter.
-
-    Tukey's biweight with a scale that shrinks from the rough to the measured one.
-    """
-    w = weight
-    for iteration in range(6):
-        sw = np.maximum(w.sum(axis=1), 1e-9)
-        mu, mv = (w * u).sum(axis=1) / sw, (w * v).sum(axis=1) / sw
-        du, dv = u - mu[:, None], v - mv[:, None]
-        suu = np.maximum((w * du * du).sum(axis=1), 1e-9)
-        b = (w * du * dv).sum(axis=1) / suu
-        residual = dv - b[:, None] * du
-        scale = _scale(residual, weight)
-        cut = np.maximum(4.0 * scale, (3.0, 2.0, 1.0, 0.5, 0.3, 0.3)[iteration])[:, None]
-        w = weight * np.maximum(0.0, 1.0 - (residual / cut) ** 2) ** 2
-    sw = np.maximum(w.sum(axis=1), 1e-9)
-    sigma = np.sqrt((w * residual * residual).sum(axis=1) / np.maximum(sw - 2, 1.0))
-    return mv - b * mu, b, w, np.maximum(sigma, 0.02)
-
-
-def _scale(residual: Array, weight: Array) -> Array:
-    """Median absolute residual of each row's valid points, as a standard deviation."""
-    valid = weight > 0
-    size = np.where(valid, np.abs(residual), np.inf)
-    size.sort(axis=1)
-    middle = np.maximum(valid.sum(axis=1) // 2, 0)
-    median = size[np.arange(len(size)), np.minimum(middle, size.shape[1] - 1)]
-    return np.where(np.isfinite(median), 1.4826 * median, 1.0)
-
-
-def _take(bgr: Image, strips: list[Strip], plane: Plane, half: int) -> Taps:
-    """Gather the pixels across every guessed edge."""
-    height, width = bgr.shape[:2]
-    count = len(strips)
-    stations = max(_MIN_STATIONS, min(_MAX_STATIONS, STATIONS // (2 * count)))
-    half_x, half_y = (width - 1) / 2, (height - 1) / 2
-    steep = np.repeat([s.steep for s in strips], 2)[:, None]
-    sign = np.tile(np.array([1, -1]), count)[:, None]
-    guess = np.array([(f.a, f.b, s.u0, s.u1) for s in strips for f in (s.low, s.high)])
-    a, b, u0, u1 = (guess[:, k, None] for k in range(4))
-    u = u0 + (u1 - u0) * ((np.arange(stations) + 0.5) / stations)
-    v = a + b * u
-    x, y = plane.raw(np.where(steep, v, u), np.where(steep, u, v))
-    row = np.rint(np.where(steep, y + half_y, x + half_x)).astype(np.intp)
-    base = np.rint(np.where(steep, x + half_x, y + half_y)).astype(np.intp)
-
-    # Inside a thin band the taps stop at its middle: beyond it the far edge would be seen.
-    middles = np.array([(s.high.at(m) - s.low.at(m)) / 2 for s in strips for m in [(s.u0 + s.u1) / 2]])
-    inner = np.repeat(np.maximum(1, middles.astype(np.intp)), 2)[:, None, None]
-    column = base[:, :, None] + sign[:, :, None] * np.minimum(np.arange(-half, half + 1), inner)
-    rows: Indices = np.where(steep, np.full(1, height), width)
-    columns: Indices = np.where(steep, np.full(1, width), height)[:, :, None]
-    row_inside = (row >= 0) & (row < rows)
-    inside = (column >= 0) & (column < columns) & row_inside[:, :, None]
-    stride_u, stride_v = np.where(steep, width, 1), np.where(steep, 1, width)
-    flat = np.clip(row, 0, rows - 1) * stride_u
-    index = flat[:, :, None] + np.clip(column, 0, columns - 1) * stride_v[:, :, None]
-    pixels = bgr.reshape(-1, 3).take(index, axis=0).astype(np.float32)
-    profile, contrast = _project(pixels, row_inside)
-    return Taps(steep, sign, row, base, half, inside, profile, contrast)
-
-
-def _rough(taps: Taps) -> tuple[Array, Array]:
-    """Lines through the steepest rise towards the paint at each station, in raw pixels: v = a + b u."""
-    p, inside = taps.profile, taps.inside
-    rise = p[..., 3:] + p[..., 2:-1] - p[..., 1:-2] - p[..., :-3]
-    rise[~(inside[..., 3:] & inside[..., :-3])] = 0.0
-    best = rise.argmax(axis=-1)
-    strength = np.take_along_axis(rise, best[..., None], axis=-1)[..., 0]
-    found = strength > np.maximum(0.5 * taps.contrast[:, None], 2 * _MIN_CONTRAST)
-    v = taps.base + taps.sign * (best + 1.5 - taps.half)
-    a, b, _, _ = robust_lines(taps.row.astype(float), v, found.astype(float))
-    return a[:, None], b[:, None]
-
-
-def _locate(taps: Taps, rough_a: Array, rough_b: Array, plane: Plane) -> Edges:
-    """Edge points by area, in a window centred on the rough lines."""
-    expected = (rough_a + rough_b * taps.row - taps.base) * taps.sign
-    middle = np.rint(expected).astype(np.intp) + taps.half
-    window = middle[..., None] + np.arange(-_FINE, _FINE + 1)
-    length = taps.profile.shape[-1]
-    usable = (window[..., 0] >= 0) & (window[..., -1] < length)
-    window = np.clip(window, 0, length - 1)
-    p = np.take_along_axis(taps.profile, window, axis=-1)
-    usable &= np.take_along_axis(taps.inside, window, axis=-1).all(axis=-1)
-    floor, paint = p[..., :2].mean(axis=-1), p[..., -2:].mean(axis=-1)
-    step = paint - floor
-    usable &= step > np.maximum(0.35 * taps.contrast[:, None], _MIN_CONTRAST)
-    painted = (p - floor[..., None]).sum(axis=-1) / np.where(usable, step, 1.0)
-    position = middle - taps.half + _FINE + 0.5 - painted
-    usable &= np.abs(position - expected) <= 2.5
-    edge = taps.base + taps.sign * np.where(usable, position, expected)
-    x = np.where(taps.steep, edge, taps.row) - (plane.width_px - 1) / 2
-    y = np.where(taps.steep, taps.row, edge) - (plane.height_px - 1) / 2
-    x, y = plane.ideal(x, y)
-    return Edges(np.where(taps.steep, y, x), np.where(taps.steep, x, y), usable.astype(float))
-
-
-def _project(pixels: Floats, valid: NDArray[np.bool_]) -> tuple[Floats, Array]:
-    """Profiles (E, S, T) along the colour direction from floor to paint, and each edge's contrast."""
-    weight = valid.astype(np.float32)
-    total = np.maximum(weight.sum(axis=1), 1.0)[:, None]
-    outside = (pixels[:, :, :2].mean(axis=2) * weight[..., None]).sum(axis=1) / total
-    inside = (pixels[:, :, -2:].mean(axis=2) * weight[..., None]).sum(axis=1) / total
-    direction = inside - outside
-    contrast = np.linalg.norm(direction, axis=1)
-    direction /= np.maximum(contrast, 1e-6)[:, None]
-    profile = np.einsum("estc,ec->est", pixels, direction)
-    return np.asarray(profile, np.float32), contrast.astype(float)
+    refined = replace(strip, centre=centre, low=low, high=high)
+    return refined if refined.width_px >= _MIN_WIDTH_PX else None

@@ -1,0 +1,139 @@
+"""Where a band's edges are on the full frame, to a fraction of a pixel, only where a band was guessed.
+
+All bands' edges are measured at once: arrays are (edge, station, tap), a station being a whole pixel row
+(steep band) or column (shallow band), a tap one pixel of it.  No interpolation: pixels are taken as
+they are, projected on the colour difference between paint and floor, and an edge is located by area,
+which is exact for any symmetric blur.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightd.core.types import Image
+from flightd.vision.fit import robust_lines
+from flightd.vision.plane import Plane
+from flightd.vision.strip import Array, Strip
+
+Floats: TypeAlias = NDArray[np.float32]
+Indices: TypeAlias = NDArray[np.intp]
+
+STATIONS = 384
+"""Shared among all edges of a frame."""
+MIN_CONTRAST = 6.0
+"""Grey levels between floor and paint below which there is no edge."""
+FINE = 4
+"""Half width of the window in which an edge is located by area, in pixels."""
+
+_MIN_STATIONS, _MAX_STATIONS = 32, 128
+
+
+@dataclass(frozen=True, slots=True)
+class Taps:
+    """Pixels across the guessed edges: (E, S) places, (E, S, T) taps from floor to paint.
+
+    `row` counts along u and `base` along v in raw pixels; tap t of an edge is pixel base + sign (t - half).
+    """
+
+    steep: NDArray[np.bool_]
+    sign: Indices
+    row: Indices
+    base: Indices
+    half: int
+    inside: NDArray[np.bool_]
+    profile: Floats
+    contrast: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Edges:
+    """Located edge points (E, S) in the distortion-free plane with their weights (0 where none)."""
+
+    u: Array
+    v: Array
+    weight: Array
+
+
+def take(bgr: Image, strips: list[Strip], plane: Plane, half: int) -> Taps:
+    """Gather the pixels across every guessed edge."""
+    height, width = bgr.shape[:2]
+    count = len(strips)
+    stations = max(_MIN_STATIONS, min(_MAX_STATIONS, STATIONS // (2 * count)))
+    half_x, half_y = (width - 1) / 2, (height - 1) / 2
+    steep = np.repeat([s.steep for s in strips], 2)[:, None]
+    sign = np.tile(np.array([1, -1]), count)[:, None]
+    guess = np.array([(f.a, f.b, s.u0, s.u1) for s in strips for f in (s.low, s.high)])
+    a, b, u0, u1 = (guess[:, k, None] for k in range(4))
+    u = u0 + (u1 - u0) * ((np.arange(stations) + 0.5) / stations)
+    v = a + b * u
+    x, y = plane.raw(np.where(steep, v, u), np.where(steep, u, v))
+    row = np.rint(np.where(steep, y + half_y, x + half_x)).astype(np.intp)
+    base = np.rint(np.where(steep, x + half_x, y + half_y)).astype(np.intp)
+
+    # Inside a thin band the taps stop at its middle: beyond it the far edge would be seen.
+    middles = np.array([(s.high.at(m) - s.low.at(m)) / 2 for s in strips for m in [(s.u0 + s.u1) / 2]])
+    inner = np.repeat(np.maximum(1, middles.astype(np.intp)), 2)[:, None, None]
+    column = base[:, :, None] + sign[:, :, None] * np.minimum(np.arange(-half, half + 1), inner)
+    rows: Indices = np.where(steep, np.full(1, height), width)
+    columns: Indices = np.where(steep, np.full(1, width), height)[:, :, None]
+    row_inside = (row >= 0) & (row < rows)
+    inside = (column >= 0) & (column < columns) & row_inside[:, :, None]
+    stride_u, stride_v = np.where(steep, width, 1), np.where(steep, 1, width)
+    flat = np.clip(row, 0, rows - 1) * stride_u
+    index = flat[:, :, None] + np.clip(column, 0, columns - 1) * stride_v[:, :, None]
+    pixels = bgr.reshape(-1, 3).take(index, axis=0).astype(np.float32)
+    profile, contrast = _project(pixels, row_inside)
+    return Taps(steep, sign, row, base, half, inside, profile, contrast)
+
+
+def rough(taps: Taps) -> tuple[Array, Array]:
+    """Lines through the steepest rise towards the paint at each station, in raw pixels: v = a + b u."""
+    p, inside = taps.profile, taps.inside
+    rise = p[..., 3:] + p[..., 2:-1] - p[..., 1:-2] - p[..., :-3]
+    rise[~(inside[..., 3:] & inside[..., :-3])] = 0.0
+    best = rise.argmax(axis=-1)
+    strength = np.take_along_axis(rise, best[..., None], axis=-1)[..., 0]
+    found = strength > np.maximum(0.5 * taps.contrast[:, None], 2 * MIN_CONTRAST)
+    v = taps.base + taps.sign * (best + 1.5 - taps.half)
+    lines = robust_lines(taps.row.astype(float), v, found.astype(float))
+    return lines.a[:, None], lines.b[:, None]
+
+
+def locate(taps: Taps, rough_a: Array, rough_b: Array, plane: Plane) -> Edges:
+    """Edge points by area, in a window centred on the rough lines."""
+    expected = (rough_a + rough_b * taps.row - taps.base) * taps.sign
+    middle = np.rint(expected).astype(np.intp) + taps.half
+    window = middle[..., None] + np.arange(-FINE, FINE + 1)
+    length = taps.profile.shape[-1]
+    usable = (window[..., 0] >= 0) & (window[..., -1] < length)
+    window = np.clip(window, 0, length - 1)
+    p = np.take_along_axis(taps.profile, window, axis=-1)
+    usable &= np.take_along_axis(taps.inside, window, axis=-1).all(axis=-1)
+    floor, paint = p[..., :2].mean(axis=-1), p[..., -2:].mean(axis=-1)
+    step = paint - floor
+    usable &= step > np.maximum(0.35 * taps.contrast[:, None], MIN_CONTRAST)
+    painted = (p - floor[..., None]).sum(axis=-1) / np.where(usable, step, 1.0)
+    position = middle - taps.half + FINE + 0.5 - painted
+    usable &= np.abs(position - expected) <= 2.5
+    edge = taps.base + taps.sign * np.where(usable, position, expected)
+    x = np.where(taps.steep, edge, taps.row) - (plane.width_px - 1) / 2
+    y = np.where(taps.steep, taps.row, edge) - (plane.height_px - 1) / 2
+    x, y = plane.ideal(x, y)
+    return Edges(np.where(taps.steep, y, x), np.where(taps.steep, x, y), usable.astype(float))
+
+
+def _project(pixels: Floats, valid: NDArray[np.bool_]) -> tuple[Floats, Array]:
+    """Profiles (E, S, T) along the colour direction from floor to paint, and each edge's contrast."""
+    weight = valid.astype(np.float32)
+    total = np.maximum(weight.sum(axis=1), 1.0)[:, None]
+    outside = (pixels[:, :, :2].mean(axis=2) * weight[..., None]).sum(axis=1) / total
+    inside = (pixels[:, :, -2:].mean(axis=2) * weight[..., None]).sum(axis=1) / total
+    direction = inside - outside
+    contrast = np.linalg.norm(direction, axis=1)
+    direction /= np.maximum(contrast, 1e-6)[:, None]
+    profile = np.einsum("estc,ec->est", pixels, direction)
+    return np.asarray(profile, np.float32), contrast.astype(float)
