@@ -1,0 +1,68 @@
+"""ArduCopter: attitude flight in GUIDED_NOGPS, thrust as climb rate, LAND as the way down of last resort."""
+
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.adapters.vehicle.mavlink.link import Firmware
+from flightd.adapters.vehicle.mavlink.setpoint import climb_thrust
+from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
+from flightd.core.types import AttitudeSetpoint
+
+GUIDED_NOGPS = dialect.COPTER_MODE_GUIDED_NOGPS
+LAND = dialect.COPTER_MODE_LAND
+
+_MODE_NAMES: dict[int, str] = {
+    number: entry.name.removeprefix("COPTER_MODE_")
+    for number, entry in dialect.enums["COPTER_MODE"].items()
+    if not entry.name.endswith("ENUM_END")
+}
+
+_GUID_OPTIONS = ("GUID_OPTIONS",)
+_SPEED_UP = ("WPNAV_SPEED_UP", "WP_SPD_UP")
+_SPEED_DOWN = ("WPNAV_SPEED_DN", "WP_SPD_DN")
+_DEFAULT_UP_MPS, _DEFAULT_DOWN_MPS = 2.5, 1.5
+_THRUST_IS_COLLECTIVE = 8
+
+
+class ArduPilotVehicle(MavlinkVehicle):
+    """An ArduCopter.  It is not armed before GUID_OPTIONS is known: with its bit 3 the thrust that holds
+    the height would be half of full power."""
+
+    firmware = Firmware.ARDUPILOT
+    flying_mode = GUIDED_NOGPS
+    landing_mode = LAND
+    parameter_names = (_GUID_OPTIONS, _SPEED_UP, _SPEED_DOWN)
+
+    def mode_name(self, custom_mode: int) -> str:
+        return _MODE_NAMES.get(custom_mode, f"mode {custom_mode}")
+
+    def _mode_params(self, custom_mode: int) -> tuple[float, ...]:
+        return float(dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(custom_mode)
+
+    def _not_fit(self) -> str:
+        problem = super()._not_fit()
+        if problem:
+            return problem
+        options = self.parameters.get(_GUID_OPTIONS)
+        if options is None:
+            return "GUID_OPTIONS not read yet"
+        if int(options[1]) & _THRUST_IS_COLLECTIVE:
+            return "GUID_OPTIONS has bit 3 (thrust as thrust) set: clear it"
+        return ""
+
+    def _thrust(self, setpoint: AttitudeSetpoint) -> float:
+        return climb_thrust(
+            setpoint.climb_mps,
+            self._speed_mps(_SPEED_UP, _DEFAULT_UP_MPS),
+            self._speed_mps(_SPEED_DOWN, _DEFAULT_DOWN_MPS),
+        )
+
+    def _speed_mps(self, names: tuple[str, ...], default_mps: float) -> float:
+        """A climb or sink speed: in cm/s under its old name, in m/s under that of ArduCopter 4.7."""
+        found = self.parameters.get(names)
+        if found is None:
+            return default_mps
+        name, value = found
+        speed_mps = value / 100.0 if name.startswith("WPNAV_") else value
+        return speed_mps if speed_mps > 0.0 else default_mps

@@ -1,0 +1,151 @@
+"""MAVLink telemetry to `VehicleState`: units, signs and times put right in one place."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.adapters.vehicle.mavlink.codec import Message
+from flightd.adapters.vehicle.mavlink.timesync import ClockSync
+from flightd.core.types import Attitude, LandedState, VehicleState
+
+_ATTITUDES_MAX = 512
+_NS_PER_MS = 1_000_000
+_STAMP_AGE_MAX_NS = 500_000_000
+_RANGE_STALE_NS = 500_000_000
+_CLIMB_STALE_NS = 1_000_000_000
+_REBOOT_MS = 1_000
+_NO_CELL_MV = 65535
+_UNKNOWN_U16 = 65535
+
+_LANDED = {
+    dialect.MAV_LANDED_STATE_ON_GROUND: LandedState.ON_GROUND,
+    dialect.MAV_LANDED_STATE_IN_AIR: LandedState.IN_AIR,
+    dialect.MAV_LANDED_STATE_TAKEOFF: LandedState.IN_AIR,
+    dialect.MAV_LANDED_STATE_LANDING: LandedState.IN_AIR,
+}
+
+
+class Telemetry:
+    """The newest readings of one autopilot.  Values that are not finite or make no sense are not taken."""
+
+    def __init__(self, sync: ClockSync) -> None:
+        self._sync = sync
+        self._attitude: Attitude | None = None
+        self._attitudes: deque[Attitude] = deque(maxlen=_ATTITUDES_MAX)
+        self._boot_ms = 0
+        self._range_m = math.nan
+        self._range_ns = 0
+        self._climb_mps = math.nan
+        self._climb_ns = 0
+        self._landed = LandedState.UNKNOWN
+        self._battery_frac = math.nan
+        self._battery_v = math.nan
+        self.heartbeat_ns = 0
+        self.custom_mode: int | None = None
+        self.armed = False
+
+    @property
+    def yaw_rad(self) -> float | None:
+        """The newest measured heading."""
+        return None if self._attitude is None else self._attitude.yaw_rad
+
+    @property
+    def landed(self) -> LandedState:
+        return self._landed
+
+    def take(self, message: Message, now_ns: int) -> bool:
+        """Fold one message in; True when it shows that the autopilot has rebooted."""
+        match message.get_type():
+            case "HEARTBEAT":
+                self.heartbeat_ns = now_ns
+                self.custom_mode = int(message.custom_mode)
+                self.armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+            case "ATTITUDE":
+                return self._take_attitude(message, now_ns)
+            case "DISTANCE_SENSOR" if message.orientation == dialect.MAV_SENSOR_ROTATION_PITCH_270:
+                self._take_range(message, now_ns)
+            case "GLOBAL_POSITION_INT":
+                self._climb_mps = -message.vz / 100.0
+                self._climb_ns = now_ns
+            case "EXTENDED_SYS_STATE":
+                self._landed = _LANDED.get(message.landed_state, LandedState.UNKNOWN)
+            case "BATTERY_STATUS" if message.id == 0:
+                cells = [mv for mv in message.voltages if mv != _NO_CELL_MV]
+                self._take_battery(sum(cells), message.battery_remaining)
+            case "SYS_STATUS":
+                millivolt = message.voltage_battery
+                self._take_battery(0 if millivolt == _UNKNOWN_U16 else millivolt, message.battery_remaining)
+            case _:
+                pass
+        return False
+
+    def attitudes(self) -> list[Attitude]:
+        """The attitude samples since the last call, oldest first."""
+        samples = list(self._attitudes)
+        self._attitudes.clear()
+        return samples
+
+    def state(self, now_ns: int, mode: str, *, in_control: bool, refusal: str) -> VehicleState | None:
+        """Everything at one glance; None until heartbeat and attitude were heard."""
+        attitude = self._attitude
+        if attitude is None or not self.heartbeat_ns:
+            return None
+        ranged = now_ns - self._range_ns <= _RANGE_STALE_NS
+        climbing = now_ns - self._climb_ns <= _CLIMB_STALE_NS
+        return VehicleState(
+            attitude=attitude,
+            height_m=self._range_m if ranged else math.nan,
+            height_stamp_ns=self._range_ns,
+            climb_mps=self._climb_mps if climbing else math.nan,
+            mode=mode,
+            in_control=in_control,
+            armed=self.armed,
+            landed=self._landed,
+            battery_frac=self._battery_frac,
+            battery_v=self._battery_v,
+            heartbeat_ns=self.heartbeat_ns,
+            refusal=refusal,
+        )
+
+    def _take_attitude(self, message: Message, now_ns: int) -> bool:
+        angles = (message.roll, message.pitch, message.yaw)
+        if not all(map(math.isfinite, angles)):
+            return False
+        boot_ms = int(message.time_boot_ms)
+        rebooted = boot_ms + _REBOOT_MS < self._boot_ms
+        self._boot_ms = boot_ms
+        if rebooted:
+            self._sync.reset()
+        stamp_ns = self._stamp(boot_ms, now_ns)
+        if self._attitude is None or rebooted or stamp_ns > self._attitude.stamp_ns:
+            self._attitude = Attitude(stamp_ns, *angles)
+            self._attitudes.append(self._attitude)
+        return rebooted
+
+    def _take_range(self, message: Message, now_ns: int) -> None:
+        """Distance along the body's z axis in cm; outside the sensor's limits it saw nothing."""
+        centimetres = message.current_distance
+        if not max(message.min_distance, 1) <= centimetres <= message.max_distance:
+            return
+        tilt_cos = 1.0
+        if self._attitude is not None:
+            tilt_cos = math.cos(self._attitude.roll_rad) * math.cos(self._attitude.pitch_rad)
+        self._range_m = centimetres / 100.0 * max(tilt_cos, 0.0)
+        self._range_ns = self._stamp(message.time_boot_ms, now_ns)
+
+    def _take_battery(self, millivolt: int, remaining_pc: int) -> None:
+        if millivolt > 0:
+            self._battery_v = millivolt / 1000.0
+        if 0 <= remaining_pc <= 100:
+            self._battery_frac = remaining_pc / 100.0
+
+    def _stamp(self, boot_ms: int, now_ns: int) -> int:
+        """Our time of an autopilot stamp; the arrival while the clocks are not yet compared or when the
+        stamp makes no sense (some messages carry 0)."""
+        ours_ns = self._sync.to_ours(boot_ms * _NS_PER_MS)
+        if ours_ns is None or not now_ns - _STAMP_AGE_MAX_NS <= ours_ns <= now_ns:
+            return now_ns
+        return ours_ns

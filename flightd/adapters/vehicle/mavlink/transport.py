@@ -1,0 +1,220 @@
+"""UDP, TCP and serial lines behind one small interface, on asyncio alone."""
+
+from __future__ import annotations
+
+import abc
+import asyncio
+import contextlib
+import errno
+import os
+import socket
+import termios
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+from flightd.adapters.vehicle.mavlink.endpoint import Endpoint, EndpointKind
+from flightd.core.errors import InputError, UnavailableError
+
+Source: TypeAlias = tuple[str, int] | None
+"""Address a datagram came from; None on a stream."""
+
+_RECEIVE_BUFFER_BYTES = 1 << 20
+_BACKLOG_MAX_BYTES = 4096
+"""More than this unsent means a stalled link: what is new is dropped, stale setpoints must not pile up."""
+
+
+class Transport(abc.ABC):
+    """One line to the vehicle.  `received(data, source)` and `lost()` are set before `open`."""
+
+    datagrams: bool
+    """Whether data comes in datagrams (whole frames) or as a stream."""
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        self.endpoint = endpoint
+        self.received: Callable[[bytes, Source], None] = lambda _data, _source: None
+        self.lost: Callable[[], None] = lambda: None
+        self.peer: Source = None
+        """Whom a listening socket answers to."""
+
+    @abc.abstractmethod
+    async def open(self) -> None:
+        """Open once; OSError when the other side is not there (try again), UnavailableError when it
+        can never work so."""
+
+    @abc.abstractmethod
+    def send(self, data: bytes) -> bool:
+        """Hand over one frame without blocking; False when it was dropped."""
+
+    @abc.abstractmethod
+    def close(self) -> None: ...
+
+
+class UdpTransport(Transport, asyncio.DatagramProtocol):
+    """udpin: bound, answers to `peer`.  udpout: speaks first, to one address."""
+
+    datagrams = True
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        super().__init__(endpoint)
+        self._transport: asyncio.DatagramTransport | None = None
+
+    async def open(self) -> None:
+        address = (self.endpoint.host, self.endpoint.port)
+        listening = self.endpoint.kind is EndpointKind.UDP_IN
+        place: dict[str, Any] = {"local_addr": address} if listening else {"remote_addr": address}
+        loop = asyncio.get_running_loop()
+        try:
+            self._transport, _ = await loop.create_datagram_endpoint(lambda: self, **place)
+        except OSError as err:
+            if err.errno == errno.EADDRINUSE:
+                text = f"{self.endpoint}: the port is in use: stop the other program or choose another port"
+                raise UnavailableError(text) from err
+            raise
+        sock = self._transport.get_extra_info("socket")
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """The local address once open."""
+        assert self._transport is not None
+        name: tuple[str, int] = self._transport.get_extra_info("sockname")[:2]
+        return name
+
+    def send(self, data: bytes) -> bool:
+        if self._transport is None:
+            return False
+        if self.endpoint.kind is EndpointKind.UDP_OUT:
+            self._transport.sendto(data)
+        elif self.peer is not None:
+            self._transport.sendto(data, self.peer)
+        else:
+            return False
+        return True
+
+    def close(self) -> None:
+        if self._transport is not None:
+            self._transport.close()
+            self._transport = None
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:
+        self.received(data, (addr[0], addr[1]))
+
+    def error_received(self, exc: Exception) -> None:
+        """Nobody listens there yet (ICMP): the vehicle may boot later."""
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if exc is not None:
+            self.lost()
+
+
+class TcpTransport(Transport, asyncio.Protocol):
+    """A TCP client."""
+
+    datagrams = False
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        super().__init__(endpoint)
+        self._transport: asyncio.Transport | None = None
+
+    async def open(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._transport, _ = await loop.create_connection(
+            lambda: self, self.endpoint.host, self.endpoint.port
+        )
+
+    def send(self, data: bytes) -> bool:
+        transport = self._transport
+        if transport is None or transport.get_write_buffer_size() > _BACKLOG_MAX_BYTES:
+            return False
+        transport.write(data)
+        return True
+
+    def close(self) -> None:
+        if self._transport is not None:
+            self._transport.abort()
+            self._transport = None
+
+    def data_received(self, data: bytes) -> None:
+        self.received(data, None)
+
+    def connection_lost(self, _exc: Exception | None) -> None:
+        self._transport = None
+        self.lost()
+
+
+class SerialTransport(Transport):
+    """A serial device in raw mode."""
+
+    datagrams = False
+
+    def __init__(self, endpoint: Endpoint) -> None:
+        super().__init__(endpoint)
+        self._speed = getattr(termios, f"B{endpoint.baud}", None)
+        if self._speed is None:
+            raise InputError(f"vehicle.url {endpoint}: {endpoint.baud} is not a baud rate of this machine")
+        self._fd = -1
+
+    async def open(self) -> None:
+        fd = os.open(self.endpoint.device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            self._make_raw(fd)
+        except termios.error as err:
+            os.close(fd)
+            text = f"{self.endpoint}: {self.endpoint.device} is not a serial device: check the path"
+            raise UnavailableError(text) from err
+        self._fd = fd
+        asyncio.get_running_loop().add_reader(fd, self._read)
+
+    def send(self, data: bytes) -> bool:
+        if self._fd < 0:
+            return False
+        try:
+            return os.write(self._fd, data) == len(data)
+        except BlockingIOError:
+            return False
+        except OSError:
+            self._fail()
+            return False
+
+    def close(self) -> None:
+        if self._fd >= 0:
+            asyncio.get_running_loop().remove_reader(self._fd)
+            with contextlib.suppress(OSError):
+                os.close(self._fd)
+            self._fd = -1
+
+    def _make_raw(self, fd: int) -> None:
+        """8 data bits, no parity, one stop bit, no flow control, nothing interpreted."""
+        iflag = termios.IGNBRK
+        cflag = termios.CS8 | termios.CREAD | termios.CLOCAL
+        control = termios.tcgetattr(fd)[6]
+        assert self._speed is not None
+        termios.tcsetattr(fd, termios.TCSANOW, [iflag, 0, cflag, 0, self._speed, self._speed, control])
+        termios.tcflush(fd, termios.TCIOFLUSH)
+
+    def _read(self) -> None:
+        try:
+            data = os.read(self._fd, 4096)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if data:
+            self.received(data, None)
+        else:
+            self._fail()
+
+    def _fail(self) -> None:
+        self.close()
+        self.lost()
+
+
+def make_transport(endpoint: Endpoint) -> Transport:
+    """The transport for an endpoint; InputError for a baud rate that this machine cannot set."""
+    match endpoint.kind:
+        case EndpointKind.TCP:
+            return TcpTransport(endpoint)
+        case EndpointKind.SERIAL:
+            return SerialTransport(endpoint)
+        case _:
+            return UdpTransport(endpoint)

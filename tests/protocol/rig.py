@@ -1,0 +1,125 @@
+"""A vehicle adapter and its simulated peer, joined by real loopback sockets, in virtual time."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
+from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
+from flightd.ports import Vehicle
+from flightd.runtime.clock import LoopClock
+from flightd.runtime.loops import VirtualLoop
+from flightd.sim.airframe import Airframe
+from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
+from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.kinematics import Kinematics
+from flightd.sim.wind import Draught
+
+CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
+
+
+class Peer(Protocol):
+    """What the contract needs of a simulated vehicle, whatever its kind."""
+
+    airframe: Airframe
+
+    def truth(self) -> Kinematics: ...
+
+    async def run(self) -> None: ...
+
+
+@dataclass
+class Rig:
+    """One adapter under test, and the levers of the world behind it."""
+
+    vehicle: Vehicle
+    peer: Any
+    take_over: Callable[[], None]
+    """The pilot moves his switch."""
+    cut: Callable[[bool], None]
+    """Cut the link, or join it again."""
+    flying_task: asyncio.Task[None] | None = None
+
+    def known(self) -> VehicleState:
+        state = self.vehicle.state()
+        assert state is not None
+        return state
+
+    async def until(self, condition: Callable[[], bool], within_s: float = 10.0) -> float:
+        """Seconds until the condition held; fails when it does not in time."""
+        loop = asyncio.get_running_loop()
+        start_s = loop.time()
+        while not condition():
+            assert loop.time() - start_s < within_s, "waited too long"
+            await asyncio.sleep(0.005)
+        return loop.time() - start_s
+
+    async def stream(self, duration_s: float, hz: float = 50.0, **setpoint: float) -> list[bool]:
+        """Send one setpoint at a steady rate; what each `send` said."""
+        sent = []
+        clock = LoopClock()
+        for _ in range(round(duration_s * hz)):
+            sent.append(self.vehicle.send(AttitudeSetpoint(clock.now_ns(), **setpoint)))
+            await asyncio.sleep(1.0 / hz)
+        return sent
+
+    async def take_off(self, height_m: float = 1.5) -> None:
+        """Demand FLY and climb to a height by setpoints, then stop there."""
+        await self.until(lambda: self.vehicle.state() is not None)
+        self.vehicle.demand(Demand.FLY)
+        await self.until(lambda: self.known().armed and self.known().in_control)
+        climb_until = asyncio.get_running_loop().time() + 20.0
+        while self.peer.truth().height_m < height_m:
+            assert asyncio.get_running_loop().time() < climb_until, "does not climb"
+            await self.stream(0.1, climb_mps=0.5)
+        await self.stream(2.0)
+
+
+@asynccontextmanager
+async def ardupilot_rig(config: PeerConfig | None = None, *, peer_runs: bool = True) -> AsyncIterator[Rig]:
+    clock = LoopClock()
+    peer = ArduCopterPeer(clock, Airframe(draught=CALM), config or PeerConfig(ready_s=0.5))
+    host, port = await peer.open()
+    vehicle = ArduPilotVehicle(f"udpout://{host}:{port}", clock)
+
+    def cut(apart: bool) -> None:
+        peer.link.muted = apart
+
+    rig = Rig(vehicle, peer, lambda: _switch(peer), cut)
+    tasks = [asyncio.create_task(vehicle.run(), name="vehicle")]
+    if peer_runs:
+        tasks.append(asyncio.create_task(peer.run(), name="peer"))
+    rig.flying_task = tasks[0]
+    try:
+        yield rig
+    finally:
+        for task in tasks:
+            task.cancel()
+        results = await asyncio.gather(*tasks, return_exceptions=True)
+        failures = [r for r in results if isinstance(r, Exception)]
+        assert not failures, failures
+
+
+def _switch(peer: ArduCopterPeer) -> None:
+    assert peer.pilot_mode(CopterMode.ALT_HOLD)
+
+
+RIGS: dict[str, Callable[[], Any]] = {"ardupilot": ardupilot_rig}
+"""Every adapter that keeps the contract."""
+
+
+def run_virtual(test: Callable[[], Awaitable[Any]]) -> Any:
+    """Run an async test in virtual time; no task may be left behind."""
+
+    async def main() -> Any:
+        result = await test()
+        left = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
+        assert not left, left
+        return result
+
+    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+        return runner.run(main())
