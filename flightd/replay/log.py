@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
+import os
 import struct
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
@@ -12,25 +13,30 @@ from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias, TypeVar
 
 import msgspec
-import zstandard
-from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Metadata
 
 from flightd.core.errors import InputError
 from flightd.core.topics import MESSAGE_TYPES, Picture
 from flightd.core.types import Event, EventLevel
+from flightd.runtime.mcap_scan import (
+    MAGIC,
+    DamagedRecordError,
+    RawRecord,
+    inner_records,
+    parse,
+    raw_records,
+    unpacked,
+)
 
 Decoder: TypeAlias = Callable[[bytes], object]
 MessageT = TypeVar("MessageT")
 
-RECORD_LIMIT_BYTES = 256 << 20
-"""No record, packed or unpacked, is larger; one that says so is damaged."""
+_MESSAGE_HEAD = struct.Struct("<HIQQ")
+"""Channel, sequence, log time, publish time; then the payload."""
 
-_DAMAGE = (McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, RuntimeError, OverflowError)
-"""What the `mcap` package raises on bytes that are not what they should be."""
-
-_MAGIC = b"\x89MCAP0\r\n"
+_Message: TypeAlias = tuple[int, int, bytes]
+_CUT = "cut off before its end"
 _LEVELS = {2: EventLevel.INFO, 3: EventLevel.WARNING, 4: EventLevel.ERROR}
 
 
@@ -45,7 +51,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class FlightLog:
-    """A log in memory.  `damage` is "" for a whole file, else what was found wrong with its end."""
+    """A log in memory.  `damage` is "" for a whole file, else what was found wrong with it."""
 
     path: Path
     entries: tuple[Entry, ...]
@@ -64,8 +70,8 @@ class FlightLog:
 def read_log(path: Path, topics: Collection[str] | None = None) -> FlightLog:
     """Everything in the log, or its `topics` only, decoded to the types of `core.topics`.
 
-    A log that ends early is read up to there.  InputError if it cannot be opened, is not an MCAP file,
-    or holds a message that does not fit its topic.
+    A log that ends early is read up to there, and a damaged chunk is passed over.  InputError if the
+    file cannot be opened, is not MCAP, or holds a message that does not fit its topic.
     """
     reader = LogReader(path)
     entries = tuple(reader.entries(topics))
@@ -87,37 +93,47 @@ class LogReader:
     def entries(self, topics: Collection[str] | None = None) -> Iterator[Entry]:
         """The messages of all topics or of `topics`; errors as in `read_log`."""
         with _opened(self._path) as stream:
-            messages = self._messages(stream)
-            while True:
-                try:
-                    message = next(messages, None)
-                except _DAMAGE as err:
-                    self.damage = f"cut off or damaged ({type(err).__name__})"
-                    return
-                if message is None:
-                    return
-                topic = self._channels.get(message.channel_id, "")
-                if topic and (topics is None or topic in topics):
-                    yield Entry(topic, message.log_time, self._decode(topic, message.data))
+            for channel_id, stamp_ns, payload in self._messages(stream):
+                topic = self._channels.get(channel_id)
+                if topic is not None and (topics is None or topic in topics):
+                    yield Entry(topic, stamp_ns, self._decode(topic, payload))
 
-    def _messages(self, stream: BinaryIO) -> Iterator[Message]:
-        reader = StreamReader(stream, emit_chunks=True, record_size_limit=RECORD_LIMIT_BYTES)
-        for record in reader.records:
-            if isinstance(record, Chunk):
-                if record.uncompressed_size > RECORD_LIMIT_BYTES:
-                    raise McapError("chunk too large")
-                for inner in breakup_chunk(record, validate_crc=True):
-                    yield from self._take(inner)
-            else:
-                yield from self._take(record)
+    def _messages(self, stream: BinaryIO) -> Iterator[_Message]:
+        """Channel, stamp and payload of each message; what is damaged is passed over and noted."""
+        damage: list[str] = []
+        self.damage = _CUT
+        descriptor = stream.fileno()
+        size = os.fstat(descriptor).st_size
 
-    def _take(self, record: McapRecord) -> Iterator[Message]:
-        if isinstance(record, Channel):
-            self._channels[record.id] = record.topic if record.message_encoding == "json" else ""
-        elif isinstance(record, Metadata) and record.name == "flightd":
-            self.metadata.update(record.metadata)
-        elif isinstance(record, Message):
-            yield record
+        def read_at(offset: int, length: int) -> bytes:
+            return os.pread(descriptor, length, offset)
+
+        for record in raw_records(read_at, len(MAGIC), size):
+            if record.opcode == Opcode.DATA_END:
+                self.damage = ", ".join(damage)
+                return
+            try:
+                if record.opcode == Opcode.CHUNK:
+                    for inner in inner_records(unpacked(parse(Chunk, record.content))):
+                        yield from self._take(inner)
+                else:
+                    yield from self._take(record)
+            except DamagedRecordError as err:
+                damage.append(str(err))
+                self.damage = ", ".join([*damage, _CUT])
+
+    def _take(self, record: RawRecord) -> Iterator[_Message]:
+        if record.opcode == Opcode.MESSAGE and len(record.content) >= _MESSAGE_HEAD.size:
+            channel_id, _, stamp_ns, _ = _MESSAGE_HEAD.unpack_from(record.content)
+            yield channel_id, stamp_ns, record.content[_MESSAGE_HEAD.size :]
+        elif record.opcode == Opcode.CHANNEL:
+            channel = parse(Channel, record.content)
+            if channel.message_encoding == "json":
+                self._channels[channel.id] = channel.topic
+        elif record.opcode == Opcode.METADATA:
+            metadata = parse(Metadata, record.content)
+            if metadata.name == "flightd":
+                self.metadata.update(metadata.metadata)
 
     def _decode(self, topic: str, payload: bytes) -> object:
         try:
@@ -133,10 +149,9 @@ def _opened(path: Path) -> BinaryIO:
         stream = path.open("rb")
     except OSError as err:
         raise InputError(f"{path}: cannot open the flight log: {err.strerror}") from None
-    if not _MAGIC.startswith(stream.read(len(_MAGIC))):
+    if not MAGIC.startswith(stream.read(len(MAGIC))):
         stream.close()
         raise InputError(f"{path}: not a flight log (an MCAP file was expected)")
-    stream.seek(0)
     return stream
 
 

@@ -188,6 +188,15 @@ def test_hostile_text_stays_text(tmp_path: Path) -> None:
     assert page.count("<script>") == 1
 
 
+def test_a_map_that_cannot_be_read_costs_the_map_alone(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "flight.mcap") as recorder:
+        recorder.record(Topic.MAP, 1, Document("[site]\n"))
+        recorder.record(Topic.EVENT, 1, Event(1, EventLevel.INFO, "armed", "armed"))
+    page = render(load_flight(tmp_path / "flight.mcap"))
+    assert "the recorded map: site.name: missing" in page
+    assert "armed" in page
+
+
 def test_a_picture_that_is_none_is_left_out(tmp_path: Path) -> None:
     with Recorder(tmp_path / "flight.mcap") as recorder:
         recorder.image(Topic.FRAME, 1, 1, b"this is no JPEG")

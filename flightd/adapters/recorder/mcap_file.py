@@ -11,13 +11,13 @@ import os
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from io import BytesIO
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO, Self, TypeAlias
 
 import zstandard
-from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
     Channel,
@@ -36,16 +36,23 @@ from mcap.records import (
 )
 
 from flightd.core.errors import InputError
+from flightd.runtime.mcap_scan import (
+    MAGIC,
+    DamagedRecordError,
+    RawRecord,
+    inner_records,
+    parse,
+    raw_records,
+    unpacked,
+)
 
-MAGIC = b"\x89MCAP0\r\n"
 CHUNK_BYTES = 1 << 20
 """A chunk is closed when it holds this much, or sooner by `flush`."""
 
 _LIBRARY = "flightd"
-_RECORD_HEAD = 9
-_MESSAGE = struct.Struct("<BQHIQQ")
-"""Opcode, length of what follows, channel, sequence, log time, publish time; then the payload."""
-_MESSAGE_FIELDS = _MESSAGE.size - _RECORD_HEAD
+_RECORD_HEAD = struct.Struct("<BQ")
+_MESSAGE_HEAD = struct.Struct("<HIQQ")
+"""Channel, sequence, log time, publish time; then the payload."""
 
 
 class McapFile:
@@ -232,67 +239,56 @@ class McapFile:
 
     def _recover(self) -> None:
         """Rebuild the index from the records on disk and drop what is not whole."""
-        records = self._records()
+        descriptor = self._stream.fileno()
+        size = os.fstat(descriptor).st_size
+        records = raw_records(lambda offset, length: os.pread(descriptor, length, offset), len(MAGIC), size)
         self._check_origin(next(records, None))
-        for offset, opcode, content in records:
-            stream = ReadDataStream(BytesIO(content))
-            if opcode == Opcode.DATA_END:
+        for record in records:
+            if record.opcode == Opcode.DATA_END:
                 break
-            self._end = offset + _RECORD_HEAD + len(content)
-            if opcode == Opcode.SCHEMA:
-                schema = Schema.read(stream)
-                self._schemas[schema.id] = schema
-            elif opcode == Opcode.CHANNEL:
-                channel = Channel.read(stream)
-                self._channels[channel.id] = channel
-            elif opcode == Opcode.METADATA:
-                name = Metadata.read(stream).name
-                self._metadata.append(MetadataIndex(offset, _RECORD_HEAD + len(content), name))
-            elif opcode == Opcode.CHUNK:
-                self._recover_chunk(offset, Chunk.read(stream))
+            self._end = record.end
+            with suppress(DamagedRecordError):  # it stays in the file but not in the index
+                self._recover_record(record)
         self._stream.truncate(self._end)
 
-    def _check_origin(self, first: tuple[int, int, bytes] | None) -> None:
+    def _check_origin(self, first: RawRecord | None) -> None:
         if first is None:
             self._begin()
             return
-        offset, opcode, content = first
-        if opcode != Opcode.HEADER or Header.read(ReadDataStream(BytesIO(content))).library != _LIBRARY:
-            raise InputError(
-                f"{self._stream.name}: written by another program; only flightd's logs are mended"
-            )
-        self._end = offset + _RECORD_HEAD + len(content)
+        with suppress(DamagedRecordError):
+            if first.opcode == Opcode.HEADER and parse(Header, first.content).library == _LIBRARY:
+                self._end = first.end
+                return
+        raise InputError(f"{self._stream.name}: written by another program; only flightd's logs are mended")
 
-    def _recover_chunk(self, offset: int, chunk: Chunk) -> None:
-        """Index a chunk anew (its message indexes may be cut off); a damaged one stays unindexed."""
-        try:
-            content = zstandard.decompress(chunk.data, chunk.uncompressed_size)
-        except zstandard.ZstdError:
-            return
-        if zlib.crc32(content) != chunk.uncompressed_crc:
-            return
-        entries = _message_offsets(content)
-        indexes, index = _indexes(chunk, entries, offset, self._end - offset)
+    def _recover_record(self, record: RawRecord) -> None:
+        if record.opcode == Opcode.SCHEMA:
+            schema = parse(Schema, record.content)
+            self._schemas[schema.id] = schema
+        elif record.opcode == Opcode.CHANNEL:
+            channel = parse(Channel, record.content)
+            self._channels[channel.id] = channel
+        elif record.opcode == Opcode.METADATA:
+            name = parse(Metadata, record.content).name
+            self._metadata.append(MetadataIndex(record.offset, record.end - record.offset, name))
+        elif record.opcode == Opcode.CHUNK:
+            self._recover_chunk(record)
+
+    def _recover_chunk(self, record: RawRecord) -> None:
+        """Index a chunk anew, for its message indexes may be cut off."""
+        chunk = parse(Chunk, record.content)
+        entries: _Entries = {}
+        for inner in inner_records(unpacked(chunk)):
+            if inner.opcode == Opcode.MESSAGE:
+                channel_id, _, stamp_ns, _ = _MESSAGE_HEAD.unpack_from(inner.content)
+                entries.setdefault(channel_id, []).append((stamp_ns, inner.offset))
+        indexes, index = _indexes(chunk, entries, record.offset, record.end - record.offset)
         if os.pread(self._stream.fileno(), len(indexes), self._end) == indexes:
             self._end += len(indexes)
         else:
             self._append(indexes)
         self._chunks.append(index)
         self._counts.update({channel: len(found) for channel, found in entries.items()})
-
-    def _records(self) -> Iterator[tuple[int, int, bytes]]:
-        """Offset, opcode and content of each whole record from the start of the file."""
-        descriptor = self._stream.fileno()
-        size = os.fstat(descriptor).st_size
-        offset = len(MAGIC)
-        while offset + _RECORD_HEAD <= size:
-            head = os.pread(descriptor, _RECORD_HEAD, offset)
-            length = int.from_bytes(head[1:], "little")
-            start = offset + _RECORD_HEAD
-            if start + length > size:
-                return
-            yield offset, head[0], os.pread(descriptor, length, start)
-            offset = start + length
 
 
 def repair(path: Path) -> None:
@@ -320,9 +316,8 @@ class _OpenChunk:
         self.last_ns = 0
 
     def add(self, channel_id: int, stamp_ns: int, payload: bytes) -> None:
-        head = _MESSAGE.pack(
-            Opcode.MESSAGE, _MESSAGE_FIELDS + len(payload), channel_id, 0, stamp_ns, stamp_ns
-        )
+        head = _RECORD_HEAD.pack(Opcode.MESSAGE, _MESSAGE_HEAD.size + len(payload))
+        head += _MESSAGE_HEAD.pack(channel_id, 0, stamp_ns, stamp_ns)
         self.index.setdefault(channel_id, []).append((stamp_ns, self.size))
         self._parts += (head, payload)
         self.size += len(head) + len(payload)
@@ -332,17 +327,6 @@ class _OpenChunk:
 
     def content(self) -> bytes:
         return b"".join(self._parts)
-
-
-def _message_offsets(content: bytes) -> _Entries:
-    entries: _Entries = {}
-    offset = 0
-    while offset < len(content):
-        opcode, length, channel_id, _, stamp_ns, _ = _MESSAGE.unpack_from(content, offset)
-        if opcode == Opcode.MESSAGE:
-            entries.setdefault(channel_id, []).append((stamp_ns, offset))
-        offset += _RECORD_HEAD + length
-    return entries
 
 
 def _indexes(chunk: Chunk, entries: _Entries, offset: int, length: int) -> tuple[bytes, ChunkIndex]:

@@ -121,6 +121,7 @@ class Flight:
     start_ns: int
     duration_s: float
     site: Site | None
+    map_error: str
     phases: tuple[PhaseSpan, ...]
     visits: tuple[Visit, ...]
     estimate: Track
@@ -178,13 +179,14 @@ def load_flight(path: Path) -> Flight:
 
     estimate = _estimate(log.messages(GridPose), seconds)
     truth = _truth(truths, seconds) if truths else None
-    site = _site(log)
+    site, map_error = _site(log)
     phases = tuple(_phase_spans(statuses, start_ns))
     return Flight(
         log=log,
         start_ns=start_ns,
         duration_s=max(0.0, (end_ns - start_ns) / NS_PER_S),
         site=site,
+        map_error=map_error,
         phases=phases,
         visits=tuple(_visits(statuses, start_ns, site, estimate, truth)),
         estimate=estimate,
@@ -243,9 +245,15 @@ def _summary(path: Path) -> Summary:
     return summary
 
 
-def _site(log: FlightLog) -> Site | None:
+def _site(log: FlightLog) -> tuple[Site | None, str]:
+    """The recorded map, or None and why it cannot be drawn: a report without it is worth having."""
     maps = log.messages(Document, Topic.MAP)
-    return parse_site(maps[-1].text, f"{log.path} (map)") if maps else None
+    if not maps:
+        return None, ""
+    try:
+        return parse_site(maps[-1].text, "the recorded map"), ""
+    except InputError as err:
+        return None, str(err)
 
 
 class _TruthSample(msgspec.Struct, frozen=True):

@@ -83,6 +83,7 @@ def _facts(flight: Flight) -> str:
             f"{flight.log.path.name}, {flight.log.damage}" if flight.log.damage else flight.log.path.name,
         ),
     ]
+    facts.append(("Map", flight.map_error))
     return "".join(
         element("div", element("dt", label), element("dd", text(value))) for label, value in facts if value
     )
