@@ -1,0 +1,264 @@
+"""The composition root: configuration -> adapters -> one TaskGroup.  The dataflow can be read here.
+
+camera -> latest slot -> detector processes -> tick (pilot) -> pump -> vehicle
+vehicle -> tick; tick -> recorder, observers
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+from flightd.adapters.camera.shared import SharedCamera
+from flightd.adapters.vehicle.connect import connect_vehicle
+from flightd.config.schema import Config
+from flightd.core.topics import Topic
+from flightd.core.types import AttitudeSetpoint, Command, Phase, Status
+from flightd.grid.site import Site
+from flightd.mission.plan import FlightPlan, make_plan
+from flightd.pilot import Pilot, TickInput, TickOutput
+from flightd.ports import Clock, Recorder, Vehicle
+from flightd.runtime.latency import LatencyBook
+from flightd.runtime.latest import Latest
+from flightd.runtime.pool import Detection, DetectorPool, Detectors
+from flightd.runtime.pump import SetpointPump
+from flightd.runtime.ring import FrameTicket
+from flightd.vision.detector import Detector
+
+TICK_S = 0.02
+_STATUS_NS = 100_000_000
+_OVER = {Phase.DONE, Phase.ABORTED, Phase.PILOT}
+_LINGER_NS = 1_500_000_000
+"""Time after the mission's end in which the vehicle is still watched (disarming)."""
+
+
+@dataclass(slots=True)
+class FlightResult:
+    """What the daemon itself knows of a flight when it is over."""
+
+    phase: Phase
+    reason: str
+    visited: tuple[str, ...]
+    planned: int
+    frames: int
+    frames_dropped: int
+    latency_ms: dict[str, float]
+    setpoint_interval_ms: dict[str, float] = field(default_factory=dict)
+
+
+def plan_of(config: Config, site: Site) -> FlightPlan:
+    """The flight plan that the configuration asks for, from the home pad and back."""
+    mission = config.mission
+    visits: Sequence[str] = mission.nodes or site.serpentine_route()
+    pad = site.home.node
+    return make_plan(site, visits, pad, pad, mission.heading, math.radians(mission.start_yaw_deg))
+
+
+def detector_pool(config: Config, clock: Clock) -> DetectorPool:
+    """Detector processes after the configuration; the colour profile is read here, so that a wrong one
+    is found before anything flies."""
+    camera, vision = config.camera, config.vision
+    lens = camera.lens() if camera.lens().is_distorted else None
+    Detector(vision.method, vision.profile, lens)
+    make = partial(Detector, vision.method, vision.profile, lens)
+    return DetectorPool(make, vision.workers, vision.timeout_s, clock)
+
+
+class Daemon:
+    """One flight of one vehicle.  `fly` runs until the mission is over."""
+
+    def __init__(
+        self,
+        config: Config,
+        site: Site,
+        clock: Clock,
+        detectors: Detectors,
+        recorder: Recorder | None = None,
+        observers: Sequence[Callable[[Status], None]] = (),
+    ) -> None:
+        self._config = config
+        self._clock = clock
+        self._detectors = detectors
+        self._recorder = recorder
+        self._observers = observers
+        self._pilot = Pilot(site, plan_of(config, site), config.mission.heading, config.pilot_params())
+        self._frames: Latest[FrameTicket] = Latest()
+        self._camera = SharedCamera(
+            config.camera.url,
+            (config.camera.width_px, config.camera.height_px),
+            config.camera.latency_s,
+            clock,
+            self._frames.put,
+        )
+        self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock)
+        self._pump = SetpointPump(self._vehicle, clock, self._sent, TICK_S)
+        self._latency = LatencyBook()
+        self._detections: list[Detection] = []
+        self._commands: list[Command] = []
+        self._lost = 0
+        self._newest_seq = -1
+        self._picture_ns = 0
+        self._status_ns = 0
+        self._last_phase: Phase | None = None
+        self._rate: list[int] = []
+
+    def command(self, command: Command) -> None:
+        """Hand an operator's order to the next tick."""
+        self._commands.append(command)
+
+    async def fly(self) -> FlightResult:
+        """Run everything until the mission is over; cancelled, the vehicle is handed back."""
+        async with asyncio.TaskGroup() as tasks:
+            services = [
+                tasks.create_task(self._vehicle.run(), name="vehicle"),
+                tasks.create_task(self._camera.run(), name="camera"),
+                tasks.create_task(self._pump.run(), name="pump"),
+                *(
+                    tasks.create_task(self._detect(), name=f"detect-{i}")
+                    for i in range(self._config.vision.workers)
+                ),
+            ]
+            output = await self._tick_until_over()
+            for service in services:
+                service.cancel()
+        return self._result(output)
+
+    async def _detect(self) -> None:
+        """One frame after the other, as many of these loops as there are detector processes."""
+        period_ns = round(1e9 / fps) if (fps := self._config.recorder.picture_fps) else 0
+        while True:
+            ticket = await self._frames.get()
+            keep = (
+                bool(period_ns)
+                and self._recorder is not None
+                and ticket.stamp_ns - self._picture_ns >= period_ns
+            )
+            if keep:
+                self._picture_ns = ticket.stamp_ns
+            detection = await self._detectors.detect(ticket, keep)
+            if detection is None:
+                self._lost += 1
+                continue
+            if detection.jpeg is not None and self._recorder is not None:
+                self._recorder.image(Topic.FRAME, ticket.stamp_ns, ticket.seq, detection.jpeg)
+            self._detections.append(detection)
+
+    async def _tick_until_over(self) -> TickOutput:
+        """The control tick, at a fixed rate."""
+        clock = self._clock
+        due_ns = clock.now_ns()
+        over_ns: int | None = None
+        while True:
+            due_ns += round(TICK_S * 1e9)
+            await asyncio.sleep((due_ns - clock.now_ns()) * 1e-9)
+            now_ns = clock.now_ns()
+            due_ns = max(due_ns, now_ns - round(TICK_S * 1e9))  # late: leave ticks out, never bunch them
+            output = self._tick(now_ns)
+            if output.phase not in _OVER:
+                continue
+            over_ns = over_ns or now_ns
+            state = self._vehicle.state()
+            down = state is None or not state.armed
+            if down and now_ns - over_ns > _LINGER_NS:
+                return output
+
+    def _tick(self, now_ns: int) -> TickOutput:
+        detections = self._fresh()
+        commands, self._commands = self._commands, []
+        tick = TickInput(
+            now_ns,
+            tuple(d.lines for d in detections),
+            self._vehicle.state(),
+            tuple(self._vehicle.attitudes()),
+            tuple(commands),
+        )
+        for detection in detections:
+            self._latency.taken(detection, now_ns)
+        output = self._pilot.step(tick)
+        self._vehicle.demand(output.demand)
+        self._pump.set(output.setpoint)
+        if output.setpoint is None:
+            self._latency.forget()
+        for event in output.events:
+            self._vehicle.notify(event)
+        self._tell(tick, output)
+        return output
+
+    def _fresh(self) -> list[Detection]:
+        """Detections since the last tick in the order of their frames; one overtaken is dropped."""
+        arrived, self._detections = sorted(self._detections, key=lambda d: d.ticket.seq), []
+        fresh = [d for d in arrived if d.ticket.seq > self._newest_seq]
+        self._lost += len(arrived) - len(fresh)
+        if fresh:
+            self._newest_seq = fresh[-1].ticket.seq
+        return fresh
+
+    def _sent(self, setpoint: AttitudeSetpoint, now_ns: int) -> None:
+        self._latency.sent(now_ns)
+        if self._recorder is not None:
+            self._recorder.record(Topic.SETPOINT, setpoint.stamp_ns, setpoint)
+
+    def _tell(self, tick: TickInput, output: TickOutput) -> None:
+        """Record what came in and went out; status ten times a second and at each change of phase."""
+        now_ns, recorder = tick.now_ns, self._recorder
+        if recorder is not None:
+            for lines in tick.lines:
+                recorder.record(Topic.LINES, lines.stamp_ns, lines)
+            if tick.vehicle is not None:
+                recorder.record(Topic.VEHICLE, now_ns, tick.vehicle)
+            if output.pose is not None:
+                recorder.record(Topic.POSE, now_ns, output.pose)
+            for command in tick.commands:
+                recorder.record(Topic.COMMAND, now_ns, command)
+            for event in output.events:
+                recorder.record(Topic.EVENT, event.stamp_ns, event)
+        self._rate = [stamp for stamp in self._rate if now_ns - stamp < 10**9]
+        self._rate.extend([now_ns] * len(tick.lines))
+        if now_ns - self._status_ns < _STATUS_NS and output.phase is self._last_phase:
+            return
+        self._status_ns, self._last_phase = now_ns, output.phase
+        status = self._status(tick, output)
+        if recorder is not None:
+            recorder.record(Topic.STATUS, now_ns, status)
+        for observer in self._observers:
+            observer(status)
+
+    def _status(self, tick: TickInput, output: TickOutput) -> Status:
+        vehicle = tick.vehicle
+        return Status(
+            stamp_ns=tick.now_ns,
+            phase=output.phase,
+            reason=output.reason,
+            node=output.pose.node if output.pose else "",
+            goal=output.goal,
+            nodes_done=output.visited,
+            nodes_planned=output.planned,
+            battery_frac=vehicle.battery_frac if vehicle else 0.0,
+            height_m=output.pose.height_m if output.pose else 0.0,
+            frames=self._camera.frames,
+            frames_dropped=self._frames.dropped + self._lost,
+            fps=float(len(self._rate)),
+            latency_ms=dict(self._latency.newest),
+        )
+
+    def _result(self, output: TickOutput) -> FlightResult:
+        intervals = sorted(self._pump.intervals_ns)
+        quantile = {
+            name: round(intervals[min(int(share * len(intervals)), len(intervals) - 1)] * 1e-6, 2)
+            if intervals
+            else 0.0
+            for name, share in (("p50", 0.5), ("p99", 0.99), ("max", 1.0))
+        }
+        return FlightResult(
+            phase=output.phase,
+            reason=output.reason,
+            visited=tuple(self._pilot.mission.visited),
+            planned=output.planned,
+            frames=self._camera.frames,
+            frames_dropped=self._frames.dropped + self._lost,
+            latency_ms=self._latency.quantiles_ms(),
+            setpoint_interval_ms=quantile,
+        )

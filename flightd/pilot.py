@@ -42,7 +42,7 @@ class PilotParams:
     gains: FlightGains
     limits: Limits
     mission: MissionParams
-    max_sigma_m: float = 0.6
+    max_sigma_m: float = 1.0
     start_sigma_m: float = 0.15
 
 

@@ -10,13 +10,14 @@ import sys
 import typer
 
 from flightd import __version__
-from flightd.cli import report, vision
+from flightd.cli import report, sim, vision
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
 )
 vision.register(app)
+sim.register(app)
 report.register(app)
 
 

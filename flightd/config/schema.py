@@ -105,7 +105,7 @@ class ControlConfig(_Section):
     """Loops and limits; the limits have the last word before the wire."""
 
     horizontal: PidConfig = Field(
-        PidConfig(kp=2.2, ki=0.5, kd=2.6, integral_limit=0.8, output_limit=1.7), description="m/s^2 per m"
+        PidConfig(kp=6.5, ki=3.3, kd=4.4, integral_limit=0.8, output_limit=1.7), description="m/s^2 per m"
     )
     yaw: PidConfig = Field(
         PidConfig(kp=1.5, ki=0.1, kd=0.1, integral_limit=0.1, output_limit=0.8), description="rad/s per rad"
@@ -221,28 +221,32 @@ class Config(_Section):
 
 def load_config(path: Path) -> Config:
     """Read and check a configuration file.  Raises InputError naming the file, the key and the remedy."""
+    return parse_config(load_table(path), path)
+
+
+def load_table(path: Path) -> dict[str, Any]:
+    """The file as it is, unchecked."""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as err:
         raise InputError(f"config {path}: {err.strerror}; give the path of a TOML file") from err
     except UnicodeDecodeError as err:
         raise InputError(f"config {path}: not UTF-8 text") from err
     except tomllib.TOMLDecodeError as err:
         raise InputError(f"config {path}: not TOML: {err}") from err
-    config = parse_config(table, str(path))
-    site = (path.parent / config.mission.site).resolve()
-    return config.model_copy(update={"mission": config.mission.model_copy(update={"site": site})})
 
 
-def parse_config(table: dict[str, Any], name: str) -> Config:
-    """Check a table that was read from `name`."""
+def parse_config(table: dict[str, Any], path: Path) -> Config:
+    """Check a table that was read from `path`; relative paths in it are taken from there."""
     try:
-        return Config.model_validate(table)
+        config = Config.model_validate(table)
     except ValidationError as err:
         first = err.errors()[0]
         key = ".".join(str(part) for part in first["loc"]) or "(top level)"
         more = f" (and {len(err.errors()) - 1} more)" if len(err.errors()) > 1 else ""
-        raise InputError(f"config {name}: {key}: {_remedy(first['type'], first['msg'])}{more}") from err
+        raise InputError(f"config {path}: {key}: {_remedy(first['type'], first['msg'])}{more}") from err
+    site = (path.parent / config.mission.site).resolve()
+    return config.model_copy(update={"mission": config.mission.model_copy(update={"site": site})})
 
 
 def _remedy(kind: str, message: str) -> str:

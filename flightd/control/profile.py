@@ -23,15 +23,16 @@ class Profile:
 
     def step(self, target: float, dt_s: float) -> None:
         """Advance by `dt_s` towards `target`."""
-        distance = target - self.position
-        # half of a step ahead, so that the stop in discrete time does not overshoot
-        reach = max(abs(distance) - 0.5 * abs(self.velocity) * dt_s, 0.0)
-        wanted = math.copysign(min(self._max_speed, math.sqrt(2.0 * self._max_accel * reach)), distance)
-        change = min(max(wanted - self.velocity, -self._max_accel * dt_s), self._max_accel * dt_s)
-        velocity = self.velocity + change
-        if abs(distance) <= abs(velocity) * dt_s and abs(velocity) <= 2.0 * self._max_accel * dt_s:
+        a, distance = self._max_accel, target - self.position
+        if abs(distance) <= 0.5 * a * dt_s * dt_s and abs(self.velocity) <= a * dt_s:
             self.position, velocity = target, 0.0
         else:
+            # the speed from which, after this step, the stop at `a` just ends at the target
+            towards = math.copysign(1.0, distance)
+            left = max(abs(distance) - 0.5 * towards * self.velocity * dt_s, 0.0)
+            stop = a * (math.sqrt(0.25 * dt_s * dt_s + 2.0 * left / a) - 0.5 * dt_s)
+            wanted = towards * min(self._max_speed, stop)
+            velocity = self.velocity + min(max(wanted - self.velocity, -a * dt_s), a * dt_s)
             self.position += 0.5 * (self.velocity + velocity) * dt_s
         self.acceleration = (velocity - self.velocity) / dt_s
         self.velocity = velocity

@@ -143,8 +143,8 @@ class VehicleState:
     """The newest that the vehicle told, each group with its own time.
 
     `in_control` says that the autopilot is in the mode in which it obeys our setpoints (or, while LAND
-    is demanded, in its landing mode) *and* that we asked for that mode: False means hands off.  `height_m` is above the floor below, along the
-    vertical; NaN when no range finder speaks.
+    is demanded, in its landing mode) *and* that we asked for that mode: False means hands off.
+    `height_m` is above the floor below, along the vertical; NaN when no range finder speaks.
     """
 
     attitude: Attitude

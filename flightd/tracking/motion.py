@@ -22,7 +22,7 @@ _GATE_SIGMAS = 4.0
 class MotionNoise:
     """What the model does not know, as densities (per square root of a second) and starting sigmas."""
 
-    accel_mps2: float = 0.35
+    accel_mps2: float = 0.2
     disturbance_mps2: float = 0.15
     drag_per_s: float = 0.25
     start_velocity_mps: float = 0.3

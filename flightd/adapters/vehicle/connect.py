@@ -1,0 +1,16 @@
+"""The adapter for the vehicle that the configuration names."""
+
+from __future__ import annotations
+
+from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
+from flightd.config.schema import VehicleConfig
+from flightd.core.errors import InputError
+from flightd.ports import Clock, Vehicle
+
+
+def connect_vehicle(config: VehicleConfig, clock: Clock) -> Vehicle:
+    """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address."""
+    match config.kind:
+        case "ardupilot":
+            return ArduPilotVehicle(config.url, clock, config.system_id)
+    raise InputError(f"vehicle.kind {config.kind}: no such adapter")

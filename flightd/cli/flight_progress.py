@@ -1,0 +1,60 @@
+"""A live view of a flight in the terminal: phase, node, battery, frame rate, latency."""
+
+from __future__ import annotations
+
+import sys
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+from flightd.core.types import Status
+
+_PLAIN_NS = 10_000_000_000
+
+
+class FlightProgress:
+    """Shows each status it is called with: a bar on a terminal, a line now and then elsewhere."""
+
+    def __init__(self, shown: bool) -> None:
+        self._shown = shown
+        self._live = shown and sys.stderr.isatty()
+        self._progress = Progress(
+            TextColumn("{task.description:<9}"),
+            BarColumn(bar_width=24),
+            TextColumn("{task.completed:.0f}/{task.total:.0f} nodes  {task.fields[detail]}"),
+            TimeElapsedColumn(),
+            console=Console(stderr=True),
+            disable=not self._live,
+        )
+        self._task: TaskID | None = None
+        self._plain_ns = 0
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.stop()
+
+    def __call__(self, status: Status) -> None:
+        if not self._shown:
+            return
+        detail = (
+            f"at {status.node or '-':<4} to {status.goal:<4} {status.height_m:4.1f} m  "
+            f"battery {status.battery_frac:4.0%}  {status.fps:3.0f} fps  "
+            f"latency {status.latency_ms.get('total', 0.0):3.0f} ms"
+        )
+        if not self._live:
+            if status.stamp_ns - self._plain_ns >= _PLAIN_NS:
+                self._plain_ns = status.stamp_ns
+                print(
+                    f"{status.phase:<9} {status.nodes_done}/{status.nodes_planned} nodes  {detail}",
+                    file=sys.stderr,
+                )
+            return
+        if self._task is None:
+            self._task = self._progress.add_task("", total=max(status.nodes_planned, 1), detail="")
+        self._progress.update(
+            self._task, completed=status.nodes_done, description=status.phase.value, detail=detail
+        )

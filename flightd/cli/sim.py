@@ -1,0 +1,242 @@
+"""`flightd sim`: a whole mission in the simulator, with its report."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from flightd.core.errors import InputError, RunError
+
+EXAMPLES = """Examples:
+
+  flightd sim                                  the demo site, one flight in lockstep
+  flightd sim --seed 7 --json                  the summary as JSON
+  flightd sim --speed 1                        in real time, over UDP between processes
+  flightd sim --warehouse configs/site-large.toml --out /tmp/large
+  flightd sim --set mission.heading=shelf --set control.tilt_compensation=none
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Hang the command under `app`."""
+    app.command("sim", epilog=EXAMPLES)(sim)
+
+
+def sim(
+    config: Annotated[
+        Path | None, typer.Option(help="Configuration file (default: configs/sim.toml).")
+    ] = None,
+    warehouse: Annotated[
+        str | None, typer.Option(help="Site file, or random:SEED for a random site.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of wind, sensors, floor and camera.", min=0)] = 1,
+    vehicle: Annotated[str, typer.Option(help="ardupilot.")] = "ardupilot",
+    speed: Annotated[str, typer.Option(help="max (lockstep), or a multiple of real time.")] = "max",
+    scenario: Annotated[list[Path] | None, typer.Option(help="Scenario file.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for log, report and summary.")] = Path("out/sim"),
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="KEY=VALUE over the configuration.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print summary.json and nothing else.")] = False,
+) -> None:
+    """Fly a whole mission in the simulator and leave its log, report and summary."""
+    from flightd.cli.flight_progress import FlightProgress
+    from flightd.cli.simulate import Simulation, fly
+
+    factor = _factor(speed)
+    chosen, site = _configured(config, warehouse, vehicle, settings or [])
+    conditions = _scenario(scenario or [])
+    chosen = _camera_of(chosen, conditions)
+    _make_folder(out)
+    started = time.monotonic()
+    with FlightProgress(shown=not as_json) as progress:
+        simulation = Simulation(chosen, site, conditions, seed, factor, out, progress)
+        result = fly(simulation)
+    summary = _summary(simulation, result, time.monotonic() - started)
+    (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    _write_inventory(out / "inventory.csv", result.visited)
+    report = _report(simulation)
+    if as_json:
+        print(json.dumps(summary, indent=2))
+    else:
+        _print_summary(summary, report)
+    if summary["mission"] != "completed":
+        raise RunError(f"mission aborted: {summary['reason']}")
+
+
+def _factor(speed: str) -> float | None:
+    if speed == "max":
+        return None
+    try:
+        factor = float(speed)
+    except ValueError:
+        factor = 0.0
+    if not 0.05 <= factor <= 50:
+        raise InputError(f"--speed {speed}: expected max, or a factor between 0.05 and 50")
+    return factor
+
+
+def _configured(
+    path: Path | None, warehouse: str | None, vehicle: str, settings: Sequence[str]
+) -> tuple[Any, Any]:
+    """Configuration and site, with the command's own options laid over the file."""
+    from flightd.config.paths import shipped
+    from flightd.config.schema import load_table, parse_config
+    from flightd.config.site_file import load_site
+    from flightd.sim.sites import random_site
+
+    path = path or shipped("sim.toml")
+    table = load_table(path)
+    _lay(table, "vehicle.kind", vehicle)
+    for setting in settings:
+        key, equals, value = setting.partition("=")
+        if not equals:
+            raise InputError(f"--set {setting}: expected KEY=VALUE, for example mission.heading=shelf")
+        _lay(table, key, _value(value))
+    config = parse_config(table, path)
+    if warehouse and warehouse.startswith("random:"):
+        number = warehouse.removeprefix("random:")
+        if not number.isdigit():
+            raise InputError(f"--warehouse {warehouse}: expected random:SEED, for example random:7")
+        return config, random_site(int(number))
+    return config, load_site(Path(warehouse) if warehouse else config.mission.site)
+
+
+def _lay(table: dict[str, Any], key: str, value: object) -> None:
+    *sections, name = key.split(".")
+    for section in sections:
+        table = table.setdefault(section, {})
+        if not isinstance(table, dict):
+            raise InputError(f"--set {key}: {section} is not a section")
+    table[name] = value
+
+
+def _value(text: str) -> object:
+    """A TOML value; bare words are text."""
+    import tomllib
+
+    try:
+        return tomllib.loads(f"v = {text}")["v"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _scenario(paths: Sequence[Path]) -> Any:
+    from flightd.sim.scenario import Scenario, load_scenario
+
+    if len(paths) > 1:
+        raise InputError("--scenario: give one file")
+    return load_scenario(paths[0]) if paths else Scenario()
+
+
+def _camera_of(config: Any, scenario: Any) -> Any:
+    """The daemon's calibration of the simulated camera."""
+    lens = scenario.camera.camera().lens
+    camera = config.camera.model_copy(
+        update={
+            "width_px": lens.width_px,
+            "height_px": lens.height_px,
+            "fx_px": lens.fx_px,
+            "fy_px": lens.fy_px,
+            "cx_px": lens.cx_px,
+            "cy_px": lens.cy_px,
+            "distortion": lens.distortion,
+            "latency_s": scenario.camera.capture_delay_s,
+        }
+    )
+    return config.model_copy(update={"camera": camera})
+
+
+def _make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "summary.json").unlink(missing_ok=True)
+    except OSError as err:
+        raise InputError(f"--out {out}: {err.strerror}; give a folder that can be written") from err
+
+
+def _summary(simulation: Any, result: Any, wall_s: float) -> dict[str, Any]:
+    from flightd.app import plan_of
+    from flightd.core.topics import Topic
+    from flightd.core.types import Event, Status
+    from flightd.replay.log import read_log
+    from flightd.sim.kinematics import Kinematics
+    from flightd.sim.score import as_summary, score
+
+    flight = read_log(simulation.flight_log, {Topic.STATUS, Topic.EVENT})
+    truth = read_log(simulation.truth_log, {Topic.TRUTH}).entries
+    measured = score(
+        simulation.site,
+        plan_of(simulation.config, simulation.site),
+        flight.messages(Status),
+        flight.messages(Event),
+        [Kinematics(**entry.message) for entry in truth if isinstance(entry.message, dict)],
+    )
+    return {
+        **as_summary(measured),
+        "codes_expected": 0,
+        "codes_read": 0,
+        "codes_wrong": 0,
+        "frames": result.frames,
+        "frames_dropped": result.frames_dropped,
+        "latency_ms": result.latency_ms,
+        "setpoint_interval_ms": result.setpoint_interval_ms,
+        "wall_time_s": round(wall_s, 2),
+        "seed": simulation.seed,
+        "vehicle": simulation.config.vehicle.kind,
+    }
+
+
+def _write_inventory(path: Path, visited: Sequence[str]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file)
+        rows.writerow(["node", "visit", "code"])
+        rows.writerows([node, i, ""] for i, node in enumerate(visited, start=1))
+
+
+def _report(simulation: Any) -> Path:
+    from flightd.replay.report.page import write_report
+
+    path: Path = simulation.folder / "report.html"
+    write_report(simulation.flight_log, path)
+    return path
+
+
+def _print_summary(summary: dict[str, Any], report: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    def metres(key: str) -> str:
+        value = summary[key]
+        return "-" if value is None else f"{value * 100:.1f} cm"
+
+    table = Table(
+        title=f"Mission {summary['mission']}: {summary['reason']}", show_header=False, title_justify="left"
+    )
+    simulated, wall = summary["flight_time_s"], summary["wall_time_s"]
+    rows = [
+        (
+            "nodes visited",
+            f"{summary['nodes_visited']} of {summary['nodes_planned']}, {summary['nodes_miscounted']} wrong",
+        ),
+        ("off the line, rms", metres("cross_track_rms_m")),
+        ("hover error, p95", metres("hover_error_p95_m")),
+        ("landing error", metres("landed_error_m")),
+        ("flight time", f"{simulated:.0f} s in {wall:.0f} s ({simulated / max(wall, 1e-9):.1f} x)"),
+        ("frames", f"{summary['frames']}, {summary['frames_dropped']} dropped"),
+        (
+            "exposure to set point",
+            f"{summary['latency_ms']['p50']:.0f} ms, p99 {summary['latency_ms']['p99']:.0f} ms",
+        ),
+        ("report", str(report)),
+    ]
+    for name, value in rows:
+        table.add_row(name, value)
+    Console(file=sys.stdout).print(table)

@@ -1,0 +1,199 @@
+"""A simulated flight: the world's peers and the daemon, put together in one of two ways.
+
+In lockstep both share one event loop on virtual time, one process, real loopback sockets: repeatable and
+as fast as the machine goes.  In real time the world is a process of its own and time runs by the clock,
+or a multiple of it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import multiprocessing
+import signal
+import socket
+from collections.abc import Callable, Coroutine
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from flightd.adapters.recorder.recorder import Recorder
+from flightd.app import Daemon, FlightResult, detector_pool, plan_of
+from flightd.config.schema import Config
+from flightd.config.site_file import site_toml
+from flightd.core.errors import RunError, UnavailableError
+from flightd.core.topics import Document, Topic
+from flightd.core.types import Status
+from flightd.grid.site import Site
+from flightd.runtime.clock import LoopClock
+from flightd.runtime.loops import ScaledLoop, VirtualLoop
+from flightd.sim.lockstep import LockstepDetectors
+from flightd.sim.scenario import Scenario
+from flightd.sim.world import World, WorldSpec
+
+DETECTION_S = 0.008
+"""Modelled time of a detection in lockstep: what a companion computer needs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """One simulated flight to be flown; `speed` None is lockstep."""
+
+    config: Config
+    site: Site
+    scenario: Scenario
+    seed: int
+    speed: float | None
+    folder: Path
+    observer: Callable[[Status], None] = lambda _: None
+
+    @property
+    def flight_log(self) -> Path:
+        return self.folder / "flight.mcap"
+
+    @property
+    def truth_log(self) -> Path:
+        return self.folder / "truth.mcap"
+
+
+def fly(simulation: Simulation) -> FlightResult:
+    """Fly it and leave `flight.mcap` and `truth.mcap` in the folder."""
+    if simulation.speed is None:
+        with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+            return runner.run(_lockstep(simulation))
+    factor = simulation.speed
+    with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
+        return runner.run(_real_time(simulation, factor))
+
+
+async def _lockstep(simulation: Simulation) -> FlightResult:
+    clock = LoopClock()
+    with ExitStack() as stack:
+        recorder = stack.enter_context(_flight_recorder(simulation, lossless=True))
+        truth = stack.enter_context(Recorder(simulation.truth_log, lossless=True))
+        pool = stack.enter_context(detector_pool(simulation.config, clock))
+        camera_port = free_port()
+        world = World(_spec(simulation, camera_port, 0), clock, truth)
+        host, port = await world.open()
+        config = _connected(simulation.config, f"udpout://{host}:{port}", camera_port)
+        await pool.ready()
+        daemon = Daemon(
+            config,
+            simulation.site,
+            clock,
+            LockstepDetectors(pool, clock, DETECTION_S),
+            recorder,
+            [simulation.observer],
+        )
+        running = asyncio.ensure_future(world.run())
+        try:
+            return await _within_limit(simulation, daemon, running)
+        finally:
+            running.cancel()
+            await asyncio.wait([running])
+
+
+async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
+    clock = LoopClock()
+    vehicle_port, camera_port = free_port(), free_port()
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    spec = _spec(simulation, camera_port, vehicle_port)
+    process = context.Process(
+        target=_run_world, args=(spec, factor, simulation.truth_log, theirs), name="world"
+    )
+    with ExitStack() as stack:
+        recorder = stack.enter_context(_flight_recorder(simulation, lossless=False))
+        process.start()
+        theirs.close()
+        stack.callback(process.join, 15.0)
+        stack.callback(ours.close)  # the world ends when its pipe closes, however this process ends
+        pool = stack.enter_context(detector_pool(simulation.config, clock))
+        await pool.ready()
+        config = _connected(simulation.config, f"udpout://127.0.0.1:{vehicle_port}", camera_port)
+        daemon = Daemon(config, simulation.site, clock, pool, recorder, [simulation.observer])
+        recording = asyncio.ensure_future(recorder.run())
+        try:
+            return await _within_limit(simulation, daemon, recording)
+        finally:
+            recording.cancel()
+
+
+async def _within_limit(simulation: Simulation, daemon: Daemon, beside: asyncio.Future[None]) -> FlightResult:
+    """The flight, unless it takes far longer than its plan can, or what runs beside it fails."""
+    limit_s = 120.0 + 60.0 * (len(plan_of(simulation.config, simulation.site).stops) + 1)
+    flight = asyncio.ensure_future(daemon.fly())
+    async with asyncio.timeout(limit_s):
+        parts: list[asyncio.Future[Any]] = [flight, beside]
+        await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED)
+        if flight.done():
+            return flight.result()
+        flight.cancel()
+        await asyncio.wait([flight])
+        beside.result()
+        raise RunError("the simulated world ended before the flight")
+
+
+def _run_world(spec: WorldSpec, factor: float, log: Path, pipe: Connection) -> None:
+    """The world's process: lives until the other end of `pipe` closes."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    async def main() -> None:
+        closed = asyncio.Event()
+        asyncio.get_running_loop().add_reader(pipe.fileno(), closed.set)
+        with Recorder(log) as recorder:
+            world = World(spec, LoopClock(), recorder)
+            parts: tuple[Coroutine[Any, Any, Any], ...] = (world.run(), recorder.run(), closed.wait())
+            tasks = [asyncio.ensure_future(part) for part in parts]
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in tasks:
+                task.cancel()
+            await asyncio.wait(tasks)
+
+    with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
+        runner.run(main())
+
+
+def _flight_recorder(simulation: Simulation, lossless: bool) -> Recorder:
+    recorder = Recorder(simulation.flight_log, lossless=lossless)
+    recorder.record(Topic.MAP, 0, Document(site_toml(simulation.site)))
+    recorder.record(Topic.CONFIG, 0, Document(simulation.config.model_dump_json(indent=1)))
+    recorder.record(Topic.SCENARIO, 0, Document(simulation.scenario.model_dump_json(indent=1)))
+    return recorder
+
+
+def _spec(simulation: Simulation, camera_port: int, vehicle_port: int) -> WorldSpec:
+    scenario = simulation.scenario
+    return WorldSpec(
+        site=simulation.site,
+        seed=simulation.seed,
+        camera_address=("127.0.0.1", camera_port),
+        vehicle_port=vehicle_port,
+        start_yaw_rad=math.radians(simulation.config.mission.start_yaw_deg),
+        camera=replace(scenario.camera.camera(), mount=simulation.config.camera.mount()),
+        appearance=scenario.floor.look(),
+        draught=scenario.wind.draught(),
+        battery_frac=scenario.vehicle.battery,
+    )
+
+
+def _connected(config: Config, vehicle_url: str, camera_port: int) -> Config:
+    """The configuration with the addresses of this simulation's peers."""
+    return config.model_copy(
+        update={
+            "vehicle": config.vehicle.model_copy(update={"url": vehicle_url}),
+            "camera": config.camera.model_copy(update={"url": f"udp://127.0.0.1:{camera_port}"}),
+        }
+    )
+
+
+def free_port() -> int:
+    """A UDP port of the loopback interface that nobody uses now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("127.0.0.1", 0))
+        except OSError as err:
+            raise UnavailableError(f"no free UDP port on 127.0.0.1: {err.strerror}") from err
+        return int(probe.getsockname()[1])

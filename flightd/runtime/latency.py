@@ -1,0 +1,63 @@
+"""How long each frame took, stage by stage, from mid-exposure to the set point on the wire."""
+
+from __future__ import annotations
+
+from collections import deque
+from itertools import pairwise
+
+import numpy as np
+
+from flightd.runtime.pool import Detection
+
+_KEEP = 200_000
+
+
+class LatencyBook:
+    """Follows frames: `taken` when a tick used their lines, `sent` when its set point was on the wire."""
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[Detection, int]] = []
+        self._totals_ms: deque[float] = deque(maxlen=_KEEP)
+        self._transports_ms: deque[float] = deque(maxlen=_KEEP)
+        self.newest: dict[str, float] = {}
+
+    def taken(self, detection: Detection, now_ns: int) -> None:
+        """The tick at `now_ns` used these lines."""
+        self._waiting.append((detection, now_ns))
+
+    def sent(self, now_ns: int) -> None:
+        """The set point of that tick left at `now_ns`."""
+        for detection, taken_ns in self._waiting:
+            ticket = detection.ticket
+            marks = (
+                ticket.stamp_ns,
+                ticket.arrival_ns,
+                detection.started_ns,
+                detection.finished_ns,
+                taken_ns,
+                now_ns,
+            )
+            capture, transport, detect, track, wire = ((b - a) * 1e-6 for a, b in pairwise(marks))
+            total = (now_ns - ticket.stamp_ns) * 1e-6
+            self.newest = {
+                "capture": capture,
+                "transport": transport,
+                "detection": detect,
+                "track": track,
+                "wire": wire,
+                "total": total,
+            }
+            self._totals_ms.append(total)
+            self._transports_ms.append(transport)
+        self._waiting.clear()
+
+    def forget(self) -> None:
+        """No set point goes out (not flying): the frames in waiting count for nothing."""
+        self._waiting.clear()
+
+    def quantiles_ms(self) -> dict[str, float]:
+        """p50 and p99 of the whole way, rounded to a hundredth; zeros before any frame was flown by."""
+        if not self._totals_ms:
+            return {"p50": 0.0, "p99": 0.0}
+        p50, p99 = np.percentile(np.array(self._totals_ms), [50, 99])
+        return {"p50": round(float(p50), 2), "p99": round(float(p99), 2)}

@@ -1,0 +1,129 @@
+"""The simulated down camera: a peer that renders into shared memory and tells of each picture by UDP.
+
+It exposes at its own rate, renders in a process of its own and delivers after the capture delay, with
+jitter, as a real camera and its driver do.  Its clock is not the daemon's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import random
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from flightd.core.errors import TransientError
+from flightd.grid.site import Site
+from flightd.ports import Clock
+from flightd.runtime.child import Child
+from flightd.runtime.notice import FrameNotice, encode_notice
+from flightd.runtime.ring import FrameRing
+from flightd.sim.kinematics import Kinematics
+from flightd.sim.renderer import Appearance, Renderer, SimCamera
+
+_SLOTS = 12
+_CLOCK_OFFSET_NS = 7_300_000_000_000
+
+
+class _RenderWorker:
+    """Inside the process: answers (kinematics, seq, slot) by rendering into the ring."""
+
+    def __init__(self, site: Site, camera: SimCamera, appearance: Appearance, seed: int, ring: str) -> None:
+        self._renderer = Renderer(site, camera, appearance, seed)
+        self._ring = FrameRing.attach(ring, _SLOTS, camera.lens.width_px, camera.lens.height_px)
+
+    def __call__(self, request: tuple[Kinematics, int, int]) -> int:
+        kinematics, seq, slot = request
+        self._renderer.render(kinematics, seq, out=self._ring.pixels(slot))
+        return seq
+
+
+class CameraPeer:
+    """Sends pictures of what `truth_at` says to the daemon at `address` until cancelled."""
+
+    def __init__(
+        self,
+        site: Site,
+        camera: SimCamera,
+        appearance: Appearance,
+        seed: int,
+        address: tuple[str, int],
+        truth_at: Callable[[int], Kinematics],
+        clock: Clock,
+    ) -> None:
+        self._camera = camera
+        self._address = address
+        self._truth_at = truth_at
+        self._clock = clock
+        self._random = random.Random(f"camera {seed}")
+        self._ring = FrameRing.create(_SLOTS, camera.lens.width_px, camera.lens.height_px)
+        self._make = partial(_RenderWorker, site, camera, appearance, seed, self._ring.name)
+        self._ready = asyncio.Event()
+        self._turn = asyncio.Lock()
+        self.late = 0
+
+    async def run(self) -> None:
+        loop = asyncio.get_running_loop()
+        transport, _ = await loop.create_datagram_endpoint(
+            asyncio.DatagramProtocol, remote_addr=self._address
+        )
+        child = Child(self._make, lambda _: self._ready.set(), lambda _: None)
+        try:
+            with self._clock.hold():
+                await self._ready.wait()
+            async with asyncio.TaskGroup() as pictures:
+                await self._expose(child, transport, pictures)
+        finally:
+            child.kill()
+            child.join(1.0)
+            transport.close()
+            self._ring.close()
+
+    async def _expose(self, child: Child, transport: Any, pictures: asyncio.TaskGroup) -> None:
+        """Take a picture each period; each is rendered and delivered by a task of its own."""
+        period_ns = round(1e9 / self._camera.fps)
+        exposure_ns = self._clock.now_ns()
+        seq = 0
+        while True:
+            exposure_ns += period_ns
+            behind_ns = self._clock.now_ns() - exposure_ns
+            if behind_ns > 4 * period_ns:  # the machine cannot keep up: the camera skips, it does not queue
+                missed = behind_ns // period_ns
+                exposure_ns += missed * period_ns
+                seq += missed
+                self.late += missed
+            await asyncio.sleep(max((exposure_ns - self._clock.now_ns()) * 1e-9, 0.0))
+            jitter_s = self._random.random() * self._camera.jitter_s
+            due_ns = exposure_ns + round((self._camera.capture_delay_s + jitter_s) * 1e9)
+            pictures.create_task(self._deliver(child, transport, self._truth_at(exposure_ns), seq, due_ns))
+            seq += 1
+
+    async def _deliver(self, child: Child, transport: Any, truth: Kinematics, seq: int, due_ns: int) -> None:
+        rendering = asyncio.ensure_future(self._render(child, truth, seq))
+        try:
+            await asyncio.sleep((due_ns - self._clock.now_ns()) * 1e-9)
+            with self._clock.hold():
+                slot = await rendering
+        except TransientError:
+            self.late += 1
+            return
+        finally:
+            rendering.cancel()
+        lens = self._camera.lens
+        notice = FrameNotice(
+            self._ring.name,
+            _SLOTS,
+            slot,
+            seq,
+            truth.stamp_ns + _CLOCK_OFFSET_NS,
+            lens.width_px,
+            lens.height_px,
+        )
+        transport.sendto(encode_notice(notice))
+
+    async def _render(self, child: Child, truth: Kinematics, seq: int) -> int:
+        async with self._turn:
+            slot = self._ring.begin(seq)
+            await child.ask((truth, seq, slot))
+            self._ring.publish(slot, seq, truth.stamp_ns)
+            return slot

@@ -1,0 +1,35 @@
+"""Detection in lockstep with virtual time: the real processes, a modelled time."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+
+from flightd.ports import Clock
+from flightd.runtime.pool import Detection, Detectors
+from flightd.runtime.ring import FrameTicket
+
+
+class LockstepDetectors:
+    """Answers `latency_s` of virtual time after it was asked, whenever the process really was done.
+
+    The work goes on in parallel with virtual time; only at the end time stands still for it, if need be.
+    """
+
+    def __init__(self, inner: Detectors, clock: Clock, latency_s: float) -> None:
+        self._inner = inner
+        self._clock = clock
+        self._latency_s = latency_s
+
+    async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None:
+        started_ns = self._clock.now_ns()
+        work = asyncio.ensure_future(self._inner.detect(ticket, with_jpeg))
+        try:
+            await asyncio.sleep(self._latency_s)
+            with self._clock.hold():
+                detection = await work
+        finally:
+            work.cancel()
+        if detection is None:
+            return None
+        return replace(detection, started_ns=started_ns, finished_ns=self._clock.now_ns())

@@ -1,0 +1,101 @@
+"""Scenarios: what a simulated flight is flown in.  A small typed TOML format; every key may be left out.
+
+[camera]                 # the down camera
+width_px = 640
+height_px = 360
+fps = 30
+capture_delay_s = 0.060  # from mid-exposure to arrival
+jitter_s = 0.003
+exposure_s = 0.004
+
+[floor]
+appearance = "default"   # default, clean or harsh
+
+[wind]
+mean_x_mps = 0.0         # steady draught in the map frame
+mean_y_mps = 0.0
+gust_mps = 0.3           # root mean square of the gusts
+
+[vehicle]
+battery = 1.0            # charge at the start, 0..1
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from flightd.core.errors import InputError
+from flightd.sim.appearance import CLEAN, DEFAULT, HARSH, Appearance
+from flightd.sim.optics import SimCamera, wide_lens
+from flightd.sim.wind import Draught
+
+_APPEARANCES = {"default": DEFAULT, "clean": CLEAN, "harsh": HARSH}
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class CameraScenario(_Section):
+    width_px: int = Field(640, ge=64, le=3840)
+    height_px: int = Field(360, ge=36, le=2160)
+    fps: float = Field(30.0, gt=1, le=120)
+    capture_delay_s: float = Field(0.060, ge=0, le=1)
+    jitter_s: float = Field(0.003, ge=0, le=0.1)
+    exposure_s: float = Field(0.004, gt=0, le=0.1)
+
+    def camera(self) -> SimCamera:
+        return SimCamera(
+            lens=wide_lens().scaled(self.width_px, self.height_px),
+            fps=self.fps,
+            exposure_s=self.exposure_s,
+            capture_delay_s=self.capture_delay_s,
+            jitter_s=self.jitter_s,
+        )
+
+
+class FloorScenario(_Section):
+    appearance: Literal["default", "clean", "harsh"] = "default"
+
+    def look(self) -> Appearance:
+        return _APPEARANCES[self.appearance]
+
+
+class WindScenario(_Section):
+    mean_x_mps: float = Field(0.0, ge=-10, le=10)
+    mean_y_mps: float = Field(0.0, ge=-10, le=10)
+    gust_mps: float = Field(Draught().gust_rms_mps, ge=0, le=10)
+
+    def draught(self) -> Draught:
+        return Draught(self.mean_x_mps, self.mean_y_mps, self.gust_mps)
+
+
+class VehicleScenario(_Section):
+    battery: float = Field(1.0, ge=0, le=1)
+
+
+class Scenario(_Section):
+    """One simulated world's conditions."""
+
+    camera: CameraScenario = CameraScenario()
+    floor: FloorScenario = FloorScenario()
+    wind: WindScenario = WindScenario()
+    vehicle: VehicleScenario = VehicleScenario()
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Read a scenario file; InputError names the file, the key and the remedy."""
+    try:
+        return Scenario.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except OSError as err:
+        raise InputError(f"scenario {path}: {err.strerror}; give the path of a TOML file") from err
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as err:
+        raise InputError(f"scenario {path}: not TOML: {err}") from err
+    except ValidationError as err:
+        first = err.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"scenario {path}: {key}: {first['msg'].lower()}") from err

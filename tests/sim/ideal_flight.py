@@ -1,0 +1,191 @@
+"""A whole flight without pixels, sockets or event loop: pilot, airframe and ideal sight in one loop."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+from flightd.core.types import (
+    Attitude,
+    AttitudeSetpoint,
+    Demand,
+    Event,
+    LandedState,
+    LineSet,
+    Phase,
+    VehicleState,
+)
+from flightd.grid.site import Site
+from flightd.mission.plan import FlightPlan, Heading, make_plan
+from flightd.pilot import Pilot, PilotParams, TickInput, TickOutput
+from flightd.sim.airframe import Airframe, AirframeCommand
+from flightd.sim.climb_loop import ClimbLoop
+from flightd.sim.ideal import EyeErrors, IdealEye
+from flightd.sim.kinematics import Kinematics
+from flightd.sim.sensors import Sensors
+from flightd.sim.wind import Draught
+
+STEP_NS = 5_000_000
+TICK_NS = 20_000_000
+FRAME_NS = 33_333_333
+
+
+@dataclass
+class Flown:
+    """Everything that happened, for a test to judge."""
+
+    phase: Phase = Phase.PREFLIGHT
+    reason: str = ""
+    visited: list[str] = field(default_factory=list)
+    truth: list[tuple[Phase, Kinematics]] = field(default_factory=list)
+    outputs: list[TickOutput] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+
+    def on_lines(self) -> list[Kinematics]:
+        return [k for phase, k in self.truth if phase in {Phase.FOLLOW, Phase.HOVER, Phase.TURN}]
+
+
+class IdealFlight:
+    """`fly` runs until the mission is over.  Sensors, wind and sight are those of the simulator."""
+
+    def __init__(
+        self,
+        site: Site,
+        params: PilotParams,
+        *,
+        heading: Heading = Heading.ALONG,
+        visits: tuple[str, ...] = (),
+        seed: int = 1,
+        draught: Draught | None = None,
+        errors: EyeErrors | None = None,
+        delay_ns: int = 68_000_000,
+    ) -> None:
+        pad = site.home.node
+        self.plan: FlightPlan = make_plan(site, visits or site.serpentine_route(), pad, pad, heading)
+        self.pilot = Pilot(site, self.plan, heading, params)
+        node = site.nodes[pad]
+        self.airframe = Airframe(draught=draught, seed=seed, x_m=node.x_m, y_m=node.y_m)
+        self.sensors = Sensors(seed=seed)
+        self._eye = IdealEye(site, params.tracker.lens, params.tracker.mount, errors, seed)
+        self._climb = ClimbLoop()
+        self._delay_ns = delay_ns
+        self._armed = False
+        self._now_ns = 1_000_000_000_000
+        self._yaw_target = 0.0
+        self.in_control = True
+        self.blind = False
+
+    def fly(self, limit_s: float = 600.0) -> Flown:
+        flown = Flown()
+        late: deque[tuple[int, LineSet]] = deque()
+        attitudes: list[Attitude] = []
+        setpoint: AttitudeSetpoint | None = None
+        frame_ns = tick_ns = self._now_ns
+        seq = 0
+        end_ns = self._now_ns + round(limit_s * 1e9)
+        self.sensors.update(STEP_NS * 1e-9, self.airframe)
+        while self._now_ns < end_ns:
+            self._now_ns += STEP_NS
+            self._step(setpoint)
+            if self._now_ns % 10_000_000 == 0:
+                attitudes.append(self._attitude())
+            if self._now_ns >= frame_ns:
+                frame_ns += FRAME_NS
+                seq += 1
+                if not self.blind:
+                    seen = self._eye.see(self.airframe.kinematics(self._now_ns), seq, self._now_ns)
+                    late.append((self._now_ns + self._delay_ns, seen))
+            if self._now_ns >= tick_ns:
+                tick_ns += TICK_NS
+                lines = []
+                while late and late[0][0] <= self._now_ns:
+                    lines.append(late.popleft()[1])
+                output = self.pilot.step(
+                    TickInput(self._now_ns, tuple(lines), self._state(), tuple(attitudes))
+                )
+                attitudes = []
+                setpoint = output.setpoint
+                self._obey(output.demand)
+                flown.outputs.append(output)
+                flown.events.extend(output.events)
+                flown.truth.append((output.phase, self.airframe.kinematics(self._now_ns)))
+                if output.phase in {Phase.DONE, Phase.ABORTED, Phase.PILOT}:
+                    break
+        flown.phase, flown.reason = flown.outputs[-1].phase, flown.outputs[-1].reason
+        flown.visited = list(self.pilot.mission.visited)
+        return flown
+
+    def _obey(self, demand: Demand) -> None:
+        if demand is Demand.FLY and not self._armed:
+            self._armed = True
+            self._yaw_target = self.airframe.yaw_rad
+            self._climb.reset(self.airframe.height_m)
+        elif demand is Demand.DISARM:
+            self._armed = False
+
+    def _step(self, setpoint: AttitudeSetpoint | None) -> None:
+        dt_s = STEP_NS * 1e-9
+        wanted = setpoint or AttitudeSetpoint(self._now_ns)
+        flying = (
+            self._armed and (setpoint is not None) and (wanted.climb_mps > 0 or not self.airframe.on_floor)
+        )
+        self._yaw_target += wanted.yaw_rate_radps * dt_s
+        collective = 0.05
+        if flying:
+            collective = self._climb.step(
+                dt_s,
+                wanted.climb_mps,
+                height_m=self.sensors.height_m,
+                speed_mps=self.sensors.climb_mps,
+                tilt_cos=self.airframe.tilt_cos,
+            )
+        self.airframe.step(
+            dt_s,
+            AirframeCommand(
+                self._armed,
+                wanted.roll_rad - self.sensors.roll_error_rad,
+                wanted.pitch_rad - self.sensors.pitch_error_rad,
+                self._yaw_target,
+                wanted.yaw_rate_radps,
+                collective,
+            ),
+        )
+        self.sensors.update(dt_s, self.airframe)
+
+    def _attitude(self) -> Attitude:
+        s = self.sensors
+        return Attitude(self._now_ns, s.roll_rad, s.pitch_rad, s.yaw_rad)
+
+    def _state(self) -> VehicleState:
+        on_floor = self.airframe.on_floor
+        height = round(self.airframe.height_m, 2)
+        return VehicleState(
+            attitude=self._attitude(),
+            height_m=height,
+            height_stamp_ns=self._now_ns,
+            climb_mps=self.sensors.climb_mps,
+            mode="GUIDED_NOGPS",
+            in_control=self._armed and self.in_control,
+            armed=self._armed,
+            landed=LandedState.ON_GROUND if on_floor else LandedState.IN_AIR,
+            battery_frac=self.airframe.battery_frac,
+            battery_v=12.0,
+            heartbeat_ns=self._now_ns,
+        )
+
+
+def rms_off_line(flown: Flown, site: Site) -> float:
+    """Cross-track error of the flight between take-off and landing, root mean square, metres."""
+    squares = [
+        min(_to_segment(k.x_m, k.y_m, site, edge.a, edge.b) for edge in site.edges) ** 2
+        for k in flown.on_lines()
+    ]
+    return math.sqrt(math.fsum(squares) / max(len(squares), 1))
+
+
+def _to_segment(x: float, y: float, site: Site, a: str, b: str) -> float:
+    p, q = site.nodes[a], site.nodes[b]
+    dx, dy = q.x_m - p.x_m, q.y_m - p.y_m
+    share = min(max(((x - p.x_m) * dx + (y - p.y_m) * dy) / (dx * dx + dy * dy), 0.0), 1.0)
+    return math.hypot(x - p.x_m - share * dx, y - p.y_m - share * dy)

@@ -1,0 +1,84 @@
+"""PID, reference profile and limits: what they promise for any input."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flightd.control.limits import Limiter, Limits
+from flightd.control.pid import Pid, PidGains
+from flightd.control.profile import Profile
+from flightd.core.types import AttitudeSetpoint
+
+GAINS = PidGains(kp=2.0, ki=1.0, kd=1.0, integral_limit=0.5, output_limit=1.0)
+LIMITS = Limits(math.radians(10), math.radians(60), math.radians(45), 0.8, 0.6)
+finite = st.floats(-1e3, 1e3)
+
+
+@given(st.lists(st.tuples(finite, finite, st.floats(1e-3, 0.1)), max_size=50))
+def test_output_and_integral_never_exceed_their_limits(steps: list[tuple[float, float, float]]) -> None:
+    pid = Pid(GAINS)
+    for error, rate, dt in steps:
+        assert abs(pid.step(error, rate, dt)) <= GAINS.output_limit
+        assert abs(pid.integral) <= GAINS.integral_limit
+
+
+def test_the_integral_takes_a_steady_disturbance_out() -> None:
+    pid, position, velocity = Pid(GAINS), 0.0, 0.0
+    for _ in range(4000):
+        push = pid.step(-position, velocity, 0.01) + 0.3
+        velocity += push * 0.01
+        position += velocity * 0.01
+    assert abs(position) < 1e-3
+    assert pid.integral == pytest.approx(-0.3, abs=1e-2)
+
+
+def test_the_integral_does_not_wind_up_while_the_output_is_saturated() -> None:
+    pid = Pid(GAINS)
+    for _ in range(1000):
+        pid.step(10.0, 0.0, 0.01)
+    assert pid.integral == 0.0
+
+
+def test_a_jump_of_the_set_point_does_not_kick_through_the_derivative() -> None:
+    pid = Pid(PidGains(kp=0.1, ki=0.0, kd=5.0, integral_limit=0.0, output_limit=10.0))
+    assert pid.step(1.0, 0.0, 0.01) == pytest.approx(0.1)
+
+
+@given(start=st.floats(-20, 20), target=st.floats(-20, 20), dt=st.floats(0.005, 0.05))
+def test_the_reference_arrives_without_overshoot_within_its_limits(
+    start: float, target: float, dt: float
+) -> None:
+    profile = Profile(start, max_speed=0.8, max_accel=0.5)
+    low, high = min(start, target) - 1e-6, max(start, target) + 1e-6
+    seconds = abs(target - start) / 0.8 + 0.8 / 0.5 * 2 + 1.0
+    for _ in range(int(seconds / dt)):
+        profile.step(target, dt)
+        assert abs(profile.velocity) <= 0.8 + 1e-9
+        assert abs(profile.acceleration) <= 0.5 + 1e-9
+        assert low - 1e-3 <= profile.position <= high + 1e-3
+    assert profile.position == pytest.approx(target, abs=1e-6)
+    assert profile.velocity == 0.0
+
+
+@given(st.lists(st.tuples(finite, finite, finite, finite, st.integers(0, 200)), min_size=1, max_size=40))
+def test_nothing_beyond_the_limits_reaches_the_wire(
+    steps: list[tuple[float, float, float, float, int]],
+) -> None:
+    limiter, now_ns, last = Limiter(LIMITS), 10**9, AttitudeSetpoint(0)
+    for roll, pitch, yaw_rate, climb, gap_ms in steps:
+        gap_ns = gap_ms * 1_000_000
+        now_ns += gap_ns
+        out = limiter.apply(AttitudeSetpoint(now_ns, roll, pitch, yaw_rate, climb))
+        assert abs(out.roll_rad) <= LIMITS.tilt_rad + 1e-12
+        assert abs(out.pitch_rad) <= LIMITS.tilt_rad + 1e-12
+        assert abs(out.yaw_rate_radps) <= LIMITS.yaw_rate_radps
+        assert -LIMITS.descend_mps <= out.climb_mps <= LIMITS.climb_mps
+        if last.stamp_ns:
+            swing = LIMITS.tilt_rate_radps * min(gap_ns * 1e-9, 0.1) + 1e-9
+            assert abs(out.roll_rad - last.roll_rad) <= swing
+            assert abs(out.pitch_rad - last.pitch_rad) <= swing
+        last = out

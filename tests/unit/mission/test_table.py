@@ -1,0 +1,80 @@
+"""The transition table over every phase and every trigger, and the plan."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from flightd.core.errors import InputError
+from flightd.core.types import Phase
+from flightd.mission.plan import Heading, make_plan
+from flightd.mission.table import TABLE, Trigger, next_phase
+from flightd.sim.sites import random_site
+
+FLYING = [
+    p for p in Phase if p not in {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE, Phase.ABORTED, Phase.PILOT}
+]
+
+
+@pytest.mark.parametrize("phase", list(Phase))
+@pytest.mark.parametrize("trigger", list(Trigger))
+def test_every_phase_answers_every_trigger(phase: Phase, trigger: Trigger) -> None:
+    following, taken = next_phase(phase, {trigger})
+    assert following in Phase
+    assert (taken is None) == (trigger not in TABLE[phase])
+    if taken is None:
+        assert following is phase
+
+
+@pytest.mark.parametrize("phase", FLYING)
+def test_the_pilot_wins_over_everything_else_in_the_air(phase: Phase) -> None:
+    assert next_phase(phase, set(Trigger))[0] is Phase.PILOT
+
+
+@pytest.mark.parametrize("phase", [p for p in FLYING if p is not Phase.LAND])
+def test_every_flying_phase_lands_on_a_critical_battery_lost_telemetry_or_an_order(phase: Phase) -> None:
+    for trigger in (Trigger.BATTERY_CRITICAL, Trigger.TELEMETRY_LOST, Trigger.LAND_HERE, Trigger.STOP):
+        assert next_phase(phase, {trigger})[0] is Phase.LAND
+
+
+@pytest.mark.parametrize("phase", [Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN])
+def test_lost_lines_hold_before_any_progress(phase: Phase) -> None:
+    progress = {Trigger.ARRIVED, Trigger.DWELLED, Trigger.TURNED, Trigger.ACQUIRED}
+    assert next_phase(phase, progress | {Trigger.LINES_LOST})[0] is Phase.HOLD
+
+
+@pytest.mark.parametrize("phase", [Phase.DONE, Phase.ABORTED, Phase.PILOT])
+def test_the_end_is_final(phase: Phase) -> None:
+    assert next_phase(phase, set(Trigger)) == (phase, None)
+
+
+def test_a_plan_stops_at_every_corner_and_ends_above_the_pad() -> None:
+    site = random_site(5)
+    home = site.home.node
+    plan = make_plan(site, site.serpentine_route(), home, home, Heading.ALONG)
+    at = site.nodes[home]
+    here = (at.x_m, at.y_m)
+    for stop in plan.stops:
+        assert stop.x_m == pytest.approx(here[0]) or stop.y_m == pytest.approx(here[1]), "a leg is straight"
+        if (stop.x_m, stop.y_m) != here:
+            assert stop.yaw_rad == pytest.approx(math.atan2(stop.y_m - here[1], stop.x_m - here[0]))
+        here = (stop.x_m, stop.y_m)
+    assert plan.stops[-1].node == home
+    assert {stop.node for stop in plan.stops if stop.visit} == set(site.nodes)
+
+
+def test_facing_the_shelf_the_nose_turns_only_with_the_shelf() -> None:
+    site = random_site(5)
+    home = site.home.node
+    plan = make_plan(site, site.serpentine_route(), home, home, Heading.SHELF)
+    assert {abs(stop.yaw_rad) for stop in plan.stops if stop.visit and stop.node != home} <= {
+        math.pi / 2,
+        0.0,
+    }
+
+
+def test_a_node_that_the_site_lacks_is_named() -> None:
+    site = random_site(5)
+    with pytest.raises(InputError, match="no node 'Q7'"):
+        make_plan(site, ["Q7"], site.home.node, site.home.node, Heading.ALONG)
