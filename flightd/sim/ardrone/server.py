@@ -112,11 +112,12 @@ class ArDroneServer:
         for writer in [*self._watchers, *self._readers]:
             writer.transport.abort()
 
-    def show(self, bgr: Image) -> None:
-        """Stream one picture of the camera in use to whoever watches; (H, W, 3) of any size."""
+    def show(self, bgr: Image, stamp_ns: int | None = None) -> None:
+        """Stream one picture of the camera in use to whoever watches; (H, W, 3) of any size, exposed at
+        `stamp_ns` (now when left out)."""
         if not self.video_radio or not self.radio:
             return
-        timestamp_ms = self._clock.now_ns() // 1_000_000
+        timestamp_ms = (self._clock.now_ns() if stamp_ns is None else stamp_ns) // 1_000_000
         for writer, stream in list(self._watchers.items()):
             room = writer.transport.get_write_buffer_size() <= _VIDEO_BACKLOG_BYTES
             data = stream.frame(bgr, timestamp_ms, room=room)

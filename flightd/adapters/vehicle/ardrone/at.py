@@ -29,6 +29,8 @@ REF_EMERGENCY = 1 << 8
 
 PCMD_PROGRESSIVE = 1
 
+_LEAST_FRACTION = 1e-6
+
 CTRL_SEND_CONFIG = 4
 CTRL_CLEAR_ACK = 5
 
@@ -87,9 +89,10 @@ def pcmd(*, roll: float, pitch: float, gaz: float, yaw: float) -> AtCommand:
 
     roll + right side down and pitch + nose up are tilts, fractions of `control:euler_angle_max`; gaz + up
     is a climb rate, of `control:control_vz_max`; yaw + clockwise from above a turn rate, of
-    `control:control_yaw`.  Minus zero goes out as zero.
+    `control:control_yaw`.  What would be minus zero on the wire goes out as zero.
     """
-    fractions = (min(1.0, max(-1.0, value)) + 0.0 for value in (roll, pitch, gaz, yaw))
+    clamped = (min(1.0, max(-1.0, value)) for value in (roll, pitch, gaz, yaw))
+    fractions = (value if abs(value) >= _LEAST_FRACTION else 0.0 for value in clamped)
     return AtCommand("PCMD", (PCMD_PROGRESSIVE, *fractions))
 
 

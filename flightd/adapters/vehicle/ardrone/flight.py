@@ -145,7 +145,7 @@ class FlightLogic:
             return []
         if not self.heard or (self.demand is Demand.HANDS_OFF and not telemetry.airborne):
             return [at.comwdg()]
-        self._follow(now_ns)
+        self.follow(now_ns)
         commands = [at.comwdg()] if telemetry.state & DroneState.COM_WATCHDOG else []
         if self._may_take_off(now_ns) and self._trims_left:
             self._trims_left -= 1
@@ -157,8 +157,8 @@ class FlightLogic:
         """The last word before silence."""
         return [at.ref(fly=self._telemetry.airborne), at.hover()]
 
-    def _follow(self, now_ns: int) -> None:
-        """Notice that the drone took off, or ended the flight by itself."""
+    def follow(self, now_ns: int) -> None:
+        """Notice that the drone took off, or ended the flight by itself; with each packet and each beat."""
         telemetry = self._telemetry
         if self.demand is not Demand.FLY or self._over:
             return

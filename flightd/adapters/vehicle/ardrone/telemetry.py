@@ -6,10 +6,11 @@ import math
 from collections import deque
 
 from flightd.adapters.vehicle.ardrone.navdata import Demo, DroneState, Major, Navdata
-from flightd.adapters.vehicle.ardrone.stamps import RemoteClock
+from flightd.adapters.vehicle.ardrone.stamps import WrappingCounter
 from flightd.core.types import Attitude
+from flightd.tracking.clocks import DeviceClock
 
-CLOCK_WRAP_NS = 2048 * 1_000_000_000
+CLOCK_WRAP_US = 2048 * 1_000_000
 AIRBORNE = frozenset(
     {Major.FLYING, Major.HOVERING, Major.TAKE_OFF, Major.GO_TO_FIX, Major.LANDING, Major.LOOPING}
 )
@@ -38,7 +39,8 @@ class Telemetry:
 
     def __init__(self, latency_ns: int) -> None:
         self._latency_ns = latency_ns
-        self._clock = RemoteClock(CLOCK_WRAP_NS)
+        self._counter = WrappingCounter(CLOCK_WRAP_US)
+        self._clock = DeviceClock(latency_ns)
         self._attitudes: deque[Attitude] = deque(maxlen=_MAX_ATTITUDES)
         self.state = DroneState(0)
         self.demo: Demo | None = None
@@ -78,10 +80,9 @@ class Telemetry:
         if packet.demo is None:
             return
         self.demo = demo = packet.demo
-        stamp_ns = now_ns
+        stamp_ns = now_ns - self._latency_ns
         if packet.clock_us is not None:
-            stamp_ns = self._clock.stamp_ns(packet.clock_us * 1000, now_ns)
-        stamp_ns -= self._latency_ns
+            stamp_ns = self._clock.to_ours(self._counter.unwrap(packet.clock_us) * 1000, now_ns)
         if self.attitude is not None:
             stamp_ns = max(stamp_ns, self.attitude.stamp_ns + 1)
         self.attitude = Attitude(stamp_ns, demo.roll_rad, demo.pitch_rad, demo.yaw_rad)

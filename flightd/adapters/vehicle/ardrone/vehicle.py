@@ -148,6 +148,7 @@ class ArDroneVehicle:
 
     def _receive(self, packet: Navdata, now_ns: int) -> None:
         self._telemetry.observe(packet, now_ns)
+        self._flight.follow(now_ns)
         if packet.state & DroneState.NAVDATA_BOOTSTRAP and self._flight.configured:
             self._flight.configured = False
             self._unconfigured.set()

@@ -1,0 +1,73 @@
+"""The drone's one video stream as the daemon's cameras: pictures in shared memory, a ticket for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, Camera
+from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
+from flightd.adapters.vehicle.ardrone.video import Picture, VideoStream
+from flightd.ports import Clock
+from flightd.runtime.ring import FrameRing, FrameTicket
+
+SLOTS = 8
+
+
+class ArDroneCamera:
+    """Hands a ticket for each picture to the taker of the camera that the stream shows.
+
+    Both cameras come through one channel, `vehicle.select_camera` chooses.  Pictures that arrive while
+    the drone is switching may be of either and go to nobody (`unassigned` counts them).
+    """
+
+    def __init__(
+        self,
+        vehicle: ArDroneVehicle,
+        settings: ArDroneSettings,
+        clock: Clock,
+        on_frame: dict[Camera, Callable[[FrameTicket], None]],
+    ) -> None:
+        self._vehicle = vehicle
+        self._on_frame = on_frame
+        self._stream = VideoStream(settings, clock, self._show)
+        self._ring: FrameRing | None = None
+        self._seq = 0
+        self.unassigned = 0
+
+    @property
+    def stream(self) -> VideoStream:
+        """The stream behind, with its counts."""
+        return self._stream
+
+    async def run(self) -> None:
+        """Receive until cancelled; the shared memory lives as long."""
+        try:
+            await self._stream.run()
+        finally:
+            if self._ring is not None:
+                self._ring.close()
+
+    def _show(self, picture: Picture) -> None:
+        since_ns = self._vehicle.camera_since_ns
+        take = self._on_frame.get(self._vehicle.camera)
+        if take is None or since_ns is None or picture.arrival_ns < since_ns:
+            self.unassigned += 1
+            return
+        height_px, width_px = picture.bgr.shape[:2]
+        ring = self._ring_for(width_px, height_px)
+        slot = ring.begin(self._seq)
+        ring.pixels(slot)[:] = picture.bgr
+        ring.publish(slot, self._seq, picture.stamp_ns)
+        ticket = FrameTicket(
+            ring.name, slot, SLOTS, self._seq, picture.stamp_ns, picture.arrival_ns, width_px, height_px
+        )
+        self._seq += 1
+        take(ticket)
+
+    def _ring_for(self, width_px: int, height_px: int) -> FrameRing:
+        ring = self._ring
+        if ring is None or (ring.width_px, ring.height_px) != (width_px, height_px):
+            if ring is not None:
+                ring.close()
+            self._ring = ring = FrameRing.create(SLOTS, width_px, height_px)
+        return ring
