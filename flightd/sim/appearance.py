@@ -20,8 +20,8 @@ class Appearance:
     `exposure` scales the brightness (1 is right)."""
 
     concrete: float = 0.5
-    wear: float = 0.12
-    ragged_m: float = 0.0012
+    wear: float = 0.18
+    ragged_m: float = 0.001
     dirt: float = 0.35
     stains: float = 0.4
     tyre_marks: float = 0.5

@@ -14,7 +14,8 @@ from flightd.sim.optics import Floats
 
 _MIDDLE = 128
 """A gain of one in the sensor's tables."""
-_TABLES = 6
+_TABLE_PIXELS = 6 * 640 * 360
+"""Enough tables that their repetition does not show, few enough to fit in memory."""
 _MAX_SMEAR_PX = 24.0
 _MAINS_HZ = 100.0
 
@@ -33,7 +34,7 @@ class Sensor:
         fall = _vignette(lens, look.vignetting)
         self._gains = []
         if look.noise > 0.0 or look.vignetting > 0.0:
-            for _ in range(_TABLES if look.noise > 0.0 else 1):
+            for _ in range(max(3, _TABLE_PIXELS // (shape[0] * shape[1])) if look.noise > 0.0 else 1):
                 # at mid grey two thirds of the variance is the photons', spread over three channels
                 grain = rng.standard_normal((*shape, 3), dtype=np.float32) * np.float32(
                     0.8 * look.noise / 128

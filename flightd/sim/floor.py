@@ -31,6 +31,7 @@ _CONCRETE_SRGB = (152, 150, 144)
 _MAT_SRGB = (58, 58, 61)
 _UPRIGHT_SRGB = (40, 62, 110)
 _WOOD_SRGB = (150, 118, 84)
+_BOARD_M = 0.145
 _GAMMA_STEPS = 4096
 
 
@@ -70,20 +71,16 @@ class Floor:
     def paint(self, patch: Patch) -> Image:
         """(size, size, 3) BGR picture of the patch."""
         colour = self._concrete(patch)
-        for boxes, reflectance in (
-            (self._pallets, _linear(_WOOD_SRGB)),
-            (self._uprights, _linear(_UPRIGHT_SRGB)),
-        ):
-            cover = self._cover(patch, boxes, None)
-            if cover is not None:
-                _lay(colour, reflectance, cover)
         mats = self._cover(patch, self._mats, None)
         if mats is not None:
             rubber = 1.0 + 0.12 * self._noise.mix(patch, "mat", {0.004: 1.0, 0.03: 0.6})
-            _lay(colour, _linear(_MAT_SRGB), mats)
-            colour *= 1.0 + (rubber - 1.0)[..., None] * mats[..., None]
+            _lay(colour, _linear(_MAT_SRGB) * rubber[..., None], mats)
         self._lay_paint(colour, patch, mats)
-        colour *= self._marks.shade(patch)[..., None]
+        shade = self._marks.shade(patch)
+        if mats is not None:  # the mat lies on the marks
+            shade += (1.0 - shade) * mats
+        colour *= shade[..., None]
+        self._lay_shelf_feet(colour, patch)
         colour *= self._lighting.on(patch)[..., None]
         np.clip(colour, 0.0, 1.0, out=colour)
         picture: Image = self._gamma[(colour * np.float32(_GAMMA_STEPS - 1)).astype(np.uint16)]
@@ -106,10 +103,24 @@ class Floor:
         base[..., 2] *= 1.0 + strength * tint
         return base
 
+    def _lay_shelf_feet(self, colour: Floats, patch: Patch) -> None:
+        wood = self._cover(patch, self._pallets, None)
+        if wood is not None:
+            # boards along the aisle: the board's own tone, the dark gaps between, the grain
+            ys = patch.xs() + np.float32(patch.y_m)
+            tone = 0.16 * np.sin(np.floor(ys / _BOARD_M) * 12.9898)
+            gap = np.clip(1.2 - np.abs((ys / _BOARD_M) % 1.0 - 0.5) * _BOARD_M / 0.008, 0.0, 1.0)
+            grain = 0.2 * self._noise.mix(patch, "wood", {0.3: 0.6, 0.05: 0.5, 0.01: 0.5})
+            boards = (1.0 + tone - 0.8 * gap)[:, None] * (1.0 + grain)
+            _lay(colour, _linear(_WOOD_SRGB) * boards[..., None], wood)
+        steel = self._cover(patch, self._uprights, None)
+        if steel is not None:
+            _lay(colour, _linear(_UPRIGHT_SRGB), steel)
+
     def _lay_paint(self, colour: Floats, patch: Patch, mats: Floats | None) -> None:
         ragged = None
         if self._look.ragged_m > 0.0:
-            ragged = self._look.ragged_m * self._noise.mix(patch, "edge", {0.12: 0.5, 0.03: 0.6, 0.008: 0.6})
+            ragged = self._look.ragged_m * self._noise.mix(patch, "edge", {0.15: 0.5, 0.02: 0.4, 0.006: 0.6})
         cover = self._cover(patch, self._strokes, ragged)
         if cover is None:
             return

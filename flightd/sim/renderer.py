@@ -23,10 +23,12 @@ from flightd.sim.floor import Floor
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.lighting import Lighting
 from flightd.sim.optics import Floats, RayTable, SimCamera, Viewpoint, smear_px
-from flightd.sim.tiles import TiledFloor
+from flightd.sim.tiles import Ahead, TiledFloor
 
 __all__ = ["Appearance", "Renderer", "SimCamera"]
 
+_AHEAD_S = 0.8
+"""How far ahead of the view the floor is painted: long enough for a row of tiles, one to a picture."""
 _SHADOW_HALF_M = 0.18
 _SHADOW_FADES_M = 0.9
 """Height at which the airframe's shadow below itself has lost most of its depth."""
@@ -60,13 +62,15 @@ class Renderer:
             )
         view = Viewpoint.of(kinematics, self._camera.mount)
         x_m, y_m = self._rays.floor(view)
-        canvas, cells = self._tiles.look(x_m, y_m, (view.x_m, view.y_m), self._rays.footprint_m(view))
+        foot, footprint_m = (view.x_m, view.y_m), self._rays.footprint_m(view)
+        canvas, cells = self._tiles.look(x_m, y_m, foot, footprint_m)
         floor_map = self._rays.to_pixels(cells)
         cv2.remap(canvas, floor_map, None, cv2.INTER_LINEAR, dst=picture, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
         self._smear(picture, kinematics)
         self._shine(picture, view, x_m, y_m)
         self._shade(picture, kinematics, view, x_m, y_m)
         self._sensor.expose(picture, kinematics.stamp_ns, seq)
+        self._tiles.prepare(x_m, y_m, foot, footprint_m, _ahead(kinematics, view))
         return picture
 
     def _smear(self, picture: Image, kinematics: Kinematics) -> None:
@@ -91,6 +95,11 @@ class Renderer:
         reach = np.float32(_SHADOW_HALF_M + 0.25 * view.height_m)
         near = 1.0 - np.float32(depth) / (1.0 + ((dx * dx + dy * dy) / (reach * reach)) ** 2)
         cv2.multiply(picture, self._rays.to_pixels(_grey(near * 255.0)), dst=picture, scale=1 / 255)
+
+
+def _ahead(kinematics: Kinematics, view: Viewpoint) -> Ahead:
+    rise_m = max(kinematics.climb_mps * _AHEAD_S, -0.5 * view.height_m)
+    return Ahead(kinematics.vx_mps * _AHEAD_S, kinematics.vy_mps * _AHEAD_S, 1.0 + rise_m / view.height_m)
 
 
 def _grey(level: NDArray[np.floating[Any]]) -> Image:

@@ -1,6 +1,6 @@
 """Floor tiles at the resolution of the view, kept while they are of use.
 
-Five resolutions, a factor of two apart.  The tiles under the view lie side by side in a canvas, which the
+Six resolutions, a factor of two apart.  The tiles under the view lie side by side in a canvas, which the
 renderer looks up; it is laid anew when the view leaves it.
 """
 
@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,8 +23,43 @@ FINEST_M = 0.001
 LEVELS = 6
 _TILES_KEPT = 320
 """60 MB of tiles."""
+_CANVASES_KEPT = 2
+"""Hovering between two resolutions changes the canvas often; both stay."""
 _CANVAS_TILES = 8
 """Most tiles on one side of the canvas: 2048 texels; a view beyond is cut at the horizon."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Area:
+    """A rectangle of tiles, first and last of each axis included."""
+
+    level: int
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    @property
+    def texel_m(self) -> float:
+        return math.ldexp(FINEST_M, self.level)
+
+    def contains(self, other: _Area) -> bool:
+        across = self.left <= other.left and other.right <= self.right
+        return across and self.top <= other.top and other.bottom <= self.bottom
+
+    def tiles(self) -> Iterator[tuple[int, int, int]]:
+        for row in range(self.top, self.bottom + 1):
+            for column in range(self.left, self.right + 1):
+                yield self.level, column, row
+
+
+@dataclass(frozen=True, slots=True)
+class Ahead:
+    """Where the view will be a little later: moved by (x_m, y_m) and `growth` times as wide."""
+
+    x_m: float
+    y_m: float
+    growth: float
 
 
 class TiledFloor:
@@ -31,60 +68,52 @@ class TiledFloor:
     def __init__(self, floor: Floor) -> None:
         self._floor = floor
         self._tiles: OrderedDict[tuple[int, int, int], Image] = OrderedDict()
-        self._canvas: Image = np.empty((0, 0, 3), np.uint8)
-        self._laid: tuple[int, int, int, int, int] | None = None
+        self._laid: dict[int, tuple[_Area, Image]] = {}
 
     def look(
         self, x_m: Floats, y_m: Floats, foot: tuple[float, float], footprint_m: float
     ) -> tuple[Image, Floats]:
         """A picture of the floor around the points (relative to `foot`, map axes), and the points in its
         pixels: (rows, columns, 2) of (column, row).  `footprint_m` is the size of a camera pixel there."""
-        level = min(max(round(math.log2(footprint_m / FINEST_M)), 0), LEVELS - 1)
-        texel_m = FINEST_M * 2**level
-        side_m = texel_m * TILE_PX
-        first_x, last_x = _span(float(x_m.min()) + foot[0], float(x_m.max()) + foot[0], foot[0], side_m)
-        first_y, last_y = _span(float(y_m.min()) + foot[1], float(y_m.max()) + foot[1], foot[1], side_m)
-        if not self._covers(level, first_x, first_y, last_x, last_y):
-            self._lay(level, first_x, first_y, last_x, last_y)
-        assert self._laid is not None
-        _, left, top, _, _ = self._laid
+        area = _area(x_m, y_m, foot, footprint_m)
+        if area.level not in self._laid or not self._laid[area.level][0].contains(area):
+            self._lay(area)
+        laid, canvas = self._laid[area.level]
+        texel_m = laid.texel_m
         cells = np.empty((*x_m.shape, 2), np.float32)
         np.multiply(x_m, 1.0 / texel_m, out=cells[..., 0])
         np.multiply(y_m, 1.0 / texel_m, out=cells[..., 1])
-        cells += np.array(
-            [foot[0] / texel_m - left * TILE_PX - 0.5, foot[1] / texel_m - top * TILE_PX - 0.5], np.float32
-        )
-        return self._canvas, cells
+        cells[..., 0] += foot[0] / texel_m - laid.left * TILE_PX - 0.5
+        cells[..., 1] += foot[1] / texel_m - laid.top * TILE_PX - 0.5
+        return canvas, cells
 
-    def _covers(self, level: int, first_x: int, first_y: int, last_x: int, last_y: int) -> bool:
-        if self._laid is None:
-            return False
-        laid_level, left, top, right, bottom = self._laid
-        return (
-            laid_level == level
-            and left <= first_x
-            and top <= first_y
-            and last_x <= right
-            and last_y <= bottom
-        )
+    def prepare(
+        self, x_m: Floats, y_m: Floats, foot: tuple[float, float], footprint_m: float, ahead: Ahead
+    ) -> None:
+        """Paint at most one tile that the view will need soon, so that no picture waits for a whole row."""
+        there = (foot[0] + ahead.x_m, foot[1] + ahead.y_m)
+        area = _area(x_m * ahead.growth, y_m * ahead.growth, there, footprint_m * ahead.growth)
+        missing = next((key for key in area.tiles() if key not in self._tiles), None)
+        if missing is not None:
+            self._tile(*missing)
 
-    def _lay(self, level: int, first_x: int, first_y: int, last_x: int, last_y: int) -> None:
-        rows, columns = last_y - first_y + 1, last_x - first_x + 1
-        shape = (rows * TILE_PX, columns * TILE_PX, 3)
-        if self._canvas.shape != shape:
-            self._canvas = np.empty(shape, np.uint8)
-        for row in range(rows):
-            for column in range(columns):
-                self._canvas[
-                    row * TILE_PX : (row + 1) * TILE_PX, column * TILE_PX : (column + 1) * TILE_PX
-                ] = self._tile(level, first_x + column, first_y + row)
-        self._laid = (level, first_x, first_y, last_x, last_y)
+    def _lay(self, area: _Area) -> None:
+        shape = ((area.bottom - area.top + 1) * TILE_PX, (area.right - area.left + 1) * TILE_PX, 3)
+        canvas = self._laid.pop(area.level)[1] if area.level in self._laid else None
+        if canvas is None or canvas.shape != shape:
+            canvas = np.empty(shape, np.uint8)
+        for key in area.tiles():
+            row, column = (key[2] - area.top) * TILE_PX, (key[1] - area.left) * TILE_PX
+            canvas[row : row + TILE_PX, column : column + TILE_PX] = self._tile(*key)
+        self._laid[area.level] = (area, canvas)
+        while len(self._laid) > _CANVASES_KEPT:
+            self._laid.pop(next(iter(self._laid)))
 
     def _tile(self, level: int, column: int, row: int) -> Image:
         key = (level, column, row)
         tile = self._tiles.get(key)
         if tile is None:
-            texel_m = FINEST_M * 2**level
+            texel_m = math.ldexp(FINEST_M, level)
             side_m = texel_m * TILE_PX
             tile = self._floor.paint(Patch(column * side_m, row * side_m, texel_m, TILE_PX))
             self._tiles[key] = tile
@@ -95,10 +124,20 @@ class TiledFloor:
         return tile
 
 
-def _span(low_m: float, high_m: float, foot_m: float, side_m: float) -> tuple[int, int]:
-    """First and last tile that the view needs on one axis, a tile's margin for bilinear look-up
-    included, cut to what a canvas holds around the camera's foot."""
+def _area(x_m: Floats, y_m: Floats, foot: tuple[float, float], footprint_m: float) -> _Area:
+    """The tiles, of the resolution nearest to the camera's, under the points."""
+    level = min(max(round(math.log2(footprint_m / FINEST_M)), 0), LEVELS - 1)
+    side_m = math.ldexp(FINEST_M, level) * TILE_PX
+    left, right = _span(x_m, foot[0], side_m)
+    top, bottom = _span(y_m, foot[1], side_m)
+    return _Area(level, left, top, right, bottom)
+
+
+def _span(offsets_m: Floats, foot_m: float, side_m: float) -> tuple[int, int]:
+    """First and last tile that the view needs on one axis, a rim for the bilinear look-up included, cut
+    to what a canvas holds around the camera's foot."""
     reach_m = (_CANVAS_TILES - 1) / 2 * side_m
-    first = math.floor(max(low_m - 0.02 * side_m, foot_m - reach_m) / side_m)
-    last = math.floor(min(high_m + 0.02 * side_m, foot_m + reach_m) / side_m)
-    return min(first, last), max(first, last)
+    low_m, high_m = float(offsets_m.min()) - 0.02 * side_m, float(offsets_m.max()) + 0.02 * side_m
+    first = math.floor((foot_m + min(max(low_m, -reach_m), reach_m)) / side_m)
+    last = math.floor((foot_m + min(max(high_m, -reach_m), reach_m)) / side_m)
+    return first, last
