@@ -76,5 +76,5 @@ def test_the_drone_reads_what_pcmd_means(roll: float, pitch: float, gaz: float, 
     (command,) = commands.parse(at.pcmd(roll=roll, pitch=pitch, gaz=gaz, yaw=yaw).encode(7))
     assert (command.name, command.sequence, command.integer(0)) == ("PCMD", 7, 1)
     for n, value in enumerate((roll, pitch, gaz, yaw), 1):
-        assert command.fraction(n) == pytest.approx(min(1.0, max(-1.0, value)), abs=1e-7)
+        assert command.fraction(n) == pytest.approx(min(1.0, max(-1.0, value)), abs=1.1e-6)
         assert command.integer(n) != -(1 << 31), "minus zero"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 
@@ -82,7 +81,7 @@ def test_the_next_config_waits_until_the_acknowledge_bit_is_cleared() -> None:
         async with bench(drone) as b:
             await b.configured()
         firsts = [new for old, new in itertools.pairwise(configs) if new[0] != old[0]]
-        assert len(firsts) > 10
+        assert {"custom:profile_id", "control:altitude_max", "video:bitrate"} <= {key for key, _ in firsts}
         assert [key for key, acknowledged in firsts if acknowledged] == []
 
     virtually(main)
@@ -194,14 +193,14 @@ def test_the_camera_is_switched_and_known_to_be_switched_only_after_settling() -
 
 
 def test_settings_outside_the_drones_ranges_are_refused() -> None:
-    for bad in (
-        {"tilt_max_rad": 0.6},
-        {"climb_max_mps": 0.1},
-        {"yaw_rate_max_radps": 7.0},
-        {"period_s": 0.1},
-    ):
-        with pytest.raises(ValueError, match="outside"):
-            ArDroneSettings(**bad)
+    with pytest.raises(ValueError, match=r"tilt_max_rad = 0.6 outside"):
+        ArDroneSettings(tilt_max_rad=0.6)
+    with pytest.raises(ValueError, match=r"climb_max_mps = 0.1 outside"):
+        ArDroneSettings(climb_max_mps=0.1)
+    with pytest.raises(ValueError, match=r"yaw_rate_max_radps = 7.0 outside"):
+        ArDroneSettings(yaw_rate_max_radps=7.0)
+    with pytest.raises(ValueError, match=r"period_s = 0.1 outside"):
+        ArDroneSettings(period_s=0.1)
 
 
 def test_the_dump_is_read_up_to_its_closing_nul() -> None:

@@ -149,6 +149,7 @@ class Configurator:
                 await self._until(False, at.ctrl(at.CTRL_CLEAR_ACK))
                 with contextlib.suppress(OSError, TimeoutError):
                     if values := parse_text(await self._fetch()):
+                        await self._until(True)  # a packet from before the dump may still be under way
                         await self._until(False, at.ctrl(at.CTRL_CLEAR_ACK))
                         return values
             return {}
