@@ -10,6 +10,7 @@ import sys
 import typer
 
 from flightd import __version__
+from flightd.cli import map as site_map
 from flightd.cli import report, sim, vision
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 
@@ -19,6 +20,7 @@ app = typer.Typer(
 vision.register(app)
 sim.register(app)
 report.register(app)
+site_map.register(app)
 
 
 def _version(wanted: bool) -> None:

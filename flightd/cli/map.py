@@ -1,0 +1,149 @@
+"""`flightd map`: check, draw and make site files.  What it does is imported when it runs."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flightd.core.errors import InputError
+
+if TYPE_CHECKING:
+    from flightd.grid.site import Site
+
+_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+
+SiteFile = Annotated[Path, typer.Argument(metavar="SITE", help="Site file, TOML.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite a file that is there.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Hang `map check`, `map draw` and `map new` on `app`."""
+    maps = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+    maps.command("check")(check)
+    maps.command("draw")(draw)
+    maps.command("new")(new)
+    app.add_typer(maps, name="map", help="Check, draw and make site files (the map of a warehouse).")
+
+
+def check(site_file: SiteFile, as_json: AsJson = False) -> None:
+    """Say whether a site file is sound, and what it holds.
+
+    \b
+    flightd map check configs/site-demo.toml
+    flightd map check hall-3.toml --json
+    """
+    from flightd.config.site_file import load_site
+
+    facts = _facts(load_site(site_file))
+    if as_json:
+        print(json.dumps({"file": str(site_file), "ok": True, **facts}))
+        return
+    print(f"{site_file}: sound")
+    for name, value in facts.items():
+        label, _, unit = name.replace("_", " ").rpartition(" ")
+        print(f"  {label:<13} {value} m" if unit == "m" else f"  {name.replace('_', ' '):<13} {value}")
+
+
+def draw(
+    site_file: SiteFile,
+    out: Annotated[
+        Path | None, typer.Option(metavar="F", help="Where to write; beside the site file, as .svg.")
+    ] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Draw the floor plan of a site to scale, as an SVG picture for any browser.
+
+    \b
+    flightd map draw configs/site-demo.toml --out demo.svg
+    """
+    from flightd.cli.site_drawing import draw_site
+    from flightd.config.site_file import load_site
+
+    target = out if out is not None else site_file.with_suffix(".svg")
+    _write(target, draw_site(load_site(site_file)), force)
+    print(json.dumps({"drawing": str(target)}) if as_json else target)
+
+
+def new(
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Site file to write.")],
+    aisles: Annotated[int, typer.Option(help="Number of aisles.", min=1, max=26)] = 2,
+    nodes: Annotated[int, typer.Option(help="Nodes of each aisle.", min=2, max=1000)] = 6,
+    spacing_m: Annotated[
+        str, typer.Option(help="Metres between nodes: one number, or a list that repeats: 1.5,1.8.")
+    ] = "1.5",
+    pitch_m: Annotated[float, typer.Option(help="Metres from aisle to aisle.", min=0.5, max=100)] = 3.0,
+    line_width_m: Annotated[float, typer.Option(help="Width of the painted lines.")] = 0.075,
+    line_colour: Annotated[str, typer.Option(help="yellow, white, red or blue.")] = "yellow",
+    shelf_distance_m: Annotated[float, typer.Option(help="From the line to the shelf front.")] = 1.2,
+    shelf_height_m: Annotated[float, typer.Option(help="Height of the shelves.")] = 3.0,
+    ceiling_m: Annotated[float, typer.Option(help="Height of the hall.")] = 6.0,
+    name: Annotated[str | None, typer.Option(help="Name of the site; the file's name.")] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Make a site file of equal aisles, joined at both ends, with the pad at A1; then edit it.
+
+    \b
+    flightd map new hall-3.toml --aisles 4 --nodes 8 --spacing-m 1.4,1.7 --pitch-m 3.2
+    """
+    from flightd.config.site_file import parse_site, site_toml
+
+    steps = [repr(step) for step in _spacings(spacing_m, nodes)]
+    letters = _LETTERS[:aisles]
+    blocks = [
+        f"[site]\nname = {json.dumps(name or out.stem)}\nline_width_m = {line_width_m}\n"
+        f"line_colour = {json.dumps(line_colour)}\nceiling_m = {ceiling_m}"
+    ]
+    for i, letter in enumerate(letters):
+        blocks.append(
+            f'[[aisle]]\nid = "{letter}"\nx_m = 0.0\ny_m = {round(i * pitch_m, 6)}\n'
+            f"spacing_m = [{', '.join(steps)}]\nshelf_distance_m = {shelf_distance_m}\n"
+            f"shelf_height_m = {shelf_height_m}"
+        )
+    for a, b in itertools.pairwise(letters):
+        blocks += [f'[[cross]]\nnodes = ["{a}{end}", "{b}{end}"]' for end in (1, nodes)]
+    blocks.append('[[pad]]\nid = "home"\nnode = "A1"')
+    site = parse_site("\n\n".join(blocks), str(out))
+    _write(out, site_toml(site), force)
+    print(json.dumps({"file": str(out), **_facts(site)}) if as_json else out)
+
+
+def _facts(site: Site) -> dict[str, Any]:
+    x0, y0, x1, y1 = site.bounds()
+    route = site.serpentine_route()
+    return {
+        "name": site.name,
+        "aisles": len(site.aisles),
+        "nodes": len(site.nodes),
+        "crosses": len(site.crosses),
+        "pads": len(site.pads),
+        "length_m": round(x1 - x0, 2),
+        "width_m": round(y1 - y0, 2),
+        "paint_m": round(math.fsum(abs(p.x1_m - p.x0_m) + abs(p.y1_m - p.y0_m) for p in site.lines), 1),
+        "route_m": round(site.length_m(route), 1),
+    }
+
+
+def _spacings(text: str, nodes: int) -> list[float]:
+    try:
+        pattern = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"--spacing-m {text!r}: give metres, as in 1.5 or 1.5,1.8") from None
+    return [pattern[i % len(pattern)] for i in range(nodes - 1)]
+
+
+def _write(path: Path, text: str, force: bool) -> None:
+    try:
+        with path.open("w" if force else "x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise InputError(f"{path}: there already; choose another name or add --force") from None
+    except OSError as err:
+        raise InputError(f"{path}: cannot write: {err.strerror or err}") from None

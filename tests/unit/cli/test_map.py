@@ -1,0 +1,111 @@
+"""`flightd map`: what it prints, writes and refuses."""
+
+import json
+import sys
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from flightd.cli.main import main
+from flightd.config.site_file import load_site, site_toml
+from flightd.sim.sites import random_site
+
+DEMO = Path(__file__).parents[3] / "configs" / "site-demo.toml"
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture
+def flightd(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> "Run":
+    return Run(monkeypatch, capsys)
+
+
+class Run:
+    """Runs the command in this process; gives exit code, stdout and stderr."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+        self._monkeypatch = monkeypatch
+        self._capsys = capsys
+
+    def __call__(self, *arguments: object) -> tuple[int, str, str]:
+        self._monkeypatch.setattr(sys, "argv", ["flightd", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        printed = self._capsys.readouterr()
+        code = ended.value.code
+        return int(code or 0), printed.out, printed.err
+
+
+def test_check_tells_what_a_sound_file_holds(flightd: Run) -> None:
+    code, out, _ = flightd("map", "check", DEMO, "--json")
+    facts = json.loads(out)
+    assert code == 0
+    assert (facts["ok"], facts["aisles"], facts["nodes"], facts["route_m"]) == (True, 2, 12, 21.8)
+    assert "sound" in flightd("map", "check", DEMO)[1]
+
+
+def test_check_names_the_mistake_in_one_line_and_exits_2(flightd: Run, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.toml"
+    bad.write_text(DEMO.read_text().replace('node = "A1"', 'node = "A9"'))
+    code, out, err = flightd("map", "check", bad, "--json")
+    assert (code, out) == (2, "")
+    assert err == f"flightd: {bad}: pad[0] (home).node: there is no node A9\n"
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_drawing_is_svg_with_every_node_line_and_shelf(flightd: Run, tmp_path: Path, seed: int) -> None:
+    site = random_site(seed)
+    file = tmp_path / "site.toml"
+    file.write_text(site_toml(site))
+    code, out, _ = flightd("map", "draw", file)
+    assert (code, out.strip()) == (0, str(tmp_path / "site.svg"))
+    picture = ET.parse(tmp_path / "site.svg").getroot()
+    texts = {text.text for text in picture.iter(f"{SVG}text")}
+    assert set(site.nodes) | {aisle.id for aisle in site.aisles} | {"home"} <= texts
+    assert len([r for r in picture.iter(f"{SVG}rect") if r.get("class") == "shelf"]) == len(site.shelves)
+    assert len([p for p in picture.iter(f"{SVG}path") if p.get("stroke") == "#6b6047"]) == len(site.lines)
+    _, _, width, height = map(float, picture.attrib["viewBox"].split())
+    for circle in picture.iter(f"{SVG}circle"):
+        assert 0 < float(circle.attrib["cx"]) < width
+        assert 0 < float(circle.attrib["cy"]) < height
+
+
+def test_new_makes_a_site_that_loads(flightd: Run, tmp_path: Path) -> None:
+    file = tmp_path / "hall.toml"
+    numbers = ("--aisles", 4, "--nodes", 5, "--spacing-m", "1.4,1.7", "--pitch-m", 3.2)
+    assert flightd("map", "new", file, *numbers)[0] == 0
+    site = load_site(file)
+    assert (site.name, len(site.aisles), site.aisles[0].spacing_m) == ("hall", 4, (1.4, 1.7, 1.4, 1.7))
+    assert [aisle.y_m for aisle in site.aisles] == [0.0, 3.2, 6.4, 9.6]
+    assert len(site.crosses) == 6
+
+
+def test_new_keeps_a_file_that_is_there(flightd: Run, tmp_path: Path) -> None:
+    file = tmp_path / "hall.toml"
+    file.write_text("mine")
+    code, _, err = flightd("map", "new", file)
+    assert code == 2
+    assert "--force" in err
+    assert file.read_text() == "mine"
+    assert flightd("map", "new", file, "--force")[0] == 0
+    assert load_site(file).name == "hall"
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--spacing-m", "wide", "give metres"),
+        ("--spacing-m", "nan", "spacing_m[0]: Input should be a finite number"),
+        ("--pitch-m", "1.0", "cross lines need"),
+        ("--line-colour", "pink", "line_colour"),
+        ("--shelf-height-m", "9", "above the ceiling"),
+    ],
+)
+def test_new_refuses_numbers_that_make_no_floor(
+    flightd: Run, tmp_path: Path, option: str, value: str, words: str
+) -> None:
+    code, _, err = flightd("map", "new", tmp_path / "hall.toml", option, value)
+    assert code == 2
+    assert words in err
+    assert err.count("\n") == 1
+    assert not (tmp_path / "hall.toml").exists()
