@@ -10,8 +10,8 @@ import sys
 import typer
 
 from flightd import __version__
+from flightd.cli import log, report, sim, vision
 from flightd.cli import map as site_map
-from flightd.cli import report, sim, vision
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 
 app = typer.Typer(
@@ -20,6 +20,7 @@ app = typer.Typer(
 vision.register(app)
 sim.register(app)
 report.register(app)
+log.register(app)
 site_map.register(app)
 
 

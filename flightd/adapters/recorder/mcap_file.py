@@ -7,12 +7,13 @@ chunks, so that mending a file needs to unpack none but the last of them.
 
 from __future__ import annotations
 
+import fcntl
 import os
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, Self, TypeAlias
 
@@ -76,32 +77,28 @@ class McapFile:
 
     @classmethod
     def create(cls, path: Path) -> Self:
-        """A new file at `path`; what was there is replaced."""
-        file = cls(path.open("wb+", buffering=0))
-        file._begin()
-        return file
+        """A new file at `path`; what was there is replaced.  Errors as in `resume`."""
+        with _claimed(path, os.O_CREAT) as stream:
+            stream.truncate(0)
+            file = cls(stream)
+            file._begin()
+            return file
 
     @classmethod
     def resume(cls, path: Path) -> Self:
-        """Open `path` to write on behind its last whole record; InputError if it is not an MCAP file."""
-        try:
-            stream = path.open("rb+", buffering=0)
-        except OSError as err:
-            raise InputError(f"{path}: cannot open the log: {err.strerror}") from None
-        start = stream.read(len(MAGIC))
-        if not MAGIC.startswith(start):
-            stream.close()
-            raise InputError(f"{path}: not a flight log (no MCAP header)")
-        file = cls(stream)
-        try:
+        """Open `path` to write on behind its last whole record.
+
+        InputError if it cannot be opened, is not one of flightd's logs, or is being written."""
+        with _claimed(path) as stream:
+            start = stream.read(len(MAGIC))
+            if not MAGIC.startswith(start):
+                raise InputError(f"{path}: not a flight log (no MCAP header)")
+            file = cls(stream)
             if len(start) < len(MAGIC):
                 file._begin()
             else:
                 file._recover()
-        except BaseException:
-            stream.close()
-            raise
-        return file
+            return file
 
     @property
     def size(self) -> int:
@@ -298,6 +295,24 @@ def repair(path: Path) -> None:
     Raises InputError if the file cannot be opened or is not one of flightd's logs.
     """
     McapFile.resume(path).close()
+
+
+@contextmanager
+def _claimed(path: Path, flags: int = 0) -> Iterator[BinaryIO]:
+    """The file open for reading and writing and locked against other writers; closed again on errors."""
+    try:
+        stream = open(path, "rb+", buffering=0, opener=lambda name, mode: os.open(name, mode | flags, 0o644))  # noqa: SIM115
+    except OSError as err:
+        raise InputError(f"{path}: cannot open the log: {err.strerror}") from None
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield stream
+    except BlockingIOError:
+        stream.close()
+        raise InputError(f"{path}: is being written by another process; wait until it is done") from None
+    except BaseException:
+        stream.close()
+        raise
 
 
 _Entries: TypeAlias = dict[int, list[tuple[int, int]]]

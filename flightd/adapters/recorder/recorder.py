@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import fcntl
 import os
 import select
 import socket
@@ -70,7 +71,10 @@ class Recorder:
         self._restarts = 0
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.open("wb").close()
+            with path.open("ab") as probe:
+                fcntl.flock(probe, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UnavailableError(f"{path}: another process is writing this flight log") from None
         except OSError as err:
             raise UnavailableError(f"{path}: cannot write the flight log: {err.strerror}") from None
         self._metadata = _frame(

@@ -138,6 +138,17 @@ def test_a_place_that_cannot_be_written_is_told_in_one_line(tmp_path: Path) -> N
         Recorder(tmp_path / "file" / "flight.mcap")
 
 
+def test_a_log_that_another_recorder_writes_is_not_taken_from_it(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+    with Recorder(path) as recorder:
+        recorder.record(Topic.POSE, 2, POSE)
+        recorder._push()
+        _wait_for(path, 1)
+        with pytest.raises(UnavailableError, match="another process is writing"):
+            Recorder(path)
+    assert len(read_log(path).entries) == 1
+
+
 def test_nothing_is_lost_in_a_clean_close_under_load(tmp_path: Path) -> None:
     count = 20_000
     with Recorder(tmp_path / "flight.mcap", queue_bytes=1 << 16, lossless=True) as recorder:
