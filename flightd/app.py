@@ -84,7 +84,7 @@ class Daemon:
         self._detectors = detectors
         self._recorder = recorder
         self._observers = observers
-        self._pilot = Pilot(site, plan_of(config, site), config.mission.heading, config.pilot_params())
+        self._pilot = Pilot(site, plan_of(config, site), config.mission.heading, config.pilot_params(site))
         self._frames: Latest[FrameTicket] = Latest()
         self._camera = SharedCamera(
             config.camera.url,

@@ -71,7 +71,7 @@ def fly(simulation: Simulation) -> FlightResult:
 async def _lockstep(simulation: Simulation) -> FlightResult:
     clock = LoopClock()
     with ExitStack() as stack:
-        recorder = stack.enter_context(_flight_recorder(simulation, lossless=True))
+        recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=True))
         truth = stack.enter_context(Recorder(simulation.truth_log, lossless=True))
         pool = stack.enter_context(detector_pool(simulation.config, clock))
         camera_port = free_port()
@@ -105,7 +105,7 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
         target=_run_world, args=(spec, factor, simulation.truth_log, theirs), name="world"
     )
     with ExitStack() as stack:
-        recorder = stack.enter_context(_flight_recorder(simulation, lossless=False))
+        recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=False))
         process.start()
         theirs.close()
         stack.callback(process.join, 15.0)
@@ -156,11 +156,12 @@ def _run_world(spec: WorldSpec, factor: float, log: Path, pipe: Connection) -> N
         runner.run(main())
 
 
-def _flight_recorder(simulation: Simulation, lossless: bool) -> Recorder:
+def _flight_recorder(simulation: Simulation, clock: LoopClock, lossless: bool) -> Recorder:
     recorder = Recorder(simulation.flight_log, lossless=lossless)
-    recorder.record(Topic.MAP, 0, Document(site_toml(simulation.site)))
-    recorder.record(Topic.CONFIG, 0, Document(simulation.config.model_dump_json(indent=1)))
-    recorder.record(Topic.SCENARIO, 0, Document(simulation.scenario.model_dump_json(indent=1)))
+    now_ns = clock.now_ns()
+    recorder.record(Topic.MAP, now_ns, Document(site_toml(simulation.site)))
+    recorder.record(Topic.CONFIG, now_ns, Document(simulation.config.model_dump_json(indent=1)))
+    recorder.record(Topic.SCENARIO, now_ns, Document(simulation.scenario.model_dump_json(indent=1)))
     return recorder
 
 

@@ -15,6 +15,7 @@ from flightd.control.limits import Limits
 from flightd.control.pid import PidGains
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens, Mount
+from flightd.grid.site import Site
 from flightd.mission.guidance import MissionParams
 from flightd.mission.plan import Heading
 from flightd.pilot import PilotParams
@@ -208,9 +209,14 @@ class Config(_Section):
     control: ControlConfig = ControlConfig()
     recorder: RecorderConfig = RecorderConfig()
 
-    def pilot_params(self) -> PilotParams:
+    def pilot_params(self, site: Site) -> PilotParams:
         return PilotParams(
-            tracker=TrackerParams(self.camera.lens(), self.camera.mount(), self.control.tilt_compensation),
+            tracker=TrackerParams(
+                self.camera.lens(),
+                self.camera.mount(),
+                self.control.tilt_compensation,
+                width_m=site.line_width_m,
+            ),
             gains=FlightGains(
                 self.control.horizontal.gains(), self.control.yaw.gains(), self.control.height.gains()
             ),

@@ -20,7 +20,9 @@ _SURVEY_SIGMA_M = 0.01
 _MATCH_SHARE = 0.4
 """A track is matched within this share of the distance to the next map line (0.5 would be ambiguous)."""
 _MATCH_MAX_M = 0.5
-_MIN_HITS = 2
+_MATCH_SIGMAS = 4.0
+_MATCH_SLACK_M = 0.06
+_MIN_HITS = 3
 _DRIFT_MPS = 0.15
 """Growth of the position's sigma while no line is seen."""
 
@@ -50,12 +52,13 @@ class _Axis:
         self.position_m += velocity_mps * dt_s
         self.sigma_m += _DRIFT_MPS * dt_s
         held = {track.id for track in tracks}
+        tracks = sorted(tracks, key=lambda track: -track.seen_ns)
         self._matched = {id_: at for id_, at in self._matched.items() if id_ in held}
         weight = total = 0.0
         for track in tracks:
             if track.id not in self._matched and track.hits >= _MIN_HITS:
-                at = self._match(self.position_m + track.offset_m, other_m, reach_m)
-                if at is not None:
+                at = self._match(track, other_m, reach_m)
+                if at is not None and at not in self._matched.values():
                     self._matched[track.id] = at
                     self.ever_matched = True
             if track.id in self._matched:
@@ -66,15 +69,17 @@ class _Axis:
             self.position_m = total / weight
             self.sigma_m = weight**-0.5
 
-    def _match(self, seen_at_m: float, other_m: float, reach_m: float) -> float | None:
-        """The coordinate of the painted line seen at `seen_at_m`, if it is unambiguous."""
+    def _match(self, track: TrackedLine, other_m: float, reach_m: float) -> float | None:
+        """The coordinate of the painted line that the track is, if that is near enough and unambiguous."""
+        seen_at_m = self.position_m + track.offset_m
         near = {line.at_m for line in self._lines if line.from_m - reach_m <= other_m <= line.to_m + reach_m}
         by_distance = sorted(near, key=lambda at: abs(at - seen_at_m))
         if not by_distance:
             return None
         best = by_distance[0]
         gap = min((abs(at - best) for at in by_distance[1:]), default=math.inf)
-        gate = min(_MATCH_SHARE * gap, _MATCH_MAX_M)
+        doubt_m = _MATCH_SIGMAS * math.hypot(self.sigma_m, track.sigma_m) + _MATCH_SLACK_M
+        gate = min(_MATCH_SHARE * gap, _MATCH_MAX_M, doubt_m)
         return best if abs(best - seen_at_m) <= gate else None
 
 

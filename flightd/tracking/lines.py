@@ -23,13 +23,16 @@ _PARALLEL_RAD = math.radians(20.0)
 
 @dataclass(frozen=True, slots=True)
 class TrackerParams:
-    """How the down camera sees and how far to trust it; metres, radians, seconds."""
+    """How the down camera sees and how far to trust it; metres, radians, seconds.  A line whose width is
+    not that of the guide paint, within `width_share`, is not one."""
 
     lens: Lens
     mount: Mount
     compensation: TiltCompensation = TiltCompensation.EXACT
     sigma_tilt_rad: float = math.radians(0.3)
     min_sigma_m: float = 0.004
+    width_m: float = 0.075
+    width_share: tuple[float, float] = (0.55, 1.7)
     gate_m: float = 0.35
     forget_s: float = 2.5
     start_yaw_sigma_rad: float = math.radians(5.0)
@@ -94,7 +97,8 @@ class LineTracker:
         view = FloorView(
             params.lens, params.mount, attitude, height_m, params.compensation, params.sigma_tilt_rad
         )
-        on_floor = ground_lines(lines.lines, view)
+        low, high = (share * params.width_m for share in params.width_share)
+        on_floor = [line for line in ground_lines(lines.lines, view) if low <= line.width_m <= high]
         yaw = self._turn(on_floor, attitude)
         across_x: list[tuple[float, float, float]] = []
         across_y: list[tuple[float, float, float]] = []
