@@ -13,14 +13,20 @@ Message: TypeAlias = Any
 """An instance of one of the dialect's generated message classes."""
 
 _CHANNELS_MAX = 8
+_STAMP_2026 = 347_155_200 * 100_000
+"""Signing time at boot: an autopilot without a clock starts from the one it has stored."""
 
 
 class Channel:
     """One peer address: its own sequence numbers and message intervals, as an autopilot's serial port."""
 
-    def __init__(self, address: Address, system_id: int, component_id: int) -> None:
+    def __init__(self, address: Address, system_id: int, component_id: int, key: bytes | None = None) -> None:
         self.address = address
         self._packer = dialect.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
+        if key is not None:
+            self._packer.signing.secret_key = key
+            self._packer.signing.sign_outgoing = True
+            self._packer.signing.timestamp = _STAMP_2026
         self.intervals_ns: dict[int, int] = {}
         self.due_ns: dict[int, int] = {}
 
@@ -40,16 +46,23 @@ class Channel:
 
 
 class UdpLink(asyncio.DatagramProtocol):
-    """A bound UDP socket.  `received(channel, message)` is called for every sound message."""
+    """A bound UDP socket.  `received(channel, message)` is called for every sound message; with a `key`
+    MAVLink 2 signatures are made and demanded."""
 
     def __init__(
-        self, system_id: int, component_id: int, received: Callable[[Channel, Message], None]
+        self,
+        system_id: int,
+        component_id: int,
+        received: Callable[[Channel, Message], None],
+        key: bytes | None = None,
     ) -> None:
         self._system_id = system_id
         self._component_id = component_id
         self._received = received
         self._parser = dialect.MAVLink(None)
         self._parser.robust_parsing = True
+        self._parser.signing.secret_key = key
+        self._key = key
         self._transport: asyncio.DatagramTransport | None = None
         self.channels: dict[Address, Channel] = {}
         self.muted = False
@@ -72,7 +85,9 @@ class UdpLink(asyncio.DatagramProtocol):
         """The channel of that address, made at its first use; None when too many have spoken."""
         channel = self.channels.get(address)
         if channel is None and len(self.channels) < _CHANNELS_MAX:
-            channel = self.channels[address] = Channel(address, self._system_id, self._component_id)
+            channel = self.channels[address] = Channel(
+                address, self._system_id, self._component_id, self._key
+            )
         return channel
 
     def send(self, channel: Channel, message: Message) -> None:

@@ -46,6 +46,7 @@ class PeerConfig:
     clock_ppm: float = 20.0
     sensors: SensorParams = field(default_factory=SensorParams)
     seed: int = 0
+    signing_key: bytes | None = None
     parameters: dict[str, float] = field(default_factory=dict)
 
 
@@ -63,7 +64,9 @@ class AutopilotPeer(abc.ABC):
         self.sensors = Sensors(config.sensors, config.seed)
         self.instruments = Instruments(airframe, self.sensors)
         self.parameters = ParameterServer({**parameters, **config.parameters})
-        self.link = UdpLink(config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self._received)
+        self.link = UdpLink(
+            config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self._received, config.signing_key
+        )
         self._config = config
         self._clock = clock
         self._now_ns = self._boot_ns = clock.now_ns()

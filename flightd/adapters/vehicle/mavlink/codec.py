@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.adapters.vehicle.mavlink.signing import Signing
 from flightd.core.errors import InputError
 
 Message: TypeAlias = Any
@@ -36,18 +37,25 @@ def refuse_unchecked_frames() -> None:
 class Codec:
     """Packs what we send, with our identity and sequence numbers, and decodes single frames."""
 
-    def __init__(self, system_id: int, component_id: int = COMPANION) -> None:
+    def __init__(self, system_id: int, component_id: int = COMPANION, signing: Signing | None = None) -> None:
         refuse_unchecked_frames()
         self._mav = dialect.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
+        self._signing = signing
+        if signing is not None:
+            signing.attach(self._mav)
 
     def pack(self, message: Message) -> bytes:
         """One MAVLink 2 frame; the sequence number counts modulo 256 (pymavlink's `pack` does not)."""
+        if self._signing is not None:
+            self._signing.before_pack(self._mav)
         frame: bytes = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
         return frame
 
     def decode(self, frame: bytearray) -> Message | None:
-        """The message in one whole frame of a known id, or None when its checksum is wrong."""
+        """The message in one whole frame of a known id, or None when its checksum or signature is wrong."""
+        if self._signing is not None:
+            return self._signing.decode(self._mav, frame)
         try:
             return self._mav.decode(frame)
         except dialect.MAVError:
@@ -60,8 +68,6 @@ class FrameParser:
     def __init__(self, codec: Codec) -> None:
         self._codec = codec
         self._pending = bytearray()
-        self.frames = 0
-        self.skipped_bytes = 0
 
     def datagram(self, data: bytes) -> list[Message]:
         """The messages of one datagram, which holds whole frames; nothing is kept for the next."""
@@ -85,11 +91,10 @@ class FrameParser:
             message = self._codec.decode(data[at : at + length]) if 0 < length <= size - at else None
             if message is None:
                 at += 1
-                self.skipped_bytes += 1
                 continue
             messages.append(message)
-            at += length
-        self.frames += len(messages)
+            # The checksum does not cover a signature: what stands there may be the next frame already.
+            at += length - _SIGNATURE if data[at] == _MARKER_V2 and data[at + 2] & _SIGNED else length
         return messages, at
 
 

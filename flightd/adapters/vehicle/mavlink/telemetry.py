@@ -112,7 +112,7 @@ class Telemetry:
 
     def _take_attitude(self, message: Message, now_ns: int) -> bool:
         angles = (message.roll, message.pitch, message.yaw)
-        if not all(map(math.isfinite, angles)):
+        if not all(abs(angle) <= math.tau for angle in angles):  # NaN fails too
             return False
         boot_ms = int(message.time_boot_ms)
         rebooted = boot_ms + _REBOOT_MS < self._boot_ms

@@ -19,6 +19,7 @@ from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link import Firmware, MavlinkLink
 from flightd.adapters.vehicle.mavlink.parameters import ParameterReader
 from flightd.adapters.vehicle.mavlink.setpoint import Heading, attitude_target
+from flightd.adapters.vehicle.mavlink.signing import Signing
 from flightd.adapters.vehicle.mavlink.statustext import SEVERITIES, TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.streams import StreamKeeper
 from flightd.adapters.vehicle.mavlink.telemetry import Telemetry
@@ -68,7 +69,7 @@ class MavlinkVehicle(abc.ABC):
     """What has to be known of the autopilot's parameters; each with its names, oldest first."""
     rates_hz: ClassVar[dict[int, float]] = RATES_HZ
 
-    def __init__(self, url: str, clock: Clock, system_id: int = 1) -> None:
+    def __init__(self, url: str, clock: Clock, system_id: int = 1, signing: Signing | None = None) -> None:
         self._clock = clock
         self._system_id = system_id
         self._sync = ClockSync()
@@ -76,7 +77,9 @@ class MavlinkVehicle(abc.ABC):
         self._authority = Authority()
         self._heading = Heading()
         transport = make_transport(parse_endpoint(url))
-        self.link = MavlinkLink(transport, Codec(system_id), clock, system_id, self._received)
+        self.link = MavlinkLink(
+            transport, Codec(system_id, signing=signing), clock, system_id, self._received
+        )
         self._commander = Commander(self.link, system_id)
         self.streams = StreamKeeper(self._commander, clock, self.rates_hz)
         self.parameters = ParameterReader(self.link, system_id, self.parameter_names)

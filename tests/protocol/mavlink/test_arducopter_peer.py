@@ -17,7 +17,7 @@ from flightd.sim.airframe import Airframe
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode, Sticks
 from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.wind import Draught
-from tests.protocol.raw_client import RawClient
+from tests.protocol.mavlink.raw_client import RawClient
 
 CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
 
