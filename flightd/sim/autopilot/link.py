@@ -13,8 +13,6 @@ Message: TypeAlias = Any
 """An instance of one of the dialect's generated message classes."""
 
 _CHANNELS_MAX = 8
-_STAMP_2026 = 347_155_200 * 100_000
-"""Signing time at boot: an autopilot without a clock starts from the one it has stored."""
 
 
 class Channel:
@@ -26,11 +24,12 @@ class Channel:
         if key is not None:
             self._packer.signing.secret_key = key
             self._packer.signing.sign_outgoing = True
-            self._packer.signing.timestamp = _STAMP_2026
         self.intervals_ns: dict[int, int] = {}
         self.due_ns: dict[int, int] = {}
 
-    def pack(self, message: Message) -> bytes:
+    def pack(self, message: Message, signing_time: int) -> bytes:
+        """One frame; a signature is stamped no earlier than `signing_time`."""
+        self._packer.signing.timestamp = max(self._packer.signing.timestamp, signing_time)
         frame: bytes = message.pack(self._packer)
         self._packer.seq = (self._packer.seq + 1) % 256
         return frame
@@ -47,7 +46,8 @@ class Channel:
 
 class UdpLink(asyncio.DatagramProtocol):
     """A bound UDP socket.  `received(channel, message)` is called for every sound message; with a `key`
-    MAVLink 2 signatures are made and demanded."""
+    MAVLink 2 signatures are made and demanded; their time is the newest heard, as on an autopilot
+    without a clock."""
 
     def __init__(
         self,
@@ -92,7 +92,8 @@ class UdpLink(asyncio.DatagramProtocol):
 
     def send(self, channel: Channel, message: Message) -> None:
         if self._transport is not None and not self.muted:
-            self._transport.sendto(channel.pack(message), channel.address)
+            frame = channel.pack(message, self._parser.signing.timestamp)
+            self._transport.sendto(frame, channel.address)
 
     def broadcast(self, message: Message) -> None:
         for channel in self.channels.values():

@@ -29,7 +29,8 @@ class Endpoint:
     def __str__(self) -> str:
         if self.kind is EndpointKind.SERIAL:
             return f"serial://{self.device}:{self.baud}"
-        return f"{self.kind}://{self.host}:{self.port}"
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.kind}://{host}:{self.port}"
 
 
 _FORMS = "udpin://0.0.0.0:14550, udpout://HOST:PORT, tcp://HOST:PORT or serial:///dev/ttyAMA0:921600"

@@ -1,0 +1,277 @@
+"""Addresses, and UDP, TCP and serial lines that come and go."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
+from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser
+from flightd.adapters.vehicle.mavlink.endpoint import Endpoint, EndpointKind, parse_endpoint
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.types import Demand
+from flightd.runtime.clock import LoopClock
+from flightd.sim.airframe import Airframe
+from flightd.sim.autopilot.copter import ArduCopterPeer
+from flightd.sim.autopilot.peer import PeerConfig
+from tests.protocol.rig import Rig, run_virtual
+
+
+@pytest.mark.parametrize(
+    ("url", "endpoint"),
+    [
+        ("udpin://0.0.0.0:14550", Endpoint(EndpointKind.UDP_IN, "0.0.0.0", 14550)),
+        ("udpout://127.0.0.1:14551", Endpoint(EndpointKind.UDP_OUT, "127.0.0.1", 14551)),
+        ("tcp://localhost:5760", Endpoint(EndpointKind.TCP, "localhost", 5760)),
+        ("tcp:127.0.0.1:5760", Endpoint(EndpointKind.TCP, "127.0.0.1", 5760)),
+        ("udpin://[::1]:14550", Endpoint(EndpointKind.UDP_IN, "::1", 14550)),
+        ("serial:///dev/ttyAMA0:921600", Endpoint(EndpointKind.SERIAL, device="/dev/ttyAMA0", baud=921600)),
+    ],
+)
+def test_addresses_are_read(url: str, endpoint: Endpoint) -> None:
+    assert parse_endpoint(url) == endpoint
+    assert parse_endpoint(str(endpoint)) == endpoint
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "",
+        "14550",
+        "udp://127.0.0.1:14550",
+        "udpin://0.0.0.0",
+        "tcp://h:70000",
+        "tcp://h:0",
+        "serial://COM1:9600",
+    ],
+)
+def test_bad_addresses_name_what_is_understood(url: str) -> None:
+    with pytest.raises(InputError, match=r"vehicle\.url") as caught:
+        parse_endpoint(url)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_baud_rate_that_does_not_exist_is_bad_input() -> None:
+    async def test() -> None:
+        with pytest.raises(InputError, match="baud"):
+            ArduPilotVehicle("serial:///dev/ttyAMA0:12345", LoopClock())
+
+    run_virtual(test)
+
+
+def test_a_port_in_use_is_told_in_one_line() -> None:
+    async def test() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+            taken.bind(("127.0.0.1", 0))
+            vehicle = ArduPilotVehicle(f"udpin://127.0.0.1:{taken.getsockname()[1]}", LoopClock())
+            with pytest.raises(UnavailableError, match="the port is in use") as caught:
+                await vehicle.run()
+            assert "\n" not in str(caught.value)
+
+    run_virtual(test)
+
+
+def test_what_is_no_serial_device_is_told() -> None:
+    async def test() -> None:
+        with pytest.raises(UnavailableError, match="not a serial device"):
+            await ArduPilotVehicle("serial:///dev/null:57600", LoopClock()).run()
+
+    run_virtual(test)
+
+
+def free_port(kind: int = socket.SOCK_DGRAM) -> int:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def test_a_listening_vehicle_answers_the_autopilot_that_calls() -> None:
+    async def test() -> None:
+        clock, port = LoopClock(), free_port()
+        vehicle = ArduPilotVehicle(f"udpin://127.0.0.1:{port}", clock)
+        config = PeerConfig(ready_s=0.5, remotes=(("127.0.0.1", port),))
+        peer = ArduCopterPeer(clock, Airframe(), config)
+        tasks = [asyncio.create_task(vehicle.run()), asyncio.create_task(peer.run())]
+        rig = Rig(vehicle, peer, lambda: None, lambda apart: None)
+        await rig.take_off(1.0)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    run_virtual(test)
+
+
+def test_while_the_autopilot_speaks_no_other_address_can_replace_it() -> None:
+    async def test() -> None:
+        clock, port = LoopClock(), free_port()
+        vehicle = ArduPilotVehicle(f"udpin://127.0.0.1:{port}", clock)
+        config = PeerConfig(ready_s=0.5, remotes=(("127.0.0.1", port),))
+        peer, thief = (ArduCopterPeer(clock, Airframe(), config) for _ in range(2))
+        tasks = [asyncio.create_task(part.run()) for part in (vehicle, peer)]
+        rig = Rig(vehicle, peer, lambda: None, lambda apart: None)
+        await rig.take_off(1.0)
+        tasks.append(asyncio.create_task(thief.run()))
+        thief.mode = type(thief.mode).ALT_HOLD
+        assert all(await rig.stream(5.0))
+        tasks[1].cancel()  # now the first is gone and the other may speak
+        await asyncio.sleep(6.0)
+        assert rig.known().mode == "ALT_HOLD"
+        assert not rig.known().in_control
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    run_virtual(test)
+
+
+class StreamAutopilot(asyncio.Protocol):
+    """Beats on every TCP connection that comes and acknowledges every command."""
+
+    open: list[StreamAutopilot] = []  # noqa: RUF012 - one list for all connections of a test
+    frames: list[Any] = []  # noqa: RUF012
+
+    def connection_made(self, transport: Any) -> None:
+        self.transport = transport
+        self.codec = Codec(1, 1)
+        self.parser = FrameParser(Codec(1, 1))
+        StreamAutopilot.open.append(self)
+
+    def data_received(self, data: bytes) -> None:
+        for message in self.parser.stream(data):
+            StreamAutopilot.frames.append(message)
+            if message.get_type() == "COMMAND_LONG":
+                self.say(dialect.MAVLink_command_ack_message(message.command, 0, 0, 0, 1, 191))
+
+    def say(self, message: Any) -> None:
+        self.transport.write(self.codec.pack(message))
+
+    def beat(self) -> None:
+        self.say(dialect.MAVLink_heartbeat_message(2, 3, 1, 0, 4, 3))
+        self.say(dialect.MAVLink_attitude_message(0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+
+
+@asynccontextmanager
+async def tcp_vehicle(port: int) -> AsyncIterator[ArduPilotVehicle]:
+    StreamAutopilot.open, StreamAutopilot.frames = [], []
+    vehicle = ArduPilotVehicle(f"tcp:127.0.0.1:{port}", LoopClock())
+    task = asyncio.create_task(vehicle.run())
+    try:
+        yield vehicle
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        for connection in StreamAutopilot.open:
+            connection.transport.abort()
+        await asyncio.sleep(0.1)
+
+
+async def beating(duration_s: float) -> None:
+    for _ in range(round(duration_s / 0.05)):
+        for connection in StreamAutopilot.open:
+            if not connection.transport.is_closing():
+                connection.beat()
+        await asyncio.sleep(0.05)
+
+
+def test_tcp_waits_for_the_other_side_and_comes_back_after_a_loss() -> None:
+    async def test() -> None:
+        port = free_port(socket.SOCK_STREAM)
+        async with tcp_vehicle(port) as vehicle:
+            await asyncio.sleep(20.0)
+            assert vehicle.state() is None
+            loop = asyncio.get_running_loop()
+            server = await loop.create_server(StreamAutopilot, "127.0.0.1", port)
+            await beating(7.0)
+            assert vehicle.state() is not None
+            assert {m.get_type() for m in StreamAutopilot.frames} >= {"HEARTBEAT", "COMMAND_LONG", "TIMESYNC"}
+            StreamAutopilot.open.pop().transport.abort()
+            await beating(4.0)
+            assert len(StreamAutopilot.open) == 1
+            state = vehicle.state()
+            assert state is not None
+            assert LoopClock().now_ns() - state.heartbeat_ns < 0.2e9
+            server.close()
+            await server.wait_closed()
+
+    run_virtual(test)
+
+
+def test_a_stalled_tcp_line_drops_what_is_new_instead_of_piling_it_up() -> None:
+    async def test() -> None:
+        port = free_port(socket.SOCK_STREAM)
+        async with tcp_vehicle(port) as vehicle:
+            loop = asyncio.get_running_loop()
+            server = await loop.create_server(StreamAutopilot, "127.0.0.1", port)
+            await beating(2.0)
+            StreamAutopilot.open[0].transport.pause_reading()
+            beat = dialect.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
+            accepted = sum(vehicle.link.send(beat) for _ in range(400_000))  # 8 MB
+            assert accepted < 400_000
+            server.close()
+            await server.wait_closed()
+
+    run_virtual(test)
+
+
+def test_a_serial_line_is_opened_raw_heard_and_found_again_after_a_loss(tmp_path: Path) -> None:
+    async def test() -> None:
+        link = tmp_path / "ttyTEST"
+        vehicle = ArduPilotVehicle(f"serial://{link}:57600", LoopClock())
+        task = asyncio.create_task(vehicle.run())
+        await asyncio.sleep(3.0)  # no such device yet
+        for _ in range(2):
+            master, slave = os.openpty()
+            link.symlink_to(os.ttyname(slave))
+            await asyncio.sleep(6.0)
+            codec, heard = Codec(1, 1), b""
+            os.set_blocking(master, False)
+            for _ in range(40):
+                os.write(master, codec.pack(dialect.MAVLink_heartbeat_message(2, 3, 1, 0, 4, 3)))
+                os.write(
+                    master, codec.pack(dialect.MAVLink_attitude_message(0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+                )
+                await asyncio.sleep(0.05)
+                try:
+                    heard += os.read(master, 4096)
+                except BlockingIOError:
+                    continue
+            state = vehicle.state()
+            assert state is not None
+            assert LoopClock().now_ns() - state.heartbeat_ns < 0.2e9
+            kinds = {m.get_type() for m in FrameParser(Codec(1)).stream(heard)}
+            assert {"HEARTBEAT", "COMMAND_LONG"} <= kinds
+            link.unlink()
+            os.close(slave)
+            os.close(master)  # unplugged
+            await asyncio.sleep(1.0)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    run_virtual(test)
+
+
+def test_a_demand_before_the_link_is_worked_on_when_it_comes() -> None:
+    async def test() -> None:
+        clock, port = LoopClock(), free_port()
+        vehicle = ArduPilotVehicle(f"udpin://127.0.0.1:{port}", clock)
+        vehicle.demand(Demand.FLY)
+        running = asyncio.create_task(vehicle.run())
+        await asyncio.sleep(5.0)
+        peer = ArduCopterPeer(clock, Airframe(), PeerConfig(ready_s=0.5, remotes=(("127.0.0.1", port),)))
+        serving = asyncio.create_task(peer.run())
+        rig = Rig(vehicle, peer, lambda: None, lambda apart: None)
+        await rig.until(lambda: vehicle.state() is not None and rig.known().armed)
+        for task in (running, serving):
+            task.cancel()
+        await asyncio.gather(running, serving, return_exceptions=True)
+
+    run_virtual(test)
