@@ -6,17 +6,23 @@ import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
+from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
+from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.ports import Vehicle
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.loops import VirtualLoop
 from flightd.sim.airframe import Airframe
+from flightd.sim.ardrone.drone import Drone
+from flightd.sim.ardrone.server import ArDroneServer, Ports
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.kinematics import Kinematics
+from flightd.sim.sensors import Sensors
 from flightd.sim.wind import Draught
 
 CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
@@ -42,6 +48,14 @@ class Rig:
     """The pilot moves his switch."""
     cut: Callable[[bool], None]
     """Cut the link, or join it again."""
+    attitudes_hz: float = 50.0
+    """Rate of the attitude samples."""
+    alone_s: float = 6.0
+    """How long the vehicle stays up when we let go of it in the air."""
+    gap_s: float = 4.0
+    """A radio gap after which the vehicle still obeys."""
+    has_pilot: bool = True
+    """Whether someone besides us can command it: an AR.Drone has one client only."""
     flying_task: asyncio.Task[None] | None = None
 
     def known(self) -> VehicleState:
@@ -108,7 +122,46 @@ def _switch(peer: ArduCopterPeer) -> None:
     assert peer.pilot_mode(CopterMode.ALT_HOLD)
 
 
-RIGS: dict[str, Callable[[], Any]] = {"ardupilot": ardupilot_rig}
+@asynccontextmanager
+async def ardrone_rig(**settings: Any) -> AsyncIterator[Rig]:
+    clock = LoopClock()
+    drone = Drone(Airframe(draught=CALM), Sensors())
+    async with ArDroneServer(drone, clock, Ports(at=0, navdata=0, video=0, control=0)) as server:
+        ports = server.ports
+        vehicle = ArDroneVehicle(
+            ArDroneSettings(
+                host=ports.host,
+                at_port=ports.at,
+                navdata_port=ports.navdata,
+                video_port=ports.video,
+                control_port=ports.control,
+                **settings,
+            ),
+            clock,
+        )
+
+        def cut(apart: bool) -> None:
+            server.radio = not apart
+
+        rate = 200.0 if settings.get("full_navdata") else 15.0
+        rig = Rig(vehicle, server, lambda: None, cut, rate, alone_s=1.5, gap_s=1.5, has_pilot=False)
+        rig.flying_task = asyncio.create_task(vehicle.run(), name="vehicle")
+        tasks = [rig.flying_task, asyncio.create_task(server.run(), name="peer")]
+        try:
+            yield rig
+        finally:
+            for task in tasks:
+                task.cancel()
+            results = await asyncio.gather(*tasks, return_exceptions=True)
+            failures = [r for r in results if isinstance(r, Exception)]
+            assert not failures, failures
+
+
+RIGS: dict[str, Callable[[], Any]] = {
+    "ardupilot": ardupilot_rig,
+    "ardrone": ardrone_rig,
+    "ardrone full navdata": partial(ardrone_rig, full_navdata=True),
+}
 """Every adapter that keeps the contract."""
 
 

@@ -55,7 +55,7 @@ def test_attitudes_come_once_in_order_with_the_time_at_which_they_were_true(on_r
             await rig.stream(0.5, roll_rad=0.1 * sign)
             sent += rig.vehicle.attitudes()
         assert rig.vehicle.attitudes() == []
-        assert len(sent) == pytest.approx(100, abs=5)
+        assert len(sent) == pytest.approx(2.0 * rig.attitudes_hz, rel=0.05)
         stamps = [sample.stamp_ns for sample in sent]
         assert stamps == sorted(set(stamps))
 
@@ -198,7 +198,7 @@ def test_letting_go_stops_the_stream_at_once(on_rig: Any, demand: Demand) -> Non
         rig.vehicle.demand(demand)
         assert rig.vehicle.send(AttitudeSetpoint(0)) is False
         assert not rig.known().in_control
-        await asyncio.sleep(6.0)
+        await asyncio.sleep(rig.alone_s)
         assert rig.known().armed
         assert abs(math.degrees(rig.peer.truth().roll_rad)) < 1.0
 
@@ -207,6 +207,8 @@ def test_letting_go_stops_the_stream_at_once(on_rig: Any, demand: Demand) -> Non
 
 def test_the_pilot_wins_within_a_tenth_of_a_second_and_for_good(on_rig: Any) -> None:
     async def test(rig: Rig) -> None:
+        if not rig.has_pilot:
+            pytest.skip("this vehicle has one client: nobody else can take it over")
         await rig.take_off()
         assert rig.vehicle.send(AttitudeSetpoint(0)) is True
         rig.take_over()
@@ -227,6 +229,8 @@ def test_the_pilot_wins_within_a_tenth_of_a_second_and_for_good(on_rig: Any) -> 
 
 def test_after_the_pilot_a_new_flight_starts_only_over_hands_off(on_rig: Any) -> None:
     async def test(rig: Rig) -> None:
+        if not rig.has_pilot:
+            pytest.skip("this vehicle has one client: nobody else can take it over")
         await rig.take_off()
         rig.take_over()
         await rig.stream(1.0)
@@ -244,7 +248,7 @@ def test_a_lost_link_ends_control_and_its_return_gives_it_back(on_rig: Any) -> N
     async def test(rig: Rig) -> None:
         await rig.take_off()
         rig.cut(True)
-        await asyncio.sleep(4.0)
+        await asyncio.sleep(rig.gap_s)
         assert not rig.known().in_control
         assert rig.vehicle.send(AttitudeSetpoint(0)) is False
         assert math.isnan(rig.known().height_m)

@@ -9,11 +9,16 @@ from typing import Any, Self
 
 from flightd.core.types import Image
 from flightd.ports import Clock
+from flightd.sim.airframe import Airframe
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.video import Channel, Encoder, Packer, is_idr
+from flightd.sim.kinematics import Kinematics
+from flightd.sim.truth import TruthHistory
 
 STEP_NS = 5_000_000
 _VIDEO_BACKLOG_BYTES = 200_000
+_TRUTH_SAMPLES = 1000
+_CATCH_UP_NS = 2_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +47,9 @@ class ArDroneServer:
         self.radio = True
         self.video_radio = True
         self._clock = clock
+        self._now_ns = clock.now_ns()
+        self._truth = TruthHistory(_TRUTH_SAMPLES)
+        self._truth.add(self.airframe.kinematics(self._now_ns))
         self._video_header_bytes = video_header_bytes
         self._at: asyncio.DatagramTransport | None = None
         self._navdata: asyncio.DatagramTransport | None = None
@@ -51,6 +59,10 @@ class ArDroneServer:
         self._readers: list[asyncio.StreamWriter] = []
         self._pending_configuration: list[bytes] = []
         drone.send_configuration = self._send_configuration
+
+    @property
+    def airframe(self) -> Airframe:
+        return self.drone.airframe
 
     @property
     def channel(self) -> Channel:
@@ -96,14 +108,31 @@ class ArDroneServer:
 
     async def run(self) -> None:
         """Step the drone every 5 ms of the loop's time and send its navdata, for ever."""
-        due_ns = self._clock.now_ns()
         while True:
-            due_ns += STEP_NS
-            await asyncio.sleep((due_ns - self._clock.now_ns()) / 1e9)
-            self.drone.step(due_ns, STEP_NS / 1e9)
-            packet = self.drone.navdata(due_ns)
+            self.advance(self._clock.now_ns())
+            await asyncio.sleep((self._now_ns + STEP_NS - self._clock.now_ns()) / 1e9)
+
+    def advance(self, now_ns: int) -> None:
+        """Let the drone's time pass up to `now_ns` in whole steps; what a stopped process missed by more
+        than 2 s is never simulated."""
+        if now_ns - self._now_ns > _CATCH_UP_NS:
+            self._now_ns = now_ns - STEP_NS
+        while self._now_ns + STEP_NS <= now_ns:
+            self._now_ns += STEP_NS
+            self.drone.step(self._now_ns, STEP_NS / 1e9)
+            self._truth.add(self.airframe.kinematics(self._now_ns))
+            packet = self.drone.navdata(self._now_ns)
             if packet is not None and self._client is not None and self._navdata is not None and self.radio:
                 self._navdata.sendto(packet, self._client)
+
+    def truth(self) -> Kinematics:
+        """The true motion now."""
+        return self.truth_at(self._clock.now_ns())
+
+    def truth_at(self, stamp_ns: int) -> Kinematics:
+        """The true motion at a moment of the last seconds, of the loop's clock."""
+        self.advance(min(stamp_ns, self._clock.now_ns()))
+        return self._truth.at(stamp_ns)
 
     def reboot(self) -> None:
         """Power the drone off and on: everyone is disconnected and forgotten."""

@@ -105,6 +105,8 @@ class Configurator:
             "custom:application_id": settings.application,
             "custom:profile_id": settings.user,
         }
+        options = "general:navdata_options"
+        await self.write(options, wanted_values(settings)[options])  # telemetry first, the rest takes seconds
         found = await self.read()
         if any(found.get(key) != value for key, value in profiles.items()):
             for key, value in profiles.items():

@@ -4,11 +4,12 @@ Pure: time is an argument, commands are the result.  The rules:
 
 - Before the first navdata, and on the ground in HANDS_OFF, only COMWDG keeps the link awake: a daemon that
   starts beside a flying drone must not land it by accident.
-- FLY: flat trim once, then REF with the fly bit, repeated, until the drone leaves LANDED.  STANDBY never
-  changes what the drone does: its fly bit follows the telemetry.  LAND and DISARM land; a flying drone's
-  motors are never cut.
-- HANDS_OFF in the air: one hover command, then silence.  Any command of ours would outrun the numbers of
-  whoever takes over; if nobody does, the drone lands itself after `general:com_watchdog` seconds.
+- FLY: flat trim once, then REF with the fly bit, repeated, until the drone leaves LANDED.  LAND lands.
+  STANDBY and DISARM never change what the drone does, their fly bit follows the telemetry: the motors stop
+  at the end of a landing, and in the air nothing of ours ever cuts them.
+- HANDS_OFF in the air: one hover command, a command number 1, then silence.  Any command of ours would
+  outrun the numbers of whoever takes over, and the 1 makes the drone obey his; if nobody comes, it lands
+  itself after `general:com_watchdog` seconds.
 - A mission lands by sinking: below `land_below_m` a descent becomes REF's landing order, since this drone
   touches down only by its own landing.
 - A flight that the drone ended by itself (battery, lost link, emergency) is over: nothing takes off again
@@ -123,6 +124,8 @@ class FlightLogic:
             return "no navdata from the drone"
         if self._telemetry.emergency:
             return f"emergency: {self._telemetry.emergency}"
+        if self.demand is Demand.DISARM and self._fly(now_ns):
+            return "disarming in the air would drop the drone: land first"
         if self._over or self.demand is not Demand.FLY:
             return self._over
         return self._take_off_refusal(now_ns)
@@ -191,8 +194,7 @@ class FlightLogic:
                 self._asked_ns = now_ns
             going_up = telemetry.airborne and not self._over and not self._sinking
             return starting or going_up
-        mirrored = self.demand in (Demand.STANDBY, Demand.HANDS_OFF)
-        return mirrored and telemetry.airborne and telemetry.major != Major.LANDING
+        return self.demand is not Demand.LAND and telemetry.airborne and telemetry.major != Major.LANDING
 
     def _press(self, now_ns: int) -> bool:
         """The emergency bit: held until the drone leaves the emergency, let go and pressed anew if it

@@ -27,6 +27,7 @@ class ArDroneSettings:
     The limits are what the drone's own loops are set to; setpoints travel as fractions of them.  Indoor
     defaults are the drone's own (12 deg, 0.7 m/s, 100 deg/s).  `full_navdata` asks for 200 packets a
     second with all options instead of 15 short ones: fresher attitude for a hundred times the air time.
+    `standing_height_m` is the sonar above the floor while the drone stands, when it cannot measure.
     """
 
     host: str = "192.168.1.1"
@@ -54,6 +55,7 @@ class ArDroneSettings:
     link_lost_s: float = 2.0
     take_off_patience_s: float = 3.0
     land_below_m: float = 0.35
+    standing_height_m: float = 0.10
     video_latency_s: float = 0.0
     camera_settle_s: float = 0.3
 

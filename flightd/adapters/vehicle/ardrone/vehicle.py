@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 
+from flightd.adapters.vehicle.ardrone import at
 from flightd.adapters.vehicle.ardrone.config import Configurator
 from flightd.adapters.vehicle.ardrone.flight import FlightLogic
 from flightd.adapters.vehicle.ardrone.link import Link
@@ -42,8 +44,9 @@ class ArDroneVehicle:
 
     Commands go out at least every `period_s`; a setpoint goes out at once unless the last datagram is
     younger than 20 ms, then with the next.  `armed` means that the rotors turn.  `height_m` is the sonar's
-    in the air and zero on the ground.  Cancelled in flight, `run` orders the drone to land: nobody else
-    holds its controls, and it would land by itself two seconds later.
+    in the air, the standing height on the ground, and NaN when telemetry is late.  Cancelled in flight,
+    `run` orders the drone to land: nobody else holds its controls, and it would land by itself two
+    seconds later.
     """
 
     def __init__(self, settings: ArDroneSettings, clock: Clock) -> None:
@@ -78,9 +81,10 @@ class ArDroneVehicle:
         if demo is None or attitude is None:
             return None
         landed = LandedState.IN_AIR if telemetry.airborne else LandedState.ON_GROUND
+        height_m = telemetry.height_m if telemetry.airborne else self._settings.standing_height_m
         return VehicleState(
             attitude=attitude,
-            height_m=telemetry.height_m if telemetry.airborne else 0.0,
+            height_m=height_m if self._flight.linked(now_ns) else math.nan,
             height_stamp_ns=telemetry.height_ns,
             climb_mps=telemetry.climb_mps,
             mode="emergency" if telemetry.emergency else _MODES.get(demo.major, "unknown"),
@@ -99,11 +103,13 @@ class ArDroneVehicle:
     def demand(self, demand: Demand) -> None:
         if demand is Demand.HANDS_OFF and self._flight.demand is not demand and self._telemetry.airborne:
             self._link.send(*self._flight.hush())
+            self._link.restart_numbers()
+            self._link.send(at.comwdg())
         self._flight.want(demand)
 
     def send(self, setpoint: AttitudeSetpoint) -> bool:
         now_ns = self._clock.now_ns()
-        if not self._flight.in_control(now_ns):
+        if self._flight.demand is not Demand.FLY or not self._flight.in_control(now_ns):
             return False
         self._flight.steer(setpoint, now_ns)
         if now_ns - self._link.sent_ns >= MIN_GAP_NS:
