@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.fit import bow, fit_line
+from flightd.vision.fit import bow, fit_lines
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, Strip, bisector
 
-TRIALS = 128
+TRIALS = 72
 MAX_SLOPE = 1.25
 """dv/du of a band described along its own axis; a little beyond the diagonal so that none falls between."""
 
@@ -112,11 +112,10 @@ def _bands(cuts: Cuts, step: int, *, steep: bool) -> list[Strip]:
         return []
     i, b, width_b = i[good], b[good], width_b[good]
     du = (u - u[i][:, None]).astype(np.float32)
-    off = np.abs(middle.astype(np.float32) - middle[i][:, None] - b[:, None].astype(np.float32) * du)
-    expected = width[i][:, None].astype(np.float32) + width_b[:, None].astype(np.float32) * du
-    inlier = (off <= step + 0.08 * expected) & (
-        np.abs(width.astype(np.float32) - expected) <= 2 * step + 0.25 * expected
-    )
+    off = np.abs((middle - middle[i][:, None]).astype(np.float32) - b.astype(np.float32)[:, None] * du)
+    expected = width.astype(np.float32)[i][:, None] + width_b.astype(np.float32)[:, None] * du
+    inlier = off <= step + 0.08 * expected
+    inlier &= np.abs(width.astype(np.float32) - expected) <= 2 * step + 0.25 * expected
     strips: list[Strip] = []
     free = np.ones(len(u), np.bool_)
     votes = inlier.astype(np.float32)
@@ -175,8 +174,7 @@ def _fit_band(
     for _ in range(2):
         if len(members) < _MIN_CUTS:
             return None
-        low_fit = fit_line(u[members], low[members], noise)
-        high_fit = fit_line(u[members], high[members], noise)
+        low_fit, high_fit = fit_lines(u[members], (low[members], high[members]), noise)
         # Once more through all cuts that agree with both edges.
         off_low = np.abs(low - low_fit.a - low_fit.b * u)
         off_high = np.abs(high - high_fit.a - high_fit.b * u)

@@ -7,19 +7,33 @@ import math
 from flightd.vision.strip import LinearFit, Strip, swapped
 
 
-def fuse(groups: list[list[Strip]]) -> list[Strip]:
-    """One band for each band that any method found; those found by several are averaged by information."""
+def fuse(guesses: list[Strip], tolerance_px: float) -> list[Strip]:
+    """One band for each that any method found: those that agree are averaged by information.
+
+    Two guesses agree when their centre lines stay within `tolerance_px` where the shorter is visible,
+    and their widths are alike; guesses that differ more are kept apart, for the evidence to decide.
+    """
     fused: list[Strip] = []
-    for group in groups:
-        for strip in group:
-            for k, other in enumerate(fused):
-                candidate = strip if strip.steep == other.steep else _turned(strip)
-                if candidate is not None and same_band(candidate, other):
-                    fused[k] = _merge(other, candidate)
-                    break
-            else:
-                fused.append(strip)
+    for strip in guesses:
+        for k, other in enumerate(fused):
+            if strip.steep == other.steep and _agree(strip, other, tolerance_px):
+                fused[k] = _merge(other, strip)
+                break
+        else:
+            fused.append(strip)
     return fused
+
+
+def _agree(one: Strip, other: Strip, tolerance_px: float) -> bool:
+    a, b = one.centre.a - other.centre.a, one.centre.b - other.centre.b
+    u0, u1 = max(one.u0, other.u0), min(one.u1, other.u1)
+    if u1 < u0:
+        u0, u1 = min(one.u1, other.u1), max(one.u0, other.u0)
+    if abs(a + b * u0) > tolerance_px or abs(a + b * u1) > tolerance_px:
+        return False
+    middle = (u0 + u1) / 2
+    width, width_other = (s.high.at(middle) - s.low.at(middle) for s in (one, other))
+    return abs(width - width_other) <= 2 * tolerance_px + 0.2 * max(width, width_other)
 
 
 def without_repeats(strips: list[Strip]) -> list[Strip]:

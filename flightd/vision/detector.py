@@ -118,7 +118,8 @@ class Detector:
         if self.method in ("skeleton", "combined"):
             guesses += skeleton.find(closed if worn else mask, grid, plane, zhang_suen=self._zhang_suen)
         filled = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _SMALL_CLOSING), np.uint8)
-        return evidence.weigh(guesses, filled, grid, plane)
+        fused = combine.fuse(guesses, tolerance_px=1.5 * grid.step)
+        return evidence.weigh(fused, filled, grid, plane)
 
 
 def _check(bgr: Image) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.fit import robust_lines
+from flightd.vision.fit import row_medians, weighted_lines
 from flightd.vision.plane import Plane
 from flightd.vision.strip import Array, Strip
 
@@ -29,7 +29,9 @@ MIN_CONTRAST = 6.0
 FINE = 4
 """Half width of the window in which an edge is located by area, in pixels."""
 
-_MIN_STATIONS, _MAX_STATIONS = 32, 128
+_MIN_STATIONS, _MAX_STATIONS = 24, 128
+_AGREE_PX = (4.0, 2.0)
+_GOLDEN = 0.6180339887498949
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +70,9 @@ def take(bgr: Image, strips: list[Strip], plane: Plane, half: int) -> Taps:
     sign = np.tile(np.array([1, -1]), count)[:, None]
     guess = np.array([(f.a, f.b, s.u0, s.u1) for s in strips for f in (s.low, s.high)])
     a, b, u0, u1 = (guess[:, k, None] for k in range(4))
-    u = u0 + (u1 - u0) * ((np.arange(stations) + 0.5) / stations)
+    # Evenly spread but never in step with the picture's own grids (JPEG blocks, colour subsampling).
+    order = np.arange(stations)
+    u = u0 + (u1 - u0) * ((order + order * _GOLDEN % 1.0) / stations)
     v = a + b * u
     x, y = plane.raw(np.where(steep, v, u), np.where(steep, u, v))
     row = np.rint(np.where(steep, y + half_y, x + half_x)).astype(np.intp)
@@ -98,9 +102,16 @@ def rough(taps: Taps) -> tuple[Array, Array]:
     best = rise.argmax(axis=-1)
     strength = np.take_along_axis(rise, best[..., None], axis=-1)[..., 0]
     found = strength > np.maximum(0.5 * taps.contrast[:, None], 2 * MIN_CONTRAST)
-    v = taps.base + taps.sign * (best + 1.5 - taps.half)
-    lines = robust_lines(taps.row.astype(float), v, found.astype(float))
-    return lines.a[:, None], lines.b[:, None]
+    shift = best + (1.5 - taps.half)
+    # The guess is nearly parallel: the edge is where most stations agree on the shift from it.
+    agreed = row_medians(shift, found)[:, None]
+    u, v = taps.row.astype(float), taps.base + taps.sign * shift
+    near = found & (np.abs(shift - agreed) <= _AGREE_PX[0])
+    for reach_px in _AGREE_PX[1:]:
+        a, b = weighted_lines(u, v, near.astype(float))
+        near = found & (np.abs(v - a[:, None] - b[:, None] * u) <= reach_px)
+    a, b = weighted_lines(u, v, near.astype(float))
+    return a[:, None], b[:, None]
 
 
 def locate(taps: Taps, rough_a: Array, rough_b: Array, plane: Plane) -> Edges:
@@ -128,12 +139,11 @@ def locate(taps: Taps, rough_a: Array, rough_b: Array, plane: Plane) -> Edges:
 
 def _project(pixels: Floats, valid: NDArray[np.bool_]) -> tuple[Floats, Array]:
     """Profiles (E, S, T) along the colour direction from floor to paint, and each edge's contrast."""
-    weight = valid.astype(np.float32)
-    total = np.maximum(weight.sum(axis=1), 1.0)[:, None]
-    outside = (pixels[:, :, :2].mean(axis=2) * weight[..., None]).sum(axis=1) / total
-    inside = (pixels[:, :, -2:].mean(axis=2) * weight[..., None]).sum(axis=1) / total
-    direction = inside - outside
-    contrast = np.linalg.norm(direction, axis=1)
+    weight = valid / np.maximum(np.count_nonzero(valid, axis=1), 1)[:, None].astype(np.float32)
+    rise = pixels[:, :, -1] + pixels[:, :, -2] - pixels[:, :, 0] - pixels[:, :, 1]
+    direction = np.einsum("es,esc->ec", weight.astype(np.float32), rise) / 2
+    contrast = np.sqrt(np.einsum("ec,ec->e", direction, direction))
     direction /= np.maximum(contrast, 1e-6)[:, None]
-    profile = np.einsum("estc,ec->est", pixels, direction)
+    edges, stations, taps, _ = pixels.shape
+    profile = np.matmul(pixels.reshape(edges, -1, 3), direction[:, :, None]).reshape(edges, stations, taps)
     return np.asarray(profile, np.float32), contrast.astype(float)

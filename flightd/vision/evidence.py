@@ -17,9 +17,10 @@ from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, Strip
 
-STATIONS = 64
+STATIONS = 48
 _INSIDE = np.array([-0.42, -0.25, -0.08, 0.08, 0.25, 0.42])
 """Where the paint is looked for, in widths from the centre line."""
+_PLACES = (np.arange(STATIONS) + 0.5) / STATIONS
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +28,7 @@ class Evidence:
     """A guess with its true span, and how much of a band it is.
 
     `length_px` is the length that shows paint inside and floor on both sides (one side counts half);
-    `spread` is the least painted lane of the band against the mean.
+    `score` is the area of that.
     """
 
     strip: Strip
@@ -40,46 +41,39 @@ def weigh(strips: list[Strip], mask: Image, grid: Grid, plane: Plane) -> list[Ev
     if not strips:
         return []
     steep = np.array([s.steep for s in strips])[:, None]
-    a = np.array([s.centre.a for s in strips])[:, None]
-    b = np.array([s.centre.b for s in strips])[:, None]
-    low = np.array([(s.low.a, s.low.b) for s in strips])
-    high = np.array([(s.high.a, s.high.b) for s in strips])
-    u0, u1 = _run(steep, a, b, plane)
-    place = (np.arange(STATIONS) + 0.5) / STATIONS
-    u = u0 + (u1 - u0) * place
-    width = np.maximum(high[:, :1] - low[:, :1] + (high[:, 1:] - low[:, 1:]) * u, 0.5 * grid.step)
+    fits = np.array([(s.centre.a, s.centre.b, s.low.a, s.low.b, s.high.a, s.high.b) for s in strips])
+    a, b, low_a, low_b, high_a, high_b = (fits[:, k, None] for k in range(6))
     norm = np.hypot(1.0, b)
+    u0, u1 = _run(steep, a, b, plane)
+    pitch = (u1 - u0) / STATIONS
+    u = u0 + (u1 - u0) * _PLACES
+    width = np.maximum(high_a - low_a + (high_b - low_b) * u, 0.5 * grid.step)
     margin = 1.5 * grid.step * norm
     beside = margin + np.minimum(0.35 * width, 6.0 * grid.step * norm)
-    offsets = np.concatenate(
-        [
-            _INSIDE * width[..., None],
-            np.stack([-width / 2 - beside, -width / 2 - margin, width / 2 + margin, width / 2 + beside], -1),
-        ],
-        axis=-1,
-    )
-    v = (a + b * u)[..., None] + offsets
-    painted, seen = _look_up(mask, grid, plane, steep[..., None], np.broadcast_to(u[..., None], v.shape), v)
-    inside, inside_seen = painted[..., :6], seen[..., :6].sum(-1)
-    filled = inside.sum(-1) >= 0.55 * np.maximum(inside_seen, 3)
-    left = (painted[..., 6] + painted[..., 7]) == 0
-    right = (painted[..., 8] + painted[..., 9]) == 0
-    band = filled * (left * 0.5 + right * 0.5)
+    v = np.empty((len(strips), STATIONS, len(_INSIDE) + 4))
+    v[..., :6] = _INSIDE * width[..., None]
+    v[..., 6], v[..., 7] = -width / 2 - beside, -width / 2 - margin
+    v[..., 8], v[..., 9] = width / 2 + margin, width / 2 + beside
+    v += (a + b * u)[..., None]
+    painted, seen = _look_up(mask, grid, plane, steep[..., None], u[..., None], v)
+    inside = painted[..., :6]
+    filled = inside.sum(-1) >= 0.55 * np.maximum(seen[..., :6].sum(-1), 3)
+    beside_paint = painted[..., 6:].reshape(len(strips), STATIONS, 2, 2).any(-1)
+    band = filled * (1.0 - 0.5 * beside_paint.sum(-1))
     found = []
     for k, strip in enumerate(strips):
         span = _span(filled[k], band[k])
         if span is None:
             continue
-        first, last = span
-        pitch = float(u1[k, 0] - u0[k, 0]) / STATIONS
-        ends = float(u0[k, 0]) + pitch * first, float(u0[k, 0]) + pitch * last
-        total = float(band[k, first:last].sum())
-        lanes = inside[k, first:last][filled[k, first:last]].mean(axis=0)
-        if lanes.min() < 0.3:
+        stretch = slice(*span)
+        places = filled[k, stretch]
+        count = int(np.count_nonzero(places))
+        if inside[k, stretch][places].sum(axis=0).min() < 0.3 * count:
             continue
-        length = total * pitch * float(norm[k, 0])
-        support = float(filled[k, first:last].mean())
-        new = replace(strip, u0=ends[0], u1=ends[1], support=support)
+        first, pace = float(u0[k, 0]), float(pitch[k, 0])
+        length = float(np.add.reduce(band[k, stretch])) * pace * float(norm[k, 0])
+        support = count / (span[1] - span[0])
+        new = replace(strip, u0=first + pace * span[0], u1=first + pace * span[1], support=support)
         found.append(Evidence(new, length, length * min(new.width_px, length)))
     return found
 
@@ -99,13 +93,15 @@ def _look_up(
     mask: Image, grid: Grid, plane: Plane, steep: NDArray[np.bool_], u: Array, v: Array
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Whether there is paint at each point, and whether the point is in the picture."""
-    x, y = plane.raw(np.where(steep, v, u), np.where(steep, u, v))
-    i = np.rint((x - float(grid.x(0))) / grid.step).astype(np.intp)
-    j = np.rint((y - float(grid.y(0))) / grid.step).astype(np.intp)
+    if plane.is_identity:
+        x, y = np.where(steep, v, u), np.where(steep, u, v)
+    else:
+        x, y = plane.raw(np.where(steep, v, u), np.where(steep, u, v))
+    i = ((x - float(grid.x(-0.5))) * (1 / grid.step)).astype(np.int32)
+    j = ((y - float(grid.y(-0.5))) * (1 / grid.step)).astype(np.int32)
     height, width = mask.shape
     seen = (i >= 0) & (i < width) & (j >= 0) & (j < height)
-    painted = mask[np.clip(j, 0, height - 1), np.clip(i, 0, width - 1)] > 0
-    return painted & seen, seen
+    return mask.ravel().take(np.where(seen, j * width + i, 0)) * seen > 0, seen
 
 
 def _span(filled: NDArray[np.bool_], band: Array) -> tuple[int, int] | None:
@@ -113,14 +109,12 @@ def _span(filled: NDArray[np.bool_], band: Array) -> tuple[int, int] | None:
     places = np.flatnonzero(filled)
     if len(places) == 0:
         return None
-    breaks = np.flatnonzero(np.diff(places) > STATIONS // 4)
-    starts = np.concatenate([[0], breaks + 1])
-    ends = np.concatenate([breaks, [len(places) - 1]])
-    sums = [float(band[places[s] : places[e] + 1].sum()) for s, e in zip(starts, ends, strict=True)]
-    best = int(np.argmax(sums))
-    if sums[best] <= 0:
-        return None
-    return int(places[starts[best]]), int(places[ends[best]]) + 1
+    breaks = np.flatnonzero(places[1:] - places[:-1] > STATIONS // 4)
+    if len(breaks) == 0:
+        return int(places[0]), int(places[-1]) + 1
+    starts, ends = [0, *(breaks + 1)], [*breaks, len(places) - 1]
+    parts = [(int(places[s]), int(places[e]) + 1) for s, e in zip(starts, ends, strict=True)]
+    return max(parts, key=lambda part: float(band[part[0] : part[1]].sum()))
 
 
 def select(found: list[Evidence], shortest_px: float, known: list[Strip]) -> list[Strip]:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightd.vision.strip import Array, LinearFit
 
@@ -16,14 +17,26 @@ stays below it."""
 
 def fit_line(u: Array, v: Array, sigma: float) -> LinearFit:
     """Least squares v = a + b u, each v good to at least `sigma`; the covariance follows the scatter."""
+    return fit_lines(u, (v,), sigma)[0]
+
+
+def fit_lines(u: Array, vs: tuple[Array, ...], sigma: float) -> list[LinearFit]:
+    """`fit_line` of each of `vs` over the same `u`."""
     n = len(u)
-    mean_u, mean_v = float(np.add.reduce(u)) / n, float(np.add.reduce(v)) / n
-    du, dv = u - mean_u, v - mean_v
-    suu, suv = float(du @ du), float(du @ dv)
-    b = suv / suu if suu > 0 else 0.0
-    variance = max(sigma * sigma, (float(dv @ dv) - b * suv) / max(1, n - 2))
-    var_b = variance / suu if suu > 0 else variance
-    return LinearFit(mean_v - b * mean_u, b, variance / n + mean_u * mean_u * var_b, var_b, -mean_u * var_b)
+    mean_u = float(np.add.reduce(u)) / n
+    du = u - mean_u
+    suu = float(du @ du)
+    fits = []
+    for v in vs:
+        mean_v = float(np.add.reduce(v)) / n
+        dv = v - mean_v
+        suv = float(du @ dv)
+        b = suv / suu if suu > 0 else 0.0
+        variance = max(sigma * sigma, (float(dv @ dv) - b * suv) / max(1, n - 2))
+        var_b = variance / suu if suu > 0 else variance
+        var_a = variance / n + mean_u * mean_u * var_b
+        fits.append(LinearFit(mean_v - b * mean_u, b, var_a, var_b, -mean_u * var_b))
+    return fits
 
 
 def bow(u: Array, v: Array, sigma: float) -> bool:
@@ -76,46 +89,64 @@ class RobustLines:
         return LinearFit(float(self.a[e]), float(self.b[e]), var_a, var_b, -mean * var_b)
 
 
-_CUTS_PX = (3.0, 2.0, 1.0, 0.5, 0.3, 0.3)
 _MIN_SCATTER_PX = 0.02
 
 
-def robust_lines(u: Array, v: Array, weight: Array) -> RobustLines:
-    """Fit each row by Tukey's biweight, its scale shrinking from the rough to the measured one."""
+def robust_lines(u: Array, v: Array, weight: Array, cuts_px: tuple[float, ...]) -> RobustLines:
+    """Fit each row by Tukey's biweight; `cuts_px` are the smallest cuts of the iterations, rough to fine."""
+    valid = weight > 0
     w = weight
-    for cut_px in _CUTS_PX:
-        sw = np.maximum(w.sum(axis=1), 1e-9)
-        mu, mv = (w * u).sum(axis=1) / sw, (w * v).sum(axis=1) / sw
-        du, dv = u - mu[:, None], v - mv[:, None]
-        wdu = w * du
-        suu = np.maximum((wdu * du).sum(axis=1), 1e-9)
-        b = (wdu * dv).sum(axis=1) / suu
+    for cut_px in cuts_px:
+        sw, mu, mv, du, dv, suu, b = _weighted(u, v, w)
         residual = dv - b[:, None] * du
-        cut = np.maximum(4.0 * _scale(residual, weight), cut_px)[:, None]
+        cut = np.maximum(4.0 * _scale(residual, valid), cut_px)[:, None]
         w = weight * np.maximum(0.0, 1.0 - (residual / cut) ** 2) ** 2
     sw = np.maximum(w.sum(axis=1), 1e-9)
     wr = w * residual
-    square = (wr * residual).sum(axis=1)
-    scatter = np.maximum(np.sqrt(square / np.maximum(sw - 2, 1.0)), _MIN_SCATTER_PX)
+    srr = _dot(wr, residual)
+    scatter = np.maximum(np.sqrt(srr / np.maximum(sw - 2, 1.0)), _MIN_SCATTER_PX)
 
     # Over the stretch that the points really cover: 1.7 standard deviations of an even spread.
     t = du / np.maximum(1.732 * np.sqrt(suu / sw), 1.0)[:, None]
-    tt = t * t
-    stt = np.maximum((w * tt).sum(axis=1), 1e-9)
-    q = tt - (stt / sw)[:, None] - ((w * tt * t).sum(axis=1) / stt)[:, None] * t
-    bow = (wr * q).sum(axis=1) / np.maximum((w * q * q).sum(axis=1), 1e-9)
+    wt = w * t
+    stt, tt = np.maximum(_dot(wt, t), 1e-9), t * t
+    q = tt - (stt / sw)[:, None] - (_dot(wt, tt) / stt)[:, None] * t
+    bow = _dot(wr, q) / np.maximum(_dot(w * q, q), 1e-9)
 
     # Wear, texture and compression move neighbouring points together: count them as a first-order
     # autoregressive process does.
-    r = np.clip((wr[:, 1:] * wr[:, :-1]).sum(axis=1) / np.maximum((wr * wr).sum(axis=1), 1e-9), 0.0, 0.9)
+    r = np.clip(_dot(wr[:, 1:], wr[:, :-1]) / np.maximum(_dot(wr, wr), 1e-9), 0.0, 0.9)
     return RobustLines(mv - b * mu, b, mu, suu, w, sw, scatter, bow, (1 + r) / (1 - r))
 
 
-def _scale(residual: Array, weight: Array) -> Array:
+def weighted_lines(u: Array, v: Array, weight: Array) -> tuple[Array, Array]:
+    """Plain weighted least squares of each row: a and b (E,)."""
+    _, mu, mv, _, _, _, b = _weighted(u, v, weight)
+    return mv - b * mu, b
+
+
+def _weighted(u: Array, v: Array, w: Array) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
+    sw = np.maximum(w.sum(axis=1), 1e-9)
+    mu, mv = _dot(w, u) / sw, _dot(w, v) / sw
+    du, dv = u - mu[:, None], v - mv[:, None]
+    wdu = w * du
+    suu = np.maximum(_dot(wdu, du), 1e-9)
+    return sw, mu, mv, du, dv, suu, _dot(wdu, dv) / suu
+
+
+def _dot(a: Array, b: Array) -> Array:
+    """Row by row scalar products."""
+    return np.asarray(np.einsum("es,es->e", a, b))
+
+
+def row_medians(values: Array, valid: NDArray[np.bool_]) -> Array:
+    """Median of each row's valid values; infinite where none is."""
+    ordered = np.where(valid, values, np.inf)
+    ordered.sort(axis=1)
+    middle = np.minimum(np.count_nonzero(valid, axis=1) // 2, ordered.shape[1] - 1)
+    return np.asarray(ordered[np.arange(len(ordered)), middle])
+
+
+def _scale(residual: Array, valid: NDArray[np.bool_]) -> Array:
     """Median absolute residual of each row's valid points, as a standard deviation."""
-    valid = weight > 0
-    size = np.where(valid, np.abs(residual), np.inf)
-    size.sort(axis=1)
-    middle = np.minimum(valid.sum(axis=1) // 2, size.shape[1] - 1)
-    median = size[np.arange(len(size)), middle]
-    return np.where(np.isfinite(median), 1.4826 * median, 1.0)
+    return np.minimum(1.4826 * row_medians(np.abs(residual), valid), 1.0)

@@ -13,9 +13,10 @@ from flightd.vision.fit import RobustLines, robust_lines
 from flightd.vision.plane import Plane
 from flightd.vision.strip import Array, LinearFit, Strip, bisector
 
+_CUTS_PX = (1.5, 0.7, 0.3)
 _MIN_POINTS = 6.0
 _MIN_WIDTH_PX = 2.5
-_MIN_SHARE = 0.42
+_MIN_SHARE = 0.46
 """Part of the painted stations at which both edges are where the straight edge should be."""
 _WORST_SUPPORT = 0.6
 """Gaps in the paint excuse missing edges down to this support; a chain of blobs has less."""
@@ -36,7 +37,7 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
         return []
     taps = take(bgr, strips, plane, math.ceil(reach_px) + FINE + 1)
     found = locate(taps, *rough(taps), plane)
-    lines = robust_lines(found.u, found.v, found.weight)
+    lines = robust_lines(found.u, found.v, found.weight, _CUTS_PX)
     stations = taps.row.shape[1]
     # An edge that leaves the picture is judged by the part of it that could be seen.
     visible = np.maximum(taps.inside[:, :, taps.half].sum(axis=1), stations / 2)

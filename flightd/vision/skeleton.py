@@ -25,7 +25,7 @@ CLUSTER_RAD = math.radians(5.0)
 _MIN_POINTS = 10
 _VOTE_SHARE = 0.06
 """Votes a Hough line needs, as a part of the mask's longer side."""
-_MAX_CANDIDATES = 100
+_MAX_CANDIDATES = 64
 _MAX_CLUSTERS = 12
 _AROUND = np.ones((5, 5), np.uint8)
 _NEIGHBOURS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
@@ -143,7 +143,7 @@ def _fit_ridge(
     """A straight line through the ridge; None when too little of it is straight and of one width."""
     noise = step / math.sqrt(6)
     for limit in (1.5, 1.0):
-        typical = float(np.median(radius[members]))
+        typical = _median(radius[members])
         kept = members[np.abs(radius[members] - typical) <= 1.2 * step + 0.3 * typical]
         if len(kept) < _MIN_POINTS:
             return None
@@ -156,5 +156,10 @@ def _fit_ridge(
     # The distance is to the first unpainted sample's centre: half a sample beyond the edge.
     half = max(step / 2, typical - step / 2) * math.hypot(1.0, fit.b)
     u0, u1 = float(u[kept].min()) - step / 2, float(u[kept].max()) + step / 2
-    slabs = np.unique(np.round(u[kept] / step)).size
+    slabs = np.count_nonzero(np.bincount(((u[kept] - u0) / step).astype(np.intp)))
     return Strip(steep, fit, fit.shifted(-half), fit.shifted(half), u0, u1, slabs * step / (u1 - u0))
+
+
+def _median(values: Array) -> float:
+    middle = len(values) // 2
+    return float(np.partition(values, middle)[middle])
