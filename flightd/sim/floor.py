@@ -30,7 +30,7 @@ _PAINT_SRGB = {  # red, green, blue as a camera sees clean floor paint in good l
 _CONCRETE_SRGB = (152, 150, 144)
 _MAT_SRGB = (58, 58, 61)
 _UPRIGHT_SRGB = (40, 62, 110)
-_WOOD_SRGB = (150, 118, 84)
+_WOOD_SRGB = (148, 127, 101)
 _BOARD_M = 0.145
 _GAMMA_STEPS = 4096
 
@@ -106,12 +106,12 @@ class Floor:
     def _lay_shelf_feet(self, colour: Floats, patch: Patch) -> None:
         wood = self._cover(patch, self._pallets, None)
         if wood is not None:
-            # boards along the aisle: the board's own tone, the dark gaps between, the grain
-            ys = patch.xs() + np.float32(patch.y_m)
-            tone = 0.16 * np.sin(np.floor(ys / _BOARD_M) * 12.9898)
-            gap = np.clip(1.2 - np.abs((ys / _BOARD_M) % 1.0 - 0.5) * _BOARD_M / 0.008, 0.0, 1.0)
+            # boards into the shelf, as pallets are stored: their own tone, dark gaps between, the grain
+            xs = patch.xs() + np.float32(patch.x_m)
+            tone = 0.16 * np.sin(np.floor(xs / _BOARD_M) * 12.9898)
+            gap = np.clip(1.5 - np.abs((xs / _BOARD_M) % 1.0 - 0.5) * _BOARD_M / 0.012, 0.0, 1.0)
             grain = 0.2 * self._noise.mix(patch, "wood", {0.3: 0.6, 0.05: 0.5, 0.01: 0.5})
-            boards = (1.0 + tone - 0.8 * gap)[:, None] * (1.0 + grain)
+            boards = (1.0 + tone - 0.8 * gap)[None, :] * (1.0 + grain)
             _lay(colour, _linear(_WOOD_SRGB) * boards[..., None], wood)
         steel = self._cover(patch, self._uprights, None)
         if steel is not None:
