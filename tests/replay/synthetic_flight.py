@@ -108,7 +108,7 @@ def write_flight(folder: Path, *, truth: bool = True, summary: bool = True, seed
     path = folder / "flight.mcap"
     truths: list[Kinematics] = []
     with Recorder(path, lossless=True, metadata={"vehicle": "ardupilot", "site": site.name}) as recorder:
-        recorder.record(Topic.MAP, START_NS, Document(SITE_TOML))
+        recorder.record(Topic.MAP, 0, Document(SITE_TOML))  # stamps before the flight
         recorder.record(Topic.CONFIG, START_NS, Document('[vehicle]\nkind = "ardupilot"\n'))
         t_s, frames, done, sway = 0.0, 0, 0, np.zeros(2)
         plan = list(legs(site))

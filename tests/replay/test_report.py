@@ -111,6 +111,12 @@ def test_every_stop_is_in_the_list_in_order(log: Path) -> None:
     assert all(visit.true_error_m < 0.15 for visit in flight.visits)
 
 
+def test_time_starts_with_the_flight_not_with_its_papers(log: Path) -> None:
+    flight = load_flight(log)
+    assert flight.phases[0].start_s == 0.0
+    assert flight.duration_s == pytest.approx(flight.phases[-1].end_s, abs=0.05)
+
+
 def test_phases_cover_the_flight_without_gaps(log: Path) -> None:
     phases = load_flight(log).phases
     assert phases[0].phase == Phase.PREFLIGHT

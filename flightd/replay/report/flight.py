@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from flightd.config.site_file import parse_site
 from flightd.core.errors import InputError
-from flightd.core.topics import Document, Topic
+from flightd.core.topics import RETAINED, Document, Topic
 from flightd.core.types import AttitudeSetpoint, Event, GridPose, LineSet, Phase, Status, VehicleState
 from flightd.grid.site import Site
 from flightd.replay.log import FlightLog, read_log
@@ -33,6 +33,9 @@ FLYING = frozenset({Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.
 
 _WINDOW_S = 0.6
 """The direction of flight is judged over twice this time."""
+
+_SHORTEST_STOP_S = 0.2
+"""A hover that the mission leaves at once is no stop."""
 
 _STILL_M = 0.15
 """Who moved less in that time stands still."""
@@ -168,11 +171,8 @@ def load_flight(path: Path) -> Flight:
     log = read_log(path, {topic for topic in Topic if topic != Topic.FRAME})
     truths = _truth_messages(path.with_name("truth.mcap"))
     statuses = log.messages(Status)
-    start_ns = min(
-        (entry.stamp_ns for entry in log.entries if entry.topic not in {Topic.CONFIG, Topic.MAP}),
-        default=0,
-    )
-    end_ns = max((entry.stamp_ns for entry in log.entries), default=start_ns)
+    stamps_ns = [entry.stamp_ns for entry in log.entries if entry.topic not in RETAINED]
+    start_ns, end_ns = min(stamps_ns, default=0), max(stamps_ns, default=0)
 
     def seconds(stamps_ns: Iterable[int]) -> Array:
         return (np.fromiter(stamps_ns, np.float64) - start_ns) / NS_PER_S
@@ -355,6 +355,8 @@ def _visits(
         run = list(grouped)
         node = Counter(status.node for status in run).most_common(1)[0][0]
         start_s, end_s = ((status.stamp_ns - start_ns) / NS_PER_S for status in (run[0], run[-1]))
+        if end_s - start_s < _SHORTEST_STOP_S:
+            continue
         yield Visit(
             next(numbers),
             node,

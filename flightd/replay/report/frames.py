@@ -63,8 +63,9 @@ def _figure(flight: Flight, picture: Picture) -> str:
     facts = [f"frame {picture.seq}"]
     if seen is not None:
         facts.append(_counted(len(seen.lines), "line"))
-        if seen.timings_ms:
-            facts.append(f"{number(sum(seen.timings_ms.values()), 1)} ms")
+        spent_ms = sum(seen.timings_ms.values())
+        if spent_ms > 0:  # a simulation in lockstep takes no time
+            facts.append(f"{number(spent_ms, 1)} ms")
     caption = element(
         "figcaption", element("b", clock(t_s)), f" {text(phase)}", element("small", text(" · ".join(facts)))
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
 
@@ -17,6 +18,12 @@ _WIDTH_PX = 1000.0
 """Width of the drawing's own units: sizes of text and marks below are in them."""
 
 _POINTS = 2400
+_ARROW_M = 0.3
+"""Stops nearer to each other than this have no arrow between them."""
+
+_ARROW_SAMPLES = 12
+"""Its direction is that of the track over so many samples to both sides."""
+
 _NAMED_SPACING = 52.0
 """Nodes nearer to each other than this (in drawing units) are named only at the ends of aisles."""
 
@@ -132,18 +139,20 @@ def _track(track: Track, place: _Projection, role: str, flight: Flight) -> str:
 
 
 def _arrows(track: Track, place: _Projection, flight: Flight) -> str:
-    """A chevron in the middle of each way between two stops, pointing where the drone went."""
+    """A chevron halfway between two stops, pointing where the drone went."""
     arrows = []
-    for before, after in zip(flight.visits, flight.visits[1:], strict=False):
-        middle_s = (before.end_s + after.start_s) / 2
-        x, y = track.at(np.array([middle_s - 0.2, middle_s, middle_s + 0.2]))
-        step_x, step_y = x[2] - x[0], y[2] - y[0]
-        if not math.hypot(step_x, step_y) > 0.02:
+    for before, after in itertools.pairwise(flight.visits):
+        between = (track.t_s >= before.end_s) & (track.t_s <= after.start_s)
+        x, y = track.x_m[between], track.y_m[between]
+        flown_m = np.hypot(x - x[0], y - y[0]) if len(x) else x
+        if not len(x) or flown_m[-1] < _ARROW_M:
             continue
-        degrees = math.degrees(math.atan2(step_y, step_x))
+        middle = int(np.argmax(flown_m >= flown_m[-1] / 2))
+        ahead, behind = min(middle + _ARROW_SAMPLES, len(x) - 1), max(middle - _ARROW_SAMPLES, 0)
+        degrees = math.degrees(math.atan2(y[ahead] - y[behind], x[ahead] - x[behind]))
         arrows.append(
-            f'<path class="arrow" d="M-5,-5L4,0L-5,5" transform="translate({number(place.x(x[1]))} '
-            f'{number(place.y(y[1]))}) rotate({number(degrees)})"/>'
+            f'<path class="arrow" d="M-5,-5L4,0L-5,5" transform="translate({number(place.x(x[middle]))} '
+            f'{number(place.y(y[middle]))}) rotate({number(degrees)})"/>'
         )
     return "".join(arrows)
 
