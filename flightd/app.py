@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from flightd.adapters.camera.shared import SharedCamera
+from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.config.schema import Config
+from flightd.core.errors import FlightdError, TransientError
 from flightd.core.topics import Topic
-from flightd.core.types import AttitudeSetpoint, Command, Phase, Status
+from flightd.core.types import AttitudeSetpoint, Command, Event, EventLevel, Phase, Status
 from flightd.grid.site import Site
 from flightd.mission.plan import FlightPlan, make_plan
 from flightd.pilot import Pilot, TickInput, TickOutput
@@ -26,6 +27,7 @@ from flightd.runtime.latest import Latest
 from flightd.runtime.pool import Detection, DetectorPool, Detectors
 from flightd.runtime.pump import SetpointPump
 from flightd.runtime.ring import FrameTicket
+from flightd.runtime.supervise import restarted
 from flightd.vision.detector import Detector
 
 TICK_S = 0.02
@@ -86,13 +88,7 @@ class Daemon:
         self._observers = observers
         self._pilot = Pilot(site, plan_of(config, site), config.mission.heading, config.pilot_params(site))
         self._frames: Latest[FrameTicket] = Latest()
-        self._camera = SharedCamera(
-            config.camera.url,
-            (config.camera.width_px, config.camera.height_px),
-            config.camera.latency_s,
-            clock,
-            self._frames.put,
-        )
+        self._camera = connect_camera(config.camera, clock, self._frames.put)
         self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock)
         self._pump = SetpointPump(self._vehicle, clock, self._sent, TICK_S)
         self._latency = LatencyBook()
@@ -111,20 +107,30 @@ class Daemon:
 
     async def fly(self) -> FlightResult:
         """Run everything until the mission is over; cancelled, the vehicle is handed back."""
-        async with asyncio.TaskGroup() as tasks:
-            services = [
-                tasks.create_task(self._vehicle.run(), name="vehicle"),
-                tasks.create_task(self._camera.run(), name="camera"),
-                tasks.create_task(self._pump.run(), name="pump"),
-                *(
-                    tasks.create_task(self._detect(), name=f"detect-{i}")
-                    for i in range(self._config.vision.workers)
-                ),
-            ]
-            output = await self._tick_until_over()
-            for service in services:
-                service.cancel()
+        parts = {
+            "vehicle": self._vehicle.run(),
+            "camera": restarted(self._camera.run, self._failed),
+            "pump": self._pump.run(),
+            **{f"detect-{i}": self._detect() for i in range(self._config.vision.workers)},
+        }
+        if self._recorder is not None:
+            parts["recorder"] = restarted(self._recorder.run, self._failed)
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                services = [tasks.create_task(part, name=name) for name, part in parts.items()]
+                output = await self._tick_until_over()
+                for service in services:
+                    service.cancel()
+        except ExceptionGroup as group:
+            raise _first(group) from group
         return self._result(output)
+
+    def _failed(self, err: TransientError) -> None:
+        """A part that restarts has failed: people should know."""
+        event = Event(self._clock.now_ns(), EventLevel.ERROR, "failure", str(err))
+        self._vehicle.notify(event)
+        if self._recorder is not None:
+            self._recorder.record(Topic.EVENT, event.stamp_ns, event)
 
     async def _detect(self) -> None:
         """One frame after the other, as many of these loops as there are detector processes."""
@@ -262,3 +268,17 @@ class Daemon:
             latency_ms=self._latency.quantiles_ms(),
             setpoint_interval_ms=quantile,
         )
+
+
+def _first(group: ExceptionGroup[Exception]) -> Exception:
+    """The error that a person can act on, out of a group; the first one if there is none."""
+    leaves = list(_leaves(group))
+    return next((err for err in leaves if isinstance(err, FlightdError)), leaves[0])
+
+
+def _leaves(group: ExceptionGroup[Exception]) -> Iterator[Exception]:
+    for err in group.exceptions:
+        if isinstance(err, ExceptionGroup):
+            yield from _leaves(err)
+        else:
+            yield err

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
 from contextlib import AbstractContextManager
 from typing import Protocol
 
-from flightd.core.types import Attitude, AttitudeSetpoint, Command, Demand, Event, VehicleState
+from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, VehicleState
 
 
 class Clock(Protocol):
@@ -45,34 +44,27 @@ class Vehicle(Protocol):
         ...
 
 
-class FrameSlot(Protocol):
-    """A picture that lies in shared memory: workers read it by name, the daemon never copies it."""
+class Camera(Protocol):
+    """The down camera.  `run` delivers tickets of pictures in shared memory until cancelled; it raises
+    TransientError when the source failed and another `run` may succeed."""
 
     @property
-    def seq(self) -> int: ...
+    def frames(self) -> int:
+        """Pictures delivered so far."""
+        ...
 
-    @property
-    def stamp_ns(self) -> int: ...
-
-
-class CommandSource(Protocol):
-    """Operator commands, in order."""
-
-    def commands(self) -> AsyncIterator[Command]: ...
-
-
-class EventSink(Protocol):
-    """Takes events; never blocks."""
-
-    def event(self, event: Event) -> None: ...
+    async def run(self) -> None: ...
 
 
 class Recorder(Protocol):
     """The black box: takes what is worth keeping, never blocks, counts what it had to drop.
 
     `message` is a dataclass of plain fields or a dict of JSON values; topics and their types are in
-    `core.topics`.  Stamps are the flight clock's.
+    `core.topics`.  Stamps are the flight clock's.  `run` hands over what waits; it raises
+    TransientError after a failure that another `run` may mend.
     """
+
+    async def run(self) -> None: ...
 
     def record(self, topic: str, stamp_ns: int, message: object) -> None: ...
 

@@ -114,11 +114,21 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
         await pool.ready()
         config = _connected(simulation.config, f"udpout://127.0.0.1:{vehicle_port}", camera_port)
         daemon = Daemon(config, simulation.site, clock, pool, recorder, [simulation.observer])
-        recording = asyncio.ensure_future(recorder.run())
+        watch = asyncio.ensure_future(_watch(process))
         try:
-            return await _within_limit(simulation, daemon, recording)
+            return await _within_limit(simulation, daemon, watch)
         finally:
-            recording.cancel()
+            watch.cancel()
+
+
+async def _watch(process: Any) -> None:
+    """Return when the world's process has died."""
+    loop, died = asyncio.get_running_loop(), asyncio.Event()
+    loop.add_reader(process.sentinel, died.set)
+    try:
+        await died.wait()
+    finally:
+        loop.remove_reader(process.sentinel)
 
 
 async def _within_limit(simulation: Simulation, daemon: Daemon, beside: asyncio.Future[None]) -> FlightResult:

@@ -152,7 +152,8 @@ class _CountedTransport(asyncio.DatagramTransport):
 
     def sendto(self, data: Any, addr: Any = None) -> None:
         self._inner.sendto(data, addr)
-        self._loop.datagram_sent(addr[1] if isinstance(addr, tuple) else self._peer_port)
+        if data:  # asyncio sends no empty datagrams
+            self._loop.datagram_sent(addr[1] if isinstance(addr, tuple) else self._peer_port)
 
     def get_extra_info(self, name: str, default: Any = None) -> Any:
         return self._inner.get_extra_info(name, default)

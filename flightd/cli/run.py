@@ -1,0 +1,86 @@
+"""`flightd run`: the daemon."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from flightd.core.errors import RunError
+
+if TYPE_CHECKING:
+    from flightd.app import FlightResult
+    from flightd.config.schema import Config
+    from flightd.core.types import Status
+    from flightd.grid.site import Site
+
+EXAMPLES = """Examples:
+
+  flightd run --config /etc/flightd/flightd.toml
+  flightd run --config configs/ardupilot.toml
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Hang the command under `app`."""
+    app.command("run", epilog=EXAMPLES)(run)
+
+
+def run(config: Annotated[Path, typer.Option(help="Configuration file.")]) -> None:
+    """Fly the configured mission on a real vehicle, or on any peer that speaks like one.
+
+    SIGINT and SIGTERM hand the vehicle back at once.
+    """
+    from flightd.cli.flight_progress import FlightProgress
+    from flightd.config.schema import load_config
+    from flightd.config.site_file import load_site
+    from flightd.core.types import Phase
+
+    chosen = load_config(config)
+    site = load_site(chosen.mission.site)
+    with FlightProgress(shown=True) as progress:
+        result = asyncio.run(_until_signal(chosen, site, progress))
+    if result is None:
+        raise RunError("stopped by a signal; the vehicle was handed back")
+    print(f"{result.reason}; {len(result.visited)} of {result.planned} nodes visited", file=sys.stderr)
+    if result.phase is not Phase.DONE:
+        raise RunError(f"mission {result.phase}: {result.reason}")
+
+
+async def _until_signal(
+    config: Config, site: Site, observer: Callable[[Status], None]
+) -> FlightResult | None:
+    """The flight's result, or None when a signal ended it."""
+    flight = asyncio.ensure_future(_fly(config, site, observer))
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, flight.cancel)
+    await asyncio.wait([flight])
+    return None if flight.cancelled() else flight.result()
+
+
+async def _fly(config: Config, site: Site, observer: Callable[[Status], None]) -> FlightResult:
+    from flightd.adapters.recorder.recorder import Recorder
+    from flightd.app import Daemon, detector_pool
+    from flightd.config.site_file import site_toml
+    from flightd.core.topics import Document, Topic
+    from flightd.runtime.clock import LoopClock
+
+    clock = LoopClock()
+    with ExitStack() as stack:
+        pool = stack.enter_context(detector_pool(config, clock))
+        recorder = None
+        if config.recorder.folder is not None:
+            name = time.strftime("%Y-%m-%dT%H-%M-%SZ.mcap", time.gmtime())
+            recorder = stack.enter_context(Recorder(config.recorder.folder / name))
+            recorder.record(Topic.MAP, clock.now_ns(), Document(site_toml(site)))
+            recorder.record(Topic.CONFIG, clock.now_ns(), Document(config.model_dump_json(indent=1)))
+        await pool.ready()
+        return await Daemon(config, site, clock, pool, recorder, [observer]).fly()

@@ -1,0 +1,125 @@
+"""Detector processes: pictures by shared memory, death and hanging survived, nothing stale believed."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import time
+from functools import partial
+
+import numpy as np
+import pytest
+
+from flightd.core.errors import TransientError, UnavailableError
+from flightd.core.types import Image, LineSet
+from flightd.runtime.clock import LoopClock
+from flightd.runtime.pool import Detection, DetectorPool
+from flightd.runtime.ring import FrameRing, FrameTicket
+
+
+class MeanDetector:
+    """Answers the picture's mean as a method name; picture 13 hangs, 14 kills the process."""
+
+    def detect(self, bgr: Image, seq: int = 0, stamp_ns: int = 0) -> LineSet:
+        if seq == 13:
+            time.sleep(60)
+        if seq == 14:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if seq == 15:
+            raise ValueError("a picture of nothing")
+        return LineSet(seq, stamp_ns, bgr.shape[1], bgr.shape[0], (), (), str(int(bgr.mean())))
+
+
+def ticket(ring: FrameRing, seq: int, value: int) -> FrameTicket:
+    slot = ring.begin(seq)
+    ring.pixels(slot)[:] = value
+    ring.publish(slot, seq, seq * 1000)
+    return FrameTicket(
+        ring.name, slot, ring.slots, seq, seq * 1000, seq * 1000, ring.width_px, ring.height_px
+    )
+
+
+def pool_of(size: int, timeout_s: float = 0.3) -> DetectorPool:
+    return DetectorPool(partial(MeanDetector), size, timeout_s, LoopClock())
+
+
+def test_pictures_reach_the_workers_through_shared_memory() -> None:
+    async def main() -> list[str]:
+        ring = FrameRing.create(4, 64, 36)
+        try:
+            with pool_of(2) as pool:
+                found = await asyncio.gather(*(pool.detect(ticket(ring, i, 10 * i)) for i in range(4)))
+                return [d.lines.method for d in found if d is not None]
+        finally:
+            ring.close()
+
+    assert asyncio.run(main()) == ["0", "10", "20", "30"]
+
+
+@pytest.mark.parametrize(("seq", "why"), [(13, "hung"), (14, "died"), (15, "nothing")])
+def test_a_worker_that_fails_costs_one_picture_and_is_replaced(seq: int, why: str) -> None:
+    async def main() -> tuple[list[Detection | None], DetectorPool]:
+        ring = FrameRing.create(4, 64, 36)
+        try:
+            with pool_of(1) as pool:
+                await pool.ready()
+                answers = [await pool.detect(ticket(ring, n, 7)) for n in (seq, 20, 21)]
+                return answers, pool
+        finally:
+            ring.close()
+
+    answers, pool = asyncio.run(main())
+    assert answers[0] is None
+    assert None not in answers[1:]
+    assert pool.lost.total() == 1
+    assert why in next(iter(pool.lost))
+
+
+def test_idle_workers_killed_from_outside_are_replaced() -> None:
+    async def main() -> tuple[object, int]:
+        ring = FrameRing.create(4, 64, 36)
+        try:
+            with pool_of(2) as pool:
+                await pool.ready()
+                for pid in pool.pids:
+                    os.kill(pid, signal.SIGKILL)
+                while pool.replaced < 2:  # noqa: ASYNC110 - the pool has no event for it
+                    await asyncio.sleep(0.01)
+                return await pool.detect(ticket(ring, 1, 5)), len(pool.pids)
+        finally:
+            ring.close()
+
+    detection, workers = asyncio.run(main())
+    assert detection is not None
+    assert workers == 2
+
+
+def test_a_picture_that_was_overwritten_is_lost_never_mistaken() -> None:
+    async def main() -> object:
+        ring = FrameRing.create(2, 64, 36)
+        try:
+            with pool_of(1) as pool:
+                old = ticket(ring, 1, 50)
+                ticket(ring, 3, 99)
+                return await pool.detect(old)
+        finally:
+            ring.close()
+
+    assert asyncio.run(main()) is None
+
+
+def test_the_ring_refuses_foreign_names_and_slots() -> None:
+    with pytest.raises(UnavailableError, match="not the name"):
+        FrameRing.attach("../etc/passwd", 4, 64, 36)
+    with pytest.raises(UnavailableError, match="No such file"):
+        FrameRing.attach("flightd-0-00000000", 4, 64, 36)
+    ring = FrameRing.create(2, 64, 36)
+    try:
+        with pytest.raises(TransientError, match="outside"):
+            ring.check(9, 1)
+        with pytest.raises(UnavailableError, match="smaller"):
+            FrameRing.attach(ring.name, 200, 640, 360)
+        assert np.all(ring.pixels(0) == 0)
+    finally:
+        ring.close()

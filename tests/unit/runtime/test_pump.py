@@ -1,0 +1,79 @@
+"""The set point stream: its own rate, level when its maker is dead, silent when told."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+
+from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, VehicleState
+from flightd.runtime.clock import LoopClock
+from flightd.runtime.loops import VirtualLoop
+from flightd.runtime.pump import SetpointPump
+
+MS = 1_000_000
+
+
+class Wire:
+    """Takes set points and the time they came."""
+
+    def __init__(self, clock: LoopClock) -> None:
+        self._clock = clock
+        self.sent: list[tuple[int, AttitudeSetpoint]] = []
+
+    async def run(self) -> None: ...
+
+    def state(self) -> VehicleState | None:
+        return None
+
+    def attitudes(self) -> list[Attitude]:
+        return []
+
+    def demand(self, demand: Demand) -> None: ...
+
+    def send(self, setpoint: AttitudeSetpoint) -> bool:
+        self.sent.append((self._clock.now_ns(), setpoint))
+        return True
+
+    def notify(self, event: Event) -> None: ...
+
+
+async def pumped(
+    stop_after_s: float, watch_s: float, silence: bool = False
+) -> list[tuple[int, AttitudeSetpoint]]:
+    clock = LoopClock()
+    start = clock.now_ns()
+    wire = Wire(clock)
+    pump = SetpointPump(wire, clock, lambda *_: None)
+    running = asyncio.ensure_future(pump.run())
+    while clock.now_ns() - start < stop_after_s * 1e9:
+        pump.set(AttitudeSetpoint(clock.now_ns(), roll_rad=0.1, climb_mps=0.5))
+        await asyncio.sleep(0.02)
+    if silence:
+        pump.set(None)
+    await asyncio.sleep(watch_s)
+    running.cancel()
+    return [(at - start, setpoint) for at, setpoint in wire.sent]
+
+
+def run(main: object) -> list[tuple[int, AttitudeSetpoint]]:
+    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+        return runner.run(main)  # type: ignore[arg-type]
+
+
+def test_a_dead_maker_of_set_points_leaves_level_and_hold_on_the_wire() -> None:
+    sent = run(pumped(0.2, 1.0))
+    gaps = [b[0] - a[0] for a, b in itertools.pairwise(sent)]
+    assert max(gaps) <= 30 * MS
+    late = [s for at, s in sent if at > (200 + 150 + 30) * MS]
+    assert late
+    assert {(s.roll_rad, s.pitch_rad, s.yaw_rate_radps, s.climb_mps) for s in late} == {(0.0, 0.0, 0.0, 0.0)}
+
+
+def test_a_fresh_set_point_leaves_at_once() -> None:
+    sent = run(pumped(1.0, 0.0))
+    assert all(at == setpoint.stamp_ns - sent[0][1].stamp_ns + sent[0][0] for at, setpoint in sent)
+
+
+def test_hands_off_means_silence() -> None:
+    sent = run(pumped(0.2, 1.0, silence=True))
+    assert max(at for at, _ in sent) <= 200 * MS
