@@ -46,7 +46,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A text that the flight was flown with: the configuration, the site map, the scenario (TOML)."""
+    """A text that the flight was flown with: the configuration, the site map, the scenario (TOML or JSON)."""
 
     text: str
 

@@ -46,7 +46,7 @@ def _write_topic(folder: Path, topic: str, entries: list[Entry], start_ns: int) 
     name = topic.strip("/").replace("/", "_") or "unnamed"
     newest = entries[-1].message
     if isinstance(newest, Document):
-        path = folder / f"{name}.toml"
+        path = folder / f"{name}.{'json' if newest.text.lstrip().startswith('{') else 'toml'}"
         path.write_text(newest.text, encoding="utf-8")
         return path
     path = folder / f"{name}.csv"

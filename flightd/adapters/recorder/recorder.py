@@ -20,14 +20,18 @@ import msgspec
 import flightd
 from flightd.adapters.recorder.schemas import PICTURE_SCHEMA, encode, schema_of
 from flightd.adapters.recorder.wire import HEADER, PICTURE_SEQ, Definition, Kind, Tally
-from flightd.core.errors import TransientError, UnavailableError
-from flightd.core.topics import RETAINED
+from flightd.core.errors import UnavailableError
+from flightd.core.topics import RETAINED, Topic
+from flightd.core.types import Event, EventLevel
 
 QUEUE_BYTES = 8 << 20
 """What may wait for the writing process; pictures may fill half of it, so that they are lost first."""
 
 PUSH_S = 0.1
 """`run` hands over what waits at least this often."""
+
+RESTART_S = 1.0
+"""A writing process that dies at once is started again no sooner than this."""
 
 CLOSE_S = 10.0
 """How long `close` waits for the writing process to finish the file."""
@@ -65,6 +69,7 @@ class Recorder:
         self._retained: dict[str, bytes] = {}
         self._answers = bytearray()
         self._tally = Tally(found=0, written=0, lost=0, error="")
+        self._newest_ns = 0
         self._accepted = 0
         self._accepted_before = 0
         self._refused = 0
@@ -109,6 +114,7 @@ class Recorder:
     def record(self, topic: str, stamp_ns: int, message: object) -> None:
         """Take a message: a dataclass of plain fields or a dict.  TypeError if it has no JSON form."""
         payload = encode(message)
+        self._newest_ns = max(self._newest_ns, stamp_ns)
         channel = self._channels.get(topic)
         if channel is None:
             name, schema = schema_of(message)
@@ -128,14 +134,16 @@ class Recorder:
         self._put(frame, self._queue_bytes // 2)
 
     async def run(self) -> None:
-        """Hand over what waits, for ever; TransientError after a death that was mended by a restart."""
+        """Hand over what waits, and bring the writing process back whenever it died, for ever.
+
+        A death is no error here: it costs messages (`dropped`), is written into the log as an event and
+        told by `restarts`, and the flight goes on."""
         while True:
             await asyncio.sleep(PUSH_S)
             self._push()
             if self._child.poll() is not None:
-                code = self._child.returncode
                 self._restart()
-                raise TransientError(f"the flight log's writer died (exit code {code}) and was started again")
+                await asyncio.sleep(RESTART_S)
 
     def close(self) -> None:
         """Hand over everything, wait until the file is finished; idempotent.
@@ -218,7 +226,7 @@ class Recorder:
     def _restart(self) -> None:
         """Go on in the same file; what waited is given up, for its front may be half of a frame."""
         self._link.close()
-        self._child.wait()
+        code = self._child.wait()
         self._restarts += 1
         self._accepted_before = self._accepted
         self._tally = Tally(found=self._tally.written, written=self._tally.written, lost=0, error="")
@@ -227,6 +235,9 @@ class Recorder:
         self._start("resume")
         self._queue += b"".join((*self._definitions, *self._retained.values()))
         self._accepted += len(self._retained)
+        text = f"the writer of the flight log died (exit code {code}) and was started again"
+        event = Event(self._newest_ns, EventLevel.WARNING, "recorder_died", text)
+        self.record(Topic.EVENT, self._newest_ns, event)
 
     def _start(self, how: str) -> None:
         self._link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
