@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, Self, TypeAlias
 
 from flightd.core.types import Image
 from flightd.ports import Clock
@@ -16,6 +17,8 @@ from flightd.sim.kinematics import Kinematics
 from flightd.sim.truth import TruthHistory
 
 STEP_NS = 5_000_000
+_Serve: TypeAlias = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Coroutine[Any, Any, None]]
+
 _VIDEO_BACKLOG_BYTES = 200_000
 _TRUTH_SAMPLES = 1000
 _CATCH_UP_NS = 2_000_000_000
@@ -58,6 +61,7 @@ class ArDroneServer:
         self._watchers: dict[asyncio.StreamWriter, _Stream] = {}
         self._readers: list[asyncio.StreamWriter] = []
         self._pending_configuration: list[bytes] = []
+        self._handlers: set[asyncio.Task[None]] = set()
         drone.send_configuration = self._send_configuration
 
     @property
@@ -84,8 +88,10 @@ class ArDroneServer:
         self._navdata, _ = await loop.create_datagram_endpoint(
             lambda: _Receiver(self._wake), local_addr=(host, self.ports.navdata)
         )
-        video = await asyncio.start_server(self._watch_video, host, self.ports.video)
-        control = await asyncio.start_server(self._read_configuration, host, self.ports.control)
+        video = await asyncio.start_server(self._handled(self._watch_video), host, self.ports.video)
+        control = await asyncio.start_server(
+            self._handled(self._read_configuration), host, self.ports.control
+        )
         self._servers = [video, control]
         self.ports = replace(
             self.ports,
@@ -105,6 +111,7 @@ class ArDroneServer:
         for server in self._servers:
             server.close()
             await server.wait_closed()
+        await asyncio.gather(*self._handlers, return_exceptions=True)
 
     async def run(self) -> None:
         """Step the drone every 5 ms of the loop's time and send its navdata, for ever."""
@@ -161,6 +168,16 @@ class ArDroneServer:
         if self.radio:
             self._client = sender
             self.drone.wake()
+
+    def _handled(self, serve: _Serve) -> Callable[[asyncio.StreamReader, asyncio.StreamWriter], None]:
+        """Serve each connection in a task that this server awaits when it closes."""
+
+        def connected(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            task = asyncio.get_running_loop().create_task(serve(reader, writer), name="ardrone connection")
+            self._handlers.add(task)
+            task.add_done_callback(self._handlers.discard)
+
+        return connected
 
     async def _watch_video(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._watchers[writer] = _Stream(self._video_header_bytes)
