@@ -87,9 +87,9 @@ class Packer:
 
     def pack(self, units: list[bytes], timestamp_ms: int) -> bytes:
         payload = b"".join(_START_CODE + unit for unit in units)
-        sizes = [len(_START_CODE + unit) for unit in units]
+        sizes = {unit[0] & 0x1F: len(_START_CODE) + len(unit) for unit in units}
+        sps, pps = sizes.get(_NAL_SPS, 0), sizes.get(_NAL_PPS, 0)
         idr = is_idr(units)
-        sps, pps = (sizes[0], sizes[1]) if idr else (0, 0)
         header = struct.pack(
             "<4sBBHIHHHHIIBBBBIIHBBBBHI",
             b"PaVE",
