@@ -81,7 +81,7 @@ def find(mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
     strips: list[Strip] = []
     for steep in (True, False):
         cuts = cut(mask, grid, steep=steep, spacing=spacing)
-        strips += _bands(_straightened(cuts, plane, steep=steep), grid.step, steep=steep)
+        strips += _bands(_straightened(cuts, plane, steep=steep), grid.step, strips, steep=steep)
     return strips
 
 
@@ -97,12 +97,20 @@ def _straightened(cuts: Cuts, plane: Plane, *, steep: bool) -> Cuts:
     return Cuts(cuts.slab, (u_low + u_high) / 2, low, high, cuts.whole, cuts.spacing_px)
 
 
-def _bands(cuts: Cuts, step: int, *, steep: bool) -> list[Strip]:
-    """Sequential RANSAC: one matrix of hypotheses against centroids serves all bands of a direction."""
-    whole = cuts.whole
-    if whole.sum() < _MIN_CUTS:
+def _bands(cuts: Cuts, step: int, known: list[Strip], *, steep: bool) -> list[Strip]:
+    """Sequential RANSAC: one matrix of hypotheses against centroids serves all bands of a direction.
+
+    Cuts of the `known` bands, which run the other way, are left alone.
+    """
+    usable = cuts.whole.copy()
+    if known:
+        centre = (cuts.low + cuts.high) / 2
+        for other in known:
+            away = np.abs(cuts.u - other.centre.a - other.centre.b * centre)
+            usable &= away > max(step, 0.15 * other.width_px / other.cosine)
+    if np.count_nonzero(usable) < _MIN_CUTS:
         return []
-    slab, u, low, high = cuts.slab[whole], cuts.u[whole], cuts.low[whole], cuts.high[whole]
+    slab, u, low, high = cuts.slab[usable], cuts.u[usable], cuts.low[usable], cuts.high[usable]
     middle, width = (low + high) / 2, high - low
     i, j = _pairs(slab, u, middle)
     b = (middle[j] - middle[i]) / (u[j] - u[i])

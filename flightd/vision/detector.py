@@ -108,16 +108,14 @@ class Detector:
 
     def _guess(self, mask: Image, grid: Grid, plane: Plane) -> list[evidence.Evidence]:
         """Everything that may be a band, with its evidence."""
+        filled = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _SMALL_CLOSING), np.uint8)
         closed = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _CLOSING), np.uint8)
         worn = cv2.countNonZero(closed) > _WORN * cv2.countNonZero(mask)
         guesses: list[Strip] = []
         if self.method in ("centroid", "combined"):
-            guesses += centroid.find(mask, grid, plane)
-            if worn:
-                guesses += centroid.find(closed, grid, plane)
+            guesses += centroid.find(filled, grid, plane)
         if self.method in ("skeleton", "combined"):
-            guesses += skeleton.find(closed if worn else mask, grid, plane, zhang_suen=self._zhang_suen)
-        filled = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _SMALL_CLOSING), np.uint8)
+            guesses += skeleton.find(closed if worn else mask, grid, plane, guesses, zhang_suen=self._zhang_suen)
         fused = combine.fuse(guesses, tolerance_px=1.5 * grid.step)
         return evidence.weigh(fused, filled, grid, plane)
 

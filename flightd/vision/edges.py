@@ -39,6 +39,7 @@ class Taps:
     """Pixels across the guessed edges: (E, S) places, (E, S, T) taps from floor to paint.
 
     `row` counts along u and `base` along v in raw pixels; tap t of an edge is pixel base + sign (t - half).
+    `seen` (E, S) tells which guessed places are in the picture.
     """
 
     steep: NDArray[np.bool_]
@@ -46,7 +47,7 @@ class Taps:
     row: Indices
     base: Indices
     half: int
-    inside: NDArray[np.bool_]
+    seen: NDArray[np.bool_]
     profile: Floats
     contrast: Array
 
@@ -78,30 +79,30 @@ def take(bgr: Image, strips: list[Strip], plane: Plane, half: int) -> Taps:
     row = np.rint(np.where(steep, y + half_y, x + half_x)).astype(np.intp)
     base = np.rint(np.where(steep, x + half_x, y + half_y)).astype(np.intp)
 
+    # Near the picture's border the taps are moved inwards: the edge is then not at their middle.
+    rows: Indices = np.where(steep, np.full(1, height), width)
+    columns: Indices = np.where(steep, np.full(1, width), height)
+    half = min(half, (min(height, width) - 1) // 2)
+    seen = (row >= 0) & (row < rows) & (base >= 0) & (base < columns)
+    row, base = np.clip(row, 0, rows - 1), np.clip(base, half, columns - 1 - half)
     # Inside a thin band the taps stop at its middle: beyond it the far edge would be seen.
     middles = np.array([(s.high.at(m) - s.low.at(m)) / 2 for s in strips for m in [(s.u0 + s.u1) / 2]])
-    inner = np.repeat(np.maximum(1, middles.astype(np.intp)), 2)[:, None, None]
-    column = base[:, :, None] + sign[:, :, None] * np.minimum(np.arange(-half, half + 1), inner)
-    rows: Indices = np.where(steep, np.full(1, height), width)
-    columns: Indices = np.where(steep, np.full(1, width), height)[:, :, None]
-    row_inside = (row >= 0) & (row < rows)
-    inside = (column >= 0) & (column < columns) & row_inside[:, :, None]
+    inner = np.repeat(np.maximum(1, middles.astype(np.intp)), 2)[:, None]
     stride_u, stride_v = np.where(steep, width, 1), np.where(steep, 1, width)
-    flat = np.clip(row, 0, rows - 1) * stride_u
-    index = flat[:, :, None] + np.clip(column, 0, columns - 1) * stride_v[:, :, None]
+    offset = sign * stride_v * np.minimum(np.arange(-half, half + 1), inner)
+    index = (row * stride_u + base * stride_v)[:, :, None] + offset[:, None, :]
     pixels = bgr.reshape(-1, 3).take(index, axis=0).astype(np.float32)
-    profile, contrast = _project(pixels, row_inside)
-    return Taps(steep, sign, row, base, half, inside, profile, contrast)
+    profile, contrast = _project(pixels, seen)
+    return Taps(steep, sign, row, base, half, seen, profile, contrast)
 
 
 def rough(taps: Taps) -> tuple[Array, Array]:
     """Lines through the steepest rise towards the paint at each station, in raw pixels: v = a + b u."""
-    p, inside = taps.profile, taps.inside
+    p = taps.profile
     rise = p[..., 3:] + p[..., 2:-1] - p[..., 1:-2] - p[..., :-3]
-    rise[~(inside[..., 3:] & inside[..., :-3])] = 0.0
     best = rise.argmax(axis=-1)
     strength = np.take_along_axis(rise, best[..., None], axis=-1)[..., 0]
-    found = strength > np.maximum(0.5 * taps.contrast[:, None], 2 * MIN_CONTRAST)
+    found = (strength > np.maximum(0.5 * taps.contrast[:, None], 2 * MIN_CONTRAST)) & taps.seen
     shift = best + (1.5 - taps.half)
     # The guess is nearly parallel: the edge is where most stations agree on the shift from it.
     agreed = row_medians(shift, found)[:, None]
@@ -123,7 +124,7 @@ def locate(taps: Taps, rough_a: Array, rough_b: Array, plane: Plane) -> Edges:
     usable = (window[..., 0] >= 0) & (window[..., -1] < length)
     window = np.clip(window, 0, length - 1)
     p = np.take_along_axis(taps.profile, window, axis=-1)
-    usable &= np.take_along_axis(taps.inside, window, axis=-1).all(axis=-1)
+    usable &= taps.seen
     floor, paint = p[..., :2].mean(axis=-1), p[..., -2:].mean(axis=-1)
     step = paint - floor
     usable &= step > np.maximum(0.35 * taps.contrast[:, None], MIN_CONTRAST)

@@ -40,7 +40,7 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
     lines = robust_lines(found.u, found.v, found.weight, _CUTS_PX)
     stations = taps.row.shape[1]
     # An edge that leaves the picture is judged by the part of it that could be seen.
-    visible = np.maximum(taps.inside[:, :, taps.half].sum(axis=1), stations / 2)
+    visible = np.maximum(np.count_nonzero(taps.seen, axis=1), stations / 2)
     refined: list[Strip | None] = []
     for k, strip in enumerate(strips):
         edges = [

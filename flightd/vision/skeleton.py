@@ -8,6 +8,8 @@ Zhang-Suen thinning, the paper's, is there by option.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -26,7 +28,9 @@ _MIN_POINTS = 10
 _VOTE_SHARE = 0.06
 """Votes a Hough line needs, as a part of the mask's longer side."""
 _MAX_CANDIDATES = 64
-_MAX_CLUSTERS = 12
+_MAX_CLUSTERS = 10
+_WEAKEST = 0.12
+"""Hough lines with less than this part of the strongest one's votes are scraps."""
 _AROUND = np.ones((5, 5), np.uint8)
 _NEIGHBOURS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
 """Clockwise from north, P2..P9 of Zhang and Suen."""
@@ -62,49 +66,75 @@ def thin(mask: Image) -> Image:
     return np.ascontiguousarray(image[1:-1, 1:-1]) * np.uint8(255)
 
 
-def find(mask: Image, grid: Grid, plane: Plane, *, zhang_suen: bool = False) -> list[Strip]:
-    """Straight bands in the mask, best supported first."""
+def find(
+    mask: Image, grid: Grid, plane: Plane, seeds: Sequence[Strip] = (), *, zhang_suen: bool = False
+) -> list[Strip]:
+    """Straight bands in the mask.
+
+    The ridge is first fitted along `seeds`, bands that are known roughly; Hough then looks for lines in
+    what is left of it.
+    """
     ridge, distance = distance_ridge(mask)
     if zhang_suen:
         ridge = thin(mask) > 0
-    ys, xs = np.nonzero(ridge)
-    if len(xs) < _MIN_POINTS:
+    place = np.flatnonzero(ridge)
+    if len(place) < _MIN_POINTS:
         return []
-    radius = distance[ys, xs].astype(float) * grid.step
+    ys, xs = np.divmod(place, ridge.shape[1])
+    radius = distance.ravel()[place].astype(float) * grid.step
     x, y = plane.ideal(grid.x(xs), grid.y(ys))
+    points = _Ridge(x, y, radius, np.ones(len(x), np.bool_), grid.step)
+    strips = [_take_band(points, *_normal(seed)) for seed in seeds]
     need = max(_MIN_POINTS, round(_VOTE_SHARE * max(mask.shape)))
-    found = cv2.HoughLines(ridge.view(np.uint8), 1, math.pi / 180, need)
-    if found is None:
-        return []
-    peaks = np.asarray(found, np.float64).reshape(-1, found.shape[-1])[:_MAX_CANDIDATES]
-    strips: list[Strip] = []
-    free = np.ones(len(xs), np.bool_)
-    for mean_rho, theta in _clusters(peaks, grid):
-        rho, c, s = mean_rho, math.cos(theta), math.sin(theta)
-        if not plane.is_identity:
-            rho, c, s = _straightened(rho, c, s, plane)
-        members = np.flatnonzero((np.abs(x * c + y * s - rho) <= 1.5 * grid.step) & free)
-        if len(members) < _MIN_POINTS:
-            continue
-        steep = abs(c) >= abs(s)
-        u, v = (y, x) if steep else (x, y)
-        strip = _fit_ridge(u, v, radius, members, free, grid.step, steep=steep)
-        if strip is None:
-            continue
-        strips.append(strip)
+    if np.count_nonzero(points.free) >= need:
+        if seeds:
+            ridge.ravel()[place[~points.free]] = False
+        found = cv2.HoughLinesWithAccumulator(ridge.view(np.uint8), 1, math.pi / 180, need)
+        peaks = np.zeros((0, 3)) if found is None else np.asarray(found, np.float64).reshape(-1, 3)
+        lines = _clusters(peaks[:_MAX_CANDIDATES], grid)
+        strips += [_take_band(points, *_straightened(*line, plane)) for line in lines]
+    return [strip for strip in strips if strip is not None]
+
+
+@dataclass(frozen=True, slots=True)
+class _Ridge:
+    """Ridge points in centred frame pixels, the band's half width there, and which are not yet taken."""
+
+    x: Array
+    y: Array
+    radius: Array
+    free: NDArray[np.bool_]
+    step: int
+
+
+def _take_band(ridge: _Ridge, rho: float, c: float, s: float) -> Strip | None:
+    """The straight band along a line; its points are taken off the free ones."""
+    members = np.flatnonzero((np.abs(ridge.x * c + ridge.y * s - rho) <= 1.5 * ridge.step) & ridge.free)
+    if len(members) < _MIN_POINTS:
+        return None
+    steep = abs(c) >= abs(s)
+    u, v = (ridge.y, ridge.x) if steep else (ridge.x, ridge.y)
+    strip = _fit_ridge(u, v, ridge, members, steep=steep)
+    if strip is not None:
         away = np.abs(v - strip.centre.a - strip.centre.b * u) * strip.cosine
-        free &= away > max(2 * grid.step, 0.3 * strip.width_px)
-    return strips
+        np.logical_and(ridge.free, away > max(2 * ridge.step, 0.3 * strip.width_px), out=ridge.free)
+    return strip
+
+
+def _normal(strip: Strip) -> tuple[float, float, float]:
+    """(rho, cos theta, sin theta) of a band's centre line."""
+    n = strip.cosine
+    across, along = n, -strip.centre.b * n
+    return (strip.centre.a * n, across, along) if strip.steep else (strip.centre.a * n, along, across)
 
 
 def _clusters(peaks: Array, grid: Grid) -> list[tuple[float, float]]:
     """Mean (rho, theta) of the Hough peaks that belong together, strongest first, about the image centre."""
-    theta = peaks[:, 1]
+    theta, votes = peaks[:, 1], peaks[:, 2]
     # Hough's rho is in samples from the first sample.
     rho = peaks[:, 0] * grid.step + float(grid.x(0)) * np.cos(theta) + float(grid.y(0)) * np.sin(theta)
-    votes = peaks[:, 2] if peaks.shape[1] > 2 else np.arange(len(peaks), 0, -1.0)
     means: list[tuple[float, float]] = []
-    left = np.ones(len(peaks), np.bool_)
+    left = votes >= _WEAKEST * votes.max(initial=0.0)
     while left.any() and len(means) < _MAX_CLUSTERS:
         first = int(left.argmax())
         turn = (theta - theta[first] + math.pi / 2) % math.pi - math.pi / 2
@@ -118,8 +148,11 @@ def _clusters(peaks: Array, grid: Grid) -> list[tuple[float, float]]:
     return means
 
 
-def _straightened(rho: float, c: float, s: float, plane: Plane) -> tuple[float, float, float]:
-    """The line of a distortion-free camera through two points of the raw one."""
+def _straightened(rho: float, theta: float, plane: Plane) -> tuple[float, float, float]:
+    """(rho, cos theta, sin theta) that a distortion-free camera would see."""
+    c, s = math.cos(theta), math.sin(theta)
+    if plane.is_identity:
+        return rho, c, s
     half = plane.height_px / 4
     x, y = plane.ideal(
         np.array([rho * c - half * s, rho * c + half * s]), np.array([rho * s + half * c, rho * s - half * c])
@@ -130,17 +163,9 @@ def _straightened(rho: float, c: float, s: float, plane: Plane) -> tuple[float, 
     return float(x[0] * nx + y[0] * ny), nx, ny
 
 
-def _fit_ridge(
-    u: Array,
-    v: Array,
-    radius: Array,
-    members: NDArray[np.intp],
-    free: NDArray[np.bool_],
-    step: int,
-    *,
-    steep: bool,
-) -> Strip | None:
+def _fit_ridge(u: Array, v: Array, ridge: _Ridge, members: NDArray[np.intp], *, steep: bool) -> Strip | None:
     """A straight line through the ridge; None when too little of it is straight and of one width."""
+    radius, step = ridge.radius, ridge.step
     noise = step / math.sqrt(6)
     for limit in (1.5, 1.0):
         typical = _median(radius[members])
@@ -148,7 +173,7 @@ def _fit_ridge(
         if len(kept) < _MIN_POINTS:
             return None
         fit = fit_line(u[kept], v[kept], noise)
-        members = np.flatnonzero((np.abs(v - fit.a - fit.b * u) <= limit * step) & free)
+        members = np.flatnonzero((np.abs(v - fit.a - fit.b * u) <= limit * step) & ridge.free)
         if len(members) < _MIN_POINTS:
             return None
     if bow(u[kept], v[kept], noise):
