@@ -24,7 +24,7 @@ _MIN_SIDE_PX = 16
 _CLOSING = np.ones((11, 11), np.uint8)
 _SMALL_CLOSING = np.ones((5, 5), np.uint8)
 _WORN = 1.03
-"""Closing that adds more than this to the paint shows worn paint: then lines are looked for in it too."""
+"""Closing that adds more than this to the paint shows worn paint, whose holes would break the ridge."""
 
 
 class Detector:
@@ -109,13 +109,14 @@ class Detector:
     def _guess(self, mask: Image, grid: Grid, plane: Plane) -> list[evidence.Evidence]:
         """Everything that may be a band, with its evidence."""
         filled = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _SMALL_CLOSING), np.uint8)
-        closed = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _CLOSING), np.uint8)
-        worn = cv2.countNonZero(closed) > _WORN * cv2.countNonZero(mask)
         guesses: list[Strip] = []
         if self.method in ("centroid", "combined"):
             guesses += centroid.find(filled, grid, plane)
         if self.method in ("skeleton", "combined"):
-            guesses += skeleton.find(closed if worn else mask, grid, plane, guesses, zhang_suen=self._zhang_suen)
+            closed = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _CLOSING), np.uint8)
+            worn = cv2.countNonZero(closed) > _WORN * cv2.countNonZero(mask)
+            ridged = closed if worn else mask
+            guesses += skeleton.find(ridged, grid, plane, guesses, zhang_suen=self._zhang_suen)
         fused = combine.fuse(guesses, tolerance_px=1.5 * grid.step)
         return evidence.weigh(fused, filled, grid, plane)
 
