@@ -18,7 +18,7 @@ from typing import Self
 import msgspec
 
 import flightd
-from flightd.adapters.recorder.schemas import PICTURE_SCHEMA, encode, schema_of
+from flightd.adapters.recorder.schemas import encode, picture_schema, schema_of
 from flightd.adapters.recorder.wire import HEADER, PICTURE_SEQ, Definition, Kind, Tally
 from flightd.core.errors import UnavailableError
 from flightd.core.topics import RETAINED, Topic
@@ -128,8 +128,8 @@ class Recorder:
         """Take a JPEG picture, frame number `seq`, exposed at `stamp_ns`."""
         channel = self._channels.get(topic)
         if channel is None:
-            schema = msgspec.json.encode(PICTURE_SCHEMA)
-            channel = self._define(topic, "foxglove.CompressedImage", schema)
+            name, schema = picture_schema()
+            channel = self._define(topic, name, msgspec.json.encode(schema))
         frame = _frame(Kind.PICTURE, channel, stamp_ns, PICTURE_SEQ.pack(seq) + jpeg)
         self._put(frame, self._queue_bytes // 2)
 

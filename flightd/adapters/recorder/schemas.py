@@ -1,75 +1,52 @@
 """How messages look in the log: JSON, with JSON schemas that Foxglove and other MCAP tools read.
 
-Events are `foxglove.Log`, pictures `foxglove.CompressedImage` (both with a field or two more), the rest
-are the fields of the dataclasses by name.  A float that is not a number is written as null.
+Events are `foxglove.Log`, pictures `foxglove.CompressedImage`, line sets and poses are our fields and
+those of the Foxglove schema that fits; the rest are the fields of the dataclasses by name.  A float
+that is not a number is written as null.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import Any, TypeAlias
 
 import msgspec
 import numpy as np
 
-from flightd.core.types import Event, EventLevel
+from flightd.adapters.recorder import foxglove
+from flightd.adapters.recorder.foxglove import JsonObject
+from flightd.core.types import Event, EventLevel, LineSet
 
-JsonObject: TypeAlias = dict[str, Any]
-
-NS_PER_S = 1_000_000_000
-
-_TIME: JsonObject = {
-    "type": "object",
-    "title": "time",
-    "properties": {"sec": {"type": "integer", "minimum": 0}, "nsec": {"type": "integer", "minimum": 0}},
-}
 _FOXGLOVE_LEVEL = {EventLevel.INFO: 2, EventLevel.WARNING: 3, EventLevel.ERROR: 4}
 
-LOG_SCHEMA: JsonObject = {
-    "title": "foxglove.Log",
-    "type": "object",
-    "properties": {
-        "timestamp": _TIME,
-        "level": {"type": "integer", "description": "2 info, 3 warning, 4 error"},
-        "message": {"type": "string"},
-        "name": {"type": "string"},
-        "file": {"type": "string"},
-        "line": {"type": "integer", "minimum": 0},
-    },
-}
-
-PICTURE_SCHEMA: JsonObject = {
-    "title": "foxglove.CompressedImage",
-    "type": "object",
-    "properties": {
-        "timestamp": _TIME,
-        "frame_id": {"type": "string"},
-        "data": {"type": "string", "contentEncoding": "base64"},
-        "format": {"type": "string"},
-        "seq": {"type": "integer", "minimum": 0},
-    },
-}
-
-FREE_SCHEMA: JsonObject = {"type": "object"}
-"""Of messages that are plain objects."""
+_POSE_FIELDS = frozenset({"x_m", "y_m", "height_m", "yaw_rad"})
+"""A message with these is a pose on the map."""
 
 
-def foxglove_time(stamp_ns: int) -> JsonObject:
-    return {"sec": stamp_ns // NS_PER_S, "nsec": stamp_ns % NS_PER_S}
+def picture_schema() -> tuple[str, JsonObject]:
+    """Name and JSON schema of a picture."""
+    return foxglove.COMPRESSED_IMAGE, _schema(foxglove.COMPRESSED_IMAGE, {})
 
 
 def schema_of(message: object) -> tuple[str, JsonObject]:
     """Name and JSON schema of a message's type, without references (not every reader follows them)."""
     if isinstance(message, Event):
-        return "foxglove.Log", LOG_SCHEMA
-    if dataclasses.is_dataclass(message):
-        kind = type(message)
-        schema = msgspec.json.schema(kind)
-        inlined = _inline(schema, schema.get("$defs", {}))
-        assert isinstance(inlined, dict)
-        return f"flightd.{kind.__name__}", inlined
-    return "flightd.Object", FREE_SCHEMA
+        return foxglove.LOG, _schema(foxglove.LOG, {})
+    if not dataclasses.is_dataclass(message):
+        return "flightd.Object", {"type": "object"}
+    kind = type(message)
+    schema = msgspec.json.schema(kind)
+    inlined = _inline(schema, schema.get("$defs", {}))
+    assert isinstance(inlined, dict)
+    if isinstance(message, LineSet):
+        return foxglove.IMAGE_ANNOTATIONS, _schema(foxglove.IMAGE_ANNOTATIONS, inlined["properties"])
+    if {field.name for field in dataclasses.fields(message)} >= _POSE_FIELDS:
+        return foxglove.POSE_IN_FRAME, _schema(foxglove.POSE_IN_FRAME, inlined["properties"])
+    return f"flightd.{kind.__name__}", inlined
+
+
+def _schema(name: str, ours: JsonObject) -> JsonObject:
+    return {"title": name, "type": "object", "properties": ours | foxglove.PROPERTIES[name]}
 
 
 def _inline(node: object, definitions: JsonObject) -> object:
@@ -96,7 +73,7 @@ def encode(message: object) -> bytes:
     if isinstance(message, Event):
         return _encode(
             {
-                "timestamp": foxglove_time(message.stamp_ns),
+                "timestamp": foxglove.time_of(message.stamp_ns),
                 "level": _FOXGLOVE_LEVEL[message.level],
                 "message": message.text,
                 "name": message.name,

@@ -13,11 +13,13 @@ import signal
 import socket
 import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 import msgspec
 
+from flightd.adapters.recorder.foxglove import conforming
 from flightd.adapters.recorder.mcap_file import McapFile
 from flightd.adapters.recorder.wire import PICTURE_SEQ, Definition, Kind, Tally, WireFrame, take_frames
 
@@ -34,6 +36,7 @@ class LogWriter:
     def __init__(self, file: McapFile) -> None:
         self._file = file
         self._found = file.messages
+        self._append: dict[int, Callable[[bytes, int], bytes] | None] = {}
         self._taken = 0
         self._error = ""
 
@@ -66,12 +69,14 @@ class LogWriter:
         kind, channel, stamp_ns, payload = frame
         if kind == Kind.MESSAGE:
             self._taken += 1
-            self._file.add_message(channel, stamp_ns, payload)
+            append = self._append.get(channel)
+            self._file.add_message(channel, stamp_ns, append(payload, stamp_ns) if append else payload)
         elif kind == Kind.PICTURE:
             self._taken += 1
             self._file.add_message(channel, stamp_ns, _picture(stamp_ns, payload))
         elif kind == Kind.DEFINE:
             definition = msgspec.json.decode(payload, type=Definition)
+            self._append[channel] = conforming(definition.schema_name)
             self._file.add_channel(channel, definition.topic, definition.schema_name, definition.schema)
         elif kind == Kind.METADATA:
             name, values = msgspec.json.decode(payload, type=tuple[str, dict[str, str]])
