@@ -98,6 +98,7 @@ def test_the_page_shows_what_the_flight_was(page: str) -> None:
     ):
         assert part in page
     assert page.count('class="shot"') == 6
+    assert page.count('class="alarm warning"') == 2
     assert 'class="centre vertical"' in page
     assert 'class="flown truth"' in page
     assert 'class="flown estimate"' in page
@@ -128,6 +129,7 @@ def test_the_summary_decides_the_key_figures(log: Path) -> None:
     figures = {figure.label: figure for figure in key_figures(load_flight(log))}
     assert figures["Cross-track"].value == "2.1"
     assert figures["Landing error"].value == "6.1"
+    assert 0.5 < float(figures["Position error"].value) < 3.0  # the noise of the made-up estimate
     assert figures["Codes read"].tone == "good"
     assert (figures["Nodes visited"].value, figures["Nodes visited"].tone) == ("12", "good")
 
@@ -141,6 +143,7 @@ def test_a_log_alone_makes_a_report_too(bare_log: Path) -> None:
     assert "estimated" in figures["Cross-track"].note
     assert 0.5 < float(figures["Cross-track"].value) < 10
     assert "Landing error" not in figures
+    assert "Position error" not in figures
     assert outcome(flight).headline == "Mission completed"
 
 

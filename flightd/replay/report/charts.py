@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flightd.core.types import Phase
+from flightd.core.types import EventLevel, Phase
 from flightd.replay.report.flight import Array, Flight
 from flightd.replay.report.markup import MINUS, clock, element, number, path_data, text, thin, ticks
 
@@ -134,7 +134,8 @@ def _bands(flight: Flight) -> str:
 
 
 def _ribbon(flight: Flight, duration_s: float) -> str:
-    """The phases by name, above the strips; the names hide where there is no room."""
+    """The phases by name, above the strips, with a mark at each warning and error; names hide where
+    there is no room."""
     blocks = "".join(
         element(
             "span",
@@ -149,7 +150,23 @@ def _ribbon(flight: Flight, duration_s: float) -> str:
         )
         for span in flight.phases
     )
-    return element("div", element("div", blocks, class_="track"), class_="ribbon")
+    alarms = "".join(
+        element(
+            "i",
+            class_=f"alarm {event.level}",
+            style=f"left:{number(100 * flight.seconds(event.stamp_ns) / duration_s, 3)}%",
+            title=f"{clock(flight.seconds(event.stamp_ns))} {event.name.replace('_', ' ')}: {event.text}",
+            data_at=number(flight.seconds(event.stamp_ns), 3),
+        )
+        for event in flight.events
+        if event.level != EventLevel.INFO
+    )
+    return element(
+        "div",
+        element("div", blocks, class_="track"),
+        element("div", alarms, class_="alarms"),
+        class_="ribbon",
+    )
 
 
 def _tones(flight: Flight) -> str:

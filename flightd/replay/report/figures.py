@@ -56,6 +56,7 @@ def key_figures(flight: Flight) -> tuple[Figure, ...]:
         _nodes(flight),
         _cross_track(flight),
         _hover(flight),
+        _position(flight),
         _landing(flight),
         _codes(flight.summary),
         _flight_time(flight),
@@ -121,6 +122,21 @@ def _hover(flight: Flight) -> Figure | None:
             return None
         p95_m = max(errors)
     return Figure("Hover error", _centimetres(p95_m), "cm", note)
+
+
+def _position(flight: Flight) -> Figure | None:
+    """How far the drone was from where it thought it was."""
+    if flight.truth is None:
+        return None
+    estimate = flight.estimate
+    x, y = flight.truth.at(estimate.t_s)
+    error = np.hypot(estimate.x_m - x, estimate.y_m - y)[flight.flying(estimate.t_s)]
+    error = error[np.isfinite(error)]
+    if not len(error):
+        return None
+    return Figure(
+        "Position error", _centimetres(float(np.percentile(error, 95))), "cm", "p95, believed against true"
+    )
 
 
 def _landing(flight: Flight) -> Figure | None:

@@ -35,6 +35,7 @@
   });
   const track = timeline.querySelector(".ribbon .track");
   const blocks = [...track.querySelectorAll(".block")];
+  const alarms = [...timeline.querySelectorAll(".alarm")];
   const times = timeline.querySelector(".axis .times");
   const drone = document.querySelector(".plan .drone");
   const flown = document.querySelector(".plan .flown.truth") || document.querySelector(".plan .flown.estimate");
@@ -77,6 +78,11 @@
       block.style.display = right > left ? "" : "none";
       block.style.left = 100 * (left - start) / span + "%";
       block.style.width = 100 * (right - left) / span + "%";
+    }
+    for (const alarm of alarms) {
+      const share = (Number(alarm.dataset.at) - start) / span;
+      alarm.style.display = share >= 0 && share <= 1 ? "" : "none";
+      alarm.style.left = 100 * share + "%";
     }
     const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1200, 3600].find((s) => span / s <= 10) || 7200;
     times.textContent = "";
