@@ -88,8 +88,8 @@ class Daemon:
         self._observers = observers
         self._pilot = Pilot(site, plan_of(config, site), config.mission.heading, config.pilot_params(site))
         self._frames: Latest[FrameTicket] = Latest()
-        self._camera = connect_camera(config.camera, clock, self._frames.put)
         self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock)
+        self._camera = connect_camera(config.camera, clock, self._frames.put, self._vehicle)
         self._pump = SetpointPump(self._vehicle, clock, self._sent, TICK_S)
         self._latency = LatencyBook()
         self._detections: list[Detection] = []

@@ -19,11 +19,12 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from flightd.adapters.camera.connect import ARDRONE_URL
 from flightd.adapters.recorder.recorder import Recorder
 from flightd.app import Daemon, FlightResult, detector_pool, plan_of
 from flightd.config.schema import Config
 from flightd.config.site_file import site_toml
-from flightd.core.errors import RunError, UnavailableError
+from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.topics import Document, Topic
 from flightd.core.types import Status
 from flightd.grid.site import Site
@@ -75,9 +76,10 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
         truth = stack.enter_context(Recorder(simulation.truth_log, lossless=True))
         pool = stack.enter_context(detector_pool(simulation.config, clock))
         camera_port = free_port()
-        world = World(_spec(simulation, camera_port, 0), clock, truth)
-        host, port = await world.open()
-        config = _connected(simulation.config, f"udpout://{host}:{port}", camera_port)
+        ports = _vehicle_ports(simulation.config)
+        world = World(_spec(simulation, camera_port, ports), clock, truth)
+        await world.open()
+        config = _connected(simulation.config, ports, camera_port)
         await pool.ready()
         daemon = Daemon(
             config,
@@ -97,10 +99,10 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
 
 async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
     clock = LoopClock()
-    vehicle_port, camera_port = free_port(), free_port()
+    ports, camera_port = _vehicle_ports(simulation.config), free_port()
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    spec = _spec(simulation, camera_port, vehicle_port)
+    spec = _spec(simulation, camera_port, ports)
     process = context.Process(
         target=_run_world, args=(spec, factor, simulation.truth_log, theirs), name="world"
     )
@@ -112,7 +114,7 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
         stack.callback(ours.close)  # the world ends when its pipe closes, however this process ends
         pool = stack.enter_context(detector_pool(simulation.config, clock))
         await pool.ready()
-        config = _connected(simulation.config, f"udpout://127.0.0.1:{vehicle_port}", camera_port)
+        config = _connected(simulation.config, ports, camera_port)
         daemon = Daemon(config, simulation.site, clock, pool, recorder, [simulation.observer])
         watch = asyncio.ensure_future(_watch(process))
         try:
@@ -175,13 +177,17 @@ def _flight_recorder(simulation: Simulation, clock: LoopClock, lossless: bool) -
     return recorder
 
 
-def _spec(simulation: Simulation, camera_port: int, vehicle_port: int) -> WorldSpec:
+def _spec(simulation: Simulation, camera_port: int, vehicle_ports: tuple[int, ...]) -> WorldSpec:
     scenario = simulation.scenario
+    kind = simulation.config.vehicle.kind
+    if kind not in ("ardupilot", "ardrone"):
+        raise InputError(f"--vehicle {kind}: the simulator has ardupilot and ardrone")
     return WorldSpec(
         site=simulation.site,
         seed=simulation.seed,
         camera_address=("127.0.0.1", camera_port),
-        vehicle_port=vehicle_port,
+        vehicle="ardrone" if kind == "ardrone" else "ardupilot",
+        vehicle_ports=vehicle_ports,
         start_yaw_rad=math.radians(simulation.config.mission.start_yaw_deg),
         camera=replace(scenario.camera.camera(), mount=simulation.config.camera.mount()),
         appearance=scenario.floor.look(),
@@ -190,12 +196,21 @@ def _spec(simulation: Simulation, camera_port: int, vehicle_port: int) -> WorldS
     )
 
 
-def _connected(config: Config, vehicle_url: str, camera_port: int) -> Config:
+def _vehicle_ports(config: Config) -> tuple[int, ...]:
+    """Free ports for the simulated vehicle: one, or the AR.Drone's four."""
+    return tuple(free_port() for _ in range(4 if config.vehicle.kind == "ardrone" else 1))
+
+
+def _connected(config: Config, ports: tuple[int, ...], camera_port: int) -> Config:
     """The configuration with the addresses of this simulation's peers."""
+    vehicle_url, camera_url = f"udpout://127.0.0.1:{ports[0]}", f"udp://127.0.0.1:{camera_port}"
+    if config.vehicle.kind == "ardrone":
+        query = "at={}&navdata={}&video={}&control={}".format(*ports)
+        vehicle_url, camera_url = f"ardrone://127.0.0.1?{query}", ARDRONE_URL
     return config.model_copy(
         update={
             "vehicle": config.vehicle.model_copy(update={"url": vehicle_url}),
-            "camera": config.camera.model_copy(update={"url": f"udp://127.0.0.1:{camera_port}"}),
+            "camera": config.camera.model_copy(update={"url": camera_url}),
         }
     )
 

@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any
 
 from flightd.core.errors import TransientError
+from flightd.core.types import Image
 from flightd.grid.site import Site
 from flightd.ports import Clock
 from flightd.runtime.child import Child
@@ -39,7 +40,8 @@ class _RenderWorker:
 
 
 class CameraPeer:
-    """Sends pictures of what `truth_at` says to the daemon at `address` until cancelled."""
+    """Takes pictures of what `truth_at` says until cancelled, and sends notices of them to the daemon at
+    `address`; or, with `show`, hands the pictures themselves to a vehicle that transmits them."""
 
     def __init__(
         self,
@@ -50,7 +52,9 @@ class CameraPeer:
         address: tuple[str, int],
         truth_at: Callable[[int], Kinematics],
         clock: Clock,
+        show: Callable[[Image, int], None] | None = None,
     ) -> None:
+        self._show = show
         self._camera = camera
         self._address = address
         self._truth_at = truth_at
@@ -109,6 +113,9 @@ class CameraPeer:
             return
         finally:
             rendering.cancel()
+        if self._show is not None:
+            self._show(self._ring.pixels(slot), truth.stamp_ns)
+            return
         lens = self._camera.lens
         notice = FrameNotice(
             self._ring.name,

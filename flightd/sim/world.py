@@ -9,17 +9,21 @@ import asyncio
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Literal, Protocol
 
 from flightd.core.topics import Topic
 from flightd.grid.site import Site
 from flightd.ports import Clock, Recorder
 from flightd.sim.airframe import Airframe
 from flightd.sim.appearance import DEFAULT, Appearance
+from flightd.sim.ardrone.drone import Drone
+from flightd.sim.ardrone.server import ArDroneServer, Ports
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.camera import CameraPeer
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.optics import SimCamera
+from flightd.sim.sensors import Sensors
 from flightd.sim.wind import Draught
 
 _TRUTH_PERIOD_S = 0.02
@@ -27,17 +31,31 @@ _TRUTH_PERIOD_S = 0.02
 
 @dataclass(frozen=True, slots=True)
 class WorldSpec:
-    """Everything that makes one simulated world; `vehicle_port` 0 takes any free port."""
+    """Everything that makes one simulated world; a port 0 takes any free one.  An AR.Drone has four:
+    commands, navdata, video and configuration; it transmits its pictures itself."""
 
     site: Site
     seed: int
     camera_address: tuple[str, int]
-    vehicle_port: int = 0
+    vehicle: Literal["ardupilot", "ardrone"] = "ardupilot"
+    vehicle_ports: tuple[int, ...] = (0,)
     start_yaw_rad: float = 0.0
     camera: SimCamera = field(default_factory=SimCamera)
     appearance: Appearance = DEFAULT
     draught: Draught = field(default_factory=Draught)
     battery_frac: float = 1.0
+
+
+class VehiclePeer(Protocol):
+    """A simulated vehicle on its sockets."""
+
+    async def open(self) -> tuple[str, int]: ...
+
+    async def run(self) -> None: ...
+
+    def truth(self) -> Kinematics: ...
+
+    def truth_at(self, stamp_ns: int) -> Kinematics: ...
 
 
 class World:
@@ -55,31 +73,40 @@ class World:
             yaw_rad=spec.start_yaw_rad,
             battery_frac=spec.battery_frac,
         )
-        self.autopilot = ArduCopterPeer(clock, airframe, PeerConfig(port=spec.vehicle_port, seed=spec.seed))
+        self.vehicle: VehiclePeer
+        show = None
+        if spec.vehicle == "ardrone":
+            drone = Drone(airframe, Sensors(seed=spec.seed))
+            self.vehicle = server = ArDroneServer(drone, clock, Ports("127.0.0.1", *spec.vehicle_ports))
+            show = server.show
+        else:
+            (port,) = spec.vehicle_ports
+            self.vehicle = ArduCopterPeer(clock, airframe, PeerConfig(port=port, seed=spec.seed))
         self.camera = CameraPeer(
             spec.site,
             spec.camera,
             spec.appearance,
             spec.seed,
             spec.camera_address,
-            self.autopilot.truth_at,
+            self.vehicle.truth_at,
             clock,
+            show,
         )
 
     async def open(self) -> tuple[str, int]:
-        """Bind the vehicle's socket; the address to which a daemon connects."""
-        return await self.autopilot.open()
+        """Bind the vehicle's sockets; the address to which a daemon sends commands."""
+        return await self.vehicle.open()
 
     async def run(self, opened: Callable[[], None] = lambda: None) -> None:
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self.autopilot.run(), name="autopilot")
+            tasks.create_task(self.vehicle.run(), name="autopilot")
             tasks.create_task(self.camera.run(), name="camera")
             tasks.create_task(self._log_truth(), name="truth")
             opened()
 
     async def _log_truth(self) -> None:
         while True:
-            truth: Kinematics = self.autopilot.truth()
+            truth: Kinematics = self.vehicle.truth()
             self._recorder.record(Topic.TRUTH, truth.stamp_ns, truth)
             await asyncio.sleep(_TRUTH_PERIOD_S)
 

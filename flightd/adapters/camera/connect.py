@@ -6,13 +6,29 @@ from collections.abc import Callable
 
 from flightd.adapters.camera.capture import CaptureCamera, parse_source
 from flightd.adapters.camera.shared import SharedCamera
+from flightd.adapters.vehicle.ardrone.camera import ArDroneCamera
+from flightd.adapters.vehicle.ardrone.settings import Camera as ArDroneView
+from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.config.schema import CameraConfig
-from flightd.ports import Camera, Clock
+from flightd.core.errors import InputError
+from flightd.ports import Camera, Clock, Vehicle
 from flightd.runtime.ring import FrameTicket
 
+ARDRONE_URL = "ardrone:"
+"""The camera of the AR.Drone that is the vehicle."""
 
-def connect_camera(config: CameraConfig, clock: Clock, on_frame: Callable[[FrameTicket], None]) -> Camera:
+
+def connect_camera(
+    config: CameraConfig,
+    clock: Clock,
+    on_frame: Callable[[FrameTicket], None],
+    vehicle: Vehicle | None = None,
+) -> Camera:
     """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address."""
+    if config.url == ARDRONE_URL:
+        if not isinstance(vehicle, ArDroneVehicle):
+            raise InputError(f'camera.url {ARDRONE_URL!r} needs vehicle.kind = "ardrone"')
+        return ArDroneCamera(vehicle, config.latency_s, clock, {ArDroneView.DOWN: on_frame})
     if config.url.startswith("udp:"):
         return SharedCamera(
             config.url, (config.width_px, config.height_px), config.latency_s, clock, on_frame

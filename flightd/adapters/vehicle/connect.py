@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from flightd.adapters.vehicle.ardrone.settings import settings_of
+from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.config.schema import VehicleConfig
 from flightd.core.errors import InputError
@@ -13,4 +15,6 @@ def connect_vehicle(config: VehicleConfig, clock: Clock) -> Vehicle:
     match config.kind:
         case "ardupilot":
             return ArduPilotVehicle(config.url, clock, config.system_id)
+        case "ardrone":
+            return ArDroneVehicle(settings_of(config.url), clock)
     raise InputError(f"vehicle.kind {config.kind}: no such adapter")

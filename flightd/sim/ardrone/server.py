@@ -36,7 +36,8 @@ class Ports:
 
 
 class ArDroneServer:
-    """Serves one `Drone`: `async with ArDroneServer(...) as server` listens, `run` lets its time pass.
+    """Serves one `Drone`.  `run` listens and lets its time pass until cancelled; `open` before it binds the
+    sockets early (`ports` tells which), and `close`, or leaving `async with`, frees them.
 
     `radio` False loses everything in both directions, as out of range; `video_radio` only the pictures.
     Pictures come from outside: `show` takes one of the camera that `channel` names.
@@ -80,6 +81,16 @@ class ArDroneServer:
         return bool(self._watchers)
 
     async def __aenter__(self) -> Self:
+        await self.open()
+        return self
+
+    async def __aexit__(self, *_error: object) -> None:
+        await self.close()
+
+    async def open(self) -> tuple[str, int]:
+        """Bind all four ports; the address of the commands.  OSError when one is taken."""
+        if self._at is not None:
+            return self.ports.host, self.ports.at
         loop = asyncio.get_running_loop()
         host = self.ports.host
         self._at, _ = await loop.create_datagram_endpoint(
@@ -100,24 +111,31 @@ class ArDroneServer:
             video=video.sockets[0].getsockname()[1],
             control=control.sockets[0].getsockname()[1],
         )
-        return self
+        return host, self.ports.at
 
-    async def __aexit__(self, *_error: object) -> None:
+    async def close(self) -> None:
+        """Disconnect everyone and free the ports."""
         for endpoint in (self._at, self._navdata):
             if endpoint is not None:
                 endpoint.close()
+        self._at = self._navdata = None
         for writer in [*self._watchers, *self._readers]:
             writer.transport.abort()
-        for server in self._servers:
+        servers, self._servers = self._servers, []
+        for server in servers:
             server.close()
             await server.wait_closed()
         await asyncio.gather(*self._handlers, return_exceptions=True)
 
     async def run(self) -> None:
         """Step the drone every 5 ms of the loop's time and send its navdata, for ever."""
-        while True:
-            self.advance(self._clock.now_ns())
-            await asyncio.sleep((self._now_ns + STEP_NS - self._clock.now_ns()) / 1e9)
+        await self.open()
+        try:
+            while True:
+                self.advance(self._clock.now_ns())
+                await asyncio.sleep((self._now_ns + STEP_NS - self._clock.now_ns()) / 1e9)
+        finally:
+            await self.close()
 
     def advance(self, now_ns: int) -> None:
         """Let the drone's time pass up to `now_ns` in whole steps; what a stopped process missed by more

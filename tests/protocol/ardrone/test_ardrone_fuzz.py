@@ -20,6 +20,7 @@ from flightd.adapters.vehicle.ardrone.pave import PaveFrame, PaveParser
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.adapters.vehicle.ardrone.telemetry import Telemetry
 from flightd.sim.ardrone.commands import parse
+from flightd.sim.ardrone.drone import DroneOptions
 from flightd.sim.ardrone.telemetry import ALL_OPTIONS, OPTION_BYTES, Report, packet
 from tests.protocol.ardrone import golden
 from tests.protocol.ardrone.bench import make_drone
@@ -182,7 +183,7 @@ def test_the_at_port_survives_anything_and_good_commands_count() -> None:
     recorded = golden.recorded()
     corpus = [text.encode() for vector in recorded["at"] for text in vector["datagrams"]]
     corpus += [b"\r".join(line.encode() for _, line in recorded["client_transcripts"]["ack"][:8]) + b"\r"]
-    drone = make_drone()
+    drone = make_drone(DroneOptions(profile_switch_s=0.0))  # damage may spell a switch of profiles
     drone.wake()
     encoder = at.AtEncoder()
     now_ns = 0

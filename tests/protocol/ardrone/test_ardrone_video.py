@@ -24,7 +24,7 @@ from flightd.runtime.ring import FrameRing, FrameTicket
 from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.ardrone.video import Encoder, Packer, is_idr
 from tests.protocol.ardrone import golden
-from tests.protocol.ardrone.bench import ANY_PORTS, bench, ended, make_drone, settings_for, virtually
+from tests.protocol.ardrone.bench import ANY_PORTS, bench, ended, make_drone, virtually
 
 FRAMES = PaveParser().feed(golden.pave_68())
 PERIOD_S = 1 / 30
@@ -61,11 +61,11 @@ class Watching:
 
 
 @contextlib.asynccontextmanager
-async def watching(header_bytes: int = 64, **settings: Any) -> AsyncIterator[Watching]:
+async def watching(header_bytes: int = 64, latency_s: float = 0.0) -> AsyncIterator[Watching]:
     clock = LoopClock()
     async with ArDroneServer(make_drone(), clock, ANY_PORTS, video_header_bytes=header_bytes) as server:
         pictures: list[Picture] = []
-        stream = VideoStream(settings_for(server, **settings), clock, pictures.append)
+        stream = VideoStream((server.ports.host, server.ports.video), latency_s, clock, pictures.append)
         task = asyncio.create_task(stream.run())
         try:
             yield Watching(server, stream, pictures, clock)
@@ -115,7 +115,7 @@ def test_nothing_is_shown_before_the_first_whole_picture() -> None:
 
 def test_stamps_follow_the_encoders_clock_less_the_latency() -> None:
     async def main() -> None:
-        async with watching(video_latency_s=0.1) as w:
+        async with watching(latency_s=0.1) as w:
             await w.show(40)
             for picture in w.pictures:
                 assert picture.arrival_ns - picture.stamp_ns == pytest.approx(100_000_000, abs=1_100_000)
@@ -146,7 +146,7 @@ def test_video_that_is_not_there_yet_is_asked_for_again() -> None:
         pictures: list[Picture] = []
         async with ArDroneServer(make_drone(), clock, ANY_PORTS) as server:
             ports = server.ports
-        stream = VideoStream(settings_for(server), clock, pictures.append)
+        stream = VideoStream((ports.host, ports.video), 0.0, clock, pictures.append)
         task = asyncio.create_task(stream.run())
         await asyncio.sleep(5.0)
         async with ArDroneServer(make_drone(), clock, ports) as server:
@@ -274,7 +274,7 @@ def test_each_picture_goes_to_the_camera_it_shows_and_none_during_the_switch() -
             tickets: dict[Camera, list[FrameTicket]] = {Camera.DOWN: [], Camera.FRONT: []}
             camera = ArDroneCamera(
                 b.vehicle,
-                settings_for(b.server),
+                0.0,
                 b.clock,
                 {kind: taken.append for kind, taken in tickets.items()},
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, Camera
+from flightd.adapters.vehicle.ardrone.settings import Camera
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.ardrone.video import Picture, VideoStream
 from flightd.ports import Clock
@@ -16,33 +16,37 @@ SLOTS = 8
 class ArDroneCamera:
     """Hands a ticket for each picture to the taker of the camera that the stream shows.
 
-    Both cameras come through one channel, `vehicle.select_camera` chooses.  Pictures that arrive while
-    the drone is switching may be of either and go to nobody (`unassigned` counts them).
+    `latency_s` is the least delay from mid-exposure to arrival.  Both cameras come through one channel,
+    `vehicle.select_camera` chooses.  Pictures that arrive while the drone is switching may be of either
+    and go to nobody (`unassigned` counts them).
     """
 
     def __init__(
         self,
         vehicle: ArDroneVehicle,
-        settings: ArDroneSettings,
+        latency_s: float,
         clock: Clock,
         on_frame: dict[Camera, Callable[[FrameTicket], None]],
     ) -> None:
         self._vehicle = vehicle
         self._on_frame = on_frame
-        self._stream = VideoStream(settings, clock, self._show)
+        self._address = vehicle.video_address
+        self._clock = clock
+        self._latency_s = latency_s
         self._ring: FrameRing | None = None
         self._seq = 0
         self.unassigned = 0
 
     @property
-    def stream(self) -> VideoStream:
-        """The stream behind, with its counts."""
-        return self._stream
+    def frames(self) -> int:
+        """Pictures delivered so far."""
+        return self._seq
 
     async def run(self) -> None:
-        """Receive until cancelled; the shared memory lives as long."""
+        """Receive until cancelled; the shared memory lives as long.  Raises `UnavailableError` when
+        PyAV is missing."""
         try:
-            await self._stream.run()
+            await VideoStream(self._address, self._latency_s, self._clock, self._show).run()
         finally:
             if self._ring is not None:
                 self._ring.close()

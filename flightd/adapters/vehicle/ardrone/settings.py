@@ -6,6 +6,12 @@ import enum
 import math
 import zlib
 from dataclasses import dataclass
+from typing import Any
+from urllib.parse import parse_qsl, urlsplit
+
+from flightd.core.errors import InputError
+
+_PORT_NAMES = ("at", "navdata", "video", "control")
 
 
 class Camera(enum.IntEnum):
@@ -56,7 +62,6 @@ class ArDroneSettings:
     take_off_patience_s: float = 3.0
     land_below_m: float = 0.35
     standing_height_m: float = 0.10
-    video_latency_s: float = 0.0
     camera_settle_s: float = 0.3
 
     def __post_init__(self) -> None:
@@ -73,3 +78,23 @@ class ArDroneSettings:
             value = getattr(self, name)
             if not low <= value <= high or value == 0.0:
                 raise ValueError(f"{name} = {value} outside {low}..{high}")
+
+
+def settings_of(url: str) -> ArDroneSettings:
+    """Settings for `ardrone://HOST`, with `?at=5556&navdata=5554&video=5555&control=5559&full=1` where they
+    differ from the drone's own ports and short navdata.
+
+    Raises `InputError` for anything else.
+    """
+    parts = urlsplit(url)
+    given = dict(parse_qsl(parts.query, keep_blank_values=True))
+    unknown = set(given) - {*_PORT_NAMES, "full"}
+    ports = [given[name] for name in _PORT_NAMES if name in given]
+    sound = all(port.isascii() and port.isdigit() and 0 < int(port) < 65536 for port in ports)
+    if parts.scheme != "ardrone" or not parts.hostname or unknown or not sound:
+        raise InputError(
+            f"vehicle.url {url!r}: expected ardrone://HOST, for example ardrone://192.168.1.1 "
+            "(other ports: ?at=5556&navdata=5554&video=5555&control=5559, all navdata: full=1)"
+        )
+    chosen: dict[str, Any] = {f"{name}_port": int(given[name]) for name in _PORT_NAMES if name in given}
+    return ArDroneSettings(host=parts.hostname, full_navdata=given.get("full") == "1", **chosen)

@@ -129,6 +129,11 @@ class ArDroneVehicle:
             self._camera_wanted.set()
 
     @property
+    def video_address(self) -> tuple[str, int]:
+        """Host and port of the video stream."""
+        return self._settings.host, self._settings.video_port
+
+    @property
     def camera(self) -> Camera:
         """The camera asked for."""
         return self._camera

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from flightd.adapters.vehicle.ardrone.pave import CODEC_H264, Control, FrameType, PaveFrame, PaveParser
-from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.adapters.vehicle.ardrone.stamps import WrappingCounter
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Image
@@ -122,19 +121,22 @@ class Decoder:
 
 
 class VideoStream:
-    """Hands every picture, the newest when several wait, to `show`; runs until cancelled.
+    """Hands every picture, the newest when several wait, to `show`; runs until cancelled.  `latency_s` is
+    the least delay from mid-exposure to arrival.
 
     Counts: `pictures` shown, `dropped` frames never decoded, `broken` batches, `connections` made.
     """
 
-    def __init__(self, settings: ArDroneSettings, clock: Clock, show: Callable[[Picture], None]) -> None:
-        self._settings = settings
+    def __init__(
+        self, address: tuple[str, int], latency_s: float, clock: Clock, show: Callable[[Picture], None]
+    ) -> None:
+        self._address = address
         self._clock = clock
         self._show = show
         self._backlog = Backlog()
         self._arrived = asyncio.Event()
         self._decoder = Decoder()
-        self._device = DeviceClock(round(settings.video_latency_s * 1e9))
+        self._device = DeviceClock(round(latency_s * 1e9))
         self._counter = WrappingCounter(_COUNTER_WRAP_MS)
         self.pictures = 0
         self.broken = 0
@@ -162,9 +164,8 @@ class VideoStream:
 
     async def _connection(self) -> None:
         """One connection, until it ends or falls silent."""
-        settings = self._settings
         async with asyncio.timeout(SILENCE_S):
-            reader, writer = await asyncio.open_connection(settings.host, settings.video_port)
+            reader, writer = await asyncio.open_connection(*self._address)
         self.connections += 1
         parser = PaveParser()
         try:
