@@ -36,6 +36,7 @@ def main() -> None:
     parser.add_argument("--size", type=size, default=(1920, 1080), help="WIDTHxHEIGHT (1920x1080)")
     parser.add_argument("--colour", choices=COLOURS, help="colour of the lines (default: drawn by seed)")
     parser.add_argument("--layout", choices=LAYOUTS, help="arrangement (default: drawn by seed)")
+    parser.add_argument("--masks", action="store_true", help="write each frame's paint mask (for training)")
     wanted = parser.parse_args()
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal) as progress:
@@ -48,6 +49,7 @@ def main() -> None:
             *wanted.size,
             colour=wanted.colour,
             layout=wanted.layout,
+            masks=wanted.masks,
             advance=lambda: progress.advance(task),
         )
     print(f"{wanted.count} frames in {wanted.folder}")

@@ -1,4 +1,4 @@
-"""The vision commands: detect, evaluate.  What they do is imported when they run, so `--help` is quick."""
+"""The vision commands.  What they do is imported when they run, so that `--help` is quick."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ def register(app: typer.Typer) -> None:
     """Hang the vision commands on `app`."""
     app.command("detect")(detect)
     app.command("evaluate")(evaluate)
+    app.command("train-colour")(train_colour)
 
 
 def _stdout() -> Console:
@@ -119,3 +120,33 @@ def evaluate(
         sys.stdout.write(command.as_json(dataset, gate, scores, failures, count) + "\n")
     else:
         command.print_table(dataset, scores, count, _stdout())
+
+
+def train_colour(
+    datasets: Annotated[list[Path], typer.Argument(metavar="DATASET…", help="Folders with a labels.json.")],
+    colour: Annotated[str, typer.Option(help="The `line_colour` to learn; other colours count as floor.")],
+    out: Annotated[Path, typer.Option(help="The profile file to write, .npz.")],
+    name: Annotated[str | None, typer.Option(help="The profile's name. Default: the file's.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Which pixels are drawn.")] = 0,
+    as_json: AsJson = False,
+) -> None:
+    """Train a colour profile on labelled pictures.
+
+    A support vector machine learns paint from floor, pixel by pixel, and is baked into a lookup table.
+    Each picture teaches by its `mask` (white paint, black floor, grey not told), else by its `regions`
+    (boxes and strokes), else by its `lines` (inside is paint; beside is floor if `complete`).
+
+    \b
+    labels.json: {"images": [{"file": "a.jpg", "line_colour": "orange", "mask": "a-mask.png"},
+      {"file": "b.jpg", "line_colour": "orange", "regions": [
+        {"paint": true, "stroke": [[120, 40], [130, 900]], "width": 30},
+        {"paint": false, "box": [400, 0, 300, 1080]}]}]}
+
+    \b
+    flightd train-colour photographs/ --colour orange --out orange.npz
+    flightd detect floor.jpg --profile orange.npz
+    """
+    from flightd.cli import train as command
+
+    trained = command.train_colour(datasets, colour, out, name or out.stem, seed)
+    print(command.as_json(trained, out) if as_json else command.as_text(trained, out))

@@ -38,11 +38,19 @@ COLOURS = ("yellow", "white", "red", "blue", "green", "black")
 
 @dataclass(frozen=True, slots=True)
 class LabelledFrame:
-    """One generated picture, its truth, and the paint's share of each pixel before the dirt (0..255)."""
+    """One generated picture, its truth, the paint's share of each pixel before the dirt (0..255), and
+    where things lie that hide the paint or have its colour."""
 
     bgr: Image
     label: LabelledImage
     paint: NDArray[np.uint8]
+    unsure: NDArray[np.bool_]
+
+    def mask(self) -> NDArray[np.uint8]:
+        """(H, W) for teaching a colour: 255 paint, 0 floor, 128 not to be told."""
+        partly = (self.paint > 12) & (self.paint < 230)
+        mask = np.where(self.paint > 127, 255, 0)
+        return np.where(self.unsure | partly, 128, mask).astype(np.uint8)
 
 
 def generate(
@@ -82,8 +90,8 @@ def generate(
     disturb.add_seams(rng, picture, severity.seams)
     picture += worn[..., None] * ((0.5 + 0.5 * texture)[..., None] * paint - picture)
     disturb.add_tyre_marks(rng, picture, severity.tyre_marks)
-    disturb.add_distractors(rng, picture, covered, colour, severity.distractors)
-    disturb.add_occluders(rng, picture, colour, severity.occluders)
+    unsure = disturb.add_distractors(rng, picture, covered, colour, severity.distractors)
+    unsure |= disturb.add_occluders(rng, picture, colour, severity.occluders)
     picture *= disturb.illumination(rng, width, height, severity)[..., None]
     if (added := disturb.glare(rng, width, height, severity.glares)) is not None:
         picture += added[..., None]
@@ -103,7 +111,7 @@ def generate(
         nodes=[_bent_node(node, scene, bend) for node in truth_nodes(scene)],
         tags=[level, scene.layout],
     )
-    return LabelledFrame(bgr, label, (worn * 255.0 + 0.5).astype(np.uint8))
+    return LabelledFrame(bgr, label, (worn * 255.0 + 0.5).astype(np.uint8), unsure)
 
 
 def _bent(line: LabelledLine, scene: Scene, bend: Bend) -> LabelledLine:
@@ -136,11 +144,12 @@ def write_dataset(
     height: int = 1080,
     colour: str | None = None,
     layout: Layout | None = None,
+    masks: bool = False,
     advance: Callable[[], None] = lambda: None,
 ) -> None:
     """Write `count` frames of seeds `first_seed`… as PNG and their `labels.json` into a new folder.
 
-    `advance` is called after each frame.
+    With `masks` each frame's paint is written beside it.  `advance` is called after each frame.
     """
     folder.mkdir(parents=True, exist_ok=True)
     images = []
@@ -148,7 +157,10 @@ def write_dataset(
         frame = generate(level, seed, width, height, colour, layout)
         name = f"{level}-{seed:06d}.png"
         cv2.imwrite(str(folder / name), frame.bgr, [cv2.IMWRITE_PNG_COMPRESSION, 1])
-        images.append(msgspec.structs.replace(frame.label, file=name))
+        mask = f"{level}-{seed:06d}-mask.png" if masks else ""
+        if masks:
+            cv2.imwrite(str(folder / mask), frame.mask())
+        images.append(msgspec.structs.replace(frame.label, file=name, mask=mask))
         advance()
     about: dict[str, object] = {"level": level, "first_seed": first_seed, "width": width, "height": height}
     write_labels(folder, Labels(images=images, about=about))

@@ -119,7 +119,7 @@ LEVELS: dict[str, Severity] = {
     ),
 }
 
-DARKNESS = (0.25, 0.45)
+DARKNESS = (0.3, 0.5)
 """Exposure of a dark frame, relative to a normal one."""
 
 _MARGIN_PX = 14
@@ -158,9 +158,13 @@ def add_tyre_marks(rng: np.random.Generator, picture: Picture, count: int) -> No
 
 def add_distractors(
     rng: np.random.Generator, picture: Picture, covered: Plane, line_colour: str, count: int
-) -> None:
-    """Compact things on the floor, clear of the lines: some in the paint's own colour, never elongated."""
+) -> NDArray[np.bool_]:
+    """Compact things on the floor, clear of the lines: some in the paint's own colour, never elongated.
+
+    Returns (H, W): where the paint's colour is seen though no line is there.
+    """
     height, width = picture.shape[:2]
+    alike = np.zeros((height, width), bool)
     taken = cv2.dilate((covered > 0.02).astype(np.uint8), np.ones((3, 3), np.uint8), iterations=_MARGIN_PX)
     for _ in range(int(rng.integers(0, count + 1))):
         shape = _blob(rng, width, height, rng.uniform(0.015, 0.06) * width)
@@ -169,14 +173,21 @@ def add_distractors(
         similar = rng.random() < 0.5
         tone = paint_bgr(rng, line_colour, 1.0) if similar else _anything(rng)
         _blend(picture, shape, tone * np.float32(rng.uniform(0.7, 1.0)), rng)
+        alike |= (shape > 0) & similar
+    return alike
 
 
-def add_occluders(rng: np.random.Generator, picture: Picture, line_colour: str, count: int) -> None:
-    """Boxes and cables lying over the paint, of another colour."""
+def add_occluders(
+    rng: np.random.Generator, picture: Picture, line_colour: str, count: int
+) -> NDArray[np.bool_]:
+    """Boxes and cables lying over the paint, of another colour.  Returns (H, W): where they lie."""
     height, width = picture.shape[:2]
+    hidden = np.zeros((height, width), bool)
     for _ in range(int(rng.integers(0, count + 1))):
         shape = _blob(rng, width, height, rng.uniform(0.03, 0.08) * width)
         _blend(picture, shape, _unlike(rng, line_colour), rng)
+        hidden |= shape > 0
+    return hidden
 
 
 def _blob(rng: np.random.Generator, width: int, height: int, radius: float) -> NDArray[np.uint8]:

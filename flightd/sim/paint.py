@@ -36,8 +36,13 @@ _HUE_SPREAD = {"yellow": 4.0, "white": 30.0, "red": 4.0, "blue": 9.0, "green": 1
 FLOORS_HSV = ((45.0, 0.06), (30.0, 0.14), (210.0, 0.07), (90.0, 0.06), (0.0, 0.02), (36.0, 0.20))
 """Hue and saturation of concrete, screed, grey and greenish epoxy, asphalt and dusty beige."""
 
+COLOURED_FLOORS_HSV = ((130.0, 0.45), (215.0, 0.40), (12.0, 0.45), (28.0, 0.40))
+"""Green and blue epoxy, brick and wood."""
+
 _FLOOR_VALUE = {"white": (55.0, 130.0), "black": (110.0, 205.0)}
 _OTHER_FLOOR_VALUE = (60.0, 175.0)
+_FADED = 0.35
+_APART_DEG = 75.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,21 +66,35 @@ def bgr_of(hue_deg: float, saturation: float, value: float) -> NDArray[np.float3
 
 
 def paint_bgr(rng: np.random.Generator, colour: str, spread: float) -> NDArray[np.float32]:
-    """A paint of the named colour; `spread` 0 is the standard tone, 1 the whole range of the trade."""
+    """A paint of the named colour; `spread` 0 is the standard tone, 1 the whole range of the trade, from
+    fresh to bleached and dusty."""
     hue, saturation, value = PAINT_HSV[colour]
     hue += spread * rng.uniform(-1, 1) * _HUE_SPREAD[colour]
-    saturation *= 1.0 + spread * rng.uniform(-0.2, 0.15)
+    saturation *= 1.0 + spread * rng.uniform(-0.1, 0.15)
     value *= 1.0 + spread * rng.uniform(-0.12, 0.1)
-    return bgr_of(hue, saturation, value)
+    faded = spread * rng.uniform(0, _FADED) * (rng.random() < 0.5)
+    dust = 110.0 if colour == "black" else value * 0.85
+    fresh = bgr_of(hue, saturation, value)
+    return fresh + np.float32(faded) * (np.float32(dust) - fresh)
 
 
 def floor_bgr(rng: np.random.Generator, line_colour: str, spread: float) -> NDArray[np.float32]:
-    """A floor on which lines of `line_colour` would be painted: dark under white, bright under black."""
+    """A floor on which lines of `line_colour` would be painted: dark under white, bright under black, of
+    another hue under the others."""
     low, high = _FLOOR_VALUE.get(line_colour, _OTHER_FLOOR_VALUE)
     middle = (low + high) / 2
     value = middle + spread * rng.uniform(low - middle, high - middle)
-    hue, saturation = FLOORS_HSV[int(rng.integers(len(FLOORS_HSV)))]
+    floors: tuple[tuple[float, float], ...] = FLOORS_HSV
+    if rng.random() < 0.4 * spread:
+        floors = tuple(floor for floor in COLOURED_FLOORS_HSV if _differs(floor[0], line_colour))
+    hue, saturation = floors[int(rng.integers(len(floors)))]
     return bgr_of(hue, saturation * spread, value)
+
+
+def _differs(hue_deg: float, line_colour: str) -> bool:
+    if line_colour in ("white", "black"):
+        return True
+    return abs((hue_deg - PAINT_HSV[line_colour][0] + 180.0) % 360.0 - 180.0) > _APART_DEG
 
 
 def axes(width: int, height: int) -> tuple[Plane, Plane]:

@@ -15,10 +15,10 @@ from flightd.vision.colour import (
     STRONG,
     ColourProfile,
     classify,
-    floor_light,
+    floor_field,
     grow,
+    level,
     load_profile,
-    relight,
     save_profile,
 )
 
@@ -74,20 +74,40 @@ def test_a_frame_full_of_paint_keeps_its_colour() -> None:
     assert (classify(picture, load_profile("yellow")) == STRONG).all()
 
 
-def test_relighting_the_table_equals_multiplying_the_pixels() -> None:
-    profile = load_profile("yellow")
-    gain = (1.4, 1.0, 0.7)
-    index = np.arange(65536)
-    axes = np.stack([index & 31, (index >> 5) & 63, index >> 11])
-    limits = np.array([31, 63, 31])[:, None]
-    gained = np.clip(((axes + 0.5) * np.array(gain)[:, None]).astype(int), 0, limits)
-    expected = profile.lut[gained[0] | gained[1] << 5 | gained[2] << 11]
-    assert np.array_equal(relight(profile.lut, gain), expected)
+def test_a_shadow_over_half_the_frame_changes_no_decision_away_from_its_edge() -> None:
+    for colour in SHIPPED:
+        picture, inside = band(colour)
+        shaded = picture.copy()
+        shaded[:, 80:] = (shaded[:, 80:] * 0.45).astype(np.uint8)
+        mask = grow(classify(shaded, load_profile(colour))) == 255
+        assert (mask == inside)[:, :70].all(), colour
+        assert (mask == inside)[:, 90:].all(), colour
 
 
-def test_the_floor_light_makes_a_tinted_floor_neutral() -> None:
-    luma, gains = floor_light(np.full((40, 60, 3), (59, 69, 79), np.uint8))
-    assert np.allclose(np.array((60, 70, 80)) * gains, luma)
+def test_levelling_brings_a_tinted_floor_to_grey() -> None:
+    floor = np.full((40, 60, 3), (60, 70, 80), np.uint8)
+    assert np.abs(level(floor).astype(int) - 112).max() <= 1
+
+
+def test_the_floor_field_is_the_floor_also_where_a_line_crosses_it() -> None:
+    picture, _ = band("black")
+    assert np.abs(floor_field(picture).astype(int) - (108, 112, 114)).max() <= 1
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (3, 700), (700, 3), (16, 16), (720, 1280)])
+def test_any_size_of_picture_is_classified(shape: tuple[int, int]) -> None:
+    levels = classify(np.full((*shape, 3), 90, np.uint8), load_profile("yellow"))
+    assert levels.shape == shape
+    assert not levels.any()
+
+
+def test_many_specks_are_grown_as_few_are() -> None:
+    """Beyond 16 bits of separate parts the slower way takes over, with the same answer."""
+    levels = np.zeros((600, 800), np.uint8)
+    levels[::2, ::2] = 1
+    levels[::6, ::4] = 2
+    expected = np.where(levels == 2, 255, 0)
+    assert np.array_equal(grow(levels), expected)
 
 
 def test_growing_keeps_weak_pixels_only_where_they_touch_strong_ones() -> None:
