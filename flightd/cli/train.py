@@ -35,7 +35,7 @@ def train_colour(datasets: Sequence[Path], colour: str, out: Path, name: str, se
     labelled = [(folder / label.file, label) for folder, label in _labels(datasets)]
     if not any(_shows(label, colour) for _, label in labelled):
         raise InputError(f"{datasets[0]}: no picture has `line_colour` {colour}; nothing to learn from")
-    trained = train(name, colour, collect(_lessons(labelled, colour), seed), seed)
+    trained = train(name, colour, collect(_lessons(labelled, colour), colour, seed), seed)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         save_profile(trained.profile, out)

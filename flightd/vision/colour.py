@@ -44,7 +44,10 @@ _FIELD_WIDTH = 40
 _NEIGHBOURHOOD = 13
 """Floor field: its width in cells, and the median's window: a third of the picture's width, so that a
 band half as wide as that does not count as floor."""
-_LOCAL_RANGE = (0.6, 1.7)
+_LOCAL_RANGE = {"white": (0.3, 1.7), "black": (0.6, 3.0)}
+_OTHER_LOCAL_RANGE = (0.45, 2.2)
+"""Floor's brightness over the frame's median: tight on the side where a field full of paint would pull."""
+
 _TINT_RANGE = (0.65, 1.55)
 _BRIGHT_FLOOR = 135.0
 _MAX_STRETCH = 3.0
@@ -56,13 +59,14 @@ _LUT_TAKES_16_BITS = int(cv2.__version__.split(".")[0]) >= 5
 class ColourProfile:
     """What counts as paint of one colour.
 
-    `lut` is (65536,) uint8 indexed by the 16-bit BGR565 value.  `score` is the cross-validated balanced
-    accuracy of the classifier behind it, `training_hash` names the data it was trained on.
+    `lut` is (65536,) uint8 indexed by the 16-bit BGR565 value of a levelled pixel.  `colour` also says
+    how the light is levelled.  `score` is the cross-validated balanced accuracy of the classifier behind
+    it, `training_hash` names the data it was trained on.
     """
 
     name: str
     lut: NDArray[np.uint8]
-    colour: str = ""
+    colour: str
     training_hash: str = ""
     score: float = 0.0
     version: int = FORMAT_VERSION
@@ -128,14 +132,15 @@ def _read(stream: IO[bytes], source: str) -> ColourProfile:
     return profile
 
 
-def floor_field(small_bgr: Image) -> Image:
-    """The floor's colour as a coarse picture of about 40 cells across, at least 1 in each channel."""
+def floor_field(small_bgr: Image, colour: str) -> Image:
+    """The floor's colour under lines of `colour`: about 40 cells across, at least 1 in each channel."""
     height, width = small_bgr.shape[:2]
     size = (min(_FIELD_WIDTH, width), max(round(height * min(_FIELD_WIDTH, width) / width), 1))
     cells = np.asarray(cv2.resize(small_bgr, size, interpolation=cv2.INTER_LINEAR), np.uint8)
     grey = np.asarray(cv2.cvtColor(cells, cv2.COLOR_BGR2GRAY), np.uint8)
     frame = float(np.median(grey))
-    floor = np.clip(cv2.medianBlur(grey, _NEIGHBOURHOOD), frame * _LOCAL_RANGE[0], frame * _LOCAL_RANGE[1])
+    darkest, brightest = _LOCAL_RANGE.get(colour, _OTHER_LOCAL_RANGE)
+    floor = np.clip(cv2.medianBlur(grey, _NEIGHBOURHOOD), frame * darkest, frame * brightest)
     tinted = np.clip(floor[..., None] * _floor_tint(cells[::2, ::2]), 1.0, 255.0)
     return tinted.astype(np.uint8)
 
@@ -151,14 +156,14 @@ def _floor_tint(cells: Image) -> NDArray[np.float64]:
     return tint
 
 
-def level(small_bgr: Image) -> Image:
-    """The picture with its floor brought to `FLOOR_GREY` everywhere.
+def level(small_bgr: Image, colour: str) -> Image:
+    """The picture with the floor under its lines of `colour` brought to `FLOOR_GREY` everywhere.
 
     On a bright floor the sensor's saturation has compressed what is brighter still: there the part above
     the floor is stretched again, up to threefold.
     """
     height, width = small_bgr.shape[:2]
-    field = floor_field(small_bgr)
+    field = floor_field(small_bgr, colour)
     floor = cv2.resize(field, (width, height), interpolation=cv2.INTER_LINEAR)
     levelled = cv2.divide(small_bgr, floor, scale=FLOOR_GREY)
     brightness = float(field.mean())
@@ -177,7 +182,7 @@ def table_index(bgr: Image) -> NDArray[np.uint16]:
 
 def classify(small_bgr: Image, profile: ColourProfile) -> Levels:
     """(h, w) levels of a (h, w, 3) picture, its light levelled first."""
-    return _look_up(profile.lut, table_index(level(small_bgr)))
+    return _look_up(profile.lut, table_index(level(small_bgr, profile.colour)))
 
 
 def _look_up(table: NDArray[np.uint8], index: NDArray[np.uint16]) -> NDArray[np.uint8]:

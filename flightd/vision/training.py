@@ -38,6 +38,9 @@ _PIXELS_PER_IMAGE = 36
 _PIXELS_WITHOUT_PAINT = 6
 """Taken of a picture that shows none of the paint; both for each light."""
 
+_SATURATED = 250
+"""Floor as bright as this in all channels (a lamp's mirror image) could be anything, and teaches nothing."""
+
 _LIGHTS = 2
 _EXPOSURE = (0.25, 4.0)
 _CAST = 1.3
@@ -122,12 +125,16 @@ def _band(
     cv2.fillConvexPoly(teaching, points, value, cv2.LINE_8, 4)
 
 
-def take_pixels(bgr: Image, teaching: Teaching, rng: np.random.Generator) -> tuple[Image, NDArray[np.bool_]]:
+def take_pixels(
+    bgr: Image, teaching: Teaching, colour: str, rng: np.random.Generator
+) -> tuple[Image, NDArray[np.bool_]]:
     """Some paint and as much floor of one picture, levelled: ((n, 3) BGR, (n,) paint)."""
     grid = grid_for(bgr.shape[1], bgr.shape[0])
-    small = level(sample(bgr, grid)).reshape(-1, 3)
+    raw = sample(bgr, grid)
+    small = level(raw, colour).reshape(-1, 3)
     rows, columns = (grid.offset + grid.step * np.arange(count) for count in (grid.height, grid.width))
     told = teaching[np.ix_(rows, columns)].ravel()
+    told[(told == FLOOR) & (raw.reshape(-1, 3).min(axis=1) >= _SATURATED)] = UNKNOWN
     count = _PIXELS_PER_IMAGE if (told == PAINT).any() else _PIXELS_WITHOUT_PAINT
     chosen = [rng.permutation(np.flatnonzero(told == value))[:count] for value in (PAINT, FLOOR)]
     return small[np.concatenate(chosen)], np.repeat([True, False], [len(chosen[0]), len(chosen[1])])
@@ -141,13 +148,13 @@ def _relit(bgr: Image, rng: np.random.Generator) -> Image:
     return np.asarray(cv2.convertScaleAbs(bgr * cast), np.uint8)
 
 
-def collect(pictures: Iterable[tuple[Image, Teaching]], seed: int) -> Pixels:
+def collect(pictures: Iterable[tuple[Image, Teaching]], colour: str, seed: int) -> Pixels:
     """The training pixels of all pictures.  Raises InputError without paint or without floor."""
     rng = np.random.default_rng(seed)
     colours, paint, numbers = [], [], []
     for number, (bgr, teaching) in enumerate(pictures):
         for light in range(_LIGHTS):
-            taken, is_paint = take_pixels(_relit(bgr, rng) if light else bgr, teaching, rng)
+            taken, is_paint = take_pixels(_relit(bgr, rng) if light else bgr, teaching, colour, rng)
             colours.append(taken)
             paint.append(is_paint)
             numbers.append(np.full(len(taken), number, np.intp))

@@ -74,24 +74,23 @@ def test_a_frame_full_of_paint_keeps_its_colour() -> None:
     assert (classify(picture, load_profile("yellow")) == STRONG).all()
 
 
-def test_a_shadow_over_half_the_frame_changes_no_decision_away_from_its_edge() -> None:
-    for colour in SHIPPED:
-        picture, inside = band(colour)
-        shaded = picture.copy()
-        shaded[:, 80:] = (shaded[:, 80:] * 0.45).astype(np.uint8)
-        mask = grow(classify(shaded, load_profile(colour))) == 255
-        assert (mask == inside)[:, :70].all(), colour
-        assert (mask == inside)[:, 90:].all(), colour
+@pytest.mark.parametrize("colour", SHIPPED)
+def test_a_deep_shadow_over_half_the_frame_leaves_the_line_whole(colour: str) -> None:
+    picture, inside = band(colour)
+    picture[:, 80:] = (picture[:, 80:] * 0.45).astype(np.uint8)
+    mask = grow(classify(picture, load_profile(colour))) == 255
+    assert mask[inside].mean() > 0.9
+    assert not mask[~inside].any()
 
 
 def test_levelling_brings_a_tinted_floor_to_grey() -> None:
     floor = np.full((40, 60, 3), (60, 70, 80), np.uint8)
-    assert np.abs(level(floor).astype(int) - 112).max() <= 1
+    assert np.abs(level(floor, "yellow").astype(int) - 112).max() <= 1
 
 
 def test_the_floor_field_is_the_floor_also_where_a_line_crosses_it() -> None:
     picture, _ = band("black")
-    assert np.abs(floor_field(picture).astype(int) - (108, 112, 114)).max() <= 1
+    assert np.abs(floor_field(picture, "black").astype(int) - (108, 112, 114)).max() <= 1
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (3, 700), (700, 3), (16, 16), (720, 1280)])
