@@ -26,9 +26,15 @@ STATIONS = 384
 """Shared among all edges of a frame."""
 MIN_CONTRAST = 6.0
 """Grey levels between floor and paint below which there is no edge."""
+CHROMA_VARIANCE = 3.0
+"""How much noisier colour differences are than luma: sensors and codecs give them half the resolution."""
 FINE = 4
 """Half width of the window in which an edge is located by area, in pixels."""
 
+_LUMA = np.array([[0.114, 0.587, 0.299]])
+_CHROMA = np.eye(3) - np.ones((3, 1)) @ _LUMA
+_TRUST = (_LUMA.T @ _LUMA + _CHROMA.T @ _CHROMA / CHROMA_VARIANCE).astype(np.float32)
+"""Inverse of the noise's covariance in BGR, luma's variance being one."""
 _MIN_STATIONS, _MAX_STATIONS = 24, 128
 _AGREE_PX = (4.0, 2.0)
 _GOLDEN = 0.6180339887498949
@@ -65,7 +71,7 @@ def take(bgr: Image, strips: list[Strip], plane: Plane, half: int) -> Taps:
     """Gather the pixels across every guessed edge."""
     height, width = bgr.shape[:2]
     count = len(strips)
-    stations = max(_MIN_STATIONS, min(_MAX_STATIONS, STATIONS // (2 * count)))
+    stations = max(_MIN_STATIONS, min(_MAX_STATIONS, STATIONS // (16 * count) * 8))
     half_x, half_y = (width - 1) / 2, (height - 1) / 2
     steep = np.repeat([s.steep for s in strips], 2)[:, None]
     sign = np.tile(np.array([1, -1]), count)[:, None]
@@ -143,8 +149,9 @@ def _project(pixels: Floats, valid: NDArray[np.bool_]) -> tuple[Floats, Array]:
     weight = valid / np.maximum(np.count_nonzero(valid, axis=1), 1)[:, None].astype(np.float32)
     rise = pixels[:, :, -1] + pixels[:, :, -2] - pixels[:, :, 0] - pixels[:, :, 1]
     direction = np.einsum("es,esc->ec", weight.astype(np.float32), rise) / 2
-    contrast = np.sqrt(np.einsum("ec,ec->e", direction, direction))
-    direction /= np.maximum(contrast, 1e-6)[:, None]
+    projection = direction @ _TRUST
+    contrast = np.sqrt(np.einsum("ec,ec->e", direction, projection))
+    projection /= np.maximum(contrast, 1e-6)[:, None]
     edges, stations, taps, _ = pixels.shape
-    profile = np.matmul(pixels.reshape(edges, -1, 3), direction[:, :, None]).reshape(edges, stations, taps)
+    profile = np.matmul(pixels.reshape(edges, -1, 3), projection[:, :, None]).reshape(edges, stations, taps)
     return np.asarray(profile, np.float32), contrast.astype(float)

@@ -65,31 +65,34 @@ def bow(u: Array, v: Array, sigma: float) -> bool:
 class RobustLines:
     """Straight lines v = a + b u through the rows of (E, S) points, outliers weighted out.
 
-    `weight` (E, S) is each point's part in its line; `points` its sum.  `scatter` is the standard
-    deviation of the points about their line, `bow` the sagitta of the best parabola through them, and
-    `inflation` how much their correlation along the line widens the covariance.
+    `points` is the sum of the points' weights, `scatter` the standard deviation about the line, `bow` the
+    sagitta of the best parabola.  `mean_variance` is the variance of v at `mean_u`, `spread` the
+    variance of u; both errors follow from them.
     """
 
     a: Array
     b: Array
     mean_u: Array
-    suu: Array
-    weight: Array
+    spread: Array
     points: Array
     scatter: Array
     bow: Array
-    inflation: Array
+    mean_variance: Array
 
     def fit(self, e: int) -> LinearFit:
         """Line `e` with its covariance."""
-        variance = float(self.scatter[e]) ** 2 * float(self.inflation[e])
-        mean = float(self.mean_u[e])
-        var_b = variance / max(float(self.suu[e]), 1e-9)
-        var_a = variance / max(float(self.points[e]), 1e-9) + mean * mean * var_b
-        return LinearFit(float(self.a[e]), float(self.b[e]), var_a, var_b, -mean * var_b)
+        variance, mean = float(self.mean_variance[e]), float(self.mean_u[e])
+        var_b = variance / max(float(self.spread[e]), 1e-9)
+        return LinearFit(
+            float(self.a[e]), float(self.b[e]), variance + mean * mean * var_b, var_b, -mean * var_b
+        )
 
 
 _MIN_SCATTER_PX = 0.02
+_STRETCHES = 8
+_SHARED_PER_PX = 2.5
+"""Rough edges (wear, blur, compression) also err together over longer stretches than a line shows; found by
+normalised errors on generated frames of all levels: 1.1 for smooth edges, 2 at 0.35 px of scatter."""
 
 
 def robust_lines(u: Array, v: Array, weight: Array, cuts_px: tuple[float, ...]) -> RobustLines:
@@ -100,7 +103,8 @@ def robust_lines(u: Array, v: Array, weight: Array, cuts_px: tuple[float, ...]) 
         sw, mu, mv, du, dv, suu, b = _weighted(u, v, w)
         residual = dv - b[:, None] * du
         cut = np.maximum(4.0 * _scale(residual, valid), cut_px)[:, None]
-        w = weight * np.maximum(0.0, 1.0 - (residual / cut) ** 2) ** 2
+        near = np.maximum(0.0, 1.0 - (residual / cut) ** 2)
+        w = weight * near**2
     sw = np.maximum(w.sum(axis=1), 1e-9)
     wr = w * residual
     srr = _dot(wr, residual)
@@ -113,10 +117,16 @@ def robust_lines(u: Array, v: Array, weight: Array, cuts_px: tuple[float, ...]) 
     q = tt - (stt / sw)[:, None] - (_dot(wt, tt) / stt)[:, None] * t
     bow = _dot(wr, q) / np.maximum(_dot(w * q, q), 1e-9)
 
-    # Wear, texture and compression move neighbouring points together: count them as a first-order
-    # autoregressive process does.
-    r = np.clip(_dot(wr[:, 1:], wr[:, :-1]) / np.maximum(_dot(wr, wr), 1e-9), 0.0, 0.9)
-    return RobustLines(mv - b * mu, b, mu, suu, w, sw, scatter, bow, (1 + r) / (1 - r))
+    # The variance of an M-estimator (Huber): points half-way out count against it.  Wear, texture, shadow
+    # and compression move neighbouring points together, which shows in the sums over stretches of the
+    # line: they scatter more than independent points would.
+    rr = np.maximum(_dot(wr, wr), 1e-12)
+    sums = wr.reshape(len(wr), _STRETCHES, -1).sum(axis=2)
+    inflation = np.maximum(1.0, _dot(sums, sums) / rr * (_STRETCHES / (_STRETCHES - 2)))
+    rough = (1.0 + _SHARED_PER_PX * np.minimum(scatter, 0.5)) ** 2
+    slope = np.maximum((weight * near * (5.0 * near - 4.0)).sum(axis=1), 0.2 * sw)
+    noise = np.maximum(rr, sw * _MIN_SCATTER_PX**2) / slope**2
+    return RobustLines(mv - b * mu, b, mu, suu / sw, sw, scatter, bow, noise * inflation * rough)
 
 
 def weighted_lines(u: Array, v: Array, weight: Array) -> tuple[Array, Array]:
