@@ -7,6 +7,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -177,7 +178,12 @@ def _summary(simulation: Any, result: Any, wall_s: float) -> dict[str, Any]:
         plan_of(simulation.config, simulation.site),
         flight.messages(Status),
         flight.messages(Event),
-        [Kinematics(**entry.message) for entry in truth if isinstance(entry.message, dict)],
+        # viewers' fields stand beside the truth's own
+        [
+            Kinematics(**{field.name: entry.message[field.name] for field in fields(Kinematics)})
+            for entry in truth
+            if isinstance(entry.message, dict)
+        ],
     )
     return {
         **as_summary(measured),
