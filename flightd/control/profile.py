@@ -36,3 +36,11 @@ class Profile:
             self.position += 0.5 * (self.velocity + velocity) * dt_s
         self.acceleration = (velocity - self.velocity) / dt_s
         self.velocity = velocity
+
+    def brake(self, dt_s: float) -> None:
+        """Advance by `dt_s`, coming to rest as soon as the acceleration allows."""
+        change = self._max_accel * dt_s
+        velocity = self.velocity - min(max(self.velocity, -change), change)
+        self.position += 0.5 * (self.velocity + velocity) * dt_s
+        self.acceleration = (velocity - self.velocity) / dt_s
+        self.velocity = velocity

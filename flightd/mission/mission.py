@@ -274,6 +274,9 @@ class Mission:
         if math.hypot(self._x.position - pose.x_m, self._y.position - pose.y_m) < p.max_lead_m:
             self._x.step(x, s.dt_s)
             self._y.step(y, s.dt_s)
+        else:  # wait for the vehicle at rest: a speed kept here would be fed forward and hold it off
+            self._x.brake(s.dt_s)
+            self._y.brake(s.dt_s)
         if to_goal or self.phase is Phase.TURN:
             self._yaw.step(self._yaw.position + wrap_pi(self.goal.yaw_rad - self._yaw.position), s.dt_s)
         return True

@@ -64,6 +64,22 @@ def test_the_reference_arrives_without_overshoot_within_its_limits(
     assert profile.velocity == 0.0
 
 
+@given(target=st.floats(-20, 20), steps=st.integers(1, 400), dt=st.floats(0.005, 0.05))
+def test_a_waiting_reference_comes_to_rest_and_feeds_nothing_forward(
+    target: float, steps: int, dt: float
+) -> None:
+    profile = Profile(0.0, max_speed=0.8, max_accel=0.5)
+    for _ in range(steps):
+        profile.step(target, dt)
+    left_m = abs(target - profile.position) + 0.5 * dt * dt
+    began = profile.position
+    for _ in range(int(0.8 / 0.5 / dt) + 3):
+        profile.brake(dt)
+        assert abs(profile.acceleration) <= 0.5 + 1e-9
+    assert (profile.velocity, profile.acceleration) == (0.0, 0.0)
+    assert abs(profile.position - began) <= left_m + 1e-6
+
+
 @given(st.lists(st.tuples(finite, finite, finite, finite, st.integers(0, 200)), min_size=1, max_size=40))
 def test_nothing_beyond_the_limits_reaches_the_wire(
     steps: list[tuple[float, float, float, float, int]],
