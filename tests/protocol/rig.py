@@ -12,6 +12,8 @@ from typing import Any, Protocol
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
+from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
+from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.ports import Vehicle
 from flightd.runtime.clock import LoopClock
@@ -21,6 +23,7 @@ from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer, Ports
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.sensors import Sensors
 from flightd.sim.wind import Draught
@@ -94,16 +97,26 @@ class Rig:
 
 
 @asynccontextmanager
-async def ardupilot_rig(config: PeerConfig | None = None, *, peer_runs: bool = True) -> AsyncIterator[Rig]:
+async def mavlink_rig(
+    make_peer: type[ArduCopterPeer | Px4Peer],
+    make_vehicle: type[MavlinkVehicle],
+    pilots_mode: int,
+    config: PeerConfig | None = None,
+    *,
+    peer_runs: bool = True,
+) -> AsyncIterator[Rig]:
     clock = LoopClock()
-    peer = ArduCopterPeer(clock, Airframe(draught=CALM), config or PeerConfig(ready_s=0.5))
+    peer = make_peer(clock, Airframe(draught=CALM), config or PeerConfig(ready_s=0.5))
     host, port = await peer.open()
-    vehicle = ArduPilotVehicle(f"udpout://{host}:{port}", clock)
+    vehicle = make_vehicle(f"udpout://{host}:{port}", clock)
+
+    def take_over() -> None:
+        assert peer.pilot_mode(pilots_mode)
 
     def cut(apart: bool) -> None:
         peer.link.muted = apart
 
-    rig = Rig(vehicle, peer, lambda: _switch(peer), cut)
+    rig = Rig(vehicle, peer, take_over, cut)
     tasks = [asyncio.create_task(vehicle.run(), name="vehicle")]
     if peer_runs:
         tasks.append(asyncio.create_task(peer.run(), name="peer"))
@@ -118,8 +131,12 @@ async def ardupilot_rig(config: PeerConfig | None = None, *, peer_runs: bool = T
         assert not failures, failures
 
 
-def _switch(peer: ArduCopterPeer) -> None:
-    assert peer.pilot_mode(CopterMode.ALT_HOLD)
+ardupilot_rig = partial(mavlink_rig, ArduCopterPeer, ArduPilotVehicle, CopterMode.ALT_HOLD)
+px4_rig = partial(mavlink_rig, Px4Peer, Px4Vehicle, Px4Mode.ALTCTL)
+
+_RAW_THRUST = PeerConfig(ready_s=0.5, parameters={"GUID_OPTIONS": 8})
+_PATIENT_PX4 = PeerConfig(ready_s=0.5, parameters={"COM_OF_LOSS_T": 6.5})
+"""It waits through the contract's radio gap; what it does by default has its own tests."""
 
 
 @asynccontextmanager
@@ -159,6 +176,8 @@ async def ardrone_rig(**settings: Any) -> AsyncIterator[Rig]:
 
 RIGS: dict[str, Callable[[], Any]] = {
     "ardupilot": ardupilot_rig,
+    "ardupilot raw thrust": partial(ardupilot_rig, _RAW_THRUST),
+    "px4": partial(px4_rig, _PATIENT_PX4),
     "ardrone": ardrone_rig,
     "ardrone full navdata": partial(ardrone_rig, full_navdata=True),
 }

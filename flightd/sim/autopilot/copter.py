@@ -8,8 +8,6 @@ vehicle levels and holds, it does not land; on the floor with nothing asked it d
 from __future__ import annotations
 
 import enum
-import math
-from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -17,10 +15,9 @@ from flightd.ports import Clock
 from flightd.sim.airframe import Airframe, AirframeCommand
 from flightd.sim.autopilot.guided import AngleTarget
 from flightd.sim.autopilot.link import Message
-from flightd.sim.autopilot.parameters import COPTER_PARAMETERS
+from flightd.sim.autopilot.parameters import COPTER_PARAMETERS, ParameterServer
 from flightd.sim.autopilot.peer import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.telemetry import LANDED_AIR, LANDED_GROUND, LANDED_LANDING
-from flightd.sim.climb_loop import ClimbGains, ClimbLoop
 
 _THRUST_IS_COLLECTIVE = 8
 _IDLE_COLLECTIVE = 0.05
@@ -56,44 +53,18 @@ _NEEDS_POSITION = frozenset(
 _NOT_ARMABLE = frozenset({CopterMode.LAND, CopterMode.RTL, CopterMode.BRAKE})
 
 
-@dataclass(frozen=True, slots=True)
-class Sticks:
-    """The pilot's wishes in the modes he flies himself: angles, yaw rate and climb rate."""
-
-    roll_rad: float = 0.0
-    pitch_rad: float = 0.0
-    yaw_rate_radps: float = 0.0
-    climb_mps: float = 0.0
-
-
 class ArduCopterPeer(AutopilotPeer):
     """A copter on the floor, disarmed, in STABILIZE, until somebody talks to it."""
 
     def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
-        super().__init__(clock, airframe, config or PeerConfig(), COPTER_PARAMETERS)
+        config = config or PeerConfig()
+        parameters = ParameterServer({**COPTER_PARAMETERS, **config.parameters})
+        super().__init__(clock, airframe, config, parameters)
         self.mode = CopterMode.STABILIZE
-        self.armed = False
-        self.landed = True
-        self.sticks = Sticks()
-        self.arming_block = ""
-        """A sensor fault: the reason with which arming is refused while it is not empty."""
         self._target = AngleTarget()
-        self._climb = ClimbLoop(ClimbGains(hover_guess=self.parameters["MOT_THST_HOVER"]))
-        self._stick_yaw_rad = 0.0
         self._idle_s = 0.0
         self._settled_s = 0.0
         self._low_battery_told = False
-
-    def pilot_mode(self, mode: CopterMode, sticks: Sticks | None = None) -> bool:
-        """The pilot moves his mode switch; False when the autopilot refuses."""
-        self.advance(self._clock.now_ns())
-        self.sticks = sticks or Sticks()
-        return self._set_mode(mode) == int(dialect.MAV_RESULT_ACCEPTED)
-
-    def pilot_disarm(self) -> None:
-        """The pilot's disarm switch: motors stop at once, wherever the vehicle is."""
-        self.advance(self._clock.now_ns())
-        self._disarm()
 
     def reboot(self) -> None:
         super().reboot()
@@ -118,7 +89,7 @@ class ArduCopterPeer(AutopilotPeer):
             self.mode = mode
             self._target = AngleTarget(yaw_rad=self.sensors.yaw_rad)
             self._stick_yaw_rad = self.sensors.yaw_rad
-            self._climb.reset(self.sensors.height_m)
+            self._climb_loop.reset(self.sensors.height_m)
             self.link.broadcast(self._heartbeat())
         return int(dialect.MAV_RESULT_ACCEPTED)
 
@@ -158,7 +129,7 @@ class ArduCopterPeer(AutopilotPeer):
         self.armed = True
         self.landed = True
         self._idle_s = 0.0
-        self._climb.reset(self.sensors.height_m)
+        self._climb_loop.reset(self.sensors.height_m)
         self.say(dialect.MAV_SEVERITY_INFO, "Arming motors")
         self.link.broadcast(self._heartbeat())
         return int(dialect.MAV_RESULT_ACCEPTED)
@@ -202,24 +173,10 @@ class ArduCopterPeer(AutopilotPeer):
             return self._stand(dt_s)
         self.landed = False
         self._idle_s = 0.0
-        sensors = self.sensors
-        held = self._climb.step(
-            dt_s,
-            climb_mps,
-            height_m=sensors.height_m,
-            speed_mps=sensors.climb_mps,
-            tilt_cos=math.cos(sensors.roll_rad) * math.cos(sensors.pitch_rad),
-        )
+        held = self._hold_climb(dt_s, climb_mps)
         collective = held if raw is None else raw
         self._detect_landing(dt_s, climb_mps, collective)
-        return AirframeCommand(
-            motors=True,
-            roll_rad=roll - sensors.roll_error_rad,
-            pitch_rad=pitch - sensors.pitch_error_rad,
-            yaw_rad=yaw - sensors.yaw_error_rad,
-            yaw_rate_radps=yaw_rate,
-            collective=collective,
-        )
+        return self._fly(roll, pitch, yaw, yaw_rate, collective)
 
     def _wishes(self, dt_s: float) -> tuple[float, float, float, float, float]:
         """Roll, pitch, yaw, yaw rate and climb rate of the present mode."""
@@ -244,7 +201,7 @@ class ArduCopterPeer(AutopilotPeer):
 
     def _stand(self, dt_s: float) -> AirframeCommand:
         """Armed on the floor: motors idle, targets follow the vehicle, and the disarm delay runs."""
-        self._climb.reset(self.sensors.height_m)
+        self._climb_loop.reset(self.sensors.height_m)
         self._stick_yaw_rad = self.sensors.yaw_rad
         if self._target.holding:
             self._target.yaw_rad = self.sensors.yaw_rad
@@ -276,7 +233,6 @@ class ArduCopterPeer(AutopilotPeer):
 
     def _refresh(self, now_ns: int) -> None:
         super()._refresh(now_ns)
-        self.instruments.armed = self.armed
         if self.landed:
             self.instruments.landed_state = LANDED_GROUND
         else:

@@ -58,7 +58,7 @@ class AngleTarget:
         if not mask & _IGNORE_ATTITUDE:
             if abs(math.hypot(*message.q) - 1.0) > _NORM_TOLERANCE:
                 return False
-            self.roll_rad, self.pitch_rad, self.yaw_rad = _euler(*message.q)
+            self.roll_rad, self.pitch_rad, self.yaw_rad = euler(*message.q)
         elif rates_ignored:
             return False
         rates = (0.0, 0.0, 0.0) if rates_ignored else values[4:]
@@ -85,7 +85,8 @@ class AngleTarget:
         return part * (up_mps if part > 0 else down_mps)
 
 
-def _euler(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+def euler(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of a unit quaternion."""
     roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
     yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

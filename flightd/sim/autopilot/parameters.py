@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -46,17 +47,38 @@ COPTER_PARAMETERS: dict[str, float] = {
 """ArduCopter 4.5's names and units, set up for flight without position."""
 
 
+PX4_PARAMETERS: dict[str, float | int] = {
+    "MAV_SYS_ID": 1,
+    "MAV_FWDEXTSP": 1,
+    "MPC_THR_HOVER": 0.5,
+    "MPC_THR_MIN": 0.12,
+    "MPC_MANTHR_MIN": 0.08,
+    "MPC_LAND_SPEED": 0.7,
+    "COM_OF_LOSS_T": 1.0,
+    "COM_OBL_RC_ACT": 4,
+    "COM_RCL_EXCEPT": 4,
+    "COM_DISARM_PRFLT": 10.0,
+    "COM_DISARM_LAND": 2.0,
+    "COM_ARM_WO_GPS": 1,
+    "LNDMC_Z_VEL_MAX": 0.25,
+    "BAT_LOW_THR": 0.15,
+}
+"""PX4 v1.15's names and units, set up for flight without position; whole numbers are INT32."""
+
+
 class ParameterServer:
     """A table that answers PARAM_REQUEST_READ, PARAM_REQUEST_LIST and PARAM_SET.
 
     As on ArduPilot an unknown name is answered by silence, and a value that is not finite is not taken.
+    With `bytewise` whole numbers travel as PX4 sends them: the four bytes of an INT32 in the float's place.
     """
 
-    def __init__(self, values: dict[str, float]) -> None:
+    def __init__(self, values: Mapping[str, float | int], *, bytewise: bool = False) -> None:
         too_long = [name for name in values if len(name) > 16]
         if too_long:
             raise ValueError(f"parameter names longer than 16 characters: {too_long}")
-        self._values = dict(values)
+        self._values: dict[str, float] = dict(values)
+        self._whole = frozenset(name for name in values if bytewise and isinstance(values[name], int))
 
     def __getitem__(self, name: str) -> float:
         return self._values[name]
@@ -81,15 +103,24 @@ class ParameterServer:
         name = str(message.param_id)
         if name not in self._values:
             return
-        if kind == "PARAM_SET" and math.isfinite(message.param_value):
-            self._values[name] = message.param_value
+        if kind == "PARAM_SET":
+            self._set(name, message.param_value)
         reply(self._value(name))
 
+    def _set(self, name: str, value: float) -> None:
+        if name in self._whole:
+            self._values[name] = struct.unpack("<i", struct.pack("<f", value))[0]
+        elif math.isfinite(value):
+            self._values[name] = value
+
     def _value(self, name: str) -> Message:
+        value, kind = self._values[name], dialect.MAV_PARAM_TYPE_REAL32
+        if name in self._whole:
+            value, kind = struct.unpack("<f", struct.pack("<i", value))[0], dialect.MAV_PARAM_TYPE_INT32
         return dialect.MAVLink_param_value_message(
             name.encode(),
-            self._values[name],
-            dialect.MAV_PARAM_TYPE_REAL32,
+            value,
+            kind,
             len(self._values),
             list(self._values).index(name),
         )

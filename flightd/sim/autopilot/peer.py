@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import asyncio
+import math
 from dataclasses import dataclass, field
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -13,6 +14,7 @@ from flightd.sim.airframe import Airframe, AirframeCommand
 from flightd.sim.autopilot.link import Address, Channel, Message, UdpLink
 from flightd.sim.autopilot.parameters import ParameterServer
 from flightd.sim.autopilot.telemetry import DATA_STREAMS, Instruments
+from flightd.sim.climb_loop import ClimbGains, ClimbLoop
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.sensors import SensorParams, Sensors
 from flightd.sim.truth import TruthHistory
@@ -27,6 +29,16 @@ _TRUTH_EVERY = 2
 _TRUTH_SAMPLES = 1000
 _CATCH_UP_NS = 2_000 * _NS_PER_MS
 """A process that slept longer than this goes on from now instead of simulating what it missed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sticks:
+    """The pilot's wishes in the modes he flies himself: angles, yaw rate and climb rate."""
+
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    yaw_rate_radps: float = 0.0
+    climb_mps: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +70,12 @@ class AutopilotPeer(abc.ABC):
     """
 
     def __init__(
-        self, clock: Clock, airframe: Airframe, config: PeerConfig, parameters: dict[str, float]
+        self, clock: Clock, airframe: Airframe, config: PeerConfig, parameters: ParameterServer
     ) -> None:
         self.airframe = airframe
         self.sensors = Sensors(config.sensors, config.seed)
         self.instruments = Instruments(airframe, self.sensors)
-        self.parameters = ParameterServer({**parameters, **config.parameters})
+        self.parameters = parameters
         self.link = UdpLink(
             config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self._received, config.signing_key
         )
@@ -76,6 +88,13 @@ class AutopilotPeer(abc.ABC):
         self._truth = TruthHistory(_TRUTH_SAMPLES)
         self._truth.add(airframe.kinematics(self._now_ns))
         self._address: Address | None = None
+        self.armed = False
+        self.landed = True
+        self.sticks = Sticks()
+        self.arming_block = ""
+        """A sensor fault: the reason with which arming is refused while it is not empty."""
+        self._climb_loop = ClimbLoop(ClimbGains(hover_guess=airframe.params.hover_collective))
+        self._stick_yaw_rad = 0.0
 
     async def open(self) -> Address:
         """Bind the socket and greet the remotes; the address bound.  OSError when the port is taken."""
@@ -121,6 +140,22 @@ class AutopilotPeer(abc.ABC):
         self.advance(min(stamp_ns, self._clock.now_ns()))
         return self._truth.at(stamp_ns)
 
+    def pilot_mode(self, custom_mode: int, sticks: Sticks | None = None) -> bool:
+        """The pilot moves his mode switch; False when the autopilot refuses."""
+        self.advance(self._clock.now_ns())
+        self.sticks = sticks or Sticks()
+        return self._set_mode(custom_mode) == int(dialect.MAV_RESULT_ACCEPTED)
+
+    def pilot_arm(self) -> bool:
+        """The pilot's arming switch; False when the autopilot refuses."""
+        self.advance(self._clock.now_ns())
+        return self._arm() == int(dialect.MAV_RESULT_ACCEPTED)
+
+    def pilot_disarm(self) -> None:
+        """The pilot's disarm switch: motors stop at once, wherever the vehicle is."""
+        self.advance(self._clock.now_ns())
+        self._disarm()
+
     def say(self, severity: int, text: str) -> None:
         """STATUSTEXT to everyone."""
         self.link.broadcast(
@@ -159,9 +194,46 @@ class AutopilotPeer(abc.ABC):
     def _set_mode(self, custom_mode: int) -> int:
         """Change the mode on a client's wish; the MAV_RESULT."""
 
+    def _mode_of(self, params: tuple[float, ...]) -> int:
+        """custom_mode in the parameters of DO_SET_MODE."""
+        return _whole(params[1])
+
+    @abc.abstractmethod
+    def _arm(self) -> int:
+        """Arm if nothing is against it; the MAV_RESULT."""
+
+    @abc.abstractmethod
+    def _disarm(self) -> None:
+        """Stop the motors."""
+
     @abc.abstractmethod
     def _setpoint(self, message: Message) -> None:
         """Take a SET_ATTITUDE_TARGET that is addressed to this system."""
+
+    def _hold_climb(self, dt_s: float, climb_mps: float) -> float:
+        """The collective by which the autopilot's own height loop keeps a climb rate."""
+        sensors = self.sensors
+        return self._climb_loop.step(
+            dt_s,
+            climb_mps,
+            height_m=sensors.height_m,
+            speed_mps=sensors.climb_mps,
+            tilt_cos=math.cos(sensors.roll_rad) * math.cos(sensors.pitch_rad),
+        )
+
+    def _fly(
+        self, roll_rad: float, pitch_rad: float, yaw_rad: float, yaw_rate_radps: float, collective: float
+    ) -> AirframeCommand:
+        """Attitude in the autopilot's own estimate to the airframe's truth."""
+        sensors = self.sensors
+        return AirframeCommand(
+            motors=True,
+            roll_rad=roll_rad - sensors.roll_error_rad,
+            pitch_rad=pitch_rad - sensors.pitch_error_rad,
+            yaw_rad=yaw_rad - sensors.yaw_error_rad,
+            yaw_rate_radps=yaw_rate_radps,
+            collective=collective,
+        )
 
     def _boot_clock_ns(self, now_ns: int) -> int:
         elapsed_ns = now_ns - self._boot_ns
@@ -230,7 +302,7 @@ class AutopilotPeer(abc.ABC):
                 result = self._request(channel, params[0], now_ns)
             case dialect.MAV_CMD_DO_SET_MODE:
                 custom = params[0] == params[0] and int(params[0]) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-                result = self._set_mode(_whole(params[1])) if custom else dialect.MAV_RESULT_DENIED
+                result = self._set_mode(self._mode_of(params)) if custom else dialect.MAV_RESULT_DENIED
             case _:
                 result = self._command(message.command, params)
         header = message.get_header()

@@ -34,13 +34,12 @@ DATA_STREAMS: dict[int, tuple[int, ...]] = {
 
 
 class Instruments:
-    """Telemetry of one vehicle.  The peer keeps `boot_ms`, `armed` and `landed_state` up to date."""
+    """Telemetry of one vehicle.  The peer keeps `boot_ms`, `healthy` and `landed_state` up to date."""
 
     def __init__(self, airframe: Airframe, sensors: Sensors) -> None:
         self._airframe = airframe
         self._sensors = sensors
         self.boot_ms = 0
-        self.armed = False
         self.healthy = False
         self.landed_state = LANDED_GROUND
         self._range_m = 0.0
@@ -55,6 +54,11 @@ class Instruments:
             dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_state,
             dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self._version,
         }
+
+    def tell_local_position(self) -> None:
+        """Exchange GLOBAL_POSITION_INT for LOCAL_POSITION_NED, as PX4 without a global position."""
+        del self._builders[dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT]
+        self._builders[dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED] = self._local_position
 
     def knows(self, message_id: int) -> bool:
         return message_id in self._builders
@@ -101,6 +105,13 @@ class Instruments:
         heading_cdeg = round(math.degrees(sensors.yaw_rad % math.tau) * 100) % 36000
         return dialect.MAVLink_global_position_int_message(
             self.boot_ms, 0, 0, height_mm, height_mm, 0, 0, -round(sensors.climb_mps * 100), heading_cdeg
+        )
+
+    def _local_position(self) -> Message:
+        """Down and its speed are the barometer's; the horizontal part is not estimated."""
+        height_m, climb_mps = self._sensors.height_m, self._sensors.climb_mps
+        return dialect.MAVLink_local_position_ned_message(
+            self.boot_ms, 0.0, 0.0, -height_m, 0.0, 0.0, -climb_mps
         )
 
     def _vfr_hud(self) -> Message:

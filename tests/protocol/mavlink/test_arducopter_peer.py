@@ -14,8 +14,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.loops import VirtualLoop
 from flightd.sim.airframe import Airframe
-from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode, Sticks
-from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
+from flightd.sim.autopilot.peer import PeerConfig, Sticks
 from flightd.sim.wind import Draught
 from tests.protocol.mavlink.raw_client import RawClient
 

@@ -26,8 +26,9 @@ _THRUST_IS_COLLECTIVE = 8
 
 
 class ArduPilotVehicle(MavlinkVehicle):
-    """An ArduCopter.  It is not armed before GUID_OPTIONS is known: with its bit 3 the thrust that holds
-    the height would be half of full power."""
+    """An ArduCopter.  With bit 3 of GUID_OPTIONS thrust is collective and our own height loop flies;
+    until that parameter is known the vehicle is not armed, for the thrust that holds the height would
+    then be half of full power."""
 
     firmware = Firmware.ARDUPILOT
     flying_mode = GUIDED_NOGPS
@@ -44,14 +45,12 @@ class ArduPilotVehicle(MavlinkVehicle):
         problem = super()._not_fit()
         if problem:
             return problem
-        options = self.parameters.get(_GUID_OPTIONS)
-        if options is None:
-            return "GUID_OPTIONS not read yet"
-        if int(options[1]) & _THRUST_IS_COLLECTIVE:
-            return "GUID_OPTIONS has bit 3 (thrust as thrust) set: clear it"
-        return ""
+        return "GUID_OPTIONS not read yet" if self.parameters.get(_GUID_OPTIONS) is None else ""
 
-    def _thrust(self, setpoint: AttitudeSetpoint) -> float:
+    def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
+        options = self.parameters.get(_GUID_OPTIONS)
+        if options is not None and int(options[1]) & _THRUST_IS_COLLECTIVE:
+            return self._collective(setpoint, now_ns)
         return climb_thrust(
             setpoint.climb_mps,
             self._speed_mps(_SPEED_UP, _DEFAULT_UP_MPS),

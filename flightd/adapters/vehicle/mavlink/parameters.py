@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import struct
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -39,10 +40,16 @@ class ParameterReader:
         """The autopilot rebooted: its parameters may have changed."""
         self._heard.clear()
 
-    def value(self, message: Message) -> None:
-        """Take a PARAM_VALUE, asked for by whomever."""
-        if math.isfinite(message.param_value):
-            self._heard[str(message.param_id)] = float(message.param_value)
+    def value(self, message: Message, *, bytewise: bool) -> None:
+        """Take a PARAM_VALUE, asked for by whomever.
+
+        `bytewise`: PX4 puts the four bytes of an INT32 in the float's place, ArduPilot its value.
+        """
+        value = float(message.param_value)
+        if bytewise and message.param_type == dialect.MAV_PARAM_TYPE_INT32:
+            value = float(struct.unpack("<i", struct.pack("<f", value))[0])
+        if math.isfinite(value):
+            self._heard[str(message.param_id)] = value
             self._arrived.set()
 
     async def run(self) -> None:

@@ -56,6 +56,14 @@ class Telemetry:
     def landed(self) -> LandedState:
         return self._landed
 
+    def height_m(self, now_ns: int) -> float:
+        """Height above the floor below, NaN when the range finder has fallen silent."""
+        return self._range_m if now_ns - self._range_ns <= _RANGE_STALE_NS else math.nan
+
+    def climb_mps(self, now_ns: int) -> float:
+        """Climb rate, NaN when it is not told."""
+        return self._climb_mps if now_ns - self._climb_ns <= _CLIMB_STALE_NS else math.nan
+
     def take(self, message: Message, now_ns: int) -> bool:
         """Fold one message in; True when it shows that the autopilot has rebooted."""
         match message.get_type():
@@ -69,6 +77,9 @@ class Telemetry:
                 self._take_range(message, now_ns)
             case "GLOBAL_POSITION_INT":
                 self._climb_mps = -message.vz / 100.0
+                self._climb_ns = now_ns
+            case "LOCAL_POSITION_NED" if math.isfinite(message.vz):
+                self._climb_mps = -message.vz
                 self._climb_ns = now_ns
             case "EXTENDED_SYS_STATE":
                 self._landed = _LANDED.get(message.landed_state, LandedState.UNKNOWN)
@@ -93,13 +104,11 @@ class Telemetry:
         attitude = self._attitude
         if attitude is None or not self.heartbeat_ns:
             return None
-        ranged = now_ns - self._range_ns <= _RANGE_STALE_NS
-        climbing = now_ns - self._climb_ns <= _CLIMB_STALE_NS
         return VehicleState(
             attitude=attitude,
-            height_m=self._range_m if ranged else math.nan,
+            height_m=self.height_m(now_ns),
             height_stamp_ns=self._range_ns,
-            climb_mps=self._climb_mps if climbing else math.nan,
+            climb_mps=self.climb_mps(now_ns),
             mode=mode,
             in_control=in_control,
             armed=self.armed,

@@ -6,6 +6,7 @@ import abc
 import asyncio
 import contextlib
 import logging
+import math
 from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import ClassVar
@@ -16,6 +17,7 @@ from flightd.adapters.vehicle.mavlink.authority import Authority
 from flightd.adapters.vehicle.mavlink.codec import Codec, Message
 from flightd.adapters.vehicle.mavlink.commands import Answer, Commander
 from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
+from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
 from flightd.adapters.vehicle.mavlink.link import Firmware, MavlinkLink
 from flightd.adapters.vehicle.mavlink.parameters import ParameterReader
 from flightd.adapters.vehicle.mavlink.setpoint import Heading, attitude_target
@@ -34,7 +36,7 @@ RATES_HZ: dict[int, float] = {
     dialect.MAVLINK_MSG_ID_HEARTBEAT: 20.0,  # a take-over must be seen within 100 ms
     dialect.MAVLINK_MSG_ID_ATTITUDE: 50.0,
     dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR: 20.0,
-    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 25.0,
     dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 5.0,
     dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
     dialect.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
@@ -76,6 +78,7 @@ class MavlinkVehicle(abc.ABC):
         self._telemetry = Telemetry(self._sync)
         self._authority = Authority()
         self._heading = Heading()
+        self._height = HeightLoop()
         transport = make_transport(parse_endpoint(url))
         self.link = MavlinkLink(
             transport, Codec(system_id, signing=signing), clock, system_id, self._received
@@ -145,11 +148,12 @@ class MavlinkVehicle(abc.ABC):
         ours = self._demand in _ENGAGED and self._authority.held == self.flying_mode
         if not ours or yaw_rad is None or self._is_silent(now_ns):
             self._heading.release()
+            self._height.release()
             return False
-        if not self._telemetry.armed or self._telemetry.landed is LandedState.ON_GROUND:
+        if self._stands():
             self._heading.release()  # the vehicle may be turned by hand, its compass may still settle
         heading_rad = self._heading.step(now_ns, setpoint.yaw_rate_radps, yaw_rad)
-        thrust = self._thrust(setpoint)
+        thrust = self._thrust(setpoint, now_ns)
         return self.link.send(attitude_target(now_ns, self._system_id, setpoint, heading_rad, thrust))
 
     def notify(self, event: Event) -> None:
@@ -168,7 +172,7 @@ class MavlinkVehicle(abc.ABC):
         """Parameters of DO_SET_MODE."""
 
     @abc.abstractmethod
-    def _thrust(self, setpoint: AttitudeSetpoint) -> float:
+    def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         """The thrust field for a setpoint's climb rate."""
 
     def _not_fit(self) -> str:
@@ -184,6 +188,17 @@ class MavlinkVehicle(abc.ABC):
         tasks.create_task(self._once_heard(self.streams.run), name="mavlink streams")
         tasks.create_task(self._once_heard(self.parameters.run), name="mavlink parameters")
 
+    def _collective(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
+        """Raw thrust for the climb rate, by our own height loop."""
+        return self._height.step(
+            now_ns,
+            setpoint.climb_mps,
+            climb_mps=self._telemetry.climb_mps(now_ns),
+            height_m=self._telemetry.height_m(now_ns),
+            tilt_cos=math.cos(setpoint.roll_rad) * math.cos(setpoint.pitch_rad),
+            on_floor=self._stands(),
+        )
+
     # Receiving
 
     def _received(self, message: Message, now_ns: int) -> None:
@@ -198,7 +213,7 @@ class MavlinkVehicle(abc.ABC):
             case "STATUSTEXT":
                 self._say(message, now_ns)
             case "PARAM_VALUE":
-                self.parameters.value(message)
+                self.parameters.value(message, bytewise=self.firmware is Firmware.PX4)
             case _:
                 if self._telemetry.take(message, now_ns):
                     self.parameters.forget()  # it rebooted: they may have changed
@@ -315,6 +330,10 @@ class MavlinkVehicle(abc.ABC):
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_HAND_BACK_S):
                 await self._commander.send(command, *params, patience_s=_HAND_BACK_ANSWER_S)
+
+    def _stands(self) -> bool:
+        """On the floor, as far as the autopilot knows."""
+        return not self._telemetry.armed or self._telemetry.landed is LandedState.ON_GROUND
 
     # Clocks and liveness
 

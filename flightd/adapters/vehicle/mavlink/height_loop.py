@@ -1,0 +1,135 @@
+"""Climb rate to collective thrust, for autopilots that take thrust as thrust.
+
+The hover thrust is found at lift-off: on the floor the thrust is ramped up until the vehicle moves, and
+what it then carries is very nearly its weight.  In the air a slow integral follows the sagging battery.
+After touch-down the thrust is cut, without which PX4 never reports that it has landed.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+
+GRAVITY_MPS2 = 9.80665
+
+_RAMP_START = 0.12
+_RAMP_PER_S = 0.25
+_THRUST_MAX = 0.95
+_LIFTED_MPS = 0.12
+_LIFTED_M = 0.04
+_AT_LIFT_OFF = 0.96
+"""Share of the thrust at which lift-off was noticed that is the weight: it is noticed a moment late."""
+
+_VELOCITY_PER_S = 4.0
+_INTEGRAL_PER_S2 = 4.0
+_SLEW_MPS2 = 2.5
+_TRIM_MAX_MPS2 = 3.0
+_LEARN_S = 3.0
+_LEAST_IN_AIR = 0.35
+"""Share of the hover thrust that is always kept in the air."""
+
+_SINKING_MPS = -0.05
+_STANDING_MPS = 0.1
+_NEAR_FLOOR_M = 0.06
+_LIGHT = 0.75
+_TOUCHED_S = 0.4
+_STEP_MAX_S = 0.1
+
+
+class _Stage(enum.Enum):
+    FLOOR = "floor"
+    RAMP = "ramp"
+    AIR = "air"
+
+
+class HeightLoop:
+    """One flight's height loop.  Time comes with each call; `release` before a new take-over."""
+
+    def __init__(self) -> None:
+        self.hover = 0.5
+        """The hover thrust: a guess until the first lift-off."""
+        self._stage: _Stage | None = None
+        self._stamp_ns = 0
+        self._thrust = 0.0
+        self._wanted_mps = 0.0
+        self._trim_mps2 = 0.0
+        self._floor_m = math.nan
+        self._touched_s = 0.0
+
+    def release(self) -> None:
+        """The vehicle is not ours now; where it stands is looked up anew."""
+        self._stage = None
+
+    def step(
+        self,
+        now_ns: int,
+        wanted_mps: float,
+        *,
+        climb_mps: float,
+        height_m: float,
+        tilt_cos: float,
+        on_floor: bool,
+    ) -> float:
+        """Thrust, 0..1, for a climb rate.
+
+        `climb_mps` and `height_m` are measured, NaN when unknown: without a climb rate the hover thrust
+        is kept.  `on_floor` is what the autopilot says.
+        """
+        dt_s = min(max(now_ns - self._stamp_ns, 0) * 1e-9, _STEP_MAX_S)
+        self._stamp_ns = now_ns
+        if self._stage is None or (on_floor and wanted_mps <= 0.0):
+            self._stage = _Stage.FLOOR if on_floor else _Stage.AIR
+            self._settle(climb_mps)
+        match self._stage:
+            case _Stage.FLOOR:
+                self._stand(wanted_mps, height_m)
+            case _Stage.RAMP:
+                self._ramp(dt_s, wanted_mps, climb_mps, height_m)
+            case _:
+                self._fly(dt_s, wanted_mps, climb_mps, tilt_cos)
+                self._feel_floor(dt_s, wanted_mps, climb_mps, height_m)
+        return self._thrust
+
+    def _settle(self, climb_mps: float) -> None:
+        self._wanted_mps = 0.0 if math.isnan(climb_mps) else climb_mps
+        self._trim_mps2 = self._touched_s = 0.0
+
+    def _stand(self, wanted_mps: float, height_m: float) -> None:
+        self._thrust = 0.0
+        self._floor_m = height_m
+        if wanted_mps > 0.0:
+            self._stage, self._thrust = _Stage.RAMP, _RAMP_START
+
+    def _ramp(self, dt_s: float, wanted_mps: float, climb_mps: float, height_m: float) -> None:
+        if wanted_mps <= 0.0:
+            self._stage, self._thrust = _Stage.FLOOR, 0.0
+            return
+        self._thrust = min(self._thrust + _RAMP_PER_S * dt_s, _THRUST_MAX)
+        if climb_mps > _LIFTED_MPS or height_m - self._floor_m > _LIFTED_M:
+            self._stage, self.hover = _Stage.AIR, self._thrust * _AT_LIFT_OFF
+            self._settle(climb_mps)
+
+    def _fly(self, dt_s: float, wanted_mps: float, climb_mps: float, tilt_cos: float) -> None:
+        accel = 0.0
+        if not math.isnan(climb_mps):
+            slew = _SLEW_MPS2 * dt_s
+            self._wanted_mps += min(max(wanted_mps - self._wanted_mps, -slew), slew)
+            error_mps = self._wanted_mps - climb_mps
+            self._trim_mps2 += _INTEGRAL_PER_S2 * error_mps * dt_s
+            self._trim_mps2 = min(max(self._trim_mps2, -_TRIM_MAX_MPS2), _TRIM_MAX_MPS2)
+            accel = _VELOCITY_PER_S * error_mps + self._trim_mps2
+            learnt = self._trim_mps2 * min(dt_s / _LEARN_S, 1.0)
+            self._trim_mps2 -= learnt
+            self.hover = min(max(self.hover * (1.0 + learnt / GRAVITY_MPS2), 0.1), 0.8)
+        thrust = self.hover * (1.0 + accel / GRAVITY_MPS2) / max(tilt_cos, 0.5)
+        self._thrust = min(max(thrust, _LEAST_IN_AIR * self.hover), _THRUST_MAX)
+
+    def _feel_floor(self, dt_s: float, wanted_mps: float, climb_mps: float, height_m: float) -> None:
+        """Down is wanted, nothing moves, and the floor is near (or, unseen, carries some weight)."""
+        near = height_m - self._floor_m < _NEAR_FLOOR_M
+        if math.isnan(height_m) or math.isnan(self._floor_m):
+            near = self._thrust < _LIGHT * self.hover
+        stuck = wanted_mps < _SINKING_MPS and abs(climb_mps) < _STANDING_MPS
+        self._touched_s = self._touched_s + dt_s if stuck and near else 0.0
+        if self._touched_s >= _TOUCHED_S:
+            self._stage, self._thrust = _Stage.FLOOR, 0.0

@@ -1,0 +1,233 @@
+"""PX4's semantics: OFFBOARD by a stream that must run already, raw thrust, its land detector and failsafes.
+
+Read in PX4's documentation and sources, not measured: no PX4 was at hand.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.ports import Clock
+from flightd.sim.airframe import Airframe, AirframeCommand
+from flightd.sim.autopilot.guided import euler
+from flightd.sim.autopilot.link import Message
+from flightd.sim.autopilot.parameters import PX4_PARAMETERS, ParameterServer
+from flightd.sim.autopilot.peer import AutopilotPeer, PeerConfig
+from flightd.sim.autopilot.telemetry import LANDED_AIR, LANDED_GROUND, LANDED_LANDING
+
+_STREAM_S = 1.0
+_STREAM_GAP_S = 0.5
+_IDLE_COLLECTIVE = 0.04
+_LAND_DETECT_S = 1.0
+_FORCE = 21196
+_IGNORE_YAW_RATE = 4
+_IGNORE_THRUST = 64
+_IGNORE_ATTITUDE = 128
+_AUTO = 4
+_OBL_LAND = 4
+
+
+class Px4Mode(enum.IntEnum):
+    """custom_mode: main mode << 16 | sub mode << 24."""
+
+    MANUAL = 1 << 16
+    ALTCTL = 2 << 16
+    POSCTL = 3 << 16
+    AUTO_LOITER = _AUTO << 16 | 3 << 24
+    AUTO_LAND = _AUTO << 16 | 6 << 24
+    OFFBOARD = 6 << 16
+    STABILIZED = 7 << 16
+
+
+_NEEDS_POSITION = frozenset({Px4Mode.POSCTL, Px4Mode.AUTO_LOITER})
+
+
+class Px4Peer(AutopilotPeer):
+    """A PX4 multicopter on the floor, disarmed, in ALTCTL.  Its hover thrust is the airframe's, which
+    MPC_THR_HOVER does not know."""
+
+    def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
+        config = config or PeerConfig()
+        parameters = ParameterServer({**PX4_PARAMETERS, **config.parameters}, bytewise=True)
+        super().__init__(clock, airframe, config, parameters)
+        self.instruments.tell_local_position()
+        self.mode = Px4Mode.ALTCTL
+        self._q_target = (0.0, 0.0, 0.0)
+        self._yaw_rate_radps = 0.0
+        self._thrust = 0.0
+        self._setpoint_age_s = math.inf
+        self._stream_s = 0.0
+        self._idle_s = 0.0
+        self._settled_s = 0.0
+        self._landed_s = 0.0
+        self._has_flown = False
+
+    def reboot(self) -> None:
+        super().reboot()
+        self._disarm()
+        self.mode = Px4Mode.ALTCTL
+        self._setpoint_age_s, self._stream_s = math.inf, 0.0
+
+    # Commands
+
+    def _set_mode(self, custom_mode: int) -> int:
+        try:
+            mode = Px4Mode(custom_mode)
+        except ValueError:
+            return int(dialect.MAV_RESULT_DENIED)
+        if mode == Px4Mode.OFFBOARD and self._stream_s < _STREAM_S:
+            return self._unavailable("Offboard")
+        if mode in _NEEDS_POSITION:
+            return self._unavailable("Position" if mode == Px4Mode.POSCTL else "Hold")
+        self._enter(mode)
+        return int(dialect.MAV_RESULT_ACCEPTED)
+
+    def _unavailable(self, name: str) -> int:
+        self.say(dialect.MAV_SEVERITY_CRITICAL, f"Switching to {name} is currently not available")
+        return int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+
+    def _enter(self, mode: Px4Mode) -> None:
+        if mode != self.mode:
+            self.mode = mode
+            self._stick_yaw_rad = self.sensors.yaw_rad
+            self._climb_loop.reset(self.sensors.height_m)
+
+    def _mode_of(self, params: tuple[float, ...]) -> int:
+        """DO_SET_MODE carries main and sub mode as parameters 2 and 3."""
+        main, sub = params[1], params[2]
+        return int(main) << 16 | int(sub) << 24 if 0 <= main < 256 and 0 <= sub < 256 else -1
+
+    def _command(self, command: int, params: tuple[float, ...]) -> int:
+        match command:
+            case dialect.MAV_CMD_COMPONENT_ARM_DISARM if params[0] == 1:
+                return self._arm()
+            case dialect.MAV_CMD_COMPONENT_ARM_DISARM if params[0] == 0:
+                if self.armed and not self.landed and params[1] != _FORCE:
+                    self.say(dialect.MAV_SEVERITY_CRITICAL, "Disarming denied: not landed")
+                    return int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+                self._disarm()
+                return int(dialect.MAV_RESULT_ACCEPTED)
+            case dialect.MAV_CMD_NAV_LAND:
+                return self._set_mode(Px4Mode.AUTO_LAND)
+            case dialect.MAV_CMD_COMPONENT_ARM_DISARM | dialect.MAV_CMD_NAV_TAKEOFF:
+                return int(dialect.MAV_RESULT_DENIED)
+            case _:
+                return int(dialect.MAV_RESULT_UNSUPPORTED)
+
+    def _arm(self) -> int:
+        if self.armed:
+            return int(dialect.MAV_RESULT_ACCEPTED)
+        reason = self._arming_refusal()
+        if reason:
+            self.say(dialect.MAV_SEVERITY_CRITICAL, reason)
+            return int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+        self.armed, self.landed = True, True
+        self._idle_s = self._landed_s = 0.0
+        self._has_flown = False
+        self.say(dialect.MAV_SEVERITY_INFO, "Armed by external command")
+        return int(dialect.MAV_RESULT_ACCEPTED)
+
+    def _arming_refusal(self) -> str:
+        if not self.is_ready:
+            return "Preflight Fail: system power unstable"
+        if self.arming_block:
+            return f"Preflight Fail: {self.arming_block}"
+        if self.mode == Px4Mode.OFFBOARD and self._setpoint_age_s > self.parameters["COM_OF_LOSS_T"]:
+            return "Arming denied: no offboard signal"
+        if self.mode == Px4Mode.AUTO_LAND:
+            return "Arming denied: mode not armable"
+        return ""
+
+    def _disarm(self) -> None:
+        if self.armed:
+            self.armed, self.landed = False, True
+            self.say(dialect.MAV_SEVERITY_INFO, "Disarmed")
+
+    def _setpoint(self, message: Message) -> None:
+        """Proof of life in any mode; obeyed in OFFBOARD only.  A missing thrust is none at all."""
+        mask = message.type_mask
+        if mask & _IGNORE_ATTITUDE or not self.parameters["MAV_FWDEXTSP"]:
+            return
+        gap_s, self._setpoint_age_s = self._setpoint_age_s, 0.0
+        if gap_s > _STREAM_GAP_S:
+            self._stream_s = 0.0
+        norm = math.hypot(*message.q)
+        if not norm > 0.0:  # undefined there: it must not crash here
+            return
+        self._q_target = euler(*(part / norm for part in message.q))
+        self._yaw_rate_radps = 0.0 if mask & _IGNORE_YAW_RATE else message.body_yaw_rate
+        missing = mask & _IGNORE_THRUST or not math.isfinite(message.thrust)
+        self._thrust = 0.0 if missing else min(max(message.thrust, 0.0), 1.0)
+
+    # Flight code
+
+    def _control(self, dt_s: float) -> AirframeCommand:
+        self._setpoint_age_s += dt_s
+        self._stream_s = self._stream_s + dt_s if self._setpoint_age_s <= _STREAM_GAP_S else 0.0
+        if self.mode == Px4Mode.OFFBOARD and self._setpoint_age_s > self.parameters["COM_OF_LOSS_T"]:
+            self._lose_offboard()
+        if not self.armed:
+            return AirframeCommand()
+        roll, pitch, yaw, yaw_rate, collective, down = self._wishes(dt_s)
+        self._detect_landing(dt_s, collective, down=down)
+        self._disarm_when_done(dt_s)
+        return self._fly(roll, pitch, yaw, yaw_rate, max(collective, _IDLE_COLLECTIVE))
+
+    def _wishes(self, dt_s: float) -> tuple[float, float, float, float, float, bool]:
+        """Roll, pitch, yaw, yaw rate, collective, and whether a height loop wants to go down."""
+        if self.mode == Px4Mode.OFFBOARD:
+            return *self._q_target, self._yaw_rate_radps, self._thrust, False
+        sticks = self.sticks
+        climb_mps = sticks.climb_mps
+        roll, pitch = sticks.roll_rad, sticks.pitch_rad
+        if self.mode == Px4Mode.AUTO_LAND:
+            climb_mps, roll, pitch = -self.parameters["MPC_LAND_SPEED"], 0.0, 0.0
+        if self.landed and climb_mps <= 0.0:
+            self._climb_loop.reset(self.sensors.height_m)
+            return 0.0, 0.0, self.sensors.yaw_rad, 0.0, 0.0, climb_mps < 0.0
+        self._stick_yaw_rad += sticks.yaw_rate_radps * dt_s
+        collective = self._hold_climb(dt_s, climb_mps)
+        return roll, pitch, self._stick_yaw_rad, sticks.yaw_rate_radps, collective, climb_mps < 0.0
+
+    def _detect_landing(self, dt_s: float, collective: float, *, down: bool) -> None:
+        """Without a climb-rate setpoint only a thrust near zero counts as landed."""
+        hover = self.airframe.params.hover_collective
+        low = collective < 0.6 * hover if down else collective <= self.parameters["MPC_MANTHR_MIN"] + 0.01
+        still = abs(self.sensors.climb_mps) < self.parameters["LNDMC_Z_VEL_MAX"]
+        self._settled_s = self._settled_s + dt_s if low and still else 0.0
+        if self._settled_s >= _LAND_DETECT_S:
+            self.landed = True
+        elif self.sensors.climb_mps > 0.15 and collective > 0.5 * hover:
+            self.landed = False
+            self._has_flown = True
+
+    def _disarm_when_done(self, dt_s: float) -> None:
+        self._idle_s = self._idle_s + dt_s if self.landed else 0.0
+        name = "COM_DISARM_LAND" if self._has_flown else "COM_DISARM_PRFLT"
+        delay_s = self.parameters[name]
+        if delay_s > 0 and self._idle_s >= delay_s:
+            self._disarm()
+
+    def _lose_offboard(self) -> None:
+        self.say(dialect.MAV_SEVERITY_CRITICAL, "Offboard control lost")
+        lands = self.parameters["COM_OBL_RC_ACT"] == _OBL_LAND
+        self._enter(Px4Mode.AUTO_LAND if lands else Px4Mode.ALTCTL)
+
+    # Reports
+
+    def _refresh(self, now_ns: int) -> None:
+        super()._refresh(now_ns)
+        landing = LANDED_LANDING if self.mode == Px4Mode.AUTO_LAND else LANDED_AIR
+        self.instruments.landed_state = LANDED_GROUND if self.landed else landing
+
+    def _heartbeat(self) -> Message:
+        base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
+        if self.armed:
+            base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        active = dialect.MAV_STATE_ACTIVE if self.armed else dialect.MAV_STATE_STANDBY
+        return dialect.MAVLink_heartbeat_message(
+            dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_PX4, base, self.mode, active, 3
+        )
