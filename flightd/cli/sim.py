@@ -38,7 +38,7 @@ def sim(
         str | None, typer.Option(help="Site file, or random:SEED for a random site.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of wind, sensors, floor and camera.", min=0)] = 1,
-    vehicle: Annotated[str, typer.Option(help="ardupilot or ardrone.")] = "ardupilot",
+    vehicle: Annotated[str, typer.Option(help="ardupilot, px4 or ardrone.")] = "ardupilot",
     speed: Annotated[str, typer.Option(help="max (lockstep), or a multiple of real time.")] = "max",
     scenario: Annotated[list[Path] | None, typer.Option(help="Scenario file.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for log, report and summary.")] = Path("out/sim"),

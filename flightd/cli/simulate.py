@@ -180,13 +180,13 @@ def _flight_recorder(simulation: Simulation, clock: LoopClock, lossless: bool) -
 def _spec(simulation: Simulation, camera_port: int, vehicle_ports: tuple[int, ...]) -> WorldSpec:
     scenario = simulation.scenario
     kind = simulation.config.vehicle.kind
-    if kind not in ("ardupilot", "ardrone"):
-        raise InputError(f"--vehicle {kind}: the simulator has ardupilot and ardrone")
+    if kind == "mavsdk":
+        raise InputError(f"--vehicle {kind}: the simulator has ardupilot, px4 and ardrone")
     return WorldSpec(
         site=simulation.site,
         seed=simulation.seed,
         camera_address=("127.0.0.1", camera_port),
-        vehicle="ardrone" if kind == "ardrone" else "ardupilot",
+        vehicle=kind,
         vehicle_ports=vehicle_ports,
         start_yaw_rad=math.radians(simulation.config.mission.start_yaw_deg),
         camera=replace(scenario.camera.camera(), mount=simulation.config.camera.mount()),

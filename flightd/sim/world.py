@@ -20,6 +20,7 @@ from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer, Ports
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.camera import CameraPeer
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.optics import SimCamera
@@ -37,7 +38,7 @@ class WorldSpec:
     site: Site
     seed: int
     camera_address: tuple[str, int]
-    vehicle: Literal["ardupilot", "ardrone"] = "ardupilot"
+    vehicle: Literal["ardupilot", "px4", "ardrone"] = "ardupilot"
     vehicle_ports: tuple[int, ...] = (0,)
     start_yaw_rad: float = 0.0
     camera: SimCamera = field(default_factory=SimCamera)
@@ -81,7 +82,8 @@ class World:
             show = server.show
         else:
             (port,) = spec.vehicle_ports
-            self.vehicle = ArduCopterPeer(clock, airframe, PeerConfig(port=port, seed=spec.seed))
+            peer = Px4Peer if spec.vehicle == "px4" else ArduCopterPeer
+            self.vehicle = peer(clock, airframe, PeerConfig(port=port, seed=spec.seed))
         self.camera = CameraPeer(
             spec.site,
             spec.camera,
