@@ -59,6 +59,11 @@ def plan_of(config: Config, site: Site) -> FlightPlan:
     return make_plan(site, visits, pad, pad, mission.heading, math.radians(mission.start_yaw_deg))
 
 
+def pilot_of(config: Config, site: Site) -> Pilot:
+    """A fresh pilot for one flight."""
+    return Pilot(site, plan_of(config, site), config.mission.heading, config.pilot_params(site))
+
+
 def detector_pool(config: Config, clock: Clock) -> DetectorPool:
     """Detector processes after the configuration; the colour profile is read here, so that a wrong one
     is found before anything flies."""
@@ -86,7 +91,7 @@ class Daemon:
         self._detectors = detectors
         self._recorder = recorder
         self._observers = observers
-        self._pilot = Pilot(site, plan_of(config, site), config.mission.heading, config.pilot_params(site))
+        self._pilot = pilot_of(config, site)
         self._frames: Latest[FrameTicket] = Latest()
         self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock)
         self._camera = connect_camera(config.camera, clock, self._frames.put, self._vehicle)
@@ -211,6 +216,8 @@ class Daemon:
         """Record what came in and went out; status ten times a second and at each change of phase."""
         now_ns, recorder = tick.now_ns, self._recorder
         if recorder is not None:
+            recorder.record(Topic.TICK, now_ns, tick)
+            recorder.record(Topic.DECISION, now_ns, output)
             for lines in tick.lines:
                 recorder.record(Topic.LINES, lines.stamp_ns, lines)
             if tick.vehicle is not None:

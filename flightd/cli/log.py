@@ -93,11 +93,11 @@ def export(
         raise InputError("say what to export: --csv DIR, --video F.mp4 or both")
     written: list[Path] = []
     if csv is not None:
-        from flightd.core.topics import Topic
+        from flightd.core.topics import FOR_PEOPLE
         from flightd.replay.export import export_csv
         from flightd.replay.log import read_log
 
-        written += export_csv(read_log(log, {topic for topic in Topic if topic != Topic.FRAME}), csv)
+        written += export_csv(read_log(log, FOR_PEOPLE), csv)
     if video is not None:
         from flightd.cli.video import export_video
 

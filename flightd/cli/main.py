@@ -10,7 +10,7 @@ import sys
 import typer
 
 from flightd import __version__
-from flightd.cli import log, report, run, sim, vision
+from flightd.cli import log, replay, report, run, sim, vision
 from flightd.cli import map as site_map
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 
@@ -21,6 +21,7 @@ vision.register(app)
 sim.register(app)
 run.register(app)
 report.register(app)
+replay.register(app)
 log.register(app)
 site_map.register(app)
 

@@ -19,7 +19,11 @@ from flightd.core.types import (
 
 
 class Topic(enum.StrEnum):
-    """Names of the streams in `flight.mcap`; TRUTH and SCENARIO are in the simulator's `truth.mcap`."""
+    """Names of the streams in `flight.mcap`; TRUTH and SCENARIO are in the simulator's `truth.mcap`.
+
+    TICK and DECISION are all that the pilot was given and all that it answered (`pilot.TickInput`,
+    `pilot.TickOutput`), so that a flight can be replayed; the others are for people and their tools.
+    """
 
     LINES = "/lines"
     POSE = "/pose"
@@ -29,6 +33,8 @@ class Topic(enum.StrEnum):
     EVENT = "/event"
     COMMAND = "/command"
     FRAME = "/frame"
+    TICK = "/tick"
+    DECISION = "/decision"
     CONFIG = "/config"
     MAP = "/map"
     TRUTH = "/truth"
@@ -50,6 +56,9 @@ class Document:
 
     text: str
 
+
+FOR_PEOPLE = frozenset(Topic) - {Topic.FRAME, Topic.TICK, Topic.DECISION}
+"""All but the pictures and what only a replay needs."""
 
 RETAINED = frozenset({Topic.CONFIG, Topic.MAP, Topic.SCENARIO})
 """Topics whose newest message holds for the whole flight, so that every log file must carry it."""

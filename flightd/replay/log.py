@@ -166,19 +166,20 @@ def _decoder(kind: type) -> Decoder:
     def decode(payload: bytes) -> object:
         try:
             return strict.decode(payload)
-        except msgspec.ValidationError:  # JSON has no NaN: a float that is none was written as null
-            return msgspec.convert(_with_nan(msgspec.json.decode(payload)), kind)
+        except msgspec.ValidationError:
+            return msgspec.convert(with_nan(msgspec.json.decode(payload)), kind)
 
     return decode
 
 
-def _with_nan(value: object) -> object:
+def with_nan(value: object) -> object:
+    """JSON has no NaN: the same value with NaN where null stands for a float that is no number."""
     if value is None:
         return math.nan
     if isinstance(value, dict):
-        return {key: _with_nan(item) for key, item in value.items()}
+        return {key: with_nan(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_with_nan(item) for item in value]
+        return [with_nan(item) for item in value]
     return value
 
 

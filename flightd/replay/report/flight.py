@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from flightd.config.site_file import parse_site
 from flightd.core.errors import InputError
-from flightd.core.topics import RETAINED, Document, Topic
+from flightd.core.topics import FOR_PEOPLE, RETAINED, Document, Topic
 from flightd.core.types import AttitudeSetpoint, Event, GridPose, LineSet, Phase, Status, VehicleState
 from flightd.grid.site import Site
 from flightd.replay.log import FlightLog, read_log
@@ -168,7 +168,7 @@ class Flight:
 
 def load_flight(path: Path) -> Flight:
     """Read a log, and `truth.mcap` and `summary.json` if they lie beside it.  Raises InputError."""
-    log = read_log(path, {topic for topic in Topic if topic != Topic.FRAME})
+    log = read_log(path, FOR_PEOPLE)
     truths = _truth_messages(path.with_name("truth.mcap"))
     statuses = log.messages(Status)
     stamps_ns = [entry.stamp_ns for entry in log.entries if entry.topic not in RETAINED]

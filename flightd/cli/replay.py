@@ -1,0 +1,113 @@
+"""`flightd replay`: a recorded flight through today's code.  What it does is imported when it runs."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import tomllib
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flightd.core.errors import InputError, RunError
+
+if TYPE_CHECKING:
+    from flightd.replay.decisions import Comparison, Step
+    from flightd.replay.log import FlightLog
+
+
+def register(app: typer.Typer) -> None:
+    """Hang `replay` on `app`."""
+    app.command("replay")(replay)
+
+
+def replay(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="A flight log (flight.mcap).")],
+    tolerance: Annotated[
+        float, typer.Option(min=0.0, help="Largest difference of a number that is no failure.")
+    ] = 0.0,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else.")
+    ] = False,
+) -> None:
+    """Fly a recorded flight again through today's code and compare every decision with the record.
+
+    Exit 0 if they are the same (or within the tolerance), 1 if they drift.
+
+    \b
+    flightd replay out/flight.mcap
+    flightd replay out/flight.mcap --tolerance 1e-6 --json
+    """
+    from flightd.core.topics import Topic
+    from flightd.replay.decisions import replay_decisions
+    from flightd.replay.log import read_log
+
+    recorded = read_log(log, {Topic.TICK, Topic.DECISION, Topic.CONFIG, Topic.MAP})
+    comparison = replay_decisions(recorded, _pilot_step(recorded))
+    if as_json:
+        print(json.dumps(_told(comparison, tolerance)))
+    else:
+        _print(comparison)
+    if not comparison.within(tolerance):
+        gaps = f", {comparison.missing} are missing in the log" if comparison.missing else ""
+        raise RunError(f"{log}: {comparison.differing} of {comparison.ticks} decisions drift{gaps}")
+
+
+def _pilot_step(log: FlightLog) -> Step:
+    """The step of a fresh pilot with the configuration and map of the flight."""
+    from flightd.app import pilot_of
+    from flightd.config.schema import parse_config
+    from flightd.config.site_file import parse_site
+    from flightd.core.topics import Topic
+
+    text = _document(log, Topic.CONFIG)
+    try:
+        table = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
+    except ValueError as err:
+        raise InputError(f"{log.path}: its configuration cannot be read ({err})") from None
+    config = parse_config(table, log.path)
+    return pilot_of(config, parse_site(_document(log, Topic.MAP), f"{log.path} (map)")).step
+
+
+def _document(log: FlightLog, topic: str) -> str:
+    from flightd.core.topics import Document
+
+    documents = log.messages(Document, topic)
+    if not documents:
+        raise InputError(f"{log.path}: holds no {topic.strip('/')}, so it cannot be replayed")
+    return documents[-1].text
+
+
+def _told(comparison: Comparison, tolerance: float) -> dict[str, Any]:
+    return {
+        "ticks": comparison.ticks,
+        "identical": comparison.identical,
+        "within_tolerance": comparison.within(tolerance),
+        "differing": comparison.differing,
+        "missing": comparison.missing,
+        "drift": [
+            asdict(drift) | {"largest": drift.largest if math.isfinite(drift.largest) else None}
+            for drift in comparison.drifts
+        ],
+    }
+
+
+def _print(comparison: Comparison) -> None:
+    if comparison.identical:
+        print(f"{comparison.ticks} ticks replayed: every decision is the same")
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=f"{comparison.differing} of {comparison.ticks} decisions drift")
+    for heading in ("field", "ticks", "from", "largest", "recorded", "replayed"):
+        table.add_column(heading, justify="right" if heading in {"ticks", "from", "largest"} else "left")
+    for drift in sorted(comparison.drifts, key=lambda drift: (drift.first_s, drift.field)):
+        largest = f"{drift.largest:.3g}" if math.isfinite(drift.largest) else ""
+        table.add_row(
+            drift.field, str(drift.ticks), f"{drift.first_s:.2f} s", largest, drift.recorded, drift.replayed
+        )
+    Console(width=None if sys.stdout.isatty() else 160).print(table)

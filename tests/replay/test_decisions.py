@@ -1,0 +1,152 @@
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from flightd.adapters.recorder.recorder import Recorder
+from flightd.app import pilot_of
+from flightd.config.schema import Config, load_config
+from flightd.config.site_file import load_site, site_toml
+from flightd.core.errors import InputError
+from flightd.core.topics import Document, Topic
+from flightd.core.types import AttitudeSetpoint, Phase
+from flightd.grid.site import Site
+from flightd.pilot import TickInput, TickOutput
+from flightd.replay.decisions import replay_decisions
+from flightd.replay.log import read_log
+from tests.sim.ideal_flight import IdealFlight
+
+ROOT = Path(__file__).parents[2]
+
+
+def _setting() -> tuple[Config, Site]:
+    config = load_config(ROOT / "configs" / "sim.toml")
+    visits = config.mission.model_copy(update={"nodes": ("A2", "A3")})
+    return config.model_copy(update={"mission": visits}), load_site(ROOT / "configs" / "site-demo.toml")
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short flight by ideal sight, recorded as the daemon does."""
+    path = tmp_path_factory.mktemp("flight") / "flight.mcap"
+    config, site = _setting()
+    flight = IdealFlight(site, config.pilot_params(site))
+    flight.pilot = pilot_of(config, site)
+    step = flight.pilot.step
+    with Recorder(path, lossless=True) as recorder:
+
+        def recording(tick: TickInput) -> TickOutput:
+            output = step(tick)
+            recorder.record(Topic.TICK, tick.now_ns, tick)
+            recorder.record(Topic.DECISION, tick.now_ns, output)
+            return output
+
+        recorder.record(Topic.CONFIG, 0, Document(config.model_dump_json()))
+        recorder.record(Topic.MAP, 0, Document(site_toml(site)))
+        flight.pilot.step = recording  # type: ignore[method-assign]
+        flown = flight.fly(120.0)
+    assert flown.phase is Phase.DONE
+    return path
+
+
+def _step() -> Callable[[TickInput], TickOutput]:
+    return pilot_of(*_setting()).step
+
+
+def test_the_same_code_decides_the_same(log: Path) -> None:
+    comparison = replay_decisions(read_log(log), _step())
+    assert comparison.ticks > 500
+    assert comparison.identical
+    assert comparison.drifts == ()
+
+
+def test_a_small_change_of_behaviour_is_told_with_its_size(log: Path) -> None:
+    step = _step()
+
+    def changed(tick: TickInput) -> TickOutput:
+        output = step(tick)
+        if output.setpoint is None or output.phase is not Phase.FOLLOW:
+            return output
+        more = dataclasses.replace(output.setpoint, roll_rad=output.setpoint.roll_rad + 0.001)
+        return dataclasses.replace(output, setpoint=more)
+
+    comparison = replay_decisions(read_log(log), changed)
+    (drift,) = comparison.drifts
+    assert drift.field == "setpoint.roll_rad"
+    assert drift.largest == pytest.approx(0.001)
+    assert drift.ticks == comparison.differing > 50
+    assert not comparison.within(0.0)
+    assert comparison.within(0.0011)
+
+
+def test_a_decision_of_another_kind_is_beyond_any_tolerance(log: Path) -> None:
+    step = _step()
+
+    def changed(tick: TickInput) -> TickOutput:
+        return dataclasses.replace(step(tick), goal="Z9", setpoint=None)
+
+    comparison = replay_decisions(read_log(log), changed)
+    assert {drift.field for drift in comparison.drifts} == {"goal", "setpoint"}
+    assert not comparison.within(1e9)
+
+
+def test_gaps_in_the_record_are_told(log: Path) -> None:
+    whole = read_log(log)
+    lost = next(i for i, entry in enumerate(whole.entries) if entry.topic == Topic.DECISION and i > 400)
+    holed = dataclasses.replace(whole, entries=whole.entries[:lost] + whole.entries[lost + 1 :])
+    comparison = replay_decisions(holed, _step())
+    assert (comparison.missing, comparison.differing) == (1, 0)
+    assert not comparison.within(1.0)
+
+
+def test_a_log_without_ticks_is_told(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "flight.mcap") as recorder:
+        recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
+    with pytest.raises(InputError, match="holds no ticks"):
+        replay_decisions(read_log(tmp_path / "flight.mcap"), _step())
+
+
+def _run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "flightd", "replay", *map(str, arguments)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def test_the_command_finds_no_drift_in_a_new_process(log: Path) -> None:
+    result = _run(log, "--json")
+    assert (result.returncode, result.stderr) == (0, "")
+    told = json.loads(result.stdout)
+    assert told["identical"] is True
+    assert told["drift"] == []
+
+
+def test_the_command_tells_the_drift_of_another_configuration(log: Path, tmp_path: Path) -> None:
+    config, _ = _setting()
+    slower = config.control.model_copy(update={"max_tilt_deg": 2.0})
+    path = tmp_path / "flight.mcap"
+    with Recorder(path, lossless=True) as recorder:
+        recorder.record(
+            Topic.CONFIG, 0, Document(config.model_copy(update={"control": slower}).model_dump_json())
+        )
+        for entry in read_log(log, {Topic.MAP, Topic.TICK, Topic.DECISION}).entries:
+            recorder.record(entry.topic, entry.stamp_ns, entry.message)
+    result = _run(path)
+    assert result.returncode == 1
+    assert "setpoint.pitch_rad" in result.stdout
+    assert len(result.stderr.splitlines()) == 1
+    assert "decisions drift" in result.stderr
+
+
+def test_a_log_without_its_map_is_one_line_and_exit_2(tmp_path: Path, log: Path) -> None:
+    path = tmp_path / "flight.mcap"
+    with Recorder(path, lossless=True) as recorder:
+        for entry in read_log(log, {Topic.CONFIG, Topic.TICK}).entries:
+            recorder.record(entry.topic, entry.stamp_ns, entry.message)
+    result = _run(path)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert "holds no map" in result.stderr
