@@ -21,9 +21,9 @@ from flightd.vision.strip import Strip
 METHODS = ("centroid", "skeleton", "combined", "naive")
 
 _MIN_SIDE_PX = 16
-_CLOSING = np.ones((11, 11), np.uint8)
-_SMALL_CLOSING = np.ones((5, 5), np.uint8)
-_WORN = 1.03
+_SPECKS = np.ones((5, 5), np.uint8)
+_HOLES = np.ones((11, 11), np.uint8)
+_WORN = 1.02
 """Closing that adds more than this to the paint shows worn paint, whose holes would break the ridge."""
 
 
@@ -66,7 +66,7 @@ class Detector:
         height, width = bgr.shape[:2]
         plane = self._plane(width, height)
         grid = grid_for(width, height)
-        mask = grow(classify(sample(bgr, grid), self.profile))
+        mask = _closed(grow(classify(sample(bgr, grid), self.profile)), _SPECKS)
         mark("colour")
         strips = self._find(bgr, mask, grid, plane, mark)
         lines = tuple(strip.to_line() for strip in strips)
@@ -108,17 +108,20 @@ class Detector:
 
     def _guess(self, mask: Image, grid: Grid, plane: Plane) -> list[evidence.Evidence]:
         """Everything that may be a band, with its evidence."""
-        filled = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _SMALL_CLOSING), np.uint8)
         guesses: list[Strip] = []
         if self.method in ("centroid", "combined"):
-            guesses += centroid.find(filled, grid, plane)
+            guesses += centroid.find(mask, grid, plane)
         if self.method in ("skeleton", "combined"):
-            closed = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _CLOSING), np.uint8)
-            worn = cv2.countNonZero(closed) > _WORN * cv2.countNonZero(mask)
-            ridged = closed if worn else mask
+            solid = _closed(mask, _HOLES)
+            worn = cv2.countNonZero(solid) > _WORN * cv2.countNonZero(mask)
+            ridged = solid if worn else mask
             guesses += skeleton.find(ridged, grid, plane, guesses, zhang_suen=self._zhang_suen)
         fused = combine.fuse(guesses, tolerance_px=1.5 * grid.step)
-        return evidence.weigh(fused, filled, grid, plane)
+        return evidence.weigh(fused, mask, grid, plane)
+
+
+def _closed(mask: Image, kernel: Image) -> Image:
+    return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel), np.uint8)
 
 
 def _check(bgr: Image) -> None:
