@@ -167,10 +167,10 @@ class Px4Peer(AutopilotPeer):
     def _control(self, dt_s: float) -> AirframeCommand:
         self._setpoint_age_s += dt_s
         self._stream_s = self._stream_s + dt_s if self._setpoint_age_s <= _STREAM_GAP_S else 0.0
-        if self.mode == Px4Mode.OFFBOARD and self._setpoint_age_s > self.parameters["COM_OF_LOSS_T"]:
-            self._lose_offboard()
         if not self.armed:
             return AirframeCommand()
+        if self.mode == Px4Mode.OFFBOARD and self._setpoint_age_s > self.parameters["COM_OF_LOSS_T"]:
+            self._lose_offboard()
         roll, pitch, yaw, yaw_rate, collective, down = self._wishes(dt_s)
         self._detect_landing(dt_s, collective, down=down)
         self._disarm_when_done(dt_s)
