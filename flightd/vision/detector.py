@@ -21,6 +21,8 @@ from flightd.vision.strip import Strip
 METHODS = ("centroid", "skeleton", "combined", "naive")
 
 _MIN_SIDE_PX = 16
+_REACH_PX = 10
+"""How far the guessed edge may be off: a sample and a half, or what blur hides."""
 _SPECKS = np.ones((5, 5), np.uint8)
 _HOLES = np.ones((11, 11), np.uint8)
 _WORN = 1.02
@@ -96,7 +98,7 @@ class Detector:
         frame = np.ascontiguousarray(bgr)
         found: list[Strip] = []
         while strips := evidence.select(guesses, shortest, found):
-            refined = refine(frame, strips, plane, reach_px=1.5 * grid.step + 1)
+            refined = refine(frame, strips, plane, reach_px=_REACH_PX)
             found += [strip for strip in refined if strip is not None]
             # What hid behind a guess that turned out to be no line gets its own chance.
             tried = {id(strip) for strip in strips}

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.fit import bow, fit_line
+from flightd.vision.fit import bow, fit_lines
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
-from flightd.vision.strip import Array, Strip
+from flightd.vision.strip import Array, LinearFit, Strip
 
 CLUSTER_RAD = math.radians(5.0)
 """Hough lines closer than this in angle, a few samples apart, are one line (paper, section IV)."""
@@ -168,23 +168,27 @@ def _fit_ridge(u: Array, v: Array, ridge: _Ridge, members: NDArray[np.intp], *, 
     radius, step = ridge.radius, ridge.step
     noise = step / math.sqrt(6)
     for limit in (1.5, 1.0):
-        typical = _median(radius[members])
-        kept = members[np.abs(radius[members] - typical) <= 1.2 * step + 0.3 * typical]
+        # The band may taper; where others cross or join it, the ridge is wider than its own line says.
+        fit, half = fit_lines(u[members], (v[members], radius[members]), noise)
+        off = np.abs(radius[members] - half.a - half.b * u[members])
+        kept = members[off <= 1.2 * step + 0.2 * radius[members]]
         if len(kept) < _MIN_POINTS:
             return None
-        fit = fit_line(u[kept], v[kept], noise)
+        fit, half = fit_lines(u[kept], (v[kept], radius[kept]), noise)
         members = np.flatnonzero((np.abs(v - fit.a - fit.b * u) <= limit * step) & ridge.free)
         if len(members) < _MIN_POINTS:
             return None
     if bow(u[kept], v[kept], noise):
         return None
     # The distance is to the first unpainted sample's centre: half a sample beyond the edge.
-    half = max(step / 2, typical - step / 2) * math.hypot(1.0, fit.b)
+    stretch = math.hypot(1.0, fit.b)
     u0, u1 = float(u[kept].min()) - step / 2, float(u[kept].max()) + step / 2
+    if min(half.at(u0), half.at(u1)) < step / 2:
+        return None
+    a, b = (half.a - step / 2) * stretch, half.b * stretch
+    # The transform counts whole samples: its edges are known half as well as its ridge.
+    variance = step * step / 4
+    low = LinearFit(fit.a - a, fit.b - b, fit.var_a + variance, fit.var_b, fit.cov_ab)
+    high = LinearFit(fit.a + a, fit.b + b, fit.var_a + variance, fit.var_b, fit.cov_ab)
     slabs = np.count_nonzero(np.bincount(((u[kept] - u0) / step).astype(np.intp)))
-    return Strip(steep, fit, fit.shifted(-half), fit.shifted(half), u0, u1, slabs * step / (u1 - u0))
-
-
-def _median(values: Array) -> float:
-    middle = len(values) // 2
-    return float(np.partition(values, middle)[middle])
+    return Strip(steep, fit, low, high, u0, u1, slabs * step / (u1 - u0))
