@@ -122,6 +122,7 @@ def test_the_command_finds_no_drift_in_a_new_process(log: Path) -> None:
     assert (result.returncode, result.stderr) == (0, "")
     told = json.loads(result.stdout)
     assert told["identical"] is True
+    assert told["passed"] is True
     assert told["drift"] == []
 
 
