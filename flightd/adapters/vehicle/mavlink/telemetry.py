@@ -17,6 +17,7 @@ _STAMP_AGE_MAX_NS = 500_000_000
 _RANGE_STALE_NS = 500_000_000
 _CLIMB_STALE_NS = 1_000_000_000
 _REBOOT_MS = 1_000
+_SLOPE_MS, _SLOPE_GAP_MS = 250, 500
 _NO_CELL_MV = 65535
 _UNKNOWN_U16 = 65535
 
@@ -40,6 +41,7 @@ class Telemetry:
         self._range_ns = 0
         self._climb_mps = math.nan
         self._climb_ns = 0
+        self._heights: deque[tuple[int, int]] = deque()
         self._landed = LandedState.UNKNOWN
         self._battery_frac = math.nan
         self._battery_v = math.nan
@@ -76,8 +78,7 @@ class Telemetry:
             case "DISTANCE_SENSOR" if message.orientation == dialect.MAV_SENSOR_ROTATION_PITCH_270:
                 self._take_range(message, now_ns)
             case "GLOBAL_POSITION_INT":
-                self._climb_mps = -message.vz / 100.0
-                self._climb_ns = now_ns
+                self._take_global_position(message, now_ns)
             case "LOCAL_POSITION_NED" if math.isfinite(message.vz):
                 self._climb_mps = -message.vz
                 self._climb_ns = now_ns
@@ -129,9 +130,11 @@ class Telemetry:
         if rebooted:
             self._sync.reset()
         stamp_ns = self._stamp(boot_ms, now_ns)
-        if self._attitude is None or rebooted or stamp_ns > self._attitude.stamp_ns:
-            self._attitude = Attitude(stamp_ns, *angles)
-            self._attitudes.append(self._attitude)
+        last_ns = stamp_ns - 1 if self._attitude is None or rebooted else self._attitude.stamp_ns
+        if stamp_ns >= last_ns:
+            self._attitude = sample = Attitude(stamp_ns, *angles)
+            if stamp_ns > last_ns:
+                self._attitudes.append(sample)
         return rebooted
 
     def _take_range(self, message: Message, now_ns: int) -> None:
@@ -144,6 +147,23 @@ class Telemetry:
             tilt_cos = math.cos(self._attitude.roll_rad) * math.cos(self._attitude.pitch_rad)
         self._range_m = centimetres / 100.0 * max(tilt_cos, 0.0)
         self._range_ns = self._stamp(message.time_boot_ms, now_ns)
+
+    def _take_global_position(self, message: Message, now_ns: int) -> None:
+        """Climb from the velocity; ArduPilot sends all zeros when it estimates none, and then the
+        height's own slope tells."""
+        boot_ms = message.time_boot_ms
+        if self._heights and not 0 <= boot_ms - self._heights[-1][0] <= _SLOPE_GAP_MS:
+            self._heights.clear()
+        self._heights.append((boot_ms, message.relative_alt))
+        while boot_ms - self._heights[0][0] > _SLOPE_MS:
+            self._heights.popleft()
+        if message.vx or message.vy or message.vz:
+            self._climb_mps = -message.vz / 100.0
+        else:
+            first_ms, first_mm = self._heights[0]
+            span_ms = boot_ms - first_ms
+            self._climb_mps = (message.relative_alt - first_mm) / span_ms if span_ms else 0.0
+        self._climb_ns = now_ns
 
     def _take_battery(self, millivolt: int, remaining_pc: int) -> None:
         if millivolt > 0:

@@ -1,0 +1,155 @@
+"""MAVLink telemetry to the vehicle's state: units, signs, what is missing, what makes no sense."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.adapters.vehicle.mavlink.telemetry import Telemetry
+from flightd.adapters.vehicle.mavlink.timesync import ClockSync
+from flightd.core.types import LandedState, VehicleState
+
+NOW_NS = 1_000_000_000_000
+MS = 1_000_000
+
+
+def attitude(boot_ms: int = 0, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Any:
+    return dialect.MAVLink_attitude_message(boot_ms, roll, pitch, yaw, 0.0, 0.0, 0.0)
+
+
+def told(*messages: Any, telemetry: Telemetry | None = None, now_ns: int = NOW_NS) -> VehicleState:
+    telemetry = telemetry or Telemetry(ClockSync())
+    for message in (dialect.MAVLink_heartbeat_message(2, 3, 1, 20, 4, 3), attitude(), *messages):
+        telemetry.take(message, now_ns)
+    state = telemetry.state(now_ns, "", in_control=False, refusal="")
+    assert state is not None
+    return state
+
+
+def distance(centimetres: int, orientation: int = 25, least: int = 20, most: int = 400) -> Any:
+    return dialect.MAVLink_distance_sensor_message(0, least, most, centimetres, 1, 0, orientation, 0)
+
+
+def test_nothing_is_known_before_heartbeat_and_attitude() -> None:
+    telemetry = Telemetry(ClockSync())
+    telemetry.take(attitude(), NOW_NS)
+    assert telemetry.state(NOW_NS, "", in_control=False, refusal="") is None
+    state = told()
+    assert math.isnan(state.height_m)
+    assert math.isnan(state.climb_mps)
+    assert math.isnan(state.battery_frac)
+    assert state.landed is LandedState.UNKNOWN
+
+
+def test_the_range_is_along_the_body_and_the_height_along_the_vertical() -> None:
+    assert told(distance(155)).height_m == pytest.approx(1.55)
+    state = told(attitude(1, math.radians(10), math.radians(-20)), distance(200))
+    assert state.height_m == pytest.approx(2.0 * math.cos(math.radians(10)) * math.cos(math.radians(20)))
+
+
+@pytest.mark.parametrize("message", [distance(0), distance(19), distance(401), distance(155, orientation=0)])
+def test_what_the_range_finder_did_not_see_is_no_height(message: Any) -> None:
+    assert math.isnan(told(message).height_m)
+
+
+def test_a_silent_range_finder_is_no_height() -> None:
+    telemetry = Telemetry(ClockSync())
+    told(distance(155), telemetry=telemetry)
+    assert telemetry.height_m(NOW_NS + 400 * MS) == pytest.approx(1.55)
+    assert math.isnan(telemetry.height_m(NOW_NS + 600 * MS))
+
+
+def position(boot_ms: int, relative_mm: int, vz: int = 0, vx: int = 0) -> Any:
+    return dialect.MAVLink_global_position_int_message(boot_ms, 0, 0, 0, relative_mm, vx, 0, vz, 0)
+
+
+def test_the_climb_rate_points_up() -> None:
+    assert told(position(0, 1000, vz=-50)).climb_mps == pytest.approx(0.5)
+    ned = dialect.MAVLink_local_position_ned_message(0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.3)
+    assert told(ned).climb_mps == pytest.approx(-0.3)
+
+
+def test_without_a_velocity_the_climb_rate_is_the_heights_slope() -> None:
+    """ArduPilot without a velocity estimate sends zeros, also while it climbs."""
+    rising = [position(40 * i, 1000 + 20 * i) for i in range(20)]
+    assert told(*rising).climb_mps == pytest.approx(0.5)
+    assert told(*rising, position(5000, 9000)).climb_mps == 0.0  # after a gap it starts anew
+    assert told(position(0, 1000, vx=10)).climb_mps == 0.0
+
+
+def test_the_battery_is_read_from_either_message_and_unknown_stays_unknown() -> None:
+    cells = [3900, 3900, 3900] + [65535] * 7
+
+    def battery(percent: int, number: int = 0, voltages: list[int] = cells) -> Any:
+        return dialect.MAVLink_battery_status_message(number, 0, 1, 0, voltages, 0, 0, -1, percent)
+
+    state = told(battery(75))
+    assert state.battery_frac == 0.75
+    assert state.battery_v == pytest.approx(11.7)
+    assert math.isnan(told(battery(-1)).battery_frac)
+    assert math.isnan(told(battery(75, number=1)).battery_frac)
+    assert math.isnan(told(battery(75, voltages=[65535] * 10)).battery_v)
+    status = dialect.MAVLink_sys_status_message(0, 0, 0, 0, 12_100, -1, 60, 0, 0, 0, 0, 0, 0)
+    assert told(status).battery_v == pytest.approx(12.1)
+    unknown = dialect.MAVLink_sys_status_message(0, 0, 0, 0, 65535, -1, -1, 0, 0, 0, 0, 0, 0)
+    assert math.isnan(told(unknown).battery_v)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e30])
+def test_an_attitude_that_makes_no_sense_is_not_taken(value: float) -> None:
+    telemetry = Telemetry(ClockSync())
+    told(attitude(10, roll=value), telemetry=telemetry)
+    assert len(telemetry.attitudes()) == 1
+
+
+def test_stamps_are_in_our_clock_once_the_clocks_are_compared() -> None:
+    sync = ClockSync()
+    telemetry = Telemetry(sync)
+    telemetry.take(attitude(5000), NOW_NS)
+    asked = sync.ask(NOW_NS)
+    assert sync.answered(asked, 5_010 * MS, NOW_NS + 20 * MS)  # their 5010 ms is our NOW + 10 ms
+    telemetry.take(attitude(5100), NOW_NS + 130 * MS)
+    first, second = telemetry.attitudes()
+    assert first.stamp_ns == NOW_NS
+    assert second.stamp_ns == NOW_NS + 100 * MS
+
+
+def test_an_impossible_stamp_is_replaced_by_the_arrival() -> None:
+    sync = ClockSync()
+    telemetry = Telemetry(sync)
+    sync.answered(sync.ask(NOW_NS), 5_000 * MS, NOW_NS)
+    telemetry.take(attitude(9_000), NOW_NS + 10 * MS)  # four seconds in our future
+    assert telemetry.attitudes()[0].stamp_ns == NOW_NS + 10 * MS
+
+
+def test_a_boot_clock_that_jumps_back_is_a_reboot() -> None:
+    sync = ClockSync()
+    telemetry = Telemetry(sync)
+    sync.answered(sync.ask(NOW_NS), 60_000 * MS, NOW_NS)
+    assert not telemetry.take(attitude(60_000), NOW_NS)
+    assert not telemetry.take(attitude(59_900), NOW_NS)  # late, not rebooted
+    assert telemetry.take(attitude(100), NOW_NS + 50 * MS)
+    assert sync.offset_ns is None
+    assert telemetry.attitudes()[-1].stamp_ns == NOW_NS + 50 * MS
+
+
+def test_the_fastest_of_the_round_trips_counts() -> None:
+    sync = ClockSync()
+    for delay_ms in (30, 4, 50, 80):
+        asked = sync.ask(NOW_NS + delay_ms)
+        # all of the delay lies on the way back: the worst asymmetry
+        sync.answered(asked, asked + 7_000 * MS, asked + delay_ms * MS)
+    assert sync.offset_ns == pytest.approx(7_000 * MS, abs=2.1 * MS)
+
+
+def test_answers_to_others_forged_and_late_ones_are_not_taken() -> None:
+    sync = ClockSync()
+    asked = sync.ask(NOW_NS)
+    assert not sync.answered(NOW_NS - 5, 1, NOW_NS)
+    assert not sync.answered(asked, 1, NOW_NS + 600 * MS)
+    assert not sync.answered(asked, 1, NOW_NS - 1)
+    assert sync.answered(asked, 1, NOW_NS + MS)
+    assert not sync.answered(asked, 1, NOW_NS + MS)
