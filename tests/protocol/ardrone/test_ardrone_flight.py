@@ -153,6 +153,34 @@ def test_sinking_low_becomes_the_drones_own_landing() -> None:
     virtually(main)
 
 
+def test_with_a_deaf_sonar_the_height_is_unknown_and_a_descent_becomes_a_landing() -> None:
+    async def main() -> None:
+        async with bench() as b:
+            await b.hovering()
+            state = b.drone._state
+            b.drone._state = lambda now_ns: state(now_ns) | 1 << 21  # type: ignore[method-assign]
+            await b.steer(0.3)
+            assert math.isnan(b.state.height_m)
+            await b.steer(0.3, climb_mps=-0.3)
+            assert b.drone.major == Major.LANDING
+
+    virtually(main)
+
+
+def test_a_sonar_echo_of_something_else_is_passed_over() -> None:
+    async def main() -> None:
+        async with bench(full_navdata=True) as b:
+            await b.hovering()
+            before_m = b.state.height_m
+            b.drone.loops.height_m += 2.0
+            await asyncio.sleep(0.02)
+            assert b.state.height_m == pytest.approx(before_m, abs=0.02)
+            await asyncio.sleep(0.4)
+            assert b.state.height_m > before_m + 1.0, "what persists is believed"
+
+    virtually(main)
+
+
 def test_landing_never_cuts_the_motors() -> None:
     async def main() -> None:
         drone = make_drone()

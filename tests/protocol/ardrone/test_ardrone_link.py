@@ -7,9 +7,11 @@ import itertools
 import random
 from typing import Any
 
+import pytest
+
+from flightd.adapters.vehicle.ardrone.settings import Camera
 from flightd.core.types import Demand
 from flightd.sim.ardrone.drone import Major
-from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.ardrone.telemetry import Report, packet
 from tests.protocol.ardrone.bench import bench, make_drone, virtually
 from tests.protocol.ardrone.test_ardrone_config import Ear
@@ -129,6 +131,22 @@ def test_after_a_long_gap_the_drone_stays_down_until_flight_is_demanded_anew() -
             await b.until(lambda: b.vehicle._flight.configured)
             b.vehicle.demand(Demand.FLY)
             await b.until(lambda: b.state.mode == "hovering")
+
+    virtually(main)
+
+
+@pytest.mark.parametrize("demand", [Demand.STANDBY, Demand.DISARM, Demand.HANDS_OFF, Demand.LAND])
+def test_what_was_only_being_watched_is_not_sent_up_again_after_a_long_gap(demand: Demand) -> None:
+    async def main() -> None:
+        drone = make_drone()
+        async with bench(drone) as b:
+            await b.hovering()
+            b.vehicle.demand(demand)
+            b.server.radio = False
+            await b.until(lambda: drone.major == Major.LANDED, limit_s=15.0)
+            b.server.radio = True
+            await asyncio.sleep(5.0)
+            assert drone.major == Major.LANDED
 
     virtually(main)
 
@@ -259,10 +277,17 @@ def test_no_network_is_not_the_end() -> None:
     virtually(main)
 
 
-def test_servers_close_without_leaving_anything() -> None:
+def test_a_camera_asked_for_during_a_gap_is_switched_when_the_drone_is_back() -> None:
     async def main() -> None:
         async with bench() as b:
             await b.configured()
-            assert isinstance(b.server, ArDroneServer)
+            b.server.radio = False
+            await asyncio.sleep(0.1)
+            b.vehicle.select_camera(Camera.FRONT)
+            await asyncio.sleep(1.6)
+            assert b.vehicle.camera_since_ns is None
+            b.server.radio = True
+            await b.until(lambda: b.vehicle.camera_since_ns is not None)
+            assert int(b.server.channel) == Camera.FRONT
 
     virtually(main)

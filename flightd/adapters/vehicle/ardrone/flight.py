@@ -10,8 +10,8 @@ Pure: time is an argument, commands are the result.  The rules:
 - HANDS_OFF in the air: one hover command, a command number 1, then silence.  Any command of ours would
   outrun the numbers of whoever takes over, and the 1 makes the drone obey his; if nobody comes, it lands
   itself after `general:com_watchdog` seconds.
-- A mission lands by sinking: below `land_below_m` a descent becomes REF's landing order, since this drone
-  touches down only by its own landing.
+- A mission lands by sinking: below `land_below_m`, or with a deaf sonar, a descent becomes REF's landing
+  order, since this drone touches down only by its own landing.
 - A flight that the drone ended by itself (battery, lost link, emergency) is over: nothing takes off again
   until FLY has been demanded anew.  The same after `link_lost_s` without navdata: by then it lands itself.
 - Setpoints or telemetry that are late turn into hover at once, because the drone holds the last PCMD.
@@ -103,7 +103,7 @@ class FlightLogic:
 
     def linked(self, now_ns: int) -> bool:
         """Whether telemetry is fresh enough to fly by."""
-        return self.heard and now_ns - self._telemetry.arrival_ns <= self._settings.telemetry_stale_s * 1e9
+        return self.heard and now_ns - self._telemetry.flight_ns <= self._settings.telemetry_stale_s * 1e9
 
     def in_control(self, now_ns: int) -> bool:
         """The drone obeys setpoints or will once airborne, and we want it to."""
@@ -156,9 +156,9 @@ class FlightLogic:
         fly = self._fly(now_ns)
         return [*commands, at.ref(fly=fly, emergency=self._press(now_ns)), self._stick(now_ns)]
 
-    def hush(self) -> list[AtCommand]:
+    def hush(self, now_ns: int) -> list[AtCommand]:
         """The last word before silence."""
-        return [at.ref(fly=self._telemetry.airborne), at.hover()]
+        return [at.ref(fly=self._stays_up(now_ns)), at.hover()]
 
     def follow(self, now_ns: int) -> None:
         """Notice that the drone took off, or ended the flight by itself; with each packet and each beat."""
@@ -169,9 +169,10 @@ class FlightLogic:
             self._flew = True
         if not self._flew:
             return
-        silent_s = (now_ns - telemetry.arrival_ns) / 1e9
+        silent_s = (now_ns - telemetry.flight_ns) / 1e9
         setpoint = self._setpoint
-        if telemetry.height_m < self._settings.land_below_m and setpoint is not None:
+        low = not telemetry.height_m >= self._settings.land_below_m  # or unknown: the sonar is deaf
+        if low and setpoint is not None:
             self._sinking |= setpoint.climb_mps < -_DESCENT_MPS
         if telemetry.state & DroneState.EMERGENCY:
             self._over = f"emergency in flight: {telemetry.emergency}"
@@ -194,7 +195,14 @@ class FlightLogic:
                 self._asked_ns = now_ns
             going_up = telemetry.airborne and not self._over and not self._sinking
             return starting or going_up
-        return self.demand is not Demand.LAND and telemetry.airborne and telemetry.major != Major.LANDING
+        return self.demand is not Demand.LAND and self._stays_up(now_ns)
+
+    def _stays_up(self, now_ns: int) -> bool:
+        """The drone flies and is not landing, as far as we know; after a lost link it will have landed, and
+        a fly bit that greets it then would send it up again."""
+        telemetry = self._telemetry
+        known = now_ns - telemetry.flight_ns <= self._settings.link_lost_s * 1e9
+        return known and telemetry.airborne and telemetry.major != Major.LANDING
 
     def _press(self, now_ns: int) -> bool:
         """The emergency bit: held until the drone leaves the emergency, let go and pressed anew if it

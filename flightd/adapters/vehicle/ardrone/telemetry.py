@@ -34,7 +34,8 @@ class Telemetry:
     """The newest of each quantity with its own time, and the attitude samples not yet drained.
 
     Heights that leap farther than a drone can climb are sonar echoes of something else: they are passed
-    over until they have persisted for 0.3 s.  `state` and `major` are those of the newest packet.
+    over until they have persisted for 0.3 s.  `state` is that of the newest packet, which came at
+    `arrival_ns`; what the flight is doing (`major`) comes with the demo option alone, last at `flight_ns`.
     """
 
     def __init__(self, latency_ns: int) -> None:
@@ -46,6 +47,7 @@ class Telemetry:
         self.demo: Demo | None = None
         self.attitude: Attitude | None = None
         self.arrival_ns = 0
+        self.flight_ns = 0
         self.height_m = math.nan
         self.height_ns = 0
         self.climb_mps = 0.0
@@ -79,7 +81,8 @@ class Telemetry:
             self.battery_v = packet.battery_v
         if packet.demo is None:
             return
-        self.demo = demo = packet.demo
+        self.demo, self.flight_ns = packet.demo, now_ns
+        demo = packet.demo
         stamp_ns = now_ns - self._latency_ns
         if packet.clock_us is not None:
             stamp_ns = self._clock.to_ours(self._counter.unwrap(packet.clock_us) * 1000, now_ns)

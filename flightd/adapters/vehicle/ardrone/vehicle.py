@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import math
 
@@ -24,6 +23,7 @@ MIN_GAP_NS = 20_000_000
 
 _DEAF_NS = 1_000_000_000
 _LAST_WORDS = 3
+_CAMERA_ATTEMPTS = 3
 
 _MODES: dict[int, str] = {
     Major.DEFAULT: "default",
@@ -102,7 +102,7 @@ class ArDroneVehicle:
 
     def demand(self, demand: Demand) -> None:
         if demand is Demand.HANDS_OFF and self._flight.demand is not demand and self._telemetry.airborne:
-            self._link.send(*self._flight.hush())
+            self._link.send(*self._flight.hush(self._clock.now_ns()))
             self._link.restart_numbers()
             self._link.send(at.comwdg())
         self._flight.want(demand)
@@ -201,10 +201,16 @@ class ArDroneVehicle:
             if not self._flight.configured:
                 continue
             wanted = self._camera
-            with contextlib.suppress(TimeoutError):
-                await self._configurator.write("video:video_channel", str(int(wanted)))
-                if wanted == self._camera:
-                    self._camera_since_ns = self._clock.now_ns() + round(self._settings.camera_settle_s * 1e9)
+            try:
+                for _ in range(_CAMERA_ATTEMPTS):  # some firmware never acknowledges: then it has to do
+                    if await self._configurator.write("video:video_channel", str(int(wanted))):
+                        break
+            except TimeoutError:
+                self._camera_wanted.set()
+                await self._link.packet()
+                continue
+            if wanted == self._camera:
+                self._camera_since_ns = self._clock.now_ns() + round(self._settings.camera_settle_s * 1e9)
 
     async def _release(self) -> None:
         """Hand the drone back: land it if it flies at our demand."""
