@@ -51,7 +51,8 @@ def weigh(strips: list[Strip], mask: Image, grid: Grid, plane: Plane) -> list[Ev
     margin = 1.5 * grid.step * norm
     beside = margin + np.minimum(0.35 * width, 6.0 * grid.step * norm)
     v = np.empty((len(strips), STATIONS, len(_INSIDE) + 4))
-    v[..., :6] = _INSIDE * width[..., None]
+    # Samples on the very edge may be either: look half a sample inside it.
+    v[..., :6] = _INSIDE * np.maximum(width - grid.step * norm, 0.25 * width)[..., None]
     v[..., 6], v[..., 7] = -width / 2 - beside, -width / 2 - margin
     v[..., 8], v[..., 9] = width / 2 + margin, width / 2 + beside
     v += (a + b * u)[..., None]
@@ -71,9 +72,12 @@ def weigh(strips: list[Strip], mask: Image, grid: Grid, plane: Plane) -> list[Ev
         if inside[k, stretch][places].sum(axis=0).min() < 0.3 * count:
             continue
         first, pace = float(u0[k, 0]), float(pitch[k, 0])
-        length = float(np.add.reduce(band[k, stretch])) * pace * float(norm[k, 0])
-        support = count / (span[1] - span[0])
-        new = replace(strip, u0=first + pace * span[0], u1=first + pace * span[1], support=support)
+        stations = span[1] - span[0]
+        clear = float(np.add.reduce(band[k, stretch])) / stations
+        length = clear * stations * pace * float(norm[k, 0])
+        new = replace(
+            strip, u0=first + pace * span[0], u1=first + pace * span[1], support=count / stations, clear=clear
+        )
         found.append(Evidence(new, length, length * min(new.width_px, length)))
     return found
 

@@ -17,13 +17,14 @@ _CUTS_PX = (1.5, 0.7, 0.3)
 _MIN_POINTS = 6.0
 _MIN_WIDTH_PX = 2.5
 _MIN_SHARE = 0.46
-"""Part of the painted stations at which both edges are where the straight edge should be."""
-_WORST_SUPPORT = 0.6
-"""Gaps in the paint excuse missing edges down to this support; a chain of blobs has less."""
+"""Of the stations that show paint between floor, the part at which the edges are where they should be."""
+_WORST_CLEAR = 0.6
+"""Crossings and gaps excuse missing edges down to this clear part; a chain of blobs has less."""
 _COMPACT_ASPECT, _COMPACT_SHARE = 3.5, 0.20
 """Below this length to width a blob may pass for a band: each unit less asks for that much more share."""
-_FRAYED_PX, _FRAYED_SHARE = 0.7, 0.5
-"""So does each pixel of scatter beyond this; points all over the window, on no edge at all, have 1.4."""
+_USUAL_SCATTER_PX, _FRAYED_SHARE, _SHARP_SHARE = 0.7, 0.5, 0.2
+"""A pixel of scatter more asks for so much more share, one less for so much less; points all over the
+window, on no edge at all, have 1.4."""
 _MAX_BOW = 0.006
 _MIN_BOW_PX = 1.2
 
@@ -62,9 +63,10 @@ def _is_line(strip: Strip, lines: RobustLines, visible: Array, edges: list[int |
         return False
     share = sum(float(lines.points[e] / visible[e]) for e in seen) / 2
     aspect = strip.length_px / max(strip.width_px, 1.0)
-    frayed = max(float(lines.scatter[e]) for e in seen) - _FRAYED_PX
-    need = _MIN_SHARE + _COMPACT_SHARE * max(0.0, _COMPACT_ASPECT - aspect) + _FRAYED_SHARE * max(0.0, frayed)
-    if share < need * max(_WORST_SUPPORT, strip.support):
+    rough = max(float(lines.scatter[e]) for e in seen) - _USUAL_SCATTER_PX
+    need = _MIN_SHARE + _COMPACT_SHARE * max(0.0, _COMPACT_ASPECT - aspect)
+    need += rough * (_FRAYED_SHARE if rough > 0 else _SHARP_SHARE)
+    if share < need * max(_WORST_CLEAR, strip.clear):
         return False
     # A curve bends both edges the same way.
     bow = sum(float(lines.bow[e]) for e in seen) / len(seen)

@@ -42,7 +42,11 @@ def distance_ridge(mask: Image) -> tuple[NDArray[np.bool_], NDArray[np.float32]]
     # A sample is on the ridge when nothing two samples around is deeper; the staircase of a slanted edge
     # makes small peaks too, but those have deeper paint right behind them.
     deepest = cv2.dilate(distance, _AROUND)
-    return (distance >= deepest - 0.7) & (mask > 0), distance
+    ridge = (distance >= deepest - 0.7) & (mask > 0)
+    # Paint that the picture's border cuts is deepest there, on no ridge of its own.
+    ridge[[0, -1]] = False
+    ridge[:, [0, -1]] = False
+    return ridge, distance
 
 
 def thin(mask: Image) -> Image:

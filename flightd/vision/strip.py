@@ -47,7 +47,7 @@ class Strip:
     """A band between two edges, `low` on the side of smaller v, visible for u in [u0, u1].
 
     `steep` says that u is y and v is x.  `centre` is the bisector of the edges.  `support` is the part
-    of the span that is painted.
+    of the span that is painted, `clear` the part that also shows floor on both sides.
     """
 
     steep: bool
@@ -57,6 +57,7 @@ class Strip:
     u0: float
     u1: float
     support: float
+    clear: float = 1.0
 
     @property
     def cosine(self) -> float:
@@ -139,4 +140,4 @@ def swapped(strip: Strip) -> Strip:
     if strip.centre.b > 0:
         low, high = high, low
     ends = sorted((strip.centre.at(strip.u0), strip.centre.at(strip.u1)))
-    return Strip(not strip.steep, turn(strip.centre), low, high, ends[0], ends[1], strip.support)
+    return Strip(not strip.steep, turn(strip.centre), low, high, ends[0], ends[1], strip.support, strip.clear)
