@@ -26,6 +26,8 @@ MAX_SLOPE = 1.25
 """dv/du of a band described along its own axis; a little beyond the diagonal so that none falls between."""
 
 _MIN_CUTS = 5
+_ROUNDS = 2
+"""Draws go to long bands first; what they leave over is drawn from once more, for the short ones."""
 _NEAR_SLABS, _FAR_SLABS = (3, 6), (14, 30)
 _SLAB_KEY = 1e6
 
@@ -98,40 +100,52 @@ def _straightened(cuts: Cuts, plane: Plane, *, steep: bool) -> Cuts:
 
 
 def _bands(cuts: Cuts, step: int, known: list[Strip], *, steep: bool) -> list[Strip]:
-    """Sequential RANSAC: one matrix of hypotheses against centroids serves all bands of a direction.
-
-    Cuts of the `known` bands, which run the other way, are left alone.
-    """
+    """The bands through the cuts, except those of the `known` bands, which run the other way."""
     usable = cuts.whole.copy()
     if known:
         centre = (cuts.low + cuts.high) / 2
         for other in known:
             away = np.abs(cuts.u - other.centre.a - other.centre.b * centre)
             usable &= away > max(step, 0.15 * other.width_px / other.cosine)
-    if np.count_nonzero(usable) < _MIN_CUTS:
-        return []
-    slab, u, low, high = cuts.slab[usable], cuts.u[usable], cuts.low[usable], cuts.high[usable]
+    strips: list[Strip] = []
+    for _ in range(_ROUNDS):
+        left = np.flatnonzero(usable)
+        if len(left) < _MIN_CUTS:
+            break
+        found, free = _ransac(cuts, left, step, steep=steep)
+        strips += found
+        usable[left[~free]] = False
+        if not found:
+            break
+    return strips
+
+
+def _ransac(
+    cuts: Cuts, chosen: NDArray[np.intp], step: int, *, steep: bool
+) -> tuple[list[Strip], NDArray[np.bool_]]:
+    """Sequential RANSAC: one matrix of hypotheses against centroids serves all bands of a direction.
+
+    Returns the bands and which of the chosen cuts belong to none.
+    """
+    slab, u, low, high = cuts.slab[chosen], cuts.u[chosen], cuts.low[chosen], cuts.high[chosen]
     middle, width = (low + high) / 2, high - low
+    strips: list[Strip] = []
+    free = np.ones(len(u), np.bool_)
     i, j = _pairs(slab, u, middle)
     b = (middle[j] - middle[i]) / (u[j] - u[i])
     width_b = (width[j] - width[i]) / (u[j] - u[i])
     good = (np.abs(b) <= MAX_SLOPE) & (np.abs(width[j] - width[i]) <= 0.25 * (width[j] + width[i]) + 2 * step)
     if not good.any():
-        return []
+        return strips, free
     i, b, width_b = i[good], b[good], width_b[good]
     du = (u - u[i][:, None]).astype(np.float32)
     off = np.abs((middle - middle[i][:, None]).astype(np.float32) - b.astype(np.float32)[:, None] * du)
     expected = width.astype(np.float32)[i][:, None] + width_b.astype(np.float32)[:, None] * du
     inlier = off <= step + 0.08 * expected
     inlier &= np.abs(width.astype(np.float32) - expected) <= 2 * step + 0.25 * expected
-    strips: list[Strip] = []
-    free = np.ones(len(u), np.bool_)
     votes = inlier.astype(np.float32)
     scores = votes.sum(axis=1)
-    while True:
-        best = int(scores.argmax())
-        if scores[best] < _MIN_CUTS:
-            return strips
+    while scores[best := int(scores.argmax())] >= _MIN_CUTS:
         taken = inlier[best] & free
         strip = _fit_band(u, low, high, np.flatnonzero(taken), step, cuts.spacing_px, steep=steep)
         if strip is not None:
@@ -140,6 +154,7 @@ def _bands(cuts: Cuts, step: int, known: list[Strip], *, steep: bool) -> list[St
             taken |= np.abs(middle - strip.centre.a - strip.centre.b * u) <= reach
         free &= ~taken
         scores = votes @ free.astype(np.float32)
+    return strips, free
 
 
 def _pairs(slab: NDArray[np.intp], u: Array, middle: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
