@@ -25,6 +25,7 @@ COPTER_PARAMETERS: dict[str, float] = {
     "VISO_TYPE": 0,
     "FLOW_TYPE": 0,
     "RNGFND1_TYPE": 20,
+    "RNGFND1_ORIENT": 25,
     "PLND_ENABLED": 0,
     "ARMING_CHECK": 1,
     "DISARM_DELAY": 10,
@@ -60,6 +61,8 @@ PX4_PARAMETERS: dict[str, float | int] = {
     "COM_DISARM_PRFLT": 10.0,
     "COM_DISARM_LAND": 2.0,
     "COM_ARM_WO_GPS": 1,
+    "EKF2_GPS_CTRL": 0,
+    "EKF2_HGT_REF": 0,
     "LNDMC_Z_VEL_MAX": 0.25,
     "BAT_LOW_THR": 0.15,
 }
@@ -78,6 +81,8 @@ class ParameterServer:
         if too_long:
             raise ValueError(f"parameter names longer than 16 characters: {too_long}")
         self._values: dict[str, float] = dict(values)
+        self.locked: set[str] = set()
+        """Parameters that answer a PARAM_SET with the value they keep."""
         self._whole = frozenset(name for name in values if bytewise and isinstance(values[name], int))
 
     def __getitem__(self, name: str) -> float:
@@ -103,7 +108,7 @@ class ParameterServer:
         name = str(message.param_id)
         if name not in self._values:
             return
-        if kind == "PARAM_SET":
+        if kind == "PARAM_SET" and name not in self.locked:
             self._set(name, message.param_value)
         reply(self._value(name))
 

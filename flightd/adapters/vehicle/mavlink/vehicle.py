@@ -19,7 +19,7 @@ from flightd.adapters.vehicle.mavlink.commands import Answer, Commander
 from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
 from flightd.adapters.vehicle.mavlink.link import Firmware, MavlinkLink
-from flightd.adapters.vehicle.mavlink.parameters import ParameterReader
+from flightd.adapters.vehicle.mavlink.parameters import Names, Parameters
 from flightd.adapters.vehicle.mavlink.setpoint import Heading, attitude_target
 from flightd.adapters.vehicle.mavlink.signing import Signing
 from flightd.adapters.vehicle.mavlink.statustext import SEVERITIES, TextAssembler, make_texts
@@ -67,8 +67,8 @@ class MavlinkVehicle(abc.ABC):
     """custom_mode in which the autopilot obeys setpoints."""
     landing_mode: ClassVar[int]
     """custom_mode in which it lands where it is, without a position."""
-    parameter_names: ClassVar[tuple[tuple[str, ...], ...]]
-    """What has to be known of the autopilot's parameters; each with its names, oldest first."""
+    parameter_names: ClassVar[tuple[Names, ...]]
+    """What has to be known of the autopilot's parameters."""
     rates_hz: ClassVar[dict[int, float]] = RATES_HZ
 
     def __init__(self, url: str, clock: Clock, system_id: int = 1, signing: Signing | None = None) -> None:
@@ -85,7 +85,7 @@ class MavlinkVehicle(abc.ABC):
         )
         self._commander = Commander(self.link, system_id)
         self.streams = StreamKeeper(self._commander, clock, self.rates_hz)
-        self.parameters = ParameterReader(self.link, system_id, self.parameter_names)
+        self.parameters = Parameters(self.link, system_id, bytewise=self.firmware is Firmware.PX4)
         self._texts = TextAssembler()
         self._reasons: deque[tuple[int, str]] = deque(maxlen=4)
         self._text_id = 0
@@ -186,7 +186,7 @@ class MavlinkVehicle(abc.ABC):
         tasks.create_task(self.link.run(), name="mavlink link")
         tasks.create_task(self._once_heard(self._compare_clocks), name="mavlink timesync")
         tasks.create_task(self._once_heard(self.streams.run), name="mavlink streams")
-        tasks.create_task(self._once_heard(self.parameters.run), name="mavlink parameters")
+        tasks.create_task(self._once_heard(self._read_parameters), name="mavlink parameters")
 
     def _collective(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         """Raw thrust for the climb rate, by our own height loop."""
@@ -213,7 +213,7 @@ class MavlinkVehicle(abc.ABC):
             case "STATUSTEXT":
                 self._say(message, now_ns)
             case "PARAM_VALUE":
-                self.parameters.value(message, bytewise=self.firmware is Firmware.PX4)
+                self.parameters.value(message)
             case _:
                 if self._telemetry.take(message, now_ns):
                     self.parameters.forget()  # it rebooted: they may have changed
@@ -340,6 +340,9 @@ class MavlinkVehicle(abc.ABC):
     async def _once_heard(self, work: Callable[[], Awaitable[None]]) -> None:
         await self._heard.wait()
         await work()
+
+    async def _read_parameters(self) -> None:
+        await self.parameters.keep(self.parameter_names)
 
     async def _compare_clocks(self) -> None:
         while True:

@@ -1,0 +1,111 @@
+"""Looks at an autopilot without flying it: is it there, what is it, are its parameters fit for the job?"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.adapters.vehicle.mavlink.codec import Codec, Message
+from flightd.adapters.vehicle.mavlink.commands import Commander
+from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
+from flightd.adapters.vehicle.mavlink.fitness import RULES, Finding, judge
+from flightd.adapters.vehicle.mavlink.link import Firmware, MavlinkLink
+from flightd.adapters.vehicle.mavlink.parameters import Parameters
+from flightd.adapters.vehicle.mavlink.signing import Signing
+from flightd.adapters.vehicle.mavlink.transport import make_transport
+from flightd.core.errors import UnavailableError
+from flightd.ports import Clock
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What was found.  `version` is "" when the autopilot does not tell; `unread` are parameters that it
+    does not have, under their newest names."""
+
+    firmware: Firmware
+    version: str
+    armed: bool
+    findings: tuple[Finding, ...]
+    unread: tuple[str, ...]
+
+
+class Examination:
+    """Examines one autopilot, inside `async with examination.connected():`."""
+
+    def __init__(self, url: str, clock: Clock, system_id: int = 1, signing: Signing | None = None) -> None:
+        self._url = url
+        transport = make_transport(parse_endpoint(url))
+        self._link = MavlinkLink(transport, Codec(system_id, signing=signing), clock, system_id, self._take)
+        self._commander = Commander(self._link, system_id)
+        self._parameters = Parameters(self._link, system_id, bytewise=False)
+        self._heard = asyncio.Event()
+        self._armed = False
+        self._version = ""
+
+    @asynccontextmanager
+    async def connected(self, patience_s: float = 5.0) -> AsyncIterator[None]:
+        """Hold the link; UnavailableError when no autopilot is heard within `patience_s`."""
+        line = asyncio.create_task(self._link.run(), name="examination link")
+        heard = asyncio.create_task(self._heard.wait(), name="examination heartbeat")
+        try:
+            await asyncio.wait({line, heard}, timeout=patience_s, return_when=asyncio.FIRST_COMPLETED)
+            if line.done():
+                line.result()
+            if not heard.done():
+                text = f"no ArduPilot or PX4 heard in {patience_s:g} s; check cable, rate and power"
+                raise UnavailableError(f"{self._url}: {text}")
+            yield
+        finally:
+            for task in (line, heard):
+                task.cancel()
+            await asyncio.gather(line, heard, return_exceptions=True)
+
+    async def report(self) -> Report:
+        """Read and judge every parameter of the firmware's table.  UnavailableError if none is
+        answered."""
+        firmware = self._link.firmware
+        assert firmware is not None, "only while connected"
+        await self._commander.send(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+        findings, unread = [], []
+        for rule in RULES[firmware]:
+            found = await self._parameters.read(rule.names)
+            finding = judge(rule, found)
+            if finding is not None:
+                findings.append(finding)
+            if found is None:
+                unread.append(rule.names[-1])
+        if len(unread) == len(RULES[firmware]):
+            raise UnavailableError(
+                f"{self._url}: the autopilot is heard but does not answer; check the TX line"
+            )
+        return Report(firmware, self._version, self._armed, tuple(findings), tuple(unread))
+
+    async def fix(self, findings: Sequence[Finding]) -> list[Finding]:
+        """Write the better values and read them back; the findings that remain.  Nothing is written to
+        an armed vehicle."""
+        remaining = []
+        for finding in findings:
+            better = finding.better
+            if better is None or self._armed or not await self._parameters.write(finding.name, better):
+                remaining.append(finding)
+        return remaining
+
+    def _take(self, message: Message, _now_ns: int) -> None:
+        match message.get_type():
+            case "HEARTBEAT":
+                self._armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+                self._parameters.bytewise = self._link.firmware is Firmware.PX4
+                self._heard.set()
+            case "COMMAND_ACK":
+                self._commander.acknowledged(message)
+            case "PARAM_VALUE":
+                self._parameters.value(message)
+            case "AUTOPILOT_VERSION":
+                number = message.flight_sw_version
+                self._version = f"{number >> 24 & 0xFF}.{number >> 16 & 0xFF}.{number >> 8 & 0xFF}"
+            case _:
+                pass

@@ -1,0 +1,115 @@
+"""The examination of an autopilot's parameters: what it names, what it mends, what it leaves alone."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+
+from flightd.adapters.vehicle.mavlink.examination import Examination
+from flightd.adapters.vehicle.mavlink.fitness import RULES, judge
+from flightd.adapters.vehicle.mavlink.link import Firmware
+from flightd.core.errors import UnavailableError
+from flightd.runtime.clock import LoopClock
+from flightd.sim.airframe import Airframe
+from flightd.sim.autopilot.copter import ArduCopterPeer
+from flightd.sim.autopilot.peer import AutopilotPeer, PeerConfig
+from flightd.sim.autopilot.px4 import Px4Peer
+from tests.protocol.rig import run_virtual
+
+
+@asynccontextmanager
+async def examined(
+    make_peer: type[ArduCopterPeer | Px4Peer], **parameters: float
+) -> AsyncIterator[tuple[AutopilotPeer, Examination]]:
+    clock = LoopClock()
+    peer = make_peer(clock, Airframe(), PeerConfig(ready_s=0.0, parameters=parameters))
+    host, port = await peer.open()
+    serving = asyncio.create_task(peer.run())
+    examination = Examination(f"udpout://{host}:{port}", clock)
+    try:
+        async with examination.connected():
+            yield peer, examination
+    finally:
+        serving.cancel()
+        await asyncio.gather(serving, return_exceptions=True)
+
+
+def test_the_factory_settings_of_arducopter_are_named_and_mended() -> None:
+    async def test() -> None:
+        async with examined(ArduCopterPeer) as (peer, examination):
+            report = await examination.report()
+            assert report.firmware is Firmware.ARDUPILOT
+            assert report.version == "4.5.6"
+            wrong = {finding.name for finding in report.findings}
+            assert wrong == {"GUID_TIMEOUT", "FS_THR_ENABLE", "BATT_FS_LOW_ACT"}
+            assert "ARMING_SKIPCHK" in report.unread  # a name of 4.7
+            assert await examination.fix(report.findings) == []
+            assert peer.parameters["GUID_TIMEOUT"] == 0.5
+            assert (await examination.report()).findings == ()
+
+    run_virtual(test)
+
+
+def test_px4s_whole_numbers_are_read_and_written_as_bytes() -> None:
+    async def test() -> None:
+        async with examined(Px4Peer, COM_OBL_RC_ACT=0, COM_RCL_EXCEPT=0) as (peer, examination):
+            report = await examination.report()
+            assert report.firmware is Firmware.PX4
+            found = {finding.name: finding.value for finding in report.findings}
+            assert found == {"COM_OBL_RC_ACT": 0, "COM_RCL_EXCEPT": 0}
+            (left,) = await examination.fix(report.findings)
+            assert left.name == "COM_RCL_EXCEPT"  # a person must say whether there is RC
+            assert peer.parameters["COM_OBL_RC_ACT"] == 4
+
+    run_virtual(test)
+
+
+def test_an_armed_vehicle_is_left_alone() -> None:
+    async def test() -> None:
+        async with examined(ArduCopterPeer) as (peer, examination):
+            assert peer.pilot_arm()
+            await asyncio.sleep(1.5)
+            report = await examination.report()
+            assert report.armed
+            assert len(await examination.fix(report.findings)) == len(report.findings)
+            assert peer.parameters["GUID_TIMEOUT"] == 3
+
+    run_virtual(test)
+
+
+def test_a_value_that_does_not_stay_is_still_found() -> None:
+    async def test() -> None:
+        async with examined(ArduCopterPeer) as (peer, examination):
+            report = await examination.report()
+            peer.parameters.locked.add("GUID_TIMEOUT")
+            (left,) = await examination.fix(report.findings)
+            assert left.name == "GUID_TIMEOUT"
+
+    run_virtual(test)
+
+
+def test_silence_is_told_in_one_line() -> None:
+    async def test() -> None:
+        with pytest.raises(UnavailableError, match=r"no ArduPilot or PX4 heard in 5 s"):
+            async with Examination("udpout://127.0.0.1:9", LoopClock()).connected():
+                pytest.fail("nobody is there")
+
+    run_virtual(test)
+
+
+@pytest.mark.parametrize("firmware", list(Firmware))
+def test_every_better_value_passes_its_own_rule(firmware: Firmware) -> None:
+    for rule in RULES[firmware]:
+        assert rule.names
+        assert all(len(name) <= 16 for name in rule.names)
+        if rule.better is not None:
+            assert judge(rule, (rule.names[0], rule.better)) is None, rule.names
+        wrong = next(v for v in (-1.0, 0.0, 1.0, 99.0, 256.0) if not rule.fits(v))
+        finding = judge(rule, (rule.names[0], wrong))
+        assert finding is not None
+        assert "\n" not in str(finding)
+        assert not math.isnan(finding.value)
