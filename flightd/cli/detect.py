@@ -102,10 +102,11 @@ def print_found(entry: Found, console: Console) -> None:
     """One picture for people."""
     seen = entry.lines
     title = f"{entry.name}  {seen.width_px}x{seen.height_px}  {entry.ms:.1f} ms"
+    console.print(title, style="bold", highlight=False, markup=False, soft_wrap=True)
     if not seen.lines:
-        console.print(f"{title}\n  no line", highlight=False, markup=False)
+        console.print("  no line")
         return
-    table = Table(title=title, title_justify="left", title_style="bold", box=None)
+    table = Table(box=None)
     for name in ("kind", "rho px", "theta °", "width px", "span px", "± px", "± °"):
         table.add_column(name, justify="left" if name == "kind" else "right")
     for line in seen.lines:

@@ -29,6 +29,7 @@ def register(app: typer.Typer) -> None:
     """Hang the vision commands on `app`."""
     app.command("detect")(detect)
     app.command("evaluate")(evaluate)
+    app.command("bench")(bench)
     app.command("train-colour")(train_colour)
 
 
@@ -120,6 +121,30 @@ def evaluate(
         sys.stdout.write(command.as_json(dataset, gate, scores, failures, count) + "\n")
     else:
         command.print_table(dataset, scores, count, _stdout())
+
+
+def bench(
+    seconds: Annotated[float, typer.Option(min=0.02, help="Time for each figure.")] = 1.0,
+    one_core: Annotated[bool, typer.Option("--one-core", help="Leave out the run on all cores.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Measure how fast the methods are here: the paper's Table I.
+
+    Beside them run what one would pick instead: the textbook ways on every pixel, OpenCV's line segment
+    detector with merging, scikit-image's skeleton with Hough (extra `bench`).  One unit is one
+    cvtColor(BGR2HSV) of the frame, measured in the same run.
+
+    \b
+    flightd bench
+    flightd bench --seconds 3 --json
+    """
+    from flightd.cli import bench as command
+
+    timings = command.bench(seconds, all_cores=not one_core)
+    if as_json:
+        sys.stdout.write(command.as_json(timings) + "\n")
+    else:
+        command.print_table(timings, _stdout())
 
 
 def train_colour(
