@@ -39,6 +39,7 @@ _NEIGHBOURS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, 
 def distance_ridge(mask: Image) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
     """Ridge samples of the 0/255 mask and every sample's distance to the unpainted, in samples."""
     distance = np.asarray(cv2.distanceTransform(mask, cv2.DIST_L2, 3), np.float32)
+    distance = np.minimum(distance, np.float32(max(mask.shape)))  # paint everywhere is infinitely deep
     # A sample is on the ridge when nothing two samples around is deeper; the staircase of a slanted edge
     # makes small peaks too, but those have deeper paint right behind them.
     deepest = cv2.dilate(distance, _AROUND)

@@ -53,10 +53,10 @@ _SVM_C = 4.0
 _UNSEEN = 0.06
 """Colours drawn at random and called floor, as a part of the pixels: what was never seen is not paint."""
 
-_STRONG_FALSE, _WEAK_FALSE = 0.003, 0.02
-"""Part of the held-out floor that may pass as strong and as weak paint."""
-_STRONG_LEAST, _WEAK_LEAST = 0.75, 0.95
-"""Part of the held-out paint that is to be strong, and weak or strong, whatever the floor says."""
+_STRONG = (0.003, 0.01, 0.75, 0.0)
+_WEAK = (0.02, 0.05, 0.95, -0.6)
+"""Part of the held-out floor that may pass; that may pass at most, if that part of the held-out paint
+would not pass otherwise; and the least decision value (the machine's margin is -1..1)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,8 +184,8 @@ def train(name: str, colour: str, pixels: Pixels, seed: int) -> Trained:
     refused = float((held_out[~pixels.paint] <= 0).mean())
 
     on_paint, on_floor = held_out[pixels.paint], held_out[~pixels.paint]
-    strong = min(np.quantile(on_floor, 1 - _STRONG_FALSE), np.quantile(on_paint, 1 - _STRONG_LEAST))
-    weak = min(np.quantile(on_floor, 1 - _WEAK_FALSE), np.quantile(on_paint, 1 - _WEAK_LEAST), strong)
+    strong = _threshold(on_paint, on_floor, _STRONG)
+    weak = min(_threshold(on_paint, on_floor, _WEAK), strong)
     decision = _fit(features, paint).decision_function(_features(_table_colours()))
     lut = np.zeros(TABLE_SIZE, np.uint8)
     lut[decision > weak] = WEAK
@@ -197,6 +197,15 @@ def train(name: str, colour: str, pixels: Pixels, seed: int) -> Trained:
     profile = ColourProfile(name, lut, colour, digest.hexdigest()[:16], round(score, 4))
     shown = int(pixels.picture.max()) + 1
     return Trained(profile, score, kept, refused, len(pixels.paint), shown)
+
+
+def _threshold(
+    on_paint: NDArray[np.float64], on_floor: NDArray[np.float64], aim: tuple[float, float, float, float]
+) -> float:
+    """The decision value above which a pixel passes."""
+    wanted, most, least_paint, least_value = aim
+    ideal, limit = np.quantile(on_floor, [1 - wanted, 1 - most])
+    return float(max(min(ideal, np.quantile(on_paint, 1 - least_paint)), limit, least_value))
 
 
 def _fit(features: NDArray[np.float64], paint: NDArray[np.bool_]) -> Any:

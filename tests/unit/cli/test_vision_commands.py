@@ -161,6 +161,18 @@ def test_a_tiny_image_is_named(tmp_path: Path) -> None:
     assert "5x3" in message
 
 
+@pytest.mark.parametrize("bgr", [(30, 190, 225), (0, 0, 0), (255, 255, 255)])
+@pytest.mark.parametrize("method", ["centroid", "skeleton", "combined", "naive"])
+def test_a_picture_of_one_colour_shows_no_line(
+    tmp_path: Path, bgr: tuple[int, int, int], method: str
+) -> None:
+    path = tmp_path / "plain.png"
+    cv2.imwrite(str(path), np.full((360, 640, 3), bgr, np.uint8))
+    for profile in ("yellow", "white", "black"):
+        found = run("detect", path, "--profile", profile, "--method", method, "--json")
+        assert json.loads(found)["images"][0]["lines"] == []
+
+
 def test_a_huge_image_is_searched(tmp_path: Path) -> None:
     bgr = np.full((5000, 7000, 3), (110, 112, 114), np.uint8)
     bgr[:, 3000:3200] = (30, 190, 225)
