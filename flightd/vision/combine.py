@@ -25,10 +25,9 @@ def fuse(guesses: list[Strip], tolerance_px: float) -> list[Strip]:
 
 
 def _agree(one: Strip, other: Strip, tolerance_px: float) -> bool:
+    shorter = one if one.u1 - one.u0 < other.u1 - other.u0 else other
     a, b = one.centre.a - other.centre.a, one.centre.b - other.centre.b
-    u0, u1 = max(one.u0, other.u0), min(one.u1, other.u1)
-    if u1 < u0:
-        u0, u1 = min(one.u1, other.u1), max(one.u0, other.u0)
+    u0, u1 = shorter.u0, shorter.u1
     if abs(a + b * u0) > tolerance_px or abs(a + b * u1) > tolerance_px:
         return False
     middle = (u0 + u1) / 2
