@@ -101,8 +101,7 @@ def _look_up(
         x, y = np.where(steep, v, u), np.where(steep, u, v)
     else:
         x, y = plane.raw(np.where(steep, v, u), np.where(steep, u, v))
-    i = ((x - float(grid.x(-0.5))) * (1 / grid.step)).astype(np.int32)
-    j = ((y - float(grid.y(-0.5))) * (1 / grid.step)).astype(np.int32)
+    i, j = grid.column(x), grid.row(y)
     height, width = mask.shape
     seen = (i >= 0) & (i < width) & (j >= 0) & (j < height)
     return mask.ravel().take(np.where(seen, j * width + i, 0)) * seen > 0, seen

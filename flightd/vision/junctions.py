@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations
+from typing import TypeAlias
 
 import numpy as np
 
@@ -12,30 +14,46 @@ from flightd.vision.sampling import Grid
 
 _MIN_ANGLE_RAD = math.radians(25.0)
 _PAINTED = 0.6
+"""Part of an arm's beginning that must be paint."""
+_STEPS = np.linspace(0.0, 1.0, 12)
+_MIN_SEEN = 3
 
 
 def find(lines: tuple[Line, ...], mask: Image, grid: Grid, plane: Plane) -> tuple[Junction, ...]:
     """Junctions inside the picture; kinds by which of the arms around the crossing are painted."""
-    found: list[Junction] = []
     half_x, half_y = (grid.frame_width - 1) / 2, (grid.frame_height - 1) / 2
-    for i, one in enumerate(lines):
-        for other in lines[i + 1 :]:
-            point = _crossing(one, other)
-            if point is None or abs(point[0]) > half_x or abs(point[1]) > half_y:
-                continue
-            arms = tuple(
-                arm
-                for line, across in ((one, other), (other, one))
-                for arm in _arms(point, line, across, mask, grid, plane)
+    crossings = []
+    for one, other in combinations(lines, 2):
+        point = _crossing(one, other)
+        if point is not None and abs(point[0]) <= half_x and abs(point[1]) <= half_y:
+            crossings.append(
+                (point, _arms(point, one, other, grid.step) + _arms(point, other, one, grid.step))
             )
-            kind = {4: JunctionKind.CROSS, 3: JunctionKind.TEE}.get(len(arms))
-            if len(arms) == 2 and abs(math.cos(arms[0] - arms[1])) < math.cos(_MIN_ANGLE_RAD):
-                kind = JunctionKind.CORNER
-            if kind is not None:
-                found.append(Junction(kind, point[0], point[1], arms))
+    found: list[Junction] = []
+    painted = _painted([arm for _, arms in crossings for arm in arms], mask, grid, plane)
+    for k, (point, arms) in enumerate(crossings):
+        angles = tuple(
+            math.atan2(arm[3], arm[2])
+            for arm, there in zip(arms, painted[4 * k : 4 * k + 4], strict=True)
+            if there
+        )
+        kind = _kind(angles)
+        if kind is not None:
+            found.append(Junction(kind, point[0], point[1], angles))
     for line in lines:
         found += _ends(line, found, half_x, half_y)
     return tuple(found)
+
+
+def _kind(arms_rad: tuple[float, ...]) -> JunctionKind | None:
+    """What the painted arms make; None for a line that merely passes another's end."""
+    if len(arms_rad) == 4:
+        return JunctionKind.CROSS
+    if len(arms_rad) == 3:
+        return JunctionKind.TEE
+    if len(arms_rad) == 2 and abs(math.cos(arms_rad[0] - arms_rad[1])) < math.cos(_MIN_ANGLE_RAD):
+        return JunctionKind.CORNER
+    return None
 
 
 def _crossing(one: Line, other: Line) -> tuple[float, float] | None:
@@ -46,28 +64,35 @@ def _crossing(one: Line, other: Line) -> tuple[float, float] | None:
     return (one.rho_px * s2 - other.rho_px * s1) / det, (other.rho_px * c1 - one.rho_px * c2) / det
 
 
-def _arms(
-    point: tuple[float, float], line: Line, across: Line, mask: Image, grid: Grid, plane: Plane
-) -> list[float]:
-    """Directions along `line` in which paint goes on beyond the width of `across`."""
+_Arm: TypeAlias = tuple[float, float, float, float, float]
+"""Where it begins (x, y), its direction (x, y), and the length looked at."""
+
+
+def _arms(point: tuple[float, float], line: Line, across: Line, step: int) -> list[_Arm]:
+    """The two ways along `line` from the crossing, beyond the width of `across`."""
     sine = abs(math.sin(line.theta_rad - across.theta_rad))
-    start = (
-        across.width_px / 2 + 0.5 * line.width_px * math.sqrt(max(0.0, 1 - sine * sine))
-    ) / sine + 2 * grid.step
-    length = max(line.width_px, across.width_px, 6 * grid.step)
-    arms = []
-    for sense in (1.0, -1.0):
-        dx, dy = -math.sin(line.theta_rad) * sense, math.cos(line.theta_rad) * sense
-        t = start + length * np.linspace(0.0, 1.0, 12)
-        x, y = plane.raw(point[0] + t * dx, point[1] + t * dy)
-        i = np.rint((x - float(grid.x(0))) / grid.step).astype(int)
-        j = np.rint((y - float(grid.y(0))) / grid.step).astype(int)
-        inside = (i >= 0) & (j >= 0) & (i < mask.shape[1]) & (j < mask.shape[0])
-        if inside.sum() < 3:
-            continue
-        if (mask[j[inside], i[inside]] > 0).mean() >= _PAINTED:
-            arms.append(math.atan2(dy, dx))
-    return arms
+    slant = 0.5 * line.width_px * math.sqrt(max(0.0, 1 - sine * sine))
+    start = (across.width_px / 2 + slant) / sine + 2 * step
+    length = max(line.width_px, across.width_px, 6.0 * step)
+    dx, dy = -math.sin(line.theta_rad), math.cos(line.theta_rad)
+    return [
+        (point[0] + way * start * dx, point[1] + way * start * dy, way * dx, way * dy, length)
+        for way in (1.0, -1.0)
+    ]
+
+
+def _painted(arms: list[_Arm], mask: Image, grid: Grid, plane: Plane) -> list[bool]:
+    """Whether each arm is there."""
+    if not arms:
+        return []
+    x0, y0, dx, dy, length = np.array(arms).T[:, :, None]
+    t = length * _STEPS
+    x, y = plane.raw(x0 + t * dx, y0 + t * dy)
+    i, j = grid.column(x), grid.row(y)
+    seen = (i >= 0) & (j >= 0) & (i < mask.shape[1]) & (j < mask.shape[0])
+    paint = mask[np.where(seen, j, 0), np.where(seen, i, 0)].astype(np.bool_) & seen
+    count, total = np.count_nonzero(paint, axis=1), np.count_nonzero(seen, axis=1)
+    return [bool(there) for there in (total >= _MIN_SEEN) & (count >= _PAINTED * total)]
 
 
 def _ends(line: Line, junctions: list[Junction], half_x: float, half_y: float) -> list[Junction]:

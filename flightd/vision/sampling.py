@@ -47,6 +47,15 @@ class Grid:
     def y(self, j: Array | NDArray[np.intp] | float) -> Array:
         return np.asarray(j, float) * self.step + (self.offset - (self.frame_height - 1) / 2)
 
+    def column(self, x: Array) -> NDArray[np.int32]:
+        """Sample column that stands for centred frame coordinate `x`; may lie outside the grid."""
+        left = self.offset - self.step / 2 - (self.frame_width - 1) / 2
+        return np.floor((x - left) * (1 / self.step)).astype(np.int32)
+
+    def row(self, y: Array) -> NDArray[np.int32]:
+        top = self.offset - self.step / 2 - (self.frame_height - 1) / 2
+        return np.floor((y - top) * (1 / self.step)).astype(np.int32)
+
 
 def grid_for(width: int, height: int) -> Grid:
     """About 320 samples across the longer side, at most every 6th pixel."""
