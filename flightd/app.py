@@ -56,21 +56,27 @@ def plan_of(config: Config, site: Site) -> FlightPlan:
     mission = config.mission
     visits: Sequence[str] = mission.nodes or site.serpentine_route()
     pad = site.home.node
-    return make_plan(site, visits, pad, pad, mission.heading, math.radians(mission.start_yaw_deg))
+    return make_plan(site, visits, pad, pad, config.heading_policy(), math.radians(mission.start_yaw_deg))
 
 
 def pilot_of(config: Config, site: Site) -> Pilot:
     """A fresh pilot for one flight."""
-    return Pilot(site, plan_of(config, site), config.mission.heading, config.pilot_params(site))
+    return Pilot(site, plan_of(config, site), config.heading_policy(), config.pilot_params(site))
 
 
-def detector_pool(config: Config, clock: Clock) -> DetectorPool:
+def profile_of(config: Config, site: Site) -> str:
+    """The colour profile that is configured, or else that of the site's lines."""
+    return config.vision.profile or site.line_colour.value
+
+
+def detector_pool(config: Config, site: Site, clock: Clock) -> DetectorPool:
     """Detector processes after the configuration; the colour profile is read here, so that a wrong one
     is found before anything flies."""
     camera, vision = config.camera, config.vision
+    profile = profile_of(config, site)
     lens = camera.lens() if camera.lens().is_distorted else None
-    Detector(vision.method, vision.profile, lens)
-    make = partial(Detector, vision.method, vision.profile, lens)
+    Detector(vision.method, profile, lens)
+    make = partial(Detector, vision.method, profile, lens)
     return DetectorPool(make, vision.workers, vision.timeout_s, clock)
 
 

@@ -27,7 +27,7 @@ from flightd.grid.localise import GridLocaliser
 from flightd.grid.site import Site
 from flightd.mission.guidance import Guide, MissionParams, Senses
 from flightd.mission.mission import Mission
-from flightd.mission.plan import FlightPlan, Heading
+from flightd.mission.plan import FlightPlan, HeadingPolicy
 from flightd.tracking.height import HeightHistory
 from flightd.tracking.lines import LineTracker, TrackerParams, TrackSet
 
@@ -42,7 +42,7 @@ class PilotParams:
     gains: FlightGains
     limits: Limits
     mission: MissionParams
-    max_sigma_m: float = 1.0
+    max_sigma_m: float = 1.5
     start_sigma_m: float = 0.15
 
 
@@ -77,13 +77,13 @@ class TickOutput:
 class Pilot:
     """The whole flying state of one mission."""
 
-    def __init__(self, site: Site, plan: FlightPlan, heading: Heading, params: PilotParams) -> None:
+    def __init__(self, site: Site, plan: FlightPlan, policy: HeadingPolicy, params: PilotParams) -> None:
         self._params = params
         self._plan = plan
         self._tracker = LineTracker(params.tracker, plan.start_yaw_rad)
         self._heights = HeightHistory()
         self._localiser = GridLocaliser(site, plan.start, params.start_sigma_m)
-        self._mission = Mission(site, plan, heading, params.mission)
+        self._mission = Mission(site, plan, policy, params.mission)
         self._control = FlightController(params.gains)
         self._limiter = Limiter(params.limits)
         self._last_ns: int | None = None

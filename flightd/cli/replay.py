@@ -16,6 +16,7 @@ from flightd.core.errors import InputError, RunError
 
 if TYPE_CHECKING:
     from flightd.config.schema import Config
+    from flightd.grid.site import Site
     from flightd.replay.decisions import Comparison, Step
     from flightd.replay.log import FlightLog
     from flightd.vision.detector import Detector
@@ -55,7 +56,7 @@ def replay(
     recorded = read_log(log, {Topic.TICK, Topic.DECISION, Topic.CONFIG, Topic.MAP})
     config = _config(recorded)
     decisions = replay_decisions(recorded, _pilot_step(recorded, config))
-    seen = replay_pictures(log, _detector(config).detect)
+    seen = replay_pictures(log, _detector(config, _site(recorded)).detect)
     passed = decisions.within(tolerance) and seen.within(pixels)
     if as_json:
         print(json.dumps(_told(decisions) | {"pictures": asdict(seen), "passed": passed}))
@@ -93,18 +94,25 @@ def _config(log: FlightLog) -> Config:
 def _pilot_step(log: FlightLog, config: Config) -> Step:
     """The step of a fresh pilot with the configuration and map of the flight."""
     from flightd.app import pilot_of
+
+    return pilot_of(config, _site(log)).step
+
+
+def _site(log: FlightLog) -> Site:
+    """The site that was flown."""
     from flightd.config.site_file import parse_site
     from flightd.core.topics import Topic
 
-    return pilot_of(config, parse_site(_document(log, Topic.MAP), f"{log.path} (map)")).step
+    return parse_site(_document(log, Topic.MAP), f"{log.path} (map)")
 
 
-def _detector(config: Config) -> Detector:
+def _detector(config: Config, site: Site) -> Detector:
     """The detector that the configuration asks for."""
+    from flightd.app import profile_of
     from flightd.vision.detector import Detector
 
     lens = config.camera.lens()
-    return Detector(config.vision.method, config.vision.profile, lens if lens.is_distorted else None)
+    return Detector(config.vision.method, profile_of(config, site), lens if lens.is_distorted else None)
 
 
 def _document(log: FlightLog, topic: str) -> str:

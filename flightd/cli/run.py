@@ -75,7 +75,7 @@ async def _fly(config: Config, site: Site, observer: Callable[[Status], None]) -
 
     clock = LoopClock()
     with ExitStack() as stack:
-        pool = stack.enter_context(detector_pool(config, clock))
+        pool = stack.enter_context(detector_pool(config, site, clock))
         recorder = None
         if config.recorder.folder is not None:
             name = time.strftime("%Y-%m-%dT%H-%M-%SZ.mcap", time.gmtime())

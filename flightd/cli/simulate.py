@@ -74,7 +74,7 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
     with ExitStack() as stack:
         recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=True))
         truth = stack.enter_context(Recorder(simulation.truth_log, lossless=True))
-        pool = stack.enter_context(detector_pool(simulation.config, clock))
+        pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
         camera_port = free_port()
         ports = _vehicle_ports(simulation.config)
         world = World(_spec(simulation, camera_port, ports), clock, truth)
@@ -112,7 +112,7 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
         theirs.close()
         stack.callback(process.join, 15.0)
         stack.callback(ours.close)  # the world ends when its pipe closes, however this process ends
-        pool = stack.enter_context(detector_pool(simulation.config, clock))
+        pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
         await pool.ready()
         config = _connected(simulation.config, ports, camera_port)
         daemon = Daemon(config, simulation.site, clock, pool, recorder, [simulation.observer])

@@ -17,7 +17,7 @@ from flightd.core.errors import InputError
 from flightd.core.geometry import Lens, Mount
 from flightd.grid.site import Site
 from flightd.mission.guidance import MissionParams
-from flightd.mission.plan import Heading
+from flightd.mission.plan import Heading, HeadingPolicy
 from flightd.pilot import PilotParams
 from flightd.tracking.lines import TrackerParams
 from flightd.tracking.tilt import TiltCompensation
@@ -72,7 +72,9 @@ class VisionConfig(_Section):
     method: Literal["combined", "centroid", "skeleton", "naive"] = Field(
         "combined", description="line detector"
     )
-    profile: str = Field("yellow", description="colour profile: a shipped name or a file")
+    profile: str | None = Field(
+        None, description="colour profile: a shipped name or a file; none: the site's line colour"
+    )
     workers: int = Field(2, ge=1, le=16, description="detector processes")
     timeout_s: float = Field(
         0.5, gt=0.01, le=5, description="a detector that takes longer is killed and replaced"
@@ -208,6 +210,12 @@ class Config(_Section):
     vehicle: VehicleConfig = VehicleConfig()
     control: ControlConfig = ControlConfig()
     recorder: RecorderConfig = RecorderConfig()
+
+    def heading_policy(self) -> HeadingPolicy:
+        """The mission's heading, with which side of the down camera's picture lies along the nose."""
+        camera = self.camera
+        turned = abs(math.sin(math.radians(camera.mount_yaw_deg))) > math.sqrt(0.5)
+        return HeadingPolicy(self.mission.heading, (camera.width_px > camera.height_px) == turned)
 
     def pilot_params(self, site: Site) -> PilotParams:
         return PilotParams(

@@ -19,7 +19,6 @@ from flightd.tracking.motion import TrackedLine
 _SURVEY_SIGMA_M = 0.01
 _MATCH_SHARE = 0.4
 """A track is matched within this share of the distance to the next map line (0.5 would be ambiguous)."""
-_MATCH_MAX_M = 0.5
 _MATCH_SIGMAS = 4.0
 _MATCH_SLACK_M = 0.06
 _MIN_HITS = 3
@@ -79,7 +78,7 @@ class _Axis:
         best = by_distance[0]
         gap = min((abs(at - best) for at in by_distance[1:]), default=math.inf)
         doubt_m = _MATCH_SIGMAS * math.hypot(self.sigma_m, track.sigma_m) + _MATCH_SLACK_M
-        gate = min(_MATCH_SHARE * gap, _MATCH_MAX_M, doubt_m)
+        gate = min(_MATCH_SHARE * gap, doubt_m)
         return best if abs(best - seen_at_m) <= gate else None
 
 

@@ -10,7 +10,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, LandedState, Phase
 from flightd.grid.site import Site
 from flightd.mission.guidance import Guidance, Guide, MissionParams, Senses
-from flightd.mission.plan import FlightPlan, Heading, Stop, make_plan
+from flightd.mission.plan import FlightPlan, HeadingPolicy, Stop, make_plan
 from flightd.mission.table import Trigger, next_phase
 
 _DEMANDS = {
@@ -25,10 +25,10 @@ _TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
 class Mission:
     """One flight of one plan: call `step` at a fixed rate, `drain_events` for what happened."""
 
-    def __init__(self, site: Site, plan: FlightPlan, heading: Heading, params: MissionParams) -> None:
+    def __init__(self, site: Site, plan: FlightPlan, policy: HeadingPolicy, params: MissionParams) -> None:
         self._site = site
         self._plan = plan
-        self._heading = heading
+        self._policy = policy
         self._params = params
         self._stops: list[Stop] = list(plan.stops)
         self._next = 0
@@ -228,7 +228,7 @@ class Mission:
         """Finish the present leg, then fly to `node` and, from there, home."""
         here = self.goal
         wanted = [node] if visit else []
-        onward = make_plan(self._site, wanted, here.node, self._plan.home, self._heading, here.yaw_rad)
+        onward = make_plan(self._site, wanted, here.node, self._plan.home, self._policy, here.yaw_rad)
         self._stops[self._next + 1 :] = onward.stops
 
     # What to do

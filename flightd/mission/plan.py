@@ -1,7 +1,8 @@
 """The flight plan: where to stop, in what order, facing where.
 
 Heading policies: ALONG flies with the nose in the direction of travel; SHELF keeps the nose (the front
-camera) to the shelf of the aisle and flies sideways.
+camera) to the shelf of the aisle and flies sideways.  Between aisles the next line is far away, so there
+the longer side of the down camera's picture is turned along the way.
 """
 
 from __future__ import annotations
@@ -12,12 +13,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flightd.core.errors import InputError
-from flightd.grid.site import Site
+from flightd.grid.site import Side, Site
 
 
 class Heading(enum.StrEnum):
     ALONG = "along"
     SHELF = "shelf"
+
+
+@dataclass(frozen=True, slots=True)
+class HeadingPolicy:
+    """The heading wanted, and whether the longer side of the picture lies along the drone's nose."""
+
+    heading: Heading
+    long_side_ahead: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +56,12 @@ class FlightPlan:
 
 
 def make_plan(
-    site: Site, visits: Sequence[str], start: str, home: str, heading: Heading, start_yaw_rad: float = 0.0
+    site: Site,
+    visits: Sequence[str],
+    start: str,
+    home: str,
+    policy: HeadingPolicy,
+    start_yaw_rad: float = 0.0,
 ) -> FlightPlan:
     """Plan a flight from `start` over `visits` in the given order to `home`, along painted lines.
 
@@ -64,7 +78,7 @@ def make_plan(
         path = site.path(here, goal)
         for i, node in enumerate(path[1:], start=1):
             corner = i + 1 < len(path) and not _straight(site, path[i - 1], node, path[i + 1])
-            yaw = _leg_yaw(site, path[i - 1], node, heading, yaw)
+            yaw = _leg_yaw(site, path[i - 1], node, policy, yaw)
             if corner or node == goal:
                 stops.append(_stop(site, node, yaw, visit and node == goal))
         if len(path) == 1:
@@ -87,10 +101,13 @@ def _straight(site: Site, a: str, b: str, c: str) -> bool:
     return abs(math.sin((_direction(site, a, b) - _direction(site, b, c)) / 2)) < 1e-6
 
 
-def _leg_yaw(site: Site, a: str, b: str, heading: Heading, yaw_before: float) -> float:
-    if heading is Heading.ALONG:
-        return _direction(site, a, b)
+def _leg_yaw(site: Site, a: str, b: str, policy: HeadingPolicy, yaw_before: float) -> float:
+    direction = _direction(site, a, b)
+    if policy.heading is Heading.ALONG:
+        return direction
+    if site.nodes[a].aisle != site.nodes[b].aisle:
+        return direction if policy.long_side_ahead else 0.0
     sides = [shelf.side for shelf in site.shelves if shelf.aisle == site.nodes[b].aisle]
-    if not sides or site.nodes[a].aisle != site.nodes[b].aisle:
+    if not sides:
         return yaw_before
-    return math.pi / 2 if "right" in sides else -math.pi / 2
+    return math.pi / 2 if Side.RIGHT in sides else -math.pi / 2

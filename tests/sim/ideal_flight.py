@@ -17,7 +17,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.grid.site import Site
-from flightd.mission.plan import FlightPlan, Heading, make_plan
+from flightd.mission.plan import FlightPlan, Heading, HeadingPolicy, make_plan
 from flightd.pilot import Pilot, PilotParams, TickInput, TickOutput
 from flightd.sim.airframe import Airframe, AirframeCommand
 from flightd.sim.climb_loop import ClimbLoop
@@ -54,16 +54,17 @@ class IdealFlight:
         site: Site,
         params: PilotParams,
         *,
-        heading: Heading = Heading.ALONG,
+        policy: HeadingPolicy | None = None,
         visits: tuple[str, ...] = (),
         seed: int = 1,
         draught: Draught | None = None,
         errors: EyeErrors | None = None,
         delay_ns: int = 68_000_000,
     ) -> None:
+        policy = policy or HeadingPolicy(Heading.ALONG)
         pad = site.home.node
-        self.plan: FlightPlan = make_plan(site, visits or site.serpentine_route(), pad, pad, heading)
-        self.pilot = Pilot(site, self.plan, heading, params)
+        self.plan: FlightPlan = make_plan(site, visits or site.serpentine_route(), pad, pad, policy)
+        self.pilot = Pilot(site, self.plan, policy, params)
         node = site.nodes[pad]
         self.airframe = Airframe(draught=draught, seed=seed, x_m=node.x_m, y_m=node.y_m)
         self.sensors = Sensors(seed=seed)

@@ -10,7 +10,7 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.types import Phase
-from flightd.mission.plan import Heading
+from flightd.mission.plan import Heading, HeadingPolicy
 from flightd.sim.sites import random_site
 from flightd.sim.wind import Draught
 from tests.sim.ideal_flight import Flown, IdealFlight, rms_off_line
@@ -29,7 +29,7 @@ def landed_error(flown: Flown) -> float:
 
 @pytest.mark.parametrize("heading", list(Heading))
 def test_a_mission_visits_every_node_on_the_line_and_lands_on_the_pad(heading: Heading) -> None:
-    flight = IdealFlight(DEMO, CONFIG.pilot_params(DEMO), heading=heading, seed=11)
+    flight = IdealFlight(DEMO, CONFIG.pilot_params(DEMO), policy=HeadingPolicy(heading), seed=11)
     flown = flight.fly()
     assert (flown.phase, flown.reason) == (Phase.DONE, "landed on the pad")
     assert flown.visited == list(DEMO.serpentine_route())
