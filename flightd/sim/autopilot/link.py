@@ -8,6 +8,8 @@ from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.sim.autopilot.radio import Radio, RadioParams
+
 Address: TypeAlias = tuple[str, int]
 Message: TypeAlias = Any
 """An instance of one of the dialect's generated message classes."""
@@ -55,7 +57,11 @@ class UdpLink(asyncio.DatagramProtocol):
         component_id: int,
         received: Callable[[Channel, Message], None],
         key: bytes | None = None,
+        seed: int = 0,
     ) -> None:
+        self.down = Radio(RadioParams(), seed)
+        """From the vehicle to its companion."""
+        self.up = Radio(RadioParams(), seed + 1)
         self._system_id = system_id
         self._component_id = component_id
         self._received = received
@@ -93,15 +99,21 @@ class UdpLink(asyncio.DatagramProtocol):
     def send(self, channel: Channel, message: Message) -> None:
         if self._transport is not None and not self.muted:
             frame = channel.pack(message, self._parser.signing.timestamp)
-            self._transport.sendto(frame, channel.address)
+            self.down.carry(lambda: self._out(frame, channel.address))
 
     def broadcast(self, message: Message) -> None:
         for channel in self.channels.values():
             self.send(channel, message)
 
+    def _out(self, frame: bytes, address: Address) -> None:
+        if self._transport is not None and not self.muted:
+            self._transport.sendto(frame, address)
+
     def datagram_received(self, data: bytes, addr: Any) -> None:
-        if self.muted:
-            return
+        if not self.muted:
+            self.up.carry(lambda: self._in(data, addr))
+
+    def _in(self, data: bytes, addr: Any) -> None:
         self._parser.buf = bytearray()
         self._parser.buf_index = 0
         for message in self._parser.parse_buffer(data) or ():

@@ -13,6 +13,7 @@ from flightd.ports import Clock
 from flightd.sim.airframe import Airframe, AirframeCommand
 from flightd.sim.autopilot.link import Address, Channel, Message, UdpLink
 from flightd.sim.autopilot.parameters import ParameterServer
+from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.autopilot.telemetry import DATA_STREAMS, Instruments
 from flightd.sim.climb_loop import ClimbGains, ClimbLoop
 from flightd.sim.kinematics import Kinematics
@@ -46,7 +47,8 @@ class PeerConfig:
     """Where the autopilot listens and how it starts.
 
     `remotes` are addresses it talks to unasked (a companion that only listens).  `ready_s` after boot
-    it can be armed (a real one takes about 20 s).  Its boot clock runs `clock_ppm` fast.
+    it can be armed (a real one takes about 20 s).  Its boot clock runs `clock_ppm` fast.  `radio` is what
+    lies between it and the companion, each way.
     """
 
     host: str = "127.0.0.1"
@@ -59,6 +61,7 @@ class PeerConfig:
     sensors: SensorParams = field(default_factory=SensorParams)
     seed: int = 0
     signing_key: bytes | None = None
+    radio: RadioParams = PERFECT
     parameters: dict[str, float] = field(default_factory=dict)
 
 
@@ -77,8 +80,9 @@ class AutopilotPeer(abc.ABC):
         self.instruments = Instruments(airframe, self.sensors)
         self.parameters = parameters
         self.link = UdpLink(
-            config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self._received, config.signing_key
+            config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self._received, config.signing_key, config.seed
         )
+        self.link.down.params = self.link.up.params = config.radio
         self._config = config
         self._clock = clock
         self._now_ns = self._boot_ns = clock.now_ns()

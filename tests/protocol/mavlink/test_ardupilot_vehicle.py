@@ -10,9 +10,11 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
+from flightd.core.geometry import wrap_pi
 from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, VehicleState
 from flightd.sim.autopilot.copter import CopterMode
 from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.autopilot.radio import RadioParams
 from tests.protocol.mavlink.scripted import PX4, ScriptedAutopilot, scripted
 from tests.protocol.rig import Rig, ardupilot_rig, run_virtual
 
@@ -408,6 +410,48 @@ def test_a_reboot_in_control_is_hands_off() -> None:
             assert not rig.known().in_control
             assert not rig.known().armed
             assert not any(await rig.stream(1.0))
+
+    run_virtual(test)
+
+
+def test_an_overtaken_heartbeat_is_no_take_over() -> None:
+    async def test() -> None:
+        autopilot = ScriptedAutopilot()
+        async with scripted(autopilot) as (_, vehicle):
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(2.0)
+            (channel,) = autopilot.link.channels.values()
+            old = dialect.MAVLink_heartbeat_message(2, 3, 129, ALT_HOLD, 4, 3)
+            channel._packer.seq = (channel._packer.seq - 3) % 256
+            autopilot.say(old)
+            channel._packer.seq = (channel._packer.seq + 2) % 256
+            await asyncio.sleep(0.5)
+            assert known(vehicle).in_control
+            autopilot.say(old)  # the same, but new
+            await asyncio.sleep(0.1)
+            assert not known(vehicle).in_control
+
+    run_virtual(test)
+
+
+def test_a_poor_radio_is_flown_through() -> None:
+    async def test() -> None:
+        radio = RadioParams(loss=0.1, delay_s=0.02, jitter_s=0.02, doubled=0.05)
+        async with ardupilot_rig(PeerConfig(ready_s=0.5, radio=radio)) as rig:
+            await rig.take_off(1.5)
+            for rate in (0.3, -0.3):
+                sent = await rig.stream(5.0, yaw_rate_radps=rate)
+                assert all(sent)
+                assert rig.known().in_control
+            samples = rig.vehicle.attitudes()
+            stamps = [sample.stamp_ns for sample in samples]
+            assert stamps == sorted(stamps)
+            errors = [
+                abs(wrap_pi(s.yaw_rad - rig.peer.truth_at(s.stamp_ns).yaw_rad - 0.7)) for s in samples[-80:]
+            ]
+            assert sum(errors) / len(errors) < math.radians(1.0)  # 30 ms of a 17 deg/s turn are half a degree
+            rig.take_over()
+            assert await rig.until(lambda: not rig.known().in_control, 1.0) < 0.3
 
     run_virtual(test)
 

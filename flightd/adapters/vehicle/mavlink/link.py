@@ -19,6 +19,9 @@ _LOG = logging.getLogger(__name__)
 _HEARTBEAT_S = 1.0
 _BACKOFF_S = (0.5, 1.0, 2.0, 5.0)
 _PARSERS_MAX = 16
+_LATE_MAX, _LATE_RUN_MAX = 64, 16
+_STATES = frozenset({"HEARTBEAT", "EXTENDED_SYS_STATE"})
+"""Messages of which only the newest counts and which carry no time stamp of their own."""
 _PEER_SILENT_NS = 3_000_000_000
 """After this long another address may take over as the autopilot's."""
 
@@ -55,6 +58,8 @@ class MavlinkLink:
         self._on_message = on_message
         self._parsers: dict[Source, FrameParser] = {}
         self._lost = asyncio.Event()
+        self._sequence = 0
+        self._late = 0
         self._heard_ns = -2 * _PEER_SILENT_NS
         self.system_status = dialect.MAV_STATE_STANDBY
         self.firmware: Firmware | None = None
@@ -127,6 +132,19 @@ class MavlinkLink:
         for message in messages:
             self._sort(message, source, now_ns)
 
+    def _is_late(self, message: Message) -> bool:
+        """Whether a newer message overtook this one on the way and it says what is no longer so.
+
+        Told by the sequence number, which counts modulo 256; one that stays behind is that of an
+        autopilot which started anew.
+        """
+        behind = (self._sequence - message.get_seq()) % 256
+        if not 0 < behind < _LATE_MAX or self._late >= _LATE_RUN_MAX:
+            self._sequence, self._late = message.get_seq(), 0
+            return False
+        self._late += 1
+        return message.get_type() in _STATES
+
     def _sort(self, message: Message, source: Source, now_ns: int) -> None:
         header = message.get_header()
         if header.srcSystem != self._system_id or header.srcComponent != dialect.MAV_COMP_ID_AUTOPILOT1:
@@ -140,7 +158,7 @@ class MavlinkLink:
             if source == self._transport.peer:
                 self._heard_ns = now_ns
                 self.firmware = firmware
-        if source != self._transport.peer:
+        if source != self._transport.peer or self._is_late(message):
             return
         self.received += 1
         self._on_message(message, now_ns)
