@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import signal
 import sys
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +16,8 @@ import typer
 from flightd.core.errors import RunError
 
 if TYPE_CHECKING:
+    from flightd.adapters.recorder.archive import FlightArchive
+    from flightd.adapters.recorder.recorder import Recorder
     from flightd.app import FlightResult
     from flightd.config.schema import Config
     from flightd.core.types import Status
@@ -67,20 +69,39 @@ async def _until_signal(
 
 
 async def _fly(config: Config, site: Site, observer: Callable[[Status], None]) -> FlightResult:
-    from flightd.adapters.recorder.recorder import Recorder
     from flightd.app import Daemon, detector_pool
-    from flightd.config.site_file import site_toml
-    from flightd.core.topics import Document, Topic
     from flightd.runtime.clock import LoopClock
 
     clock = LoopClock()
     with ExitStack() as stack:
         pool = stack.enter_context(detector_pool(config, site, clock))
-        recorder = None
-        if config.recorder.folder is not None:
-            name = time.strftime("%Y-%m-%dT%H-%M-%SZ.mcap", time.gmtime())
-            recorder = stack.enter_context(Recorder(config.recorder.folder / name))
-            recorder.record(Topic.MAP, clock.now_ns(), Document(site_toml(site)))
-            recorder.record(Topic.CONFIG, clock.now_ns(), Document(config.model_dump_json(indent=1)))
+        recorder, archive = _black_box(config, site, clock.now_ns()) or (None, None)
+        if recorder is not None:
+            stack.enter_context(recorder)
         await pool.ready()
-        return await Daemon(config, site, clock, pool, recorder, [observer]).fly()
+        beside = [asyncio.ensure_future(part.run()) for part in (recorder, archive) if part is not None]
+        try:
+            return await Daemon(config, site, clock, pool, recorder, [observer]).fly()
+        finally:
+            for part in beside:
+                part.cancel()
+            await asyncio.gather(*beside, return_exceptions=True)
+
+
+def _black_box(config: Config, site: Site, now_ns: int) -> tuple[Recorder, FlightArchive] | None:
+    """The recorder of this flight and the archive of all, if the configuration wants them."""
+    from flightd.adapters.recorder.archive import FlightArchive
+    from flightd.adapters.recorder.recorder import Recorder
+    from flightd.config.site_file import site_toml
+    from flightd.core.topics import Document, Topic
+
+    settings = config.recorder
+    if settings.folder is None:
+        return None
+    archive = FlightArchive(settings.folder, round(settings.quota_gb * 1e9), round(settings.reserve_gb * 1e9))
+    started = datetime.now(UTC)
+    metadata = {"started": f"{started:%Y-%m-%d %H:%M:%S} UTC", "vehicle": config.vehicle.kind}
+    recorder = Recorder(archive.begin(started), metadata=metadata)
+    recorder.record(Topic.MAP, now_ns, Document(site_toml(site)))
+    recorder.record(Topic.CONFIG, now_ns, Document(config.model_dump_json(indent=1)))
+    return recorder, archive

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import shutil
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
-from flightd.adapters.recorder.mcap_file import repair
+from flightd.adapters.recorder.mcap_file import is_whole, repair
 from flightd.core.errors import InputError, UnavailableError
 
 LOG_NAME = "flight.mcap"
+
+ROOM_S = 30.0
+"""In a flight the disk is looked at this often."""
 
 _FLIGHT = re.compile(r"flight-(\d{6})-\d{8}T\d{6}Z")
 
@@ -49,8 +53,18 @@ class FlightArchive:
         except OSError as err:
             raise UnavailableError(f"{folder}: cannot make the flight's folder: {err.strerror}") from None
         self._in_progress = folder
-        self.make_room()
+        with suppress(OSError):
+            self.make_room()
         return folder / LOG_NAME
+
+    async def run(self) -> None:
+        """Mend what earlier flights left behind, then keep room on the disk, for ever; works in a thread,
+        beside the flight.  A disk that refuses is the recorder's to tell."""
+        await asyncio.to_thread(self.mend)
+        while True:
+            await asyncio.sleep(ROOM_S)
+            with suppress(OSError):
+                await asyncio.to_thread(self.make_room)
 
     def mend(self) -> list[Path]:
         """Repair the logs of earlier flights that were cut off; returns those that were changed.
@@ -59,19 +73,16 @@ class FlightArchive:
         mended = []
         for folder in self.flights():
             log = folder / LOG_NAME
-            if folder == self._in_progress or not log.exists():
-                continue
-            before = log.stat().st_size
-            with suppress(InputError, OSError):  # not a log, in use, or the disk is full
-                repair(log)
-                if log.stat().st_size != before:
+            with suppress(InputError, OSError):  # none, not a log, in use, or the disk is full
+                if folder != self._in_progress and not is_whole(log):
+                    repair(log)
                     mended.append(log)
         return mended
 
     def make_room(self) -> list[Path]:
         """Remove the oldest flights until quota and reserve are kept; returns what was removed.
 
-        For the start of a flight and now and then in it, off the control task: it walks the folder."""
+        OSError if the disk cannot be asked."""
         flights = [folder for folder in self.flights() if folder != self._in_progress]
         sizes = {folder: _bytes(folder) for folder in flights}
         used = sum(sizes.values()) + (_bytes(self._in_progress) if self._in_progress else 0)

@@ -297,6 +297,14 @@ def repair(path: Path) -> None:
     McapFile.resume(path).close()
 
 
+def is_whole(path: Path) -> bool:
+    """Whether a log was closed: its last bytes are those of a finished file.  OSError if unreadable."""
+    with path.open("rb") as stream:
+        size = stream.seek(0, os.SEEK_END)
+        stream.seek(max(size - len(MAGIC), 0))
+        return size > 2 * len(MAGIC) and stream.read() == MAGIC
+
+
 @contextmanager
 def _claimed(path: Path, flags: int = 0) -> Iterator[BinaryIO]:
     """The file open for reading and writing and locked against other writers; closed again on errors."""

@@ -1,14 +1,18 @@
 from __future__ import annotations
 
+import asyncio
 import shutil
+import time
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
+from flightd.adapters.recorder import archive as archive_module
 from flightd.adapters.recorder.archive import FlightArchive
-from flightd.adapters.recorder.mcap_file import McapFile
+from flightd.adapters.recorder.mcap_file import McapFile, is_whole
 from flightd.core.errors import UnavailableError
 from flightd.replay.log import read_log
 
@@ -110,6 +114,37 @@ def test_a_log_that_is_still_being_written_is_left_alone(tmp_path: Path) -> None
     file.add_message(1, 2, b"{}")
     file.close()
     assert len(read_log(log).entries) == 2
+
+
+def _wait_until(condition: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.01)
+
+
+def test_beside_a_flight_it_mends_and_makes_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = FlightArchive(tmp_path, 100 * MEGABYTE).begin(STARTED)
+    file = McapFile.create(broken)
+    file.add_channel(1, "/a", "A", "{}")
+    file.flush()
+    file._stream.close()
+    archive = FlightArchive(tmp_path, 5 * MEGABYTE)
+    current = archive.begin(STARTED)
+
+    async def fly() -> None:
+        running = asyncio.ensure_future(archive.run())
+        await asyncio.to_thread(_wait_until, lambda: is_whole(broken))
+        for _ in range(7):  # the flight fills the disk
+            with current.open("ab") as stream:
+                stream.write(b"x" * MEGABYTE)
+        await asyncio.to_thread(_wait_until, lambda: not broken.parent.exists())
+        running.cancel()
+        await asyncio.wait([running])
+
+    monkeypatch.setattr(archive_module, "ROOM_S", 0.05)
+    asyncio.run(fly())
+    assert archive.flights() == [current.parent]
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
