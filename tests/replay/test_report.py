@@ -19,7 +19,7 @@ from flightd.core.topics import Document, Topic
 from flightd.core.types import Event, EventLevel, GridPose, Phase, Status
 from flightd.replay.report.charts import Line, Strip
 from flightd.replay.report.figures import key_figures, outcome
-from flightd.replay.report.flight import load_flight
+from flightd.replay.report.load import load_flight
 from flightd.replay.report.markup import clock, number, path_data, thin, ticks
 from flightd.replay.report.page import render, write_report
 from tests.replay.synthetic_flight import SITE_TOML, SUMMARY, legs, write_flight

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import fcntl
 import os
-import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO, Self, TypeAlias
+from typing import BinaryIO, Self
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -28,7 +27,6 @@ from mcap.records import (
     Footer,
     Header,
     McapRecord,
-    MessageIndex,
     Metadata,
     MetadataIndex,
     Schema,
@@ -36,6 +34,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
+from flightd.adapters.recorder.mcap_chunk import MESSAGE_HEAD, Entries, OpenChunk, indexes_of, pack
 from flightd.core.errors import InputError
 from flightd.runtime.mcap_scan import (
     MAGIC,
@@ -51,9 +50,6 @@ CHUNK_BYTES = 1 << 20
 """A chunk is closed when it holds this much, or sooner by `flush`."""
 
 _LIBRARY = "flightd"
-_RECORD_HEAD = struct.Struct("<BQ")
-_MESSAGE_HEAD = struct.Struct("<HIQQ")
-"""Channel, sequence, log time, publish time; then the payload."""
 
 
 class McapFile:
@@ -72,7 +68,7 @@ class McapFile:
         self._metadata: list[MetadataIndex] = []
         self._counts: Counter[int] = Counter()
         self._undeclared: list[McapRecord] = []
-        self._open_chunk = _OpenChunk()
+        self._open_chunk = OpenChunk()
         self._compressor = zstandard.ZstdCompressor(level=1)
 
     @classmethod
@@ -129,7 +125,7 @@ class McapFile:
         self._undeclared += [described, channel]
 
     def add_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
-        record = _packed(Metadata(name=name, metadata=dict(metadata)))
+        record = pack(Metadata(name=name, metadata=dict(metadata)))
         self._metadata.append(MetadataIndex(offset=self._end, length=len(record), name=name))
         try:
             self._append(record)
@@ -145,9 +141,9 @@ class McapFile:
 
     def flush(self) -> None:
         """Close the open chunk and write it."""
-        taken, self._open_chunk = self._open_chunk, _OpenChunk()
+        taken, self._open_chunk = self._open_chunk, OpenChunk()
         if self._undeclared:
-            self._append(_packed(*self._undeclared))
+            self._append(pack(*self._undeclared))
             self._undeclared.clear()
         if not taken.messages:
             return
@@ -160,8 +156,8 @@ class McapFile:
             uncompressed_crc=zlib.crc32(content),
             uncompressed_size=len(content),
         )
-        packed = _packed(chunk)
-        indexes, index = _indexes(chunk, taken.index, self._end, len(packed))
+        packed = pack(chunk)
+        indexes, index = indexes_of(chunk, taken.index, self._end, len(packed))
         self._append(packed + indexes)
         self._chunks.append(index)
         self._counts.update({channel: len(entries) for channel, entries in taken.index.items()})
@@ -179,7 +175,7 @@ class McapFile:
             self._stream.close()
 
     def _begin(self) -> None:
-        self._append(MAGIC + _packed(Header(profile="", library=_LIBRARY)))
+        self._append(MAGIC + pack(Header(profile="", library=_LIBRARY)))
 
     def _append(self, data: bytes) -> None:
         """Write at the end, wholly or not at all."""
@@ -274,12 +270,12 @@ class McapFile:
     def _recover_chunk(self, record: RawRecord) -> None:
         """Index a chunk anew, for its message indexes may be cut off."""
         chunk = parse(Chunk, record.content)
-        entries: _Entries = {}
+        entries: Entries = {}
         for inner in inner_records(unpacked(chunk)):
             if inner.opcode == Opcode.MESSAGE:
-                channel_id, _, stamp_ns, _ = _MESSAGE_HEAD.unpack_from(inner.content)
+                channel_id, _, stamp_ns, _ = MESSAGE_HEAD.unpack_from(inner.content)
                 entries.setdefault(channel_id, []).append((stamp_ns, inner.offset))
-        indexes, index = _indexes(chunk, entries, record.offset, record.end - record.offset)
+        indexes, index = indexes_of(chunk, entries, record.offset, record.end - record.offset)
         if os.pread(self._stream.fileno(), len(indexes), self._end) == indexes:
             self._end += len(indexes)
         else:
@@ -321,62 +317,3 @@ def _claimed(path: Path, flags: int = 0) -> Iterator[BinaryIO]:
     except BaseException:
         stream.close()
         raise
-
-
-_Entries: TypeAlias = dict[int, list[tuple[int, int]]]
-"""Channel to the (stamp, offset in the chunk) of its messages."""
-
-
-class _OpenChunk:
-    """The messages of the chunk that is being filled."""
-
-    def __init__(self) -> None:
-        self._parts: list[bytes] = []
-        self.size = 0
-        self.messages = 0
-        self.index: _Entries = {}
-        self.first_ns = 0
-        self.last_ns = 0
-
-    def add(self, channel_id: int, stamp_ns: int, payload: bytes) -> None:
-        head = _RECORD_HEAD.pack(Opcode.MESSAGE, _MESSAGE_HEAD.size + len(payload))
-        head += _MESSAGE_HEAD.pack(channel_id, 0, stamp_ns, stamp_ns)
-        self.index.setdefault(channel_id, []).append((stamp_ns, self.size))
-        self._parts += (head, payload)
-        self.size += len(head) + len(payload)
-        self.first_ns = min(self.first_ns, stamp_ns) if self.messages else stamp_ns
-        self.last_ns = max(self.last_ns, stamp_ns)
-        self.messages += 1
-
-    def content(self) -> bytes:
-        return b"".join(self._parts)
-
-
-def _indexes(chunk: Chunk, entries: _Entries, offset: int, length: int) -> tuple[bytes, ChunkIndex]:
-    """The message index records that follow the chunk of `length` bytes at `offset`, and its own index."""
-    builder = RecordBuilder()
-    positions = {}
-    for channel_id, found in entries.items():
-        positions[channel_id] = offset + length + builder.count
-        MessageIndex(channel_id=channel_id, records=found).write(builder)
-    packed: bytes = builder.end()
-    index = ChunkIndex(
-        chunk_length=length,
-        chunk_start_offset=offset,
-        compression=chunk.compression,
-        compressed_size=len(chunk.data),
-        message_end_time=chunk.message_end_time,
-        message_index_length=len(packed),
-        message_index_offsets=positions,
-        message_start_time=chunk.message_start_time,
-        uncompressed_size=chunk.uncompressed_size,
-    )
-    return packed, index
-
-
-def _packed(*records: McapRecord) -> bytes:
-    builder = RecordBuilder()
-    for record in records:
-        record.write(builder)
-    packed: bytes = builder.end()
-    return packed

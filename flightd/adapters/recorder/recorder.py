@@ -82,12 +82,7 @@ class Recorder:
             raise UnavailableError(f"{path}: another process is writing this flight log") from None
         except OSError as err:
             raise UnavailableError(f"{path}: cannot write the flight log: {err.strerror}") from None
-        self._metadata = _frame(
-            Kind.METADATA,
-            0,
-            0,
-            msgspec.json.encode(("flightd", {"version": flightd.__version__, **(metadata or {})})),
-        )
+        self._metadata = _metadata({"version": flightd.__version__, **(metadata or {})})
         self._start("create")
 
     @property
@@ -153,6 +148,8 @@ class Recorder:
             return
         if self._child.poll() is not None:
             self._restart()
+        if self.dropped:
+            self._queue += _metadata({"dropped": str(self.dropped)})
         with suppress(OSError):
             self._link.settimeout(CLOSE_S)
             self._link.sendall(self._queue)
@@ -263,3 +260,7 @@ class Recorder:
 
 def _frame(kind: Kind, channel: int, stamp_ns: int, payload: bytes) -> bytes:
     return HEADER.pack(len(payload), kind, channel, max(stamp_ns, 0)) + payload
+
+
+def _metadata(values: Mapping[str, str]) -> bytes:
+    return _frame(Kind.METADATA, 0, 0, msgspec.json.encode(("flightd", values)))

@@ -12,9 +12,10 @@ from flightd import __version__
 from flightd.core.errors import UnavailableError
 from flightd.replay.report.charts import strips, timeline
 from flightd.replay.report.figures import Figure, key_figures, outcome
-from flightd.replay.report.flight import Flight, load_flight
+from flightd.replay.report.flight import Flight
 from flightd.replay.report.frames import frames_section
 from flightd.replay.report.latency import latency_section
+from flightd.replay.report.load import load_flight
 from flightd.replay.report.markup import NOTHING, clock, element, number, text
 from flightd.replay.report.plan import floor_plan
 
@@ -83,6 +84,8 @@ def _facts(flight: Flight) -> str:
             f"{flight.log.path.name}, {flight.log.damage}" if flight.log.damage else flight.log.path.name,
         ),
     ]
+    if "dropped" in metadata:
+        facts.append(("Lost", f"{metadata['dropped']} messages"))
     facts.append(("Map", flight.map_error))
     return "".join(
         element("div", element("dt", label), element("dd", text(value))) for label, value in facts if value

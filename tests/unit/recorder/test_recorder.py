@@ -175,7 +175,9 @@ def test_a_full_queue_drops_and_counts_instead_of_waiting(tmp_path: Path) -> Non
     recorder.close()
     assert recorder.dropped == dropped
     assert recorder.written == 20_000 - dropped
-    assert len(read_log(tmp_path / "flight.mcap").entries) == recorder.written
+    log = read_log(tmp_path / "flight.mcap")
+    assert len(log.entries) == recorder.written
+    assert log.metadata["dropped"] == str(dropped)
 
 
 def test_pictures_are_lost_before_decisions(tmp_path: Path) -> None:
