@@ -2,7 +2,7 @@
 
 The records are those of the `mcap` package; its own writer cannot close a chunk on request, which is
 what keeps the loss after `kill -9` to the last second.  Schemas and channels are written outside the
-chunks, so that mending a file needs to unpack none but the last of them.
+chunks: a damaged chunk takes no channel with it.
 """
 
 from __future__ import annotations
