@@ -72,12 +72,16 @@ def profile_of(config: Config, site: Site) -> str:
 def detector_pool(config: Config, site: Site, clock: Clock) -> DetectorPool:
     """Detector processes after the configuration; the colour profile is read here, so that a wrong one
     is found before anything flies."""
+    make = detector_of(config, site)
+    make()
+    return DetectorPool(make, config.vision.workers, config.vision.timeout_s, clock)
+
+
+def detector_of(config: Config, site: Site) -> Callable[[], Detector]:
+    """What makes the detector that configuration and map ask for (in its own process, where it flies)."""
     camera, vision = config.camera, config.vision
-    profile = profile_of(config, site)
     lens = camera.lens() if camera.lens().is_distorted else None
-    Detector(vision.method, profile, lens)
-    make = partial(Detector, vision.method, profile, lens)
-    return DetectorPool(make, vision.workers, vision.timeout_s, clock)
+    return partial(Detector, vision.method, profile_of(config, site), lens)
 
 
 class Daemon:

@@ -16,10 +16,8 @@ from flightd.core.errors import InputError, RunError
 
 if TYPE_CHECKING:
     from flightd.config.schema import Config
-    from flightd.grid.site import Site
-    from flightd.replay.decisions import Comparison, Step
+    from flightd.replay.decisions import Comparison
     from flightd.replay.log import FlightLog
-    from flightd.vision.detector import Detector
 
 
 def register(app: typer.Typer) -> None:
@@ -89,30 +87,6 @@ def _config(log: FlightLog) -> Config:
     except ValueError as err:
         raise InputError(f"{log.path}: its configuration cannot be read ({err})") from None
     return parse_config(table, log.path)
-
-
-def _pilot_step(log: FlightLog, config: Config) -> Step:
-    """The step of a fresh pilot with the configuration and map of the flight."""
-    from flightd.app import pilot_of
-
-    return pilot_of(config, _site(log)).step
-
-
-def _site(log: FlightLog) -> Site:
-    """The site that was flown."""
-    from flightd.config.site_file import parse_site
-    from flightd.core.topics import Topic
-
-    return parse_site(_document(log, Topic.MAP), f"{log.path} (map)")
-
-
-def _detector(config: Config, site: Site) -> Detector:
-    """The detector that the configuration asks for."""
-    from flightd.app import profile_of
-    from flightd.vision.detector import Detector
-
-    lens = config.camera.lens()
-    return Detector(config.vision.method, profile_of(config, site), lens if lens.is_distorted else None)
 
 
 def _document(log: FlightLog, topic: str) -> str:
