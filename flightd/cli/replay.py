@@ -46,6 +46,8 @@ def replay(
     flightd replay out/flight.mcap
     flightd replay out/flight.mcap --tolerance 1e-6 --json
     """
+    from flightd.app import detector_of, pilot_of
+    from flightd.config.site_file import parse_site
     from flightd.core.topics import Topic
     from flightd.replay.decisions import replay_decisions
     from flightd.replay.log import read_log
@@ -53,8 +55,9 @@ def replay(
 
     recorded = read_log(log, {Topic.TICK, Topic.DECISION, Topic.CONFIG, Topic.MAP})
     config = _config(recorded)
-    decisions = replay_decisions(recorded, _pilot_step(recorded, config))
-    seen = replay_pictures(log, _detector(config, _site(recorded)).detect)
+    site = parse_site(_document(recorded, Topic.MAP), f"{log} (map)")
+    decisions = replay_decisions(recorded, pilot_of(config, site).step)
+    seen = replay_pictures(log, detector_of(config, site)().detect)
     passed = decisions.within(tolerance) and seen.within(pixels)
     if as_json:
         print(json.dumps(_told(decisions) | {"pictures": asdict(seen), "passed": passed}))
