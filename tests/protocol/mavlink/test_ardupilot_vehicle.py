@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.adapters.vehicle.mavlink.outputs import PoseForm
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.core.geometry import wrap_pi
-from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, VehicleState
+from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, GridPose, VehicleState
 from flightd.sim.autopilot.copter import CopterMode
 from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.autopilot.radio import RadioParams
@@ -469,6 +470,26 @@ def test_either_side_may_start_first() -> None:
             await rig.take_off(1.0)
             serving.cancel()
             await asyncio.gather(serving, return_exceptions=True)
+
+    run_virtual(test)
+
+
+# Poses
+
+
+def test_the_grid_pose_is_shared_at_thirty_hertz_if_so_chosen() -> None:
+    async def test() -> None:
+        pose = GridPose(0, "A1", 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 1.5, (0.01,) * 9, 0.9)
+        for form, expected in ((PoseForm.ODOMETRY, 60), (None, 0)):
+            async with scripted(pose_form=form) as (autopilot, vehicle):
+                autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, 150, 0, 0, 25, 0))
+                await asyncio.sleep(0.1)
+                for _ in range(100):
+                    autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, 150, 0, 0, 25, 0))
+                    vehicle.share_pose(pose, (3.0, 4.0))
+                    await asyncio.sleep(0.02)
+                assert len(autopilot.all("ODOMETRY")) == pytest.approx(expected, abs=3)
+                assert len(autopilot.all("LANDING_TARGET")) == len(autopilot.all("ODOMETRY"))
 
     run_virtual(test)
 

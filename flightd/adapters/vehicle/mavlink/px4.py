@@ -10,6 +10,7 @@ import asyncio
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link import Firmware
+from flightd.adapters.vehicle.mavlink.outputs import PoseForm
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.signing import Signing
 from flightd.adapters.vehicle.mavlink.vehicle import RATES_HZ, MavlinkVehicle
@@ -55,8 +56,15 @@ class Px4Vehicle(MavlinkVehicle):
         if message_id != dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
     } | {dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50.0}
 
-    def __init__(self, url: str, clock: Clock, system_id: int = 1, signing: Signing | None = None) -> None:
-        super().__init__(url, clock, system_id, signing)
+    def __init__(
+        self,
+        url: str,
+        clock: Clock,
+        system_id: int = 1,
+        signing: Signing | None = None,
+        pose_form: PoseForm | None = None,
+    ) -> None:
+        super().__init__(url, clock, system_id, signing, pose_form)
         self._sent_ns = 0
         self._guessed = False
 

@@ -50,6 +50,11 @@ class Telemetry:
         self.armed = False
 
     @property
+    def attitude(self) -> Attitude | None:
+        """The newest attitude."""
+        return self._attitude
+
+    @property
     def yaw_rad(self) -> float | None:
         """The newest measured heading."""
         return None if self._attitude is None else self._attitude.yaw_rad

@@ -19,6 +19,7 @@ from flightd.adapters.vehicle.mavlink.commands import Answer, Commander
 from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
 from flightd.adapters.vehicle.mavlink.link import Firmware, MavlinkLink
+from flightd.adapters.vehicle.mavlink.outputs import PoseForm, PoseOutput, landing_target
 from flightd.adapters.vehicle.mavlink.parameters import Names, Parameters
 from flightd.adapters.vehicle.mavlink.setpoint import Heading, attitude_target
 from flightd.adapters.vehicle.mavlink.signing import Signing
@@ -27,7 +28,15 @@ from flightd.adapters.vehicle.mavlink.streams import StreamKeeper
 from flightd.adapters.vehicle.mavlink.telemetry import Telemetry
 from flightd.adapters.vehicle.mavlink.timesync import ClockSync
 from flightd.adapters.vehicle.mavlink.transport import make_transport
-from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, LandedState, VehicleState
+from flightd.core.types import (
+    Attitude,
+    AttitudeSetpoint,
+    Demand,
+    Event,
+    GridPose,
+    LandedState,
+    VehicleState,
+)
 from flightd.ports import Clock
 
 _LOG = logging.getLogger(__name__)
@@ -71,7 +80,14 @@ class MavlinkVehicle(abc.ABC):
     """What has to be known of the autopilot's parameters."""
     rates_hz: ClassVar[dict[int, float]] = RATES_HZ
 
-    def __init__(self, url: str, clock: Clock, system_id: int = 1, signing: Signing | None = None) -> None:
+    def __init__(
+        self,
+        url: str,
+        clock: Clock,
+        system_id: int = 1,
+        signing: Signing | None = None,
+        pose_form: PoseForm | None = None,
+    ) -> None:
         self._clock = clock
         self._system_id = system_id
         self._sync = ClockSync()
@@ -79,6 +95,7 @@ class MavlinkVehicle(abc.ABC):
         self._authority = Authority()
         self._heading = Heading()
         self._height = HeightLoop()
+        self._pose_output = None if pose_form is None else PoseOutput(pose_form)
         transport = make_transport(parse_endpoint(url))
         self.link = MavlinkLink(
             transport, Codec(system_id, signing=signing), clock, system_id, self._received
@@ -160,6 +177,19 @@ class MavlinkVehicle(abc.ABC):
         self._text_id = self._text_id % 65535 + 1
         for text in make_texts(SEVERITIES[event.level], f"{event.name}: {event.text}", self._text_id):
             self.link.send(text)
+
+    def share_pose(self, pose: GridPose, pad_m: tuple[float, float] | None = None) -> None:
+        """Give the autopilot's estimator the grid pose, at 30 Hz at most, if a `pose_form` was chosen; with
+        `pad_m`, a place on the map, also the target of its precision landing."""
+        now_ns = self._clock.now_ns()
+        attitude, height_m = self._telemetry.attitude, self._telemetry.height_m(now_ns)
+        if self._pose_output is None or attitude is None:
+            return
+        message = self._pose_output.make(now_ns, pose, attitude, height_m)
+        if message is not None:
+            self.link.send(message)
+            if pad_m is not None:
+                self.link.send(landing_target(self.firmware, pose, pad_m, height_m))
 
     # The firmware
 
