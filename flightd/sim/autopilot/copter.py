@@ -1,8 +1,8 @@
 """ArduCopter's semantics: modes, arming, attitude flight without position, landing, time-outs.
 
-Measured on ArduCopter 4.5.6 where it says so, otherwise read in its sources: set-points are obeyed in
-GUIDED_NOGPS only and dropped in silence elsewhere; 0.5 thrust holds the height; after GUID_TIMEOUT the
-vehicle levels and holds, it does not land; on the floor with nothing asked it disarms after DISARM_DELAY.
+Measured on ArduCopter 4.5.6 or read in its sources: set-points are obeyed in GUIDED_NOGPS and GUIDED
+only and dropped in silence elsewhere; 0.5 thrust holds the height; after GUID_TIMEOUT the vehicle levels
+and holds, it does not land; on the floor with nothing asked it disarms after DISARM_DELAY.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _FORCE = 21196
 
 
 class CopterMode(enum.IntEnum):
-    """custom_mode of the modes this vehicle, which has no position, can be asked for."""
+    """custom_mode of the modes this vehicle can be asked for."""
 
     STABILIZE = 0
     ALT_HOLD = 2
@@ -50,6 +50,7 @@ _NEEDS_POSITION = frozenset(
         CopterMode.BRAKE,
     }
 )
+_GUIDED = frozenset({CopterMode.GUIDED, CopterMode.GUIDED_NOGPS})
 _NOT_ARMABLE = frozenset({CopterMode.LAND, CopterMode.RTL, CopterMode.BRAKE})
 
 
@@ -81,7 +82,7 @@ class ArduCopterPeer(AutopilotPeer):
         except ValueError:
             self.say(dialect.MAV_SEVERITY_WARNING, f"No such mode {custom_mode}")
             return int(dialect.MAV_RESULT_FAILED)
-        if self.armed and mode in _NEEDS_POSITION:
+        if self.armed and mode in _NEEDS_POSITION and not self._config.has_position:
             text = f"Mode change to {mode.name} failed: requires position"
             self.say(dialect.MAV_SEVERITY_WARNING, text)
             return int(dialect.MAV_RESULT_FAILED)
@@ -143,7 +144,7 @@ class ArduCopterPeer(AutopilotPeer):
             return "PreArm: Battery 1 below minimum arming voltage"
         if self.mode in _NOT_ARMABLE:
             return f"Arm: {self.mode.name} mode not armable"
-        if self.mode in _NEEDS_POSITION:
+        if self.mode in _NEEDS_POSITION and not self._config.has_position:
             return "PreArm: Need Position Estimate"
         return ""
 
@@ -155,7 +156,7 @@ class ArduCopterPeer(AutopilotPeer):
             self.link.broadcast(self._heartbeat())
 
     def _setpoint(self, message: Message) -> None:
-        if self.mode == CopterMode.GUIDED_NOGPS:
+        if self.mode in _GUIDED:
             self._target.take(message)
 
     # Flight code
@@ -180,7 +181,7 @@ class ArduCopterPeer(AutopilotPeer):
 
     def _wishes(self, dt_s: float) -> tuple[float, float, float, float, float]:
         """Roll, pitch, yaw, yaw rate and climb rate of the present mode."""
-        if self.mode == CopterMode.GUIDED_NOGPS:
+        if self.mode in _GUIDED:
             target = self._target
             up_mps = self.parameters["WPNAV_SPEED_UP"] / 100.0
             down_mps = self.parameters["WPNAV_SPEED_DN"] / 100.0
@@ -195,7 +196,7 @@ class ArduCopterPeer(AutopilotPeer):
     def _raw_collective(self) -> float | None:
         """The setpoint's thrust where GUID_OPTIONS makes it collective, None where the height loop flies."""
         raw = int(self.parameters["GUID_OPTIONS"]) & _THRUST_IS_COLLECTIVE
-        if self.mode == CopterMode.GUIDED_NOGPS and raw and not self._target.holding:
+        if self.mode in _GUIDED and raw and not self._target.holding:
             return max(0.0, self._target.thrust)
         return None
 
@@ -241,7 +242,7 @@ class ArduCopterPeer(AutopilotPeer):
 
     def _heartbeat(self) -> Message:
         base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
-        if self.mode == CopterMode.GUIDED_NOGPS:
+        if self.mode in _GUIDED:
             base |= dialect.MAV_MODE_FLAG_GUIDED_ENABLED
         if self.armed:
             base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED

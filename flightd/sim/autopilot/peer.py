@@ -47,8 +47,8 @@ class PeerConfig:
     """Where the autopilot listens and how it starts.
 
     `remotes` are addresses it talks to unasked (a companion that only listens).  `ready_s` after boot
-    it can be armed (a real one takes about 20 s).  Its boot clock runs `clock_ppm` fast.  `radio` is what
-    lies between it and the companion, each way.
+    it can be armed (a real one takes about 20 s).  Its boot clock runs `clock_ppm` fast.
+    It has no estimate of its position unless `has_position`.  `radio` lies between it and the companion.
     """
 
     host: str = "127.0.0.1"
@@ -56,6 +56,7 @@ class PeerConfig:
     remotes: tuple[Address, ...] = ()
     system_id: int = 1
     ready_s: float = 3.0
+    has_position: bool = False
     step_ns: int = 2_500_000
     clock_ppm: float = 20.0
     sensors: SensorParams = field(default_factory=SensorParams)

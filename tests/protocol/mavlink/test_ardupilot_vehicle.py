@@ -9,11 +9,15 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.outputs import PoseForm
+from flightd.adapters.vehicle.mavlink.signing import Signing
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, GridPose, VehicleState
-from flightd.sim.autopilot.copter import CopterMode
+from flightd.runtime.clock import LoopClock
+from flightd.sim.airframe import Airframe
+from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.autopilot.radio import RadioParams
 from tests.protocol.mavlink.scripted import PX4, ScriptedAutopilot, scripted
@@ -285,6 +289,29 @@ def test_a_disarm_demand_on_the_floor_never_disarms_the_pilot() -> None:
     run_virtual(test)
 
 
+@pytest.mark.parametrize("has_position", [True, False])
+def test_guided_flies_a_vehicle_that_knows_its_position_and_no_other(has_position: bool) -> None:
+    async def test() -> None:
+        clock = LoopClock()
+        peer = ArduCopterPeer(clock, Airframe(), PeerConfig(ready_s=0.5, has_position=has_position))
+        host, port = await peer.open()
+        vehicle = ArduPilotVehicle(f"udpout://{host}:{port}", clock, flying_mode=GUIDED)
+        tasks = [asyncio.create_task(part.run()) for part in (peer, vehicle)]
+        rig = Rig(vehicle, peer, lambda: None, lambda apart: None)
+        if has_position:
+            await rig.take_off(1.0)
+            assert rig.known().mode == "GUIDED"
+        else:
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(4.0)
+            assert rig.known().refusal == "arming: failed (PreArm: Need Position Estimate)"
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    run_virtual(test)
+
+
 # The pilot
 
 
@@ -533,12 +560,6 @@ def test_a_reason_in_chunks_is_told_whole() -> None:
 
 
 def test_the_flight_over_a_signed_link() -> None:
-    from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
-    from flightd.adapters.vehicle.mavlink.signing import Signing
-    from flightd.runtime.clock import LoopClock
-    from flightd.sim.airframe import Airframe
-    from flightd.sim.autopilot.copter import ArduCopterPeer
-
     async def test() -> None:
         key, clock = bytes(range(32)), LoopClock()
         peer = ArduCopterPeer(clock, Airframe(), PeerConfig(ready_s=0.5, signing_key=key))

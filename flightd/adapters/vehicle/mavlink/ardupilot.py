@@ -1,14 +1,18 @@
-"""ArduCopter: attitude flight in GUIDED_NOGPS, thrust as climb rate, LAND as the way down of last resort."""
+"""ArduCopter: attitude flight in GUIDED_NOGPS or GUIDED, LAND as the way down of last resort."""
 
 from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link import Firmware
+from flightd.adapters.vehicle.mavlink.outputs import PoseForm
 from flightd.adapters.vehicle.mavlink.setpoint import climb_thrust
+from flightd.adapters.vehicle.mavlink.signing import Signing
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.core.types import AttitudeSetpoint
+from flightd.ports import Clock
 
+GUIDED = dialect.COPTER_MODE_GUIDED
 GUIDED_NOGPS = dialect.COPTER_MODE_GUIDED_NOGPS
 LAND = dialect.COPTER_MODE_LAND
 
@@ -31,9 +35,23 @@ class ArduPilotVehicle(MavlinkVehicle):
     then be half of full power."""
 
     firmware = Firmware.ARDUPILOT
-    flying_mode = GUIDED_NOGPS
+    flying_mode: int = GUIDED_NOGPS
     landing_mode = LAND
     parameter_names = (_GUID_OPTIONS, _SPEED_UP, _SPEED_DOWN)
+
+    def __init__(
+        self,
+        url: str,
+        clock: Clock,
+        system_id: int = 1,
+        signing: Signing | None = None,
+        pose_form: PoseForm | None = None,
+        *,
+        flying_mode: int = GUIDED_NOGPS,
+    ) -> None:
+        """`flying_mode` is GUIDED_NOGPS, or GUIDED for a vehicle that estimates its position."""
+        super().__init__(url, clock, system_id, signing, pose_form)
+        self.flying_mode = flying_mode
 
     def mode_name(self, custom_mode: int) -> str:
         return _MODE_NAMES.get(custom_mode, f"mode {custom_mode}")

@@ -72,9 +72,9 @@ class MavlinkVehicle(abc.ABC):
     """
 
     firmware: ClassVar[Firmware]
-    flying_mode: ClassVar[int]
+    flying_mode: int
     """custom_mode in which the autopilot obeys setpoints."""
-    landing_mode: ClassVar[int]
+    landing_mode: int
     """custom_mode in which it lands where it is, without a position."""
     parameter_names: ClassVar[tuple[Names, ...]]
     """What has to be known of the autopilot's parameters."""
