@@ -148,10 +148,13 @@ def floor_field(small_bgr: Image, colour: str) -> Image:
 def _floor_tint(cells: Image) -> NDArray[np.float64]:
     """(3,) colour of the less colourful half of the cells, in units of its brightness, within limits."""
     pixels = cells.reshape(-1, 3)
-    most = pixels.max(axis=1)
-    saturation = (most - pixels.min(axis=1)) / (most + 8.0)
-    plain = pixels[saturation <= np.median(saturation)]
-    colour = np.median(plain, axis=0) + 1.0
+    blue, green, red = pixels.T
+    most = np.maximum(np.maximum(blue, green), red)
+    saturation = (most - np.minimum(np.minimum(blue, green), red)) / (most + 8.0)
+    middle = len(pixels) // 2
+    plain = pixels[saturation <= np.partition(saturation, middle)[middle]]
+    plain.sort(axis=0)
+    colour = plain[len(plain) // 2] + 1.0
     tint: NDArray[np.float64] = np.clip(colour / float(colour @ _LUMA_BGR), *_TINT_RANGE)
     return tint
 
