@@ -89,6 +89,12 @@ def evaluate(
     ] = None,
     gate_rho: Annotated[float, typer.Option(min=0.01, help="Farthest match, percent of the width.")] = 5.0,
     gate_theta: Annotated[float, typer.Option(min=0.01, max=90.0, help="Farthest match, degrees.")] = 5.0,
+    exposure: Annotated[
+        float, typer.Option(min=0.01, help="Brighten or darken every picture by this factor first.")
+    ] = 1.0,
+    warmth: Annotated[
+        float, typer.Option(min=0.1, max=10.0, help="Turn the white balance: factor of red over blue.")
+    ] = 1.0,
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write each picture that went wrong here.")
     ] = None,
@@ -109,6 +115,7 @@ def evaluate(
     \b
     flightd evaluate photographs/
     flightd evaluate out/hard --method combined --overlay out/failures
+    flightd evaluate out/clean --exposure 0.25 --warmth 1.5
     """
     wanted = tuple(methods or _TABLE_ORDER)
     _check_methods(wanted)
@@ -116,7 +123,8 @@ def evaluate(
     from flightd.vision.score import Gate
 
     gate = Gate(gate_rho / 100.0, math.radians(gate_theta))
-    scores, failures, count = command.evaluate(dataset, wanted, profile, gate, overlay)
+    light = command.Light(exposure, warmth)
+    scores, failures, count = command.evaluate(dataset, wanted, profile, gate, overlay, light)
     if as_json:
         sys.stdout.write(command.as_json(dataset, gate, scores, failures, count) + "\n")
     else:
