@@ -6,6 +6,7 @@ import asyncio
 import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 import pytest
 
@@ -113,3 +114,32 @@ def test_every_better_value_passes_its_own_rule(firmware: Firmware) -> None:
         assert finding is not None
         assert "\n" not in str(finding)
         assert not math.isnan(finding.value)
+
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+
+
+def shipped_parameters() -> list[tuple[Firmware, dict[str, float]]]:
+    """The parameter files that are shipped, by firmware."""
+    copter = [line.split() for line in (CONFIGS / "arducopter-nogps.parm").read_text().splitlines()]
+    px4 = [line.split() for line in (CONFIGS / "px4-nogps.params").read_text().splitlines()]
+    return [
+        (Firmware.ARDUPILOT, {row[0]: float(row[1]) for row in copter if row and row[0] != "#"}),
+        (Firmware.PX4, {row[2]: float(row[3]) for row in px4 if row[0] != "#"}),
+    ]
+
+
+@pytest.mark.parametrize(("firmware", "values"), shipped_parameters(), ids=["arducopter", "px4"])
+def test_the_shipped_parameter_files_are_fit_and_complete(
+    firmware: Firmware, values: dict[str, float]
+) -> None:
+    judged = 0
+    for rule in RULES[firmware]:
+        name = next((name for name in rule.names if name in values), None)
+        if name is not None:
+            judged += 1
+            assert judge(rule, (name, values[name])) is None
+        elif rule.better is not None:  # what a fix could write must be there, or be a name of another version
+            assert rule.names[-1] in {"ARMING_CHECK", "ARMING_SKIPCHK"}
+    assert judged >= 8
+    assert all(len(name) <= 16 for name in values)
