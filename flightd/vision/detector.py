@@ -24,7 +24,7 @@ _MIN_SIDE_PX = 16
 _REACH_PX = 10
 """How far the guessed edge may be off: a sample and a half, or what blur hides."""
 _SPECKS = np.ones((5, 5), np.uint8)
-_HOLES = np.ones((11, 11), np.uint8)
+_HOLES = np.ones((9, 9), np.uint8)
 _WORN = 1.02
 """Closing that adds more than this to the paint shows worn paint, whose holes would break the ridge."""
 

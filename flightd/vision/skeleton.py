@@ -183,7 +183,11 @@ def _fit_ridge(u: Array, v: Array, ridge: _Ridge, members: NDArray[np.intp], *, 
         members = np.flatnonzero((np.abs(v - fit.a - fit.b * u) <= limit * step) & ridge.free)
         if len(members) < _MIN_POINTS:
             return None
-    if bow(u[kept], v[kept], noise):
+    # Of a curve the near points look straight: judge by what lies around, too.
+    reach = 0.3 * (float(u[kept].max()) - float(u[kept].min()))
+    around = np.abs(v - fit.a - fit.b * u) <= 3 * step
+    around &= (u >= u[kept].min() - reach) & (u <= u[kept].max() + reach)
+    if bow(u[around], v[around], noise):
         return None
     # The distance is to the first unpainted sample's centre: half a sample beyond the edge.
     stretch = math.hypot(1.0, fit.b)
