@@ -207,7 +207,13 @@ def _fit_band(
         return None
     centre = bisector(low_fit, high_fit)
     inside = u[members]
-    if abs(centre.b) > MAX_SLOPE or bow(inside, (low[members] + high[members]) / 2, noise):
+    if abs(centre.b) > MAX_SLOPE:
+        return None
+    # Of a curve the near cuts look straight: judge by what lies around, too.
+    reach = 0.3 * (float(inside.max()) - float(inside.min()))
+    around = np.abs((low + high) / 2 - centre.a - centre.b * u) <= limit + 2 * step
+    around &= (u >= inside.min() - reach) & (u <= inside.max() + reach)
+    if bow(u[around], (low[around] + high[around]) / 2, noise):
         return None
     u0, u1 = float(inside.min()), float(inside.max())
     slabs = max(1.0, (u1 - u0) / spacing_px + 1)

@@ -42,8 +42,8 @@ def fit_lines(u: Array, vs: tuple[Array, ...], sigma: float) -> list[LinearFit]:
 def bow(u: Array, v: Array, sigma: float) -> bool:
     """Whether v(u) is bent: its sagitta exceeds MAX_BOW of the chord, and four of its own sigmas."""
     n = len(u)
-    chord = float(u.max() - u.min())
-    if n < 5 or chord <= 0:
+    chord = float(u.max() - u.min()) if n >= 5 else 0.0
+    if chord <= 0:
         return False
     t = (u - float(np.add.reduce(u)) / n) * (2 / chord)
     # v = c0 + c1 t + c2 q with q the part of t^2 that no straight line explains: the sagitta is c2, to

@@ -209,6 +209,24 @@ def test_any_size_is_looked_at(size: tuple[int, int]) -> None:
     assert (seen.width_px, seen.height_px) == size
 
 
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 10_000),
+    grain=st.sampled_from([0.0, 1.0, 3.0, 8.0]),
+    share=st.floats(0.02, 0.98),
+    method=st.sampled_from(METHODS),
+    size=st.sampled_from([(640, 360), (160, 120), (64, 64), (321, 243)]),
+)
+def test_paint_strewn_at_random_is_no_trouble(
+    seed: int, grain: float, share: float, method: str, size: tuple[int, int]
+) -> None:
+    noise = np.random.default_rng(seed).normal(size=(size[1], size[0]))
+    if grain:
+        noise = np.asarray(cv2.GaussianBlur(noise, (0, 0), grain))
+    seen = Detector(method).detect(picture((noise < np.quantile(noise, share)).astype(float), seed))
+    assert all(math.isfinite(line.rho_px) and line.sigma_rho_px > 0 for line in seen.lines)
+
+
 @pytest.mark.parametrize("value", [0, 255])
 @pytest.mark.parametrize("method", METHODS)
 def test_black_and_white_pictures_have_no_line(method: str, value: int) -> None:
