@@ -21,7 +21,8 @@ Lines: TypeAlias = list[tuple[float, float]]
 Baseline: TypeAlias = Callable[[Image], Lines]
 
 _YELLOW_HSV = (np.array([18, 80, 60]), np.array([36, 255, 255]))
-_SLICES = 12
+_SURELY_YELLOW_HSV = (np.array([21, 120, 80]), np.array([33, 255, 255]))
+_FEWEST_SLICES, _MOST_SLICES = 8, 40
 _CLUSTER_PX, _CLUSTER_RAD = 0.06, math.radians(5)
 _SIDE_BY_SIDE = 0.12
 
@@ -33,11 +34,12 @@ def textbook_naive(bgr: Image) -> Lines:
 
 
 def textbook_centroid(bgr: Image) -> Lines:
-    """The paper's centroid method: the mask in square cells, the largest contour of each, its moments,
-    a robust line through the centroids."""
-    mask = cv2.morphologyEx(_in_range(bgr), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
+    """The paper's centroid method: region growing, square cells, the fewer the more paint there is, the
+    largest contour of each, its moments, a robust line through the centroids."""
+    mask = _region_grown(bgr)
     height, width = mask.shape
-    cell = max(height // _SLICES, 4)
+    coverage = max(cv2.countNonZero(mask) / mask.size, 1e-3)
+    cell = height // round(min(max(1.5 / coverage, _FEWEST_SLICES), _MOST_SLICES))
     points = []
     for top in range(0, height, cell):
         for left in range(0, width, cell):
@@ -54,12 +56,12 @@ def textbook_centroid(bgr: Image) -> Lines:
 
 
 def skimage_skeleton(bgr: Image) -> Lines:
-    """HSV range, scikit-image's Zhang-Suen thinning, Hough, mean clustering: the paper's skeleton method."""
+    """The paper's skeleton method: region growing, Zhang-Suen thinning by scikit-image, Hough, clustering."""
     try:
         from skimage.morphology import skeletonize
     except ImportError as err:
         raise UnavailableError("pip install 'flightd[bench]'") from err
-    thin = skeletonize(_in_range(bgr) > 0).astype(np.uint8) * 255  # type: ignore[no-untyped-call]
+    thin = skeletonize(_region_grown(bgr) > 0).astype(np.uint8) * 255  # type: ignore[no-untyped-call]
     return _average(_hough(thin, min(bgr.shape[:2]) // 6), bgr.shape[1] * _CLUSTER_PX)
 
 
@@ -88,6 +90,17 @@ BASELINES: dict[str, Baseline] = {
 def _in_range(bgr: Image) -> NDArray[np.uint8]:
     hsv = cv2.cvtColor(bgr, cv2.COLOR_BGR2HSV)
     return np.asarray(cv2.inRange(hsv, *_YELLOW_HSV), np.uint8)
+
+
+def _region_grown(bgr: Image) -> NDArray[np.uint8]:
+    """Everything perhaps yellow that is joined to something surely yellow."""
+    hsv = cv2.cvtColor(bgr, cv2.COLOR_BGR2HSV)
+    perhaps, surely = (cv2.inRange(hsv, *limits) for limits in (_YELLOW_HSV, _SURELY_YELLOW_HSV))
+    count, parts = cv2.connectedComponents(perhaps)
+    kept = np.zeros(count, np.uint8)
+    kept[np.asarray(parts)[np.asarray(surely) > 0]] = 255
+    kept[0] = 0
+    return kept.take(np.asarray(parts))
 
 
 def _hough(mask: NDArray[np.uint8], votes: int) -> Lines:

@@ -12,7 +12,7 @@ The format is meant for hand-labelled photographs and generated frames alike:
                    "grade": "main",  "main" must be found, "minor" may be found or not
                    "uncert_px": 0.8, "uncert_deg": 0.7}],
         "nodes": [{"x": 231.2, "y": 157.1, "kind": "+"}],      "+", "T", "L", "end", "bend"
-        "mask": "a-mask.png",        non-zero where there is paint (for training)
+        "mask": "a-mask.png",        white paint, black floor, grey not told (for training)
         "regions": [                 paint and floor shown by hand (for training)
             {"paint": true, "box": [x, y, width, height]},
             {"paint": false, "stroke": [[x, y], [x, y]], "width": 12}]}]}
