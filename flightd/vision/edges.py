@@ -24,7 +24,7 @@ Indices: TypeAlias = NDArray[np.intp]
 
 STATIONS = 384
 """Shared among all edges of a frame."""
-MIN_CONTRAST = 6.0
+MIN_CONTRAST = 4.0
 """Grey levels between floor and paint below which there is no edge."""
 CHROMA_VARIANCE = 3.0
 """How much noisier colour differences are than luma: sensors and codecs give them half the resolution."""
