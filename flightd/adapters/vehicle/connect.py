@@ -6,6 +6,7 @@ from flightd.adapters.vehicle.ardrone.settings import settings_of
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
+from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
 from flightd.config.schema import VehicleConfig
 from flightd.core.errors import InputError
 from flightd.ports import Clock, Vehicle
@@ -15,9 +16,9 @@ def connect_vehicle(config: VehicleConfig, clock: Clock) -> Vehicle:
     """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address."""
     match config.kind:
         case "ardupilot":
-            return ArduPilotVehicle(config.url, clock, config.system_id)
+            return ArduPilotVehicle(config.url, clock, MavlinkOptions(config.system_id))
         case "px4":
-            return Px4Vehicle(config.url, clock, config.system_id)
+            return Px4Vehicle(config.url, clock, MavlinkOptions(config.system_id))
         case "ardrone":
             return ArDroneVehicle(settings_of(config.url), clock)
     raise InputError(f"vehicle.kind {config.kind}: no such adapter")

@@ -10,7 +10,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
-from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
+from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions, MavlinkVehicle
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.link import Channel, UdpLink
 
@@ -86,7 +86,7 @@ async def scripted(
     """A scripted autopilot and an ArduPilot adapter that talk to each other."""
     autopilot = autopilot or ScriptedAutopilot()
     host, port = await autopilot.link.open("127.0.0.1", 0)
-    vehicle = ArduPilotVehicle(f"udpout://{host}:{port}", LoopClock(), **options)
+    vehicle = ArduPilotVehicle(f"udpout://{host}:{port}", LoopClock(), MavlinkOptions(**options))
     tasks = [asyncio.create_task(vehicle.run(), name="vehicle")]
     if beats:
         tasks.append(asyncio.create_task(autopilot.run(), name="autopilot"))

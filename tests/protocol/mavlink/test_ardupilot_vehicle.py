@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.outputs import PoseForm
 from flightd.adapters.vehicle.mavlink.signing import Signing
-from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
+from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions, MavlinkVehicle
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, GridPose, VehicleState
 from flightd.runtime.clock import LoopClock
@@ -565,7 +565,7 @@ def test_the_flight_over_a_signed_link() -> None:
         peer = ArduCopterPeer(clock, Airframe(), PeerConfig(ready_s=0.5, signing_key=key))
         host, port = await peer.open()
         url = f"udpout://{host}:{port}"
-        signed = ArduPilotVehicle(url, clock, signing=Signing(key, clock, 1_795_000_000.0))
+        signed = ArduPilotVehicle(url, clock, MavlinkOptions(signing=Signing(key, clock, 1_795_000_000.0)))
         bare = ArduPilotVehicle(url, clock)
         tasks = [asyncio.create_task(part.run()) for part in (peer, signed, bare)]
         rig = Rig(signed, peer, lambda: None, lambda apart: None)

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link import Firmware
-from flightd.adapters.vehicle.mavlink.outputs import PoseForm
 from flightd.adapters.vehicle.mavlink.setpoint import climb_thrust
-from flightd.adapters.vehicle.mavlink.signing import Signing
-from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
+from flightd.adapters.vehicle.mavlink.vehicle import DEFAULTS, MavlinkOptions, MavlinkVehicle
 from flightd.core.types import AttitudeSetpoint
 from flightd.ports import Clock
 
@@ -43,24 +41,22 @@ class ArduPilotVehicle(MavlinkVehicle):
         self,
         url: str,
         clock: Clock,
-        system_id: int = 1,
-        signing: Signing | None = None,
-        pose_form: PoseForm | None = None,
+        options: MavlinkOptions = DEFAULTS,
         *,
         flying_mode: int = GUIDED_NOGPS,
     ) -> None:
         """`flying_mode` is GUIDED_NOGPS, or GUIDED for a vehicle that estimates its position."""
-        super().__init__(url, clock, system_id, signing, pose_form)
+        super().__init__(url, clock, options)
         self.flying_mode = flying_mode
 
     def mode_name(self, custom_mode: int) -> str:
         return _MODE_NAMES.get(custom_mode, f"mode {custom_mode}")
 
-    def _mode_params(self, custom_mode: int) -> tuple[float, ...]:
+    def mode_params(self, custom_mode: int) -> tuple[float, ...]:
         return float(dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(custom_mode)
 
-    def _not_fit(self) -> str:
-        problem = super()._not_fit()
+    def not_fit(self) -> str:
+        problem = super().not_fit()
         if problem:
             return problem
         return "GUID_OPTIONS not read yet" if self.parameters.get(_GUID_OPTIONS) is None else ""

@@ -27,7 +27,8 @@ class Authority:
 
     def release(self) -> None:
         """Let go, and forget a take-over: the next request counts as new."""
-        self.__init__()  # type: ignore[misc]
+        self._asked = self._held = self._before = self._before_until_ns = None
+        self.taken = False
 
     def ask(self, mode: int, current: int | None) -> None:
         """We are about to ask for `mode`, the vehicle being in `current`."""

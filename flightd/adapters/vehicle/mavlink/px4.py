@@ -10,11 +10,9 @@ import asyncio
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link import Firmware
-from flightd.adapters.vehicle.mavlink.outputs import PoseForm
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
-from flightd.adapters.vehicle.mavlink.signing import Signing
-from flightd.adapters.vehicle.mavlink.vehicle import RATES_HZ, MavlinkVehicle
-from flightd.core.types import AttitudeSetpoint, Demand
+from flightd.adapters.vehicle.mavlink.vehicle import DEFAULTS, RATES_HZ, MavlinkOptions, MavlinkVehicle
+from flightd.core.types import AttitudeSetpoint
 from flightd.ports import Clock
 
 _AUTO = 4
@@ -32,8 +30,6 @@ _MAIN_MODES = {
 }
 _AUTO_MODES = {1: "READY", 2: "TAKEOFF", 3: "LOITER", 4: "MISSION", 5: "RTL", 6: "LAND", 9: "PRECLAND"}
 
-_PRIME_S = 1.3
-"""PX4 wants setpoints for more than a second before it enters OFFBOARD."""
 _IDLE_PERIOD_S = 0.05
 _PUMP_SILENT_NS = 200_000_000
 
@@ -49,6 +45,7 @@ class Px4Vehicle(MavlinkVehicle):
     firmware = Firmware.PX4
     flying_mode = OFFBOARD
     landing_mode = LAND
+    prime_s = 1.3  # PX4 wants more than a second
     parameter_names = (("MPC_THR_HOVER",),)
     rates_hz = {
         message_id: hz
@@ -56,15 +53,8 @@ class Px4Vehicle(MavlinkVehicle):
         if message_id != dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
     } | {dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50.0}
 
-    def __init__(
-        self,
-        url: str,
-        clock: Clock,
-        system_id: int = 1,
-        signing: Signing | None = None,
-        pose_form: PoseForm | None = None,
-    ) -> None:
-        super().__init__(url, clock, system_id, signing, pose_form)
+    def __init__(self, url: str, clock: Clock, options: MavlinkOptions = DEFAULTS) -> None:
+        super().__init__(url, clock, options)
         self._sent_ns = 0
         self._guessed = False
 
@@ -84,17 +74,9 @@ class Px4Vehicle(MavlinkVehicle):
         super()._serve(tasks)
         tasks.create_task(self._once_heard(self._idle), name="px4 idle setpoints")
 
-    def _mode_params(self, custom_mode: int) -> tuple[float, ...]:
+    def mode_params(self, custom_mode: int) -> tuple[float, ...]:
         main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
         return float(dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(main), float(sub)
-
-    async def _ask_mode(self, mode: int) -> None:
-        if mode == self.flying_mode:
-            demand = self._demand
-            await self._pause(_PRIME_S)
-            if not self._still(demand):
-                return
-        await super()._ask_mode(mode)
 
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         self._guess_hover()
@@ -112,13 +94,11 @@ class Px4Vehicle(MavlinkVehicle):
             await asyncio.sleep(_IDLE_PERIOD_S)
             now_ns = self._clock.now_ns()
             yaw_rad = self._telemetry.yaw_rad
-            wanted = self._demand is Demand.FLY and not self._authority.taken and not self._is_silent(now_ns)
-            held = self._authority.held == self.flying_mode
-            if not wanted or yaw_rad is None or now_ns - self._sent_ns < _PUMP_SILENT_NS:
+            if not self._pursuit.wants_flight or yaw_rad is None or now_ns - self._sent_ns < _PUMP_SILENT_NS:
                 continue
-            if self._stands():
+            if self._pursuit.stands:
                 thrust = 0.0
-            elif held:
+            elif self._pursuit.may_steer:
                 continue  # in the air only the mission keeps it flying
             else:
                 self._guess_hover()

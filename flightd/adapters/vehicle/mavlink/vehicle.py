@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import abc
 import asyncio
-import contextlib
 import logging
 import math
-from collections import deque
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.authority import Authority
 from flightd.adapters.vehicle.mavlink.codec import Codec, Message
-from flightd.adapters.vehicle.mavlink.commands import Answer, Commander
+from flightd.adapters.vehicle.mavlink.commands import Commander
 from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
 from flightd.adapters.vehicle.mavlink.link import Firmware, MavlinkLink
 from flightd.adapters.vehicle.mavlink.outputs import PoseForm, PoseOutput, landing_target
 from flightd.adapters.vehicle.mavlink.parameters import Names, Parameters
+from flightd.adapters.vehicle.mavlink.pursuit import Pursuit
 from flightd.adapters.vehicle.mavlink.setpoint import Heading, attitude_target
 from flightd.adapters.vehicle.mavlink.signing import Signing
 from flightd.adapters.vehicle.mavlink.statustext import SEVERITIES, TextAssembler, make_texts
@@ -34,7 +33,6 @@ from flightd.core.types import (
     Demand,
     Event,
     GridPose,
-    LandedState,
     VehicleState,
 )
 from flightd.ports import Clock
@@ -51,24 +49,27 @@ RATES_HZ: dict[int, float] = {
     dialect.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
 }
 
-_SILENT_NS = 3_000_000_000
-_RECONCILE_S = 0.05
 _SYNC_FAST_S, _SYNC_SLOW_S = 0.1, 1.0
-_ARM_PAUSE_S = 1.0
-_MODE_PAUSE_S = 0.5
-_REASON_NS = 2_000_000_000
-_HAND_BACK_S = 0.2
-_HAND_BACK_ANSWER_S = 0.06
-_ENGAGED = frozenset({Demand.FLY, Demand.LAND, Demand.DISARM})
+
+
+@dataclass(frozen=True, slots=True)
+class MavlinkOptions:
+    """The vehicle's `system_id`, the key of a signed link, and the form in which the grid pose is given to
+    the autopilot's estimator (None: not at all)."""
+
+    system_id: int = 1
+    signing: Signing | None = None
+    pose_form: PoseForm | None = None
+
+
+DEFAULTS = MavlinkOptions()
 
 
 class MavlinkVehicle(abc.ABC):
     """`ports.Vehicle` over MAVLink; the firmware's modes and the setpoint's thrust come from the subclass.
 
-    One arming per FLY demand: a vehicle that was armed under it and is disarmed again (landed, timed
-    out, the pilot's switch) is not armed anew until FLY follows another demand.  `in_control` also
-    holds in the landing mode while LAND is demanded.  After a take-over by the pilot (or by a failsafe
-    of the autopilot) nothing is sent until FLY follows HANDS_OFF or STANDBY.
+    `in_control` also holds in the landing mode while LAND is demanded.  After a take-over by the pilot
+    (or by a failsafe of the autopilot) nothing is sent until FLY follows HANDS_OFF or STANDBY.
     """
 
     firmware: ClassVar[Firmware]
@@ -76,42 +77,31 @@ class MavlinkVehicle(abc.ABC):
     """custom_mode in which the autopilot obeys setpoints."""
     landing_mode: int
     """custom_mode in which it lands where it is, without a position."""
+    prime_s: float = 0.0
+    """How long setpoints have to stream before the flying mode is entered."""
     parameter_names: ClassVar[tuple[Names, ...]]
     """What has to be known of the autopilot's parameters."""
     rates_hz: ClassVar[dict[int, float]] = RATES_HZ
 
-    def __init__(
-        self,
-        url: str,
-        clock: Clock,
-        system_id: int = 1,
-        signing: Signing | None = None,
-        pose_form: PoseForm | None = None,
-    ) -> None:
+    def __init__(self, url: str, clock: Clock, options: MavlinkOptions = DEFAULTS) -> None:
+        system_id = options.system_id
         self._clock = clock
         self._system_id = system_id
         self._sync = ClockSync()
         self._telemetry = Telemetry(self._sync)
-        self._authority = Authority()
         self._heading = Heading()
         self._height = HeightLoop()
-        self._pose_output = None if pose_form is None else PoseOutput(pose_form)
+        self._pose_output = None if options.pose_form is None else PoseOutput(options.pose_form)
         transport = make_transport(parse_endpoint(url))
-        self.link = MavlinkLink(
-            transport, Codec(system_id, signing=signing), clock, system_id, self._received
-        )
+        codec = Codec(system_id, signing=options.signing)
+        self.link = MavlinkLink(transport, codec, clock, system_id, self._received)
         self._commander = Commander(self.link, system_id)
+        self._pursuit = Pursuit(self, self._commander, self._telemetry, clock)
         self.streams = StreamKeeper(self._commander, clock, self.rates_hz)
         self.parameters = Parameters(self.link, system_id, bytewise=self.firmware is Firmware.PX4)
         self._texts = TextAssembler()
-        self._reasons: deque[tuple[int, str]] = deque(maxlen=4)
         self._text_id = 0
-        self._demand = Demand.STANDBY
-        self._was_armed = False
-        self._refused = ""
-        self._refused_ns = 0
         self._heard = asyncio.Event()
-        self._wake = asyncio.Event()
 
     # The port
 
@@ -124,9 +114,9 @@ class MavlinkVehicle(abc.ABC):
             async with asyncio.TaskGroup() as tasks:
                 self._serve(tasks)
                 try:
-                    await self._work()
+                    await self._pursuit.run()
                 finally:
-                    await self._hand_back()
+                    await self._pursuit.hand_back()
         except ExceptionGroup as group:
             if len(group.exceptions) == 1:
                 raise group.exceptions[0] from None
@@ -138,36 +128,26 @@ class MavlinkVehicle(abc.ABC):
         return self._telemetry.state(
             now_ns,
             "" if mode is None else self.mode_name(mode),
-            in_control=self._authority.held is not None and not self._is_silent(now_ns),
-            refusal=self._refusal(),
+            in_control=self._pursuit.in_control,
+            refusal=self._pursuit.refusal,
         )
 
     def attitudes(self) -> list[Attitude]:
         return self._telemetry.attitudes()
 
     def demand(self, demand: Demand) -> None:
-        if demand is self._demand:
-            return
-        if demand not in _ENGAGED or self._demand not in _ENGAGED:
-            self._authority.release()
-        if demand is Demand.FLY:
-            self._was_armed = False
-        self._demand = demand
-        self._refused = ""
-        self.link.system_status = (
-            dialect.MAV_STATE_ACTIVE if demand in _ENGAGED else dialect.MAV_STATE_STANDBY
-        )
-        self._wake.set()
+        self._pursuit.demand(demand)
+        engaged = self._pursuit.is_engaged
+        self.link.system_status = dialect.MAV_STATE_ACTIVE if engaged else dialect.MAV_STATE_STANDBY
 
     def send(self, setpoint: AttitudeSetpoint) -> bool:
         now_ns = self._clock.now_ns()
         yaw_rad = self._telemetry.yaw_rad
-        ours = self._demand in _ENGAGED and self._authority.held == self.flying_mode
-        if not ours or yaw_rad is None or self._is_silent(now_ns):
+        if not self._pursuit.may_steer or yaw_rad is None:
             self._heading.release()
             self._height.release()
             return False
-        if self._stands():
+        if self._pursuit.stands:
             self._heading.release()  # the vehicle may be turned by hand, its compass may still settle
         heading_rad = self._heading.step(now_ns, setpoint.yaw_rate_radps, yaw_rad)
         thrust = self._thrust(setpoint, now_ns)
@@ -198,14 +178,14 @@ class MavlinkVehicle(abc.ABC):
         """The firmware's own name of a mode."""
 
     @abc.abstractmethod
-    def _mode_params(self, custom_mode: int) -> tuple[float, ...]:
+    def mode_params(self, custom_mode: int) -> tuple[float, ...]:
         """Parameters of DO_SET_MODE."""
 
     @abc.abstractmethod
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         """The thrust field for a setpoint's climb rate."""
 
-    def _not_fit(self) -> str:
+    def not_fit(self) -> str:
         """Why the vehicle must not be flown by us, or an empty text."""
         if self.link.firmware is not None and self.link.firmware is not self.firmware:
             return f"the autopilot is {self.link.firmware.name}, the configuration says {self.firmware.name}"
@@ -226,7 +206,7 @@ class MavlinkVehicle(abc.ABC):
             climb_mps=self._telemetry.climb_mps(now_ns),
             height_m=self._telemetry.height_m(now_ns),
             tilt_cos=math.cos(setpoint.roll_rad) * math.cos(setpoint.pitch_rad),
-            on_floor=self._stands(),
+            on_floor=self._pursuit.stands,
         )
 
     # Receiving
@@ -248,124 +228,15 @@ class MavlinkVehicle(abc.ABC):
                 if self._telemetry.take(message, now_ns):
                     self.parameters.forget()  # it rebooted: they may have changed
                 if message.get_type() == "HEARTBEAT":
-                    self._beat(now_ns)
-
-    def _beat(self, now_ns: int) -> None:
-        self._heard.set()
-        mode = self._telemetry.custom_mode
-        assert mode is not None
-        if self._authority.heartbeat(mode, now_ns):
-            _LOG.warning("%s: taken over by mode %s", self.link.endpoint, self.mode_name(mode))
-            self._wake.set()
-        if self._telemetry.armed and self._authority.held == self.flying_mode:
-            self._was_armed = True
+                    self._heard.set()
+                    self._pursuit.heartbeat(now_ns)
 
     def _say(self, message: Message, now_ns: int) -> None:
         for severity, text in self._texts.add(message):
             _LOG.info("autopilot: %s", text)
-            if severity <= dialect.MAV_SEVERITY_WARNING:
-                self._reasons.append((now_ns, text))
+            self._pursuit.text(severity, text, now_ns)
 
-    # Working on the demand
-
-    async def _work(self) -> None:
-        while True:
-            await self._reconcile(self._demand)
-            await self._pause(_RECONCILE_S)
-
-    async def _reconcile(self, demand: Demand) -> None:
-        """One step from what the vehicle does towards what is demanded."""
-        if demand not in _ENGAGED or self._authority.taken or self._is_silent(self._clock.now_ns()):
-            return
-        held = self._authority.held
-        problem = self._not_fit() if demand is Demand.FLY else ""
-        match demand:
-            case Demand.FLY if problem:
-                self._refuse(problem)
-            case Demand.FLY if held != self.flying_mode:
-                await self._ask_mode(self.flying_mode)
-            case Demand.FLY if not self._telemetry.armed and not self._was_armed:
-                await self._ask_arming()
-            case Demand.LAND if held is not None and held != self.landing_mode:
-                await self._ask_mode(self.landing_mode)
-            case Demand.DISARM if held is not None and self._telemetry.armed:
-                await self._ask_disarming()
-            case _:
-                pass
-
-    async def _ask_mode(self, mode: int) -> None:
-        demand = self._demand
-        self._authority.ask(mode, self._telemetry.custom_mode)
-        answer = await self._commander.send(
-            dialect.MAV_CMD_DO_SET_MODE, *self._mode_params(mode), wanted=lambda: self._still(demand)
-        )
-        if answer.accepted:
-            self._authority.accepted(mode, self._clock.now_ns())
-        await self._settle(answer, f"mode {self.mode_name(mode)}", _MODE_PAUSE_S, demand)
-
-    async def _ask_arming(self) -> None:
-        demand = self._demand
-        answer = await self._commander.send(
-            dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1, wanted=lambda: self._still(demand)
-        )
-        await self._settle(answer, "arming", _ARM_PAUSE_S, demand)
-
-    async def _ask_disarming(self) -> None:
-        demand = self._demand
-        answer = await self._commander.send(
-            dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0, wanted=lambda: self._still(demand)
-        )
-        await self._settle(answer, "disarming", _ARM_PAUSE_S, demand)
-
-    def _still(self, demand: Demand) -> bool:
-        return self._demand is demand and not self._authority.taken
-
-    async def _settle(self, answer: Answer, what: str, pause_s: float, demand: Demand) -> None:
-        """Keep the refusal's reason and wait before the next attempt; after a success give the
-        vehicle's heartbeat time to show it."""
-        if not self._still(demand):
-            return
-        if answer.accepted:
-            self._refused = ""
-        else:
-            self._refuse(f"{what}: {answer}")
-        await self._pause(pause_s)
-
-    async def _pause(self, duration_s: float) -> None:
-        """Wait, or until the demand or the vehicle's owner changes."""
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(duration_s):
-                await self._wake.wait()
-        self._wake.clear()
-
-    def _refuse(self, text: str) -> None:
-        self._refused = text
-        self._refused_ns = self._clock.now_ns()
-
-    def _refusal(self) -> str:
-        """What was refused and the autopilot's own words at that time."""
-        if self._authority.taken:
-            return "the pilot or a failsafe changed the mode"
-        said = [text for at_ns, text in self._reasons if abs(at_ns - self._refused_ns) < _REASON_NS]
-        return f"{self._refused} ({said[-1]})" if self._refused and said else self._refused
-
-    async def _hand_back(self) -> None:
-        """Leave the vehicle in a state that needs no companion: landing, or disarmed on the floor."""
-        if self._authority.held != self.flying_mode or not self._telemetry.armed:
-            return
-        command: int = dialect.MAV_CMD_DO_SET_MODE
-        params = self._mode_params(self.landing_mode)
-        if self._telemetry.landed is LandedState.ON_GROUND:
-            command, params = dialect.MAV_CMD_COMPONENT_ARM_DISARM, (0.0,)
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(_HAND_BACK_S):
-                await self._commander.send(command, *params, patience_s=_HAND_BACK_ANSWER_S)
-
-    def _stands(self) -> bool:
-        """On the floor, as far as the autopilot knows."""
-        return not self._telemetry.armed or self._telemetry.landed is LandedState.ON_GROUND
-
-    # Clocks and liveness
+    # Beside the demand
 
     async def _once_heard(self, work: Callable[[], Awaitable[None]]) -> None:
         await self._heard.wait()
@@ -378,6 +249,3 @@ class MavlinkVehicle(abc.ABC):
         while True:
             self.link.send(dialect.MAVLink_timesync_message(0, self._sync.ask(self._clock.now_ns())))
             await asyncio.sleep(_SYNC_SLOW_S if self._sync.is_settled else _SYNC_FAST_S)
-
-    def _is_silent(self, now_ns: int) -> bool:
-        return now_ns - self._telemetry.heartbeat_ns > _SILENT_NS
