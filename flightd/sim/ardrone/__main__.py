@@ -1,0 +1,70 @@
+"""An emulated AR.Drone 2.0 for anyone's client: `python -m flightd.sim.ardrone`.
+
+It stands on the charging pad of a simulated warehouse, flies in real time and streams what its bottom
+camera sees there.  A client that insists on the drone's own address can be given it:
+`ip address add 192.168.1.1/32 dev lo`, then `--host 192.168.1.1`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from flightd.config.paths import shipped
+from flightd.config.site_file import load_site
+from flightd.core.errors import InputError
+from flightd.grid.site import Site
+from flightd.runtime.clock import LoopClock
+from flightd.sim.airframe import Airframe
+from flightd.sim.appearance import DEFAULT
+from flightd.sim.ardrone.drone import Drone
+from flightd.sim.ardrone.server import ArDroneServer, Ports
+from flightd.sim.camera import CameraPeer
+from flightd.sim.optics import SimCamera
+from flightd.sim.sensors import Sensors
+
+_NOBODY = ("127.0.0.1", 9)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Serve until interrupted; 2 when a port or the site file cannot be had."""
+    parser = argparse.ArgumentParser(prog="python -m flightd.sim.ardrone", description=__doc__)
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
+    names = ("AT", "NAVDATA", "VIDEO", "CONTROL")
+    parser.add_argument(
+        "--ports", type=int, nargs=4, default=[5556, 5554, 5555, 5559], metavar=names, help="the four ports"
+    )
+    parser.add_argument("--site", type=Path, help="site file (default: the demo site)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of wind, sensors and floor")
+    parser.add_argument("--battery", type=float, default=1.0, help="charge at the start, 0..1")
+    chosen = parser.parse_args(arguments)
+    try:
+        site = load_site(chosen.site or shipped("site-demo.toml"))
+        ports = Ports(chosen.host, *chosen.ports)
+        asyncio.run(_serve(site, ports, chosen.seed, chosen.battery))
+    except KeyboardInterrupt:
+        return 0
+    except (InputError, OSError) as error:
+        print(f"flightd.sim.ardrone: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+async def _serve(site: Site, ports: Ports, seed: int, battery_frac: float) -> None:
+    clock = LoopClock()
+    pad = site.nodes[site.home.node]
+    airframe = Airframe(seed=seed, x_m=pad.x_m, y_m=pad.y_m, battery_frac=battery_frac)
+    server = ArDroneServer(Drone(airframe, Sensors(seed=seed)), clock, ports)
+    await server.open()
+    print(f"AR.Drone 2.0 on {server.ports}", flush=True)
+    camera = CameraPeer(site, SimCamera(), DEFAULT, seed, _NOBODY, server.truth_at, clock, server.show)
+    async with asyncio.TaskGroup() as tasks:
+        tasks.create_task(server.run(), name="drone")
+        tasks.create_task(camera.run(), name="camera")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
