@@ -104,7 +104,7 @@ class Daemon:
         self._pilot = pilot_of(config, site)
         self._frames: Latest[FrameTicket] = Latest()
         self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock)
-        self._camera = connect_camera(config.camera, clock, self._frames.put, self._vehicle)
+        self._camera = connect_camera(config.camera, clock, self._frames.put, self._trouble, self._vehicle)
         self._pump = SetpointPump(self._vehicle, clock, self._sent, TICK_S)
         self._latency = LatencyBook()
         self._detections: list[Detection] = []
@@ -141,8 +141,12 @@ class Daemon:
         return self._result(output)
 
     def _failed(self, err: TransientError) -> None:
-        """A part that restarts has failed: people should know."""
-        event = Event(self._clock.now_ns(), EventLevel.ERROR, "failure", str(err))
+        """A part that restarts has failed."""
+        self._trouble(str(err))
+
+    def _trouble(self, text: str) -> None:
+        """Something that people should know."""
+        event = Event(self._clock.now_ns(), EventLevel.ERROR, "failure", text)
         self._vehicle.notify(event)
         if self._recorder is not None:
             self._recorder.record(Topic.EVENT, event.stamp_ns, event)

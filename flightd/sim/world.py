@@ -6,7 +6,6 @@ It knows nothing of the daemon but the address that its camera reports to.
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
@@ -111,8 +110,3 @@ class World:
             truth: Kinematics = self.vehicle.truth()
             self._recorder.record(Topic.TRUTH, truth.stamp_ns, truth)
             await asyncio.sleep(_TRUTH_PERIOD_S)
-
-
-def start_yaw(degrees: float) -> float:
-    """Heading on the pad in radians."""
-    return math.radians(degrees)

@@ -22,16 +22,18 @@ def connect_camera(
     config: CameraConfig,
     clock: Clock,
     on_frame: Callable[[FrameTicket], None],
+    on_trouble: Callable[[str], None],
     vehicle: Vehicle | None = None,
 ) -> Camera:
-    """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address."""
+    """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address.
+
+    `on_trouble` hears, now and then, in a line for a person, why pictures are refused."""
     if config.url == ARDRONE_URL:
         if not isinstance(vehicle, ArDroneVehicle):
             raise InputError(f'camera.url {ARDRONE_URL!r} needs vehicle.kind = "ardrone"')
         return ArDroneCamera(vehicle, config.latency_s, clock, {ArDroneView.DOWN: on_frame})
     if config.url.startswith("udp:"):
-        return SharedCamera(
-            config.url, (config.width_px, config.height_px), config.latency_s, clock, on_frame
-        )
+        size_px = config.width_px, config.height_px
+        return SharedCamera(config.url, size_px, config.latency_s, clock, on_frame, on_trouble)
     source = parse_source(config.url, config.width_px, config.height_px, config.fps)
     return CaptureCamera(source, config.latency_s, clock, on_frame)

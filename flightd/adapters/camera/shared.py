@@ -13,6 +13,8 @@ from flightd.runtime.notice import decode_notice
 from flightd.runtime.ring import FrameTicket
 from flightd.tracking.clocks import DeviceClock
 
+_TELL_NS = 5_000_000_000
+
 
 def parse_address(url: str) -> tuple[str, int]:
     """(host, port) of a `udp://HOST:PORT`; InputError otherwise."""
@@ -27,7 +29,8 @@ def parse_address(url: str) -> tuple[str, int]:
 
 
 class SharedCamera(asyncio.DatagramProtocol):
-    """Listens for notices and hands each picture's ticket to `on_frame`."""
+    """Listens for notices and hands each picture's ticket to `on_frame`; what is no usable notice is
+    counted and told to `on_trouble`, at most once in five seconds."""
 
     def __init__(
         self,
@@ -36,6 +39,7 @@ class SharedCamera(asyncio.DatagramProtocol):
         latency_s: float,
         clock: Clock,
         on_frame: Callable[[FrameTicket], None],
+        on_trouble: Callable[[str], None],
     ) -> None:
         self._address = parse_address(url)
         self._url = url
@@ -44,8 +48,9 @@ class SharedCamera(asyncio.DatagramProtocol):
         self._device = DeviceClock(round(latency_s * 1e9))
         self._on_frame = on_frame
         self.frames = 0
+        self._on_trouble = on_trouble
+        self._told_ns: int | None = None
         self.rejected = 0
-        self.reason = ""
 
     async def run(self) -> None:
         """Listen until cancelled.  Raises UnavailableError when the port is taken."""
@@ -91,4 +96,7 @@ class SharedCamera(asyncio.DatagramProtocol):
 
     def _reject(self, reason: str) -> None:
         self.rejected += 1
-        self.reason = reason
+        now_ns = self._clock.now_ns()
+        if self._told_ns is None or now_ns - self._told_ns >= _TELL_NS:
+            self._told_ns = now_ns
+            self._on_trouble(f"camera {self._url}: {reason} ({self.rejected} notices refused so far)")

@@ -32,9 +32,13 @@ def notice(seq: int, device_ns: int, width: int = 64) -> bytes:
 
 
 def test_notices_become_tickets_in_our_time_and_junk_is_counted() -> None:
+    troubles: list[str] = []
+
     async def main() -> tuple[list[FrameTicket], SharedCamera]:
         clock, tickets, port = LoopClock(), list[FrameTicket](), free_port()
-        camera = SharedCamera(f"udp://127.0.0.1:{port}", (64, 36), 0.05, clock, tickets.append)
+        camera = SharedCamera(
+            f"udp://127.0.0.1:{port}", (64, 36), 0.05, clock, tickets.append, troubles.append
+        )
         running = asyncio.ensure_future(camera.run())
         await asyncio.sleep(0.01)
         loop = asyncio.get_running_loop()
@@ -55,6 +59,8 @@ def test_notices_become_tickets_in_our_time_and_junk_is_counted() -> None:
         tickets, camera = runner.run(main())
     assert [t.seq for t in tickets] == [0, 1, 2]
     assert camera.rejected == 5
+    assert len(troubles) == 1, "told once, not for every datagram"
+    assert "not a picture notice" in troubles[0]
     assert all(abs(t.arrival_ns - t.stamp_ns - 50_000_000) < 10_000 for t in tickets)
 
 
@@ -63,7 +69,7 @@ def test_a_port_in_use_is_said_in_one_line() -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
             taken.bind(("127.0.0.1", 0))
             url = f"udp://127.0.0.1:{taken.getsockname()[1]}"
-            await SharedCamera(url, (64, 36), 0.0, LoopClock(), lambda _: None).run()
+            await SharedCamera(url, (64, 36), 0.0, LoopClock(), lambda _: None, print).run()
 
     with pytest.raises(UnavailableError, match="in use; is another flightd running"):
         asyncio.run(main())
@@ -74,7 +80,7 @@ def test_a_port_in_use_is_said_in_one_line() -> None:
 )
 def test_a_wrong_address_is_refused_before_anything_opens(url: str) -> None:
     async def main() -> None:
-        connect_camera(CameraConfig(url=url), LoopClock(), lambda _: None)
+        connect_camera(CameraConfig(url=url), LoopClock(), lambda _: None, print)
 
     with pytest.raises(InputError, match=r"camera\.url"):
         asyncio.run(main())
