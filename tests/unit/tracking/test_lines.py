@@ -1,0 +1,141 @@
+"""Line tracks: velocity from tilt and lines, late pictures, false lines, heading modulo 90 degrees."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+
+from flightd.core.geometry import Lens, Mount
+from flightd.core.types import Attitude, Line, LineSet
+from flightd.sim.ideal import EyeErrors, IdealEye
+from flightd.sim.kinematics import Kinematics
+from flightd.sim.sites import random_site
+from flightd.tracking.lines import GRAVITY_MPS2, LineTracker, TrackerParams
+from flightd.tracking.motion import AxisTracker, MotionNoise
+
+LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)
+HEIGHT_M = 1.6
+SITE = random_site(3)
+FRAME_NS = 33_333_333
+LATE_NS = 70_000_000
+
+
+def flown(
+    tilt_rad: float, seconds: float, yaw_offset_rad: float = 0.0
+) -> tuple[LineTracker, Kinematics, int]:
+    """A drone that accelerates along the first aisle by a constant pitch, without drag; its pictures
+    come late, its own yaw is off by `yaw_offset_rad`."""
+    params = TrackerParams(LENS, Mount(), width_m=SITE.line_width_m, noise=MotionNoise(drag_per_s=0.0))
+    tracker, eye = LineTracker(params, 0.0), IdealEye(SITE, LENS, Mount(), EyeErrors(0.1, 0.0002), 1)
+    accel = GRAVITY_MPS2 * math.tan(tilt_rad)
+    start = SITE.nodes["A1"]
+    waiting: list[tuple[int, LineSet]] = []
+    next_frame, now_ns = 0, 0
+    k = Kinematics(0, start.x_m, start.y_m, HEIGHT_M, 0, 0, 0, 0, -tilt_rad, 0, 0, 0, 0)
+    while now_ns < seconds * 1e9:
+        now_ns += 10_000_000
+        t = now_ns * 1e-9
+        k = Kinematics(
+            now_ns,
+            start.x_m + accel * t * t / 2,
+            start.y_m,
+            HEIGHT_M,
+            accel * t,
+            0,
+            0,
+            0,
+            -tilt_rad,
+            0,
+            0,
+            0,
+            0,
+        )
+        tracker.attitude(Attitude(now_ns, 0.0, -tilt_rad, yaw_offset_rad))
+        if now_ns >= next_frame:
+            next_frame += FRAME_NS
+            waiting.append((now_ns + LATE_NS, eye.see(k, next_frame, now_ns)))
+        while waiting and waiting[0][0] <= now_ns:
+            tracker.frame(waiting.pop(0)[1], HEIGHT_M)
+    return tracker, k, now_ns
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, 2.0, -3.0])
+def test_velocity_and_offsets_are_those_of_now_although_pictures_are_late(tilt_deg: float) -> None:
+    tracker, k, now_ns = flown(math.radians(tilt_deg), 1.5)
+    tracks = tracker.at(now_ns)
+    assert tracks is not None
+    assert tracks.vx_mps == pytest.approx(k.vx_mps, abs=0.06)
+    assert tracks.vy_mps == pytest.approx(0.0, abs=0.04)
+    truth = sorted(line.x0_m for line in SITE.lines if line.x0_m == line.x1_m)
+    for track in tracks.across_x:
+        assert min(abs(k.x_m + track.offset_m - at) for at in truth) < 0.02
+    assert any(abs(track.offset_m) < 0.01 for track in tracks.across_y), "the aisle line below"
+
+
+def test_the_vehicles_own_heading_may_start_anywhere() -> None:
+    tracker, _, now_ns = flown(0.0, 1.0, yaw_offset_rad=2.3)
+    tracks = tracker.at(now_ns)
+    assert tracks is not None
+    assert tracks.yaw_rad == pytest.approx(0.0, abs=math.radians(0.3))
+
+
+def test_a_frame_older_than_the_last_or_without_attitude_is_refused() -> None:
+    tracker, _, now_ns = flown(0.0, 0.5)
+    old = LineSet(0, now_ns - 300_000_000, 640, 360, (), (), "ideal")
+    future = LineSet(0, now_ns + 10**9, 640, 360, (), (), "ideal")
+    assert not tracker.frame(old, HEIGHT_M)
+    assert not tracker.frame(future, HEIGHT_M)
+    assert not tracker.frame(LineSet(0, now_ns, 640, 360, (), (), "ideal"), math.nan)
+    assert tracker.rejected == 3
+
+
+def test_a_line_of_another_width_is_not_paint() -> None:
+    tracker = LineTracker(TrackerParams(LENS, Mount(), width_m=0.075), 0.0)
+    for i in range(1, 10):
+        tracker.attitude(Attitude(i * FRAME_NS, 0.0, 0.0, 0.0))
+        wide = Line(0.0, 0.0, 60.0, -180.0, 180.0, 1.0, 0.1, 0.001)
+        tracker.frame(LineSet(i, i * FRAME_NS, 640, 360, (wide,), (), "test"), HEIGHT_M)
+    tracks = tracker.at(9 * FRAME_NS)
+    assert tracks is not None
+    assert not tracks.across_y
+    assert tracks.lines_ns == 0
+
+
+def test_tracked_sigmas_are_honest() -> None:
+    """Normalised errors of one axis over many runs have a spread near one."""
+    noise = MotionNoise()
+    errors: list[float] = []
+    for seed in range(300):
+        rng = random.Random(seed)
+        axis = AxisTracker(noise, gate_m=0.35, forget_ns=10**10)
+        x = 0.0
+        v, push = rng.gauss(0, noise.start_velocity_mps), rng.gauss(0, noise.start_disturbance_mps2)
+        dt = 1 / 30
+        for step in range(60):
+            if step:
+                accel = rng.gauss(0, noise.accel_mps2 / dt**0.5)
+                push += rng.gauss(0, noise.disturbance_mps2 * dt**0.5)
+                x += v * dt + 0.5 * (accel + push) * dt * dt
+                v += (accel + push - noise.drag_per_s * v) * dt
+                axis.predict(dt, 0.0)
+            if step < 40:
+                axis.update([(0.5 - x + rng.gauss(0, 0.01), 0.01, 0.075)], step)
+        (line,) = axis.lines()
+        errors.append((line.offset_m - (0.5 - x)) / line.sigma_m)
+    spread = (sum(e * e for e in errors) / len(errors)) ** 0.5
+    assert 0.8 < spread < 1.25
+
+
+def test_a_false_line_nearby_starts_a_track_of_its_own() -> None:
+    axis = AxisTracker(MotionNoise(), gate_m=0.35, forget_ns=10**9)
+    for step in range(20):
+        axis.predict(1 / 30, 0.0)
+        axis.update([(0.2, 0.005, 0.075), (0.9, 0.005, 0.075)], step * FRAME_NS)
+    first = axis.lines()
+    axis.update([(0.2, 0.005, 0.075), (0.5, 0.005, 0.075)], 21 * FRAME_NS)
+    assert [round(line.offset_m, 2) for line in first] == [0.2, 0.9]
+    assert len(axis.lines()) == 3
+    axis.update([], 10**10)
+    assert axis.lines() == [], "lines not seen for long are forgotten"
