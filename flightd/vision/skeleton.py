@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.fit import bow, fit_lines
+from flightd.vision.fit import bow, fit_line, fit_lines
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, LinearFit, Strip
@@ -89,7 +89,7 @@ def find(
     radius = distance.ravel()[place].astype(float) * grid.step
     x, y = plane.ideal(grid.x(xs), grid.y(ys))
     points = _Ridge(x, y, radius, np.ones(len(x), np.bool_), grid.step)
-    strips = [_take_band(points, *_normal(seed)) for seed in seeds]
+    strips = [_take_band(points, *_normal(seed), passes=1) for seed in seeds]
     need = max(_MIN_POINTS, round(_VOTE_SHARE * max(mask.shape)))
     if np.count_nonzero(points.free) >= need:
         if seeds:
@@ -112,14 +112,14 @@ class _Ridge:
     step: int
 
 
-def _take_band(ridge: _Ridge, rho: float, c: float, s: float) -> Strip | None:
+def _take_band(ridge: _Ridge, rho: float, c: float, s: float, passes: int = 2) -> Strip | None:
     """The straight band along a line; its points are taken off the free ones."""
     members = np.flatnonzero((np.abs(ridge.x * c + ridge.y * s - rho) <= 1.5 * ridge.step) & ridge.free)
     if len(members) < _MIN_POINTS:
         return None
     steep = abs(c) >= abs(s)
     u, v = (ridge.y, ridge.x) if steep else (ridge.x, ridge.y)
-    strip = _fit_ridge(u, v, ridge, members, steep=steep)
+    strip = _fit_ridge(u, v, ridge, members, passes, steep=steep)
     if strip is not None:
         away = np.abs(v - strip.centre.a - strip.centre.b * u) * strip.cosine
         np.logical_and(ridge.free, away > max(2 * ridge.step, 0.3 * strip.width_px), out=ridge.free)
@@ -168,30 +168,33 @@ def _straightened(rho: float, theta: float, plane: Plane) -> tuple[float, float,
     return float(x[0] * nx + y[0] * ny), nx, ny
 
 
-def _fit_ridge(u: Array, v: Array, ridge: _Ridge, members: NDArray[np.intp], *, steep: bool) -> Strip | None:
+def _fit_ridge(
+    u: Array, v: Array, ridge: _Ridge, members: NDArray[np.intp], passes: int, *, steep: bool
+) -> Strip | None:
     """A straight line through the ridge; None when too little of it is straight and of one width."""
     radius, step = ridge.radius, ridge.step
     noise = step / math.sqrt(6)
-    for limit in (1.5, 1.0):
+    for _ in range(passes):
         # The band may taper; where others cross or join it, the ridge is wider than its own line says.
-        fit, half = fit_lines(u[members], (v[members], radius[members]), noise)
+        half = fit_line(u[members], radius[members], noise)
         off = np.abs(radius[members] - half.a - half.b * u[members])
         kept = members[off <= 1.2 * step + 0.2 * radius[members]]
         if len(kept) < _MIN_POINTS:
             return None
         fit, half = fit_lines(u[kept], (v[kept], radius[kept]), noise)
-        members = np.flatnonzero((np.abs(v - fit.a - fit.b * u) <= limit * step) & ridge.free)
+        away = np.abs(v - fit.a - fit.b * u)
+        members = np.flatnonzero((away <= 1.5 * step) & ridge.free)
         if len(members) < _MIN_POINTS:
             return None
     # Of a curve the near points look straight: judge by what lies around, too.
-    reach = 0.3 * (float(u[kept].max()) - float(u[kept].min()))
-    around = np.abs(v - fit.a - fit.b * u) <= 3 * step
-    around &= (u >= u[kept].min() - reach) & (u <= u[kept].max() + reach)
+    first, last = float(u[kept].min()), float(u[kept].max())
+    reach = 0.3 * (last - first)
+    around = (away <= 3 * step) & (u >= first - reach) & (u <= last + reach)
     if bow(u[around], v[around], noise):
         return None
     # The distance is to the first unpainted sample's centre: half a sample beyond the edge.
     stretch = math.hypot(1.0, fit.b)
-    u0, u1 = float(u[kept].min()) - step / 2, float(u[kept].max()) + step / 2
+    u0, u1 = first - step / 2, last + step / 2
     if min(half.at(u0), half.at(u1)) < step / 2:
         return None
     a, b = (half.a - step / 2) * stretch, half.b * stretch
