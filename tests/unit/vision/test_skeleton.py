@@ -34,7 +34,7 @@ def test_thinning_leaves_one_connected_line_one_sample_wide() -> None:
 
 
 def thinned_pixel_by_pixel(mask: Image) -> NDArray[np.bool_]:
-    """The algorithm as published: conditions (a) to (d) and (c'), (d'), each pass on the picture before it."""
+    """The algorithm as published: conditions (a) to (d) and (c'), (d'), each pass on the one before."""
     image = np.pad(mask > 0, 1)
     changed = True
     while changed:
