@@ -145,3 +145,17 @@ def test_a_file_that_is_no_profile_is_named(tmp_path: Path, content: bytes) -> N
 def test_an_unknown_name_lists_the_shipped_ones() -> None:
     with pytest.raises(InputError, match=r"purple.*yellow, white"):
         load_profile("purple")
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_each_shipped_profile_says_what_it_was_trained_on(name: str) -> None:
+    profile = load_profile(name)
+    assert (profile.name, profile.colour) == (name, name)
+    assert profile.score > 0.95
+    assert len(profile.training_hash) == 16
+
+
+@pytest.mark.parametrize("lut", [np.zeros(10, np.uint8), np.full(65536, 3, np.uint8), np.zeros(65536)])
+def test_a_table_of_the_wrong_kind_is_refused(lut: NDArray[np.uint8]) -> None:
+    with pytest.raises(ValueError, match="table"):
+        ColourProfile("bad", lut, "yellow")
