@@ -188,8 +188,10 @@ def test_a_rebooted_drone_is_configured_again_and_flies() -> None:
             b.server.reboot()
             await asyncio.sleep(3.0)
             b.server.radio = True
-            await b.until(b.vehicle.attitudes)
+            await b.until(lambda: b.vehicle.camera_since_ns is None)
+            ear = Ear(drone)
             await b.hovering()
+            assert ear.named("FTRIM")
 
     virtually(main)
 
@@ -216,7 +218,7 @@ def test_a_second_client_that_ran_ahead_is_overcome_by_starting_at_one() -> None
             drone.command(b"AT*COMWDG=2000000\r", b.clock.now_ns())
             await asyncio.sleep(0.5)
             assert drone.last_sequence == 2000000
-            await b.until(lambda: drone.last_sequence < 100, limit_s=2.0)
+            await b.until(lambda: drone.last_sequence < 100, limit_s=1.0)  # before the drone gives us up
             await b.hovering()
 
     virtually(main)
@@ -252,6 +254,22 @@ def test_damaged_and_foreign_navdata_costs_nothing() -> None:
             assert 14 <= len(b.vehicle.attitudes()) <= 16
             assert b.vehicle._link.bad_packets == 200
             assert b.state.battery_frac == 1.0
+
+    virtually(main)
+
+
+def test_navdata_that_was_overtaken_is_not_taken() -> None:
+    async def main() -> None:
+        async with bench() as b:
+            await b.configured()
+            navdata, client = b.server._navdata, b.server._client
+            assert navdata is not None
+            old = packet(Report(state=0x0F800490, sequence=3, major=3, battery_percent=5), (0,))
+            for _ in range(20):
+                navdata.sendto(old, client)
+                await asyncio.sleep(0.01)
+                assert (b.state.battery_frac, b.state.mode) == (1.0, "landed")
+            assert b.vehicle._link.stale_packets == 20
 
     virtually(main)
 

@@ -4,9 +4,9 @@ Pure: time is an argument, commands are the result.  The rules:
 
 - Before the first navdata, and on the ground in HANDS_OFF, only COMWDG keeps the link awake: a daemon that
   starts beside a flying drone must not land it by accident.
-- FLY: flat trim once, then REF with the fly bit, repeated, until the drone leaves LANDED.  LAND lands.
-  STANDBY and DISARM never change what the drone does, their fly bit follows the telemetry: the motors stop
-  at the end of a landing, and in the air nothing of ours ever cuts them.
+- FLY: flat trim once per boot of the drone, then REF with the fly bit, repeated, until the drone leaves
+  LANDED.  LAND lands.  STANDBY and DISARM never change what the drone does, their fly bit follows the
+  telemetry: the motors stop at the end of a landing, and in the air nothing of ours ever cuts them.
 - HANDS_OFF in the air: one hover command, a command number 1, then silence.  Any command of ours would
   outrun the numbers of whoever takes over, and the 1 makes the drone obey his; if nobody comes, it lands
   itself after `general:com_watchdog` seconds.
@@ -86,6 +86,11 @@ class FlightLogic:
         self._flew = self._sinking = False
         self._over = ""
         self._asked_ns = self._press_ns = self._setpoint = None
+
+    def forget_drone(self) -> None:
+        """The drone came up anew: it has to be configured and trimmed again."""
+        self.configured = False
+        self._trims_left = _TRIM_REPEATS
 
     def steer(self, setpoint: AttitudeSetpoint, now_ns: int) -> None:
         self._setpoint, self._setpoint_ns = setpoint, now_ns

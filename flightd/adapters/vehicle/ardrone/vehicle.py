@@ -161,7 +161,8 @@ class ArDroneVehicle:
         self._telemetry.observe(packet, now_ns)
         self._flight.follow(now_ns)
         if packet.state & DroneState.NAVDATA_BOOTSTRAP and self._flight.configured:
-            self._flight.configured = False
+            self._flight.forget_drone()
+            self._camera_since_ns = None  # it may show either camera now
             self._unconfigured.set()
 
     def _mind_numbers(self, now_ns: int) -> None:
