@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.fit import bow, fit_lines
+from flightd.vision.fit import fit_lines, is_bent
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, Strip, bisector
@@ -209,11 +209,11 @@ def _fit_band(
     inside = u[members]
     if abs(centre.b) > MAX_SLOPE:
         return None
-    # Of a curve the near cuts look straight: judge by what lies around, too.
     reach = 0.3 * (float(inside.max()) - float(inside.min()))
-    around = np.abs((low + high) / 2 - centre.a - centre.b * u) <= limit + 2 * step
+    middle = (low + high) / 2
+    around = np.abs(middle - centre.a - centre.b * u) <= limit + 2 * step
     around &= (u >= inside.min() - reach) & (u <= inside.max() + reach)
-    if bow(u[around], (low[around] + high[around]) / 2, noise):
+    if is_bent((inside, middle[members]), (u[around], middle[around]), noise):
         return None
     u0, u1 = float(inside.min()), float(inside.max())
     slabs = max(1.0, (u1 - u0) / spacing_px + 1)

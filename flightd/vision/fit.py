@@ -39,12 +39,25 @@ def fit_lines(u: Array, vs: tuple[Array, ...], sigma: float) -> list[LinearFit]:
     return fits
 
 
-def bow(u: Array, v: Array, sigma: float) -> bool:
-    """Whether v(u) is bent: its sagitta exceeds MAX_BOW of the chord, and four of its own sigmas."""
+def is_bent(core: tuple[Array, Array], around: tuple[Array, Array], sigma: float) -> bool:
+    """Whether points (u, v), each good to `sigma`, run on a curve.
+
+    Of a curve the points that fit a straight line look straight: what lies around them must bend by
+    MAX_BOW.  But straight bands end in bends, too: so their core must bend the same way.
+    """
+    wide, wide_sigma, chord = sagitta(*around, sigma)
+    if abs(wide) <= max(MAX_BOW * chord, 4 * wide_sigma):
+        return False
+    narrow, narrow_sigma, chord = sagitta(*core, sigma)
+    return narrow * wide > 0 and abs(narrow) > max(0.3 * MAX_BOW * chord, narrow_sigma)
+
+
+def sagitta(u: Array, v: Array, sigma: float) -> tuple[float, float, float]:
+    """Height of the best parabola's arc over its chord, its standard deviation, and the chord."""
     n = len(u)
     chord = float(u.max() - u.min()) if n >= 5 else 0.0
     if chord <= 0:
-        return False
+        return 0.0, math.inf, 0.0
     t = (u - float(np.add.reduce(u)) / n) * (2 / chord)
     # v = c0 + c1 t + c2 q with q the part of t^2 that no straight line explains: the sagitta is c2, to
     # within how unevenly the points lie.
@@ -53,12 +66,12 @@ def bow(u: Array, v: Array, sigma: float) -> bool:
     q = tt - stt / n - (float(t @ tt) / stt) * t
     sqq = float(q @ q)
     if sqq <= 1e-9 * n:
-        return False
+        return 0.0, math.inf, chord
     c1, c2 = float(t @ v) / stt, float(q @ v) / sqq
     residual = v - float(np.add.reduce(v)) / n - c1 * t - c2 * q
     variance = max(sigma * sigma, float(residual @ residual) / max(1, n - 3))
-    sagitta = abs(c2) / math.hypot(1.0, c1 * 2 / chord)
-    return sagitta > max(MAX_BOW * chord, 4 * math.sqrt(variance / sqq))
+    slope = math.hypot(1.0, c1 * 2 / chord)
+    return c2 / slope, math.sqrt(variance / sqq) / slope, chord
 
 
 @dataclass(frozen=True, slots=True)

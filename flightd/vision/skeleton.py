@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.fit import bow, fit_line, fit_lines
+from flightd.vision.fit import fit_line, fit_lines, is_bent
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, LinearFit, Strip
@@ -186,11 +186,10 @@ def _fit_ridge(
         members = np.flatnonzero((away <= 1.5 * step) & ridge.free)
         if len(members) < _MIN_POINTS:
             return None
-    # Of a curve the near points look straight: judge by what lies around, too.
     first, last = float(u[kept].min()), float(u[kept].max())
     reach = 0.3 * (last - first)
     around = (away <= 3 * step) & (u >= first - reach) & (u <= last + reach)
-    if bow(u[around], v[around], noise):
+    if is_bent((u[kept], v[kept]), (u[around], v[around]), noise):
         return None
     # The distance is to the first unpainted sample's centre: half a sample beyond the edge.
     stretch = math.hypot(1.0, fit.b)

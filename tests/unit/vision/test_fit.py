@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightd.vision.combine import fuse
-from flightd.vision.fit import bow, fit_line, robust_lines
+from flightd.vision.fit import fit_line, is_bent, robust_lines, sagitta
 from flightd.vision.strip import LinearFit, Strip, bisector, swapped
 
 
@@ -51,12 +51,21 @@ def test_points_without_weight_have_no_say() -> None:
 
 
 @given(radius=st.floats(50, 500), noise=st.floats(0, 0.5))
-def test_an_arc_of_three_radii_is_bent_and_a_line_is_not(radius: float, noise: float) -> None:
-    rng = np.random.default_rng(1)
+def test_an_arc_is_bent_and_a_line_is_not(radius: float, noise: float) -> None:
     u = np.linspace(-radius / 2, radius / 2, 80)
-    ripple = rng.normal(0, noise, u.size)
-    assert bow(u, np.sqrt(radius**2 - u**2) + ripple, max(noise, 0.1))
-    assert not bow(u, 0.7 * u + ripple, max(noise, 0.1))
+    ripple = np.random.default_rng(1).normal(0, noise, u.size)
+    arc, line = np.sqrt(radius**2 - u**2) + ripple, 0.7 * u + ripple
+    core = slice(20, 60)
+    assert is_bent((u[core], arc[core]), (u, arc), max(noise, 0.1))
+    assert not is_bent((u[core], line[core]), (u, line), max(noise, 0.1))
+
+
+def test_a_line_that_ends_in_bends_is_a_line() -> None:
+    u = np.linspace(-100, 100, 101)
+    v = np.where(np.abs(u) > 70, (np.abs(u) - 70) ** 2 / 60, 0.0)
+    core = np.abs(u) <= 70
+    assert abs(sagitta(u, v, 0.1)[0]) > 0.02 * 200
+    assert not is_bent((u[core], v[core]), (u, v), 0.1)
 
 
 @given(a=st.floats(-300, 300), b=st.floats(-1.2, 1.2), steep=st.booleans())
