@@ -21,6 +21,7 @@ EXAMPLES = """Examples:
   flightd sim --seed 7 --json                  the summary as JSON
   flightd sim --speed 1                        in real time, over UDP between processes
   flightd sim --warehouse configs/site-large.toml --out /tmp/large
+  flightd sim --truth-url tcp:127.0.0.1:5762 --vehicle-url tcp:127.0.0.1:5760   ArduCopter's SITL flies
   flightd sim --set mission.heading=shelf --set control.tilt_compensation=none
 """
 
@@ -45,20 +46,33 @@ def sim(
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE over the configuration.")
     ] = None,
+    truth_url: Annotated[
+        str, typer.Option(help="tcp:HOST:PORT of an external simulator's second port: it is the airframe.")
+    ] = "",
+    vehicle_url: Annotated[
+        str, typer.Option(help="Where its autopilot is flown, e.g. tcp:127.0.0.1:5760.")
+    ] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json and nothing else.")] = False,
 ) -> None:
     """Fly a whole mission in the simulator and leave its log, report and summary."""
     from flightd.cli.flight_progress import FlightProgress
     from flightd.cli.simulate import Simulation, fly
+    from flightd.sim.external import truth_address
 
-    factor = _factor(speed)
+    external = bool(truth_url or vehicle_url)
+    if external and not (truth_url and vehicle_url):
+        raise InputError("--truth-url and --vehicle-url belong together: give both or neither")
+    factor = _factor("1" if external and speed == "max" else speed)
     chosen, site = _configured(config, warehouse, vehicle, settings or [])
+    if external:
+        truth_address(truth_url)
+        chosen = chosen.model_copy(update={"vehicle": chosen.vehicle.model_copy(update={"url": vehicle_url})})
     conditions = _scenario(scenario or [])
     chosen = _camera_of(chosen, conditions)
     _make_folder(out)
     started = time.monotonic()
     with FlightProgress(shown=not as_json) as progress:
-        simulation = Simulation(chosen, site, conditions, seed, factor, out, progress)
+        simulation = Simulation(chosen, site, conditions, seed, factor, out, progress, truth_url)
         result = fly(simulation)
     summary = _summary(simulation, result, time.monotonic() - started)
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")

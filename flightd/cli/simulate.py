@@ -12,6 +12,7 @@ import math
 import multiprocessing
 import signal
 import socket
+import sys
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -24,7 +25,7 @@ from flightd.adapters.recorder.recorder import Recorder
 from flightd.app import Daemon, FlightResult, detector_pool, plan_of
 from flightd.config.schema import Config
 from flightd.config.site_file import site_toml
-from flightd.core.errors import InputError, RunError, UnavailableError
+from flightd.core.errors import FlightdError, InputError, RunError, UnavailableError
 from flightd.core.topics import Document, Topic
 from flightd.core.types import Status
 from flightd.grid.site import Site
@@ -49,6 +50,8 @@ class Simulation:
     speed: float | None
     folder: Path
     observer: Callable[[Status], None] = lambda _: None
+    truth_url: str = ""
+    """An external simulator's truth link; the configuration then says where its vehicle is flown."""
 
     @property
     def flight_log(self) -> Path:
@@ -115,6 +118,8 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
         pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
         await pool.ready()
         config = _connected(simulation.config, ports, camera_port)
+        if simulation.truth_url:
+            config = config.model_copy(update={"vehicle": simulation.config.vehicle})
         daemon = Daemon(config, simulation.site, clock, pool, recorder, [simulation.observer])
         watch = asyncio.ensure_future(_watch(process))
         try:
@@ -163,6 +168,9 @@ def _run_world(spec: WorldSpec, factor: float, log: Path, pipe: Connection) -> N
             for task in tasks:
                 task.cancel()
             await asyncio.wait(tasks)
+            for task in tasks:
+                if not task.cancelled() and isinstance(task.exception(), FlightdError):
+                    sys.stderr.write(f"{task.exception()}\n")
 
     with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
         runner.run(main())
@@ -193,6 +201,8 @@ def _spec(simulation: Simulation, camera_port: int, vehicle_ports: tuple[int, ..
         appearance=scenario.floor.look(),
         draught=scenario.wind.draught(),
         battery_frac=scenario.vehicle.battery,
+        radio=scenario.vehicle.radio(),
+        truth_url=simulation.truth_url,
     )
 
 

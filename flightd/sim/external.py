@@ -168,9 +168,9 @@ class ExternalVehicle(asyncio.Protocol):
     `open` waits for the first truth; a lost link is found again, the warehouse staying where it is.
     """
 
-    def __init__(self, url: str, clock: Clock, placement: Placement, patience_s: float = 60.0) -> None:
+    def __init__(self, url: str, clock: Clock, placement: Placement, patience_s: float = 30.0) -> None:
         self._url = url
-        self._host, self._port = _address(url)
+        self._host, self._port = truth_address(url)
         self._clock = clock
         self._reader = TruthReader(placement)
         self._truth = TruthHistory(_SAMPLES)
@@ -187,7 +187,8 @@ class ExternalVehicle(asyncio.Protocol):
 
         UnavailableError when it does not within the patience.
         """
-        self._line = asyncio.create_task(self._hold(), name="external truth")
+        if self._line is None:
+            self._line = asyncio.create_task(self._hold(), name="external truth")
         try:
             async with asyncio.timeout(self._patience_s):
                 await self._first.wait()
@@ -199,8 +200,7 @@ class ExternalVehicle(asyncio.Protocol):
 
     async def run(self) -> None:
         """Listen until cancelled."""
-        if self._line is None:
-            await self.open()
+        await self.open()
         assert self._line is not None
         try:
             await self._line
@@ -269,7 +269,8 @@ class ExternalVehicle(asyncio.Protocol):
                 self._first.set()
 
 
-def _address(url: str) -> tuple[str, int]:
+def truth_address(url: str) -> tuple[str, int]:
+    """Host and port of `tcp:HOST:PORT`; InputError for anything else."""
     match = re.fullmatch(r"tcp:(?://)?([^\s:]+):(\d{1,5})", url)
     if match is None or not 0 < int(match[2]) < 65536:
         raise InputError(f"--truth-url {url!r} is no address: use tcp:HOST:PORT, e.g. tcp:127.0.0.1:5762")

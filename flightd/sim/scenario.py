@@ -30,6 +30,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from flightd.core.errors import InputError
 from flightd.sim.appearance import CLEAN, DEFAULT, HARSH, Appearance
+from flightd.sim.autopilot.radio import RadioParams
 from flightd.sim.optics import SimCamera, wide_lens
 from flightd.sim.wind import Draught
 
@@ -76,6 +77,13 @@ class WindScenario(_Section):
 
 class VehicleScenario(_Section):
     battery: float = Field(1.0, ge=0, le=1)
+    radio_loss: float = Field(0.0, ge=0, le=1)
+    radio_delay_ms: float = Field(0.0, ge=0, le=2000)
+    radio_jitter_ms: float = Field(0.0, ge=0, le=2000)
+
+    def radio(self) -> RadioParams:
+        """Each way between a MAVLink autopilot and its companion."""
+        return RadioParams(self.radio_loss, self.radio_delay_ms / 1000, self.radio_jitter_ms / 1000)
 
 
 class Scenario(_Section):

@@ -20,7 +20,9 @@ from flightd.sim.ardrone.server import ArDroneServer, Ports
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Peer
+from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.camera import CameraPeer
+from flightd.sim.external import ExternalVehicle, Placement
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.optics import SimCamera
 from flightd.sim.sensors import Sensors
@@ -32,7 +34,9 @@ _TRUTH_PERIOD_S = 0.02
 @dataclass(frozen=True, slots=True)
 class WorldSpec:
     """Everything that makes one simulated world; a port 0 takes any free one.  An AR.Drone has four:
-    commands, navdata, video and configuration; it transmits its pictures itself."""
+    commands, navdata, video and configuration; it transmits its pictures itself.  With a `truth_url` the
+    vehicle is an external simulator's, which stands on the pad, and only the camera is ours; `radio` lies
+    between a MAVLink autopilot and its companion."""
 
     site: Site
     seed: int
@@ -44,6 +48,8 @@ class WorldSpec:
     appearance: Appearance = DEFAULT
     draught: Draught = field(default_factory=Draught)
     battery_frac: float = 1.0
+    radio: RadioParams = PERFECT
+    truth_url: str = ""
 
 
 class VehiclePeer(Protocol):
@@ -75,14 +81,18 @@ class World:
         )
         self.vehicle: VehiclePeer
         show = None
-        if spec.vehicle == "ardrone":
+        if spec.truth_url:
+            self.vehicle = ExternalVehicle(
+                spec.truth_url, clock, Placement(pad.x_m, pad.y_m, spec.start_yaw_rad)
+            )
+        elif spec.vehicle == "ardrone":
             drone = Drone(airframe, Sensors(seed=spec.seed))
             self.vehicle = server = ArDroneServer(drone, clock, Ports("127.0.0.1", *spec.vehicle_ports))
             show = server.show
         else:
             (port,) = spec.vehicle_ports
             peer = Px4Peer if spec.vehicle == "px4" else ArduCopterPeer
-            self.vehicle = peer(clock, airframe, PeerConfig(port=port, seed=spec.seed))
+            self.vehicle = peer(clock, airframe, PeerConfig(port=port, seed=spec.seed, radio=spec.radio))
         self.camera = CameraPeer(
             spec.site,
             spec.camera,
@@ -95,10 +105,13 @@ class World:
         )
 
     async def open(self) -> tuple[str, int]:
-        """Bind the vehicle's sockets; the address to which a daemon sends commands."""
+        """Bind the vehicle's sockets; the address to which a daemon sends commands.  UnavailableError when
+        an external simulator does not tell its truth."""
         return await self.vehicle.open()
 
     async def run(self, opened: Callable[[], None] = lambda: None) -> None:
+        if isinstance(self.vehicle, ExternalVehicle):
+            await self.vehicle.open()  # nothing can be drawn before its truth is known
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self.vehicle.run(), name="autopilot")
             tasks.create_task(self.camera.run(), name="camera")

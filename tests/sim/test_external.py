@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import math
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -183,3 +185,18 @@ def test_a_wrong_address_names_the_right_form(url: str) -> None:
             ExternalVehicle(url, LoopClock(), PAD)
 
     run_virtual(test)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--truth-url", "tcp:127.0.0.1:5762"], "belong together"),
+        (["--truth-url", "nowhere", "--vehicle-url", "tcp:127.0.0.1:5760"], "tcp:HOST:PORT"),
+    ],
+)
+def test_the_command_names_what_is_wrong_with_its_addresses(arguments: list[str], told: str) -> None:
+    command = [sys.executable, "-m", "flightd", "sim", *arguments]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert run.returncode == 2
+    assert told in run.stderr
+    assert "Traceback" not in run.stderr

@@ -49,7 +49,9 @@ class Pursuit:
     out, the pilot's switch) is not armed anew until FLY follows another demand.
     """
 
-    def __init__(self, firmware: FirmwareRules, commander: Commander, telemetry: Telemetry, clock: Clock) -> None:
+    def __init__(
+        self, firmware: FirmwareRules, commander: Commander, telemetry: Telemetry, clock: Clock
+    ) -> None:
         self._firmware = firmware
         self._commander = commander
         self._telemetry = telemetry
