@@ -39,7 +39,7 @@ class ArDroneServer:
     """Serves one `Drone`.  `run` listens and lets its time pass until cancelled; `open` before it binds the
     sockets early (`ports` tells which), and `close`, or leaving `async with`, frees them.
 
-    `radio` False loses everything in both directions, as out of range; `video_radio` only the pictures.
+    `radio` False loses everything in both directions, as out of range.
     Pictures come from outside: `show` takes one of the camera that `channel` names.
     """
 
@@ -49,7 +49,6 @@ class ArDroneServer:
         self.drone = drone
         self.ports = ports or Ports()
         self.radio = True
-        self.video_radio = True
         self._clock = clock
         self._now_ns = clock.now_ns()
         self._truth = TruthHistory(_TRUTH_SAMPLES)
@@ -169,7 +168,7 @@ class ArDroneServer:
     def show(self, bgr: Image, stamp_ns: int | None = None) -> None:
         """Stream one picture of the camera in use to whoever watches; (H, W, 3) of any size, exposed at
         `stamp_ns` (now when left out)."""
-        if not self.video_radio or not self.radio:
+        if not self.radio:
             return
         timestamp_ms = (self._clock.now_ns() if stamp_ns is None else stamp_ns) // 1_000_000
         for writer, stream in list(self._watchers.items()):

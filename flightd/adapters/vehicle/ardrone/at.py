@@ -135,10 +135,6 @@ class AtEncoder:
     def __init__(self) -> None:
         self._last = 0
 
-    @property
-    def last_sequence(self) -> int:
-        return self._last
-
     def restart(self) -> None:
         """The next command is number 1 again."""
         self._last = 0
