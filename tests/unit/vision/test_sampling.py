@@ -1,0 +1,55 @@
+"""Which pixels are looked at, and where the lens moves them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flightd.core.geometry import Lens
+from flightd.vision.plane import Plane
+from flightd.vision.sampling import Grid, grid_for, sample
+
+FISHY = Lens(640, 360, 420.0, 415.0, 322.0, 178.0, (-0.25, 0.08, 0.002, -0.001, -0.01))
+
+
+@given(width=st.integers(16, 700), height=st.integers(16, 500), step=st.integers(1, 6))
+def test_sample_i_is_pixel_k_i_and_a_half_step(width: int, height: int, step: int) -> None:
+    y, x = np.mgrid[0:height, 0:width]
+    image = np.stack([x & 255, y & 255, (x >> 8) + 16 * (y >> 8)], axis=-1).astype(np.uint8)
+    grid = Grid(width, height, step)
+    small = sample(image, grid)
+    assert small.shape == (grid.height, grid.width, 3)
+    if step > 1:
+        expected = image[grid.offset :: step, grid.offset :: step][: grid.height, : grid.width]
+        assert np.array_equal(small, expected)
+
+
+@given(width=st.integers(16, 4000), height=st.integers(16, 4000), i=st.integers(0, 50))
+def test_a_sample_s_place_leads_back_to_it(width: int, height: int, i: int) -> None:
+    grid = grid_for(width, height)
+    assert int(grid.column(grid.x(i))) == i
+    assert int(grid.row(grid.y(i))) == i
+
+
+def test_the_usual_pictures_are_looked_at_320_samples_wide() -> None:
+    assert grid_for(1920, 1080).step == 6
+    assert grid_for(640, 360).step == 2
+    assert grid_for(3840, 2160).step == 6  # a 6 px line must still leave a trace
+
+
+def test_taking_out_the_lens_and_putting_it_back_changes_nothing() -> None:
+    plane = Plane(640, 360, FISHY)
+    x, y = np.meshgrid(np.linspace(-310, 310, 21), np.linspace(-170, 170, 13))
+    ideal = plane.ideal(x, y)
+    assert np.abs(np.hypot(ideal[0] - x, ideal[1] - y)).max() > 5
+    back = plane.raw(*ideal)
+    assert back[0] == pytest.approx(x, abs=0.02)
+    assert back[1] == pytest.approx(y, abs=0.02)
+
+
+def test_without_a_lens_nothing_moves() -> None:
+    x, y = np.array([1.5, -20.0]), np.array([3.0, 4.0])
+    assert Plane(640, 360).ideal(x, y)[0] is x
+    assert Plane(640, 360).raw(x, y)[1] is y
