@@ -1,7 +1,7 @@
 """The composition root: configuration -> adapters -> one TaskGroup.  The dataflow can be read here.
 
 camera -> latest slot -> detector processes -> tick (pilot) -> pump -> vehicle
-vehicle -> tick; tick -> recorder, observers
+vehicle, ground -> tick; tick -> recorder, ground, observers
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from flightd.adapters.camera.connect import connect_camera
+from flightd.adapters.ground.link import ZmqGround
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, TransientError
@@ -21,7 +22,7 @@ from flightd.core.types import AttitudeSetpoint, Command, Event, EventLevel, Pha
 from flightd.grid.site import Site
 from flightd.mission.plan import FlightPlan, make_plan
 from flightd.pilot import Pilot, TickInput, TickOutput
-from flightd.ports import Clock, Recorder, Vehicle
+from flightd.ports import Clock, Ground, Recorder, Vehicle
 from flightd.runtime.latency import LatencyBook
 from flightd.runtime.latest import Latest
 from flightd.runtime.pool import Detection, DetectorPool, Detectors
@@ -84,6 +85,11 @@ def detector_of(config: Config, site: Site) -> Callable[[], Detector]:
     return partial(Detector, vision.method, profile_of(config, site), lens)
 
 
+def ground_link(config: Config, site: Site, clock: Clock) -> ZmqGround | None:
+    """The link to ground stations, if the configuration wants one."""
+    return ZmqGround(config.ground, site, clock) if config.ground.listen else None
+
+
 class Daemon:
     """One flight of one vehicle.  `fly` runs until the mission is over."""
 
@@ -95,12 +101,14 @@ class Daemon:
         detectors: Detectors,
         recorder: Recorder | None = None,
         observers: Sequence[Callable[[Status], None]] = (),
+        ground: Ground | None = None,
     ) -> None:
         self._config = config
         self._clock = clock
         self._detectors = detectors
         self._recorder = recorder
         self._observers = observers
+        self._ground = ground
         self._pilot = pilot_of(config, site)
         self._frames: Latest[FrameTicket] = Latest()
         self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock)
@@ -130,6 +138,8 @@ class Daemon:
         }
         if self._recorder is not None:
             parts["recorder"] = restarted(self._recorder.run, self._failed)
+        if self._ground is not None:
+            parts["ground"] = restarted(self._ground.run, self._failed)
         try:
             async with asyncio.TaskGroup() as tasks:
                 services = [tasks.create_task(part, name=name) for name, part in parts.items()]
@@ -150,6 +160,8 @@ class Daemon:
         self._vehicle.notify(event)
         if self._recorder is not None:
             self._recorder.record(Topic.EVENT, event.stamp_ns, event)
+        if self._ground is not None:
+            self._ground.event(event)
 
     async def _detect(self) -> None:
         """One frame after the other, as many of these loops as there are detector processes."""
@@ -163,12 +175,15 @@ class Daemon:
             )
             if keep:
                 self._picture_ns = ticket.stamp_ns
-            detection = await self._detectors.detect(ticket, keep)
+            show = self._ground is not None and self._ground.picture_due(ticket.stamp_ns)
+            detection = await self._detectors.detect(ticket, keep or show)
             if detection is None:
                 self._lost += 1
                 continue
-            if detection.jpeg is not None and self._recorder is not None:
+            if detection.jpeg is not None and keep and self._recorder is not None:
                 self._recorder.image(Topic.FRAME, ticket.stamp_ns, ticket.seq, detection.jpeg)
+            if detection.jpeg is not None and show and self._ground is not None:
+                self._ground.picture(ticket.seq, ticket.stamp_ns, detection.jpeg)
             self._detections.append(detection)
 
     async def _tick_until_over(self) -> TickOutput:
@@ -193,12 +208,15 @@ class Daemon:
     def _tick(self, now_ns: int) -> TickOutput:
         detections = self._fresh()
         commands, self._commands = self._commands, []
+        if self._ground is not None:
+            commands += self._ground.take_commands()
         tick = TickInput(
             now_ns,
             tuple(d.lines for d in detections),
             self._vehicle.state(),
             tuple(self._vehicle.attitudes()),
             tuple(commands),
+            self._ground.silent_s(now_ns) if self._ground is not None else 0.0,
         )
         for detection in detections:
             self._latency.taken(detection, now_ns)
@@ -209,6 +227,8 @@ class Daemon:
             self._latency.forget()
         for event in output.events:
             self._vehicle.notify(event)
+            if self._ground is not None:
+                self._ground.event(event)
         self._tell(tick, output)
         return output
 
@@ -250,6 +270,8 @@ class Daemon:
         status = self._status(tick, output)
         if recorder is not None:
             recorder.record(Topic.STATUS, now_ns, status)
+        if self._ground is not None:
+            self._ground.tell(status, tick, output)
         for observer in self._observers:
             observer(status)
 

@@ -49,13 +49,14 @@ class PilotParams:
 @dataclass(frozen=True, slots=True)
 class TickInput:
     """What arrived since the last tick, oldest first.  `vehicle` is the newest state, None until there
-    is one."""
+    is one; `ground_silent_s` the time since an attending ground station was heard, 0 if none attends."""
 
     now_ns: int
     lines: tuple[LineSet, ...] = ()
     vehicle: VehicleState | None = None
     attitudes: tuple[Attitude, ...] = ()
     commands: tuple[Command, ...] = ()
+    ground_silent_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +159,7 @@ class Pilot:
             lines_age_s=lines_age_s,
             telemetry_age_s=math.inf if v is None else (now_ns - v.attitude.stamp_ns) * 1e-9,
             vehicle=v,
+            ground_silent_s=tick.ground_silent_s,
         )
 
     def _motion(self, pose: GridPose | None, height_m: float, dt_s: float) -> Motion:

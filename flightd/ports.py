@@ -5,7 +5,8 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 from typing import Protocol
 
-from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, VehicleState
+from flightd.core.types import Attitude, AttitudeSetpoint, Command, Demand, Event, Status, VehicleState
+from flightd.pilot import TickInput, TickOutput
 
 
 class Clock(Protocol):
@@ -69,3 +70,28 @@ class Recorder(Protocol):
     def record(self, topic: str, stamp_ns: int, message: object) -> None: ...
 
     def image(self, topic: str, stamp_ns: int, seq: int, jpeg: bytes) -> None: ...
+
+
+class Ground(Protocol):
+    """People on the ground: they are told what happens and give orders.  Nothing but `run` ever waits.
+
+    `tell` comes with each status, `event` with each event.  `take_commands` drains the orders since the
+    last call, oldest first; `silent_s` is the time since any client that attends the flight was heard,
+    0 when none attends.  `picture_due` says whether the picture exposed at that time is asked for (True at
+    a capped rate only), `picture` then hands it over.  `run` serves until cancelled; TransientError when
+    another `run` may succeed.
+    """
+
+    async def run(self) -> None: ...
+
+    def tell(self, status: Status, tick: TickInput, output: TickOutput) -> None: ...
+
+    def event(self, event: Event) -> None: ...
+
+    def take_commands(self) -> list[Command]: ...
+
+    def silent_s(self, now_ns: int) -> float: ...
+
+    def picture_due(self, stamp_ns: int) -> bool: ...
+
+    def picture(self, seq: int, stamp_ns: int, jpeg: bytes) -> None: ...

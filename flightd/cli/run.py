@@ -6,7 +6,7 @@ import asyncio
 import signal
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -69,7 +69,7 @@ async def _until_signal(
 
 
 async def _fly(config: Config, site: Site, observer: Callable[[Status], None]) -> FlightResult:
-    from flightd.app import Daemon, detector_pool
+    from flightd.app import Daemon, detector_pool, ground_link
     from flightd.runtime.clock import LoopClock
 
     clock = LoopClock()
@@ -78,10 +78,11 @@ async def _fly(config: Config, site: Site, observer: Callable[[Status], None]) -
         recorder, archive = _black_box(config, site, clock.now_ns()) or (None, None)
         if recorder is not None:
             stack.enter_context(recorder)
+        ground = stack.enter_context(ground_link(config, site, clock) or nullcontext())
         await pool.ready()
         beside = [asyncio.ensure_future(part.run()) for part in (recorder, archive) if part is not None]
         try:
-            return await Daemon(config, site, clock, pool, recorder, [observer]).fly()
+            return await Daemon(config, site, clock, pool, recorder, [observer], ground).fly()
         finally:
             for part in beside:
                 part.cancel()

@@ -2,7 +2,7 @@
 
 In lockstep both share one event loop on virtual time, one process, real loopback sockets: repeatable and
 as fast as the machine goes.  In real time the world is a process of its own and time runs by the clock,
-or a multiple of it.
+or a multiple of it; only then does the ground link run, whose sockets have threads of their own.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import signal
 import socket
 import sys
 from collections.abc import Callable, Coroutine
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -22,7 +22,7 @@ from typing import Any
 
 from flightd.adapters.camera.connect import ARDRONE_URL
 from flightd.adapters.recorder.recorder import Recorder
-from flightd.app import Daemon, FlightResult, detector_pool, plan_of
+from flightd.app import Daemon, FlightResult, detector_pool, ground_link, plan_of
 from flightd.config.schema import Config
 from flightd.config.site_file import site_toml
 from flightd.core.errors import FlightdError, InputError, RunError, UnavailableError
@@ -116,11 +116,12 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
         stack.callback(process.join, 15.0)
         stack.callback(ours.close)  # the world ends when its pipe closes, however this process ends
         pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
+        ground = stack.enter_context(ground_link(simulation.config, simulation.site, clock) or nullcontext())
         await pool.ready()
         config = _connected(simulation.config, ports, camera_port)
         if simulation.truth_url:
             config = config.model_copy(update={"vehicle": simulation.config.vehicle})
-        daemon = Daemon(config, simulation.site, clock, pool, recorder, [simulation.observer])
+        daemon = Daemon(config, simulation.site, clock, pool, recorder, [simulation.observer], ground)
         watch = asyncio.ensure_future(_watch(process))
         try:
             return await _within_limit(simulation, daemon, watch)

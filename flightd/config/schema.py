@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import math
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from flightd.config.ground import GroundConfig
 from flightd.control.flight import FlightGains
 from flightd.control.limits import Limits
 from flightd.control.pid import PidGains
@@ -212,6 +214,7 @@ class Config(_Section):
     vehicle: VehicleConfig = VehicleConfig()
     control: ControlConfig = ControlConfig()
     recorder: RecorderConfig = RecorderConfig()
+    ground: GroundConfig = GroundConfig()
 
     def heading_policy(self) -> HeadingPolicy:
         """The mission's heading, with which side of the down camera's picture lies along the nose."""
@@ -231,7 +234,11 @@ class Config(_Section):
                 self.control.horizontal.gains(), self.control.yaw.gains(), self.control.height.gains()
             ),
             limits=self.control.limits(),
-            mission=self.mission.params(),
+            mission=replace(
+                self.mission.params(),
+                ground_lost_s=self.ground.lost_s,
+                ground_lost=self.ground.lost_action,
+            ),
         )
 
 
@@ -262,7 +269,12 @@ def parse_config(table: dict[str, Any], path: Path) -> Config:
         more = f" (and {len(err.errors()) - 1} more)" if len(err.errors()) > 1 else ""
         raise InputError(f"config {path}: {key}: {_remedy(first['type'], first['msg'])}{more}") from err
     site = (path.parent / config.mission.site).resolve()
-    return config.model_copy(update={"mission": config.mission.model_copy(update={"site": site})})
+    return config.model_copy(
+        update={
+            "mission": config.mission.model_copy(update={"site": site}),
+            "ground": config.ground.beside(path.parent),
+        }
+    )
 
 
 def _remedy(kind: str, message: str) -> str:

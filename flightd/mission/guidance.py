@@ -10,6 +10,15 @@ from flightd.control.flight import Reference
 from flightd.core.types import Demand, GridPose, Phase, VehicleState
 
 
+class GroundLost(enum.StrEnum):
+    """What to do when the ground station that attends the flight falls silent."""
+
+    CONTINUE = "continue"
+    HOLD = "hold"
+    HOME = "home"
+    LAND = "land"
+
+
 @dataclass(frozen=True, slots=True)
 class MissionParams:
     """Speeds, distances and waiting times of the mission; SI units, radians."""
@@ -42,6 +51,8 @@ class MissionParams:
     battery_land_frac: float = 0.1
     max_lead_m: float = 0.35
     autostart: bool = True
+    ground_lost_s: float = 5.0
+    ground_lost: GroundLost = GroundLost.CONTINUE
 
 
 class Guide(enum.Enum):
@@ -55,7 +66,7 @@ class Guide(enum.Enum):
 @dataclass(frozen=True, slots=True)
 class Senses:
     """All that the mission knows at one tick.  `pose` is None before the floor was seen; ages in
-    seconds, infinite when there never was any."""
+    seconds, infinite when there never was any.  `ground_silent_s` is 0 while no ground station attends."""
 
     now_ns: int
     dt_s: float
@@ -66,6 +77,7 @@ class Senses:
     lines_age_s: float
     telemetry_age_s: float
     vehicle: VehicleState | None
+    ground_silent_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from flightd.control.profile import Profile
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, LandedState, Phase
 from flightd.grid.site import Site
-from flightd.mission.guidance import Guidance, Guide, MissionParams, Senses
+from flightd.mission.guidance import GroundLost, Guidance, Guide, MissionParams, Senses
 from flightd.mission.plan import FlightPlan, HeadingPolicy, Stop, make_plan
 from flightd.mission.table import Trigger, next_phase
 
@@ -41,6 +41,7 @@ class Mission:
         self._returning = False
         self._on_pad_leg = False
         self._paused = False
+        self._ground_lost = False
         self._started = params.autostart
         self._ordered: Trigger | None = None
         self._since_ns = 0
@@ -102,6 +103,7 @@ class Mission:
         in_phase_s = (s.now_ns - self._since_ns) * 1e-9
         if self._ordered is not None:
             found.add(self._ordered)
+        found |= self._ground(s)
         if self._paused:
             found.add(Trigger.HOLD)
         if v is not None and self.airborne:
@@ -121,9 +123,23 @@ class Mission:
             found.add(Trigger.LINES_LOST)
             if in_phase_s > p.lines_land_s:
                 found.add(Trigger.LINES_LOST_LONG)
-        elif in_phase_s > p.lines_hold_s and not self._paused:
+        elif in_phase_s > p.lines_hold_s and Trigger.HOLD not in found:
             found.add(Trigger.LINES_FOUND)
         return found
+
+    def _ground(self, s: Senses) -> set[Trigger]:
+        """What a lost ground link asks for, by the configured action; the link's return ends a hold."""
+        action = self._params.ground_lost
+        lost = s.ground_silent_s > self._params.ground_lost_s
+        if lost is not self._ground_lost:
+            self._ground_lost = lost
+            text = f"silent for {s.ground_silent_s:.1f} s: {action.value}" if lost else "heard again"
+            self._event(s.now_ns, EventLevel.WARNING if lost else EventLevel.INFO, "ground_link", text)
+        if not lost:
+            return set()
+        if action is GroundLost.HOME and self.airborne and not self._returning:
+            self._go_home(s.now_ns, "ground link lost")
+        return {GroundLost.HOLD: {Trigger.HOLD}, GroundLost.LAND: {Trigger.GROUND_LOST}}.get(action, set())
 
     def _progress(self, s: Senses) -> set[Trigger]:
         """The trigger by which the present phase reaches its end, if it has."""
@@ -168,7 +184,8 @@ class Mission:
             return f"battery at {v.battery_frac:.0%}, {p.battery_start_frac:.0%} needed to start"
         if not s.frames_arrive:
             return "no picture from the down camera"
-        return ""
+        silent = self._ground_lost and p.ground_lost is not GroundLost.CONTINUE
+        return "the ground station that attends this flight fell silent" if silent else ""
 
     def _settled(self, s: Senses, condition: bool) -> bool:
         """True once `condition` has held for the settling time."""

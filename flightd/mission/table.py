@@ -21,6 +21,7 @@ class Trigger(enum.Enum):
     TELEMETRY_LOST = "vehicle telemetry lost"
     BATTERY_CRITICAL = "battery critical"
     LAND_HERE = "landing ordered"
+    GROUND_LOST = "ground link lost"
     LINES_LOST_LONG = "lines lost for too long"
     TIMED_OUT = "the phase took too long"
     LINES_LOST = "lines lost"
@@ -44,6 +45,7 @@ _SAFETY = {
     Trigger.TELEMETRY_LOST: Phase.LAND,
     Trigger.BATTERY_CRITICAL: Phase.LAND,
     Trigger.LAND_HERE: Phase.LAND,
+    Trigger.GROUND_LOST: Phase.LAND,
 }
 _ON_LINES = _SAFETY | {Trigger.LINES_LOST: Phase.HOLD, Trigger.HOLD: Phase.HOLD}
 
@@ -52,6 +54,7 @@ TABLE: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.ARMING: {
         Trigger.STOP: Phase.ABORTED,
         Trigger.LAND_HERE: Phase.ABORTED,
+        Trigger.GROUND_LOST: Phase.ABORTED,
         Trigger.TIMED_OUT: Phase.ABORTED,
         Trigger.ARMED: Phase.TAKE_OFF,
     },

@@ -1,0 +1,76 @@
+"""A desk with nothing around it, and the messages to hand in."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from flightd.adapters.ground.audit import AuditEntry
+from flightd.adapters.ground.desk import Desk, Peer
+from flightd.adapters.ground.protocol import (
+    VERSION,
+    Answer,
+    AskPicture,
+    LinkReport,
+    Role,
+    StatusReport,
+)
+from flightd.config.site_file import load_site
+from flightd.core.types import Phase
+
+SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
+OPERATOR = Peer("ann", Role.OPERATOR, b"1", "127.0.0.1")
+VIEWER = Peer("bob", Role.VIEWER, b"2", "127.0.0.1")
+SESSION = "session-1"
+S = 1_000_000_000
+
+_ids = itertools.count()
+
+
+def report(phase: Phase) -> StatusReport:
+    return StatusReport(
+        version=VERSION,
+        session=SESSION,
+        seq=1,
+        stamp_ns=1,
+        phase=phase,
+        reason="",
+        node="A1",
+        goal="A2",
+        nodes_done=0,
+        nodes_planned=2,
+        height_m=None,
+        position=None,
+        lines=(),
+        lines_age_s=None,
+        vehicle=None,
+        frames=0,
+        frames_dropped=0,
+        fps=0.0,
+        latency_ms={},
+        link=LinkReport(0, 0, 0, 0, 0),
+    )
+
+
+def body(op: str, **fields: Any) -> bytes:
+    """A request as a client in any language would write it."""
+    return msgspec.json.encode({"version": VERSION, "id": f"request-{next(_ids)}", "op": op, **fields})
+
+
+class DeskRig:
+    """`hand` gives the desk's answer; what it wrote down is in `audit`."""
+
+    def __init__(self, phase: Phase = Phase.FOLLOW, **more: Any) -> None:
+        self.audit: list[AuditEntry] = []
+        self.desk = Desk(SITE, SESSION, self.audit.append, **more)
+        self.desk.status = report(phase)
+        self.now_ns = 100 * S
+
+    def hand(self, request: bytes, peer: Peer = OPERATOR) -> Answer | AskPicture:
+        return self.desk.answer(request, peer, self.now_ns)
+
+    def order(self, command: str, peer: Peer = OPERATOR, **fields: Any) -> Answer | AskPicture:
+        return self.hand(body("command", command=command, **fields), peer)
