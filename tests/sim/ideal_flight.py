@@ -76,6 +76,7 @@ class IdealFlight:
         self._yaw_target = 0.0
         self.in_control = True
         self.blind = False
+        self.ground_silent_s = 0.0
 
     def fly(self, limit_s: float = 600.0) -> Flown:
         flown = Flown()
@@ -103,7 +104,13 @@ class IdealFlight:
                 while late and late[0][0] <= self._now_ns:
                     lines.append(late.popleft()[1])
                 output = self.pilot.step(
-                    TickInput(self._now_ns, tuple(lines), self._state(), tuple(attitudes))
+                    TickInput(
+                        self._now_ns,
+                        tuple(lines),
+                        self._state(),
+                        tuple(attitudes),
+                        ground_silent_s=self.ground_silent_s,
+                    )
                 )
                 attitudes = []
                 setpoint = output.setpoint

@@ -220,7 +220,10 @@ class ZmqGround:
             head, body = head[:1], b""
         if not head:
             return
-        answer = self._desk.answer(body, self._peer(head[0], frames[-1]), now_ns)
+        peer = self._peer(head[0], frames[-1])
+        if peer is None:
+            return
+        answer = self._desk.answer(body, peer, now_ns)
         if not isinstance(answer, AskPicture):
             self._send(head, answer)
         elif len(self._waiting) < _PICTURES_WAITING:
@@ -229,11 +232,12 @@ class ZmqGround:
             text = "too many clients wait for a picture; ask again later"
             self._send(head, self._desk.refuse_picture(answer, Code.BUSY, text))
 
-    def _peer(self, route: bytes, frame: zmq.Frame) -> Peer:
-        client = _LOCAL
-        if self._keys is not None:
-            client = self._clients[str(frame.get("User-Id"))]
-        return Peer(client.name, client.role, route, str(frame.get("Peer-Address")))
+    def _peer(self, route: bytes, frame: zmq.Frame) -> Peer | None:
+        """Who sent it, by the key of its connection; None for nobody that is known."""
+        client = _LOCAL if self._keys is None else self._clients.get(_property(frame, "User-Id"))
+        if client is None:
+            return None
+        return Peer(client.name, client.role, route, _property(frame, "Peer-Address"))
 
     def _send(self, head: list[bytes], answer: Answer, *more: bytes) -> None:
         sent = self._requests.send_multipart([*head, encode(answer), *more], zmq.NOBLOCK)
@@ -259,6 +263,14 @@ class ZmqGround:
     def _write_down(self, entry: AuditEntry) -> None:
         if self._audit is not None:
             self._audit.write(entry)
+
+
+def _property(frame: zmq.Frame, name: str) -> str:
+    """A property of the connection, empty where it has none (peers of ZMQ's first protocols)."""
+    try:
+        return str(frame.get(name))
+    except zmq.ZMQError:
+        return ""
 
 
 def _endpoint(socket: Any) -> str:

@@ -34,8 +34,9 @@ def test_the_pilot_wins_over_everything_else_in_the_air(phase: Phase) -> None:
 
 
 @pytest.mark.parametrize("phase", [p for p in FLYING if p is not Phase.LAND])
-def test_every_flying_phase_lands_on_a_critical_battery_lost_telemetry_or_an_order(phase: Phase) -> None:
-    for trigger in (Trigger.BATTERY_CRITICAL, Trigger.TELEMETRY_LOST, Trigger.LAND_HERE, Trigger.STOP):
+def test_every_flying_phase_lands_on_a_critical_battery_lost_links_or_an_order(phase: Phase) -> None:
+    lost = (Trigger.BATTERY_CRITICAL, Trigger.TELEMETRY_LOST, Trigger.GROUND_LOST)
+    for trigger in (*lost, Trigger.LAND_HERE, Trigger.STOP):
         assert next_phase(phase, {trigger})[0] is Phase.LAND
 
 

@@ -1,0 +1,150 @@
+"""A ground link on real loopback sockets, with what the daemon would tell it made by hand."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import functools
+from collections.abc import AsyncIterator, Callable, Coroutine
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ParamSpec
+
+from flightd.adapters.ground.client import Address, GroundClient
+from flightd.adapters.ground.keys import load_pair, load_public, make_keys
+from flightd.adapters.ground.link import ZmqGround
+from flightd.config.ground import GroundConfig
+from flightd.config.site_file import load_site
+from flightd.core.types import (
+    Attitude,
+    Demand,
+    Event,
+    EventLevel,
+    GridPose,
+    LandedState,
+    Phase,
+    Status,
+    VehicleState,
+)
+from flightd.pilot import TickInput, TickOutput
+from flightd.runtime.clock import LoopClock
+
+_P = ParamSpec("_P")
+
+
+def in_loop(test: Callable[_P, Coroutine[Any, Any, None]]) -> Callable[_P, None]:
+    """Run a test in an event loop of its own."""
+
+    @functools.wraps(test)
+    def run(*args: _P.args, **kwargs: _P.kwargs) -> None:
+        asyncio.run(test(*args, **kwargs))
+
+    return run
+
+
+SITE = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")
+
+
+@dataclass(frozen=True)
+class Keyring:
+    """Keys of a daemon and of an operator, a viewer and a stranger, in a folder."""
+
+    folder: Path
+
+    @classmethod
+    def make(cls, folder: Path) -> Keyring:
+        for name in ("daemon", "operator", "viewer", "stranger"):
+            make_keys(folder, name)
+        lines = [f"{name} {load_public(folder / f'{name}.key')} {name}\n" for name in ("operator", "viewer")]
+        (folder / "clients").write_text("".join(lines))
+        return cls(folder)
+
+    def config(self, **more: Any) -> GroundConfig:
+        """All addresses of this machine, any free ports."""
+        files = {"server_key": "daemon.key_secret", "clients": "clients", "audit": "audit.jsonl"}
+        paths = {key: self.folder / name for key, name in files.items()}
+        return GroundConfig(listen="0.0.0.0", status_port=0, command_port=0, **paths, **more)
+
+    def address(self, link: ZmqGround, name: str) -> Address:
+        pair = load_pair(self.folder / f"{name}.key_secret")
+        return replace(address_of(link), keys=pair, server_key=load_public(self.folder / "daemon.key"))
+
+
+def local(**more: Any) -> GroundConfig:
+    return GroundConfig(listen="127.0.0.1", status_port=0, command_port=0, **more)
+
+
+def address_of(link: ZmqGround) -> Address:
+    status, command = (int(endpoint.rpartition(":")[2]) for endpoint in link.endpoints)
+    return Address("127.0.0.1", status, command)
+
+
+@contextlib.asynccontextmanager
+async def serving(config: GroundConfig) -> AsyncIterator[ZmqGround]:
+    """The link, answering."""
+    with ZmqGround(config, SITE, LoopClock()) as link:
+        async with asyncio.TaskGroup() as tasks:
+            running = tasks.create_task(link.run())
+            try:
+                yield link
+            finally:
+                running.cancel()
+
+
+@contextlib.asynccontextmanager
+async def telling(link: ZmqGround, phase: Phase = Phase.FOLLOW) -> AsyncIterator[None]:
+    """Statuses in quick succession, as a flying daemon gives them."""
+
+    async def tell() -> None:
+        while True:
+            tell_once(link, phase)
+            await asyncio.sleep(0.02)
+
+    async with asyncio.TaskGroup() as tasks:
+        told = tasks.create_task(tell())
+        try:
+            yield
+        finally:
+            told.cancel()
+
+
+async def connected(client: GroundClient, link: ZmqGround) -> None:
+    """Until what is published reaches the client (a subscription takes its time)."""
+    async with asyncio.timeout(20), telling(link):
+        async for _ in client.published():
+            return
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    """Let others run until the condition holds."""
+    async with asyncio.timeout(30):
+        while not condition():  # noqa: ASYNC110 - what is waited for knows nothing of events
+            await asyncio.sleep(0.005)
+
+
+def tell_once(link: ZmqGround, phase: Phase = Phase.FOLLOW, x_m: float = 1.0) -> None:
+    now_ns = LoopClock().now_ns()
+    attitude = Attitude(now_ns - 10_000_000, 0.01, -0.02, 0.0)
+    vehicle = VehicleState(
+        attitude,
+        1.6,
+        now_ns,
+        0.0,
+        "GUIDED_NOGPS",
+        True,
+        True,
+        LandedState.IN_AIR,
+        0.8,
+        12.1,
+        now_ns - 500_000_000,
+    )
+    pose = GridPose(now_ns, "A2", x_m - 1.5, 0.01, 0.0, x_m, 0.01, 0.4, 0.3, 1.6, (0.0,) * 9, 0.99)
+    output = TickOutput(None, Demand.FLY, phase, "arrived", "A2", 1, 12, pose, None)
+    status = Status(
+        now_ns, phase, "arrived", "A2", "A2", 1, 12, 0.8, 1.6, 300, 2, 29.0, {"detection": 5.0, "total": 71.0}
+    )
+    link.tell(status, TickInput(now_ns, vehicle=vehicle), output)
+
+
+def event(text: str) -> Event:
+    return Event(LoopClock().now_ns(), EventLevel.WARNING, "test", text)
