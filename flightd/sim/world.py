@@ -87,7 +87,8 @@ class World:
             )
         elif spec.vehicle == "ardrone":
             drone = Drone(airframe, Sensors(seed=spec.seed))
-            self.vehicle = server = ArDroneServer(drone, clock, Ports("127.0.0.1", *spec.vehicle_ports))
+            ports = Ports("127.0.0.1", *spec.vehicle_ports)
+            self.vehicle = server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)
             show = server.show
         else:
             (port,) = spec.vehicle_ports

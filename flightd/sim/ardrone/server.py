@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Self, TypeAlias
 
 from flightd.core.types import Image
@@ -13,6 +14,7 @@ from flightd.ports import Clock
 from flightd.sim.airframe import Airframe
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.video import Channel, Encoder, Packer, is_idr
+from flightd.sim.autopilot.radio import PERFECT, Radio, RadioParams
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.truth import TruthHistory
 
@@ -39,16 +41,25 @@ class ArDroneServer:
     """Serves one `Drone`.  `run` listens and lets its time pass until cancelled; `open` before it binds the
     sockets early (`ports` tells which), and `close`, or leaving `async with`, frees them.
 
-    `radio` False loses everything in both directions, as out of range.
+    `radio` False loses everything in both directions, as out of range;
+    `air` is what the radio does to datagrams otherwise, each way.
     Pictures come from outside: `show` takes one of the camera that `channel` names.
     """
 
     def __init__(
-        self, drone: Drone, clock: Clock, ports: Ports | None = None, *, video_header_bytes: int = 64
+        self,
+        drone: Drone,
+        clock: Clock,
+        ports: Ports | None = None,
+        *,
+        video_header_bytes: int = 64,
+        air: RadioParams = PERFECT,
+        seed: int = 0,
     ) -> None:
         self.drone = drone
         self.ports = ports or Ports()
         self.radio = True
+        self._up, self._down = Radio(air, seed), Radio(air, seed + 1)
         self._clock = clock
         self._now_ns = clock.now_ns()
         self._truth = TruthHistory(_TRUTH_SAMPLES)
@@ -147,7 +158,7 @@ class ArDroneServer:
             self._truth.add(self.airframe.kinematics(self._now_ns))
             packet = self.drone.navdata(self._now_ns)
             if packet is not None and self._client is not None and self._navdata is not None and self.radio:
-                self._navdata.sendto(packet, self._client)
+                self._down.carry(partial(self._transmit, packet))
 
     def truth(self) -> Kinematics:
         """The true motion now."""
@@ -177,14 +188,18 @@ class ArDroneServer:
             if data and not writer.is_closing():
                 writer.write(data)
 
+    def _transmit(self, packet: bytes) -> None:
+        if self._client is not None and self._navdata is not None:
+            self._navdata.sendto(packet, self._client)
+
     def _command(self, datagram: bytes, _sender: Any) -> None:
         if self.radio:
-            self.drone.command(datagram, self._clock.now_ns())
+            self._up.carry(lambda: self.drone.command(datagram, self._clock.now_ns()))
 
     def _wake(self, _datagram: bytes, sender: Any) -> None:
         if self.radio:
             self._client = sender
-            self.drone.wake()
+            self._up.carry(self.drone.wake)
 
     def _handled(self, serve: _Serve) -> Callable[[asyncio.StreamReader, asyncio.StreamWriter], None]:
         """Serve each connection in a task that this server awaits when it closes."""

@@ -15,6 +15,7 @@ from flightd.runtime.loops import VirtualLoop
 from flightd.sim.airframe import Airframe
 from flightd.sim.ardrone.drone import Drone, DroneOptions
 from flightd.sim.ardrone.server import ArDroneServer, Ports
+from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.sensors import SensorParams, Sensors
 
 T = TypeVar("T")
@@ -95,10 +96,12 @@ class Bench:
 
 
 @contextlib.asynccontextmanager
-async def bench(drone: Drone | None = None, **settings: Any) -> AsyncIterator[Bench]:
+async def bench(
+    drone: Drone | None = None, air: RadioParams = PERFECT, **settings: Any
+) -> AsyncIterator[Bench]:
     """A served drone and a running adapter; both end with the block."""
     clock = LoopClock()
-    async with ArDroneServer(drone or make_drone(), clock, ANY_PORTS) as server:
+    async with ArDroneServer(drone or make_drone(), clock, ANY_PORTS, air=air) as server:
         vehicle = ArDroneVehicle(settings_for(server, **settings), clock)
         tasks = [asyncio.create_task(server.run()), asyncio.create_task(vehicle.run())]
         try:

@@ -13,6 +13,7 @@ from flightd.adapters.vehicle.ardrone.settings import Camera
 from flightd.core.types import Demand
 from flightd.sim.ardrone.drone import Major
 from flightd.sim.ardrone.telemetry import Report, packet
+from flightd.sim.autopilot.radio import RadioParams
 from tests.protocol.ardrone.bench import bench, make_drone, virtually
 from tests.protocol.ardrone.test_ardrone_config import Ear
 
@@ -220,6 +221,20 @@ def test_a_second_client_that_ran_ahead_is_overcome_by_starting_at_one() -> None
             assert drone.last_sequence == 2000000
             await b.until(lambda: drone.last_sequence < 100, limit_s=1.0)  # before the drone gives us up
             await b.hovering()
+
+    virtually(main)
+
+
+def test_a_bad_radio_delays_and_does_not_stop_a_flight() -> None:
+    async def main() -> None:
+        bad = RadioParams(loss=0.15, delay_s=0.02, jitter_s=0.01, doubled=0.05)
+        async with bench(air=bad) as b:
+            await b.hovering()
+            await b.steer(3.0, pitch_rad=-0.05)
+            assert sum(b.sent) > 0.95 * len(b.sent)
+            assert b.drone.airframe.vx_mps > 0.3
+            await b.steer(10.0, climb_mps=-0.3, while_=lambda: b.state.armed)
+            assert (b.drone.major, b.drone.emergency) == (Major.LANDED, False)
 
     virtually(main)
 
