@@ -159,3 +159,13 @@ def test_each_shipped_profile_says_what_it_was_trained_on(name: str) -> None:
 def test_a_table_of_the_wrong_kind_is_refused(lut: NDArray[np.uint8]) -> None:
     with pytest.raises(ValueError, match="table"):
         ColourProfile("bad", lut, "yellow")
+
+
+def test_an_older_opencv_gives_the_same_levels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before OpenCV 5, `LUT` took no 16-bit index."""
+    picture, _ = band("yellow")
+    profile = load_profile("yellow")
+    levels = classify(picture, profile)
+    monkeypatch.setattr("flightd.vision.colour._LUT_TAKES_16_BITS", False)
+    assert np.array_equal(classify(picture, profile), levels)
+    assert np.array_equal(grow(levels), np.where(levels > 0, 255, 0))
