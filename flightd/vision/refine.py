@@ -27,6 +27,8 @@ _USUAL_SCATTER_PX, _FRAYED_SHARE, _SHARP_SHARE = 0.7, 0.5, 0.2
 window, on no edge at all, have 1.4."""
 _MAX_BOW = 0.006
 _MIN_BOW_PX = 1.2
+_PLAIN_CLEAR, _PLAIN_ASPECT, _PLAIN_LENGTH = 0.8, 8.0, 0.45
+_LENS_BOW = 0.004
 
 
 def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> list[Strip | None]:
@@ -52,8 +54,19 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
             low, high = (None if e is None else lines.fit(e) for e in edges)
             refined.append(_assemble(strip, low, high))
         else:
-            refined.append(None)
+            refined.append(_unrefined(strip, plane))
     return refined
+
+
+def _unrefined(strip: Strip, plane: Plane) -> Strip | None:
+    """A long clear band is believed even where its edges are not straight: a lens nobody calibrated bends
+    them.  It keeps the guess, good to what such a lens does."""
+    shortest = max(_PLAIN_ASPECT * strip.width_px, _PLAIN_LENGTH * min(plane.width_px, plane.height_px))
+    if strip.clear < _PLAIN_CLEAR or strip.length_px < shortest or strip.width_px < _MIN_WIDTH_PX:
+        return None
+    off, turn = _LENS_BOW * strip.length_px, 2 * _LENS_BOW
+    c = strip.centre
+    return replace(strip, centre=replace(c, var_a=c.var_a + off * off, var_b=c.var_b + turn * turn))
 
 
 def _is_line(strip: Strip, lines: RobustLines, visible: Array, edges: list[int | None]) -> bool:

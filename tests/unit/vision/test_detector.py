@@ -157,6 +157,15 @@ def test_with_the_lens_known_lines_come_out_straight_and_in_place() -> None:
     assert crossing.kind is JunctionKind.CROSS
 
 
+def test_a_lens_nobody_calibrated_costs_accuracy_but_no_line() -> None:
+    lens = Lens(1920, 1080, 1260.0, 1260.0, 959.5, 539.5, (-0.15, 0.0, 0.0, 0.0, 0.0))
+    band = Band(300.0, 1.5, 50.0)
+    line, rho, theta = nearest(Detector().detect(draw([band], 1920, 1080, lens=lens)), band)
+    assert abs(rho) < 30
+    assert abs(rho) < 4 * line.sigma_rho_px
+    assert abs(math.degrees(theta)) < 1
+
+
 @pytest.mark.parametrize("method", ["centroid", "skeleton", "combined"])
 @pytest.mark.parametrize("radius", [110.0, 220.0])
 def test_a_curve_is_not_a_straight_line(method: str, radius: float) -> None:
