@@ -49,6 +49,9 @@ _OTHER_LOCAL_RANGE = (0.45, 2.2)
 """Floor's brightness over the frame's median: tight on the side where a field full of paint would pull."""
 
 _TINT_RANGE = (0.65, 1.55)
+_FEWEST_SEEDS = 20
+"""One strong pixel in so many is enough to seed the bands of a picture."""
+
 _BRIGHT_FLOOR = 135.0
 _MAX_STRETCH = 3.0
 _LUMA_BGR = np.array([0.114, 0.587, 0.299])
@@ -196,10 +199,15 @@ def _look_up(table: NDArray[np.uint8], index: NDArray[np.uint16]) -> NDArray[np.
 
 
 def grow(levels: Levels) -> NDArray[np.uint8]:
-    """(h, w) mask, 255 where a pixel is strong, or weak and joined (8-neighbours) to a strong one."""
+    """(h, w) mask, 255 where a pixel is strong, or weak and joined (8-neighbours) to a strong one.
+
+    Where next to no paint is strong (a worn white on a light floor) the weak pixels are seeds themselves:
+    what is no band among them does not pass the tests of shape and edge that follow.
+    """
     strong = levels >= STRONG
-    if not strong.any():
-        return np.zeros_like(levels)
+    seeds = int(np.count_nonzero(strong))
+    if seeds * _FEWEST_SEEDS < np.count_nonzero(levels):
+        return np.where(levels, np.uint8(255), np.uint8(0))
     kept = np.zeros(TABLE_SIZE, np.uint8)
     if levels.size < TABLE_SIZE * 2:  # too few pixels for more separate parts than 16 bits can number
         _, parts = cv2.connectedComponents(levels, connectivity=8, ltype=cv2.CV_16U)

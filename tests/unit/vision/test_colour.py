@@ -169,3 +169,10 @@ def test_an_older_opencv_gives_the_same_levels(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("flightd.vision.colour._LUT_TAKES_16_BITS", False)
     assert np.array_equal(classify(picture, profile), levels)
     assert np.array_equal(grow(levels), np.where(levels > 0, 255, 0))
+
+
+def test_dull_paint_throughout_seeds_itself() -> None:
+    """Worn white on a light floor: no pixel is surely paint, yet the band is a band."""
+    levels = np.zeros((60, 80), np.uint8)
+    levels[:, 38:42] = 1
+    assert np.array_equal(grow(levels) == 255, levels == 1)
