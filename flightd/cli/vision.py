@@ -29,6 +29,7 @@ def register(app: typer.Typer) -> None:
     """Hang the vision commands on `app`."""
     app.command("detect")(detect)
     app.command("evaluate")(evaluate)
+    app.command("codes")(codes)
     app.command("bench")(bench)
     app.command("train-colour")(train_colour)
 
@@ -129,6 +130,44 @@ def evaluate(
         sys.stdout.write(command.as_json(dataset, gate, scores, failures, count) + "\n")
     else:
         command.print_table(dataset, scores, count, _stdout())
+
+
+def codes(
+    paths: Annotated[
+        list[Path], typer.Argument(metavar="PATH…", help="Images, folders of them, and videos.")
+    ],
+    labels: Annotated[
+        Path | None, typer.Option(metavar="F", help="Compare with the texts that this JSON file expects.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Read the QR codes and barcodes in pictures.
+
+    Every symbology; GS1 element strings come with their parts.  A text is told only when the code's own
+    checksum vouches for it or two ways of looking at the picture agree; the rest is counted as doubtful.
+
+    \b
+    F: {"codes": [{"file": "a.jpg", "text": "9780804816632"}]}
+
+    \b
+    flightd codes label.jpg
+    flightd codes shelf/ --json
+    flightd codes photographs/ --labels photographs/codes.json
+    """
+    from flightd.cli import codes as command
+
+    expected = command.read_expected(labels) if labels else None
+    pages = command.read(paths)
+    if as_json:
+        sys.stdout.write(command.as_json(list(pages), expected) + "\n")
+        return
+    console = _stdout()
+    shown = []
+    for page in pages:
+        command.print_page(page, console)
+        shown.append(page)
+    if expected is not None:
+        command.print_verdict(command.compare(shown, expected), console)
 
 
 def bench(

@@ -123,6 +123,34 @@ class LineSet:
 
 
 @dataclass(frozen=True, slots=True)
+class CodeRead:
+    """One code read from one picture.
+
+    `symbology` is the reader's name for it ("QR Code", "EAN-13"); UPC-A is told as its 12 digits.
+    `corners_px` are in centred image coordinates, from the code's own top left, clockwise.  `sure` says
+    that the code's error correction or checksum vouches for the text; `agreeing` counts the ways of
+    looking at the picture that gave this text; `quality` is 1 for a code read from the picture as it is
+    and falls towards 0 with every alteration it took.  `gs1` are the (application identifier, value)
+    pairs of a GS1 code whose check digits hold, and `gs1_problem` says what is wrong with one that is
+    none.
+    """
+
+    symbology: str
+    text: str
+    corners_px: tuple[tuple[float, float], ...]
+    sure: bool
+    agreeing: int
+    quality: float
+    gs1: tuple[tuple[str, str], ...] = ()
+    gs1_problem: str = ""
+
+    @property
+    def believed(self) -> bool:
+        """A checksum vouches for it, or two reads agree: never a guess."""
+        return self.sure or self.agreeing >= 2
+
+
+@dataclass(frozen=True, slots=True)
 class Attitude:
     """Body to level frame: roll + right side down, pitch + nose up, yaw + clockwise from above."""
 
