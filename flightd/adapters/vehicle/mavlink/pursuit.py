@@ -6,13 +6,13 @@ import asyncio
 import contextlib
 import logging
 from collections import deque
+from collections.abc import Callable
 from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.authority import Authority
-from flightd.adapters.vehicle.mavlink.commands import Answer, Commander
-from flightd.adapters.vehicle.mavlink.telemetry import Telemetry
+from flightd.adapters.vehicle.mavlink.commands import Answer
 from flightd.core.types import Demand, LandedState
 from flightd.ports import Clock
 
@@ -42,6 +42,27 @@ class FirmwareRules(Protocol):
     def not_fit(self) -> str: ...
 
 
+class Heard(Protocol):
+    """What has to be known of the vehicle; `heartbeat_ns` is 0 until it was heard."""
+
+    heartbeat_ns: int
+    armed: bool
+
+    @property
+    def custom_mode(self) -> int | None: ...
+
+    @property
+    def landed(self) -> LandedState: ...
+
+
+class Commands(Protocol):
+    """How the vehicle is commanded: repeated when unanswered while `wanted`."""
+
+    async def send(
+        self, command: int, /, *params: float, patience_s: float = ..., wanted: Callable[[], bool] = ...
+    ) -> Answer: ...
+
+
 class Pursuit:
     """Holds the demand and pursues it while the vehicle is ours.
 
@@ -49,9 +70,7 @@ class Pursuit:
     out, the pilot's switch) is not armed anew until FLY follows another demand.
     """
 
-    def __init__(
-        self, firmware: FirmwareRules, commander: Commander, telemetry: Telemetry, clock: Clock
-    ) -> None:
+    def __init__(self, firmware: FirmwareRules, commander: Commands, telemetry: Heard, clock: Clock) -> None:
         self._firmware = firmware
         self._commander = commander
         self._telemetry = telemetry

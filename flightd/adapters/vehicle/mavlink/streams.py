@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.commands import Commander
+from flightd.adapters.vehicle.mavlink.commands import Answer
 from flightd.ports import Clock
 
 _CHECK_S = 1.0
@@ -17,6 +18,12 @@ _DENIED_PAUSE_NS = 30_000_000_000
 _TOO_FEW, _TOO_MANY = 0.6, 1.6
 
 
+class Sends(Protocol):
+    """Whoever can send a command and tell how it was answered."""
+
+    async def send(self, command: int, /, *params: float) -> Answer: ...
+
+
 class StreamKeeper:
     """Keeps the wanted messages coming, `rates_hz` by message id.
 
@@ -24,7 +31,7 @@ class StreamKeeper:
     what arrives is counted and a stream whose rate is off is asked for again.
     """
 
-    def __init__(self, commander: Commander, clock: Clock, rates_hz: dict[int, float]) -> None:
+    def __init__(self, commander: Sends, clock: Clock, rates_hz: dict[int, float]) -> None:
         self._commander = commander
         self._clock = clock
         self._rates_hz = rates_hz
