@@ -12,19 +12,19 @@ import pytest
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, LandedState
 from flightd.runtime.clock import LoopClock
-from tests.protocol.rig import RIGS, Rig, run_virtual
+from tests.protocol.rig import REAL_TIME, RIGS, Rig, run_real, run_virtual
 
 
 @pytest.fixture(params=list(RIGS))
 def on_rig(request: pytest.FixtureRequest) -> Callable[[Any], Any]:
-    """Runs `test(rig)` in virtual time with the adapter of this parameter."""
+    """Runs `test(rig)` with the adapter of this parameter, in virtual time where that can be."""
 
     def run(test: Any) -> Any:
         async def main() -> Any:
             async with RIGS[request.param]() as rig:
                 return await test(rig)
 
-        return run_virtual(main)
+        return (run_real if request.param in REAL_TIME else run_virtual)(main)
 
     return run
 
@@ -32,7 +32,8 @@ def on_rig(request: pytest.FixtureRequest) -> Callable[[Any], Any]:
 def test_telemetry_arrives_without_any_demand_and_nothing_is_commanded(on_rig: Any) -> None:
     async def test(rig: Rig) -> None:
         assert rig.vehicle.state() is None
-        await asyncio.sleep(3.0)
+        await rig.until(lambda: rig.vehicle.state() is not None)
+        await asyncio.sleep(2.0)
         state = rig.known()
         assert state.height_m == pytest.approx(0.10, abs=0.03)
         assert state.battery_frac == pytest.approx(1.0, abs=0.02)

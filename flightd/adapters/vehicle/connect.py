@@ -21,4 +21,16 @@ def connect_vehicle(config: VehicleConfig, clock: Clock) -> Vehicle:
             return Px4Vehicle(config.url, clock, MavlinkOptions(config.system_id))
         case "ardrone":
             return ArDroneVehicle(settings_of(config.url), clock)
+        case "mavsdk":
+            return _mavsdk_vehicle(config, clock)
     raise InputError(f"vehicle.kind {config.kind}: no such adapter")
+
+
+def _mavsdk_vehicle(config: VehicleConfig, clock: Clock) -> Vehicle:
+    """The library is an extra, and 19 MB that nobody else has to load."""
+    try:
+        from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle  # noqa: PLC0415
+    except ImportError as err:
+        text = f"vehicle.kind mavsdk: {err}; install the library: pip install 'flightd[mavsdk]'"
+        raise InputError(text) from err
+    return MavsdkVehicle(config.url, clock, config.system_id)

@@ -1,0 +1,317 @@
+"""PX4 through MAVSDK 4: attitude OFFBOARD, arming, landing and telemetry by the library's plugins.
+
+As far as its API reaches: the set point carries no yaw rate (mask 7), only the heading that we integrate;
+there is no signing; ArduPilot is left to the adapter of our own, since the library's offboard mode means
+GUIDED there, which needs a position.  After the library's documentation and behaviour; not tried on
+hardware.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import math
+from collections import deque
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+from mavsdk.autopilot import Autopilot
+from mavsdk.exceptions import MavsdkError
+from mavsdk.plugins.offboard import Attitude as SdkAttitude
+from mavsdk.plugins.server_utility import StatusTextType
+from mavsdk.plugins.telemetry import FlightMode
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
+from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
+from flightd.adapters.vehicle.mavlink.pursuit import Pursuit
+from flightd.adapters.vehicle.mavlink.setpoint import Heading
+from flightd.adapters.vehicle.mavlink.streams import StreamKeeper
+from flightd.adapters.vehicle.mavlink.timesync import ClockSync
+from flightd.adapters.vehicle.mavlink.transport import make_transport
+from flightd.adapters.vehicle.mavsdk.commander import SdkCommander
+from flightd.adapters.vehicle.mavsdk.gate import SetpointGate
+from flightd.adapters.vehicle.mavsdk.library import Library, Plugins
+from flightd.adapters.vehicle.mavsdk.line import Line
+from flightd.adapters.vehicle.mavsdk.readings import Readings
+from flightd.core.types import (
+    Attitude,
+    AttitudeSetpoint,
+    Demand,
+    Event,
+    EventLevel,
+    VehicleState,
+)
+from flightd.ports import Clock
+from flightd.runtime.latest import Latest
+
+_LOG = logging.getLogger(__name__)
+
+_RATES_HZ: dict[int, float] = {
+    dialect.MAVLINK_MSG_ID_HEARTBEAT: 20.0,  # a take-over must be seen within 100 ms
+    dialect.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50.0,
+    dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR: 20.0,
+    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 5.0,
+    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
+}
+_TEXT_TYPES = {
+    EventLevel.INFO: StatusTextType.INFO,
+    EventLevel.WARNING: StatusTextType.WARNING,
+    EventLevel.ERROR: StatusTextType.ERROR,
+}
+_INFO = int(dialect.MAV_SEVERITY_INFO)
+_SEVERITIES = {
+    StatusTextType.WARNING: int(dialect.MAV_SEVERITY_WARNING),
+    StatusTextType.ERROR: int(dialect.MAV_SEVERITY_ERROR),
+    StatusTextType.CRITICAL: int(dialect.MAV_SEVERITY_CRITICAL),
+    StatusTextType.ALERT: int(dialect.MAV_SEVERITY_ALERT),
+    StatusTextType.EMERGENCY: int(dialect.MAV_SEVERITY_EMERGENCY),
+}
+_TEXT_MAX = 49
+_TEXTS_MAX = 20
+
+_YAW_LEAD_S = 0.2
+"""The library sends no yaw rate to feed forward, so the heading leads by what the yaw loop lags."""
+
+_IDLE_PERIOD_S = 0.05
+_PUMP_SILENT_NS = 150_000_000
+_SYNC_FAST_S, _SYNC_SLOW_S = 0.1, 1.0
+
+
+class MavsdkVehicle:
+    """`ports.Vehicle` by MAVSDK, with the rules of the other MAVLink adapters: one arming per FLY demand,
+    and after a take-over nothing until FLY follows HANDS_OFF or STANDBY."""
+
+    flying_mode = int(FlightMode.OFFBOARD)
+    landing_mode = int(FlightMode.LAND)
+    prime_s = 1.3
+    """PX4 wants set points for more than a second before it enters OFFBOARD."""
+
+    def __init__(self, url: str, clock: Clock, system_id: int = 1) -> None:
+        self._clock = clock
+        self._system_id = system_id
+        self._sync = ClockSync()
+        self._readings = Readings(self._sync)
+        self._heading = Heading()
+        self._height = HeightLoop()
+        self.gate = SetpointGate()
+        self._transport = make_transport(parse_endpoint(url))
+        self._commander = SdkCommander()
+        self._pursuit = Pursuit(self, self._commander, self._readings, clock)
+        self._setpoints: Latest[SdkAttitude] = Latest()
+        self._texts: deque[tuple[StatusTextType, str]] = deque(maxlen=_TEXTS_MAX)
+        self._text_waits = asyncio.Event()
+        self._sent_ns = 0
+        self._unfit = ""
+
+    # The port
+
+    async def run(self) -> None:
+        """Own link and library until cancelled, then hand the vehicle back: in the air it is told to land.
+
+        UnavailableError when the link can never be opened (port in use, not a serial device).
+        """
+        library = Library(self._system_id)
+        line = Line(self._transport, self.gate, self._clock, library.feed)
+        library.connect(line.send)
+        try:
+            async with asyncio.TaskGroup() as carrying:
+                carrier = carrying.create_task(line.run(), name="mavsdk line")
+                try:
+                    await self._live(library)
+                finally:
+                    await library.close()  # the line still carries the last answers
+                    carrier.cancel()
+        except ExceptionGroup as group:
+            if len(group.exceptions) == 1:
+                raise group.exceptions[0] from None
+            raise
+
+    async def _live(self, library: Library) -> None:
+        plugins = await library.vehicle()
+        await self._look_at(plugins)
+        self._commander.attach(library, plugins)
+        async with asyncio.TaskGroup() as tasks:
+            self._listen(tasks, library, plugins)
+            try:
+                await self._pursuit.run()
+            finally:
+                await self._pursuit.hand_back()
+
+    def state(self) -> VehicleState | None:
+        pursuit = self._pursuit
+        return self._readings.state(
+            self._clock.now_ns(), in_control=pursuit.in_control, refusal=pursuit.refusal
+        )
+
+    def attitudes(self) -> list[Attitude]:
+        return self._readings.attitudes()
+
+    def demand(self, demand: Demand) -> None:
+        self._pursuit.demand(demand)
+        self._mind_gate()
+
+    def send(self, setpoint: AttitudeSetpoint) -> bool:
+        now_ns = self._clock.now_ns()
+        yaw_rad = self._readings.yaw_rad
+        if not self._pursuit.may_steer or yaw_rad is None:
+            self._heading.release()
+            self._height.release()
+            return False
+        if self._pursuit.stands:
+            self._heading.release()  # the vehicle may be turned by hand, its compass may still settle
+        heading_rad = self._heading.step(now_ns, setpoint.yaw_rate_radps, yaw_rad)
+        thrust = self._height.step(
+            now_ns,
+            setpoint.climb_mps,
+            climb_mps=self._readings.climb_mps(now_ns),
+            height_m=self._readings.height_m(now_ns),
+            tilt_cos=math.cos(setpoint.roll_rad) * math.cos(setpoint.pitch_rad),
+            on_floor=self._pursuit.stands,
+        )
+        self._sent_ns = now_ns
+        heading_rad += setpoint.yaw_rate_radps * _YAW_LEAD_S
+        self._steer(now_ns, setpoint.roll_rad, setpoint.pitch_rad, heading_rad, thrust)
+        return True
+
+    def notify(self, event: Event) -> None:
+        text = f"{event.name}: {event.text}".encode("ascii", "replace").decode("ascii")
+        self._texts.append((_TEXT_TYPES[event.level], text[:_TEXT_MAX]))
+        self._text_waits.set()
+
+    # The firmware
+
+    def mode_name(self, custom_mode: int) -> str:
+        """The library's name of a mode."""
+        return str(FlightMode(custom_mode).name)
+
+    def mode_params(self, custom_mode: int) -> tuple[float, ...]:
+        """The mode, for the commander to choose the library's call."""
+        return (float(custom_mode),)
+
+    def not_fit(self) -> str:
+        """Why the vehicle must not be flown by us, or an empty text."""
+        return self._unfit
+
+    # Listening
+
+    async def _look_at(self, plugins: Plugins) -> None:
+        found, kind = await plugins.system.get_system_id(), await plugins.system.autopilot_type()
+        self._unfit = ""
+        if found != self._system_id:
+            self._unfit = f"the vehicle's system id is {found}, the configuration says {self._system_id}"
+        elif kind != Autopilot.PX4:
+            self._unfit = f"the autopilot is {Autopilot(kind).name}: MAVSDK flies PX4 only, use vehicle.kind"
+
+    def _listen(self, tasks: asyncio.TaskGroup, library: Library, plugins: Plugins) -> None:
+        telemetry, readings = plugins.telemetry, self._readings
+        streams = StreamKeeper(self._commander, self._clock, _RATES_HZ)
+        sources: list[tuple[AsyncIterator[Any], int | None, Callable[[Any, int], None]]] = [
+            (telemetry.subscribe_flight_mode(), dialect.MAVLINK_MSG_ID_HEARTBEAT, self._beat),
+            (telemetry.subscribe_armed(), None, readings.take_armed),
+            (telemetry.subscribe_attitude_euler(), dialect.MAVLINK_MSG_ID_ATTITUDE, readings.take_attitude),
+            (
+                telemetry.subscribe_position_velocity_ned(),
+                dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+                readings.take_velocity,
+            ),
+            (
+                telemetry.subscribe_distance_sensor(),
+                dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR,
+                readings.take_range,
+            ),
+            (
+                telemetry.subscribe_landed_state(),
+                dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+                readings.take_landed,
+            ),
+            (telemetry.subscribe_battery(), dialect.MAVLINK_MSG_ID_BATTERY_STATUS, readings.take_battery),
+            (telemetry.subscribe_status_text(), None, self._say),
+            (plugins.direct.subscribe_message("TIMESYNC"), None, self._compare),
+        ]
+        for source, message_id, take in sources:
+            tasks.create_task(self._take(source, streams, message_id, take), name=f"mavsdk {message_id}")
+        tasks.create_task(streams.run(), name="mavsdk streams")
+        tasks.create_task(self._compare_clocks(library, plugins), name="mavsdk timesync")
+        tasks.create_task(self._pass_on(library, plugins), name="mavsdk set points")
+        tasks.create_task(self._idle(), name="mavsdk idle set points")
+        tasks.create_task(self._tell(library, plugins), name="mavsdk texts")
+
+    async def _take(
+        self,
+        source: AsyncIterator[Any],
+        streams: StreamKeeper,
+        message_id: int | None,
+        take: Callable[[Any, int], None],
+    ) -> None:
+        async for value in source:
+            if message_id is not None:
+                streams.count(message_id)
+            take(value, self._clock.now_ns())
+
+    def _beat(self, mode: FlightMode, now_ns: int) -> None:
+        self._readings.take_mode(mode, now_ns)
+        self._pursuit.heartbeat(now_ns)
+        self._mind_gate()
+
+    def _say(self, text: Any, now_ns: int) -> None:
+        _LOG.info("autopilot: %s", text.text)
+        self._pursuit.text(_SEVERITIES.get(text.type, _INFO), text.text, now_ns)
+
+    def _compare(self, message: Any, now_ns: int) -> None:
+        fields = json.loads(message.fields_json)
+        if fields["tc1"] != 0:
+            self._sync.answered(int(fields["ts1"]), int(fields["tc1"]), now_ns)
+
+    async def _compare_clocks(self, library: Library, plugins: Plugins) -> None:
+        while True:
+            question = library.message("TIMESYNC", tc1=0, ts1=self._sync.ask(self._clock.now_ns()))
+            with contextlib.suppress(MavsdkError):
+                await library.call(plugins.direct.send_message(question))
+            await asyncio.sleep(_SYNC_SLOW_S if self._sync.is_settled else _SYNC_FAST_S)
+
+    # Set points
+
+    def _mind_gate(self) -> None:
+        """Shut it as soon as nobody here may steer any more."""
+        if not self._pursuit.may_steer and not self._pursuit.wants_flight:
+            self.gate.close()
+
+    def _steer(self, now_ns: int, roll_rad: float, pitch_rad: float, yaw_rad: float, thrust: float) -> None:
+        """Have the library send this attitude, and let it pass the gate for a while."""
+        self.gate.refresh(now_ns)
+        degrees = map(math.degrees, (roll_rad, pitch_rad, yaw_rad))
+        self._setpoints.put(SdkAttitude(*degrees, thrust))
+
+    async def _pass_on(self, library: Library, plugins: Plugins) -> None:
+        while True:
+            attitude = await self._setpoints.get()
+            with contextlib.suppress(MavsdkError):
+                await library.call(plugins.offboard.set_attitude(attitude))
+
+    async def _idle(self) -> None:
+        """Set points while the mission makes none yet: PX4 enters OFFBOARD only while they stream.  On the
+        floor without thrust; in the air only until OFFBOARD is entered, never to keep it flying."""
+        while True:
+            await asyncio.sleep(_IDLE_PERIOD_S)
+            now_ns = self._clock.now_ns()
+            yaw_rad = self._readings.yaw_rad
+            recently = now_ns - self._sent_ns < _PUMP_SILENT_NS
+            if not self._pursuit.wants_flight or yaw_rad is None or recently:
+                continue
+            if self._pursuit.stands:
+                self._steer(now_ns, 0.0, 0.0, yaw_rad, 0.0)
+            elif not self._pursuit.may_steer:
+                self._steer(now_ns, 0.0, 0.0, yaw_rad, self._height.hover)
+
+    async def _tell(self, library: Library, plugins: Plugins) -> None:
+        while True:
+            await self._text_waits.wait()
+            self._text_waits.clear()
+            while self._texts:
+                kind, text = self._texts.popleft()
+                with contextlib.suppress(MavsdkError):
+                    await library.call(plugins.texts.send_status_text(kind, text))

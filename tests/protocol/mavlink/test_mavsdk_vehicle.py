@@ -1,0 +1,185 @@
+"""MAVSDK's own set point repeater never keeps a dead loop flying; what the adapter refuses, and why."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import threading
+import time
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.adapters.vehicle.connect import connect_vehicle
+from flightd.adapters.vehicle.mavsdk.gate import FRESH_NS, SetpointGate, message_id
+from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
+from flightd.config.schema import VehicleConfig
+from flightd.core.errors import InputError
+from flightd.core.types import Demand
+from flightd.runtime.clock import LoopClock
+from flightd.runtime.loops import ScaledLoop
+from flightd.sim.airframe import Airframe
+from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
+from flightd.sim.autopilot.link import Message
+from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
+from tests.protocol.rig import Rig, mavlink_rig, mavsdk_rig, run_real
+
+
+class _CountingPx4(Px4Peer):
+    """Counts the set points that reach it."""
+
+    def __init__(self, clock: LoopClock, airframe: Airframe, config: PeerConfig | None = None) -> None:
+        super().__init__(clock, airframe, config)
+        self.setpoints = 0
+        self.streaming = asyncio.Event()
+        """Set once they keep it in OFFBOARD."""
+
+    def _setpoint(self, message: Message) -> None:
+        super()._setpoint(message)
+        self.setpoints += 1
+        if self.mode == Px4Mode.OFFBOARD:
+            self.streaming.set()
+
+
+def _packed(message: Message, *, v1: bool = False) -> bytes:
+    frame: bytes = message.pack(dialect.MAVLink(None, 1, 191), force_mavlink1=v1)
+    return frame
+
+
+_TARGET = dialect.MAVLink_set_attitude_target_message(0, 1, 1, 7, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, 0.5)
+_COMMAND = dialect.MAVLink_command_long_message(1, 1, 21, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
+@pytest.mark.parametrize("v1", [False, True])
+def test_the_gate_passes_set_points_only_while_they_are_fresh_and_all_else_always(v1: bool) -> None:
+    gate = SetpointGate()
+    setpoint, command = _packed(_TARGET, v1=v1), _packed(_COMMAND, v1=v1)
+    assert message_id(setpoint) == 82
+    assert not gate.passes(setpoint, 5)
+    gate.refresh(1_000)
+    assert gate.passes(setpoint, 1_000 + FRESH_NS - 1)
+    assert not gate.passes(setpoint, 1_000 + FRESH_NS)
+    gate.refresh(2_000_000_000)
+    gate.close()
+    assert not gate.passes(setpoint, 2_000_000_001)
+    assert gate.passes(command, 2_000_000_001)
+    assert gate.passes(b"", 2_000_000_001)
+    assert gate.held_back == 3
+
+
+def test_a_tick_that_died_in_the_air_is_not_flown_on_and_px4s_own_failsafe_acts() -> None:
+    async def test() -> None:
+        config = PeerConfig(ready_s=0.5, parameters={"COM_OF_LOSS_T": 0.5})
+        async with mavlink_rig(_CountingPx4, MavsdkVehicle, Px4Mode.ALTCTL, config) as rig:
+            assert isinstance(rig.vehicle, MavsdkVehicle)
+            await rig.take_off()
+            await rig.stream(0.3, roll_rad=0.1)
+            await asyncio.sleep(FRESH_NS * 1e-9 + 0.1)
+            arrived, held_back = rig.peer.setpoints, rig.vehicle.gate.held_back
+            assert rig.peer.mode == Px4Mode.OFFBOARD
+            await asyncio.sleep(1.0)
+            assert rig.peer.setpoints == arrived
+            assert rig.vehicle.gate.held_back > held_back  # the library did try
+            assert rig.peer.mode != Px4Mode.OFFBOARD
+            assert abs(rig.peer.truth().roll_rad) < 0.02
+            assert not rig.known().in_control
+
+    run_real(test)
+
+
+def test_a_loop_that_hangs_sends_nothing_though_the_librarys_threads_live() -> None:
+    async def test() -> None:
+        peer = _CountingPx4(LoopClock(), Airframe(), PeerConfig(ready_s=0.5))
+        host, port = await peer.open()
+        serving = asyncio.create_task(peer.run())
+        companion = _Companion(f"udpout://{host}:{port}")
+        try:
+            async with asyncio.timeout(20.0):
+                await peer.streaming.wait()
+            companion.hang(1.5)
+            await asyncio.sleep(0.1)
+            arrived = peer.setpoints
+            await asyncio.sleep(1.0)
+            assert peer.setpoints == arrived
+        finally:
+            await asyncio.to_thread(companion.end)
+            serving.cancel()
+            await asyncio.wait([serving])
+
+    with asyncio.Runner(loop_factory=lambda: ScaledLoop(1.0)) as runner:
+        runner.run(test())
+
+
+class _Companion:
+    """The adapter on a loop and a thread of its own, demanding to fly."""
+
+    def __init__(self, url: str) -> None:
+        self._url = url
+        self._loop = ScaledLoop(1.0)
+        self._over = asyncio.Event()
+        self._thread = threading.Thread(target=self._live, name="companion")
+        self._thread.start()
+
+    def hang(self, duration_s: float) -> None:
+        self._loop.call_soon_threadsafe(time.sleep, duration_s)
+
+    def end(self) -> None:
+        self._loop.call_soon_threadsafe(self._over.set)
+        self._thread.join()
+
+    def _live(self) -> None:
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            runner.run(self._fly())
+
+    async def _fly(self) -> None:
+        vehicle = MavsdkVehicle(self._url, LoopClock())
+        flying = asyncio.create_task(vehicle.run())
+        vehicle.demand(Demand.FLY)
+        await self._over.wait()
+        flying.cancel()
+        await asyncio.wait([flying])
+
+
+def _refusal_of(rig: Rig) -> str:
+    return rig.known().refusal
+
+
+def test_arducopter_is_refused_with_the_reason() -> None:
+    async def test() -> None:
+        async with mavlink_rig(ArduCopterPeer, MavsdkVehicle, CopterMode.ALT_HOLD) as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            rig.vehicle.demand(Demand.FLY)
+            await rig.until(lambda: "PX4" in _refusal_of(rig))
+            assert rig.peer.mode == CopterMode.STABILIZE
+            assert not rig.known().armed
+
+    run_real(test)
+
+
+def test_a_refused_arming_is_told_with_the_autopilots_words_and_tried_again() -> None:
+    async def test() -> None:
+        async with mavsdk_rig() as rig:
+            rig.peer.arming_block = "Accel 0 uncalibrated"
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            rig.vehicle.demand(Demand.FLY)
+            await rig.until(lambda: "arming" in _refusal_of(rig) and "uncalibrated" in _refusal_of(rig), 20.0)
+            rig.peer.arming_block = ""
+            await rig.until(lambda: rig.known().armed)
+            assert rig.known().refusal == ""
+
+    run_real(test)
+
+
+def test_without_the_library_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.split(".")[0] == "mavsdk"]:
+        monkeypatch.setitem(sys.modules, name, None)
+    for name in [name for name in sys.modules if name.startswith("flightd.adapters.vehicle.mavsdk")]:
+        monkeypatch.delitem(sys.modules, name)
+    config = VehicleConfig(kind="mavsdk", url="udpout://127.0.0.1:14550")
+
+    async def test() -> None:
+        with pytest.raises(InputError, match=r"pip install 'flightd\[mavsdk\]'"):
+            connect_vehicle(config, LoopClock())
+
+    asyncio.run(test())
