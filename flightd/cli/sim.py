@@ -39,8 +39,13 @@ def sim(
         str | None, typer.Option(help="Site file, or random:SEED for a random site.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of wind, sensors, floor and camera.", min=0)] = 1,
-    vehicle: Annotated[str, typer.Option(help="ardupilot, px4 or ardrone.")] = "ardupilot",
-    speed: Annotated[str, typer.Option(help="max (lockstep), or a multiple of real time.")] = "max",
+    vehicle: Annotated[
+        str, typer.Option(help="ardupilot, px4, ardrone or mavsdk (flies PX4, in real time).")
+    ] = "ardupilot",
+    speed: Annotated[
+        str | None,
+        typer.Option(help="max (lockstep, the default), or a multiple of real time.", show_default=False),
+    ] = None,
     scenario: Annotated[list[Path] | None, typer.Option(help="Scenario file.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for log, report and summary.")] = Path("out/sim"),
     settings: Annotated[
@@ -62,7 +67,7 @@ def sim(
     external = bool(truth_url or vehicle_url)
     if external and not (truth_url and vehicle_url):
         raise InputError("--truth-url and --vehicle-url belong together: give both or neither")
-    factor = _factor("1" if external and speed == "max" else speed)
+    factor = _factor(speed, _own_clock(vehicle, truth_url))
     chosen, site = _configured(config, warehouse, vehicle, settings or [])
     if external:
         truth_address(truth_url)
@@ -86,13 +91,27 @@ def sim(
         raise RunError(f"mission aborted: {summary['reason']}")
 
 
-def _factor(speed: str) -> float | None:
-    if speed == "max":
-        return None
+def _own_clock(vehicle: str, truth_url: str) -> str:
+    """Who keeps a clock of his own, which rules out lockstep; an empty text for nobody."""
+    return "MAVSDK" if vehicle == "mavsdk" else "an external simulator" if truth_url else ""
+
+
+def _factor(speed: str | None, own_clock: str) -> float | None:
+    """Multiple of real time, None for lockstep."""
+    if speed is None:
+        return 1.0 if own_clock else None
     try:
         factor = float(speed)
     except ValueError:
         factor = 0.0
+    if own_clock and speed == "max":
+        raise InputError(
+            f"--speed max: {own_clock} keeps a clock of its own; leave --speed out for real time"
+        )
+    if own_clock == "MAVSDK" and factor != 1.0:
+        raise InputError(f"--speed {speed}: MAVSDK keeps a clock of its own; it flies with --speed 1 only")
+    if speed == "max":
+        return None
     if not 0.05 <= factor <= 50:
         raise InputError(f"--speed {speed}: expected max, or a factor between 0.05 and 50")
     return factor

@@ -25,7 +25,7 @@ from flightd.adapters.recorder.recorder import Recorder
 from flightd.app import Daemon, FlightResult, detector_pool, ground_link, plan_of
 from flightd.config.schema import Config
 from flightd.config.site_file import site_toml
-from flightd.core.errors import FlightdError, InputError, RunError, UnavailableError
+from flightd.core.errors import FlightdError, RunError, UnavailableError
 from flightd.core.topics import Document, Topic
 from flightd.core.types import Status
 from flightd.grid.site import Site
@@ -188,14 +188,12 @@ def _flight_recorder(simulation: Simulation, clock: LoopClock, lossless: bool) -
 
 def _spec(simulation: Simulation, camera_port: int, vehicle_ports: tuple[int, ...]) -> WorldSpec:
     scenario = simulation.scenario
-    kind = simulation.config.vehicle.kind
-    if kind == "mavsdk":
-        raise InputError(f"--vehicle {kind}: the simulator has ardupilot, px4 and ardrone")
+    adapter = simulation.config.vehicle.kind
     return WorldSpec(
         site=simulation.site,
         seed=simulation.seed,
         camera_address=("127.0.0.1", camera_port),
-        vehicle=kind,
+        vehicle="px4" if adapter == "mavsdk" else adapter,
         vehicle_ports=vehicle_ports,
         start_yaw_rad=math.radians(simulation.config.mission.start_yaw_deg),
         camera=replace(scenario.camera.camera(), mount=simulation.config.camera.mount()),

@@ -71,6 +71,8 @@ def test_the_same_seed_flies_the_same_flight(tmp_path: Path) -> None:
         (["--scenario", "no-such-scenario.toml"], "no-such-scenario.toml"),
         (["--out", "/proc/nowhere"], "/proc/nowhere"),
         (["--vehicle", "zeppelin"], "vehicle.kind"),
+        (["--vehicle", "mavsdk", "--speed", "max"], "leave --speed out"),
+        (["--vehicle", "mavsdk", "--speed", "3"], "--speed 1"),
     ],
 )
 def test_wrong_input_is_one_line_that_names_it(options: list[str], word: str, tmp_path: Path) -> None:
