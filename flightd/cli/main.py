@@ -10,7 +10,7 @@ import sys
 import typer
 
 from flightd import __version__
-from flightd.cli import log, replay, report, run, sim, vision
+from flightd.cli import calibrate, log, replay, report, run, sim, vision
 from flightd.cli import map as site_map
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 
@@ -19,6 +19,7 @@ app = typer.Typer(
 )
 vision.register(app)
 sim.register(app)
+calibrate.register(app)
 run.register(app)
 report.register(app)
 replay.register(app)

@@ -1,0 +1,77 @@
+"""The down camera's lens from pictures of a chessboard (Zhang 2000, as OpenCV does it)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from flightd.core.errors import InputError
+from flightd.core.geometry import Lens
+from flightd.core.types import Image
+
+FEWEST_PICTURES = 8
+_MOST_ERROR_PX = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """A chessboard by its *inner* corners; the squares' size does not matter for the lens."""
+
+    columns: int
+    rows: int
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """The lens, the root mean square of its reprojection error in pixels, and the standard deviation of
+    the focal length."""
+
+    lens: Lens
+    error_px: float
+    sigma_focal_px: float
+
+
+def find_board(bgr: Image, board: Board) -> NDArray[np.float32] | None:
+    """(N, 2) inner corners in pixels, row by row, or None when the whole board is not seen."""
+    grey = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)
+    found, corners = cv2.findChessboardCornersSB(grey, (board.columns, board.rows))
+    return np.asarray(corners, np.float32).reshape(-1, 2) if found else None
+
+
+def calibrate(
+    views: Sequence[NDArray[np.float32]], board: Board, width_px: int, height_px: int
+) -> Calibration:
+    """Fit focal lengths, principal point and Brown-Conrady distortion to the boards seen in `views`.
+
+    Raises InputError when there are too few views or they do not fit together.
+    """
+    if len(views) < FEWEST_PICTURES:
+        raise InputError(
+            f"the {board.columns}x{board.rows} board was found in {len(views)} pictures, {FEWEST_PICTURES}"
+            " are needed: show all of it, tilted and turned, in every part of the picture"
+        )
+    flat = np.zeros((board.columns * board.rows, 3), np.float32)
+    flat[:, :2] = np.mgrid[0 : board.columns, 0 : board.rows].T.reshape(-1, 2)
+    error_px, matrix, distortion, *_, sigmas, _, _ = cv2.calibrateCameraExtended(
+        [flat] * len(views), list(views), (width_px, height_px), np.eye(3), np.zeros(5)
+    )
+    if not error_px < _MOST_ERROR_PX:
+        raise InputError(
+            f"the pictures do not fit one lens (error {error_px:.2f} px): keep focus and zoom fixed and the"
+            " board flat"
+        )
+    k1, k2, p1, p2, k3 = (float(v) for v in np.asarray(distortion).reshape(-1)[:5])
+    lens = Lens(
+        width_px,
+        height_px,
+        float(matrix[0, 0]),
+        float(matrix[1, 1]),
+        float(matrix[0, 2]),
+        float(matrix[1, 2]),
+        (k1, k2, p1, p2, k3),
+    )
+    return Calibration(lens, float(error_px), float(np.asarray(sigmas).reshape(-1)[0]))
