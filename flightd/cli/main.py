@@ -1,18 +1,13 @@
-"""The `flightd` command: every subcommand hangs here, errors become one line and an exit code.
-
-Exit 0 on success, 1 for a failed run, 2 for bad input, configuration or a resource that cannot be had.
-"""
+"""The `flightd` command: every subcommand hangs here."""
 
 from __future__ import annotations
-
-import sys
 
 import typer
 
 from flightd import __version__
 from flightd.cli import calibrate, log, replay, report, run, sim, vision
 from flightd.cli import map as site_map
-from flightd.core.errors import FlightdError, InputError, UnavailableError
+from flightd.cli.exits import run_app
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
@@ -44,14 +39,4 @@ def flightd(
 
 def main() -> None:
     """Entry point of the `flightd` script."""
-    try:
-        app()
-    except (InputError, UnavailableError) as err:
-        print(f"flightd: {err}", file=sys.stderr)
-        raise SystemExit(2) from None
-    except FlightdError as err:
-        print(f"flightd: {err}", file=sys.stderr)
-        raise SystemExit(1) from None
-    except KeyboardInterrupt:
-        print("flightd: interrupted", file=sys.stderr)
-        raise SystemExit(130) from None
+    run_app(app, "flightd")

@@ -47,6 +47,9 @@ RETRY_S = 1.0
 """An answer that does not come for so long is asked for again, with the same id."""
 
 _KINDS_OF_INPUT = {Code.MALFORMED, Code.VERSION, Code.NODE, Code.UNAVAILABLE}
+_SHUT_OUT = {zmq.Event.HANDSHAKE_FAILED_AUTH, zmq.Event.HANDSHAKE_FAILED_PROTOCOL}
+"""Events after which asking again is of no use."""
+
 _A = TypeVar("_A")
 
 
@@ -80,6 +83,7 @@ class GroundClient:
         self._status: Any = self._socket(zmq.SUB)
         self._monitor: Any = self._requests.get_monitor_socket()
         self._asking = asyncio.Lock()
+        self._seen: set[int] = set()
         self.session = ""
 
     async def __aenter__(self) -> Self:
@@ -159,7 +163,9 @@ class GroundClient:
                 async with asyncio.timeout(patience_s):
                     return await self._received(request.id)
             except TimeoutError:
-                continue
+                await self._note_events()
+                if self._seen & _SHUT_OUT:
+                    raise
 
     async def _received(self, request_id: str) -> tuple[Answer, list[bytes]]:
         """The next answer to this request; late ones to earlier requests are left out."""
@@ -177,9 +183,8 @@ class GroundClient:
     async def _why_silent(self) -> str:
         """What ZMQ saw happen to the connection, in words."""
         where = self._address.endpoint(self._address.command_port)
-        seen: set[int] = set()
-        while await self._monitor.poll(0):
-            seen.add(parse_monitor_message(await self._monitor.recv_multipart())["event"])
+        await self._note_events()
+        seen = self._seen
         if zmq.Event.HANDSHAKE_FAILED_AUTH in seen:
             return f"{where}: refused: this key is not on the daemon's list of clients"
         if zmq.Event.HANDSHAKE_FAILED_PROTOCOL in seen or zmq.Event.HANDSHAKE_FAILED_NO_DETAIL in seen:
@@ -191,6 +196,11 @@ class GroundClient:
             needs = "wrong server key" if self._address.keys else "it wants a key (--key, --server-key)"
             return f"{where}: something listens there but does not shake hands: {needs}, or it is no flightd"
         return f"{where}: nobody listens; is flightd running, with [ground] listen set?"
+
+    async def _note_events(self) -> None:
+        """Keep what ZMQ told of the connection since the last call."""
+        while await self._monitor.poll(0):
+            self._seen.add(parse_monitor_message(await self._monitor.recv_multipart())["event"])
 
     def _socket(self, kind: int) -> Any:
         socket: Any = self._context.socket(kind)
