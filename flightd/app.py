@@ -22,7 +22,7 @@ from flightd.core.types import AttitudeSetpoint, Command, Event, EventLevel, Pha
 from flightd.grid.site import Site
 from flightd.mission.plan import FlightPlan, make_plan
 from flightd.pilot import Pilot, TickInput, TickOutput
-from flightd.ports import Clock, Ground, Recorder, Vehicle
+from flightd.ports import Clock, Ground, PoseTaker, Recorder, Vehicle
 from flightd.runtime.latency import LatencyBook
 from flightd.runtime.latest import Latest
 from flightd.runtime.pool import Detection, DetectorPool, Detectors
@@ -112,6 +112,11 @@ class Daemon:
         self._pilot = pilot_of(config, site)
         self._frames: Latest[FrameTicket] = Latest()
         self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock)
+        self._pose_taker: PoseTaker | None = None
+        if config.vehicle.shares_pose and isinstance(self._vehicle, PoseTaker):
+            self._pose_taker = self._vehicle
+        pad = site.nodes[site.home.node]
+        self._pad_m = (pad.x_m, pad.y_m) if config.vehicle.landing_target else None
         self._camera = connect_camera(config.camera, clock, self._frames.put, self._trouble, self._vehicle)
         self._pump = SetpointPump(self._vehicle, clock, self._sent, TICK_S)
         self._latency = LatencyBook()
@@ -223,6 +228,8 @@ class Daemon:
         output = self._pilot.step(tick)
         self._vehicle.demand(output.demand)
         self._pump.set(output.setpoint)
+        if self._pose_taker is not None and output.pose is not None:
+            self._pose_taker.share_pose(output.pose, self._pad_m)
         if output.setpoint is None:
             self._latency.forget()
         for event in output.events:

@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
-from flightd.core.types import Attitude, AttitudeSetpoint, Command, Demand, Event, Status, VehicleState
+from flightd.core.types import (
+    Attitude,
+    AttitudeSetpoint,
+    Command,
+    Demand,
+    Event,
+    GridPose,
+    Status,
+    VehicleState,
+)
 from flightd.pilot import TickInput, TickOutput
 
 
@@ -42,6 +51,16 @@ class Vehicle(Protocol):
 
     def notify(self, event: Event) -> None:
         """Show an event to the pilot's ground station (best effort)."""
+        ...
+
+
+@runtime_checkable
+class PoseTaker(Protocol):
+    """A vehicle whose own estimator can use the grid pose."""
+
+    def share_pose(self, pose: GridPose, pad_m: tuple[float, float] | None = None) -> None:
+        """Give it the newest pose, as often as there is one, and the place of the charge pad on the map
+        (metres) if it shall land by it.  Never blocks."""
         ...
 
 

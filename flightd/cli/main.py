@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from flightd import __version__
-from flightd.cli import calibrate, log, replay, report, run, sim, vision
+from flightd.cli import calibrate, keygen, log, replay, report, run, sim, vision
 from flightd.cli import map as site_map
 from flightd.cli.exits import run_app
 
@@ -19,6 +19,7 @@ run.register(app)
 report.register(app)
 replay.register(app)
 log.register(app)
+keygen.register(app)
 site_map.register(app)
 
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from flightd.config.ground import GroundConfig
+from flightd.config.vehicle import VehicleConfig
 from flightd.control.flight import FlightGains
 from flightd.control.limits import Limits
 from flightd.control.pid import PidGains
@@ -81,18 +82,6 @@ class VisionConfig(_Section):
     timeout_s: float = Field(
         0.5, gt=0.01, le=5, description="a detector that takes longer is killed and replaced"
     )
-
-
-class VehicleConfig(_Section):
-    """The link to the autopilot."""
-
-    kind: Literal["ardupilot", "px4", "ardrone", "mavsdk"] = Field(
-        "ardupilot", description="which adapter flies"
-    )
-    url: str = Field(
-        "udpin://127.0.0.1:14550", description="udpin://, udpout://, tcp://HOST:PORT or serial:///dev/X:BAUD"
-    )
-    system_id: int = Field(1, ge=1, le=255, description="MAVLink system id of the vehicle")
 
 
 class PidConfig(_Section):
@@ -273,6 +262,7 @@ def parse_config(table: dict[str, Any], path: Path) -> Config:
         update={
             "mission": config.mission.model_copy(update={"site": site}),
             "ground": config.ground.beside(path.parent),
+            "vehicle": config.vehicle.beside(path.parent),
         }
     )
 

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import time
+
 from flightd.adapters.vehicle.ardrone.settings import settings_of
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
-from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
+from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, GUIDED_NOGPS, ArduPilotVehicle
+from flightd.adapters.vehicle.mavlink.outputs import PoseForm
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
+from flightd.adapters.vehicle.mavlink.signing import Signing, read_key
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
-from flightd.config.schema import VehicleConfig
+from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import InputError
 from flightd.ports import Clock, Vehicle
 
 
 def connect_vehicle(config: VehicleConfig, clock: Clock) -> Vehicle:
-    """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address."""
+    """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address or a
+    signing key that cannot be used."""
     match config.kind:
         case "ardupilot":
-            return ArduPilotVehicle(config.url, clock, MavlinkOptions(config.system_id))
+            mode = GUIDED if config.flying_mode == "guided" else GUIDED_NOGPS
+            return ArduPilotVehicle(config.url, clock, _options(config, clock), flying_mode=mode)
         case "px4":
-            return Px4Vehicle(config.url, clock, MavlinkOptions(config.system_id))
+            return Px4Vehicle(config.url, clock, _options(config, clock))
         case "ardrone":
             return ArDroneVehicle(settings_of(config.url), clock)
         case "mavsdk":
@@ -34,3 +40,19 @@ def _mavsdk_vehicle(config: VehicleConfig, clock: Clock) -> Vehicle:
         text = f"vehicle.kind mavsdk: {err}; install the library: pip install 'flightd[mavsdk]'"
         raise InputError(text) from err
     return MavsdkVehicle(config.url, clock, config.system_id)
+
+
+def signing_of(config: VehicleConfig, clock: Clock) -> Signing | None:
+    """The configured key of a signed link.  InputError when the key or its time stamp cannot be read."""
+    if config.signing_key is None:
+        return None
+    return Signing(read_key(config.signing_key), clock, time.time(), config.stamp_file)
+
+
+def _options(config: VehicleConfig, clock: Clock) -> MavlinkOptions:
+    return MavlinkOptions(
+        system_id=config.system_id,
+        signing=signing_of(config, clock),
+        pose_form=PoseForm(config.pose_output) if config.shares_pose else None,
+        raw_thrust=config.raw_thrust,
+    )

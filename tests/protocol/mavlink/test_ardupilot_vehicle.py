@@ -134,6 +134,22 @@ def test_before_the_meaning_of_thrust_is_known_it_is_not_flown() -> None:
     run_virtual(test)
 
 
+@pytest.mark.parametrize(("options", "wanted"), [(0, True), (8, False), (1, True)])
+def test_thrust_that_means_something_else_than_configured_is_not_flown(options: int, wanted: bool) -> None:
+    async def test() -> None:
+        for configured in (wanted, None):
+            autopilot = ScriptedAutopilot()
+            autopilot.parameters = {"GUID_OPTIONS": options}
+            async with scripted(autopilot, raw_thrust=configured) as (_, vehicle):
+                vehicle.demand(Demand.FLY)
+                await asyncio.sleep(3.0)
+                refused = "vehicle.raw_thrust" in known(vehicle).refusal
+                assert refused is (configured is not None)
+                assert bool(autopilot.commands(ARM)) is not refused
+
+    run_virtual(test)
+
+
 # Whom we believe
 
 
@@ -507,16 +523,21 @@ def test_either_side_may_start_first() -> None:
 def test_the_grid_pose_is_shared_at_thirty_hertz_if_so_chosen() -> None:
     async def test() -> None:
         pose = GridPose(0, "A1", 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 1.5, (0.01,) * 9, 0.9)
-        for form, expected in ((PoseForm.ODOMETRY, 60), (None, 0)):
+        near, far = (pose.x_m + 0.4, pose.y_m), (pose.x_m + 4.0, pose.y_m)
+        for form, pad_m, expected, targets in (
+            (PoseForm.ODOMETRY, near, 60, 60),
+            (PoseForm.ODOMETRY, far, 60, 0),
+            (None, near, 0, 0),
+        ):
             async with scripted(pose_form=form) as (autopilot, vehicle):
                 autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, 150, 0, 0, 25, 0))
                 await asyncio.sleep(0.1)
                 for _ in range(100):
                     autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, 150, 0, 0, 25, 0))
-                    vehicle.share_pose(pose, (3.0, 4.0))
+                    vehicle.share_pose(pose, pad_m)
                     await asyncio.sleep(0.02)
                 assert len(autopilot.all("ODOMETRY")) == pytest.approx(expected, abs=3)
-                assert len(autopilot.all("LANDING_TARGET")) == len(autopilot.all("ODOMETRY"))
+                assert len(autopilot.all("LANDING_TARGET")) == pytest.approx(targets, abs=3)
 
     run_virtual(test)
 

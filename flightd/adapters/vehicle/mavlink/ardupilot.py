@@ -48,6 +48,7 @@ class ArduPilotVehicle(MavlinkVehicle):
         """`flying_mode` is GUIDED_NOGPS, or GUIDED for a vehicle that estimates its position."""
         super().__init__(url, clock, options)
         self.flying_mode = flying_mode
+        self._raw_thrust = options.raw_thrust
 
     def mode_name(self, custom_mode: int) -> str:
         return _MODE_NAMES.get(custom_mode, f"mode {custom_mode}")
@@ -59,11 +60,21 @@ class ArduPilotVehicle(MavlinkVehicle):
         problem = super().not_fit()
         if problem:
             return problem
-        return "GUID_OPTIONS not read yet" if self.parameters.get(_GUID_OPTIONS) is None else ""
+        raw = self._thrust_is_raw()
+        if raw is None:
+            return "GUID_OPTIONS not read yet"
+        if self._raw_thrust is not None and raw is not self._raw_thrust:
+            state = "set" if raw else "not set"
+            return f"bit 3 of GUID_OPTIONS is {state}, against vehicle.raw_thrust: see flightd doctor"
+        return ""
+
+    def _thrust_is_raw(self) -> bool | None:
+        """Whether thrust is collective; None while the parameter is not known."""
+        found = self.parameters.get(_GUID_OPTIONS)
+        return None if found is None else bool(int(found[1]) & _THRUST_IS_COLLECTIVE)
 
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
-        options = self.parameters.get(_GUID_OPTIONS)
-        if options is not None and int(options[1]) & _THRUST_IS_COLLECTIVE:
+        if self._thrust_is_raw():
             return self._collective(setpoint, now_ns)
         return climb_thrust(
             setpoint.climb_mps,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ def read_key(path: Path) -> bytes:
         data = path.read_bytes()
         mode = path.stat().st_mode
     except OSError as err:
-        raise InputError(f"signing key {path}: {err.strerror}: make one with flightctl keygen") from err
+        raise InputError(f"signing key {path}: {err.strerror}: make one with flightd keygen") from err
     if mode & 0o077:
         raise InputError(f"signing key {path} can be read by others: chmod 600 {path}")
     if len(data) != KEY_BYTES:
@@ -37,10 +38,22 @@ def read_key(path: Path) -> bytes:
         except ValueError:
             data = b""
     if len(data) != KEY_BYTES:
-        raise InputError(
-            f"signing key {path} is not 64 hex digits or 32 bytes: make one with flightctl keygen"
-        )
+        raise InputError(f"signing key {path} is not 64 hex digits or 32 bytes: make one with flightd keygen")
     return data
+
+
+def make_key(path: Path) -> None:
+    """Write 32 new secret bytes as 64 hex digits to a new file of mode 0600.
+
+    InputError when the file is there already or cannot be written."""
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(handle, "w", encoding="ascii") as file:
+            file.write(f"{secrets.token_hex(KEY_BYTES)}\n")
+    except FileExistsError:
+        raise InputError(f"{path}: there already; choose another name, or delete it first") from None
+    except OSError as err:
+        raise InputError(f"{path}: cannot write the key: {err.strerror}") from None
 
 
 class Signing:

@@ -50,16 +50,20 @@ RATES_HZ: dict[int, float] = {
 }
 
 _SYNC_FAST_S, _SYNC_SLOW_S = 0.1, 1.0
+_PAD_NEAR_M = 1.0
+"""Further away the pad is not shown: a landing of last resort must not set out for it."""
 
 
 @dataclass(frozen=True, slots=True)
 class MavlinkOptions:
-    """The vehicle's `system_id`, the key of a signed link, and the form in which the grid pose is given to
-    the autopilot's estimator (None: not at all)."""
+    """The vehicle's `system_id`, the key of a signed link, the form in which the grid pose is given to
+    the autopilot's estimator (None: not at all), and what ArduCopter's GUID_OPTIONS must say of thrust:
+    raw, a climb rate, or (None) either."""
 
     system_id: int = 1
     signing: Signing | None = None
     pose_form: PoseForm | None = None
+    raw_thrust: bool | None = None
 
 
 DEFAULTS = MavlinkOptions()
@@ -160,7 +164,7 @@ class MavlinkVehicle(abc.ABC):
 
     def share_pose(self, pose: GridPose, pad_m: tuple[float, float] | None = None) -> None:
         """Give the autopilot's estimator the grid pose, at 30 Hz at most, if a `pose_form` was chosen; with
-        `pad_m`, a place on the map, also the target of its precision landing."""
+        `pad_m`, a place on the map, also the target of its precision landing while it is near."""
         now_ns = self._clock.now_ns()
         attitude, height_m = self._telemetry.attitude, self._telemetry.height_m(now_ns)
         if self._pose_output is None or attitude is None:
@@ -168,7 +172,7 @@ class MavlinkVehicle(abc.ABC):
         message = self._pose_output.make(now_ns, pose, attitude, height_m)
         if message is not None:
             self.link.send(message)
-            if pad_m is not None:
+            if pad_m is not None and math.dist(pad_m, (pose.x_m, pose.y_m)) < _PAD_NEAR_M:
                 self.link.send(landing_target(self.firmware, pose, pad_m, height_m))
 
     # The firmware

@@ -1,0 +1,82 @@
+"""The vehicle's section of the configuration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+
+class VehicleConfig(BaseModel):
+    """The link to the autopilot, and what it is given besides setpoints."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: Literal["ardupilot", "px4", "ardrone", "mavsdk"] = Field(
+        "ardupilot", description="which adapter flies"
+    )
+    url: str = Field(
+        "udpin://127.0.0.1:14550", description="udpin://, udpout://, tcp://HOST:PORT or serial:///dev/X:BAUD"
+    )
+    system_id: int = Field(1, ge=1, le=255, description="MAVLink system id of the vehicle")
+    flying_mode: Literal["guided_nogps", "guided"] = Field(
+        "guided_nogps",
+        description="ArduCopter: the mode to fly in; guided only where it estimates its position",
+    )
+    raw_thrust: bool | None = Field(
+        None,
+        description="ArduCopter: true: bit 3 of GUID_OPTIONS must be set, our own height loop flies; "
+        "false: it must not be; left out: either, as the autopilot says",
+    )
+    signing_key: Path | None = Field(
+        None, description="MAVLink 2 signing: the secret key file, from `flightd keygen`; none: unsigned"
+    )
+    signing_stamp: Path | None = Field(
+        None, description="where the newest signing time stamp is kept; none: beside the key, as KEY.stamp"
+    )
+    pose_output: Literal["none", "odometry", "vision_position"] = Field(
+        "none", description="message that gives the grid pose to the autopilot's estimator, at 30 Hz"
+    )
+    landing_target: bool = Field(
+        False, description="tell the autopilot's precision landing where the home pad is, near it"
+    )
+
+    @model_validator(mode="after")
+    def _only_what_the_adapter_can(self) -> Self:
+        if self.kind != "ardupilot" and self.flying_mode != "guided_nogps":
+            raise ValueError('flying_mode is ArduCopter\'s: take it out, or set kind = "ardupilot"')
+        if self.kind != "ardupilot" and self.raw_thrust is not None:
+            raise ValueError('raw_thrust is ArduCopter\'s: take it out, or set kind = "ardupilot"')
+        speaks = self.kind in {"ardupilot", "px4"}
+        for key, wanted in (
+            ("signing_key", self.signing_key is not None),
+            ("pose_output", self.shares_pose),
+        ):
+            if wanted and not speaks:
+                raise ValueError(f'{key} needs kind = "ardupilot" or "px4", not "{self.kind}"')
+        if self.signing_stamp is not None and self.signing_key is None:
+            raise ValueError("signing_stamp without signing_key: give the key too, or take it out")
+        if self.landing_target and not self.shares_pose:
+            raise ValueError(
+                "landing_target needs pose_output: precision landing flies by the autopilot's own position"
+            )
+        return self
+
+    @property
+    def shares_pose(self) -> bool:
+        return self.pose_output != "none"
+
+    @property
+    def stamp_file(self) -> Path | None:
+        """Where the signing time stamp is kept; None on an unsigned link."""
+        if self.signing_key is None:
+            return None
+        return self.signing_stamp or self.signing_key.with_name(f"{self.signing_key.name}.stamp")
+
+    def beside(self, folder: Path) -> Self:
+        """The same with the files' relative paths taken from `folder`."""
+        files = {key: getattr(self, key) for key in ("signing_key", "signing_stamp")}
+        return self.model_copy(
+            update={key: (folder / path).resolve() for key, path in files.items() if path is not None}
+        )
