@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -19,6 +19,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.ports import Clock
 from flightd.sim.autopilot.guided import euler
 from flightd.sim.kinematics import Kinematics
+from flightd.sim.sensors import SensorParams
 from flightd.sim.truth import TruthHistory
 
 Message: TypeAlias = Any
@@ -32,6 +33,8 @@ _TRUTH_IDS = (
     dialect.MAVLINK_MSG_ID_ATTITUDE,
 )
 _ASK_S = 2.0
+_RANGE_S = 0.04
+_AHEAD_MAX_S = 0.1
 _SAMPLES = 1000
 _GPS_BLEND = 0.1
 """Share of each position sample that is believed against the integrated velocity: latitude and longitude
@@ -162,22 +165,25 @@ class TruthReader:
         )
 
 
-class ExternalVehicle(asyncio.Protocol):
-    """The truth link to an external simulator over TCP, in the place of a simulated vehicle.
+class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
+    """The truth link to an external simulator over TCP or UDP, in the place of a simulated vehicle.
 
-    `open` waits for the first truth; a lost link is found again, the warehouse staying where it is.
+    `open` waits for the first truth; a lost link is found again, the warehouse staying where it is.  The
+    distance to our floor goes back as DISTANCE_SENSOR, for an autopilot whose range finder is fed so.
     """
 
     def __init__(self, url: str, clock: Clock, placement: Placement, patience_s: float = 30.0) -> None:
         self._url = url
-        self._host, self._port = truth_address(url)
+        self._kind, self._host, self._port = truth_address(url)
         self._clock = clock
         self._reader = TruthReader(placement)
         self._truth = TruthHistory(_SAMPLES)
         self._patience_s = patience_s
         self._mav = dialect.MAVLink(None, srcSystem=254, srcComponent=dialect.MAV_COMP_ID_MISSIONPLANNER)
         self._mav.robust_parsing = True
-        self._transport: asyncio.WriteTransport | None = None
+        self._transport: Any = None
+        self._peer: tuple[str, int] | None = None
+        self._range = SensorParams()
         self._first = asyncio.Event()
         self._newest_ns = 0
         self._line: asyncio.Task[None] | None = None
@@ -208,12 +214,26 @@ class ExternalVehicle(asyncio.Protocol):
             await self._let_go()
 
     def truth(self) -> Kinematics:
-        """The newest true motion."""
-        return self._truth.at(self._clock.now_ns())
+        """The true motion now."""
+        return self.truth_at(self._clock.now_ns())
 
     def truth_at(self, stamp_ns: int) -> Kinematics:
-        """The true motion at a moment of the last seconds, of the loop's clock."""
-        return self._truth.at(stamp_ns)
+        """The true motion at a moment of the last seconds, of the loop's clock; beyond the newest sample it
+        goes on as it was, for a moment."""
+        newest = self._truth.latest()
+        if stamp_ns <= newest.stamp_ns:
+            return self._truth.at(stamp_ns)
+        ahead_s = min((stamp_ns - newest.stamp_ns) * 1e-9, _AHEAD_MAX_S)
+        return replace(
+            newest,
+            stamp_ns=stamp_ns,
+            x_m=newest.x_m + newest.vx_mps * ahead_s,
+            y_m=newest.y_m + newest.vy_mps * ahead_s,
+            height_m=newest.height_m + newest.climb_mps * ahead_s,
+            roll_rad=newest.roll_rad + newest.roll_rate_radps * ahead_s,
+            pitch_rad=newest.pitch_rad + newest.pitch_rate_radps * ahead_s,
+            yaw_rad=wrap_pi(newest.yaw_rad + newest.yaw_rate_radps * ahead_s),
+        )
 
     async def _let_go(self) -> None:
         if self._line is not None:
@@ -225,16 +245,39 @@ class ExternalVehicle(asyncio.Protocol):
             self._transport = None
 
     async def _hold(self) -> None:
-        loop = asyncio.get_running_loop()
         while True:
             if self._transport is None:
                 try:
-                    await loop.create_connection(lambda: self, self._host, self._port)
+                    await self._connect()
                 except OSError:
                     await asyncio.sleep(_ASK_S / 2)
                     continue
             self._ask()
-            await asyncio.sleep(_ASK_S)
+            for _ in range(round(_ASK_S / _RANGE_S)):
+                self._tell_range()
+                await asyncio.sleep(_RANGE_S)
+
+    async def _connect(self) -> None:
+        loop, place = asyncio.get_running_loop(), (self._host, self._port)
+        if self._kind == "tcp":
+            await loop.create_connection(lambda: self, *place)
+        else:
+            await loop.create_datagram_endpoint(lambda: self, local_addr=place)
+
+    def _tell_range(self) -> None:
+        """What a range finder sees of the floor; nothing out of its reach, as a real one."""
+        if not self._first.is_set():
+            return
+        truth = self.truth()
+        least_m, most_m = self._range.range_min_m, self._range.range_max_m
+        distance_m = truth.height_m / max(math.cos(truth.roll_rad) * math.cos(truth.pitch_rad), 0.1)
+        if least_m <= distance_m <= most_m:
+            limits_cm, distance_cm = (round(least_m * 100), round(most_m * 100)), round(distance_m * 100)
+            kind, down = dialect.MAV_DISTANCE_SENSOR_LASER, dialect.MAV_SENSOR_ROTATION_PITCH_270
+            boot_ms = truth.stamp_ns // 1_000_000 % 2**32
+            self._send(
+                dialect.MAVLink_distance_sensor_message(boot_ms, *limits_cm, distance_cm, kind, 1, down, 0)
+            )
 
     def _ask(self) -> None:
         """A heartbeat, and the rates (a rebooted simulator has forgotten them)."""
@@ -247,15 +290,28 @@ class ExternalVehicle(asyncio.Protocol):
             self._send(dialect.MAVLink_command_long_message(1, 1, command, 0, *params))
 
     def _send(self, message: Message) -> None:
-        if self._transport is not None:
-            self._transport.write(message.pack(self._mav))
-            self._mav.seq = (self._mav.seq + 1) % 256
+        if self._transport is None:
+            return
+        frame = message.pack(self._mav)
+        self._mav.seq = (self._mav.seq + 1) % 256
+        if self._kind == "tcp":
+            self._transport.write(frame)
+        elif self._peer is not None:
+            self._transport.sendto(frame, self._peer)
 
     def connection_made(self, transport: Any) -> None:
         self._transport = transport
 
     def connection_lost(self, _exc: Exception | None) -> None:
         self._transport = None
+
+    def error_received(self, exc: Exception) -> None:
+        """Nobody is there at the moment (ICMP)."""
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:
+        self._peer = (addr[0], addr[1])
+        self._mav.buf, self._mav.buf_index = bytearray(), 0  # a broken datagram must not eat the next one
+        self.data_received(data)
 
     def data_received(self, data: bytes) -> None:
         now_ns = self._clock.now_ns()
@@ -269,9 +325,10 @@ class ExternalVehicle(asyncio.Protocol):
                 self._first.set()
 
 
-def truth_address(url: str) -> tuple[str, int]:
-    """Host and port of `tcp:HOST:PORT`; InputError for anything else."""
-    match = re.fullmatch(r"tcp:(?://)?([^\s:]+):(\d{1,5})", url)
-    if match is None or not 0 < int(match[2]) < 65536:
-        raise InputError(f"--truth-url {url!r} is no address: use tcp:HOST:PORT, e.g. tcp:127.0.0.1:5762")
-    return match[1], int(match[2])
+def truth_address(url: str) -> tuple[str, str, int]:
+    """Kind, host and port of `tcp:HOST:PORT` or `udpin:HOST:PORT`; InputError for anything else."""
+    match = re.fullmatch(r"(tcp|udpin):(?://)?([^\s:]+):(\d{1,5})", url)
+    if match is None or not 0 < int(match[3]) < 65536:
+        forms = "use tcp:HOST:PORT, e.g. tcp:127.0.0.1:5762 (ArduPilot), or udpin:0.0.0.0:14550 (PX4)"
+        raise InputError(f"--truth-url {url!r} is no address: {forms}")
+    return match[1], match[2], int(match[3])

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.cli.simulate import free_port
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.geometry import wrap_pi
 from flightd.runtime.clock import LoopClock
@@ -169,6 +170,80 @@ def test_the_link_is_opened_followed_and_found_again() -> None:
     run_virtual(test)
 
 
+class UdpSitl(asyncio.DatagramProtocol):
+    """PX4's side: speaks first, to a fixed port; keeps what comes back."""
+
+    def __init__(self) -> None:
+        self.mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+        self.heard: list[Any] = []
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:
+        self.heard += self.mav.parse_buffer(data) or []
+
+
+def test_a_simulator_on_udp_is_heard_and_told_the_distance_to_our_floor() -> None:
+    def hil(up_m: float) -> Any:
+        place = (round(LAT0 * 1e7), round(LON0 * 1e7), round((ALT0 + up_m) * 1000))
+        attitude = [math.cos(0.1), math.sin(0.1), 0.0, 0.0]  # 0.2 rad to the right
+        return dialect.MAVLink_hil_state_quaternion_message(
+            0, attitude, 0.0, 0.0, 0.0, *place, 0, 0, 0, 0, 0, 0, 0, 0
+        )
+
+    async def test() -> None:
+        loop, port = asyncio.get_running_loop(), free_port()
+        vehicle = ExternalVehicle(f"udpin:127.0.0.1:{port}", LoopClock(), PAD)
+        opening = asyncio.create_task(vehicle.open())
+        await asyncio.sleep(0.1)
+        transport, sitl = await loop.create_datagram_endpoint(UdpSitl, remote_addr=("127.0.0.1", port))
+        for step in range(400):
+            transport.sendto(b"\xfd\x1c\x00" + bytes(3))  # a torn frame costs no other
+            transport.sendto(hil(1.5 if step else 0.0).pack(sitl.mav))
+            await asyncio.sleep(0.01)
+        await opening
+        asked = {int(m.param1) for m in sitl.heard if m.get_type() == "COMMAND_LONG"}
+        assert {108, 115, 32, 30} <= asked
+        ranges = [m for m in sitl.heard if m.get_type() == "DISTANCE_SENSOR"]
+        assert len(ranges) == pytest.approx(100, abs=12)
+        assert ranges[-1].orientation == dialect.MAV_SENSOR_ROTATION_PITCH_270
+        assert ranges[-1].current_distance == pytest.approx(160.0 / math.cos(0.2), abs=1.0)
+        assert vehicle.truth().height_m == pytest.approx(1.6)
+        running = asyncio.create_task(vehicle.run())
+        await asyncio.sleep(0.1)
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        transport.close()
+        await asyncio.sleep(0.01)
+
+    run_virtual(test)
+
+
+def test_between_samples_the_motion_goes_on_for_a_moment() -> None:
+    async def test() -> None:
+        Sitl.connections, Sitl.climbed_m = [], 0.0
+        loop, clock = asyncio.get_running_loop(), LoopClock()
+        server = await loop.create_server(Sitl, "127.0.0.1", 0)
+        vehicle = ExternalVehicle(f"tcp:127.0.0.1:{server.sockets[0].getsockname()[1]}", clock, PAD)
+        opening = asyncio.create_task(vehicle.open())
+        await Sitl.fly(4.0)  # and falls silent
+        await opening
+        now_ns = clock.now_ns()
+        newest_m = vehicle.truth_at(now_ns - 20_000_000).height_m
+        assert vehicle.truth_at(now_ns + 40_000_000).height_m - newest_m == pytest.approx(0.03, abs=0.008)
+        later_m = vehicle.truth_at(now_ns + 10_000_000_000).height_m
+        assert later_m - newest_m < 0.08
+        running = asyncio.create_task(vehicle.run())
+        await asyncio.sleep(0.01)
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        for sitl in Sitl.connections:
+            sitl.transport.abort()
+        server.close()
+        await server.wait_closed()
+        await asyncio.sleep(0.01)
+
+    run_virtual(test)
+
+
 def test_a_simulator_that_is_not_there_is_told_in_one_line() -> None:
     async def test() -> None:
         vehicle = ExternalVehicle("tcp:127.0.0.1:9", LoopClock(), PAD, patience_s=5.0)
@@ -178,7 +253,9 @@ def test_a_simulator_that_is_not_there_is_told_in_one_line() -> None:
     run_virtual(test)
 
 
-@pytest.mark.parametrize("url", ["", "udp:127.0.0.1:14550", "tcp:host", "tcp:host:0", "tcp:host:99999"])
+@pytest.mark.parametrize(
+    "url", ["", "udp:127.0.0.1:14550", "udpin:host", "tcp:host", "tcp:host:0", "tcp:host:99999"]
+)
 def test_a_wrong_address_names_the_right_form(url: str) -> None:
     async def test() -> None:
         with pytest.raises(InputError, match="tcp:HOST:PORT"):
