@@ -8,11 +8,11 @@ or a multiple of it; only then does the ground link run, whose sockets have thre
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import math
 import multiprocessing
 import signal
 import socket
-import sys
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
@@ -122,21 +122,24 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
         if simulation.truth_url:
             config = config.model_copy(update={"vehicle": simulation.config.vehicle})
         daemon = Daemon(config, simulation.site, clock, pool, recorder, [simulation.observer], ground)
-        watch = asyncio.ensure_future(_watch(process))
+        watch = asyncio.ensure_future(_watch(process, ours))
         try:
             return await _within_limit(simulation, daemon, watch)
         finally:
             watch.cancel()
 
 
-async def _watch(process: Any) -> None:
-    """Return when the world's process has died."""
+async def _watch(process: Any, pipe: Connection) -> None:
+    """Return when the world's process has died; UnavailableError with the reason that it left."""
     loop, died = asyncio.get_running_loop(), asyncio.Event()
     loop.add_reader(process.sentinel, died.set)
     try:
         await died.wait()
     finally:
         loop.remove_reader(process.sentinel)
+    with contextlib.suppress(EOFError):
+        if pipe.poll():
+            raise UnavailableError(pipe.recv())
 
 
 async def _within_limit(simulation: Simulation, daemon: Daemon, beside: asyncio.Future[None]) -> FlightResult:
@@ -169,12 +172,19 @@ def _run_world(spec: WorldSpec, factor: float, log: Path, pipe: Connection) -> N
             for task in tasks:
                 task.cancel()
             await asyncio.wait(tasks)
-            for task in tasks:
-                if not task.cancelled() and isinstance(task.exception(), FlightdError):
-                    sys.stderr.write(f"{task.exception()}\n")
+            reasons = [_reason(task.exception()) for task in tasks if not task.cancelled()]
+            if reason := next(filter(None, reasons), ""):
+                pipe.send(reason)
 
     with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
         runner.run(main())
+
+
+def _reason(err: BaseException | None) -> str:
+    """What a person can do something about, out of an error or a group of them."""
+    if isinstance(err, BaseExceptionGroup):
+        return next(filter(None, map(_reason, err.exceptions)), "")
+    return str(err) if isinstance(err, FlightdError) else ""
 
 
 def _flight_recorder(simulation: Simulation, clock: LoopClock, lossless: bool) -> Recorder:

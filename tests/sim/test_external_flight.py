@@ -80,3 +80,15 @@ def test_a_mission_is_flown_through_mavsdk_in_real_time_without_being_told_to(tm
     assert is_sound(summary), summary
     assert summary["vehicle"] == "mavsdk"
     assert summary["wall_time_s"] >= summary["flight_time_s"]
+
+
+def test_a_simulator_that_does_not_answer_is_one_line(tmp_path: Path) -> None:
+    nowhere = ["--truth-url", "tcp:127.0.0.1:9", "--vehicle-url", "tcp:127.0.0.1:9", "--speed", "20"]
+    command = [sys.executable, "-m", "flightd", "sim", "--json", "--out", str(tmp_path), *nowhere]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 2, done.stderr
+    lines = [line for line in done.stderr.splitlines() if line.startswith("flightd:")]
+    assert len(lines) == 1
+    assert "start it" in lines[0]
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
