@@ -122,7 +122,9 @@ async def until(condition: Callable[[], bool]) -> None:
             await asyncio.sleep(0.005)
 
 
-def tell_once(link: ZmqGround, phase: Phase = Phase.FOLLOW, x_m: float = 1.0) -> None:
+def tell_once(
+    link: ZmqGround, phase: Phase = Phase.FOLLOW, x_m: float = 1.0, battery_frac: float = 0.8
+) -> None:
     now_ns = LoopClock().now_ns()
     attitude = Attitude(now_ns - 10_000_000, 0.01, -0.02, 0.0)
     vehicle = VehicleState(
@@ -134,7 +136,7 @@ def tell_once(link: ZmqGround, phase: Phase = Phase.FOLLOW, x_m: float = 1.0) ->
         True,
         True,
         LandedState.IN_AIR,
-        0.8,
+        battery_frac,
         12.1,
         now_ns - 500_000_000,
     )

@@ -6,6 +6,7 @@ import asyncio
 import json
 import random
 import socket
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,8 @@ from tests.sim.ground_rig import (
     telling,
     until,
 )
+
+EXAMPLE = Path(__file__).parents[2] / "tools" / "ground_client.py"
 
 
 @in_loop
@@ -165,6 +168,36 @@ async def test_a_plain_req_socket_and_json_are_a_whole_client() -> None:
             "request": "my-first-order",
             "repeated": False,
         }
+
+
+@in_loop
+async def test_the_example_client_shows_events_and_sends_a_tired_drone_home() -> None:
+    async with serving(local()) as link:
+        process = await asyncio.create_subprocess_exec(
+            sys.executable, EXAMPLE, *link.endpoints, stdout=asyncio.subprocess.PIPE
+        )
+        assert process.stdout is not None
+        told: list[str] = []
+
+        async def read(lines: asyncio.StreamReader) -> None:
+            told.extend([line.decode() async for line in lines])
+
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(read(process.stdout))
+            commands: list[CommandKind] = []
+
+            def ordered_home() -> bool:
+                link.event(event("look out"))
+                tell_once(link, battery_frac=0.4)
+                commands.extend(command.kind for command in link.take_commands())
+                return bool(commands)
+
+            await until(ordered_home)
+            tell_once(link)
+            process.kill()
+        await process.wait()
+        assert commands == [CommandKind.HOME]
+        assert "warning test look out\n" in told
 
 
 @in_loop
