@@ -13,9 +13,10 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.adapters.vehicle.mavsdk.gate import FRESH_NS, SetpointGate, message_id
 from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
-from flightd.config.schema import VehicleConfig
-from flightd.core.errors import InputError
-from flightd.core.types import Demand
+from flightd.cli.simulate import free_port
+from flightd.config.vehicle import VehicleConfig
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.types import Attitude, Demand
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.loops import ScaledLoop
 from flightd.sim.airframe import Airframe
@@ -167,6 +168,84 @@ def test_a_refused_arming_is_told_with_the_autopilots_words_and_tried_again() ->
             rig.peer.arming_block = ""
             await rig.until(lambda: rig.known().armed)
             assert rig.known().refusal == ""
+
+    run_real(test)
+
+
+def test_a_rebooted_autopilot_is_asked_for_its_streams_again_and_its_new_clock_is_taken() -> None:
+    async def test() -> None:
+        async with mavsdk_rig() as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            await asyncio.sleep(3.0)
+            rig.peer.reboot()
+            await asyncio.sleep(0.3)
+            rig.vehicle.attitudes()
+            seen: list[Attitude] = []
+
+            def streams() -> bool:
+                seen.extend(rig.vehicle.attitudes())
+                return len(seen) >= 50
+
+            await rig.until(streams, 20.0)
+            assert [sample.stamp_ns for sample in seen] == sorted({sample.stamp_ns for sample in seen})
+            assert 0 <= LoopClock().now_ns() - seen[-1].stamp_ns < 100_000_000
+
+    run_real(test)
+
+
+def test_a_companion_that_boots_first_finds_the_autopilot_later() -> None:
+    async def test() -> None:
+        async with mavsdk_rig(peer_runs=False) as rig:
+            await asyncio.sleep(4.0)
+            assert rig.vehicle.state() is None
+            serving = asyncio.create_task(rig.peer.run())
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            serving.cancel()
+            await asyncio.wait([serving])
+
+    run_real(test)
+
+
+def test_without_any_autopilot_it_ends_at_once_and_quietly(caplog: pytest.LogCaptureFixture) -> None:
+    async def test() -> None:
+        vehicle = MavsdkVehicle(f"udpin://127.0.0.1:{free_port()}", LoopClock())
+        running = asyncio.create_task(vehicle.run())
+        vehicle.demand(Demand.FLY)
+        await asyncio.sleep(1.5)
+        started_s = time.monotonic()
+        running.cancel()
+        await asyncio.wait([running])
+        assert time.monotonic() - started_s < 1.0
+        assert vehicle.state() is None
+
+    run_real(test)
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
+
+
+def test_with_the_link_gone_it_still_ends() -> None:
+    async def test() -> None:
+        async with mavsdk_rig() as rig:
+            await rig.take_off()
+            rig.cut(True)
+            assert rig.flying_task is not None
+            rig.flying_task.cancel()
+            await asyncio.wait([rig.flying_task], timeout=20.0)
+            assert rig.flying_task.done()
+            rig.cut(False)
+            await rig.until(lambda: rig.peer.mode != Px4Mode.OFFBOARD)  # its own failsafe
+
+    run_real(test)
+
+
+def test_a_port_in_use_is_told_at_once() -> None:
+    async def test() -> None:
+        loop = asyncio.get_running_loop()
+        taken, _ = await loop.create_datagram_endpoint(asyncio.DatagramProtocol, local_addr=("127.0.0.1", 0))
+        port = taken.get_extra_info("sockname")[1]
+        with pytest.raises(UnavailableError, match=str(port)):
+            await MavsdkVehicle(f"udpin://127.0.0.1:{port}", LoopClock()).run()
+        taken.close()
+        await asyncio.sleep(0.05)
 
     run_real(test)
 
