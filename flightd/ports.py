@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from typing import Protocol, runtime_checkable
 
+from flightd.core.inventory import LocationRecord, Observation, PlannedLocation
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -114,3 +116,28 @@ class Ground(Protocol):
     def picture_due(self, stamp_ns: int) -> bool: ...
 
     def picture(self, seq: int, stamp_ns: int, jpeg: bytes) -> None: ...
+
+
+class Store(Protocol):
+    """The inventory, kept through a power cut.
+
+    Every call blocks for the disk (call it from a worker, any thread) and is whole or not at all: what
+    `plan` and `commit` have returned from is on the disk.  All of them may be repeated: the same location
+    or observation again changes nothing.  They raise UnavailableError when the disk refuses.
+    """
+
+    def plan(self, locations: Iterable[PlannedLocation]) -> None:
+        """Make locations known; new ones are not visited yet."""
+        ...
+
+    def keep_evidence(self, jpeg: bytes) -> str:
+        """Keep a picture (JPEG, at most 50 KB) and return the name that an observation refers to."""
+        ...
+
+    def commit(self, observation: Observation) -> None:
+        """Record one look at one location; the newest look is the location's state."""
+        ...
+
+    def locations(self) -> list[LocationRecord]:
+        """Every location by its code, as it stands."""
+        ...

@@ -1,0 +1,233 @@
+"""The inventory in one SQLite file: write-ahead log, every commit through to the disk.
+
+One observation is one transaction, so a power cut loses at most the location in work.  Observations are
+named by their content and only ever added; a location's state is that of its newest one.  So writing the
+same again, or merging another drone's file in any order, ends in the same inventory.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Self
+
+from flightd.adapters.store.evidence import EvidenceFolder
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.inventory import (
+    CountPose,
+    LocationRecord,
+    LocationState,
+    Observation,
+    PlannedLocation,
+    StoredRead,
+)
+
+_VERSION = 1
+_APPLICATION = 0x666C7464
+"""`fltd`: SQLite's application id, so that another program's file is told apart."""
+_SCHEMA = """
+CREATE TABLE location (
+    code TEXT PRIMARY KEY,
+    node TEXT NOT NULL
+) STRICT, WITHOUT ROWID;
+CREATE TABLE observation (
+    id TEXT PRIMARY KEY,
+    run TEXT NOT NULL,
+    location TEXT NOT NULL REFERENCES location (code),
+    utc_ns INTEGER NOT NULL,
+    state TEXT NOT NULL CHECK (state IN ('read', 'several', 'empty', 'unreadable', 'occluded')),
+    confidence REAL NOT NULL CHECK (confidence BETWEEN 0 AND 1),
+    node TEXT, x_m REAL, y_m REAL, height_m REAL, yaw_rad REAL,
+    evidence TEXT NOT NULL
+) STRICT, WITHOUT ROWID;
+CREATE INDEX newest ON observation (location, utc_ns, id);
+CREATE TABLE code_read (
+    observation TEXT NOT NULL REFERENCES observation (id),
+    number INTEGER NOT NULL,
+    symbology TEXT NOT NULL,
+    text TEXT NOT NULL,
+    sure INTEGER NOT NULL,
+    agreeing INTEGER NOT NULL,
+    quality REAL NOT NULL,
+    gs1 TEXT NOT NULL,
+    PRIMARY KEY (observation, number)
+) STRICT, WITHOUT ROWID;
+"""
+
+
+class SqliteStore:
+    """A `ports.Store` in FOLDER: `inventory.db` and the pictures beside it in `evidence`.
+
+    Safe from any thread of one process; a second process may read meanwhile.
+    """
+
+    def __init__(self, folder: Path, *, create: bool = True) -> None:
+        """Open the store, making it when `create`.  Raises InputError for what is no inventory (or is
+        missing), UnavailableError when the disk refuses."""
+        self.folder = folder
+        self._file = folder / "inventory.db"
+        if not create and not self._file.exists():
+            raise InputError(f"{folder}: holds no inventory.db; give the folder of an inventory")
+        self._lock = threading.RLock()
+        self.evidence = EvidenceFolder(folder / "evidence")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(
+                self._file, timeout=10.0, isolation_level=None, check_same_thread=False
+            )
+        except (OSError, sqlite3.Error) as err:
+            raise UnavailableError(f"{self._file}: cannot be opened: {err}") from err
+        try:
+            self._prepare()
+        except BaseException:
+            self._db.close()
+            raise
+        if create:
+            self.evidence.clean()
+
+    def _prepare(self) -> None:
+        try:
+            self._db.execute("PRAGMA journal_mode = WAL")
+            self._db.execute("PRAGMA synchronous = FULL")
+            self._db.execute("PRAGMA foreign_keys = ON")
+            with self._transaction():
+                version = self._db.execute("PRAGMA user_version").fetchone()[0]
+                application = self._db.execute("PRAGMA application_id").fetchone()[0]
+                tables = self._db.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
+                if not tables:
+                    # one transaction: a power cut leaves an empty file or a whole one
+                    for statement in _SCHEMA.split(";\n"):
+                        self._db.execute(statement)
+                    self._db.execute(f"PRAGMA user_version = {_VERSION}")
+                    self._db.execute(f"PRAGMA application_id = {_APPLICATION}")
+                elif application != _APPLICATION:
+                    raise InputError(f"{self._file}: a database, but no inventory; choose another folder")
+                elif version != _VERSION:
+                    problem = f"format {version}, known here is {_VERSION}"
+                    raise InputError(f"{self._file}: {problem}; use the flightd that wrote it")
+        except sqlite3.DatabaseError as err:
+            if isinstance(err, sqlite3.OperationalError):
+                raise UnavailableError(f"{self._file}: {err}") from err
+            raise InputError(f"{self._file}: no inventory, or a damaged one: {err}") from err
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; what was committed stays."""
+        with self._lock:
+            self._db.close()
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        with self._lock:
+            try:
+                self._db.execute("BEGIN IMMEDIATE")
+                try:
+                    yield
+                except BaseException:
+                    self._db.execute("ROLLBACK")
+                    raise
+                self._db.execute("COMMIT")
+            except sqlite3.OperationalError as err:
+                raise UnavailableError(f"{self._file}: cannot be written: {err}") from err
+
+    def plan(self, locations: Iterable[PlannedLocation]) -> None:
+        """Make locations known; the node of a known one follows the newest plan."""
+        rows = [(location.code, location.node) for location in locations]
+        with self._transaction():
+            self._db.executemany(
+                "INSERT INTO location VALUES (?, ?) ON CONFLICT (code) DO UPDATE SET node = excluded.node",
+                rows,
+            )
+
+    def keep_evidence(self, jpeg: bytes) -> str:
+        """Keep a picture; see `EvidenceFolder.keep`."""
+        return self.evidence.keep(jpeg)
+
+    def commit(self, observation: Observation) -> None:
+        """Record one look.  A location never planned becomes known, with the node it was seen from."""
+        with self._transaction():
+            self._insert(observation)
+
+    def _insert(self, seen: Observation) -> None:
+        pose = seen.pose
+        node = pose.node if pose else ""
+        self._db.execute("INSERT OR IGNORE INTO location VALUES (?, ?)", (seen.location, node))
+        where = (pose.node, pose.x_m, pose.y_m, pose.height_m, pose.yaw_rad) if pose else (None,) * 5
+        cursor = self._db.execute(
+            "INSERT OR IGNORE INTO observation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            (
+                seen.id, seen.run, seen.location, seen.utc_ns, seen.state.value, seen.confidence, *where,
+                seen.evidence,
+            ),
+        )  # fmt: skip
+        if cursor.rowcount == 0:
+            return
+        self._db.executemany(
+            "INSERT INTO code_read VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+            [
+                (seen.id, i, r.symbology, r.text, r.sure, r.agreeing, r.quality, json.dumps(r.gs1))
+                for i, r in enumerate(seen.reads)
+            ],
+        )
+
+    def locations(self) -> list[LocationRecord]:
+        """Every location by its code, with its newest observation (of equally new ones, the greatest id)."""
+        with self._lock:
+            newest = {seen.location: seen for seen in self._observations()}
+            rows = self._db.execute("SELECT code, node FROM location ORDER BY code").fetchall()
+        return [LocationRecord(code, node, newest.get(code)) for code, node in rows]
+
+    def history(self, location: str) -> list[Observation]:
+        """Every look at one location, oldest first."""
+        with self._lock:
+            return self._observations(location)
+
+    def _observations(self, location: str | None = None) -> list[Observation]:
+        """All looks, or those at one location, oldest first."""
+        reads: dict[str, list[StoredRead]] = {}
+        for seen, symbology, text, sure, agreeing, quality, gs1 in self._db.execute(
+            "SELECT observation, symbology, text, sure, agreeing, quality, gs1 FROM code_read "
+            "ORDER BY observation, number"
+        ):
+            elements = tuple((ai, value) for ai, value in json.loads(gs1))
+            read = StoredRead(symbology, text, bool(sure), agreeing, quality, elements)
+            reads.setdefault(seen, []).append(read)
+        rows = self._db.execute(
+            "SELECT id, run, location, utc_ns, state, confidence, evidence, "
+            "node, x_m, y_m, height_m, yaw_rad FROM observation "
+            "WHERE ?1 IS NULL OR location = ?1 ORDER BY utc_ns, id",
+            (location,),
+        )
+        return [_observation(row, tuple(reads.get(row[0], ()))) for row in rows]
+
+    def merge(self, other: SqliteStore) -> int:
+        """Take in everything of another store, pictures included; returns how many looks were new."""
+        with other._lock:
+            planned = [PlannedLocation(record.code, record.node) for record in other.locations()]
+            seen = other._observations()
+        for observation in seen:
+            if observation.evidence and other.evidence.path(observation.evidence).exists():
+                self.evidence.keep(other.evidence.path(observation.evidence).read_bytes())
+        with self._transaction():
+            before = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
+            rows = [(location.code, location.node) for location in planned]
+            self._db.executemany("INSERT OR IGNORE INTO location VALUES (?, ?)", rows)
+            for observation in seen:
+                self._insert(observation)
+            after = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
+        return int(after - before)
+
+
+def _observation(row: tuple[Any, ...], reads: tuple[StoredRead, ...]) -> Observation:
+    _, run, location, utc_ns, state, confidence, evidence, node, *place = row
+    pose = None if node is None else CountPose(node, *place)
+    return Observation(run, location, utc_ns, LocationState(state), confidence, reads, pose, evidence)

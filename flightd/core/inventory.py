@@ -1,0 +1,122 @@
+"""What the count of a warehouse is made of: locations, each in exactly one state, and observations.
+
+Times are UTC in nanoseconds since 1970: an inventory is compared across flights and machines.
+"""
+
+from __future__ import annotations
+
+import enum
+import hashlib
+import json
+import math
+from dataclasses import dataclass
+
+
+class LocationState(enum.StrEnum):
+    """The one thing that is known of a planned location."""
+
+    READ = "read"
+    SEVERAL = "several"
+    EMPTY = "empty"
+    UNREADABLE = "unreadable"
+    OCCLUDED = "occluded"
+    NOT_VISITED = "not_visited"
+
+    @property
+    def is_counted(self) -> bool:
+        """Whether it says what is there; the others say only that nobody knows."""
+        return self in {LocationState.READ, LocationState.SEVERAL, LocationState.EMPTY}
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedLocation:
+    """A place that must be counted, and the node of the map it is counted from."""
+
+    code: str
+    node: str
+
+
+@dataclass(frozen=True, slots=True)
+class StoredRead:
+    """One code at a location; the fields are those of `core.types.CodeRead`."""
+
+    symbology: str
+    text: str
+    sure: bool
+    agreeing: int
+    quality: float
+    gs1: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class CountPose:
+    """Where the drone was when it saw the location; map frame, metres, radians."""
+
+    node: str
+    x_m: float
+    y_m: float
+    height_m: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """One look at one location: its state, what was read, from where, and how sure (0..1).
+
+    `evidence` is the SHA-256 of the picture, in hexadecimal, or empty.
+    """
+
+    run: str
+    location: str
+    utc_ns: int
+    state: LocationState
+    confidence: float
+    reads: tuple[StoredRead, ...] = ()
+    pose: CountPose | None = None
+    evidence: str = ""
+
+    def __post_init__(self) -> None:
+        texts = {read.text for read in self.reads}
+        fits = {
+            LocationState.READ: len(texts) == 1,
+            LocationState.SEVERAL: len(texts) >= 2,
+            LocationState.NOT_VISITED: False,
+        }.get(self.state, not texts)
+        if not fits:
+            raise ValueError(f"{self.location}: {self.state} with {len(texts)} different texts")
+        if not 0.0 <= self.confidence <= 1.0:
+            raise ValueError(f"{self.location}: confidence {self.confidence} outside 0..1")
+        if (p := self.pose) and not all(map(math.isfinite, (p.x_m, p.y_m, p.height_m, p.yaw_rad))):
+            raise ValueError(f"{self.location}: pose is not finite: {p}")
+
+    @property
+    def id(self) -> str:
+        """The same for the same content: writing an observation twice changes nothing."""
+        pose, place = self.pose, None
+        if pose:
+            place = [pose.node, *map(float, (pose.x_m, pose.y_m, pose.height_m, pose.yaw_rad))]
+        reads = [
+            [r.symbology, r.text, bool(r.sure), r.agreeing, float(r.quality), [list(pair) for pair in r.gs1]]
+            for r in self.reads
+        ]
+        looked = [self.run, self.location, self.utc_ns, self.state.value, float(self.confidence)]
+        content = json.dumps([*looked, reads, place, self.evidence], separators=(",", ":"))
+        return hashlib.sha256(content.encode()).hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class LocationRecord:
+    """A location as it stands: by its newest observation, None while nobody looked."""
+
+    code: str
+    node: str
+    observation: Observation | None
+
+    @property
+    def state(self) -> LocationState:
+        return self.observation.state if self.observation else LocationState.NOT_VISITED
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The different texts read there, in the order of their reading."""
+        return tuple(dict.fromkeys(read.text for read in self.observation.reads)) if self.observation else ()

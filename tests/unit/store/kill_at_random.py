@@ -1,0 +1,75 @@
+"""Kill a writing process at random moments and see what the store still holds.
+
+    python -m tests.unit.store.kill_at_random 200 1 FOLDER
+
+Prints one JSON document: kills, commits that were reported before the kill, how many of those were lost,
+how many stores did not open sound.  Killing uses fork, so this is a program of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import select
+import signal
+import sqlite3
+import sys
+import time
+from pathlib import Path
+
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.inventory import CountPose, LocationState, Observation, StoredRead
+
+
+def look(number: int, run: str = "kill", evidence: str = "") -> Observation:
+    """The `number`-th observation of a run over 50 locations."""
+    read = StoredRead("QR Code", f"PALLET-{number:06d}", True, 1, 1.0)
+    pose = CountPose("A1", 0.1 * number, -1.0, 1.6, 0.5)
+    location = f"A-{number % 50:02d}"
+    return Observation(run, location, 10**18 + number, LocationState.READ, 0.9, (read,), pose, evidence)
+
+
+def _write_until_killed(folder: Path, first: int, told: int) -> None:
+    store = SqliteStore(folder)
+    number = first
+    while True:
+        evidence = store.keep_evidence(b"picture %d " % number * 500)
+        seen = look(number, evidence=evidence)
+        store.commit(seen)
+        os.write(told, f"{seen.id} {evidence}\n".encode())
+        number += 1
+
+
+def main() -> None:
+    kills, seed, folder = int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3])
+    rng = random.Random(seed)
+    told: dict[str, str] = {}
+    lost = unsound = 0
+    for round_number in range(kills):
+        read_end, write_end = os.pipe()
+        child = os.fork()
+        if child == 0:
+            os.close(read_end)
+            _write_until_killed(folder, 1_000_000 * round_number, write_end)
+        os.close(write_end)
+        if round_number % 4:
+            select.select([read_end], [], [])  # writing has begun: kill amid commits, else amid opening
+        time.sleep(rng.uniform(0.0, 0.06))
+        os.kill(child, signal.SIGKILL)
+        with os.fdopen(read_end) as pipe:
+            lines = pipe.read().splitlines()
+        os.waitpid(child, 0)
+        told.update(line.split(" ") for line in lines)  # type: ignore[misc]
+        with SqliteStore(folder) as store:
+            held = {seen.id for n in range(50) for seen in store.history(f"A-{n:02d}")}
+            lost += len(told.keys() - held)
+            lost += sum(not store.evidence.path(name).exists() for name in told.values())
+        database = sqlite3.connect(folder / "inventory.db")
+        unsound += database.execute("PRAGMA integrity_check").fetchone() != ("ok",)
+        database.close()
+    print(json.dumps({"kills": kills, "commits": len(told), "lost": lost, "unsound": unsound}))
+
+
+if __name__ == "__main__":
+    main()

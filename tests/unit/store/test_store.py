@@ -1,0 +1,178 @@
+"""The inventory keeps what it said it kept: through kills, torn writes, repeats and merges."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+import sqlite3
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flightd.adapters.store.evidence import MOST_BYTES, evidence_jpeg
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.inventory import LocationState, Observation, PlannedLocation, StoredRead
+from flightd.ports import Store
+from tests.unit.store.kill_at_random import look
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_planned_locations_are_not_visited_until_somebody_looks(tmp_path: Path) -> None:
+    store: Store
+    with SqliteStore(tmp_path) as store:
+        store.plan([PlannedLocation("A-01", "A1"), PlannedLocation("A-02", "A1")])
+        store.commit(look(1))
+        found = {record.code: record for record in store.locations()}
+    assert found["A-01"].state is LocationState.READ
+    assert found["A-01"].texts == ("PALLET-000001",)
+    assert (found["A-02"].state, found["A-02"].observation) == (LocationState.NOT_VISITED, None)
+
+
+def test_what_was_committed_is_read_back_as_it_was(tmp_path: Path) -> None:
+    gs1 = StoredRead("Code 128", "0109501101530003", True, 3, 0.75, (("01", "09501101530003"),))
+    seen = replace(look(2), reads=(gs1,), evidence="ab" * 32, confidence=1)
+    bare = Observation("r", "B-1", 5, LocationState.EMPTY, 0.5)
+    with SqliteStore(tmp_path) as store:
+        store.commit(seen)
+        store.commit(bare)
+    with SqliteStore(tmp_path, create=False) as store:
+        assert store.history("A-02") == [seen]
+        assert store.history("B-1") == [bare]
+        assert [observation.id for observation in store.history("A-02")] == [seen.id]
+
+
+def test_the_newest_look_is_the_state_whatever_the_order(tmp_path: Path) -> None:
+    looks = [replace(look(50 * n), location="A-00") for n in range(5)]
+    random.Random(3).shuffle(looks)
+    with SqliteStore(tmp_path) as store:
+        for seen in looks + looks:
+            store.commit(seen)
+        (record,) = store.locations()
+        assert record.texts == ("PALLET-000200",)
+        assert len(store.history("A-00")) == 5
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.lists(st.integers(0, 300), max_size=12), st.lists(st.integers(0, 300), max_size=12))
+def test_merging_is_idempotent_and_knows_no_order(
+    tmp_path_factory: pytest.TempPathFactory, mine: list[int], theirs: list[int]
+) -> None:
+    folder = tmp_path_factory.mktemp("merge")
+    one, two = SqliteStore(folder / "one"), SqliteStore(folder / "two")
+    for numbers, store in ((mine, one), (theirs, two)):
+        store.plan([PlannedLocation("Z-9", "Z9")])
+        for number in numbers:
+            store.commit(look(number))
+    with one, two:
+        assert one.merge(two) == len(set(theirs) - set(mine))
+        assert one.merge(two) == 0
+        two.merge(one)
+        assert one.locations() == two.locations()
+        assert all(one.history(r.code) == two.history(r.code) for r in one.locations())
+
+
+def test_evidence_is_merged_with_the_looks(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path / "one") as one, SqliteStore(tmp_path / "two") as two:
+        name = two.keep_evidence(b"a picture")
+        two.commit(look(7, evidence=name))
+        one.merge(two)
+        assert one.evidence.path(name).read_bytes() == b"a picture"
+
+
+def test_evidence_pictures_fit_their_size_and_are_kept_once(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).integers(0, 256, (1080, 1920, 3), np.uint8)
+    for picture in (noise, np.full((480, 640, 3), 90, np.uint8)):
+        assert len(evidence_jpeg(picture)) <= MOST_BYTES
+    with SqliteStore(tmp_path) as store:
+        jpeg = evidence_jpeg(noise)
+        assert store.keep_evidence(jpeg) == store.keep_evidence(jpeg)
+        assert len(list((tmp_path / "evidence").rglob("*.*"))) == 1
+        with pytest.raises(ValueError, match="50000"):
+            store.keep_evidence(b"x" * 60_000)
+
+
+def test_half_written_pictures_are_swept_at_the_start(tmp_path: Path) -> None:
+    SqliteStore(tmp_path).close()
+    part = tmp_path / "evidence" / "ab" / "abcd.1.part"
+    part.parent.mkdir(parents=True)
+    part.write_bytes(b"half")
+    SqliteStore(tmp_path).close()
+    assert not part.exists()
+
+
+def test_killed_at_random_moments_nothing_reported_is_lost(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "tests.unit.store.kill_at_random", "30", "5", str(tmp_path / "store")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=250)
+    result = json.loads(done.stdout)
+    assert (result["kills"], result["lost"], result["unsound"]) == (30, 0, 0)
+    assert result["commits"] > 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_log_torn_at_any_byte_loses_only_the_latest_looks(tmp_path: Path, seed: int) -> None:
+    source = tmp_path / "source"
+    with SqliteStore(source) as store:
+        for number in range(30):
+            store.commit(look(number))
+        log = (source / "inventory.db-wal").read_bytes()
+        base = (source / "inventory.db").read_bytes()
+    rng = random.Random(seed)
+    kept_before = -1
+    for cut in sorted(rng.randrange(len(log) + 1) for _ in range(25)):
+        torn = tmp_path / f"torn-{cut}"
+        torn.mkdir(exist_ok=True)
+        (torn / "inventory.db").write_bytes(base)
+        (torn / "inventory.db-wal").write_bytes(log[:cut] + bytes(rng.randrange(4096)))
+        with SqliteStore(torn) as store:
+            kept = [record.texts[0] for record in store.locations()]
+            assert kept == [f"PALLET-{n:06d}" for n in range(len(kept))]
+            assert len(kept) >= kept_before
+            store.commit(look(49))
+        kept_before = len(kept)
+        shutil.rmtree(torn)
+    assert kept_before > 20
+
+
+def test_what_is_no_inventory_is_refused_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds no inventory"):
+        SqliteStore(tmp_path / "missing", create=False)
+    assert not (tmp_path / "missing").exists()
+    (tmp_path / "inventory.db").write_bytes(b"no database at all, but long enough " * 50)
+    with pytest.raises(InputError, match="no inventory, or a damaged one"):
+        SqliteStore(tmp_path)
+    other = tmp_path / "other"
+    other.mkdir()
+    database = sqlite3.connect(other / "inventory.db")
+    database.execute("CREATE TABLE t (x)")
+    database.close()
+    with pytest.raises(InputError, match="no inventory; choose another folder"):
+        SqliteStore(other)
+
+
+def test_a_disk_that_refuses_is_said_so(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UnavailableError):
+        SqliteStore(tmp_path / "file" / "store")
+    with SqliteStore(tmp_path / "store") as store:
+        store._db.execute("PRAGMA query_only = ON")
+        with pytest.raises(UnavailableError, match="cannot be written"):
+            store.commit(look(1))
+
+
+@pytest.mark.parametrize(
+    ("state", "texts"),
+    [("read", 0), ("read", 2), ("several", 1), ("empty", 1), ("not_visited", 0), ("occluded", 1)],
+)
+def test_a_state_that_its_reads_deny_cannot_be_made(state: str, texts: int) -> None:
+    reads = tuple(StoredRead("QR Code", f"T{n}", True, 1, 1.0) for n in range(texts))
+    with pytest.raises(ValueError, match="A-1"):
+        Observation("r", "A-1", 1, LocationState(state), 0.5, reads)
