@@ -1,0 +1,222 @@
+"""`flightd inventory` as its user meets it: count, look, export, compare, count again."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import shutil
+import zipfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import zxingcpp
+from typer.testing import CliRunner
+
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.cli.inventory_formats import as_csv, as_epcis, as_xlsx
+from flightd.cli.main import app
+from flightd.config.schema import load_config
+from flightd.core.errors import InputError
+from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, StoredRead
+
+RUNNER = CliRunner()
+CONFIGS = Path(__file__).parents[3] / "configs"
+
+
+def run(*arguments: object) -> str:
+    """Standard output of a command that must succeed."""
+    result = RUNNER.invoke(app, ["inventory", *map(str, arguments)])
+    assert result.exit_code == 0, result.output + repr(result.exception)
+    return result.stdout
+
+
+def error_of(*arguments: object) -> str:
+    """The one line of a command that must refuse its input."""
+    result = RUNNER.invoke(app, ["inventory", *map(str, arguments)])
+    assert isinstance(result.exception, InputError), result.output + repr(result.exception)
+    text = str(result.exception)
+    assert "\n" not in text
+    return text
+
+
+def photograph(path: Path, *codes: tuple[str, zxingcpp.BarcodeFormat]) -> None:
+    picture = np.full((400, 300 * len(codes) + 100), 235, np.uint8)
+    for i, (text, kind) in enumerate(codes):
+        drawing = np.asarray(zxingcpp.create_barcode(text, kind).to_image(scale=3), np.uint8)
+        height, width = drawing.shape
+        picture[60 : 60 + height, 60 + 300 * i : 60 + 300 * i + width] = drawing
+    cv2.imwrite(str(path), picture)
+    os.utime(path, ns=(1_700_000_000_000_000_000, 1_700_000_000_000_000_000))
+
+
+QR, EAN = zxingcpp.BarcodeFormat.QRCode, zxingcpp.BarcodeFormat.EAN13
+
+
+@pytest.fixture
+def photographs(tmp_path: Path) -> Path:
+    folder = tmp_path / "photographs"
+    folder.mkdir()
+    photograph(folder / "A-01.png", ("PALLET-1", QR))
+    photograph(folder / "A-02.png", ("PALLET-2", QR), ("9780679601050", EAN))
+    photograph(folder / "A-03.png")
+    return folder
+
+
+def test_photographs_become_an_inventory_and_again_change_nothing(tmp_path: Path, photographs: Path) -> None:
+    store = tmp_path / "store"
+    counted = json.loads(run("add", store, photographs, "--json"))
+    assert counted == {"A-01": "read", "A-02": "several", "A-03": "unreadable"}
+    first = run("show", store, "--json")
+    run("add", store, photographs)
+    assert run("show", store, "--json") == first
+    (look,) = json.loads(run("show", store, "--location", "A-01", "--json"))["observations"]
+    assert (look["utc"], look["reads"][0]["text"]) == ("2023-11-14T22:13:20.000Z", "PALLET-1")
+    evidence = store / "evidence" / look["evidence"][:2] / f"{look['evidence']}.jpg"
+    assert 0 < evidence.stat().st_size <= 50_000
+    assert "3 locations: 1 read, 1 several, 1 unreadable" in run("show", store)
+
+
+def look(location: str, number: int, *reads: StoredRead, state: str = "") -> Observation:
+    texts = {read.text for read in reads}
+    chosen = state or ("read" if len(texts) == 1 else "several")
+    pose = CountPose("A2", 1.5, 0.0, 1.6, 0.0)
+    return Observation("flight-1", location, 10**18 + number, LocationState(chosen), 0.9, reads, pose)
+
+
+def code(text: str, symbology: str = "QR Code", **gs1: str) -> StoredRead:
+    return StoredRead(symbology, text, True, 1, 1.0, tuple((key[1:], value) for key, value in gs1.items()))
+
+
+@pytest.fixture
+def counted(tmp_path: Path) -> Path:
+    folder = tmp_path / "counted"
+    with SqliteStore(folder) as store:
+        store.plan([PlannedLocation(f"A-{n:02d}", "A2") for n in range(1, 9)])
+        store.commit(look("A-01", 1, code("=HYPERLINK(1)")))
+        store.commit(look("A-02", 2, code("0109501101530003", "Code 128", a01="09501101530003", a10="B/1")))
+        store.commit(look("A-03", 3, code("x", "Data Matrix", a01="09501101530003", a21="S 1")))
+        store.commit(
+            look("A-04", 4, code("y", "Code 128", a00="395011010013000129"), code("036602301467", "UPC-A"))
+        )
+        store.commit(look("A-05", 5, state="empty"))
+        store.commit(look("A-06", 6, state="occluded"))
+    return folder
+
+
+def test_csv_has_a_row_for_each_code_and_each_location_without(counted: Path) -> None:
+    rows = list(csv.DictReader(io.StringIO(run("export", counted))))
+    assert [(row["location"], row["state"], row["text"]) for row in rows] == [
+        ("A-01", "read", "=HYPERLINK(1)"),
+        ("A-02", "read", "0109501101530003"),
+        ("A-03", "read", "x"),
+        ("A-04", "several", "y"),
+        ("A-04", "several", "036602301467"),
+        ("A-05", "empty", ""),
+        ("A-06", "occluded", ""),
+        ("A-07", "not_visited", ""),
+        ("A-08", "not_visited", ""),
+    ]
+    assert (rows[1]["gs1"], rows[1]["utc"]) == ("(01)09501101530003(10)B/1", "2001-09-09T01:46:40.000Z")
+
+
+def test_xlsx_holds_the_same_as_text_never_as_a_formula(counted: Path, tmp_path: Path) -> None:
+    out = tmp_path / "stock.xlsx"
+    assert run("export", counted, "--out", out).strip() == str(out)
+    with zipfile.ZipFile(out) as book:
+        sheet = book.read("xl/worksheets/sheet1.xml").decode()
+        strings = book.read("xl/sharedStrings.xml").decode()
+    assert "=HYPERLINK(1)" in strings
+    assert "<f>" not in sheet
+    assert sheet.count("<row ") == 10
+
+
+def test_epcis_counts_with_gs1_uris(counted: Path, tmp_path: Path) -> None:
+    out = tmp_path / "stock.jsonld"
+    run("export", counted, "--out", out)
+    document = json.loads(out.read_text())
+    assert (document["type"], document["schemaVersion"]) == ("EPCISDocument", "2.0")
+    events = {event["readPoint"]["id"]: event for event in document["epcisBody"]["eventList"]}
+    assert sorted(events) == [f"urn:x-flightd:location:A-0{n}" for n in range(1, 5)]
+    assert {(e["type"], e["action"], e["bizStep"]) for e in events.values()} == {
+        ("ObjectEvent", "OBSERVE", "cycle_counting")
+    }
+    assert len({event["eventID"] for event in events.values()}) == 4
+    told = [
+        (event.get("epcList"), [q["epcClass"] for q in event.get("quantityList", [])])
+        for _, event in sorted(events.items())
+    ]
+    assert told == [
+        (["urn:x-flightd:code:%3DHYPERLINK%281%29"], []),
+        (None, ["https://id.gs1.org/01/09501101530003/10/B%2F1"]),
+        (["https://id.gs1.org/01/09501101530003/21/S%201"], []),
+        (["https://id.gs1.org/00/395011010013000129"], ["https://id.gs1.org/01/00036602301467"]),
+    ]
+
+
+def test_the_comparison_names_differences_and_makes_a_mission_that_loads(
+    counted: Path, tmp_path: Path
+) -> None:
+    stock = tmp_path / "stock.csv"
+    stock.write_text(
+        "\ufefflocation,code,article\nA-01,=HYPERLINK(1),\nA-05,PALLET-5,nails\nA-06,PALLET-6,\nA-07,\n"
+    )
+    shutil.copy(CONFIGS / "site-demo.toml", tmp_path)
+    config = tmp_path / "hall.toml"
+    config.write_text((CONFIGS / "sim.toml").read_text())
+    recount = tmp_path / "recount.toml"
+    result = json.loads(run("compare", counted, stock, "--recount", recount, "--config", config, "--json"))
+    assert {name: n for name, n in result["outcomes"].items() if n} == {
+        "match": 1, "unexpected": 4, "empty_but_expected": 1, "uncounted": 1,
+    }  # fmt: skip
+    assert "A-01" not in result["recount"]
+    assert result["recount"]["A-05"] == "empty_but_expected"
+    assert result["recount"]["A-08"] == "not_visited"
+    before, after = load_config(config), load_config(recount)
+    assert after.mission.nodes == ("A2",)
+    assert after.model_copy(update={"mission": before.mission}) == before
+    assert "empty_but_expected PALLET-5" in run("compare", counted, stock)
+
+
+def test_stores_merge(counted: Path, tmp_path: Path, photographs: Path) -> None:
+    other = tmp_path / "other"
+    run("add", other, photographs)
+    assert json.loads(run("merge", counted, other, "--json"))["new_observations"] == 3
+    assert json.loads(run("merge", counted, other, "--json"))["new_observations"] == 0
+
+
+def test_the_same_inventory_gives_the_same_files(counted: Path) -> None:
+    with SqliteStore(counted) as store:
+        records = store.locations()
+    assert as_csv(records) == as_csv(records)
+    assert as_epcis(records) == as_epcis(records)
+    assert as_xlsx([]).startswith(b"PK")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("place,code\nA,B\n", "no column 'location'"),
+        ("location,code\n,B\n", "line 2: no location"),
+        ("", "no column"),
+    ],
+)
+def test_bad_stock_files_are_refused(counted: Path, tmp_path: Path, text: str, words: str) -> None:
+    stock = tmp_path / "stock.csv"
+    stock.write_text(text)
+    assert words in error_of("compare", counted, stock)
+
+
+def test_bad_arguments_are_refused(counted: Path, tmp_path: Path) -> None:
+    stock = tmp_path / "stock.csv"
+    stock.write_text("location,code\n")
+    assert "holds no inventory" in error_of("show", tmp_path / "nowhere")
+    assert "knows no location 'Q'" in error_of("show", counted, "--location", "Q")
+    assert "--format pdf" in error_of("export", counted, "--format", "pdf")
+    assert "give both" in error_of("compare", counted, stock, "--recount", tmp_path / "r.toml")
+    elsewhere = tmp_path / "deep" / "r.toml"
+    config = CONFIGS / "sim.toml"
+    assert "beside" in error_of("compare", counted, stock, "--recount", elsewhere, "--config", config)
