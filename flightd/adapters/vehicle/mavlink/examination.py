@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.mavlink.codec import Codec, Message
 from flightd.adapters.vehicle.mavlink.commands import Commander
 from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
-from flightd.adapters.vehicle.mavlink.fitness import RULES, Finding, judge
+from flightd.adapters.vehicle.mavlink.fitness import Finding, Job, judge, rules_for
 from flightd.adapters.vehicle.mavlink.link import Firmware, MavlinkLink
 from flightd.adapters.vehicle.mavlink.parameters import Parameters
 from flightd.adapters.vehicle.mavlink.signing import Signing
@@ -34,10 +34,18 @@ class Report:
 
 
 class Examination:
-    """Examines one autopilot, inside `async with examination.connected():`."""
+    """Examines one autopilot for a job, inside `async with examination.connected():`."""
 
-    def __init__(self, url: str, clock: Clock, system_id: int = 1, signing: Signing | None = None) -> None:
+    def __init__(
+        self,
+        url: str,
+        clock: Clock,
+        system_id: int = 1,
+        signing: Signing | None = None,
+        job: Job | None = None,
+    ) -> None:
         self._url = url
+        self._job = job or Job()
         transport = make_transport(parse_endpoint(url))
         self._link = MavlinkLink(transport, Codec(system_id, signing=signing), clock, system_id, self._take)
         self._commander = Commander(self._link, system_id)
@@ -65,20 +73,22 @@ class Examination:
             await asyncio.gather(line, heard, return_exceptions=True)
 
     async def report(self) -> Report:
-        """Read and judge every parameter of the firmware's table.  UnavailableError if none is
+        """Read afresh and judge every parameter of the firmware's table.  UnavailableError if none is
         answered."""
         firmware = self._link.firmware
         assert firmware is not None, "only while connected"
+        rules = rules_for(firmware, self._job)
+        self._parameters.forget()
         await self._commander.send(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
         findings, unread = [], []
-        for rule in RULES[firmware]:
+        for rule in rules:
             found = await self._parameters.read(rule.names)
             finding = judge(rule, found)
             if finding is not None:
                 findings.append(finding)
             if found is None:
                 unread.append(rule.names[-1])
-        if len(unread) == len(RULES[firmware]):
+        if len(unread) == len(rules):
             raise UnavailableError(
                 f"{self._url}: the autopilot is heard but does not answer; check the TX line"
             )

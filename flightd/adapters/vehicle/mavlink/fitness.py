@@ -25,6 +25,18 @@ class Rule:
 
 
 @dataclass(frozen=True, slots=True)
+class Job:
+    """What the daemon is configured to ask of the autopilot beyond flight by attitude."""
+
+    guided: bool = False
+    """ArduCopter flies in GUIDED, which wants an estimate of its motion."""
+    raw_thrust: bool | None = None
+    """What bit 3 of ArduCopter's GUID_OPTIONS must be; None: either."""
+    shares_pose: bool = False
+    landing_target: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Finding:
     """A parameter that is unsafe or wrong for this job."""
 
@@ -46,8 +58,8 @@ def _within(low: float, high: float) -> Callable[[float], bool]:
     return lambda value: low <= value <= high + 1e-6
 
 
-def _has_bit(bit: int) -> Callable[[float], bool]:
-    return lambda value: bool(int(value) & bit)
+def _has_bits(bits: int) -> Callable[[float], bool]:
+    return lambda value: int(value) & bits == bits
 
 
 _ARDUPILOT: tuple[Rule, ...] = (
@@ -145,7 +157,7 @@ _PX4: tuple[Rule, ...] = (
     ),
     Rule(
         ("COM_RCL_EXCEPT",),
-        _has_bit(4),
+        _has_bits(4),
         "bit 2 set (4)",
         "without RC the loss of RC must not end OFFBOARD",
     ),
@@ -170,7 +182,60 @@ _PX4: tuple[Rule, ...] = (
     Rule(("MPC_THR_HOVER",), _within(0.1, 0.8), "0.1 to 0.8", "the first guess of the hover thrust"),
 )
 
+_GUID_OPTIONS = "the thrust of our set-points would be taken for something else (vehicle.raw_thrust)"
+_POSE = "the grid pose that is shared (vehicle.pose_output) is in the map's frame, its yaw too"
+
+_ARDUPILOT_GUIDED = (
+    Rule(
+        ("EK3_SRC1_VELXY",),
+        _one_of(5, 6),
+        "5 (flow) or 6 (external)",
+        "GUIDED needs an estimate of the motion (vehicle.flying_mode)",
+    ),
+)
+_ARDUPILOT_POSE = (
+    Rule(("VISO_TYPE",), _one_of(1, 3), "1 (MAVLink) or 3 (VOXL)", "else the shared pose is not heard", 1),
+    Rule(("EK3_SRC1_POSXY",), _one_of(6), "6 (external)", _POSE, 6),
+    Rule(("EK3_SRC1_YAW",), _one_of(6), "6 (external)", _POSE, 6),
+)
+_ARDUPILOT_LANDING = (
+    Rule(("PLND_ENABLED",), _one_of(1), "1", "else the landing target is not heard", 1),
+    Rule(("PLND_TYPE",), _one_of(1), "1 (MAVLink)", "else the landing target is not heard", 1),
+)
+_PX4_POSE = (Rule(("EKF2_EV_CTRL",), _has_bits(1 | 8), "bits 0 and 3 set (9: position and yaw)", _POSE, 9),)
+
+
+def _guid_options(raw: bool) -> Rule:
+    expected = "8 (raw thrust)" if raw else "0 (thrust is a climb rate)"
+    return Rule(
+        ("GUID_OPTIONS",),
+        lambda value: bool(int(value) & 8) is raw and not int(value) & ~(1 | 8),
+        expected,
+        _GUID_OPTIONS,
+        8.0 if raw else 0.0,
+    )
+
+
 RULES: dict[Firmware, tuple[Rule, ...]] = {Firmware.ARDUPILOT: _ARDUPILOT, Firmware.PX4: _PX4}
+
+
+def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
+    """The firmware's table, with the rules that the job adds or makes stricter in their places."""
+    extra: tuple[Rule, ...] = ()
+    if firmware is Firmware.ARDUPILOT:
+        if job.guided:
+            extra += _ARDUPILOT_GUIDED
+        if job.raw_thrust is not None:
+            extra += (_guid_options(job.raw_thrust),)
+        if job.shares_pose:
+            extra += _ARDUPILOT_POSE
+        if job.landing_target:
+            extra += _ARDUPILOT_LANDING
+    elif job.shares_pose:
+        extra += _PX4_POSE
+    stricter = {rule.names: rule for rule in extra}
+    table = [stricter.pop(rule.names, rule) for rule in RULES[firmware]]
+    return (*table, *stricter.values())
 
 
 def judge(rule: Rule, found: tuple[str, float] | None) -> Finding | None:
