@@ -9,17 +9,10 @@ from typing import Annotated
 
 import typer
 
-EXAMPLES = """Examples:
-
-  flightd keygen --mavlink /etc/flightd/mavlink.key
-
-Then name it in the configuration: [vehicle] signing_key = "mavlink.key".
-"""
-
 
 def register(app: typer.Typer) -> None:
     """Hang the command under `app`."""
-    app.command("keygen", epilog=EXAMPLES)(keygen)
+    app.command("keygen")(keygen)
 
 
 def keygen(
@@ -30,6 +23,10 @@ def keygen(
 
     The autopilot needs the same 32 bytes: send them once over a cable, with a ground station or with
     pymavlink's SETUP_SIGNING.  The keys of ground stations are made by flightctl keygen.
+
+    \b
+    flightd keygen --mavlink /etc/flightd/mavlink.key
+    then in the configuration: [vehicle] signing_key = "mavlink.key"
     """
     from flightd.adapters.vehicle.mavlink.signing import make_key
 

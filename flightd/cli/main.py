@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from flightd import __version__
-from flightd.cli import calibrate, inventory, keygen, log, replay, report, run, sim, vision
+from flightd.cli import calibrate, doctor, inventory, keygen, log, replay, report, run, sim, vision
 from flightd.cli import map as site_map
 from flightd.cli.exits import run_app
 
@@ -16,6 +16,7 @@ vision.register(app)
 sim.register(app)
 calibrate.register(app)
 run.register(app)
+doctor.register(app)
 report.register(app)
 replay.register(app)
 log.register(app)

@@ -1,0 +1,1 @@
+"""What `flightd doctor` looks at, a module for each kind of thing."""
