@@ -7,6 +7,7 @@ import json
 import random
 import socket
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from flightd.adapters.ground.link import ZmqGround
 from flightd.adapters.ground.protocol import EventReport, Role, StatusReport
 from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.types import CommandKind, Phase
+from flightd.grid.site import Aisle, Edge, Node
 from flightd.runtime.clock import LoopClock
 from tests.sim.ground_rig import (
     SITE,
@@ -300,6 +302,44 @@ async def test_a_flood_does_not_keep_the_stop_waiting_nor_the_loop() -> None:
                 await until(lambda: link._desk.requests > 3000)
                 counting.cancel()
         assert turns * 10 > 3000
+
+
+@in_loop
+async def test_expensive_requests_leave_the_loop_most_of_its_time() -> None:
+    """A hello on a map of 10,000 nodes takes milliseconds to answer; the flight does not wait for many."""
+    aisles = [Aisle(f"R{i}", 0.0, 3.0 * i, (1.5,) * 99) for i in range(100)]
+    crosses = [Edge(f"R{i}-1", f"R{i + 1}-1") for i in range(99)]
+    nodes = {
+        f"{aisle.id}-{k + 1}": Node(f"{aisle.id}-{k + 1}", 1.5 * k, aisle.y_m, aisle.id, k + 1)
+        for aisle in aisles
+        for k in range(100)
+    }
+    big = replace(SITE, aisles=tuple(aisles), crosses=tuple(crosses), nodes=nodes)
+    with ZmqGround(local(), big, LoopClock()) as link:
+        busy_s = 0.0
+        take = link._take
+
+        def timed(frames: Any) -> None:
+            nonlocal busy_s
+            began_s = time.monotonic()
+            take(frames)
+            busy_s += time.monotonic() - began_s
+
+        link._take = timed  # type: ignore[method-assign]
+        address = address_of(link)
+        with zmq.asyncio.Context() as context, context.socket(zmq.DEALER) as flood:
+            flood.linger = 0
+            flood.connect(address.endpoint(address.command_port))
+            async with asyncio.TaskGroup() as tasks:
+                serving_ = tasks.create_task(link.run())
+                for i in range(60):
+                    await flood.send_json({"version": 1, "id": f"request-{i}", "op": "hello"})
+                await until(lambda: link._desk.requests >= 10)
+                began_s, busy_before_s, before = time.monotonic(), busy_s, link._desk.requests
+                await until(lambda: link._desk.requests >= before + 30)
+                share = (busy_s - busy_before_s) / (time.monotonic() - began_s)
+                serving_.cancel()
+        assert share < 0.35
 
 
 @in_loop
