@@ -1,0 +1,135 @@
+"""What `flightd doctor` makes of what it reads: machine, lens and pictures, each complaint with a remedy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flightd.cli.checks.calibration import check_calibration
+from flightd.cli.checks.camera import Pictures, check_vision, judge_camera
+from flightd.cli.checks.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
+from flightd.cli.checks.verdict import Check, Level
+from flightd.config.schema import CameraConfig, Config, RecorderConfig, load_config
+from flightd.config.site_file import load_site
+from flightd.vision.detector import Detector
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+SITE = load_site(CONFIGS / "site-demo.toml")
+FIT = Load(cores=4, load=0.5, hottest_c=55.0, governor="schedutil", memory_bytes=2_000_000_000)
+ROOM = 50_000_000_000
+
+
+def levels(checks: list[Check]) -> list[Level]:
+    for check in checks:
+        assert "\n" not in check.text + check.remedy
+        assert bool(check.remedy) is (check.level is not Level.OK)
+    return [check.level for check in checks]
+
+
+@pytest.mark.parametrize(
+    ("change", "word", "level"),
+    [
+        ({}, "4 cores", Level.OK),
+        ({"cores": 2}, "detectors and the control loop", Level.WARNING),
+        ({"load": 3.5}, "busy before the flight", Level.WARNING),
+        ({"hottest_c": 85.0}, "85 degrees", Level.WARNING),
+        ({"hottest_c": None}, "4 cores", Level.OK),
+        ({"governor": "powersave"}, "powersave", Level.WARNING),
+        ({"memory_bytes": 100_000_000}, "100 MB", Level.ERROR),
+    ],
+)
+def test_the_processor(change: dict[str, Any], word: str, level: Level) -> None:
+    checks = judge_processor(replace(FIT, **change), workers=2)
+    assert levels(checks) == [level]
+    assert word in checks[0].text
+
+
+@pytest.mark.parametrize(
+    ("resolution_s", "year", "synchronised", "level"),
+    [
+        (1e-9, 2026, True, Level.OK),
+        (1e-9, 2026, False, Level.WARNING),
+        (1e-9, 1970, True, Level.WARNING),
+        (0.015, 2026, True, Level.ERROR),
+    ],
+)
+def test_the_clock(resolution_s: float, year: int, synchronised: bool, level: Level) -> None:
+    assert levels([judge_clock(resolution_s, year, synchronised=synchronised)]) == [level]
+
+
+@pytest.mark.parametrize(
+    ("free_bytes", "level"),
+    [(ROOM, Level.OK), (2_500_000_000, Level.WARNING), (900_000_000, Level.ERROR)],
+)
+def test_room_on_the_disk(free_bytes: int, level: Level) -> None:
+    assert levels([judge_disk(Path("flights"), free_bytes, 1_000_000_000)]) == [level]
+
+
+def test_the_recorders_folder(tmp_path: Path) -> None:
+    assert levels([check_disk(RecorderConfig())]) == [Level.WARNING]  # not recorded at all
+    folder = tmp_path / "not" / "there" / "yet"
+    assert check_disk(RecorderConfig(folder=folder, reserve_gb=0)).level is not Level.ERROR
+    assert not folder.exists()  # it only looked
+    file = tmp_path / "file"
+    file.touch()
+    assert levels([check_disk(RecorderConfig(folder=file))]) == [Level.ERROR]
+
+
+@pytest.mark.parametrize(
+    ("keys", "word"),
+    [
+        ({"fx_px": 30.0, "fy_px": 30.0}, "is no lens"),
+        ({"fx_px": 5000.0, "fy_px": 5000.0}, "is no lens"),
+        ({"fx_px": 381.0, "fy_px": 500.0}, "differ"),
+        ({"fx_px": 381.0, "fy_px": 381.0, "cx_px": 10.0}, "far from the picture's middle"),
+        ({"fx_px": 381.0, "fy_px": 381.0, "distortion": (-0.6, 0.0, 0.0, 0.0, 0.0)}, "folds"),
+        ({}, "a guess is used"),
+    ],
+)
+def test_a_lens_that_cannot_be_is_named(keys: dict[str, Any], word: str) -> None:
+    checks = check_calibration(CameraConfig(**keys), SITE, 1.6)
+    assert Level.OK not in levels(checks)
+    assert any(word in check.text for check in checks)
+
+
+def test_a_calibrated_lens_is_fit_where_its_lines_are_wide_enough() -> None:
+    camera = CameraConfig(fx_px=381.0, fy_px=382.0, distortion=(-0.1, 0.02, 0.0, 0.0, 0.0))
+    assert levels(check_calibration(camera, SITE, 1.6)) == [Level.OK]
+    assert Level.ERROR in levels(check_calibration(camera, SITE, 12.0))
+
+
+def pictures(rate_hz: float, grey: int = 120) -> Pictures:
+    stamps = [round(i * 1e9 / rate_hz) for i in range(20)]
+    return Pictures(stamps, np.full((360, 640, 3), grey, np.uint8))
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (pictures(30.0), [Level.OK]),
+        (pictures(20.0), [Level.WARNING]),
+        (pictures(4.0), [Level.ERROR]),
+        (pictures(30.0, grey=3), [Level.OK, Level.ERROR]),
+        (pictures(30.0, grey=254), [Level.OK, Level.ERROR]),
+        (Pictures(), [Level.ERROR]),
+        (Pictures(trouble="pictures are 800x600, the configuration says 640x360"), [Level.ERROR]),
+    ],
+)
+def test_the_cameras_pictures(found: Pictures, expected: list[Level]) -> None:
+    checks = judge_camera(config(), found)
+    assert levels(checks) == expected
+    assert found.trouble in checks[0].text
+
+
+def test_a_floor_without_lines_is_a_warning_only() -> None:
+    checks = check_vision(config(), Detector("combined", "yellow"), pictures(30.0).picture)
+    assert set(levels(checks)) == {Level.WARNING}
+    assert levels(check_vision(config(), Detector("combined", "yellow"), None)) == [Level.WARNING]
+
+
+def config() -> Config:
+    return load_config(CONFIGS / "sim.toml")
