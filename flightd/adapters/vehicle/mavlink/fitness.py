@@ -100,6 +100,12 @@ _ARDUPILOT: tuple[Rule, ...] = (
         "a return to launch needs a position",
         3,
     ),
+    Rule(
+        ("RC_OPTIONS",),
+        lambda value: not int(value) & 1,
+        "bit 0 clear",
+        "the receiver is ignored: no pilot could take over",
+    ),
     Rule(("BATT_FS_LOW_ACT",), _one_of(1), "1 (land)", "an empty battery must end in a landing", 1),
     Rule(("BATT_LOW_VOLT",), lambda value: value > 0, "above 0 V", "else the battery failsafe never acts"),
     Rule(("AHRS_EKF_TYPE",), _one_of(3), "3 (EKF3)", "the heights and attitudes used here are EKF3's", 3),
@@ -160,6 +166,13 @@ _PX4: tuple[Rule, ...] = (
         _has_bits(4),
         "bit 2 set (4)",
         "without RC the loss of RC must not end OFFBOARD",
+    ),
+    Rule(
+        ("COM_RC_OVERRIDE",),
+        _has_bits(2),
+        "bit 1 set (3)",
+        "a pilot who moves the sticks must get the vehicle out of OFFBOARD",
+        3,
     ),
     Rule(("COM_DISARM_LAND",), _within(0.1, 20), "above 0 s", "a landed vehicle must disarm itself", 2),
     Rule(
