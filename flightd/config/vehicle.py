@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -37,6 +37,14 @@ class VehicleConfig(BaseModel):
     )
     pose_output: Literal["none", "odometry", "vision_position"] = Field(
         "none", description="message that gives the grid pose to the autopilot's estimator, at 30 Hz"
+    )
+    origin_deg: tuple[
+        Annotated[float, Field(ge=-90, le=90)],
+        Annotated[float, Field(ge=-180, le=180)],
+    ] = Field(
+        (51.4778, 0.0),
+        description="ArduCopter with pose_output: the hall's latitude and longitude, roughly; its estimator "
+        "has to have some",
     )
     landing_target: bool = Field(
         False, description="tell the autopilot's precision landing where the home pad is, near it"

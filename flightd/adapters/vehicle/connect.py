@@ -55,4 +55,5 @@ def _options(config: VehicleConfig, clock: Clock) -> MavlinkOptions:
         signing=signing_of(config, clock),
         pose_form=PoseForm(config.pose_output) if config.shares_pose else None,
         raw_thrust=config.raw_thrust,
+        origin_deg=config.origin_deg,
     )

@@ -542,6 +542,29 @@ def test_the_grid_pose_is_shared_at_thirty_hertz_if_so_chosen() -> None:
     run_virtual(test)
 
 
+def test_an_estimator_that_gets_our_pose_gets_an_origin_until_it_reports_one() -> None:
+    async def test() -> None:
+        for form in (PoseForm.ODOMETRY, None):
+            async with scripted(pose_form=form, origin_deg=(47.5, -8.25)) as (autopilot, _):
+                await asyncio.sleep(9.0)
+                sent = autopilot.all("SET_GPS_GLOBAL_ORIGIN")
+                if form is None:
+                    assert not sent
+                    continue
+                assert len(sent) >= 2  # nobody answered
+                assert (sent[0].latitude, sent[0].longitude) == (475_000_000, -82_500_000)
+                autopilot.say(dialect.MAVLink_gps_global_origin_message(475_000_000, -82_500_000, 0, 0))
+                await asyncio.sleep(5.0)
+                known = len(autopilot.all("SET_GPS_GLOBAL_ORIGIN"))
+                await asyncio.sleep(10.0)
+                assert len(autopilot.all("SET_GPS_GLOBAL_ORIGIN")) == known
+                autopilot.say(dialect.MAVLink_attitude_message(1, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))  # a reboot
+                await asyncio.sleep(3.0)
+                assert len(autopilot.all("SET_GPS_GLOBAL_ORIGIN")) > known
+
+    run_virtual(test)
+
+
 # Texts
 
 

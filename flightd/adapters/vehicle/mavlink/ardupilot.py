@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.adapters.vehicle.mavlink.codec import Message
 from flightd.adapters.vehicle.mavlink.link import Firmware
+from flightd.adapters.vehicle.mavlink.origin import Origin
 from flightd.adapters.vehicle.mavlink.setpoint import climb_thrust
 from flightd.adapters.vehicle.mavlink.vehicle import DEFAULTS, MavlinkOptions, MavlinkVehicle
 from flightd.core.types import AttitudeSetpoint
@@ -49,6 +53,9 @@ class ArduPilotVehicle(MavlinkVehicle):
         super().__init__(url, clock, options)
         self.flying_mode = flying_mode
         self._raw_thrust = options.raw_thrust
+        self._origin: Origin | None = None
+        if options.pose_form is not None:
+            self._origin = Origin(self.link, self._commander, options.system_id, options.origin_deg)
 
     def mode_name(self, custom_mode: int) -> str:
         return _MODE_NAMES.get(custom_mode, f"mode {custom_mode}")
@@ -67,6 +74,21 @@ class ArduPilotVehicle(MavlinkVehicle):
             state = "set" if raw else "not set"
             return f"bit 3 of GUID_OPTIONS is {state}, against vehicle.raw_thrust: see flightd doctor"
         return ""
+
+    def _serve(self, tasks: asyncio.TaskGroup) -> None:
+        super()._serve(tasks)
+        if self._origin is not None:
+            tasks.create_task(self._once_heard(self._origin.run), name="ardupilot origin")
+
+    def _received(self, message: Message, now_ns: int) -> None:
+        super()._received(message, now_ns)
+        if self._origin is not None:
+            self._origin.take(message)
+
+    def _rebooted(self) -> None:
+        super()._rebooted()
+        if self._origin is not None:
+            self._origin.forget()
 
     def _thrust_is_raw(self) -> bool | None:
         """Whether thrust is collective; None while the parameter is not known."""

@@ -57,13 +57,14 @@ _PAD_NEAR_M = 1.0
 @dataclass(frozen=True, slots=True)
 class MavlinkOptions:
     """The vehicle's `system_id`, the key of a signed link, the form in which the grid pose is given to
-    the autopilot's estimator (None: not at all), and what ArduCopter's GUID_OPTIONS must say of thrust:
-    raw, a climb rate, or (None) either."""
+    the autopilot's estimator (None: not at all); what ArduCopter's GUID_OPTIONS must say of thrust (raw,
+    a climb rate, or None: either), and latitude and longitude for an estimator that has to have some."""
 
     system_id: int = 1
     signing: Signing | None = None
     pose_form: PoseForm | None = None
     raw_thrust: bool | None = None
+    origin_deg: tuple[float, float] = (51.4778, 0.0)
 
 
 DEFAULTS = MavlinkOptions()
@@ -230,10 +231,14 @@ class MavlinkVehicle(abc.ABC):
                 self.parameters.value(message)
             case _:
                 if self._telemetry.take(message, now_ns):
-                    self.parameters.forget()  # it rebooted: they may have changed
+                    self._rebooted()
                 if message.get_type() == "HEARTBEAT":
                     self._heard.set()
                     self._pursuit.heartbeat(now_ns)
+
+    def _rebooted(self) -> None:
+        """The autopilot started anew: what was read of it and set in it may be so no longer."""
+        self.parameters.forget()
 
     def _say(self, message: Message, now_ns: int) -> None:
         for severity, text in self._texts.add(message):
