@@ -24,11 +24,34 @@ _SUFFIXES = {".csv": "csv", ".xlsx": "xlsx", ".json": "json", ".jsonld": "epcis"
 
 
 def register(app: typer.Typer) -> None:
-    """Hang `inventory add`, `show`, `export`, `compare` and `merge` on `app`."""
+    """Hang `inventory plan`, `show`, `add`, `export`, `compare` and `merge` on `app`."""
     group = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
-    for command in (show, add, export, compare, merge):
+    for command in (plan, show, add, export, compare, merge):
         group.command(command.__name__)(command)
-    app.add_typer(group, name="inventory", help="What was counted: show, add, export, compare, merge.")
+    app.add_typer(group, name="inventory", help="What was counted: plan, show, add, export, compare, merge.")
+
+
+def plan(
+    folder: Folder,
+    site_file: Annotated[Path, typer.Argument(metavar="SITE", help="Site file with racks, TOML.")],
+    as_json: AsJson = False,
+) -> None:
+    """Make every location of a site known to the inventory, not visited until somebody looks.
+
+    \b
+    flightd inventory plan out/inventory hall-3.toml
+    """
+    from flightd.adapters.store.sqlite import SqliteStore
+    from flightd.config.site_file import load_site
+    from flightd.core.inventory import PlannedLocation
+
+    site = load_site(site_file)
+    if not site.locations:
+        raise InputError(f"{site_file}: has no locations; add a [[rack]]")
+    with SqliteStore(folder) as store:
+        store.plan(PlannedLocation(location.code, location.node) for location in site.locations.values())
+        records = store.locations()
+    print(json.dumps({"locations": len(records)}) if as_json else _states(records))
 
 
 def show(

@@ -13,6 +13,7 @@ import typer
 from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
+    from flightd.grid.coverage import Coverage
     from flightd.grid.site import Site
 
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -31,23 +32,69 @@ def register(app: typer.Typer) -> None:
     app.add_typer(maps, name="map", help="Check, draw and make site files (the map of a warehouse).")
 
 
-def check(site_file: SiteFile, as_json: AsJson = False) -> None:
-    """Say whether a site file is sound, and what it holds.
+def check(
+    site_file: SiteFile,
+    fov_deg: Annotated[
+        float | None, typer.Option(help="Check the front camera too: its horizontal field.", min=5, max=170)
+    ] = None,
+    width_px: Annotated[int, typer.Option(help="Its picture's width.", min=16)] = 1920,
+    exposure_ms: Annotated[float, typer.Option(help="Its exposure.", min=0.001, max=1000)] = 1.0,
+    module_mm: Annotated[
+        float, typer.Option(help="Size of a module of the smallest label.", min=0.05, max=100)
+    ] = 3.0,
+    speed_mps: Annotated[float, typer.Option(help="Speed along the shelf while looking.", min=0)] = 0.3,
+    as_json: AsJson = False,
+) -> None:
+    """Say whether a site file is sound, what it holds, and whether the labels will be read.
+
+    With --fov-deg the front camera is held against the paper's rule D_X = 2 D_Y tan(sigma / 2), against
+    2.5 pixels for each module and a blur of 0.75 module; exit 1 where it does not reach.
 
     \b
     flightd map check configs/site-demo.toml
     flightd map check hall-3.toml --json
+    flightd map check hall-3.toml --fov-deg 75 --width-px 1920 --exposure-ms 2 --module-mm 3
     """
     from flightd.config.site_file import load_site
+    from flightd.grid.coverage import FrontView, check_coverage
 
-    facts = _facts(load_site(site_file))
+    site = load_site(site_file)
+    facts = _facts(site)
+    reach = None
+    if fov_deg is not None:
+        view = FrontView(math.radians(fov_deg), width_px, exposure_ms / 1e3, module_mm / 1e3)
+        reach = check_coverage(site, view, speed_mps)
     if as_json:
-        print(json.dumps({"file": str(site_file), "ok": True, **facts}))
-        return
-    print(f"{site_file}: sound")
-    for name, value in facts.items():
-        label, _, unit = name.replace("_", " ").rpartition(" ")
-        print(f"  {label:<13} {value} m" if unit == "m" else f"  {name.replace('_', ' '):<13} {value}")
+        document = {"file": str(site_file), "ok": reach is None or not reach.problems, **facts}
+        print(json.dumps(document | ({"scan": _scan_facts(reach)} if reach else {})))
+    else:
+        print(f"{site_file}: sound")
+        for name, value in facts.items():
+            _print_fact(name, value)
+        for name, value in _scan_facts(reach).items() if reach else ():
+            if not isinstance(value, list):
+                _print_fact(name, value)
+        for problem in reach.problems if reach else ():
+            print(f"  problem: {problem}")
+    if reach and reach.problems:
+        raise typer.Exit(1)
+
+
+def _print_fact(name: str, value: object) -> None:
+    label, _, unit = name.replace("_", " ").rpartition(" ")
+    print(f"  {label:<13} {value} m" if unit == "m" else f"  {name.replace('_', ' '):<13} {value}")
+
+
+def _scan_facts(reach: Coverage) -> dict[str, Any]:
+    return {
+        "read_part": round(reach.read_part, 5),
+        "px_per_module": round(reach.least_px_per_module, 3),
+        "blur_modules": round(reach.blur_modules, 3),
+        "speed_limit_mps": round(reach.speed_limit_mps, 4),
+        "unseen": list(reach.unseen),
+        "unreadable": list(reach.unreadable),
+        "problems": list(reach.problems),
+    }
 
 
 def draw(
@@ -84,6 +131,11 @@ def new(
     shelf_distance_m: Annotated[float, typer.Option(help="From the line to the shelf front.")] = 1.2,
     shelf_height_m: Annotated[float, typer.Option(help="Height of the shelves.")] = 3.0,
     ceiling_m: Annotated[float, typer.Option(help="Height of the hall.")] = 6.0,
+    levels_m: Annotated[
+        str | None, typer.Option(help="Heights of the labels, as in 0.3,1.5: adds racks with locations.")
+    ] = None,
+    bay_width_m: Annotated[float, typer.Option(help="Width of the racks' bays.", min=0.2, max=50)] = 1.35,
+    positions: Annotated[int, typer.Option(help="Places in each bay on each level.", min=1, max=100)] = 1,
     name: Annotated[str | None, typer.Option(help="Name of the site; the file's name.")] = None,
     force: Force = False,
     as_json: AsJson = False,
@@ -109,6 +161,11 @@ def new(
         )
     for a, b in itertools.pairwise(letters):
         blocks += [f'[[cross]]\nnodes = ["{a}{end}", "{b}{end}"]' for end in (1, nodes)]
+    if levels_m is not None:
+        levels = ", ".join(repr(level) for level in _numbers("--levels-m", levels_m))
+        blocks.append(
+            f"[[rack]]\nbay_width_m = {bay_width_m}\nlevels_m = [{levels}]\npositions = {positions}"
+        )
     blocks.append('[[pad]]\nid = "home"\nnode = "A1"')
     site = parse_site("\n\n".join(blocks), str(out))
     _write(out, site_toml(site), force)
@@ -124,6 +181,7 @@ def _facts(site: Site) -> dict[str, Any]:
         "nodes": len(site.nodes),
         "crosses": len(site.crosses),
         "pads": len(site.pads),
+        "locations": len(site.locations),
         "length_m": round(x1 - x0, 2),
         "width_m": round(y1 - y0, 2),
         "paint_m": round(math.fsum(abs(p.x1_m - p.x0_m) + abs(p.y1_m - p.y0_m) for p in site.lines), 1),
@@ -132,11 +190,15 @@ def _facts(site: Site) -> dict[str, Any]:
 
 
 def _spacings(text: str, nodes: int) -> list[float]:
-    try:
-        pattern = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"--spacing-m {text!r}: give metres, as in 1.5 or 1.5,1.8") from None
+    pattern = _numbers("--spacing-m", text)
     return [pattern[i % len(pattern)] for i in range(nodes - 1)]
+
+
+def _numbers(option: str, text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{option} {text!r}: give metres, as in 1.5 or 1.5,1.8") from None
 
 
 def _write(path: Path, text: str, force: bool) -> None:

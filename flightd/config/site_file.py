@@ -20,6 +20,14 @@
     [[cross]]                    # a painted line between two aisles, at right angles to both
     nodes = ["A1", "B1"]
 
+    [[rack]]                     # divides shelf fronts into bays, levels and places; may be left out
+    aisles = ["A"]               # left out: every aisle with a shelf on these sides
+    sides = ["left", "right"]
+    bay_width_m = 1.35           # as many bays as fit stand in the middle of each front
+    levels_m = [0.3, 1.5]        # heights of the labels, from the floor up
+    positions = 2                # places in each bay on each level
+    pattern = "{aisle}{side}-{bay:02}-{level}-{position}"  # location codes: AL-01-2-1
+
     [[pad]]
     id = "home"                  # missions start and end here
     node = "A1"
@@ -39,7 +47,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from flightd.core.errors import InputError
 from flightd.grid.layout import LayoutError, lay_out
-from flightd.grid.site import Aisle, LineColour, Pad, Side, Site
+from flightd.grid.site import Aisle, LineColour, Pad, Rack, Side, Site
 
 _Metres = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 _Coordinate = Annotated[float, Field(ge=-10_000, le=10_000, allow_inf_nan=False)]
@@ -72,6 +80,17 @@ class _CrossTable(_Table):
     nodes: tuple[str, str]
 
 
+class _RackTable(_Table):
+    aisles: tuple[str, ...] | None = Field(None, min_length=1)
+    sides: tuple[Side, ...] = Field((Side.LEFT, Side.RIGHT), min_length=1)
+    bay_width_m: float = Field(ge=0.2, le=50)
+    levels_m: tuple[Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)], ...] = Field(
+        min_length=1, max_length=100
+    )
+    positions: int = Field(1, ge=1, le=100)
+    pattern: str = Field("{aisle}{side}-{bay:02}-{level}-{position}", min_length=1, max_length=100)
+
+
 class _PadTable(_Table):
     id: str = Field(min_length=1, max_length=40)
     node: str
@@ -82,6 +101,7 @@ class _SiteFile(_Table):
     site: _SiteTable
     aisle: tuple[_AisleTable, ...] = Field(min_length=1)
     cross: tuple[_CrossTable, ...] = ()
+    rack: tuple[_RackTable, ...] = ()
     pad: tuple[_PadTable, ...] = Field(min_length=1)
 
 
@@ -115,9 +135,17 @@ def parse_site(text: str, source: str) -> Site:
             line_width_m=file.site.line_width_m,
             line_colour=file.site.line_colour,
             ceiling_m=file.site.ceiling_m,
+            racks=[_rack(rack, file.aisle) for rack in file.rack],
         )
     except LayoutError as err:
         raise InputError(f"{source}: {err}") from None
+
+
+def _rack(table: _RackTable, aisles: tuple[_AisleTable, ...]) -> Rack:
+    told = table.aisles
+    if told is None:
+        told = tuple(aisle.id for aisle in aisles if set(table.sides) <= set(aisle.shelves))
+    return Rack(told, table.bay_width_m, table.levels_m, table.positions, table.sides, table.pattern)
 
 
 def site_toml(site: Site) -> str:
@@ -139,6 +167,11 @@ def site_toml(site: Site) -> str:
         parts += [f"shelf_height_m = {aisle.shelf_height_m!r}"]
     for cross in site.crosses:
         parts += ["", "[[cross]]", f"nodes = [{_quoted(cross.a)}, {_quoted(cross.b)}]"]
+    for rack in site.racks:
+        parts += ["", "[[rack]]", f"aisles = [{', '.join(map(_quoted, rack.aisles))}]"]
+        parts += [f"sides = [{', '.join(map(_quoted, rack.sides))}]", f"bay_width_m = {rack.bay_width_m!r}"]
+        parts += [f"levels_m = [{', '.join(map(repr, rack.levels_m))}]", f"positions = {rack.positions}"]
+        parts += [f"pattern = {_quoted(rack.pattern)}"]
     for pad in site.pads:
         parts += ["", "[[pad]]", f"id = {_quoted(pad.id)}", f"node = {_quoted(pad.node)}"]
         parts += [f"size_m = {pad.size_m!r}"]
@@ -190,6 +223,7 @@ def _fields(location: tuple[int | str, ...]) -> list[str]:
         "site": _SiteTable,
         "aisle": _AisleTable,
         "cross": _CrossTable,
+        "rack": _RackTable,
         "pad": _PadTable,
     }
     table = tables[cast(str, location[0])] if len(location) > 1 else _SiteFile

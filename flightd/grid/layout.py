@@ -9,7 +9,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Sequence
 
-from flightd.grid.site import Aisle, Edge, LineColour, Node, Pad, PaintedLine, Shelf, Side, Site
+from flightd.grid.racks import RackError, place_locations
+from flightd.grid.site import Aisle, Edge, LineColour, Node, Pad, PaintedLine, Rack, Shelf, Side, Site
 
 SAME_X_M = 0.01
 """Strokes across the aisles this close in x are one line."""
@@ -37,6 +38,7 @@ def lay_out(
     line_width_m: float = 0.075,
     line_colour: LineColour = LineColour.YELLOW,
     ceiling_m: float = 6.0,
+    racks: Sequence[Rack] = (),
 ) -> Site:
     """Make the site, or raise LayoutError naming the part that does not fit.
 
@@ -48,6 +50,12 @@ def lay_out(
     edges = (*along, *cross_edges)
     _check_connected(nodes, edges)
     lines = (*_aisle_strokes(aisles, line_width_m), *_cross_strokes(aisles, nodes, cross_edges, line_width_m))
+    shelves = tuple(shelf for aisle in aisles for shelf in _shelves(aisle, nodes, cross_edges))
+    try:
+        locations = place_locations(racks, shelves, nodes.values())
+    except RackError as err:
+        key, _, problem = str(err).partition(": ")
+        raise LayoutError(key, problem) from None
     return Site(
         name=name,
         aisles=tuple(aisles),
@@ -56,10 +64,12 @@ def lay_out(
         edges=edges,
         lines=lines,
         pads=_check_pads(tuple(pads), nodes),
-        shelves=tuple(shelf for aisle in aisles for shelf in _shelves(aisle, nodes, cross_edges)),
+        shelves=shelves,
         line_width_m=line_width_m,
         line_colour=line_colour,
         ceiling_m=ceiling_m,
+        racks=tuple(racks),
+        locations=locations,
     )
 
 

@@ -11,7 +11,7 @@ import heapq
 import itertools
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 
@@ -110,6 +110,36 @@ class Shelf:
     height_m: float
 
 
+@dataclass(frozen=True, slots=True)
+class Rack:
+    """How the shelf fronts on `sides` of `aisles` are divided.  Bays of `bay_width_m` stand in the middle
+    of each front; `levels_m` are the heights at which the labels hang; each level of a bay has `positions`
+    places.  `pattern` makes the location code of {aisle} {side} (L, R) {bay} {level} {position}."""
+
+    aisles: tuple[str, ...]
+    bay_width_m: float
+    levels_m: tuple[float, ...]
+    positions: int = 1
+    sides: tuple[Side, ...] = (Side.LEFT, Side.RIGHT)
+    pattern: str = "{aisle}{side}-{bay:02}-{level}-{position}"
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    """One place for goods: where its label hangs on the shelf front, and the node that faces it."""
+
+    code: str
+    aisle: str
+    side: Side
+    bay: int
+    level: int
+    position: int
+    x_m: float
+    y_m: float
+    height_m: float
+    node: str
+
+
 @dataclass(frozen=True)
 class Site:
     """A whole warehouse floor; immutable, connected, every edge on paint."""
@@ -125,6 +155,8 @@ class Site:
     line_width_m: float
     line_colour: LineColour
     ceiling_m: float
+    racks: tuple[Rack, ...] = ()
+    locations: Mapping[str, Location] = field(default_factory=dict)
 
     @cached_property
     def _neighbours(self) -> dict[str, tuple[str, ...]]:

@@ -220,3 +220,15 @@ def test_bad_arguments_are_refused(counted: Path, tmp_path: Path) -> None:
     elsewhere = tmp_path / "deep" / "r.toml"
     config = CONFIGS / "sim.toml"
     assert "beside" in error_of("compare", counted, stock, "--recount", elsewhere, "--config", config)
+
+
+def test_a_sites_locations_are_planned(tmp_path: Path) -> None:
+    site = tmp_path / "hall.toml"
+    made = RUNNER.invoke(app, ["map", "new", str(site), "--levels-m", "0.4,1.4"])
+    assert made.exit_code == 0
+    count = json.loads(run("plan", tmp_path / "store", site, "--json"))["locations"]
+    assert json.loads(run("show", tmp_path / "store", "--json"))["states"] == {"not_visited": count}
+    assert count > 0
+    bare = tmp_path / "bare.toml"
+    assert RUNNER.invoke(app, ["map", "new", str(bare)]).exit_code == 0
+    assert "add a [[rack]]" in error_of("plan", tmp_path / "store", bare)

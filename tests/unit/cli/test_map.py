@@ -109,3 +109,17 @@ def test_new_refuses_numbers_that_make_no_floor(
     assert words in err
     assert err.count("\n") == 1
     assert not (tmp_path / "hall.toml").exists()
+
+
+def test_check_holds_the_front_camera_against_the_shelves(flightd: Run, tmp_path: Path) -> None:
+    file = tmp_path / "hall.toml"
+    assert flightd("map", "new", file, "--levels-m", "0.4,1.4", "--positions", 2)[0] == 0
+    sees = ("--fov-deg", 70, "--module-mm", 3)
+    code, out, _ = flightd("map", "check", file, *sees, "--json")
+    facts = json.loads(out)
+    assert (code, facts["ok"], facts["scan"]["read_part"]) == (0, True, 1.0)
+    assert facts["locations"] == len(load_site(file).locations) > 0
+    code, out, _ = flightd("map", "check", file, *sees, "--exposure-ms", 20, "--json")
+    facts = json.loads(out)
+    assert (code, facts["ok"], facts["scan"]["speed_limit_mps"]) == (1, False, 0.1125)
+    assert "problem: 0.3 m/s blurs" in flightd("map", "check", file, *sees, "--exposure-ms", 20)[1]
