@@ -117,8 +117,10 @@ def _capture(source: Source, ring_name: str, conn: Connection) -> None:
     """The process's life: read, write into the ring, tell; it ends with a text that says why."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     ring = FrameRing.attach(ring_name, _SLOTS, source.width_px, source.height_px)
+    over = "cannot be opened, or gives no picture"
     try:
         for seq, picture in enumerate(_pictures(source)):
+            over = "no more pictures"
             grabbed_ns = time.monotonic_ns()
             if picture.shape != (source.height_px, source.width_px, 3) or picture.dtype != np.uint8:
                 size = f"{picture.shape[1]}x{picture.shape[0]}"
@@ -128,7 +130,7 @@ def _capture(source: Source, ring_name: str, conn: Connection) -> None:
             np.copyto(ring.pixels(slot), picture)
             ring.publish(slot, seq, grabbed_ns)
             conn.send((slot, seq, time.monotonic_ns() - grabbed_ns))
-        conn.send("no more pictures")
+        conn.send(over)
     except BrokenPipeError:
         return
 
