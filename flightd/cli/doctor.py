@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flightd.core.errors import InputError, RunError
+from flightd.core.errors import InputError, RunError, UnavailableError
 
 if TYPE_CHECKING:
     from flightd.adapters.vehicle.mavlink.examination import Report
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from flightd.cli.checks.verdict import Check
     from flightd.config.schema import Config
     from flightd.grid.site import Site
+    from flightd.ports import Clock
 
 _COLOURS = {"ok": typer.colors.GREEN, "warning": typer.colors.YELLOW, "error": typer.colors.RED}
 
@@ -107,6 +108,7 @@ async def _examine(config: Config, site: Site, path: Path) -> Diagnosis:
     else:
         pictures = await camera.watch(config, clock, None)
         autopilot = await vehicle.examine(config.vehicle, clock)
+    checks += _check_ground(config, site, clock)
     checks += camera.judge_camera(config, pictures)
     checks += camera.check_vision(config, detector, pictures.picture)
     return Diagnosis([*checks, *autopilot.checks], autopilot.report)
@@ -120,6 +122,24 @@ def _check_plan(config: Config, site: Site, path: Path) -> Check:
     nodes = len(config.mission.nodes) or len(site.nodes)
     plan_of(config, site)
     return ok("config", f"{path}: site {site.name}, {nodes} nodes to visit at {config.mission.height_m:g} m")
+
+
+def _check_ground(config: Config, site: Site, clock: Clock) -> list[Check]:
+    """Keys and allow-list are read (InputError if they are wrong), the ports are listened on for a moment."""
+    from flightd.app import ground_link
+    from flightd.cli.checks.verdict import error, ok
+
+    ground = config.ground
+    link = ground_link(config, site, clock)
+    if link is None:
+        return []
+    try:
+        with link:
+            text = f"{ground.listen}, ports {ground.status_port} and {ground.command_port}"
+            keys = "with keys" if ground.server_key else "without keys, this machine only"
+            return [ok("ground", f"can listen on {text}, {keys}")]
+    except UnavailableError as err:
+        return [error("ground", str(err), "stop what has the port (another flightd?), or choose another")]
 
 
 async def _fix(config: Config, agreed: list[str]) -> Autopilot:

@@ -8,6 +8,7 @@ import os
 import pty
 import re
 import select
+import socket
 import subprocess
 import sys
 import threading
@@ -220,7 +221,23 @@ def test_no_autopilot_and_no_camera_are_lines_not_ends(tmp_path: Path, doctor: D
     assert document["autopilot"] is None
     assert "no ArduPilot or PX4 heard" in by_name(document, "vehicle")["text"]
     assert by_name(document, "camera")["level"] == "error"
+    assert "cannot be opened" in by_name(document, "camera")["text"]
     assert err == "flightd: not fit to fly: 2 errors\n"
+
+
+def test_a_ground_port_that_is_taken_is_told(tmp_path: Path, doctor: Doctor) -> None:
+    config = write_config(tmp_path, {"url": "udpout://127.0.0.1:9"})
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        ports = f"status_port = {taken.getsockname()[1]}\ncommand_port = 0\n"
+        config.write_text(config.read_text() + f'[ground]\nlisten = "127.0.0.1"\n{ports}')
+        code, out, _ = doctor(config, "--json")
+    check = by_name(json.loads(out), "ground")
+    assert (code, check["level"]) == (1, "error")
+    config.write_text(config.read_text().replace(ports, "status_port = 0\ncommand_port = 0\n"))
+    _, out, _ = doctor(config, "--json")
+    assert by_name(json.loads(out), "ground")["level"] == "ok"
 
 
 def test_bad_input_is_one_line_and_exit_2(tmp_path: Path, doctor: Doctor) -> None:
