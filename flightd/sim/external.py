@@ -7,6 +7,7 @@ its nose points is the heading with which the mission starts.
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 import re
 from dataclasses import dataclass, replace
@@ -19,10 +20,13 @@ from flightd.core.geometry import wrap_pi
 from flightd.ports import Clock
 from flightd.sim.autopilot.guided import euler
 from flightd.sim.kinematics import Kinematics
+from flightd.sim.pace import PaceWatch
 from flightd.sim.sensors import SensorParams
 from flightd.sim.truth import TruthHistory
 
 Message: TypeAlias = Any
+
+_LOG = logging.getLogger(__name__)
 
 _METRES_PER_DEGREE = 111_319.49
 _WANTED_HZ = 100
@@ -184,6 +188,7 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
         self._transport: Any = None
         self._peer: tuple[str, int] | None = None
         self._range = SensorParams()
+        self._pace = PaceWatch()
         self._first = asyncio.Event()
         self._newest_ns = 0
         self._line: asyncio.Task[None] | None = None
@@ -305,6 +310,10 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
     def connection_lost(self, _exc: Exception | None) -> None:
         self._transport = None
 
+    def _mind_pace(self, boot_ms: int, now_ns: int) -> None:
+        if (pace := self._pace.observe(boot_ms, now_ns)) is not None:
+            _LOG.warning("the simulator runs %.2f times as fast as --speed says: make the two equal", pace)
+
     def error_received(self, exc: Exception) -> None:
         """Nobody is there at the moment (ICMP)."""
 
@@ -318,6 +327,8 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
         for message in self._mav.parse_buffer(data) or ():
             if message.get_type().startswith(("BAD_DATA", "UNKNOWN")):
                 continue
+            if message.get_type() == "ATTITUDE":
+                self._mind_pace(message.time_boot_ms, now_ns)
             truth = self._reader.take(message, max(now_ns, self._newest_ns + 1))
             if truth is not None:
                 self._newest_ns = truth.stamp_ns
