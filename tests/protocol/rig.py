@@ -17,7 +17,7 @@ from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.ports import Vehicle
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import ScaledLoop, VirtualLoop
+from flightd.runtime.loops import VirtualLoop
 from flightd.sim.airframe import Airframe
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer, Ports
@@ -27,6 +27,7 @@ from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.sensors import Sensors
 from flightd.sim.wind import Draught
+from tests.protocol.patience import PatientLoop
 
 CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
 
@@ -82,7 +83,7 @@ class Rig:
         due_ns = clock.now_ns()
         for _ in range(round(duration_s * hz)):
             sent.append(self.vehicle.send(AttitudeSetpoint(clock.now_ns(), **setpoint)))
-            due_ns = max(due_ns, clock.now_ns() - _LATE_NS) + round(1e9 / hz)
+            due_ns += round(1e9 / hz)
             await asyncio.sleep((due_ns - clock.now_ns()) * 1e-9)
         return sent
 
@@ -189,8 +190,6 @@ RIGS: dict[str, Callable[[], Any]] = {
 
 
 _HURRY = 2.0
-_LATE_NS = 100_000_000
-"""A machine that was busy for longer does not make good for it by a burst."""
 
 REAL_TIME = frozenset({"mavsdk"})
 """Those whose library keeps its own clock."""
@@ -204,7 +203,7 @@ def run_virtual(test: Callable[[], Awaitable[Any]]) -> Any:
 def run_real(test: Callable[[], Awaitable[Any]]) -> Any:
     """Run an async test by the clock of the machine, on which a library's threads live; our side of the
     link and the vehicle's hurry a little.  No task may be left behind."""
-    return _run(test, lambda: ScaledLoop(_HURRY))
+    return _run(test, lambda: PatientLoop(_HURRY))
 
 
 def _run(test: Callable[[], Awaitable[Any]], make_loop: Callable[[], asyncio.AbstractEventLoop]) -> Any:
