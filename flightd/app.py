@@ -16,7 +16,7 @@ from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.ground.link import ZmqGround
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.config.schema import Config
-from flightd.core.errors import FlightdError, TransientError
+from flightd.core.errors import FlightdError, InputError, TransientError
 from flightd.core.topics import Topic
 from flightd.core.types import AttitudeSetpoint, Command, Event, EventLevel, Phase, Status
 from flightd.grid.site import Site
@@ -32,6 +32,7 @@ from flightd.runtime.supervise import restarted
 from flightd.vision.detector import Detector
 
 TICK_S = 0.02
+CEILING_MARGIN_M = 0.5
 _STATUS_NS = 100_000_000
 _OVER = {Phase.DONE, Phase.ABORTED, Phase.PILOT}
 _LINGER_NS = 1_500_000_000
@@ -61,7 +62,12 @@ def plan_of(config: Config, site: Site) -> FlightPlan:
 
 
 def pilot_of(config: Config, site: Site) -> Pilot:
-    """A fresh pilot for one flight."""
+    """A fresh pilot for one flight.  Raises InputError where map and configuration contradict each other."""
+    if config.mission.height_m > site.ceiling_m - CEILING_MARGIN_M:
+        raise InputError(
+            f"mission.height_m {config.mission.height_m} is not {CEILING_MARGIN_M} m below the ceiling of"
+            f" {site.name} ({site.ceiling_m} m)"
+        )
     return Pilot(site, plan_of(config, site), config.heading_policy(), config.pilot_params(site))
 
 
@@ -123,7 +129,7 @@ class Daemon:
         self._detections: list[Detection] = []
         self._commands: list[Command] = []
         self._lost = 0
-        self._newest_seq = -1
+        self._newest_ns = -1
         self._picture_ns = 0
         self._status_ns = 0
         self._last_phase: Phase | None = None
@@ -241,11 +247,11 @@ class Daemon:
 
     def _fresh(self) -> list[Detection]:
         """Detections since the last tick in the order of their frames; one overtaken is dropped."""
-        arrived, self._detections = sorted(self._detections, key=lambda d: d.ticket.seq), []
-        fresh = [d for d in arrived if d.ticket.seq > self._newest_seq]
+        arrived, self._detections = sorted(self._detections, key=lambda d: d.ticket.stamp_ns), []
+        fresh = [d for d in arrived if d.ticket.stamp_ns > self._newest_ns]
         self._lost += len(arrived) - len(fresh)
         if fresh:
-            self._newest_seq = fresh[-1].ticket.seq
+            self._newest_ns = fresh[-1].ticket.stamp_ns
         return fresh
 
     def _sent(self, setpoint: AttitudeSetpoint, now_ns: int) -> None:

@@ -42,7 +42,7 @@ class PilotParams:
     gains: FlightGains
     limits: Limits
     mission: MissionParams
-    max_sigma_m: float = 1.5
+    max_sigma_m: float = 1.2
     start_sigma_m: float = 0.15
 
 
@@ -81,12 +81,13 @@ class Pilot:
     def __init__(self, site: Site, plan: FlightPlan, policy: HeadingPolicy, params: PilotParams) -> None:
         self._params = params
         self._plan = plan
-        self._tracker = LineTracker(params.tracker, plan.start_yaw_rad)
+        self._site = site
+        self._begin()
         self._heights = HeightHistory()
-        self._localiser = GridLocaliser(site, plan.start, params.start_sigma_m)
         self._mission = Mission(site, plan, policy, params.mission)
         self._control = FlightController(params.gains)
         self._limiter = Limiter(params.limits)
+        self._armed = False
         self._last_ns: int | None = None
         self._last_yaw: float | None = None
         self._yaw_rate = 0.0
@@ -107,7 +108,7 @@ class Pilot:
         pose = None if tracks is None else self._localiser.step(tracks, height_m)
         for command in tick.commands:
             self._mission.command(command, now_ns)
-        guidance = self._mission.step(self._senses(tick, dt_s, tracks, pose, height_m))
+        guidance = self._mission.step(self._senses(tick, dt_s, pose, height_m))
         motion = self._motion(pose, height_m, dt_s)
         if guidance.guide is Guide.NONE:
             self._control.reset()
@@ -130,24 +131,34 @@ class Pilot:
             events=mission.drain_events(),
         )
 
+    def _begin(self) -> None:
+        """Stand on the pad and know nothing else."""
+        self._tracker = LineTracker(self._params.tracker, self._plan.start_yaw_rad)
+        self._localiser = GridLocaliser(self._site, self._plan.start, self._params.start_sigma_m)
+
     def _take(self, tick: TickInput) -> None:
-        """Telemetry first: a frame needs the attitude and height of its exposure."""
+        """Telemetry first: a frame needs the attitude and height of its exposure.
+
+        What was seen before arming says nothing: until then the drone may have been carried about.  The
+        flight starts on the pad, in the plan's heading.
+        """
+        armed = tick.vehicle is not None and tick.vehicle.armed
+        if armed and not self._armed:
+            self._begin()
+        self._armed = armed
         for sample in tick.attitudes:
             self._tracker.attitude(sample)
         if tick.vehicle is not None:
             v = tick.vehicle
             self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
-            if not v.armed:
-                self._tracker.on_ground()
         for lines in tick.lines:
             self._frame_ns = max(self._frame_ns, lines.stamp_ns)
-            self._tracker.frame(lines, self._heights.at(lines.stamp_ns))
+            if armed:
+                self._tracker.frame(lines, self._heights.at(lines.stamp_ns))
 
-    def _senses(
-        self, tick: TickInput, dt_s: float, tracks: TrackSet | None, pose: GridPose | None, height_m: float
-    ) -> Senses:
+    def _senses(self, tick: TickInput, dt_s: float, pose: GridPose | None, height_m: float) -> Senses:
         now_ns, v = tick.now_ns, tick.vehicle
-        lines_age_s = math.inf if tracks is None or not tracks.lines_ns else (now_ns - tracks.lines_ns) * 1e-9
+        x_ns, y_ns = self._localiser.seen_ns
         known = pose is not None and max(pose.covariance[0], pose.covariance[4]) < self._params.max_sigma_m**2
         return Senses(
             now_ns=now_ns,
@@ -156,7 +167,8 @@ class Pilot:
             localised=known and all(self._localiser.ever_matched),
             height_m=height_m,
             frames_arrive=(now_ns - self._frame_ns) * 1e-9 < _FRAMES_ARRIVE_S,
-            lines_age_s=lines_age_s,
+            x_age_s=(now_ns - x_ns) * 1e-9 if x_ns else math.inf,
+            y_age_s=(now_ns - y_ns) * 1e-9 if y_ns else math.inf,
             telemetry_age_s=math.inf if v is None else (now_ns - v.attitude.stamp_ns) * 1e-9,
             vehicle=v,
             ground_silent_s=tick.ground_silent_s,

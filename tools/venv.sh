@@ -2,14 +2,15 @@
 
 make_venv() {
     local extra=$1 python stamp
-    python=$(command -v python3 || true)
-    [ -n "$python" ] || { echo "flightd needs Python 3.11 or newer: sudo apt install python3 python3-venv" >&2; exit 2; }
-    "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || {
-        echo "flightd needs Python 3.11 or newer; $python is $("$python" -V 2>&1): install python3.11 and python3.11-venv" >&2
+    for python in python3 python3.13 python3.12 python3.11 none; do
+        "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && break
+    done
+    [ "$python" != none ] || {
+        echo "flightd needs Python 3.11 or newer: sudo apt install python3.11 python3.11-venv" >&2
         exit 2
     }
     "$python" -c 'import ensurepip, venv' 2>/dev/null || {
-        echo "Python's venv module is missing: sudo apt install python3-venv" >&2
+        echo "Python's venv module is missing: sudo apt install $python-venv" >&2
         exit 2
     }
     stamp=.venv/installed-$extra-$(cat pyproject.toml constraints.txt | cksum | cut -d' ' -f1)

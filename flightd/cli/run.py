@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightd.core.errors import RunError
+from flightd.core.errors import InputError, RunError
 
 if TYPE_CHECKING:
     from flightd.adapters.recorder.archive import FlightArchive
@@ -46,6 +46,11 @@ def run(config: Annotated[Path, typer.Option(help="Configuration file.")]) -> No
     from flightd.core.types import Phase
 
     chosen = load_config(config)
+    if not chosen.mission.autostart and not chosen.ground.listen:
+        raise InputError(
+            f"config {config}: nobody can start this flight: set ground.listen so that flightctl can, or"
+            " mission.autostart = true"
+        )
     site = load_site(chosen.mission.site)
     with FlightProgress(shown=True) as progress:
         result = asyncio.run(_until_signal(chosen, site, progress))
@@ -80,7 +85,7 @@ async def _fly(config: Config, site: Site, observer: Callable[[Status], None]) -
             stack.enter_context(recorder)
         ground = stack.enter_context(ground_link(config, site, clock) or nullcontext())
         await pool.ready()
-        beside = [asyncio.ensure_future(part.run()) for part in (recorder, archive) if part is not None]
+        beside = [asyncio.ensure_future(archive.run())] if archive is not None else []
         try:
             return await Daemon(config, site, clock, pool, recorder, [observer], ground).fly()
         finally:

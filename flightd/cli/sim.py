@@ -40,8 +40,9 @@ def sim(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of wind, sensors, floor and camera.", min=0)] = 1,
     vehicle: Annotated[
-        str, typer.Option(help="ardupilot, px4, ardrone or mavsdk (flies PX4, in real time).")
-    ] = "ardupilot",
+        str | None,
+        typer.Option(help="ardupilot (default), px4, ardrone or mavsdk (flies PX4, in real time)."),
+    ] = None,
     speed: Annotated[
         str | None,
         typer.Option(help="max (lockstep, the default), or a multiple of real time.", show_default=False),
@@ -67,13 +68,12 @@ def sim(
     external = bool(truth_url or vehicle_url)
     if external and not (truth_url and vehicle_url):
         raise InputError("--truth-url and --vehicle-url belong together: give both or neither")
-    factor = _factor(speed, _own_clock(vehicle, truth_url))
-    chosen, site = _configured(config, warehouse, vehicle, settings or [])
+    conditions = _scenario(scenario or [])
+    chosen, site = _configured(config, warehouse, vehicle, settings or [], _camera_keys(conditions))
+    factor = _factor(speed, _own_clock(chosen.vehicle.kind, truth_url))
     if external:
         truth_address(truth_url)
         chosen = chosen.model_copy(update={"vehicle": chosen.vehicle.model_copy(update={"url": vehicle_url})})
-    conditions = _scenario(scenario or [])
-    chosen = _camera_of(chosen, conditions)
     _make_folder(out)
     started = time.monotonic()
     with FlightProgress(shown=not as_json) as progress:
@@ -118,9 +118,14 @@ def _factor(speed: str | None, own_clock: str) -> float | None:
 
 
 def _configured(
-    path: Path | None, warehouse: str | None, vehicle: str, settings: Sequence[str]
+    path: Path | None,
+    warehouse: str | None,
+    vehicle: str | None,
+    settings: Sequence[str],
+    camera: dict[str, Any],
 ) -> tuple[Any, Any]:
-    """Configuration and site, with the command's own options laid over the file."""
+    """Configuration and site, with the command's own options laid over the file; `camera` are the
+    simulated camera's keys, which hold unless a setting says otherwise."""
     from flightd.config.paths import shipped
     from flightd.config.schema import load_table, parse_config
     from flightd.config.site_file import load_site
@@ -128,7 +133,10 @@ def _configured(
 
     path = path or shipped("sim.toml")
     table = load_table(path)
-    _lay(table, "vehicle.kind", vehicle)
+    for name, value in camera.items():
+        _lay(table, f"camera.{name}", value)
+    if vehicle is not None:
+        _lay(table, "vehicle.kind", vehicle)
     for setting in settings:
         key, equals, value = setting.partition("=")
         if not equals:
@@ -170,22 +178,19 @@ def _scenario(paths: Sequence[Path]) -> Any:
     return load_scenario(paths[0]) if paths else Scenario()
 
 
-def _camera_of(config: Any, scenario: Any) -> Any:
-    """The daemon's calibration of the simulated camera."""
+def _camera_keys(scenario: Any) -> dict[str, Any]:
+    """The calibration of the simulated camera, as a configuration has it."""
     lens = scenario.camera.camera().lens
-    camera = config.camera.model_copy(
-        update={
-            "width_px": lens.width_px,
-            "height_px": lens.height_px,
-            "fx_px": lens.fx_px,
-            "fy_px": lens.fy_px,
-            "cx_px": lens.cx_px,
-            "cy_px": lens.cy_px,
-            "distortion": lens.distortion,
-            "latency_s": scenario.camera.capture_delay_s,
-        }
-    )
-    return config.model_copy(update={"camera": camera})
+    return {
+        "width_px": lens.width_px,
+        "height_px": lens.height_px,
+        "fx_px": lens.fx_px,
+        "fy_px": lens.fy_px,
+        "cx_px": lens.cx_px,
+        "cy_px": lens.cy_px,
+        "distortion": lens.distortion,
+        "latency_s": scenario.camera.capture_delay_s,
+    }
 
 
 def _make_folder(out: Path) -> None:

@@ -63,16 +63,27 @@ class Simulation:
 
 
 def fly(simulation: Simulation) -> FlightResult:
-    """Fly it and leave `flight.mcap` and `truth.mcap` in the folder."""
-    if simulation.speed is None:
-        with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-            return runner.run(_lockstep(simulation))
-    factor = simulation.speed
-    with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
-        return runner.run(_real_time(simulation, factor))
+    """Fly it and leave `flight.mcap` and `truth.mcap` in the folder.  RunError when it was ended early."""
+    try:
+        if simulation.speed is None:
+            with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+                return runner.run(_lockstep(simulation))
+        factor = simulation.speed
+        with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
+            return runner.run(_real_time(simulation, factor))
+    except asyncio.CancelledError:
+        raise RunError("ended by a signal") from None
+
+
+def _end_on_sigterm() -> None:
+    """SIGTERM ends the flight as an interrupt does: everything is closed on the way out."""
+    task = asyncio.current_task()
+    assert task is not None
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
 
 
 async def _lockstep(simulation: Simulation) -> FlightResult:
+    _end_on_sigterm()
     clock = LoopClock()
     with ExitStack() as stack:
         recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=True))
@@ -101,6 +112,7 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
 
 
 async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
+    _end_on_sigterm()
     clock = LoopClock()
     ports, camera_port = _vehicle_ports(simulation.config), free_port()
     context = multiprocessing.get_context("spawn")
@@ -146,15 +158,19 @@ async def _within_limit(simulation: Simulation, daemon: Daemon, beside: asyncio.
     """The flight, unless it takes far longer than its plan can, or what runs beside it fails."""
     limit_s = 120.0 + 60.0 * (len(plan_of(simulation.config, simulation.site).stops) + 1)
     flight = asyncio.ensure_future(daemon.fly())
-    async with asyncio.timeout(limit_s):
-        parts: list[asyncio.Future[Any]] = [flight, beside]
-        await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED)
-        if flight.done():
-            return flight.result()
+    parts: list[asyncio.Future[Any]] = [flight, beside]
+    try:
+        await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED, timeout=limit_s)
+    finally:
+        over = flight.done()
         flight.cancel()
         await asyncio.wait([flight])
+    if over:
+        return flight.result()
+    if beside.done():
         beside.result()
         raise RunError("the simulated world ended before the flight")
+    raise RunError(f"the flight was not over after {limit_s:.0f} s of its own time")
 
 
 def _run_world(spec: WorldSpec, factor: float, log: Path, pipe: Connection) -> None:

@@ -27,6 +27,7 @@ from flightd.tracking.tilt import TiltCompensation
 
 _Positive = Annotated[float, Field(gt=0, le=1e4, allow_inf_nan=False)]
 _Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+_Bend = Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)]
 _Offset = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
 
 
@@ -47,9 +48,13 @@ class CameraConfig(_Section):
     fps: float = Field(30.0, gt=0, le=240, description="frame rate asked for")
     fx_px: float = Field(381.4, gt=1, le=20000, description="focal length in x (80 deg across 640 px)")
     fy_px: float = Field(381.4, gt=1, le=20000, description="focal length in y")
-    cx_px: float | None = Field(None, description="principal point x; the picture's middle when left out")
-    cy_px: float | None = Field(None, description="principal point y; the picture's middle when left out")
-    distortion: tuple[float, float, float, float, float] = Field(
+    cx_px: float | None = Field(
+        None, allow_inf_nan=False, description="principal point x; the picture's middle when left out"
+    )
+    cy_px: float | None = Field(
+        None, allow_inf_nan=False, description="principal point y; the picture's middle when left out"
+    )
+    distortion: tuple[_Bend, _Bend, _Bend, _Bend, _Bend] = Field(
         (0.0, 0.0, 0.0, 0.0, 0.0), description="k1 k2 p1 p2 k3, OpenCV's order"
     )
     mount_yaw_deg: float = Field(0.0, ge=-180, le=180, description="turn of the camera, clockwise from above")

@@ -66,7 +66,10 @@ class FlightController:
             loop.reset()
 
     def step(self, now_ns: int, motion: Motion, reference: Reference, dt_s: float) -> AttitudeSetpoint:
-        """The full set point, all loops closed."""
+        """The full set point, all loops closed; level when any number it would be made of is not finite."""
+        known = (motion.x_m, motion.y_m, motion.vx_mps, motion.vy_mps, motion.yaw_rad, motion.yaw_rate_radps)
+        if not all(map(math.isfinite, (*known, reference.x_m, reference.y_m, reference.yaw_rad))):
+            return self.level(now_ns, motion, reference, dt_s)
         kd = self._gains.horizontal.kd
         ax = self._x.step(
             reference.x_m - motion.x_m, motion.vx_mps, dt_s, reference.ax_mps2 + kd * reference.vx_mps
@@ -97,6 +100,6 @@ class FlightController:
 
     def _climb(self, motion: Motion, reference: Reference, dt_s: float) -> float:
         """Height loop; without a height only the climb rate that is fed forward."""
-        if math.isnan(motion.height_m):
-            return reference.climb_mps
+        if not math.isfinite(motion.height_m - reference.height_m):
+            return reference.climb_mps if math.isfinite(reference.climb_mps) else 0.0
         return self._height.step(reference.height_m - motion.height_m, 0.0, dt_s, reference.climb_mps)

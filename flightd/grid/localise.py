@@ -24,6 +24,8 @@ _MATCH_SLACK_M = 0.06
 _MIN_HITS = 3
 _DRIFT_MPS = 0.15
 """Growth of the position's sigma while no line is seen."""
+_FRESH_NS = 300_000_000
+"""A line seen so recently counts as seen: pictures come late and now and then without a line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +46,16 @@ class _Axis:
         self.position_m = position_m
         self.sigma_m = sigma_m
         self.ever_matched = False
+        self.seen_ns = 0
 
     def step(
-        self, tracks: Sequence[TrackedLine], velocity_mps: float, dt_s: float, other_m: float, reach_m: float
+        self,
+        tracks: Sequence[TrackedLine],
+        now_ns: int,
+        velocity_mps: float,
+        dt_s: float,
+        other_m: float,
+        reach_m: float,
     ) -> None:
         self.position_m += velocity_mps * dt_s
         self.sigma_m += _DRIFT_MPS * dt_s
@@ -61,7 +70,9 @@ class _Axis:
                     self._matched[track.id] = at
                     self.ever_matched = True
             if track.id in self._matched:
-                w = 1.0 / (track.sigma_m**2 + _SURVEY_SIGMA_M**2)
+                unseen_m = _DRIFT_MPS * max(now_ns - track.seen_ns - _FRESH_NS, 0) * 1e-9
+                w = 1.0 / (track.sigma_m**2 + _SURVEY_SIGMA_M**2 + unseen_m**2)
+                self.seen_ns = max(self.seen_ns, track.seen_ns)
                 weight += w
                 total += w * (self._matched[track.id] - track.offset_m)
         if weight:
@@ -99,6 +110,11 @@ class GridLocaliser:
         self._stamp_ns: int | None = None
 
     @property
+    def seen_ns(self) -> tuple[int, int]:
+        """When a line of the map was last seen that tells x, and y; 0 before the first."""
+        return self._x.seen_ns, self._y.seen_ns
+
+    @property
     def ever_matched(self) -> tuple[bool, bool]:
         """Whether a map line has been recognised yet in x and in y: before that, position is belief."""
         return self._x.ever_matched, self._y.ever_matched
@@ -109,8 +125,9 @@ class GridLocaliser:
         self._stamp_ns = tracks.stamp_ns
         reach_m = max(1.5 * height_m, 0.3)
         x_before = self._x.position_m
-        self._x.step(tracks.across_x, tracks.vx_mps, dt_s, self._y.position_m, reach_m)
-        self._y.step(tracks.across_y, tracks.vy_mps, dt_s, x_before, reach_m)
+        now_ns = tracks.stamp_ns
+        self._x.step(tracks.across_x, now_ns, tracks.vx_mps, dt_s, self._y.position_m, reach_m)
+        self._y.step(tracks.across_y, now_ns, tracks.vy_mps, dt_s, x_before, reach_m)
         x, y = self._x.position_m, self._y.position_m
         node = self._site.nearest(x, y)
         sx, sy = self._x.sigma_m, self._y.sigma_m

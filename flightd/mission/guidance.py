@@ -42,10 +42,13 @@ class MissionParams:
     touch_below_m: float = 0.35
     lines_hold_s: float = 0.25
     lines_land_s: float = 6.0
+    lines_found_s: float = 1.0
+    followed_hold_s: float = 0.8
     telemetry_hold_s: float = 0.3
     telemetry_land_s: float = 3.0
     arm_timeout_s: float = 60.0
-    phase_timeout_s: float = 40.0
+    phase_slack_s: float = 20.0
+    phase_share: float = 2.0
     battery_start_frac: float = 0.3
     battery_home_frac: float = 0.2
     battery_land_frac: float = 0.1
@@ -74,7 +77,8 @@ class Senses:
     localised: bool
     height_m: float
     frames_arrive: bool
-    lines_age_s: float
+    x_age_s: float
+    y_age_s: float
     telemetry_age_s: float
     vehicle: VehicleState | None
     ground_silent_s: float = 0.0

@@ -20,6 +20,8 @@ _DEMANDS = {
     Phase.PILOT: Demand.HANDS_OFF,
 }
 _TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
+_HEARTBEAT_S = 2.0
+"""A heartbeat comes each second; older than this, modes and arming are those of the past."""
 
 
 class Mission:
@@ -45,7 +47,11 @@ class Mission:
         self._started = params.autostart
         self._ordered: Trigger | None = None
         self._since_ns = 0
+        self._limit_s = math.inf
         self._settled_ns: int | None = None
+        self._lost_ns: int | None = None
+        self._found_ns: int | None = None
+        self._no_height_ns: int | None = None
         self._steering = False
         self._events: list[Event] = []
         self._x = Profile(start.x_m, params.speed_mps, params.accel_mps2)
@@ -81,6 +87,10 @@ class Mission:
             self._paused = True
         elif kind is CommandKind.RESUME:
             self._paused = False
+        elif kind in {CommandKind.HOME, CommandKind.GOTO} and not self.airborne:
+            self._event(
+                now_ns, EventLevel.WARNING, "command", f"{kind.value} refused: the drone does not fly"
+            )
         elif kind is CommandKind.HOME:
             self._go_home(now_ns, "ordered home")
         elif kind is CommandKind.GOTO:
@@ -100,16 +110,18 @@ class Mission:
     def _triggers(self, s: Senses) -> set[Trigger]:
         p, v = self._params, s.vehicle
         found = self._progress(s)
-        in_phase_s = (s.now_ns - self._since_ns) * 1e-9
         if self._ordered is not None:
             found.add(self._ordered)
         found |= self._ground(s)
         if self._paused:
             found.add(Trigger.HOLD)
         if v is not None and self.airborne:
-            if not v.armed:
+            heard = (
+                max(s.telemetry_age_s, (s.now_ns - v.heartbeat_ns) * 1e-9 - _HEARTBEAT_S) < p.telemetry_hold_s
+            )
+            if heard and not v.armed:
                 found.add(Trigger.DISARMED)
-            elif not v.in_control:
+            elif heard and not v.in_control:  # silence is no pilot: a lost link is a lost link
                 found.add(Trigger.PILOT_TOOK)
             if v.battery_frac < p.battery_land_frac:
                 found.add(Trigger.BATTERY_CRITICAL)
@@ -117,15 +129,36 @@ class Mission:
                 self._go_home(s.now_ns, "battery low")
         if s.telemetry_age_s > p.telemetry_land_s:
             found.add(Trigger.TELEMETRY_LOST)
-        if in_phase_s > (p.arm_timeout_s if self.phase is Phase.ARMING else p.phase_timeout_s):
+        self._no_height_ns = _since(self._no_height_ns, math.isnan(s.height_m), s.now_ns)
+        if _for_s(self._no_height_ns, s.now_ns) > p.telemetry_land_s:
+            found.add(Trigger.HEIGHT_LOST)
+        if (s.now_ns - self._since_ns) * 1e-9 > self._limit_s:
             found.add(Trigger.TIMED_OUT)
-        if s.lines_age_s > p.lines_hold_s or not s.localised:
-            found.add(Trigger.LINES_LOST)
-            if in_phase_s > p.lines_land_s:
-                found.add(Trigger.LINES_LOST_LONG)
-        elif in_phase_s > p.lines_hold_s and Trigger.HOLD not in found:
-            found.add(Trigger.LINES_FOUND)
-        return found
+        return found | self._sight(s, Trigger.HOLD in found)
+
+    def _sight(self, s: Senses, held: bool) -> set[Trigger]:
+        """Lines lost and found.  The time without lines runs on through short glimpses: only lines that
+        stay for a while end it."""
+        p = self._params
+        lost = min(s.x_age_s, s.y_age_s) > p.lines_hold_s or not s.localised or self._off_line(s)
+        self._found_ns = _since(self._found_ns, not lost, s.now_ns)
+        if lost and self._lost_ns is None:
+            self._lost_ns = s.now_ns
+        elif _for_s(self._found_ns, s.now_ns) > p.lines_found_s:
+            self._lost_ns = None
+        if lost and _for_s(self._lost_ns, s.now_ns) > p.lines_land_s:
+            return {Trigger.LINES_LOST, Trigger.LINES_LOST_LONG}
+        if lost:
+            return {Trigger.LINES_LOST}
+        back = _for_s(self._found_ns, s.now_ns) > p.lines_hold_s and not held
+        return {Trigger.LINES_FOUND} if back else set()
+
+    def _off_line(self, s: Senses) -> bool:
+        """On a leg, the line that is followed must be seen, whatever else is."""
+        if self.phase is not Phase.FOLLOW:
+            return False
+        along_x = abs(self.goal.x_m - self._anchor[0]) >= abs(self.goal.y_m - self._anchor[1])
+        return (s.y_age_s if along_x else s.x_age_s) > self._params.followed_hold_s
 
     def _ground(self, s: Senses) -> set[Trigger]:
         """What a lost ground link asks for, by the configured action; the link's return ends a hold."""
@@ -148,7 +181,8 @@ class Mission:
             case Phase.PREFLIGHT:
                 done, trigger = self._started and not self._not_ready(s), Trigger.READY
             case Phase.ARMING:
-                done, trigger = v is not None and v.armed and v.in_control, Trigger.ARMED
+                ready = v is not None and v.armed and v.in_control and not math.isnan(s.height_m)
+                done, trigger = ready, Trigger.ARMED
             case Phase.TAKE_OFF:
                 done, trigger = s.height_m > p.height_m - p.height_reached_m, Trigger.AT_HEIGHT
             case Phase.ACQUIRE:
@@ -163,7 +197,7 @@ class Mission:
                 there = _distance(s, (goal.x_m, goal.y_m)) < p.arrive_m and _speed(s) < p.arrive_mps
                 done, trigger = self._settled(s, there), Trigger.ARRIVED
             case Phase.HOVER:
-                dwell_s = p.dwell_s if goal.visit else 0.0
+                dwell_s = p.dwell_s if goal.visit and not self._returning else 0.0
                 done = (s.now_ns - self._since_ns) * 1e-9 >= dwell_s
                 last = self._next + 1 >= len(self._stops)
                 trigger = Trigger.ROUTE_DONE if last else Trigger.DWELLED
@@ -176,24 +210,22 @@ class Mission:
         p, v = self._params, s.vehicle
         if v is None or s.telemetry_age_s > p.telemetry_hold_s:
             return "no telemetry from the vehicle"
-        if v.armed:
-            return "the vehicle is armed already: disarm it first"
-        if math.isnan(v.height_m):
-            return "no height from the vehicle's range finder"
-        if v.battery_frac < p.battery_start_frac:
-            return f"battery at {v.battery_frac:.0%}, {p.battery_start_frac:.0%} needed to start"
-        if not s.frames_arrive:
-            return "no picture from the down camera"
         silent = self._ground_lost and p.ground_lost is not GroundLost.CONTINUE
-        return "the ground station that attends this flight fell silent" if silent else ""
+        low = f"battery at {v.battery_frac:.0%}, {p.battery_start_frac:.0%} needed to start"
+        checks = {
+            "the vehicle is armed already: disarm it first": v.armed,
+            "no height from the vehicle's range finder": math.isnan(v.height_m),
+            "no battery level from the vehicle": math.isnan(v.battery_frac),
+            low: v.battery_frac < p.battery_start_frac,
+            "no picture from the down camera": not s.frames_arrive,
+            "the ground station that attends this flight fell silent": silent,
+        }
+        return next((reason for reason, failed in checks.items() if failed), "")
 
     def _settled(self, s: Senses, condition: bool) -> bool:
         """True once `condition` has held for the settling time."""
-        if not condition:
-            self._settled_ns = None
-        elif self._settled_ns is None:
-            self._settled_ns = s.now_ns
-        return self._settled_ns is not None and (s.now_ns - self._settled_ns) * 1e-9 >= self._params.settle_s
+        self._settled_ns = _since(self._settled_ns, condition, s.now_ns)
+        return condition and _for_s(self._settled_ns, s.now_ns) >= self._params.settle_s
 
     # Changing phase
 
@@ -221,8 +253,26 @@ class Mission:
         self._event(s.now_ns, level, "phase", f"{before.value} -> {self.phase.value}: {self.reason}")
         self._since_ns = s.now_ns
         self._settled_ns = None
+        self._limit_s = self._time_limit_s(s)
         if phase is Phase.TAKE_OFF:
-            self._height.reset(s.height_m)
+            self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m)
+
+    def _time_limit_s(self, s: Senses) -> float:
+        """How long the phase just begun may take: a fixed slack, and a multiple of its way's own time."""
+        p = self._params
+        match self.phase:
+            case Phase.ARMING:
+                return p.arm_timeout_s
+            case Phase.TAKE_OFF:
+                way_s = p.height_m / p.climb_mps
+            case Phase.TURN:
+                way_s = math.pi / p.turn_rate_radps
+            case Phase.FOLLOW:
+                here = _distance(s, (self.goal.x_m, self.goal.y_m))
+                way_s = (0.0 if math.isinf(here) else here) / p.speed_mps
+            case _:
+                way_s = 0.0
+        return p.phase_slack_s + p.phase_share * way_s
 
     def _note_visit(self, s: Senses) -> None:
         if self.goal.visit:
@@ -231,12 +281,15 @@ class Mission:
 
     def _go_home(self, now_ns: int, reason: str) -> None:
         self._returning = True
+        self._paused = False
         self._aborting = True
         self._event(now_ns, EventLevel.WARNING, "home", reason)
         self._replan(self._plan.home, visit=False)
 
     def _go_to(self, now_ns: int, node: str) -> None:
-        if node in self._site.nodes:
+        if self._returning:
+            self._event(now_ns, EventLevel.WARNING, "command", f"goto {node} refused: on the way home")
+        elif node in self._site.nodes:
             self._replan(node, visit=True)
         else:
             self._event(now_ns, EventLevel.WARNING, "command", f"no node {node!r} on site {self._site.name}")
@@ -258,6 +311,9 @@ class Mission:
             return Guidance(self.phase, Guide.NONE, self._reference(0.0), demand)
         if self.phase is Phase.LAND:
             climb, demand = self._descend(s)
+        elif math.isnan(s.height_m) or s.telemetry_age_s > self._params.telemetry_hold_s:
+            self._height.reset(self._height.position)  # no climb by heights of the past
+            climb = 0.0
         else:
             self._height.step(self._params.height_m, s.dt_s)
             climb = self._height.velocity
@@ -271,15 +327,15 @@ class Mission:
         height = 0.0 if math.isnan(s.height_m) else s.height_m
         rate = p.touch_mps if height < p.touch_below_m else p.land_mps
         self._height.reset(height, -rate)
-        standing = v is not None and v.landed is LandedState.ON_GROUND
         blind = s.telemetry_age_s > p.telemetry_land_s
+        standing = v is not None and v.landed is LandedState.ON_GROUND and not blind
         return -rate, Demand.DISARM if standing else Demand.LAND if blind else Demand.FLY
 
     def _steer(self, s: Senses) -> bool:
         """Move the reference towards where the phase wants it; False when the floor cannot be relied on."""
         p, pose = self._params, s.pose
         too_low = self.phase is Phase.TAKE_OFF and s.height_m < p.steer_above_m
-        stale = s.lines_age_s > p.lines_hold_s or s.telemetry_age_s > p.telemetry_hold_s
+        stale = min(s.x_age_s, s.y_age_s) > p.lines_hold_s or s.telemetry_age_s > p.telemetry_hold_s
         if pose is None or stale or too_low or not s.localised:
             return False
         if not self._steering:
@@ -322,3 +378,14 @@ def _distance(s: Senses, to: tuple[float, float]) -> float:
 
 def _speed(s: Senses) -> float:
     return math.inf if s.pose is None else math.hypot(s.pose.vx_mps, s.pose.vy_mps)
+
+
+def _since(since_ns: int | None, condition: bool, now_ns: int) -> int | None:
+    """The time since which `condition` has held, None while it does not."""
+    if not condition:
+        return None
+    return now_ns if since_ns is None else since_ns
+
+
+def _for_s(since_ns: int | None, now_ns: int) -> float:
+    return 0.0 if since_ns is None else (now_ns - since_ns) * 1e-9

@@ -19,6 +19,7 @@ class Trigger(enum.Enum):
     DISARMED = "the vehicle disarmed"
     STOP = "stop ordered"
     TELEMETRY_LOST = "vehicle telemetry lost"
+    HEIGHT_LOST = "height lost"
     BATTERY_CRITICAL = "battery critical"
     LAND_HERE = "landing ordered"
     GROUND_LOST = "ground link lost"
@@ -33,7 +34,6 @@ class Trigger(enum.Enum):
     ACQUIRED = "position acquired"
     ARRIVED = "arrived"
     DWELLED = "dwell over"
-    TURN_DUE = "turn due"
     TURNED = "turned"
     ROUTE_DONE = "route done"
 
@@ -43,6 +43,7 @@ _SAFETY = {
     Trigger.DISARMED: Phase.ABORTED,
     Trigger.STOP: Phase.LAND,
     Trigger.TELEMETRY_LOST: Phase.LAND,
+    Trigger.HEIGHT_LOST: Phase.LAND,
     Trigger.BATTERY_CRITICAL: Phase.LAND,
     Trigger.LAND_HERE: Phase.LAND,
     Trigger.GROUND_LOST: Phase.LAND,
@@ -50,7 +51,11 @@ _SAFETY = {
 _ON_LINES = _SAFETY | {Trigger.LINES_LOST: Phase.HOLD, Trigger.HOLD: Phase.HOLD}
 
 TABLE: Mapping[Phase, Mapping[Trigger, Phase]] = {
-    Phase.PREFLIGHT: {Trigger.READY: Phase.ARMING},
+    Phase.PREFLIGHT: {
+        Trigger.STOP: Phase.ABORTED,
+        Trigger.LAND_HERE: Phase.ABORTED,
+        Trigger.READY: Phase.ARMING,
+    },
     Phase.ARMING: {
         Trigger.STOP: Phase.ABORTED,
         Trigger.LAND_HERE: Phase.ABORTED,

@@ -53,12 +53,12 @@ class Child:
         self._on_death = on_death
         self._answer: asyncio.Future[Any] | None = None
         context = child_context()
-        self._conn, theirs = context.Pipe()
-        self._process = context.Process(target=_live, args=(theirs, make), daemon=True)
-        self._process.start()
-        theirs.close()
+        self._conn, self._theirs = context.Pipe()
+        self._process = context.Process(target=_live, args=(self._theirs, make), daemon=True)
         self.alive = True
-        self._loop.add_reader(self._conn.fileno(), self._readable)
+        # in a thread: where the server that forks children has died too, a new one takes seconds
+        self._starting = self._loop.run_in_executor(None, self._process.start)
+        self._starting.add_done_callback(self._started)
 
     @property
     def pid(self) -> int | None:
@@ -82,14 +82,25 @@ class Child:
         self.alive = False
         self._loop.remove_reader(self._conn.fileno())
         self._conn.close()
-        self._process.kill()
+        if self._process.pid is not None:
+            self._process.kill()
         if self._answer is not None and not self._answer.done():
             self._answer.set_exception(TransientError("the process died"))
         self._on_death(self)
 
     def join(self, timeout_s: float) -> None:
         """Wait for a killed child to be gone."""
-        self._process.join(timeout_s)
+        if self._process.pid is not None:
+            self._process.join(timeout_s)
+
+    def _started(self, starting: asyncio.Future[None]) -> None:
+        self._theirs.close()
+        if starting.cancelled() or starting.exception() is not None:
+            self.kill()
+        elif not self.alive:  # killed while it started
+            self._process.kill()
+        else:
+            self._loop.add_reader(self._conn.fileno(), self._readable)
 
     def _readable(self) -> None:
         try:

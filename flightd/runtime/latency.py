@@ -10,6 +10,7 @@ import numpy as np
 from flightd.runtime.pool import Detection
 
 _KEEP = 200_000
+_SAME_TICK_NS = 40_000_000
 
 
 class LatencyBook:
@@ -28,6 +29,8 @@ class LatencyBook:
     def sent(self, now_ns: int) -> None:
         """The set point of that tick left at `now_ns`."""
         for detection, taken_ns in self._waiting:
+            if now_ns - taken_ns > _SAME_TICK_NS:  # its own set point was never sent
+                continue
             ticket = detection.ticket
             marks = (
                 ticket.stamp_ns,

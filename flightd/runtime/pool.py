@@ -22,6 +22,8 @@ from flightd.runtime.child import Child
 from flightd.runtime.ring import FrameRing, FrameTicket
 
 _MAX_RINGS = 4
+_HOPELESS = 8
+"""Workers that died in a row without one being ready."""
 
 
 class Detect(Protocol):
@@ -97,6 +99,8 @@ class DetectorPool:
         self._idle: asyncio.LifoQueue[Child] = asyncio.LifoQueue()
         self._workers: set[Child] = set()
         self._open = False
+        self._deaths = 0
+        self._changed = asyncio.Event()
         self.lost: Counter[str] = Counter()
         self.replaced = 0
 
@@ -119,11 +123,13 @@ class DetectorPool:
             worker.join(1.0)
 
     async def ready(self) -> None:
-        """Wait until every worker can take a picture."""
+        """Wait until every worker can take a picture.  UnavailableError when they die one after another."""
         with self._clock.hold():
-            idle = [await self._idle.get() for _ in range(self._size)]
-        for worker in idle:
-            self._idle.put_nowait(worker)
+            while self._idle.qsize() < self._size:
+                if self._deaths >= _HOPELESS:
+                    raise UnavailableError("detector processes die as they start: is there memory left?")
+                self._changed.clear()
+                await self._changed.wait()
 
     async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None:
         """Lines of one picture (and its JPEG if wanted), or None when it was lost (counted in `lost`)."""
@@ -157,10 +163,21 @@ class DetectorPool:
                 return worker
 
     def _add(self) -> None:
-        self._workers.add(Child(self._make, self._idle.put_nowait, self._replace))
+        if self._open:
+            self._workers.add(Child(self._make, self._welcome, self._replace))
+
+    def _welcome(self, worker: Child) -> None:
+        self._deaths = 0
+        self._idle.put_nowait(worker)
+        self._changed.set()
 
     def _replace(self, worker: Child) -> None:
+        """At once the first time; workers that die as they start are given more and more time."""
         self._workers.discard(worker)
-        if self._open:
-            self.replaced += 1
-            self._add()
+        if not self._open:
+            return
+        self.replaced += 1
+        self._deaths += 1
+        self._changed.set()
+        wait_s = 0.0 if self._deaths <= self._size else min(0.1 * 2.0 ** (self._deaths - self._size), 5.0)
+        asyncio.get_running_loop().call_later(wait_s, self._add)

@@ -61,7 +61,7 @@ class FrameRing:
             raise UnavailableError(f"shared picture memory {path.name}: {err.strerror}") from err
         try:
             if owner:
-                os.posix_fallocate(fd, 0, size)
+                _reserve(fd, path, size)
             elif os.fstat(fd).st_size < size:
                 raise UnavailableError(f"shared picture memory {path.name} is smaller than {slots} pictures")
             self._memory = mmap.mmap(fd, size)
@@ -74,6 +74,8 @@ class FrameRing:
 
     @classmethod
     def create(cls, slots: int, width_px: int, height_px: int) -> FrameRing:
+        """A new ring.  What processes that were killed have left of theirs is removed on the way."""
+        _sweep()
         path = _FOLDER / f"flightd-{os.getpid()}-{secrets.token_hex(4)}"
         return cls(path, slots, width_px, height_px, owner=True)
 
@@ -114,3 +116,20 @@ class FrameRing:
         if self._owner:
             with contextlib.suppress(FileNotFoundError):
                 self._path.unlink()
+
+
+def _reserve(fd: int, path: Path, size: int) -> None:
+    """Take the memory now: a full /dev/shm must fail here, not as a bus error in flight."""
+    try:
+        os.posix_fallocate(fd, 0, size)
+    except OSError:
+        path.unlink(missing_ok=True)
+        raise
+
+
+def _sweep() -> None:
+    for path in _FOLDER.glob("flightd-*-*"):
+        pid = path.name.split("-")[1]
+        if pid.isdigit() and not Path("/proc", pid).exists():
+            with contextlib.suppress(OSError):  # another user's, or gone already
+                path.unlink()

@@ -7,6 +7,7 @@ jitter, as a real camera and its driver do.  Its clock is not the daemon's.
 from __future__ import annotations
 
 import asyncio
+import math
 import random
 from collections.abc import Callable
 from functools import partial
@@ -22,7 +23,7 @@ from flightd.runtime.ring import FrameRing
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.renderer import Appearance, Renderer, SimCamera
 
-_SLOTS = 12
+_SPARE_SLOTS = 8
 _CLOCK_OFFSET_NS = 7_300_000_000_000
 
 
@@ -31,7 +32,7 @@ class _RenderWorker:
 
     def __init__(self, site: Site, camera: SimCamera, appearance: Appearance, seed: int, ring: str) -> None:
         self._renderer = Renderer(site, camera, appearance, seed)
-        self._ring = FrameRing.attach(ring, _SLOTS, camera.lens.width_px, camera.lens.height_px)
+        self._ring = FrameRing.attach(ring, _slots(camera), camera.lens.width_px, camera.lens.height_px)
 
     def __call__(self, request: tuple[Kinematics, int, int]) -> int:
         kinematics, seq, slot = request
@@ -60,18 +61,19 @@ class CameraPeer:
         self._truth_at = truth_at
         self._clock = clock
         self._random = random.Random(f"camera {seed}")
-        self._ring = FrameRing.create(_SLOTS, camera.lens.width_px, camera.lens.height_px)
-        self._make = partial(_RenderWorker, site, camera, appearance, seed, self._ring.name)
+        self._make = partial(_RenderWorker, site, camera, appearance, seed)
         self._ready = asyncio.Event()
         self._turn = asyncio.Lock()
         self.late = 0
 
     async def run(self) -> None:
-        loop = asyncio.get_running_loop()
+        loop, lens = asyncio.get_running_loop(), self._camera.lens
         transport, _ = await loop.create_datagram_endpoint(
             asyncio.DatagramProtocol, remote_addr=self._address
         )
-        child = Child(self._make, lambda _: self._ready.set(), lambda _: None)
+        self._ring = FrameRing.create(_slots(self._camera), lens.width_px, lens.height_px)
+        make = partial(self._make, self._ring.name)
+        child = Child(make, lambda _: self._ready.set(), lambda _: None)
         try:
             with self._clock.hold():
                 await self._ready.wait()
@@ -119,7 +121,7 @@ class CameraPeer:
         lens = self._camera.lens
         notice = FrameNotice(
             self._ring.name,
-            _SLOTS,
+            self._ring.slots,
             slot,
             seq,
             truth.stamp_ns + _CLOCK_OFFSET_NS,
@@ -134,3 +136,8 @@ class CameraPeer:
             await child.ask((truth, seq, slot))
             self._ring.publish(slot, seq, truth.stamp_ns)
             return slot
+
+
+def _slots(camera: SimCamera) -> int:
+    """As many pictures as are on their way at once, and some that are being looked at."""
+    return math.ceil(camera.fps * (camera.capture_delay_s + 4 * camera.jitter_s)) + _SPARE_SLOTS

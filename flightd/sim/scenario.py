@@ -9,7 +9,7 @@ jitter_s = 0.003
 exposure_s = 0.004
 
 [floor]
-appearance = "default"   # default, clean or harsh
+appearance = "default"   # default, clean, harsh, dim, glossy or worn
 
 [wind]
 mean_x_mps = 0.0         # steady draught in the map frame
@@ -29,12 +29,10 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from flightd.core.errors import InputError
-from flightd.sim.appearance import CLEAN, DEFAULT, HARSH, Appearance
+from flightd.sim.appearance import Appearance, preset
 from flightd.sim.autopilot.radio import RadioParams
 from flightd.sim.optics import SimCamera, wide_lens
 from flightd.sim.wind import Draught
-
-_APPEARANCES = {"default": DEFAULT, "clean": CLEAN, "harsh": HARSH}
 
 
 class _Section(BaseModel):
@@ -60,10 +58,10 @@ class CameraScenario(_Section):
 
 
 class FloorScenario(_Section):
-    appearance: Literal["default", "clean", "harsh"] = "default"
+    appearance: Literal["default", "clean", "harsh", "dim", "glossy", "worn"] = "default"
 
     def look(self) -> Appearance:
-        return _APPEARANCES[self.appearance]
+        return preset(self.appearance)
 
 
 class WindScenario(_Section):

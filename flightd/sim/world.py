@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
+from flightd.core.errors import UnavailableError
 from flightd.core.topics import Topic
 from flightd.grid.site import Site
 from flightd.ports import Clock, Recorder
@@ -107,8 +108,11 @@ class World:
 
     async def open(self) -> tuple[str, int]:
         """Bind the vehicle's sockets; the address to which a daemon sends commands.  UnavailableError when
-        an external simulator does not tell its truth."""
-        return await self.vehicle.open()
+        a port is taken or an external simulator does not tell its truth."""
+        try:
+            return await self.vehicle.open()
+        except OSError as err:
+            raise UnavailableError(f"the simulated vehicle cannot listen: {err.strerror}") from err
 
     async def run(self, opened: Callable[[], None] = lambda: None) -> None:
         if isinstance(self.vehicle, ExternalVehicle):

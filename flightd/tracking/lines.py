@@ -70,8 +70,9 @@ class LineTracker:
         forget_ns = round(params.forget_s * 1e9)
         self._x = AxisTracker(params.noise, params.gate_m, forget_ns)
         self._y = AxisTracker(params.noise, params.gate_m, forget_ns)
-        self._stamp_ns = 0
+        self._forget_ns = forget_ns
         self._lines_ns = 0
+        self._stamp_ns = 0
         self.rejected = 0
 
     def attitude(self, sample: Attitude) -> None:
@@ -79,11 +80,6 @@ class LineTracker:
         if self._heading is None:
             offset = wrap_pi(self._start_yaw_rad - sample.yaw_rad)
             self._heading = HeadingTracker(offset, self._params.start_yaw_sigma_rad)
-
-    def on_ground(self) -> None:
-        """Standing still: no velocity, no wind felt."""
-        self._x.reset_motion()
-        self._y.reset_motion()
 
     def frame(self, lines: LineSet, height_m: float) -> bool:
         """Take the lines of one frame seen at `height_m`; False when it could not be used (older than
@@ -128,7 +124,8 @@ class LineTracker:
         moved_x = moved_y = 0.0
         vx, vy = self._x.velocity_mps, self._y.velocity_mps
         ax = ay = 0.0
-        stamp_ns = self._stamp_ns
+        known_ns = now_ns - self._forget_ns  # a longer blindness is not bridged by prediction
+        stamp_ns = max(self._stamp_ns, known_ns)
         while stamp_ns < now_ns:
             step_ns = min(_STEP_NS, now_ns - stamp_ns)
             ax, ay = self._accel(stamp_ns + step_ns // 2)
@@ -149,14 +146,25 @@ class LineTracker:
             vy,
             ax,
             ay,
-            tuple(replace(line, offset_m=line.offset_m - moved_x) for line in self._x.lines()),
-            tuple(replace(line, offset_m=line.offset_m - moved_y) for line in self._y.lines()),
+            tuple(
+                replace(line, offset_m=line.offset_m - moved_x)
+                for line in self._x.lines()
+                if line.seen_ns > known_ns
+            ),
+            tuple(
+                replace(line, offset_m=line.offset_m - moved_y)
+                for line in self._y.lines()
+                if line.seen_ns > known_ns
+            ),
         )
 
     def _advance(self, stamp_ns: int) -> None:
         """Carry the filters from the last frame to this one."""
         assert self._heading is not None
-        if self._stamp_ns:
+        if stamp_ns - self._stamp_ns > self._forget_ns:
+            self._x.forget()
+            self._y.forget()
+        elif self._stamp_ns:
             while self._stamp_ns < stamp_ns:
                 step_ns = min(2 * _STEP_NS, stamp_ns - self._stamp_ns)
                 ax, ay = self._accel(self._stamp_ns + step_ns // 2)

@@ -141,14 +141,12 @@ class AxisTracker:
         self._forget(stamp_ns)
         return innovations
 
-    def reset_motion(self) -> None:
-        """Forget velocity and disturbance (standing on the floor) but keep the lines."""
-        n = len(self._x)
-        self._x[:2] = 0.0
-        self._p[:2, :], self._p[:, :2] = 0.0, 0.0
-        self._p[0, 0] = self._noise.start_velocity_mps**2
-        self._p[1, 1] = self._noise.start_disturbance_mps2**2
-        assert self._p.shape == (n, n)
+    def forget(self) -> None:
+        """Know nothing any more: no lines, and a velocity as uncertain as at the start."""
+        noise = self._noise
+        self._tracks = []
+        self._x = np.zeros(2)
+        self._p = np.diag([noise.start_velocity_mps**2, noise.start_disturbance_mps2**2])
 
     def _filter(self) -> KalmanFilter:
         n = len(self._x)

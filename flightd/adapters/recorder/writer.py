@@ -102,7 +102,10 @@ def serve(link: socket.socket, file: McapFile) -> None:
     while True:
         wait_s = max(0.0, flush_at_s - time.monotonic())
         if select.select([link], [], [], wait_s)[0]:
-            received = link.recv(_RECEIVE_BYTES)
+            try:
+                received = link.recv(_RECEIVE_BYTES)
+            except ConnectionError:  # the daemon was killed: what came is written, as at any end
+                received = b""
             if not received:
                 break
             buffer += received

@@ -1,0 +1,251 @@
+"""The mission by time: what it does when things are lost, late, low or ordered at the wrong moment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from flightd.core.types import (
+    Attitude,
+    Command,
+    CommandKind,
+    Demand,
+    GridPose,
+    LandedState,
+    Phase,
+    VehicleState,
+)
+from flightd.mission.guidance import Guidance, Guide, MissionParams, Senses
+from flightd.mission.mission import Mission
+from flightd.mission.plan import Heading, HeadingPolicy, make_plan
+from flightd.sim.sites import random_site
+
+SITE = random_site(3)
+POLICY = HeadingPolicy(Heading.ALONG)
+TICK_NS = 20_000_000
+
+
+class Flight:
+    """Feeds a mission with senses: by default all is well and the drone is wherever the mission wants."""
+
+    def __init__(self, params: MissionParams | None = None) -> None:
+        home = SITE.home.node
+        plan = make_plan(SITE, SITE.serpentine_route(), home, home, POLICY)
+        self.mission = Mission(SITE, plan, POLICY, params or MissionParams(dwell_s=1.0))
+        self.now_ns = 10**12
+        self.guidance: Guidance | None = None
+        state = VehicleState(
+            Attitude(0, 0, 0, 0),
+            0.1,
+            0,
+            0.0,
+            "GUIDED_NOGPS",
+            True,
+            False,
+            LandedState.ON_GROUND,
+            0.9,
+            12.0,
+            0,
+        )
+        self.senses = Senses(0, 0.02, None, True, 0.1, True, 0.0, 0.0, 0.0, state)
+
+    @property
+    def phase(self) -> Phase:
+        return self.mission.phase
+
+    def set(self, **changes: object) -> None:
+        vehicle = {k: v for k, v in changes.items() if k in VehicleState.__slots__ and k != "height_m"}
+        other = {k: v for k, v in changes.items() if k not in vehicle}
+        assert self.senses.vehicle is not None
+        state = replace(self.senses.vehicle, **vehicle)  # type: ignore[arg-type]
+        self.senses = replace(self.senses, vehicle=state, **other)  # type: ignore[arg-type]
+
+    def run(self, seconds: float, until: Callable[[], bool] = lambda: False, follow: bool = True) -> None:
+        for _ in range(round(seconds / 0.02)):
+            self.now_ns += TICK_NS
+            g = self.guidance
+            if follow and g is not None and g.guide is not Guide.NONE:
+                height = 0.1 + (0.0 if math.isnan(g.reference.height_m) else g.reference.height_m)
+                if not math.isnan(self.senses.height_m):
+                    self.senses = replace(self.senses, height_m=height)
+                r = g.reference
+                node = SITE.nearest(r.x_m, r.y_m)
+                pose = GridPose(
+                    self.now_ns,
+                    node.id,
+                    0,
+                    0,
+                    r.yaw_rad,
+                    r.x_m,
+                    r.y_m,
+                    r.vx_mps,
+                    r.vy_mps,
+                    height,
+                    (0.0,) * 9,
+                    1.0,
+                )
+                self.senses = replace(self.senses, pose=pose)
+            if g is not None and g.demand is Demand.FLY:
+                self.set(armed=True)
+            self.set(heartbeat_ns=self.now_ns - round(self.senses.telemetry_age_s * 1e9))
+            self.guidance = self.mission.step(replace(self.senses, now_ns=self.now_ns))
+            if until():
+                return
+
+    def to(self, phase: Phase, within_s: float = 60.0) -> None:
+        self.run(within_s, lambda: self.phase is phase)
+        assert self.phase is phase, self.mission.reason
+
+    def order(self, kind: CommandKind, node: str = "") -> None:
+        self.mission.command(Command("1", kind, node), self.now_ns)
+
+
+def test_a_flight_where_all_is_well_visits_everything() -> None:
+    flight = Flight()
+    flight.to(Phase.LAND, 600)
+    flight.set(landed=LandedState.ON_GROUND)
+    flight.run(0.1)
+    assert flight.guidance is not None
+    assert flight.guidance.demand is Demand.DISARM
+    flight.set(armed=False)
+    flight.run(0.1)
+    assert flight.phase is Phase.DONE
+    assert flight.mission.visited == list(SITE.serpentine_route())
+
+
+def test_a_lost_link_is_no_pilot_and_ends_in_a_landing() -> None:
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    flight.set(in_control=False, telemetry_age_s=1.0)
+    flight.run(1.0)
+    assert flight.phase is not Phase.PILOT
+    flight.set(telemetry_age_s=3.5)
+    flight.run(0.1)
+    assert flight.phase is Phase.LAND
+    flight.run(5.0)
+    assert flight.phase is Phase.LAND
+    flight.set(telemetry_age_s=0.0)
+    flight.run(0.1)
+    assert flight.mission.phase.value == "pilot", "heard again, and somebody has taken it"
+
+
+def test_without_a_height_nothing_climbs_and_soon_it_lands() -> None:
+    flight = Flight()
+    flight.to(Phase.TAKE_OFF)
+    flight.set(height_m=math.nan)
+    flight.run(1.0)
+    assert flight.guidance is not None
+    assert flight.guidance.reference.climb_mps == 0.0
+    assert math.isfinite(flight.guidance.reference.height_m)
+    flight.run(3.0)
+    assert flight.phase is Phase.LAND
+    assert flight.mission.reason == "height lost"
+
+
+def test_it_does_not_arm_for_flight_without_a_height() -> None:
+    flight = Flight()
+    flight.to(Phase.ARMING)
+    flight.set(height_m=math.nan)
+    flight.run(30.0)
+    assert flight.phase is Phase.ARMING
+
+
+def test_stale_telemetry_stops_the_climb() -> None:
+    flight = Flight()
+    flight.to(Phase.TAKE_OFF)
+    flight.run(0.5)
+    flight.set(telemetry_age_s=0.5)
+    flight.run(0.2)
+    assert flight.guidance is not None
+    assert (flight.guidance.guide, flight.guidance.reference.climb_mps) == (Guide.LEVEL, 0.0)
+
+
+@pytest.mark.parametrize(("battery", "words"), [(math.nan, "no battery level"), (0.2, "20%")])
+def test_it_does_not_start_on_a_battery_it_cannot_trust(battery: float, words: str) -> None:
+    flight = Flight()
+    flight.set(battery_frac=battery)
+    flight.run(1.0)
+    assert flight.phase is Phase.PREFLIGHT
+    assert words in flight.mission.reason
+
+
+def test_one_dropout_after_a_long_pause_does_not_land() -> None:
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    flight.order(CommandKind.PAUSE)
+    flight.run(20.0)
+    assert flight.phase is Phase.HOLD
+    flight.set(x_age_s=0.4, y_age_s=0.4)
+    flight.run(0.1)
+    flight.set(x_age_s=0.0, y_age_s=0.0)
+    flight.order(CommandKind.RESUME)
+    flight.run(2.0)
+    assert flight.phase in {Phase.ACQUIRE, Phase.TURN, Phase.FOLLOW, Phase.HOVER}
+
+
+def test_lines_that_only_flicker_end_in_a_landing() -> None:
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    for _ in range(12):
+        flight.set(x_age_s=9.0, y_age_s=9.0)
+        flight.run(0.6)
+        flight.set(x_age_s=0.0, y_age_s=0.0)
+        flight.run(0.4)
+        if flight.phase is Phase.LAND:
+            break
+    assert flight.phase is Phase.LAND
+
+
+def test_on_a_leg_other_lines_do_not_stand_in_for_the_one_followed() -> None:
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    flight.run(2.0, lambda: flight.mission.goal.node == "A2")
+    flight.to(Phase.FOLLOW)
+    flight.set(y_age_s=1.0)
+    flight.run(0.1)
+    assert flight.phase is Phase.HOLD
+
+
+def test_a_long_leg_is_given_its_time() -> None:
+    flight = Flight(MissionParams(dwell_s=0.0, speed_mps=0.02, accel_mps2=0.5))
+    flight.to(Phase.LAND, 6000)
+    assert flight.mission.reason == "route done"
+
+
+@pytest.mark.parametrize("kind", [CommandKind.STOP, CommandKind.LAND])
+def test_an_order_to_end_before_the_start_never_arms(kind: CommandKind) -> None:
+    flight = Flight(MissionParams(autostart=False))
+    flight.run(0.2)
+    flight.order(kind)
+    flight.order(CommandKind.START)
+    demands = set()
+    for _ in range(50):
+        flight.run(0.02)
+        assert flight.guidance is not None
+        demands.add(flight.guidance.demand)
+    assert flight.phase is Phase.ABORTED
+    assert Demand.FLY not in demands
+
+
+def test_low_battery_flies_home_even_when_paused_and_without_dwelling() -> None:
+    flight = Flight(MissionParams(dwell_s=500.0))
+    flight.to(Phase.FOLLOW)
+    flight.order(CommandKind.PAUSE)
+    flight.run(2.0)
+    flight.set(battery_frac=0.15)
+    flight.order(CommandKind.GOTO, "A3")
+    flight.to(Phase.LAND, 120)
+    assert flight.mission.reason == "route done"
+    assert flight.mission.goal.node == SITE.home.node
+
+
+def test_home_is_refused_on_the_floor() -> None:
+    flight = Flight(MissionParams(autostart=False))
+    flight.run(0.1)
+    flight.order(CommandKind.HOME)
+    flight.order(CommandKind.START)
+    flight.to(Phase.FOLLOW)
+    assert any("home refused" in event.text for event in flight.mission.drain_events())
