@@ -46,7 +46,6 @@ _RequestId = Annotated[
     ),
 ]
 _Node = Annotated[str, Meta(max_length=64, description="node of the map, only with goto")]
-_Metres = Annotated[float | None, Meta(description="m")]
 
 
 # What the daemon says on the status port
@@ -109,7 +108,7 @@ class StatusReport(msgspec.Struct, frozen=True):
     goal: Annotated[str, Meta(description="node flown to or hovered at")]
     nodes_done: Annotated[int, Meta(description="planned nodes visited")]
     nodes_planned: Annotated[int, Meta(description="nodes of the plan")]
-    height_m: _Metres
+    height_m: Annotated[float | None, Meta(description="above the floor, m; null before it is known")]
     position: Annotated[Position | None, Meta(description="null before the floor was seen")]
     lines: Annotated[tuple[SeenLine, ...], Meta(description="lines tracked now")]
     lines_age_s: Annotated[float | None, Meta(description="since a line was last seen, s; null: never")]
