@@ -59,6 +59,14 @@ def _sharper(grey: Image) -> Image:
     return np.asarray(cv2.addWeighted(grey, 2.5, cv2.GaussianBlur(grey, (0, 0), 2.0), -1.5, 0.0), np.uint8)
 
 
+def _much_sharper(grey: Image) -> Image:
+    return np.asarray(cv2.addWeighted(grey, 4.0, cv2.GaussianBlur(grey, (0, 0), 3.0), -3.0, 0.0), np.uint8)
+
+
+def _contrast_sharper(grey: Image) -> Image:
+    return _sharper(_local_contrast(grey))
+
+
 def _smoother(grey: Image) -> Image:
     return np.asarray(cv2.GaussianBlur(grey, (0, 0), 1.2), np.uint8)
 
@@ -79,6 +87,9 @@ _LOOKS = (
     _Look(1.0, alter=_smoother),
     _Look(2.0, alter=_local_contrast),
     _Look(2.0, alter=_without_specks, global_threshold=True),
+    _Look(2.0, alter=_contrast_sharper),
+    _Look(2.0, alter=_much_sharper),
+    _Look(2.0, alter=_smoother),
     _Look(3.0, alter=_local_contrast),
     _Look(0.5, alter=_local_contrast),
 )
