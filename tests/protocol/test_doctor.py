@@ -29,6 +29,8 @@ from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.peer import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.px4 import Px4Peer
 
+pytestmark = pytest.mark.slow  # the command has its own loop: real time
+
 ROOT = Path(__file__).parents[2]
 WRONG = {"GUID_TIMEOUT", "FS_THR_ENABLE", "BATT_FS_LOW_ACT"}
 """What a simulated ArduCopter has in its factory settings."""
@@ -289,7 +291,6 @@ def read_until(handle: int, end: bytes) -> bytes:
     return said
 
 
-@pytest.mark.slow
 def test_an_ardrone_with_its_camera(tmp_path: Path, doctor: Doctor) -> None:
     command = [sys.executable, "-m", "flightd.sim.ardrone", "--ports", "0", "0", "0", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as program:
