@@ -74,6 +74,8 @@ def sim(
     if external:
         truth_address(truth_url)
         chosen = chosen.model_copy(update={"vehicle": chosen.vehicle.model_copy(update={"url": vehicle_url})})
+    if factor is None and chosen.ground.listen:
+        print("flightd: the ground link is off in lockstep; --speed 1 turns it on", file=sys.stderr)
     _make_folder(out)
     started = time.monotonic()
     with FlightProgress(shown=not as_json) as progress:
