@@ -89,7 +89,9 @@ def test_a_taken_camera_port_is_one_line(tmp_path: Path) -> None:
         port = taken.getsockname()[1]
         config = tmp_path / "flightd.toml"
         site = ROOT / "configs" / "site-demo.toml"
-        config.write_text(f'[mission]\nsite = "{site}"\n[camera]\nurl = "udp://127.0.0.1:{port}"\n')
+        config.write_text(
+            f'[mission]\nsite = "{site}"\nautostart = true\n[camera]\nurl = "udp://127.0.0.1:{port}"\n'
+        )
         done = flightd("run", "--config", str(config))
     assert done.returncode == 2
     errors = [line for line in done.stderr.splitlines() if line.startswith("flightd:")]
