@@ -203,7 +203,7 @@ def test_the_signing_stamp_follows_the_clock_and_outlives_a_restart(tmp_path: Pa
 
 def test_the_key_file_must_be_private_and_whole(tmp_path: Path) -> None:
     path = tmp_path / "key"
-    with pytest.raises(InputError, match="flightctl keygen"):
+    with pytest.raises(InputError, match="flightd keygen"):
         read_key(path)
     path.write_text(KEY.hex() + "\n")
     path.chmod(0o644)
