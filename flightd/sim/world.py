@@ -12,12 +12,11 @@ from typing import Literal, Protocol
 
 from flightd.core.errors import UnavailableError
 from flightd.core.topics import Topic
+from flightd.core.types import Image
 from flightd.grid.site import Site
 from flightd.ports import Clock, Recorder
 from flightd.sim.airframe import Airframe
 from flightd.sim.appearance import DEFAULT, Appearance
-from flightd.sim.ardrone.drone import Drone
-from flightd.sim.ardrone.server import ArDroneServer, Ports
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Peer
@@ -81,16 +80,13 @@ class World:
             battery_frac=spec.battery_frac,
         )
         self.vehicle: VehiclePeer
-        show = None
+        show: Callable[[Image, int], None] | None = None
         if spec.truth_url:
             self.vehicle = ExternalVehicle(
                 spec.truth_url, clock, Placement(pad.x_m, pad.y_m, spec.start_yaw_rad)
             )
         elif spec.vehicle == "ardrone":
-            drone = Drone(airframe, Sensors(seed=spec.seed))
-            ports = Ports("127.0.0.1", *spec.vehicle_ports)
-            self.vehicle = server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)
-            show = server.show
+            self.vehicle, show = _ardrone(spec, airframe, clock)
         else:
             (port,) = spec.vehicle_ports
             peer = Px4Peer if spec.vehicle == "px4" else ArduCopterPeer
@@ -128,3 +124,20 @@ class World:
             truth: Kinematics = self.vehicle.truth()
             self._recorder.record(Topic.TRUTH, truth.stamp_ns, truth)
             await asyncio.sleep(_TRUTH_PERIOD_S)
+
+
+def _ardrone(
+    spec: WorldSpec, airframe: Airframe, clock: Clock
+) -> tuple[VehiclePeer, Callable[[Image, int], None]]:
+    """The emulated AR.Drone and where its pictures go.  UnavailableError without its video library."""
+    try:
+        from flightd.sim.ardrone.drone import Drone  # noqa: PLC0415 - its video needs an optional extra
+        from flightd.sim.ardrone.server import ArDroneServer, Ports  # noqa: PLC0415
+    except ModuleNotFoundError as err:
+        raise UnavailableError(
+            f"simulating an AR.Drone needs {err.name}: pip install 'flightd[ardrone]'"
+        ) from err
+    drone = Drone(airframe, Sensors(seed=spec.seed))
+    ports = Ports("127.0.0.1", *spec.vehicle_ports)
+    server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)
+    return server, server.show
