@@ -38,6 +38,8 @@ from flightd.sim.world import World, WorldSpec
 DETECTION_S = 0.008
 """Modelled time of a detection in lockstep: what a companion computer needs."""
 
+_PORT_TRIES = 5
+
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
@@ -89,10 +91,7 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
         recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=True))
         truth = stack.enter_context(Recorder(simulation.truth_log, lossless=True))
         pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
-        camera_port = free_port()
-        ports = _vehicle_ports(simulation.config)
-        world = World(_spec(simulation, camera_port, ports), clock, truth)
-        await world.open()
+        world, camera_port, ports = await _opened(simulation, clock, truth)
         config = _connected(simulation.config, ports, camera_port)
         await pool.ready()
         daemon = Daemon(
@@ -109,6 +108,24 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
         finally:
             running.cancel()
             await asyncio.wait([running])
+
+
+async def _opened(
+    simulation: Simulation, clock: LoopClock, truth: Recorder
+) -> tuple[World, int, tuple[int, ...]]:
+    """A world that listens, its camera's and its vehicle's ports.  A port that was free a moment ago may
+    have been taken by another simulation: then others are tried."""
+    for attempt in range(1, _PORT_TRIES + 1):
+        camera_port, ports = free_port(), _vehicle_ports(simulation.config)
+        world = World(_spec(simulation, camera_port, ports), clock, truth)
+        try:
+            await world.open()
+        except UnavailableError:
+            if attempt == _PORT_TRIES or simulation.truth_url:
+                raise
+        else:
+            return world, camera_port, ports
+    raise AssertionError("unreachable")
 
 
 async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
