@@ -6,10 +6,8 @@ import math
 from dataclasses import dataclass
 
 from flightd.control.pid import Pid, PidGains
-from flightd.core.geometry import wrap_pi
+from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.core.types import AttitudeSetpoint
-
-GRAVITY_MPS2 = 9.80665
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 
 Matrix: TypeAlias = NDArray[np.float64]
 
+GRAVITY_MPS2 = 9.80665
+"""Standard gravity (ISO 80000-3)."""
+
 _IMAGE_TO_BODY = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Image axes (right, down, optical axis) to body axes (forward, right, down)."""
 

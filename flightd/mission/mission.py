@@ -69,10 +69,6 @@ class Mission:
         """The mission believes the drone to fly and answers for it."""
         return self.phase not in {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE, Phase.ABORTED, Phase.PILOT}
 
-    @property
-    def completed(self) -> bool:
-        return self.phase is Phase.DONE
-
     def drain_events(self) -> tuple[Event, ...]:
         events, self._events = tuple(self._events), []
         return events

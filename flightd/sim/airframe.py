@@ -11,11 +11,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from flightd.core.geometry import wrap_pi
+from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.wind import Draught, Wind
-
-GRAVITY_MPS2 = 9.80665
 
 
 @dataclass(frozen=True, slots=True)

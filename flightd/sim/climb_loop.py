@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from flightd.sim.airframe import GRAVITY_MPS2
+from flightd.core.geometry import GRAVITY_MPS2
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-from flightd.core.geometry import Lens, Mount, wrap_pi
+from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount, wrap_pi
 from flightd.core.types import Attitude, LineSet
 from flightd.tracking.attitude import AttitudeHistory
 from flightd.tracking.motion import AxisTracker, HeadingTracker, MotionNoise, TrackedLine
 from flightd.tracking.tilt import FloorView, GroundLine, TiltCompensation, ground_lines
 
-GRAVITY_MPS2 = 9.80665
 _STEP_NS = 20_000_000
 _PARALLEL_RAD = math.radians(20.0)
 

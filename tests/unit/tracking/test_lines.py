@@ -7,12 +7,12 @@ import random
 
 import pytest
 
-from flightd.core.geometry import Lens, Mount
+from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount
 from flightd.core.types import Attitude, Line, LineSet
 from flightd.sim.ideal import EyeErrors, IdealEye
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.sites import random_site
-from flightd.tracking.lines import GRAVITY_MPS2, LineTracker, TrackerParams
+from flightd.tracking.lines import LineTracker, TrackerParams
 from flightd.tracking.motion import AxisTracker, MotionNoise
 
 LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)

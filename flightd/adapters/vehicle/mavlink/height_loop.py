@@ -10,7 +10,7 @@ from __future__ import annotations
 import enum
 import math
 
-GRAVITY_MPS2 = 9.80665
+from flightd.core.geometry import GRAVITY_MPS2
 
 _RAMP_START = 0.12
 _RAMP_PER_S = 0.25
