@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.ground import GroundConfig
 from flightd.config.vehicle import VehicleConfig
 from flightd.control.flight import FlightGains
@@ -204,6 +205,7 @@ class Config(_Section):
 
     mission: MissionConfig
     camera: CameraConfig = CameraConfig()
+    front_camera: FrontCameraConfig = FrontCameraConfig()
     vision: VisionConfig = VisionConfig()
     vehicle: VehicleConfig = VehicleConfig()
     control: ControlConfig = ControlConfig()

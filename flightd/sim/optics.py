@@ -10,7 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.core.geometry import Lens, Mount, heading_rotation, level_from_body
+from flightd.core.distortion import undistorted
+from flightd.core.geometry import Lens, Mount
+from flightd.core.view import AnyMount, Viewpoint
 from flightd.sim.kinematics import Kinematics
 
 Floats: TypeAlias = NDArray[np.float32]
@@ -49,29 +51,16 @@ class SimCamera:
             raise ValueError(f"exposure {self.exposure_s} s does not fit {self.fps} frames a second")
 
 
-@dataclass(frozen=True, slots=True)
-class Viewpoint:
-    """Where the camera's centre is in the map frame, and the rotation from image axes (right, down,
-    optical) to map axes (x, y, down)."""
+def floor_viewpoint(kinematics: Kinematics, mount: Mount) -> Viewpoint:
+    """The down camera's pose for a pose of the airframe, never below `MIN_HEIGHT_M`."""
+    view = viewpoint(kinematics, mount)
+    return replace(view, height_m=max(view.height_m, MIN_HEIGHT_M))
 
-    x_m: float
-    y_m: float
-    height_m: float
-    map_from_image: NDArray[np.float64]
 
-    @classmethod
-    def of(cls, kinematics: Kinematics, mount: Mount) -> Viewpoint:
-        """The camera's pose for a pose of the airframe (`core.geometry` conventions)."""
-        map_from_body = heading_rotation(kinematics.yaw_rad) @ level_from_body(
-            kinematics.roll_rad, kinematics.pitch_rad
-        )
-        dx, dy, down = map_from_body @ np.array(mount.offset_m)
-        return cls(
-            kinematics.x_m + float(dx),
-            kinematics.y_m + float(dy),
-            max(kinematics.height_m - float(down), MIN_HEIGHT_M),
-            map_from_body @ mount.body_from_image(),
-        )
+def viewpoint(kinematics: Kinematics, mount: AnyMount) -> Viewpoint:
+    """A camera's pose for a pose of the airframe."""
+    k = kinematics
+    return Viewpoint.at(k.x_m, k.y_m, k.height_m, k.roll_rad, k.pitch_rad, k.yaw_rad, mount)
 
 
 class RayTable:
@@ -112,31 +101,11 @@ class RayTable:
         return view.height_m / depth / max(self._lens.fx_px, self._lens.fy_px)
 
 
-def undistorted(seen: NDArray[np.float64], lens: Lens) -> NDArray[np.float64]:
-    """Ideal normalised image points (2, …) of distorted ones, by fixed-point iteration to 1e-12.
-
-    Raises ValueError when the lens bends so much that the points have no ideal counterpart."""
-    k1, k2, p1, p2, k3 = lens.distortion
-    ideal: NDArray[np.float64] = seen.copy()
-    for _ in range(200):
-        x, y = ideal
-        r2 = x * x + y * y
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        bend_x = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-        bend_y = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
-        better: NDArray[np.float64] = (seen - np.stack([bend_x, bend_y])) / radial
-        moved = float(np.abs(better - ideal).max())
-        ideal = better
-        if moved < 1e-12:
-            return ideal
-    raise ValueError(f"distortion {lens.distortion} folds the picture's corners; use a milder lens")
-
-
 def smear_px(camera: SimCamera, kinematics: Kinematics) -> tuple[float, float]:
     """How far (right, down) the picture's middle moves during the exposure, in pixels."""
     half_s = camera.exposure_s / 2
-    before, after = (_moved(kinematics, sign * half_s) for sign in (-1.0, 1.0))
-    start, end = Viewpoint.of(before, camera.mount), Viewpoint.of(after, camera.mount)
+    before, after = (moved(kinematics, sign * half_s) for sign in (-1.0, 1.0))
+    start, end = floor_viewpoint(before, camera.mount), floor_viewpoint(after, camera.mount)
     axis = start.map_from_image[:, 2]
     reach = start.height_m / max(float(axis[2]), MIN_SLOPE)
     point = np.array([start.x_m - end.x_m, start.y_m - end.y_m, end.height_m - start.height_m]) + axis * reach
@@ -144,7 +113,7 @@ def smear_px(camera: SimCamera, kinematics: Kinematics) -> tuple[float, float]:
     return camera.lens.fx_px * float(right / depth), camera.lens.fy_px * float(down / depth)
 
 
-def _moved(k: Kinematics, dt_s: float) -> Kinematics:
+def moved(k: Kinematics, dt_s: float) -> Kinematics:
     """The pose `dt_s` later at constant rates (small angles: body rates stand for angle rates)."""
     return replace(
         k,

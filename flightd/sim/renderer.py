@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
+from flightd.core.view import Viewpoint
 from flightd.grid.site import Site
 from flightd.sim.appearance import DEFAULT, Appearance
 from flightd.sim.effects import Sensor, blur_kernel
 from flightd.sim.floor import Floor
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.lighting import Lighting
-from flightd.sim.optics import Floats, RayTable, SimCamera, Viewpoint, smear_px
+from flightd.sim.optics import Floats, RayTable, SimCamera, floor_viewpoint, smear_px
 from flightd.sim.tiles import Ahead, TiledFloor
 
 __all__ = ["Appearance", "Renderer", "SimCamera"]
@@ -60,7 +61,7 @@ class Renderer:
             raise ValueError(
                 f"out is {picture.shape} {picture.dtype}, the camera makes {lens.width_px}x{lens.height_px}"
             )
-        view = Viewpoint.of(kinematics, self._camera.mount)
+        view = floor_viewpoint(kinematics, self._camera.mount)
         x_m, y_m = self._rays.floor(view)
         foot, footprint_m = (view.x_m, view.y_m), self._rays.footprint_m(view)
         canvas, cells = self._tiles.look(x_m, y_m, foot, footprint_m)

@@ -10,13 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightd.config.site_file import load_site
+from flightd.core.distortion import undistorted
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
 from flightd.sim.appearance import DEFAULT, HARSH, Appearance, preset
 from flightd.sim.effects import blur_kernel
 from flightd.sim.floor import Floor
 from flightd.sim.lighting import Lighting
-from flightd.sim.optics import undistorted, wide_lens
+from flightd.sim.optics import wide_lens
 from flightd.sim.texture import Patch
 
 DEMO = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")
