@@ -253,6 +253,7 @@ def test_a_lost_link_ends_control_and_its_return_gives_it_back(on_rig: Any) -> N
         assert not rig.known().in_control
         assert rig.vehicle.send(AttitudeSetpoint(0)) is False
         assert math.isnan(rig.known().height_m)
+        assert rig.known().landed is LandedState.UNKNOWN
         rig.cut(False)
         await rig.until(lambda: rig.known().in_control, 5.0)
         await rig.until(lambda: not math.isnan(rig.known().height_m), 5.0)

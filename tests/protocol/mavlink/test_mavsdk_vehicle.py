@@ -8,15 +8,18 @@ import threading
 import time
 
 import pytest
+from mavsdk.plugins.telemetry import LandedState as SdkLanded
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.connect import connect_vehicle
+from flightd.adapters.vehicle.mavlink.timesync import ClockSync
 from flightd.adapters.vehicle.mavsdk.gate import FRESH_NS, SetpointGate, message_id
+from flightd.adapters.vehicle.mavsdk.readings import Readings
 from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
 from flightd.cli.simulate import free_port
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.types import Attitude, Demand
+from flightd.core.types import Attitude, Demand, LandedState
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.loops import ScaledLoop
 from flightd.sim.airframe import Airframe
@@ -67,6 +70,13 @@ def test_the_gate_passes_set_points_only_while_they_are_fresh_and_all_else_alway
     assert gate.passes(command, 2_000_000_001)
     assert gate.passes(b"", 2_000_000_001)
     assert gate.held_back == 3
+
+
+def test_a_landed_state_is_believed_for_a_second() -> None:
+    readings = Readings(ClockSync())
+    readings.take_landed(SdkLanded.ON_GROUND, 5)
+    assert readings.landed(5 + 10**9) is LandedState.ON_GROUND
+    assert readings.landed(6 + 10**9) is LandedState.UNKNOWN
 
 
 def test_a_tick_that_died_in_the_air_is_not_flown_on_and_px4s_own_failsafe_acts() -> None:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import math
+from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
 from flightd.core.types import AttitudeSetpoint, Demand, LandedState
-from flightd.sim.airframe import Airframe, AirframeCommand, AirframeParams
+from flightd.sim.airframe import AirframeParams
 from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Mode
-from tests.protocol.rig import CALM, px4_rig, run_virtual
+from tests.protocol.rig import px4_rig, run_virtual
 
 
 def test_it_streams_before_offboard_and_only_on_demand() -> None:
@@ -116,78 +116,40 @@ def test_thrust_is_cut_after_touch_down_so_that_it_reports_landed() -> None:
     run_virtual(test)
 
 
-# The height loop by itself
-
-
-def fly_loop(
-    loop: HeightLoop, airframe: Airframe, wishes: list[tuple[float, float]], *, blind: bool = False
-) -> list[tuple[float, float]]:
-    """Fly (climb, duration) pairs; (thrust, height) at each 20 ms."""
-    path, now_ns, told = [], 0, True
-    for climb, duration_s in wishes:
-        for _ in range(round(duration_s / 0.02)):
-            now_ns += 20_000_000
-            thrust = loop.step(
-                now_ns,
-                climb,
-                climb_mps=airframe.climb_mps,
-                height_m=math.nan if blind else airframe.height_m,
-                tilt_cos=1.0,
-                on_floor=told,
-            )
-            for _ in range(5):
-                airframe.step(0.004, AirframeCommand(motors=True, collective=thrust))
-            told = told and airframe.climb_mps < 0.15
-            path.append((thrust, airframe.height_m))
-    return path
-
-
-@pytest.mark.parametrize("blind", [False, True])
-def test_touch_down_is_felt_with_and_without_a_range_finder(blind: bool) -> None:
-    airframe = Airframe(draught=CALM)
-    path = fly_loop(HeightLoop(), airframe, [(0.5, 4.0), (0.0, 2.0), (-0.4, 9.0)], blind=blind)
-    assert max(height for _, height in path) > 1.0
-    last_thrust = max(i for i, (thrust, _) in enumerate(path) if thrust > 0.0)
-    assert last_thrust < len(path) - 50
-    assert path[last_thrust][1] == pytest.approx(0.1)  # it was not cut in the air
-
-
-def test_slow_sinking_and_hovering_near_the_floor_are_no_touch_down() -> None:
-    airframe = Airframe(draught=CALM)
-    path = fly_loop(HeightLoop(), airframe, [(0.3, 3.0), (-0.06, 4.0), (0.0, 5.0)])
-    assert min(thrust for thrust, _ in path[-300:]) > 0.2
-    assert path[-1][1] > 0.3
-
-
-def test_without_a_climb_rate_the_hover_thrust_is_kept() -> None:
-    loop, airframe = HeightLoop(), Airframe(draught=CALM)
-    fly_loop(loop, airframe, [(0.4, 3.0), (0.0, 2.0)])
-    thrust = loop.step(
-        6_000_000_000, 0.5, climb_mps=math.nan, height_m=math.nan, tilt_cos=1.0, on_floor=False
-    )
-    assert thrust == pytest.approx(loop.hover)
-    assert thrust == pytest.approx(airframe.params.hover_collective, rel=0.1)
-
-
-def test_a_flight_taken_over_in_the_air_starts_at_the_guessed_hover_thrust() -> None:
-    loop = HeightLoop()
-    loop.hover = 0.4
-    first = loop.step(1_000_000_000, 0.0, climb_mps=0.0, height_m=1.5, tilt_cos=1.0, on_floor=False)
-    assert first == pytest.approx(0.4)
-
-
-def test_a_waiting_vehicle_gets_no_thrust() -> None:
-    loop = HeightLoop()
-    for i in range(50):
-        thrust = loop.step(i * 20_000_000, 0.0, climb_mps=0.0, height_m=0.1, tilt_cos=1.0, on_floor=True)
-        assert thrust == 0.0
-
-
 def test_setpoints_are_refused_while_not_ours() -> None:
     async def test() -> None:
         async with px4_rig() as rig:
             await asyncio.sleep(2.0)
             assert rig.vehicle.send(AttitudeSetpoint(0, climb_mps=1.0)) is False
             assert rig.peer._thrust == 0.0
+
+    run_virtual(test)
+
+
+@pytest.mark.parametrize("told", ["nothing more", "that it stands"])
+def test_a_flight_whose_landed_state_stays_that_of_the_floor_is_not_dropped(told: str) -> None:
+    async def test() -> None:
+        async with px4_rig() as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            rig.vehicle.demand(Demand.FLY)
+            await rig.until(lambda: rig.known().armed and rig.known().landed is LandedState.ON_GROUND)
+            send = rig.peer.link.send
+
+            def falsify(channel: Any, message: Any) -> None:
+                if message.get_type() == "EXTENDED_SYS_STATE":
+                    if told == "nothing more":
+                        return
+                    message.landed_state = dialect.MAV_LANDED_STATE_ON_GROUND
+                send(channel, message)
+
+            rig.peer.link.send = falsify
+            await rig.take_off(1.5)
+            stale = told == "nothing more"
+            assert rig.known().landed is (LandedState.UNKNOWN if stale else LandedState.ON_GROUND)
+            height_m = rig.peer.truth().height_m
+            await rig.stream(3.0)
+            assert rig.peer.truth().height_m == pytest.approx(height_m, abs=0.15)
+            await rig.stream(1.0, climb_mps=-0.3)
+            assert rig.peer.truth().height_m > 1.0
 
     run_virtual(test)

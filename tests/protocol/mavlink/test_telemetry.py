@@ -98,6 +98,13 @@ def test_the_battery_is_read_from_either_message_and_unknown_stays_unknown() -> 
     assert math.isnan(told(unknown).battery_v)
 
 
+def test_a_landed_state_is_believed_for_a_second() -> None:
+    telemetry = Telemetry(ClockSync())
+    told(dialect.MAVLink_extended_sys_state_message(0, 1), telemetry=telemetry)
+    assert told(telemetry=telemetry, now_ns=NOW_NS + 1000 * MS).landed is LandedState.ON_GROUND
+    assert told(telemetry=telemetry, now_ns=NOW_NS + 1001 * MS).landed is LandedState.UNKNOWN
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e30])
 def test_an_attitude_that_makes_no_sense_is_not_taken(value: float) -> None:
     telemetry = Telemetry(ClockSync())

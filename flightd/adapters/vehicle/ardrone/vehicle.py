@@ -80,17 +80,18 @@ class ArDroneVehicle:
         demo, attitude = telemetry.demo, telemetry.attitude
         if demo is None or attitude is None:
             return None
+        linked = self._flight.linked(now_ns)
         landed = LandedState.IN_AIR if telemetry.airborne else LandedState.ON_GROUND
         height_m = telemetry.height_m if telemetry.airborne else self._settings.standing_height_m
         return VehicleState(
             attitude=attitude,
-            height_m=height_m if self._flight.linked(now_ns) else math.nan,
+            height_m=height_m if linked else math.nan,
             height_stamp_ns=telemetry.height_ns,
             climb_mps=telemetry.climb_mps,
             mode="emergency" if telemetry.emergency else _MODES.get(demo.major, "unknown"),
             in_control=self._flight.in_control(now_ns),
             armed=telemetry.airborne,
-            landed=landed,
+            landed=landed if linked else LandedState.UNKNOWN,
             battery_frac=demo.battery_percent / 100.0,
             battery_v=telemetry.battery_v,
             heartbeat_ns=telemetry.arrival_ns,

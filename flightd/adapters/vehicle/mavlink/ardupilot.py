@@ -97,7 +97,7 @@ class ArduPilotVehicle(MavlinkVehicle):
 
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         if self._thrust_is_raw():
-            return self._collective(setpoint, now_ns)
+            return self._steering.collective(setpoint, now_ns)
         return climb_thrust(
             setpoint.climb_mps,
             self._speed_mps(_SPEED_UP, _DEFAULT_UP_MPS),

@@ -2,7 +2,8 @@
 
 The hover thrust is found at lift-off: on the floor the thrust is ramped up until the vehicle moves, and
 what it then carries is very nearly its weight.  In the air a slow integral follows the sagging battery.
-After touch-down the thrust is cut, without which PX4 never reports that it has landed.
+After touch-down the thrust is cut, without which PX4 never reports that it has landed.  In the air the
+autopilot's word alone never cuts it: a report that is late or wrong would drop the vehicle.
 """
 
 from __future__ import annotations
@@ -31,6 +32,9 @@ _LEAST_IN_AIR = 0.35
 _SINKING_MPS = -0.05
 _STANDING_MPS = 0.1
 _NEAR_FLOOR_M = 0.06
+_NEAR_FLOOR_TOLD_M = 0.25
+"""The same when the autopilot says that it stands: a pad may be higher than the floor of the take-off."""
+_SURELY_UP_M = 0.5
 _LIGHT = 0.75
 _TOUCHED_S = 0.4
 _STEP_MAX_S = 0.1
@@ -56,6 +60,11 @@ class HeightLoop:
         self._floor_m = math.nan
         self._touched_s = 0.0
 
+    @property
+    def in_air(self) -> bool:
+        """Whether this loop carries the vehicle."""
+        return self._stage is _Stage.AIR
+
     def release(self) -> None:
         """The vehicle is not ours now; where it stands is looked up anew."""
         self._stage = None
@@ -68,17 +77,22 @@ class HeightLoop:
         climb_mps: float,
         height_m: float,
         tilt_cos: float,
+        armed: bool,
         on_floor: bool,
     ) -> float:
         """Thrust, 0..1, for a climb rate.
 
         `climb_mps` and `height_m` are measured, NaN when unknown: without a climb rate the hover thrust
-        is kept.  `on_floor` is what the autopilot says.
+        is kept.  `on_floor` is what the autopilot says; in the air it counts only where the vehicle does
+        not move and is near the floor (or, unseen, the floor carries some weight).
         """
         dt_s = min(max(now_ns - self._stamp_ns, 0) * 1e-9, _STEP_MAX_S)
         self._stamp_ns = now_ns
-        if self._stage is None or (on_floor and wanted_mps <= 0.0):
-            self._stage = _Stage.FLOOR if on_floor else _Stage.AIR
+        if not armed:
+            self._stage, wanted_mps = _Stage.FLOOR, 0.0
+        elif self._stage is None:
+            up = abs(climb_mps) >= _STANDING_MPS or height_m > _SURELY_UP_M
+            self._stage = _Stage.FLOOR if on_floor and not up else _Stage.AIR
             self._settle(climb_mps)
         match self._stage:
             case _Stage.FLOOR:
@@ -87,7 +101,7 @@ class HeightLoop:
                 self._ramp(dt_s, wanted_mps, climb_mps, height_m)
             case _:
                 self._fly(dt_s, wanted_mps, climb_mps, tilt_cos)
-                self._feel_floor(dt_s, wanted_mps, climb_mps, height_m)
+                self._feel_floor(dt_s, wanted_mps, climb_mps, height_m, on_floor)
         return self._thrust
 
     def _settle(self, climb_mps: float) -> None:
@@ -124,12 +138,17 @@ class HeightLoop:
         thrust = self.hover * (1.0 + accel / GRAVITY_MPS2) / max(tilt_cos, 0.5)
         self._thrust = min(max(thrust, _LEAST_IN_AIR * self.hover), _THRUST_MAX)
 
-    def _feel_floor(self, dt_s: float, wanted_mps: float, climb_mps: float, height_m: float) -> None:
-        """Down is wanted, nothing moves, and the floor is near (or, unseen, carries some weight)."""
-        near = height_m - self._floor_m < _NEAR_FLOOR_M
-        if math.isnan(height_m) or math.isnan(self._floor_m):
+    def _feel_floor(
+        self, dt_s: float, wanted_mps: float, climb_mps: float, height_m: float, told: bool
+    ) -> None:
+        """Down is wanted (or, told that it stands, no climb), nothing moves, and the floor is near (or,
+        unseen, carries some weight)."""
+        above_m = height_m - self._floor_m
+        near = above_m < (_NEAR_FLOOR_TOLD_M if told else _NEAR_FLOOR_M)
+        if math.isnan(above_m):
             near = self._thrust < _LIGHT * self.hover
-        stuck = wanted_mps < _SINKING_MPS and abs(climb_mps) < _STANDING_MPS
-        self._touched_s = self._touched_s + dt_s if stuck and near else 0.0
+        still = abs(climb_mps) < _STANDING_MPS
+        wants_down = wanted_mps < _SINKING_MPS or (told and wanted_mps <= 0.0)
+        self._touched_s = self._touched_s + dt_s if still and wants_down and near else 0.0
         if self._touched_s >= _TOUCHED_S:
             self._stage, self._thrust = _Stage.FLOOR, 0.0

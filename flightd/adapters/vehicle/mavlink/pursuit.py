@@ -51,8 +51,7 @@ class Heard(Protocol):
     @property
     def custom_mode(self) -> int | None: ...
 
-    @property
-    def landed(self) -> LandedState: ...
+    def landed(self, now_ns: int) -> LandedState: ...
 
 
 class Commands(Protocol):
@@ -115,7 +114,8 @@ class Pursuit:
     @property
     def stands(self) -> bool:
         """On the floor, as far as the autopilot knows."""
-        return not self._telemetry.armed or self._telemetry.landed is LandedState.ON_GROUND
+        says = self._telemetry.landed(self._clock.now_ns())
+        return not self._telemetry.armed or says is LandedState.ON_GROUND
 
     @property
     def refusal(self) -> str:

@@ -80,28 +80,25 @@ class Px4Vehicle(MavlinkVehicle):
 
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         self._guess_hover()
-        return self._collective(setpoint, now_ns)
+        return self._steering.collective(setpoint, now_ns)
 
     def _guess_hover(self) -> None:
         """Start from the autopilot's own idea of the hover thrust."""
         found = self.parameters.get(("MPC_THR_HOVER",))
         if found is not None and not self._guessed:
             self._guessed = True
-            self._height.hover = min(max(found[1], 0.1), 0.8)
+            self._steering.height.hover = min(max(found[1], 0.1), 0.8)
 
     async def _idle(self) -> None:
         while True:
             await asyncio.sleep(_IDLE_PERIOD_S)
             now_ns = self._clock.now_ns()
             yaw_rad = self._telemetry.yaw_rad
-            if not self._pursuit.wants_flight or yaw_rad is None or now_ns - self._sent_ns < _PUMP_SILENT_NS:
+            if yaw_rad is None or now_ns - self._sent_ns < _PUMP_SILENT_NS:
                 continue
-            if self._pursuit.stands:
-                thrust = 0.0
-            elif self._pursuit.may_steer:
-                continue  # in the air only the mission keeps it flying
-            else:
-                self._guess_hover()
-                thrust = self._height.hover
+            self._guess_hover()
+            thrust = self._steering.idle_thrust()
+            if thrust is None:
+                continue
             level = AttitudeSetpoint(now_ns)
             self.link.send(attitude_target(now_ns, self._system_id, level, yaw_rad, thrust))

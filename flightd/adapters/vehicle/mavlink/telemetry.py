@@ -16,6 +16,7 @@ _NS_PER_MS = 1_000_000
 _STAMP_AGE_MAX_NS = 500_000_000
 _RANGE_STALE_NS = 500_000_000
 _CLIMB_STALE_NS = 1_000_000_000
+_LANDED_STALE_NS = 1_000_000_000
 _REBOOT_MS = 1_000
 _SLOPE_MS, _SLOPE_GAP_MS = 250, 500
 _NO_CELL_MV = 65535
@@ -43,6 +44,7 @@ class Telemetry:
         self._climb_ns = 0
         self._heights: deque[tuple[int, int]] = deque()
         self._landed = LandedState.UNKNOWN
+        self._landed_ns = 0
         self._battery_frac = math.nan
         self._battery_v = math.nan
         self.heartbeat_ns = 0
@@ -59,9 +61,9 @@ class Telemetry:
         """The newest measured heading."""
         return None if self._attitude is None else self._attitude.yaw_rad
 
-    @property
-    def landed(self) -> LandedState:
-        return self._landed
+    def landed(self, now_ns: int) -> LandedState:
+        """Whether it stands or flies; unknown when the autopilot has not said so for a second."""
+        return self._landed if now_ns - self._landed_ns <= _LANDED_STALE_NS else LandedState.UNKNOWN
 
     def height_m(self, now_ns: int) -> float:
         """Height above the floor below, NaN when the range finder has fallen silent."""
@@ -89,6 +91,7 @@ class Telemetry:
                 self._climb_ns = now_ns
             case "EXTENDED_SYS_STATE":
                 self._landed = _LANDED.get(message.landed_state, LandedState.UNKNOWN)
+                self._landed_ns = now_ns
             case "BATTERY_STATUS" if message.id == 0:
                 cells = [mv for mv in message.voltages if mv != _NO_CELL_MV]
                 self._take_battery(sum(cells), message.battery_remaining)
@@ -118,7 +121,7 @@ class Telemetry:
             mode=mode,
             in_control=in_control,
             armed=self.armed,
-            landed=self._landed,
+            landed=self.landed(now_ns),
             battery_frac=self._battery_frac,
             battery_v=self._battery_v,
             heartbeat_ns=self.heartbeat_ns,

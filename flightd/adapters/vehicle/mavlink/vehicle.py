@@ -15,14 +15,14 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.mavlink.codec import Codec, Message
 from flightd.adapters.vehicle.mavlink.commands import Commander
 from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
-from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
 from flightd.adapters.vehicle.mavlink.link import Firmware, MavlinkLink
 from flightd.adapters.vehicle.mavlink.outputs import PoseForm, PoseOutput, landing_target
 from flightd.adapters.vehicle.mavlink.parameters import Names, Parameters
 from flightd.adapters.vehicle.mavlink.pursuit import Pursuit
-from flightd.adapters.vehicle.mavlink.setpoint import Heading, attitude_target
+from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.signing import Signing
 from flightd.adapters.vehicle.mavlink.statustext import SEVERITIES, TextAssembler, make_texts
+from flightd.adapters.vehicle.mavlink.steering import Steering
 from flightd.adapters.vehicle.mavlink.streams import StreamKeeper
 from flightd.adapters.vehicle.mavlink.telemetry import Telemetry
 from flightd.adapters.vehicle.mavlink.timesync import ClockSync
@@ -94,14 +94,13 @@ class MavlinkVehicle(abc.ABC):
         self._system_id = system_id
         self._sync = ClockSync()
         self._telemetry = Telemetry(self._sync)
-        self._heading = Heading()
-        self._height = HeightLoop()
         self._pose_output = None if options.pose_form is None else PoseOutput(options.pose_form)
         transport = make_transport(parse_endpoint(url))
         codec = Codec(system_id, signing=options.signing)
         self.link = MavlinkLink(transport, codec, clock, system_id, self._received)
         self._commander = Commander(self.link, system_id)
         self._pursuit = Pursuit(self, self._commander, self._telemetry, clock)
+        self._steering = Steering(self._pursuit, self._telemetry)
         self.streams = StreamKeeper(self._commander, clock, self.rates_hz)
         self.parameters = Parameters(self.link, system_id, bytewise=self.firmware is Firmware.PX4)
         self._texts = TextAssembler()
@@ -147,14 +146,9 @@ class MavlinkVehicle(abc.ABC):
 
     def send(self, setpoint: AttitudeSetpoint) -> bool:
         now_ns = self._clock.now_ns()
-        yaw_rad = self._telemetry.yaw_rad
-        if not self._pursuit.may_steer or yaw_rad is None:
-            self._heading.release()
-            self._height.release()
+        heading_rad = self._steering.heading_rad(setpoint, now_ns)
+        if heading_rad is None:
             return False
-        if self._pursuit.stands:
-            self._heading.release()  # the vehicle may be turned by hand, its compass may still settle
-        heading_rad = self._heading.step(now_ns, setpoint.yaw_rate_radps, yaw_rad)
         thrust = self._thrust(setpoint, now_ns)
         return self.link.send(attitude_target(now_ns, self._system_id, setpoint, heading_rad, thrust))
 
@@ -202,17 +196,6 @@ class MavlinkVehicle(abc.ABC):
         tasks.create_task(self._once_heard(self._compare_clocks), name="mavlink timesync")
         tasks.create_task(self._once_heard(self.streams.run), name="mavlink streams")
         tasks.create_task(self._once_heard(self._read_parameters), name="mavlink parameters")
-
-    def _collective(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
-        """Raw thrust for the climb rate, by our own height loop."""
-        return self._height.step(
-            now_ns,
-            setpoint.climb_mps,
-            climb_mps=self._telemetry.climb_mps(now_ns),
-            height_m=self._telemetry.height_m(now_ns),
-            tilt_cos=math.cos(setpoint.roll_rad) * math.cos(setpoint.pitch_rad),
-            on_floor=self._pursuit.stands,
-        )
 
     # Receiving
 

@@ -14,6 +14,7 @@ from flightd.core.types import Attitude, LandedState, VehicleState
 
 _ATTITUDES_MAX = 512
 _STALE_NS = 500_000_000
+_LANDED_STALE_NS = 1_000_000_000
 _STAMP_AGE_MAX_NS = 500_000_000
 _REBOOT_US = 1_000_000
 _DOWN_DEG = 270.0
@@ -44,7 +45,8 @@ class Readings:
         self._climb_ns = 0
         self._battery_frac = math.nan
         self._battery_v = math.nan
-        self.landed = LandedState.UNKNOWN
+        self._landed = LandedState.UNKNOWN
+        self._landed_ns = 0
         self.armed = False
         self.mode: FlightMode | None = None
         self.heartbeat_ns = 0
@@ -66,6 +68,10 @@ class Readings:
     def climb_mps(self, now_ns: int) -> float:
         """Climb rate, NaN when it is not told."""
         return self._climb_mps if now_ns - self._climb_ns <= _STALE_NS else math.nan
+
+    def landed(self, now_ns: int) -> LandedState:
+        """Whether it stands or flies; unknown when the autopilot has not said so for a second."""
+        return self._landed if now_ns - self._landed_ns <= _LANDED_STALE_NS else LandedState.UNKNOWN
 
     def attitudes(self) -> list[Attitude]:
         """The attitude samples since the last call, oldest first."""
@@ -125,8 +131,8 @@ class Readings:
     def take_armed(self, armed: bool, _now_ns: int) -> None:
         self.armed = bool(armed)
 
-    def take_landed(self, state: int, _now_ns: int) -> None:
-        self.landed = _LANDED.get(SdkLanded(state), LandedState.UNKNOWN)
+    def take_landed(self, state: int, now_ns: int) -> None:
+        self._landed, self._landed_ns = _LANDED.get(SdkLanded(state), LandedState.UNKNOWN), now_ns
 
     def state(self, now_ns: int, *, in_control: bool, refusal: str) -> VehicleState | None:
         """Everything at one glance; None until heartbeat and attitude were heard."""
@@ -140,7 +146,7 @@ class Readings:
             mode=self.mode.name,
             in_control=in_control,
             armed=self.armed,
-            landed=self.landed,
+            landed=self.landed(now_ns),
             battery_frac=self._battery_frac,
             battery_v=self._battery_v,
             heartbeat_ns=self.heartbeat_ns,

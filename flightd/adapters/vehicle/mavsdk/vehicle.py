@@ -25,9 +25,8 @@ from mavsdk.plugins.telemetry import FlightMode
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
-from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
 from flightd.adapters.vehicle.mavlink.pursuit import Pursuit
-from flightd.adapters.vehicle.mavlink.setpoint import Heading
+from flightd.adapters.vehicle.mavlink.steering import Steering
 from flightd.adapters.vehicle.mavlink.streams import StreamKeeper
 from flightd.adapters.vehicle.mavlink.timesync import ClockSync
 from flightd.adapters.vehicle.mavlink.transport import make_transport
@@ -95,12 +94,11 @@ class MavsdkVehicle:
         self._system_id = system_id
         self._sync = ClockSync()
         self._readings = Readings(self._sync)
-        self._heading = Heading()
-        self._height = HeightLoop()
         self.gate = SetpointGate()
         self._transport = make_transport(parse_endpoint(url))
         self._commander = SdkCommander()
         self._pursuit = Pursuit(self, self._commander, self._readings, clock)
+        self._steering = Steering(self._pursuit, self._readings)
         self._setpoints: Latest[SdkAttitude] = Latest()
         self._texts: deque[tuple[StatusTextType, str]] = deque(maxlen=_TEXTS_MAX)
         self._text_waits = asyncio.Event()
@@ -156,22 +154,10 @@ class MavsdkVehicle:
 
     def send(self, setpoint: AttitudeSetpoint) -> bool:
         now_ns = self._clock.now_ns()
-        yaw_rad = self._readings.yaw_rad
-        if not self._pursuit.may_steer or yaw_rad is None:
-            self._heading.release()
-            self._height.release()
+        heading_rad = self._steering.heading_rad(setpoint, now_ns)
+        if heading_rad is None:
             return False
-        if self._pursuit.stands:
-            self._heading.release()  # the vehicle may be turned by hand, its compass may still settle
-        heading_rad = self._heading.step(now_ns, setpoint.yaw_rate_radps, yaw_rad)
-        thrust = self._height.step(
-            now_ns,
-            setpoint.climb_mps,
-            climb_mps=self._readings.climb_mps(now_ns),
-            height_m=self._readings.height_m(now_ns),
-            tilt_cos=math.cos(setpoint.roll_rad) * math.cos(setpoint.pitch_rad),
-            on_floor=self._pursuit.stands,
-        )
+        thrust = self._steering.collective(setpoint, now_ns)
         self._sent_ns = now_ns
         heading_rad += setpoint.yaw_rate_radps * _YAW_LEAD_S
         self._steer(now_ns, setpoint.roll_rad, setpoint.pitch_rad, heading_rad, thrust)
@@ -293,19 +279,15 @@ class MavsdkVehicle:
                 await library.call(plugins.offboard.set_attitude(attitude))
 
     async def _idle(self) -> None:
-        """Set points while the mission makes none yet: PX4 enters OFFBOARD only while they stream.  On the
-        floor without thrust; in the air only until OFFBOARD is entered, never to keep it flying."""
+        """Set points while the mission makes none yet."""
         while True:
             await asyncio.sleep(_IDLE_PERIOD_S)
             now_ns = self._clock.now_ns()
             yaw_rad = self._readings.yaw_rad
             recently = now_ns - self._sent_ns < _PUMP_SILENT_NS
-            if not self._pursuit.wants_flight or yaw_rad is None or recently:
-                continue
-            if self._pursuit.stands:
-                self._steer(now_ns, 0.0, 0.0, yaw_rad, 0.0)
-            elif not self._pursuit.may_steer:
-                self._steer(now_ns, 0.0, 0.0, yaw_rad, self._height.hover)
+            thrust = self._steering.idle_thrust()
+            if thrust is not None and yaw_rad is not None and not recently:
+                self._steer(now_ns, 0.0, 0.0, yaw_rad, thrust)
 
     async def _tell(self, library: Library, plugins: Plugins) -> None:
         while True:
