@@ -11,7 +11,9 @@ from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, 
 from flightd.grid.site import Site
 from flightd.mission.guidance import GroundLost, Guidance, Guide, MissionParams, Senses
 from flightd.mission.plan import FlightPlan, HeadingPolicy, Stop, make_plan
-from flightd.mission.table import Trigger, next_phase
+from flightd.mission.table import next_phase
+from flightd.mission.triggers import Trigger
+from flightd.mission.watch import Lasting, Situation, Watch
 
 _DEMANDS = {
     Phase.PREFLIGHT: Demand.STANDBY,
@@ -20,8 +22,6 @@ _DEMANDS = {
     Phase.PILOT: Demand.HANDS_OFF,
 }
 _TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
-_HEARTBEAT_S = 2.0
-"""A heartbeat comes each second; older than this, modes and arming are those of the past."""
 
 
 class Mission:
@@ -32,6 +32,7 @@ class Mission:
         self._plan = plan
         self._policy = policy
         self._params = params
+        self._watch = Watch(params)
         self._stops: list[Stop] = list(plan.stops)
         self._next = 0
         start = site.nodes[plan.start]
@@ -48,10 +49,7 @@ class Mission:
         self._ordered: Trigger | None = None
         self._since_ns = 0
         self._limit_s = math.inf
-        self._settled_ns: int | None = None
-        self._lost_ns: int | None = None
-        self._found_ns: int | None = None
-        self._no_height_ns: int | None = None
+        self._settling = Lasting()
         self._steering = False
         self._events: list[Event] = []
         self._x = Profile(start.x_m, params.speed_mps, params.accel_mps2)
@@ -104,62 +102,28 @@ class Mission:
     # What has happened
 
     def _triggers(self, s: Senses) -> set[Trigger]:
-        p, v = self._params, s.vehicle
         found = self._progress(s)
         if self._ordered is not None:
             found.add(self._ordered)
         found |= self._ground(s)
         if self._paused:
             found.add(Trigger.HOLD)
-        if v is not None and self.airborne:
-            heard = (
-                max(s.telemetry_age_s, (s.now_ns - v.heartbeat_ns) * 1e-9 - _HEARTBEAT_S) < p.telemetry_hold_s
-            )
-            if heard and not v.armed:
-                found.add(Trigger.DISARMED)
-            elif heard and not v.in_control:  # silence is no pilot: a lost link is a lost link
-                found.add(Trigger.PILOT_TOOK)
-            if v.battery_frac < p.battery_land_frac:
-                found.add(Trigger.BATTERY_CRITICAL)
-            elif v.battery_frac < p.battery_home_frac and not self._returning:
-                self._go_home(s.now_ns, "battery low")
-        if s.telemetry_age_s > p.telemetry_land_s:
-            found.add(Trigger.TELEMETRY_LOST)
-        self._no_height_ns = _since(self._no_height_ns, math.isnan(s.height_m), s.now_ns)
-        if _for_s(self._no_height_ns, s.now_ns) > p.telemetry_land_s:
-            found.add(Trigger.HEIGHT_LOST)
+        if self.airborne and not self._returning and self._watch.battery_low(s):
+            self._go_home(s.now_ns, "battery low")
         if (s.now_ns - self._since_ns) * 1e-9 > self._limit_s:
             found.add(Trigger.TIMED_OUT)
-        return found | self._sight(s, Trigger.HOLD in found)
+        return found | self._watch.step(s, self._situation(Trigger.HOLD in found))
 
-    def _sight(self, s: Senses, held: bool) -> set[Trigger]:
-        """Lines lost and found.  The time without lines runs on through short glimpses: only lines that
-        stay for a while end it."""
-        p = self._params
-        lost = min(s.x_age_s, s.y_age_s) > p.lines_hold_s or not s.localised or self._off_line(s)
-        self._found_ns = _since(self._found_ns, not lost, s.now_ns)
-        if lost and self._lost_ns is None:
-            self._lost_ns = s.now_ns
-        elif _for_s(self._found_ns, s.now_ns) > p.lines_found_s:
-            self._lost_ns = None
-        if lost and _for_s(self._lost_ns, s.now_ns) > p.lines_land_s:
-            return {Trigger.LINES_LOST, Trigger.LINES_LOST_LONG}
-        if lost:
-            return {Trigger.LINES_LOST}
-        back = _for_s(self._found_ns, s.now_ns) > p.lines_hold_s and not held
-        return {Trigger.LINES_FOUND} if back else set()
-
-    def _off_line(self, s: Senses) -> bool:
-        """On a leg, the line that is followed must be seen, whatever else is."""
-        if self.phase is not Phase.FOLLOW:
-            return False
-        along_x = abs(self.goal.x_m - self._anchor[0]) >= abs(self.goal.y_m - self._anchor[1])
-        return (s.y_age_s if along_x else s.x_age_s) > self._params.followed_hold_s
+    def _situation(self, paused: bool) -> Situation:
+        along_x = None
+        if self.phase is Phase.FOLLOW:
+            along_x = abs(self.goal.x_m - self._anchor[0]) >= abs(self.goal.y_m - self._anchor[1])
+        return Situation(self.airborne, paused, along_x)
 
     def _ground(self, s: Senses) -> set[Trigger]:
         """What a lost ground link asks for, by the configured action; the link's return ends a hold."""
         action = self._params.ground_lost
-        lost = s.ground_silent_s > self._params.ground_lost_s
+        lost = self._watch.ground_lost(s)
         if lost is not self._ground_lost:
             self._ground_lost = lost
             text = f"silent for {s.ground_silent_s:.1f} s: {action.value}" if lost else "heard again"
@@ -220,8 +184,7 @@ class Mission:
 
     def _settled(self, s: Senses, condition: bool) -> bool:
         """True once `condition` has held for the settling time."""
-        self._settled_ns = _since(self._settled_ns, condition, s.now_ns)
-        return condition and _for_s(self._settled_ns, s.now_ns) >= self._params.settle_s
+        return self._settling.step(condition, s.now_ns) >= self._params.settle_s and condition
 
     # Changing phase
 
@@ -248,7 +211,7 @@ class Mission:
         level = EventLevel.WARNING if unplanned or phase is Phase.HOLD else EventLevel.INFO
         self._event(s.now_ns, level, "phase", f"{before.value} -> {self.phase.value}: {self.reason}")
         self._since_ns = s.now_ns
-        self._settled_ns = None
+        self._settling = Lasting()
         self._limit_s = self._time_limit_s(s)
         if phase is Phase.TAKE_OFF:
             self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m)
@@ -374,14 +337,3 @@ def _distance(s: Senses, to: tuple[float, float]) -> float:
 
 def _speed(s: Senses) -> float:
     return math.inf if s.pose is None else math.hypot(s.pose.vx_mps, s.pose.vy_mps)
-
-
-def _since(since_ns: int | None, condition: bool, now_ns: int) -> int | None:
-    """The time since which `condition` has held, None while it does not."""
-    if not condition:
-        return None
-    return now_ns if since_ns is None else since_ns
-
-
-def _for_s(since_ns: int | None, now_ns: int) -> float:
-    return 0.0 if since_ns is None else (now_ns - since_ns) * 1e-9

@@ -6,37 +6,10 @@ Triggers are tried in the order of the enum: what keeps people safe stands first
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Mapping
 
 from flightd.core.types import Phase
-
-
-class Trigger(enum.Enum):
-    """What can happen, most urgent first."""
-
-    PILOT_TOOK = "the pilot took control"
-    DISARMED = "the vehicle disarmed"
-    STOP = "stop ordered"
-    TELEMETRY_LOST = "vehicle telemetry lost"
-    HEIGHT_LOST = "height lost"
-    BATTERY_CRITICAL = "battery critical"
-    LAND_HERE = "landing ordered"
-    GROUND_LOST = "ground link lost"
-    LINES_LOST_LONG = "lines lost for too long"
-    TIMED_OUT = "the phase took too long"
-    LINES_LOST = "lines lost"
-    HOLD = "pause ordered"
-    LINES_FOUND = "lines found"
-    READY = "ready"
-    ARMED = "armed"
-    AT_HEIGHT = "at flying height"
-    ACQUIRED = "position acquired"
-    ARRIVED = "arrived"
-    DWELLED = "dwell over"
-    TURNED = "turned"
-    ROUTE_DONE = "route done"
-
+from flightd.mission.triggers import Trigger
 
 _SAFETY = {
     Trigger.PILOT_TOOK: Phase.PILOT,

@@ -10,7 +10,8 @@ import pytest
 from flightd.core.errors import InputError
 from flightd.core.types import Phase
 from flightd.mission.plan import Heading, HeadingPolicy, make_plan
-from flightd.mission.table import TABLE, Trigger, next_phase
+from flightd.mission.table import TABLE, next_phase
+from flightd.mission.triggers import Trigger
 from flightd.sim.sites import random_site
 
 FLYING = [

@@ -1,0 +1,31 @@
+"""What can happen to a mission, most urgent first."""
+
+from __future__ import annotations
+
+import enum
+
+
+class Trigger(enum.Enum):
+    """Tried in this order: what keeps people safe stands first."""
+
+    PILOT_TOOK = "the pilot took control"
+    DISARMED = "the vehicle disarmed"
+    STOP = "stop ordered"
+    TELEMETRY_LOST = "vehicle telemetry lost"
+    HEIGHT_LOST = "height lost"
+    BATTERY_CRITICAL = "battery critical"
+    LAND_HERE = "landing ordered"
+    GROUND_LOST = "ground link lost"
+    LINES_LOST_LONG = "lines lost for too long"
+    TIMED_OUT = "the phase took too long"
+    LINES_LOST = "lines lost"
+    HOLD = "pause ordered"
+    LINES_FOUND = "lines found"
+    READY = "ready"
+    ARMED = "armed"
+    AT_HEIGHT = "at flying height"
+    ACQUIRED = "position acquired"
+    ARRIVED = "arrived"
+    DWELLED = "dwell over"
+    TURNED = "turned"
+    ROUTE_DONE = "route done"
