@@ -56,6 +56,7 @@ class FlightResult:
 def plan_of(config: Config, site: Site) -> FlightPlan:
     """The flight plan that the configuration asks for, from the home pad and back."""
     mission = config.mission
+    site = site.between(*config.mission.flown_between_m())
     visits: Sequence[str] = mission.nodes or site.serpentine_route()
     pad = site.home.node
     return make_plan(site, visits, pad, pad, config.heading_policy(), math.radians(mission.start_yaw_deg))
@@ -68,7 +69,8 @@ def pilot_of(config: Config, site: Site) -> Pilot:
             f"mission.height_m {config.mission.height_m} is not {CEILING_MARGIN_M} m below the ceiling of"
             f" {site.name} ({site.ceiling_m} m)"
         )
-    return Pilot(site, plan_of(config, site), config.heading_policy(), config.pilot_params(site))
+    flown = site.between(*config.mission.flown_between_m())
+    return Pilot(flown, plan_of(config, site), config.heading_policy(), config.pilot_params(site))
 
 
 def profile_of(config: Config, site: Site) -> str:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import math
 from xml.sax.saxutils import escape
 
-from flightd.grid.site import LineColour, Node, PaintedLine, Shelf, Side, Site
+from flightd.grid.site import Edge, LineColour, Node, PaintedLine, Shelf, Side, Site
 
 _PX_PER_M = 64.0
 _MARGIN_M = 1.1
@@ -18,6 +19,7 @@ _PAINT = {
     LineColour.RED: "#c0322f",
     LineColour.BLUE: "#2f63ad",
 }
+_ARROW = "M-7 -6L9 0L-7 6Z"
 _STYLE = """
   text { font-family: ui-sans-serif, system-ui, "Segoe UI", Helvetica, Arial, sans-serif; fill: #2b3036 }
   .title { font-size: 22px; font-weight: 650 } .fact { font-size: 13px; fill: #6b737c }
@@ -25,6 +27,8 @@ _STYLE = """
   .aisle { font-size: 20px; font-weight: 700; fill: #8b939c }
   .shelf { fill: url(#rack); stroke: #8d98a5; stroke-width: 1 } .front { stroke: #56626f; stroke-width: 2.5 }
   .pad { fill: #3c4046; stroke: #1f2225 } .dot { fill: #fff; stroke: #2b3036; stroke-width: 1.8 }
+  .shut { stroke: #c0322f; stroke-width: 4; fill: none } .way { fill: #2b3036 }
+  .keep { fill: #c0322f; fill-opacity: 0.18; stroke: #c0322f; stroke-width: 1.5; stroke-dasharray: 6 4 }
   .axis { stroke: #8b939c; stroke-width: 1.4; fill: none } .home { fill: #1d9a57; stroke: #0f6b3a }
 """
 
@@ -59,6 +63,8 @@ class _Plan:
             *itertools.chain.from_iterable(self._shelf(shelf) for shelf in site.shelves),
             *self._pads(),
             *self._lines(),
+            *self._keep_outs(),
+            *itertools.chain.from_iterable(self._restriction(edge) for edge in site.edges),
             *self._steps(),
             *itertools.chain.from_iterable(self._node(node) for node in site.nodes.values()),
             *self._aisle_names(),
@@ -114,6 +120,30 @@ class _Plan:
         x1, y1 = self._at(line.x1_m + (0 if along_x else half), line.y1_m + (half if along_x else 0))
         return f"M{x0:.1f} {y0:.1f}H{x1:.1f}V{y1:.1f}H{x0:.1f}Z"
 
+    def _keep_outs(self) -> list[str]:
+        parts = []
+        for area in self._site.keep_outs:
+            x0, y0 = self._at(area.x0_m, area.y0_m)
+            x1, y1 = self._at(area.x1_m, area.y1_m)
+            top = min(area.to_m, self._site.ceiling_m)
+            size = f'width="{x1 - x0:.1f}" height="{y1 - y0:.1f}"'
+            parts += [
+                f'<rect class="keep" x="{x0:.1f}" y="{y0:.1f}" {size}/>',
+                _middle((x0 + x1) / 2, y0 + 14, f"keep out {area.from_m:g}..{top:g} m"),
+            ]
+        return parts
+
+    def _restriction(self, edge: Edge) -> list[str]:
+        """A cross over a closed line, an arrow on a one-way line."""
+        a, b = self._site.nodes[edge.a], self._site.nodes[edge.b]
+        x, y = self._at((a.x_m + b.x_m) / 2, (a.y_m + b.y_m) / 2)
+        if self._site.is_closed(edge):
+            return [f'<path class="shut" d="M{x - 8:.1f} {y - 8:.1f}l16 16m0 -16l-16 16"/>']
+        if not edge.one_way:
+            return []
+        turn = math.degrees(math.atan2(b.y_m - a.y_m, b.x_m - a.x_m))
+        return [f'<path class="way" transform="translate({x:.1f} {y:.1f}) rotate({turn:.0f})" d="{_ARROW}"/>']
+
     def _pads(self) -> list[str]:
         parts = []
         for pad in self._site.pads:
@@ -121,9 +151,10 @@ class _Plan:
             x, y = self._at(node.x_m - pad.size_m / 2, node.y_m - pad.size_m / 2)
             side = pad.size_m * _PX_PER_M
             beside, below = x + side + 5, y + side / 2 + 31
+            name = escape(pad.id if pad.charge else f"{pad.id} (no charging)")
             parts += [
                 f'<rect class="pad" x="{x:.1f}" y="{y:.1f}" width="{side:.1f}" height="{side:.1f}" rx="3"/>',
-                f'<text class="step" x="{beside:.1f}" y="{below:.1f}">{escape(pad.id)}</text>',
+                f'<text class="step" x="{beside:.1f}" y="{below:.1f}">{name}</text>',
             ]
         return parts
 

@@ -31,6 +31,9 @@ _Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 _Bend = Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)]
 _Offset = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
 
+HEIGHT_ROOM_M = 0.4
+"""Below and above the flying height, what a keep-out must leave free for a leg to pass it."""
+
 
 class _Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -162,6 +165,10 @@ class MissionConfig(_Section):
     battery_home: _Share = Field(0.20, description="fly home below")
     battery_land: _Share = Field(0.10, description="land at once below")
     autostart: bool = Field(False, description="start without waiting for the start command")
+
+    def flown_between_m(self) -> tuple[float, float]:
+        """The heights that the legs of the flight are flown between, with room to spare."""
+        return self.height_m - HEIGHT_ROOM_M, self.height_m + HEIGHT_ROOM_M
 
     def params(self) -> MissionParams:
         return MissionParams(

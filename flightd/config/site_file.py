@@ -16,9 +16,22 @@
     shelves = ["left", "right"]  # seen along +x
     shelf_distance_m = 1.2       # from the line to the shelf front
     shelf_height_m = 3.0
+    one_way = "+x"               # or "-x": flown in this direction only; left out: both
 
     [[cross]]                    # a painted line between two aisles, at right angles to both
     nodes = ["A1", "B1"]
+    one_way = false              # true: flown from the first node to the second only
+
+    [[blocked]]                  # a line that is not flown at all, for as long as it stands here
+    nodes = ["A2", "A3"]
+
+    [[keep_out]]                 # nothing flies within 0.3 m of this rectangle of the floor
+    x0_m = 4.0
+    y0_m = -0.5
+    x1_m = 5.0
+    y1_m = 0.5
+    from_m = 0.0                 # heights, both may be left out: from the floor to the ceiling
+    to_m = 2.5
 
     [[rack]]                     # divides shelf fronts into bays, levels and places; may be left out
     aisles = ["A"]               # left out: every aisle with a shelf on these sides
@@ -29,9 +42,11 @@
     pattern = "{aisle}{side}-{bay:02}-{level}-{position}"  # location codes: AL-01-2-1
 
     [[pad]]
-    id = "home"                  # missions start and end here
+    id = "home"                  # missions start and end here; without it, at the first to start from
     node = "A1"
     size_m = 0.5
+    start = true                 # missions may start here
+    charge = true                # batteries are changed or charged here
 
 Map frame: x along the aisles, y to the right of x seen from above, metres.
 """
@@ -39,6 +54,7 @@ Map frame: x along the aisles, y to the right of x seen from above, metres.
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -48,6 +64,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from flightd.core.errors import InputError
 from flightd.grid.layout import LayoutError, lay_out
 from flightd.grid.site import Aisle, LineColour, Pad, Rack, Side, Site
+from flightd.grid.ways import KeepOut, OneWay
 
 _Metres = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 _Coordinate = Annotated[float, Field(ge=-10_000, le=10_000, allow_inf_nan=False)]
@@ -74,10 +91,29 @@ class _AisleTable(_Table):
     shelves: tuple[Side, ...] = (Side.LEFT, Side.RIGHT)
     shelf_distance_m: _Metres = 1.2
     shelf_height_m: _Metres = 3.0
+    one_way: OneWay | None = None
 
 
 class _CrossTable(_Table):
     nodes: tuple[str, str]
+    one_way: bool = False
+
+
+class _BlockedTable(_Table):
+    nodes: tuple[str, str]
+
+
+class _KeepOutTable(_Table):
+    x0_m: _Coordinate
+    y0_m: _Coordinate
+    x1_m: _Coordinate
+    y1_m: _Coordinate
+    from_m: float = Field(0.0, ge=0, le=100)
+    to_m: float | None = Field(None, gt=0, le=100, allow_inf_nan=False)
+
+    def area(self) -> KeepOut:
+        to_m = math.inf if self.to_m is None else self.to_m
+        return KeepOut(self.x0_m, self.y0_m, self.x1_m, self.y1_m, self.from_m, to_m)
 
 
 class _RackTable(_Table):
@@ -95,12 +131,16 @@ class _PadTable(_Table):
     id: str = Field(min_length=1, max_length=40)
     node: str
     size_m: float = Field(0.5, ge=0.2, le=3)
+    start: bool = True
+    charge: bool = True
 
 
 class _SiteFile(_Table):
     site: _SiteTable
     aisle: tuple[_AisleTable, ...] = Field(min_length=1)
     cross: tuple[_CrossTable, ...] = ()
+    blocked: tuple[_BlockedTable, ...] = ()
+    keep_out: tuple[_KeepOutTable, ...] = ()
     rack: tuple[_RackTable, ...] = ()
     pad: tuple[_PadTable, ...] = Field(min_length=1)
 
@@ -131,11 +171,14 @@ def parse_site(text: str, source: str) -> Site:
             file.site.name,
             [Aisle(**dict(aisle)) for aisle in file.aisle],
             [cross.nodes for cross in file.cross],
-            [Pad(pad.id, pad.node, pad.size_m) for pad in file.pad],
+            [Pad(**dict(pad)) for pad in file.pad],
             line_width_m=file.site.line_width_m,
             line_colour=file.site.line_colour,
             ceiling_m=file.site.ceiling_m,
             racks=[_rack(rack, file.aisle) for rack in file.rack],
+            one_way_crosses=[cross.nodes for cross in file.cross if cross.one_way],
+            blocked=[blocked.nodes for blocked in file.blocked],
+            keep_outs=[area.area() for area in file.keep_out],
         )
     except LayoutError as err:
         raise InputError(f"{source}: {err}") from None
@@ -165,8 +208,16 @@ def site_toml(site: Site) -> str:
         parts += [f"shelves = [{', '.join(map(_quoted, aisle.shelves))}]"]
         parts += [f"shelf_distance_m = {aisle.shelf_distance_m!r}"]
         parts += [f"shelf_height_m = {aisle.shelf_height_m!r}"]
+        parts += [f"one_way = {_quoted(aisle.one_way)}"] if aisle.one_way else []
     for cross in site.crosses:
         parts += ["", "[[cross]]", f"nodes = [{_quoted(cross.a)}, {_quoted(cross.b)}]"]
+        parts += ["one_way = true"] if cross.one_way else []
+    for a, b in site.blocked:
+        parts += ["", "[[blocked]]", f"nodes = [{_quoted(a)}, {_quoted(b)}]"]
+    for area in site.keep_outs:
+        parts += ["", "[[keep_out]]", f"x0_m = {area.x0_m!r}", f"y0_m = {area.y0_m!r}"]
+        parts += [f"x1_m = {area.x1_m!r}", f"y1_m = {area.y1_m!r}", f"from_m = {area.from_m!r}"]
+        parts += [f"to_m = {area.to_m!r}"] if math.isfinite(area.to_m) else []
     for rack in site.racks:
         parts += ["", "[[rack]]", f"aisles = [{', '.join(map(_quoted, rack.aisles))}]"]
         parts += [f"sides = [{', '.join(map(_quoted, rack.sides))}]", f"bay_width_m = {rack.bay_width_m!r}"]
@@ -175,6 +226,7 @@ def site_toml(site: Site) -> str:
     for pad in site.pads:
         parts += ["", "[[pad]]", f"id = {_quoted(pad.id)}", f"node = {_quoted(pad.node)}"]
         parts += [f"size_m = {pad.size_m!r}"]
+        parts += [f"{key} = false" for key, on in (("start", pad.start), ("charge", pad.charge)) if not on]
     return "\n".join(parts) + "\n"
 
 
@@ -223,6 +275,8 @@ def _fields(location: tuple[int | str, ...]) -> list[str]:
         "site": _SiteTable,
         "aisle": _AisleTable,
         "cross": _CrossTable,
+        "blocked": _BlockedTable,
+        "keep_out": _KeepOutTable,
         "rack": _RackTable,
         "pad": _PadTable,
     }

@@ -7,10 +7,12 @@ cross line.  Shelves stop short of the crosses, so that a drone can change aisle
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
+from flightd.grid.closures import mistakes
 from flightd.grid.racks import RackError, place_locations
 from flightd.grid.site import Aisle, Edge, LineColour, Node, Pad, PaintedLine, Rack, Shelf, Side, Site
+from flightd.grid.ways import KeepOut, OneWay
 
 SAME_X_M = 0.01
 """Strokes across the aisles this close in x are one line."""
@@ -39,15 +41,18 @@ def lay_out(
     line_colour: LineColour = LineColour.YELLOW,
     ceiling_m: float = 6.0,
     racks: Sequence[Rack] = (),
+    one_way_crosses: Collection[tuple[str, str]] = (),
+    blocked: Sequence[tuple[str, str]] = (),
+    keep_outs: Sequence[KeepOut] = (),
 ) -> Site:
     """Make the site, or raise LayoutError naming the part that does not fit.
 
-    `crosses` are pairs of node ids at equal x in neighbouring aisles, in any order."""
+    `crosses` are pairs of node ids at equal x in neighbouring aisles, in any order; those that are also
+    `one_way_crosses` are flown from the first to the second only."""
     _check_aisles(aisles, line_width_m, ceiling_m)
     nodes = {node.id: node for aisle in aisles for node in _nodes(aisle)}
-    cross_edges = _crosses(tuple(crosses), aisles, nodes)
-    along = [Edge(f"{aisle.id}{i}", f"{aisle.id}{i + 1}") for aisle in aisles for i in range(1, aisle.size)]
-    edges = (*along, *cross_edges)
+    cross_edges = _crosses(tuple(crosses), aisles, nodes, one_way_crosses)
+    edges = (*(edge for aisle in aisles for edge in _along(aisle)), *cross_edges)
     _check_connected(nodes, edges)
     lines = (*_aisle_strokes(aisles, line_width_m), *_cross_strokes(aisles, nodes, cross_edges, line_width_m))
     shelves = tuple(shelf for aisle in aisles for shelf in _shelves(aisle, nodes, cross_edges))
@@ -56,7 +61,7 @@ def lay_out(
     except RackError as err:
         key, _, problem = str(err).partition(": ")
         raise LayoutError(key, problem) from None
-    return Site(
+    site = Site(
         name=name,
         aisles=tuple(aisles),
         crosses=cross_edges,
@@ -70,7 +75,19 @@ def lay_out(
         ceiling_m=ceiling_m,
         racks=tuple(racks),
         locations=locations,
+        blocked=tuple(blocked),
+        keep_outs=tuple(keep_outs),
     )
+    for key, problem in mistakes(site):
+        raise LayoutError(key, problem)
+    return site
+
+
+def _along(aisle: Aisle) -> list[Edge]:
+    """The aisle's edges, each in the direction in which it is flown."""
+    pairs = itertools.pairwise(f"{aisle.id}{i}" for i in range(1, aisle.size + 1))
+    back = aisle.one_way is OneWay.MINUS_X
+    return [Edge(b, a, True) if back else Edge(a, b, aisle.one_way is not None) for a, b in pairs]
 
 
 def _nodes(aisle: Aisle) -> list[Node]:
@@ -136,7 +153,10 @@ def _check_apart(a: Aisle, b: Aisle, width_m: float) -> None:
 
 
 def _crosses(
-    pairs: Sequence[tuple[str, str]], aisles: Sequence[Aisle], nodes: dict[str, Node]
+    pairs: Sequence[tuple[str, str]],
+    aisles: Sequence[Aisle],
+    nodes: dict[str, Node],
+    one_way: Collection[tuple[str, str]],
 ) -> tuple[Edge, ...]:
     found: list[Edge] = []
     for i, pair in enumerate(pairs):
@@ -160,8 +180,8 @@ def _crosses(
                     f"{a.id} to {b.id} runs over aisle {other.id}; write one cross to it and one from it"
                 )
                 raise LayoutError(key, problem)
-        edge = Edge(a.id, b.id)
-        if edge in found:
+        edge = Edge(*pair, True) if pair in one_way else Edge(a.id, b.id)
+        if any({edge.a, edge.b} == {other.a, other.b} for other in found):
             raise LayoutError(key, f"{a.id} and {b.id} are already joined by an earlier cross")
         found.append(edge)
     return tuple(found)
@@ -185,8 +205,10 @@ def _check_connected(nodes: dict[str, Node], edges: Sequence[Edge]) -> None:
 
 
 def _check_pads(pads: tuple[Pad, ...], nodes: dict[str, Node]) -> tuple[Pad, ...]:
-    if not pads:
-        raise LayoutError("pad", 'there is none; add [[pad]] id = "home", node = "A1"')
+    if not any(pad.start for pad in pads):
+        raise LayoutError("pad", 'there is none to start from; add [[pad]] id = "home", node = "A1"')
+    if not any(pad.charge for pad in pads):
+        raise LayoutError("pad", "there is none to charge on; set charge = true for one")
     for i, pad in enumerate(pads):
         if pad.node not in nodes:
             raise LayoutError(f"pad[{i}] ({pad.id}).node", f"there is no node {pad.node}")
@@ -217,7 +239,9 @@ def _cross_strokes(
     pieces = [
         (node.x_m, node.y_m - reach[node.aisle], node.y_m + reach[node.aisle]) for node in nodes.values()
     ]
-    pieces += [(nodes[edge.a].x_m, nodes[edge.a].y_m, nodes[edge.b].y_m) for edge in crosses]
+    for edge in crosses:
+        ends = sorted((nodes[edge.a].y_m, nodes[edge.b].y_m))
+        pieces.append((nodes[edge.a].x_m, ends[0], ends[1]))
     pieces.sort()
     merged: list[list[float]] = []
     for x_m, y0_m, y1_m in pieces:

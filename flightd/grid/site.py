@@ -7,12 +7,13 @@ clockwise from x.  A `Site` is made by `flightd.grid.layout.lay_out` from its ai
 from __future__ import annotations
 
 import enum
-import heapq
 import itertools
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+
+from flightd.grid.ways import KeepOut, NoWayError, OneWay, Ways
 
 
 class LineColour(enum.StrEnum):
@@ -35,7 +36,8 @@ class Side(enum.StrEnum):
 class Aisle:
     """One straight aisle line and its nodes: the first at (`x_m`, `y_m`), each next one `spacing_m`
     further along x.  The aisle line runs `overrun_m` past its end nodes; the node's own cross line
-    reaches `cross_half_m` to both sides.  A shelf's face stands `shelf_distance_m` from the line."""
+    reaches `cross_half_m` to both sides.  A shelf's face stands `shelf_distance_m` from the line.  With
+    `one_way` it is flown in that direction only."""
 
     id: str
     x_m: float
@@ -46,6 +48,7 @@ class Aisle:
     shelves: tuple[Side, ...] = (Side.LEFT, Side.RIGHT)
     shelf_distance_m: float = 1.2
     shelf_height_m: float = 3.0
+    one_way: OneWay | None = None
 
     @property
     def size(self) -> int:
@@ -71,10 +74,11 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A painted line between two neighbouring nodes, flown both ways."""
+    """A painted line between two neighbouring nodes, flown both ways unless it is `one_way`, from a to b."""
 
     a: str
     b: str
+    one_way: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,11 +94,13 @@ class PaintedLine:
 
 @dataclass(frozen=True, slots=True)
 class Pad:
-    """A square start and charge mat, its centre on a node."""
+    """A square mat, its centre on a node; missions may `start` on it, batteries change where `charge`."""
 
     id: str
     node: str
     size_m: float
+    start: bool = True
+    charge: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +163,47 @@ class Site:
     ceiling_m: float
     racks: tuple[Rack, ...] = ()
     locations: Mapping[str, Location] = field(default_factory=dict)
+    blocked: tuple[tuple[str, str], ...] = ()
+    keep_outs: tuple[KeepOut, ...] = ()
+
+    @cached_property
+    def _ways(self) -> Ways:
+        return Ways(self.nodes, self._arcs(against_one_way=False))
+
+    @cached_property
+    def _ways_in_need(self) -> Ways:
+        return Ways(self.nodes, self._arcs(against_one_way=True))
+
+    def _arcs(self, *, against_one_way: bool) -> list[tuple[str, str, float]]:
+        """Every direction of every line that is open, in a fixed order."""
+        found = []
+        for edge in self.edges:
+            if not self.is_closed(edge):
+                length_m = self.distance_m(edge.a, edge.b)
+                found.append((edge.a, edge.b, length_m))
+                if against_one_way or not edge.one_way:
+                    found.append((edge.b, edge.a, length_m))
+        return sorted(found, key=lambda arc: (arc[0], self._order(arc[1])))
+
+    def is_closed(self, edge: Edge) -> bool:
+        """Whether an edge is blocked or too near a keep-out, in both directions."""
+        if any({edge.a, edge.b} == {*pair} for pair in self.blocked):
+            return True
+        a, b = self.nodes[edge.a], self.nodes[edge.b]
+        return any(area.touches(a.x_m, a.y_m, b.x_m, b.y_m) for area in self.keep_outs)
+
+    @cached_property
+    def cut_off(self) -> frozenset[str]:
+        """The nodes to which no open way leads from the home pad, or from which none leads back."""
+        out = self._ways.reach(self.home.node)
+        backward = Ways(self.nodes, [(b, a, m) for a, b, m in self._arcs(against_one_way=False)])
+        return frozenset(self.nodes) - (out.keys() & backward.reach(self.home.node).keys())
+
+    def between(self, low_m: float, high_m: float) -> Site:
+        """The site as it is for a drone that stays between two heights: without the keep-outs that lie
+        wholly below or above."""
+        kept = tuple(area for area in self.keep_outs if area.from_m < high_m and area.to_m > low_m)
+        return self if kept == self.keep_outs else replace(self, keep_outs=kept)
 
     @cached_property
     def _neighbours(self) -> dict[str, tuple[str, ...]]:
@@ -172,8 +219,10 @@ class Site:
 
     @property
     def home(self) -> Pad:
-        """The pad missions start from and come back to: the one called `home`, else the first."""
-        return next((pad for pad in self.pads if pad.id == "home"), self.pads[0])
+        """The pad missions start from and come back to: the one called `home`, else the first to start
+        from."""
+        starts = [pad for pad in self.pads if pad.start]
+        return next((pad for pad in starts if pad.id == "home"), starts[0])
 
     def neighbours(self, node: str) -> tuple[str, ...]:
         """Nodes one edge away, in a fixed order.  KeyError for an unknown node."""
@@ -203,31 +252,17 @@ class Site:
         ys += [shelf.y_m for shelf in self.shelves]
         return min(xs), min(ys), max(xs), max(ys)
 
-    def path(self, start: str, goal: str) -> tuple[str, ...]:
-        """Shortest way along the edges in metres, both ends included (Dijkstra).
+    def path(self, start: str, goal: str, *, against_one_way: bool = False) -> tuple[str, ...]:
+        """Shortest way along the open lines in metres, both ends included; one-way lines are flown
+        `against_one_way` only in need, blocked ones and keep-outs never.
 
-        Raises KeyError for an unknown node; a site is connected, so a way always exists."""
-        if start not in self.nodes or goal not in self.nodes:
-            raise KeyError(start if start not in self.nodes else goal)
-        came_from: dict[str, str] = {}
-        best = {start: 0.0}
-        queue = [(0.0, start)]
-        while queue:
-            travelled_m, here = heapq.heappop(queue)
-            if here == goal:
-                break
-            if travelled_m > best[here]:
-                continue
-            for there in self._neighbours[here]:
-                total_m = travelled_m + self.distance_m(here, there)
-                if total_m < best.get(there, math.inf):
-                    best[there] = total_m
-                    came_from[there] = here
-                    heapq.heappush(queue, (total_m, there))
-        way = [goal]
-        while way[-1] != start:
-            way.append(came_from[way[-1]])
-        return tuple(reversed(way))
+        Raises NoWayError when there is none, KeyError for an unknown node."""
+        way = (self._ways_in_need if against_one_way else self._ways).path(start, goal)
+        if way is None:
+            raise NoWayError(
+                f"site {self.name}: no open way from {start} to {goal}; one-way, blocked or keep-out close it"
+            )
+        return way
 
     def length_m(self, way: Iterable[str]) -> float:
         """Metres flown along a list of nodes, each reached by the shortest way from the one before."""
@@ -242,11 +277,12 @@ class Site:
         return tuple(full)
 
     def serpentine_route(self) -> tuple[str, ...]:
-        """Every node once, aisle by aisle from the home pad, and home again at the end.
+        """Every node that is not cut off once, aisle by aisle from the home pad, and home again at the end.
 
-        Consecutive goals of one aisle are neighbours; between aisles and on the way home other nodes
-        may have to be passed (`expand` gives them).  Each aisle is entered at its nearer end; the
-        aisles on the home aisle's shorter side come first."""
+        Consecutive goals of one aisle are neighbours unless lines are closed; between aisles and on the
+        way home other nodes may have to be passed (`expand` gives them).  Each aisle is flown in the
+        direction that is shorter from where the one before ended; the aisles on the home aisle's shorter
+        side come first."""
         order = [aisle.id for aisle in self.aisle_order()]
         home = self.home.node
         at = order.index(self.nodes[home].aisle)
@@ -254,8 +290,12 @@ class Site:
         sides = (before, after) if len(before) <= len(after) else (after, before)
         goals = [home]
         for aisle in [order[at], *sides[0], *sides[1]]:
-            sweep = [node.id for node in self.aisle_nodes(aisle)]
-            if self.length_m((goals[-1], sweep[-1])) < self.length_m((goals[-1], sweep[0])):
-                sweep.reverse()
+            sweep = [node.id for node in self.aisle_nodes(aisle) if node.id not in self.cut_off]
+            back = sweep[::-1]
+            if sweep and self._sweep_m(goals[-1], back) < self._sweep_m(goals[-1], sweep):
+                sweep = back
             goals += [node for node in sweep if node != home]
         return (*goals, home) if goals[-1] != home else tuple(goals)
+
+    def _sweep_m(self, start: str, sweep: list[str]) -> float:
+        return round(self.length_m((start, *sweep)), 6)

@@ -9,6 +9,7 @@ from flightd.control.profile import Profile
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, LandedState, Phase
 from flightd.grid.site import Site
+from flightd.grid.ways import NoWayError
 from flightd.mission.guidance import GroundLost, Guidance, Guide, MissionParams, Senses
 from flightd.mission.plan import FlightPlan, HeadingPolicy, Stop, make_plan
 from flightd.mission.table import next_phase
@@ -109,7 +110,7 @@ class Mission:
         if self._paused:
             found.add(Trigger.HOLD)
         if self.airborne and not self._returning and self._watch.battery_low(s):
-            self._go_home(s.now_ns, "battery low")
+            self._go_home(s.now_ns, "battery low", in_need=True)
         if (s.now_ns - self._since_ns) * 1e-9 > self._limit_s:
             found.add(Trigger.TIMED_OUT)
         return found | self._watch.step(s, self._situation(Trigger.HOLD in found))
@@ -131,7 +132,7 @@ class Mission:
         if not lost:
             return set()
         if action is GroundLost.HOME and self.airborne and not self._returning:
-            self._go_home(s.now_ns, "ground link lost")
+            self._go_home(s.now_ns, "ground link lost", in_need=True)
         return {GroundLost.HOLD: {Trigger.HOLD}, GroundLost.LAND: {Trigger.GROUND_LOST}}.get(action, set())
 
     def _progress(self, s: Senses) -> set[Trigger]:
@@ -238,26 +239,31 @@ class Mission:
             self.visited.append(self.goal.node)
             self._event(s.now_ns, EventLevel.INFO, "visited", self.goal.node)
 
-    def _go_home(self, now_ns: int, reason: str) -> None:
+    def _go_home(self, now_ns: int, reason: str, *, in_need: bool = False) -> None:
+        """Fly to the home pad; `in_need` by the shortest way, against one-way lines too."""
         self._returning = True
         self._paused = False
         self._aborting = True
         self._event(now_ns, EventLevel.WARNING, "home", reason)
-        self._replan(self._plan.home, visit=False)
+        self._replan([], in_need=in_need)
 
     def _go_to(self, now_ns: int, node: str) -> None:
         if self._returning:
             self._event(now_ns, EventLevel.WARNING, "command", f"goto {node} refused: on the way home")
         elif node in self._site.nodes:
-            self._replan(node, visit=True)
+            try:
+                self._replan([node])
+            except NoWayError as err:
+                self._event(now_ns, EventLevel.WARNING, "command", f"goto {node} refused: {err}")
         else:
             self._event(now_ns, EventLevel.WARNING, "command", f"no node {node!r} on site {self._site.name}")
 
-    def _replan(self, node: str, visit: bool) -> None:
-        """Finish the present leg, then fly to `node` and, from there, home."""
+    def _replan(self, visits: list[str], *, in_need: bool = False) -> None:
+        """Finish the present leg, then fly over `visits` home.  NoWayError leaves everything as it is."""
         here = self.goal
-        wanted = [node] if visit else []
-        onward = make_plan(self._site, wanted, here.node, self._plan.home, self._policy, here.yaw_rad)
+        onward = make_plan(
+            self._site, visits, here.node, self._plan.home, self._policy, here.yaw_rad, in_need=in_need
+        )
         self._stops[self._next + 1 :] = onward.stops
 
     # What to do

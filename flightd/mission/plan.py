@@ -62,10 +62,14 @@ def make_plan(
     home: str,
     policy: HeadingPolicy,
     start_yaw_rad: float = 0.0,
+    *,
+    in_need: bool = False,
 ) -> FlightPlan:
-    """Plan a flight from `start` over `visits` in the given order to `home`, along painted lines.
+    """Plan a flight from `start` over `visits` in the given order to `home`, along open painted lines;
+    `in_need` one-way lines count as open both ways.
 
-    Corners on the way become stops of their own.  Raises InputError for a node that the site lacks.
+    Corners on the way become stops of their own.  Raises InputError for a node that the site lacks or to
+    which no open way leads.
     """
     for node in (start, home, *visits):
         if node not in site.nodes:
@@ -75,7 +79,7 @@ def make_plan(
     stops: list[Stop] = []
     here, yaw = start, start_yaw_rad
     for goal, visit in [*((node, True) for node in visits), (home, False)]:
-        path = site.path(here, goal)
+        path = site.path(here, goal, against_one_way=in_need)
         for i, node in enumerate(path[1:], start=1):
             corner = i + 1 < len(path) and not _straight(site, path[i - 1], node, path[i + 1])
             yaw = _leg_yaw(site, path[i - 1], node, policy, yaw)

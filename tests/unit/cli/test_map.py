@@ -123,3 +123,18 @@ def test_check_holds_the_front_camera_against_the_shelves(flightd: Run, tmp_path
     facts = json.loads(out)
     assert (code, facts["ok"], facts["scan"]["speed_limit_mps"]) == (1, False, 0.1125)
     assert "problem: 0.3 m/s blurs" in flightd("map", "check", file, *sees, "--exposure-ms", 20)[1]
+
+
+def test_restrictions_are_told_and_drawn(flightd: Run, tmp_path: Path) -> None:
+    text = DEMO.read_text() + (
+        '\n[[blocked]]\nnodes = ["A2", "A3"]\n'
+        "\n[[keep_out]]\nx0_m = 3.0\ny0_m = 2.5\nx1_m = 3.5\ny1_m = 3.5\nto_m = 2.0\n"
+    )
+    file = tmp_path / "site.toml"
+    file.write_text(text.replace('id = "B"\n', 'id = "B"\none_way = "+x"\n'))
+    facts = json.loads(flightd("map", "check", file, "--json")[1])
+    assert (facts["one_way"], facts["keep_outs"], facts["closed"]) == (5, 1, 3)
+    _, out, _ = flightd("map", "draw", file)
+    svg = ET.parse(out.strip()).getroot()
+    classes = [part.get("class") for part in svg.iter()]
+    assert (classes.count("shut"), classes.count("keep"), classes.count("way")) == (3, 1, 3)
