@@ -20,7 +20,9 @@ from flightd.core.errors import FlightdError, InputError, TransientError
 from flightd.core.topics import Topic
 from flightd.core.types import AttitudeSetpoint, Command, Event, EventLevel, Phase, Status
 from flightd.grid.site import Site
-from flightd.mission.plan import FlightPlan, make_plan
+from flightd.mission.legs import Pace
+from flightd.mission.plan import FlightPlan, VisitOrder, make_plan
+from flightd.mission.route import ordered_best
 from flightd.pilot import Pilot, TickInput, TickOutput
 from flightd.ports import Clock, Ground, PoseTaker, Recorder, Vehicle
 from flightd.runtime.latency import LatencyBook
@@ -58,8 +60,10 @@ def plan_of(config: Config, site: Site) -> FlightPlan:
     mission = config.mission
     site = site.between(*config.mission.flown_between_m())
     visits: Sequence[str] = mission.nodes or site.serpentine_route()
-    pad = site.home.node
-    return make_plan(site, visits, pad, pad, config.heading_policy(), math.radians(mission.start_yaw_deg))
+    pad, policy, yaw_rad = site.home.node, config.heading_policy(), math.radians(mission.start_yaw_deg)
+    if mission.order is VisitOrder.BEST:
+        visits = ordered_best(site, visits, pad, policy, Pace.of(mission.params()), yaw_rad)
+    return make_plan(site, visits, pad, pad, policy, yaw_rad)
 
 
 def pilot_of(config: Config, site: Site) -> Pilot:

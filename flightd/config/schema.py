@@ -21,7 +21,7 @@ from flightd.core.errors import InputError
 from flightd.core.geometry import Lens, Mount
 from flightd.grid.site import Site
 from flightd.mission.guidance import MissionParams
-from flightd.mission.plan import Heading, HeadingPolicy
+from flightd.mission.plan import Heading, HeadingPolicy, VisitOrder
 from flightd.pilot import PilotParams
 from flightd.tracking.lines import TrackerParams
 from flightd.tracking.tilt import TiltCompensation
@@ -141,6 +141,9 @@ class MissionConfig(_Section):
     site: Path = Field(description="site file, relative to this file")
     nodes: tuple[str, ...] = Field(
         (), description="nodes to visit in order; empty: every node, aisle by aisle"
+    )
+    order: VisitOrder = Field(
+        VisitOrder.GIVEN, description="given: nodes as listed (all: aisle by aisle); best: the quickest order"
     )
     heading: Heading = Field(
         Heading.ALONG, description="along: nose in flight direction; shelf: nose to the shelf"

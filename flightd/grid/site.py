@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from flightd.core.errors import InputError
 from flightd.grid.ways import KeepOut, NoWayError, OneWay, Ways
 
 
@@ -224,6 +225,13 @@ class Site:
         starts = [pad for pad in self.pads if pad.start]
         return next((pad for pad in starts if pad.id == "home"), starts[0])
 
+    def require(self, node: str) -> None:
+        """InputError unless there is such a node."""
+        if node not in self.nodes:
+            raise InputError(
+                f"site {self.name}: no node {node!r}; nodes are named like {next(iter(self.nodes))}"
+            )
+
     def neighbours(self, node: str) -> tuple[str, ...]:
         """Nodes one edge away, in a fixed order.  KeyError for an unknown node."""
         return self._neighbours[node]
@@ -263,6 +271,10 @@ class Site:
                 f"site {self.name}: no open way from {start} to {goal}; one-way, blocked or keep-out close it"
             )
         return way
+
+    def reach(self, start: str) -> dict[str, str]:
+        """Each node that open ways lead to, nearest first, with the node before it on the shortest way."""
+        return self._ways.reach(start)
 
     def length_m(self, way: Iterable[str]) -> float:
         """Metres flown along a list of nodes, each reached by the shortest way from the one before."""

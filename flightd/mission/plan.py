@@ -12,13 +12,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flightd.core.errors import InputError
 from flightd.grid.site import Side, Site
 
 
 class Heading(enum.StrEnum):
     ALONG = "along"
     SHELF = "shelf"
+
+
+class VisitOrder(enum.StrEnum):
+    """As the configuration lists the nodes (all of them: aisle by aisle), or the quickest."""
+
+    GIVEN = "given"
+    BEST = "best"
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,17 +78,14 @@ def make_plan(
     which no open way leads.
     """
     for node in (start, home, *visits):
-        if node not in site.nodes:
-            raise InputError(
-                f"site {site.name}: no node {node!r}; nodes are named like {next(iter(site.nodes))}"
-            )
+        site.require(node)
     stops: list[Stop] = []
     here, yaw = start, start_yaw_rad
     for goal, visit in [*((node, True) for node in visits), (home, False)]:
         path = site.path(here, goal, against_one_way=in_need)
         for i, node in enumerate(path[1:], start=1):
             corner = i + 1 < len(path) and not _straight(site, path[i - 1], node, path[i + 1])
-            yaw = _leg_yaw(site, path[i - 1], node, policy, yaw)
+            yaw = leg_yaw(site, path[i - 1], node, policy, yaw)
             if corner or node == goal:
                 stops.append(_stop(site, node, yaw, visit and node == goal))
         if len(path) == 1:
@@ -105,7 +108,8 @@ def _straight(site: Site, a: str, b: str, c: str) -> bool:
     return abs(math.sin((_direction(site, a, b) - _direction(site, b, c)) / 2)) < 1e-6
 
 
-def _leg_yaw(site: Site, a: str, b: str, policy: HeadingPolicy, yaw_before: float) -> float:
+def leg_yaw(site: Site, a: str, b: str, policy: HeadingPolicy, yaw_before: float) -> float:
+    """Heading flown from node `a` to its neighbour `b`."""
     direction = _direction(site, a, b)
     if policy.heading is Heading.ALONG:
         return direction
