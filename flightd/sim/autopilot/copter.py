@@ -57,6 +57,8 @@ _NOT_ARMABLE = frozenset({CopterMode.LAND, CopterMode.RTL, CopterMode.BRAKE})
 class ArduCopterPeer(AutopilotPeer):
     """A copter on the floor, disarmed, in STABILIZE, until somebody talks to it."""
 
+    takes_keys = True
+
     def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
         config = config or PeerConfig()
         parameters = ParameterServer({**COPTER_PARAMETERS, **config.parameters})

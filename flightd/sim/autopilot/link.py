@@ -24,10 +24,14 @@ class Channel:
         self.address = address
         self._packer = dialect.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
         if key is not None:
-            self._packer.signing.secret_key = key
-            self._packer.signing.sign_outgoing = True
+            self.sign(key)
         self.intervals_ns: dict[int, int] = {}
         self.due_ns: dict[int, int] = {}
+
+    def sign(self, key: bytes) -> None:
+        """Sign what goes out from now on."""
+        self._packer.signing.secret_key = key
+        self._packer.signing.sign_outgoing = True
 
     def pack(self, message: Message, signing_time: int) -> bytes:
         """One frame; a signature is stamped no earlier than `signing_time`."""
@@ -81,6 +85,13 @@ class UdpLink(asyncio.DatagramProtocol):
         self._transport = transport
         name: Address = transport.get_extra_info("sockname")[:2]
         return name
+
+    def sign(self, key: bytes, stamp: int) -> None:
+        """Sign from now on, and demand it."""
+        self._key = self._parser.signing.secret_key = key
+        self._parser.signing.timestamp = max(self._parser.signing.timestamp, stamp)
+        for channel in self.channels.values():
+            channel.sign(key)
 
     def close(self) -> None:
         if self._transport is not None:

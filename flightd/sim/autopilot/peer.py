@@ -73,6 +73,9 @@ class AutopilotPeer(abc.ABC):
     it up to the present first, so the flight does not depend on who asks when.
     """
 
+    takes_keys = False
+    """Whether SETUP_SIGNING is obeyed (on the ground)."""
+
     def __init__(
         self, clock: Clock, airframe: Airframe, config: PeerConfig, parameters: ParameterServer
     ) -> None:
@@ -293,6 +296,8 @@ class AutopilotPeer(abc.ABC):
                 self.link.send(channel, dialect.MAVLink_timesync_message(stamp_ns, message.ts1))
             case "REQUEST_DATA_STREAM":
                 self._data_stream(channel, message, now_ns)
+            case "SETUP_SIGNING" if self.takes_keys and not self.armed:
+                self.link.sign(bytes(message.secret_key), message.initial_timestamp)
             case "PARAM_REQUEST_READ" | "PARAM_REQUEST_LIST" | "PARAM_SET":
                 self.parameters.answer(message, lambda reply: self.link.send(channel, reply))
             case _:

@@ -179,6 +179,10 @@ def test_a_forged_stamp_from_the_future_does_not_lock_the_sender_out(tmp_path: P
     unheard = bytearray(Codec(1, 7, Signing(KEY, StoppedClock(), GOLDEN_UNIX_S)).pack(beat))
     unheard[-1] ^= 1  # forged for a stream that has not spoken yet
     assert parser.datagram(bytes(unheard)) == []
+    radio = dialect.MAVLink_radio_status_message(1, 1, 1, 1, 1, 1, 1)
+    modem = bytearray(Codec(1, 1, Signing(bytes(32), StoppedClock(), GOLDEN_UNIX_S + 9e5)).pack(radio))
+    assert len(parser.datagram(bytes(modem))) == 1  # needs no signature, so it must not leave a trace either
+    assert len(parser.datagram(sender.pack(beat))) == 1
 
 
 def test_the_signing_stamp_follows_the_clock_and_outlives_a_restart(tmp_path: Path) -> None:

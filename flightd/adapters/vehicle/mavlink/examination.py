@@ -15,7 +15,7 @@ from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.fitness import Finding, Job, judge, rules_for
 from flightd.adapters.vehicle.mavlink.link import Firmware, MavlinkLink
 from flightd.adapters.vehicle.mavlink.parameters import Parameters
-from flightd.adapters.vehicle.mavlink.signing import Signing
+from flightd.adapters.vehicle.mavlink.signing import Signing, setup_message
 from flightd.adapters.vehicle.mavlink.transport import make_transport
 from flightd.core.errors import UnavailableError
 from flightd.ports import Clock
@@ -45,13 +45,15 @@ class Examination:
         job: Job | None = None,
     ) -> None:
         self._url = url
+        self._system_id = system_id
         self._job = job or Job()
         transport = make_transport(parse_endpoint(url))
         self._link = MavlinkLink(transport, Codec(system_id, signing=signing), clock, system_id, self._take)
         self._commander = Commander(self._link, system_id)
         self._parameters = Parameters(self._link, system_id, bytewise=False)
         self._heard = asyncio.Event()
-        self._armed = False
+        self._armed = self._signs = False
+        self._has_key = signing is not None
         self._version = ""
 
     @asynccontextmanager
@@ -72,6 +74,15 @@ class Examination:
                 task.cancel()
             await asyncio.gather(line, heard, return_exceptions=True)
 
+    @property
+    def armed(self) -> bool:
+        """Whether it is armed, by its newest heartbeat."""
+        return self._armed
+
+    def send_key(self, key: bytes, unix_time_s: float) -> None:
+        """Give it the key of a signed link; it never answers that."""
+        self._link.send(setup_message(self._system_id, key, unix_time_s))
+
     async def report(self) -> Report:
         """Read afresh and judge every parameter of the firmware's table.  UnavailableError if none is
         answered."""
@@ -89,9 +100,10 @@ class Examination:
             if found is None:
                 unread.append(rule.names[-1])
         if len(unread) == len(rules):
-            raise UnavailableError(
-                f"{self._url}: the autopilot is heard but does not answer; check the TX line"
-            )
+            remedy = "check the TX line"
+            if self._signs and not self._has_key:
+                remedy = "it signs its messages: give its key as vehicle.signing_key"
+            raise UnavailableError(f"{self._url}: the autopilot is heard but does not answer; {remedy}")
         return Report(firmware, self._version, self._armed, tuple(findings), tuple(unread))
 
     async def fix(self, findings: Sequence[Finding]) -> list[Finding]:
@@ -107,6 +119,7 @@ class Examination:
     def _take(self, message: Message, _now_ns: int) -> None:
         match message.get_type():
             case "HEARTBEAT":
+                self._signs = bool(message.get_header().incompat_flags & dialect.MAVLINK_IFLAG_SIGNED)
                 self._armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
                 self._parameters.bytewise = self._link.firmware is Firmware.PX4
                 self._heard.set()

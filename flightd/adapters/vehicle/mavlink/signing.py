@@ -19,8 +19,9 @@ KEY_BYTES = 32
 _EPOCH_UNIX_S = 1_420_070_400
 """2015-01-01 UTC."""
 _NS_PER_UNIT = 10_000
-_RESERVE = 60 * 100_000
-"""A minute of time stamps is claimed on disk in advance, so a crash cannot bring one back."""
+_RESERVE = 30 * 100_000
+"""Half a minute of time stamps is claimed on disk in advance, so a crash cannot bring one back.  No more: an
+autopilot that is a minute behind us is not believed, and each restart begins at what was claimed."""
 
 
 def read_key(path: Path) -> bytes:
@@ -56,6 +57,17 @@ def make_key(path: Path) -> None:
         raise InputError(f"{path}: cannot write the key: {err.strerror}") from None
 
 
+def setup_message(system_id: int, key: bytes, unix_time_s: float) -> Any:
+    """SETUP_SIGNING for the autopilot, its time stamps to begin now."""
+    component = dialect.MAV_COMP_ID_AUTOPILOT1
+    return dialect.MAVLink_setup_signing_message(system_id, component, list(key), signing_time(unix_time_s))
+
+
+def signing_time(unix_time_s: float) -> int:
+    """The time stamp of a moment; 0 for one before signing was invented (a computer without its clock)."""
+    return max(round((unix_time_s - _EPOCH_UNIX_S) * 1e5), 0)
+
+
 class Signing:
     """Signs what a codec packs and checks what it decodes, with one key on one link.
 
@@ -73,7 +85,7 @@ class Signing:
         self._state = state
         self._link_id = link_id
         self._start_ns = clock.now_ns()
-        self._start = max(round((unix_time_s - _EPOCH_UNIX_S) * 1e5), _kept(state))
+        self._start = max(signing_time(unix_time_s), _kept(state))
         self._claimed = 0
         self.refused = 0
 
@@ -103,15 +115,17 @@ class Signing:
         signed = frame[0] == dialect.PROTOCOL_MARKER_V2 and frame[2] & dialect.MAVLINK_IFLAG_SIGNED
         stream = (frame[-13], frame[5], frame[6]) if signed else None
         before = stamps.get(stream)
+        message = None
         try:
-            return mav.decode(frame)
+            message = mav.decode(frame)
         except dialect.MAVError:
             self.refused += 1
+        if message is None or not message.get_signed():  # a modem's frame passes with any signature
             if before is not None:
                 stamps[stream] = before
             else:
                 stamps.pop(stream, None)
-            return None
+        return message
 
 
 def _radio_only(_mav: Any, message_id: int) -> bool:
