@@ -123,7 +123,7 @@ class Daemon:
         self._ground = ground
         self._pilot = pilot_of(config, site)
         self._frames: Latest[FrameTicket] = Latest()
-        self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock)
+        self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock, config.control.limits())
         self._pose_taker: PoseTaker | None = None
         if config.vehicle.shares_pose and isinstance(self._vehicle, PoseTaker):
             self._pose_taker = self._vehicle
@@ -149,14 +149,14 @@ class Daemon:
         """Run everything until the mission is over; cancelled, the vehicle is handed back."""
         parts = {
             "vehicle": self._vehicle.run(),
-            "camera": restarted(self._camera.run, self._failed),
+            "camera": restarted(self._camera.run, self.failed),
             "pump": self._pump.run(),
             **{f"detect-{i}": self._detect() for i in range(self._config.vision.workers)},
         }
         if self._recorder is not None:
-            parts["recorder"] = restarted(self._recorder.run, self._failed)
+            parts["recorder"] = restarted(self._recorder.run, self.failed)
         if self._ground is not None:
-            parts["ground"] = restarted(self._ground.run, self._failed)
+            parts["ground"] = restarted(self._ground.run, self.failed)
         try:
             async with asyncio.TaskGroup() as tasks:
                 services = [tasks.create_task(part, name=name) for name, part in parts.items()]
@@ -167,8 +167,8 @@ class Daemon:
             raise _first(group) from group
         return self._result(output)
 
-    def _failed(self, err: TransientError) -> None:
-        """A part that restarts has failed."""
+    def failed(self, err: TransientError) -> None:
+        """A part that restarts has failed: tell people."""
         self._trouble(str(err))
 
     def _trouble(self, text: str) -> None:

@@ -96,7 +96,7 @@ async def _examine(config: Config, site: Site, path: Path) -> Diagnosis:
     ]
     autopilot = vehicle.Autopilot(())
     if config.vehicle.kind == "ardrone":
-        drone = connect_vehicle(config.vehicle, clock)
+        drone = connect_vehicle(config.vehicle, clock, config.control.limits())
         assert isinstance(drone, ArDroneVehicle)
         flying = asyncio.ensure_future(drone.run())
         try:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import asyncio
 import signal
 import sys
-from collections.abc import Callable
-from contextlib import ExitStack, nullcontext
+from collections.abc import AsyncIterator, Callable
+from contextlib import ExitStack, asynccontextmanager, nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightd.core.errors import InputError, RunError
+from flightd.core.errors import InputError, RunError, TransientError
 
 if TYPE_CHECKING:
     from flightd.adapters.recorder.archive import FlightArchive
@@ -85,13 +85,34 @@ async def _fly(config: Config, site: Site, observer: Callable[[Status], None]) -
             stack.enter_context(recorder)
         ground = stack.enter_context(ground_link(config, site, clock) or nullcontext())
         await pool.ready()
-        beside = [asyncio.ensure_future(archive.run())] if archive is not None else []
-        try:
-            return await Daemon(config, site, clock, pool, recorder, [observer], ground).fly()
-        finally:
-            for part in beside:
-                part.cancel()
-            await asyncio.gather(*beside, return_exceptions=True)
+        daemon = Daemon(config, site, clock, pool, recorder, [observer], ground)
+        async with kept_room(archive, daemon.failed):
+            return await daemon.fly()
+
+
+@asynccontextmanager
+async def kept_room(
+    archive: FlightArchive | None, failed: Callable[[TransientError], None]
+) -> AsyncIterator[None]:
+    """Keep room for the flight's log meanwhile; whatever goes wrong with that is told to `failed` at once
+    and never ends the flight."""
+    from flightd.runtime.supervise import restarted
+
+    if archive is None:
+        yield
+        return
+
+    def ended(task: asyncio.Future[None]) -> None:
+        if not task.cancelled() and (err := task.exception()) is not None:
+            failed(TransientError(f"the archive of flights is not looked after any more: {err!r}"))
+
+    keeping = asyncio.ensure_future(restarted(archive.run, failed))
+    keeping.add_done_callback(ended)
+    try:
+        yield
+    finally:
+        keeping.cancel()
+        await asyncio.wait([keeping])
 
 
 def _black_box(config: Config, site: Site, now_ns: int) -> tuple[Recorder, FlightArchive] | None:

@@ -13,7 +13,7 @@ import math
 import multiprocessing
 import signal
 import socket
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
@@ -159,7 +159,7 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
 
 
 async def _watch(process: Any, pipe: Connection) -> None:
-    """Return when the world's process has died; UnavailableError with the reason that it left."""
+    """Return when the world's process has died; raises what it died of."""
     loop, died = asyncio.get_running_loop(), asyncio.Event()
     loop.add_reader(process.sentinel, died.set)
     try:
@@ -168,7 +168,7 @@ async def _watch(process: Any, pipe: Connection) -> None:
         loop.remove_reader(process.sentinel)
     with contextlib.suppress(EOFError):
         if pipe.poll():
-            raise UnavailableError(pipe.recv())
+            raise pipe.recv()
 
 
 async def _within_limit(simulation: Simulation, daemon: Daemon, beside: asyncio.Future[None]) -> FlightResult:
@@ -205,19 +205,35 @@ def _run_world(spec: WorldSpec, factor: float, log: Path, pipe: Connection) -> N
             for task in tasks:
                 task.cancel()
             await asyncio.wait(tasks)
-            reasons = [_reason(task.exception()) for task in tasks if not task.cancelled()]
-            if reason := next(filter(None, reasons), ""):
-                pipe.send(reason)
+            for task in tasks:
+                if not task.cancelled():
+                    task.result()
 
-    with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
-        runner.run(main())
+    try:
+        with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
+            runner.run(main())
+    except Exception as err:
+        pipe.send(_reason(err))
+        if not isinstance(_reason(err), UnavailableError):
+            raise
 
 
-def _reason(err: BaseException | None) -> str:
-    """What a person can do something about, out of an error or a group of them."""
+def _reason(err: Exception) -> FlightdError:
+    """The error that a person can do something about, out of an error or a group of them; a fault of the
+    world itself as a RunError."""
+    leaves = list(_leaves(err))
+    told = next((leaf for leaf in leaves if isinstance(leaf, FlightdError)), None)
+    if told is not None:
+        return UnavailableError(str(told))
+    return RunError(f"the simulated world failed: {type(leaves[0]).__name__}: {leaves[0]}")
+
+
+def _leaves(err: BaseException) -> Iterator[BaseException]:
     if isinstance(err, BaseExceptionGroup):
-        return next(filter(None, map(_reason, err.exceptions)), "")
-    return str(err) if isinstance(err, FlightdError) else ""
+        for part in err.exceptions:
+            yield from _leaves(part)
+    else:
+        yield err
 
 
 def _flight_recorder(simulation: Simulation, clock: LoopClock, lossless: bool) -> Recorder:

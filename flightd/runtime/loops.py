@@ -10,11 +10,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import selectors
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
+
+_LOG = logging.getLogger(__name__)
+
+HOLD_PATIENCE_S = 60.0
+"""Real time for which nothing may happen while time is held; then what is awaited counts as hung."""
 
 _STRAGGLER_WAIT_S = 0.5
 """Real time after which a datagram counts as dropped (its receiver's buffer was full)."""
@@ -64,11 +70,17 @@ class ScaledLoop(asyncio.SelectorEventLoop):
 
 class VirtualLoop(asyncio.SelectorEventLoop):
     """Time starts at `start_s` and jumps to the next timer as soon as no socket is ready, no datagram is
-    under way and nobody holds it."""
+    under way and nobody holds it.
 
-    def __init__(self, start_s: float = 1000.0) -> None:
+    Who holds it and waits for something that hung would wait for ever: after `patience_s` of real time in
+    which nothing happened time goes on until the holds end, so that time-outs do their work.
+    """
+
+    def __init__(self, start_s: float = 1000.0, patience_s: float = HOLD_PATIENCE_S) -> None:
         self._now_s = start_s
+        self._patience_s = patience_s
         self._holds = 0
+        self._overdue = False
         self._in_flight: Counter[int] = Counter()  # local port -> datagrams sent to it, not yet received
         self._ports: dict[int, int] = {}  # local port -> fd
         self.lost_datagrams = 0
@@ -85,6 +97,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
             yield
         finally:
             self._holds -= 1
+            self._overdue = self._overdue and self._holds > 0
 
     async def create_datagram_endpoint(self, protocol_factory: Any, *args: Any, **kwargs: Any) -> Any:
         """As the base class, with each datagram between this loop's own endpoints counted."""
@@ -112,9 +125,15 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         events = self._settled(real)
         if events or timeout == 0:
             return events
-        if self._holds or timeout is None:
+        if timeout is None:
             return _in_order(real.select(None))
-        self._now_s += timeout if timeout is not None else 0.0
+        if self._holds and not self._overdue:
+            events = real.select(self._patience_s)
+            if events:
+                return _in_order(events)
+            _LOG.warning("nothing happened in %g s while time was held: it goes on", self._patience_s)
+            self._overdue = True
+        self._now_s += timeout
         return []
 
     def _settled(self, real: selectors.BaseSelector) -> list[Any]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal, Protocol
 
 from flightd.core.errors import UnavailableError
@@ -111,8 +112,9 @@ class World:
             raise UnavailableError(f"the simulated vehicle cannot listen: {err.strerror}") from err
 
     async def run(self, opened: Callable[[], None] = lambda: None) -> None:
-        if isinstance(self.vehicle, ExternalVehicle):
-            await self.vehicle.open()  # nothing can be drawn before its truth is known
+        """Live until cancelled; `opened` is called when the vehicle can be talked to (an external one's truth
+        is known then, so that it can be drawn).  UnavailableError as for `open`."""
+        await self.open()
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self.vehicle.run(), name="autopilot")
             tasks.create_task(self.camera.run(), name="camera")
@@ -133,6 +135,7 @@ def _ardrone(
     try:
         from flightd.sim.ardrone.drone import Drone  # noqa: PLC0415 - its video needs an optional extra
         from flightd.sim.ardrone.server import ArDroneServer, Ports  # noqa: PLC0415
+        from flightd.sim.ardrone.video import Channel  # noqa: PLC0415
     except ModuleNotFoundError as err:
         raise UnavailableError(
             f"simulating an AR.Drone needs {err.name}: pip install 'flightd[ardrone]'"
@@ -140,4 +143,4 @@ def _ardrone(
     drone = Drone(airframe, Sensors(seed=spec.seed))
     ports = Ports("127.0.0.1", *spec.vehicle_ports)
     server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)
-    return server, server.show
+    return server, partial(server.show, camera=Channel.BOTTOM)

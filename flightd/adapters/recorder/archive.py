@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 from flightd.adapters.recorder.mcap_file import is_whole, repair
-from flightd.core.errors import InputError, UnavailableError
+from flightd.core.errors import InputError, TransientError, UnavailableError
 
 LOG_NAME = "flight.mcap"
 
@@ -59,12 +59,15 @@ class FlightArchive:
 
     async def run(self) -> None:
         """Mend what earlier flights left behind, then keep room on the disk, for ever; works in a thread,
-        beside the flight.  A disk that refuses is the recorder's to tell."""
+        beside the flight.  TransientError when the disk refuses."""
         await asyncio.to_thread(self.mend)
         while True:
             await asyncio.sleep(ROOM_S)
-            with suppress(OSError):
+            try:
                 await asyncio.to_thread(self.make_room)
+            except OSError as err:
+                text = f"{self._folder}: cannot make room for the flight's log: {err.strerror}"
+                raise TransientError(text) from err
 
     def mend(self) -> list[Path]:
         """Repair the logs of earlier flights that were cut off; returns those that were changed.

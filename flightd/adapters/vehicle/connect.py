@@ -12,13 +12,17 @@ from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
 from flightd.adapters.vehicle.mavlink.signing import Signing, read_key
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
 from flightd.config.vehicle import VehicleConfig
+from flightd.control.limits import Limits
 from flightd.core.errors import InputError
 from flightd.ports import Clock, Vehicle
 
 
-def connect_vehicle(config: VehicleConfig, clock: Clock) -> Vehicle:
+def connect_vehicle(config: VehicleConfig, clock: Clock, limits: Limits | None = None) -> Vehicle:
     """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address or a
-    signing key that cannot be used."""
+    signing key that cannot be used.
+
+    `limits` are those of the set points: an AR.Drone's own are set to them, for it takes shares of its own.
+    """
     match config.kind:
         case "ardupilot":
             mode = GUIDED if config.flying_mode == "guided" else GUIDED_NOGPS
@@ -26,7 +30,7 @@ def connect_vehicle(config: VehicleConfig, clock: Clock) -> Vehicle:
         case "px4":
             return Px4Vehicle(config.url, clock, _options(config, clock))
         case "ardrone":
-            return ArDroneVehicle(settings_of(config.url), clock)
+            return ArDroneVehicle(settings_of(config.url, limits), clock)
         case "mavsdk":
             return _mavsdk_vehicle(config, clock)
     raise InputError(f"vehicle.kind {config.kind}: no such adapter")

@@ -1,7 +1,8 @@
 """An emulated AR.Drone 2.0 for anyone's client: `python -m flightd.sim.ardrone`.
 
 It stands on the charging pad of a simulated warehouse, flies in real time and streams what its bottom
-camera sees there.  A client that insists on the drone's own address can be given it:
+camera sees there; its front camera sees a plain horizon.  A client that insists on the drone's own address
+can be given it:
 `ip address add 192.168.1.1/32 dev lo`, then `--host 192.168.1.1`.
 """
 
@@ -11,6 +12,7 @@ import argparse
 import asyncio
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from flightd.config.paths import shipped
@@ -22,6 +24,7 @@ from flightd.sim.airframe import Airframe
 from flightd.sim.appearance import DEFAULT
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer, Ports
+from flightd.sim.ardrone.video import Channel
 from flightd.sim.camera import CameraPeer
 from flightd.sim.optics import SimCamera
 from flightd.sim.sensors import Sensors
@@ -60,7 +63,8 @@ async def _serve(site: Site, ports: Ports, seed: int, battery_frac: float) -> No
     server = ArDroneServer(Drone(airframe, Sensors(seed=seed)), clock, ports)
     await server.open()
     print(f"AR.Drone 2.0 on {server.ports}", flush=True)
-    camera = CameraPeer(site, SimCamera(), DEFAULT, seed, _NOBODY, server.truth_at, clock, server.show)
+    show = partial(server.show, camera=Channel.BOTTOM)
+    camera = CameraPeer(site, SimCamera(), DEFAULT, seed, _NOBODY, server.truth_at, clock, show)
     async with asyncio.TaskGroup() as tasks:
         tasks.create_task(server.run(), name="drone")
         tasks.create_task(camera.run(), name="camera")

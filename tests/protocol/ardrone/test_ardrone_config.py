@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import math
 from collections.abc import Callable
 
 import pytest
 
 from flightd.adapters.vehicle.ardrone.config import parse_text, same_value, wanted_values
-from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, Camera, profile_id
+from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, Camera, profile_id, settings_of
+from flightd.control.limits import Limits
 from flightd.core.types import Demand
 from flightd.sim.ardrone import configuration
 from flightd.sim.ardrone.commands import Command, parse
@@ -163,6 +165,31 @@ def test_setpoints_are_scaled_by_the_limits_which_the_drone_really_has() -> None
             assert drone.airframe.pitch_rad == pytest.approx(-0.1, abs=0.012)
 
     virtually(main)
+
+
+def test_the_set_points_limits_become_the_drones_own() -> None:
+    async def main() -> None:
+        limits = Limits(math.radians(10.0), 1.0, math.radians(45.0), 0.8, 0.6)
+        chosen = settings_of("ardrone://127.0.0.1", limits)
+        drone = make_drone()
+        names = ("tilt_max_rad", "climb_max_mps", "yaw_rate_max_radps")
+        async with bench(drone, **{name: getattr(chosen, name) for name in names}) as b:
+            await b.hovering()
+            values = in_force(b)
+            assert float(values["control:euler_angle_max"]) == pytest.approx(math.radians(10.0), abs=1e-5)
+            assert float(values["control:control_vz_max"]) == 800.0
+            assert float(values["control:control_yaw"]) == pytest.approx(math.radians(45.0), abs=1e-5)
+            await b.steer(1.0, roll_rad=math.radians(5.0))
+            assert drone.airframe.roll_rad == pytest.approx(math.radians(5.0), abs=0.012)
+            await b.steer(1.0, roll_rad=math.radians(20.0))
+            assert drone.airframe.roll_rad == pytest.approx(math.radians(10.0), abs=0.015)
+
+    virtually(main)
+
+
+def test_limits_outside_the_drones_ranges_are_brought_into_them() -> None:
+    chosen = settings_of("ardrone://127.0.0.1", Limits(math.radians(30.0), 1.0, 0.1, 0.1, 3.0))
+    assert (chosen.tilt_max_rad, chosen.yaw_rate_max_radps, chosen.climb_max_mps) == (0.52, 0.7, 2.0)
 
 
 def test_a_configured_drone_is_not_written_to_again() -> None:

@@ -13,7 +13,8 @@ import pytest
 from flightd.adapters.recorder import archive as archive_module
 from flightd.adapters.recorder.archive import FlightArchive
 from flightd.adapters.recorder.mcap_file import McapFile, is_whole
-from flightd.core.errors import UnavailableError
+from flightd.cli.run import kept_room
+from flightd.core.errors import TransientError, UnavailableError
 from flightd.replay.log import read_log
 
 STARTED = datetime(2026, 3, 1, 12, 0, 5, tzinfo=UTC)
@@ -151,3 +152,33 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UnavailableError, match="cannot make the flight's folder"):
         FlightArchive(tmp_path / "file", MEGABYTE).begin(STARTED)
+
+
+def test_trouble_with_the_archive_is_told_at_once_and_the_flight_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(archive_module, "ROOM_S", 0.01)
+    archive = FlightArchive(tmp_path / "flights", 100 * MEGABYTE)
+    _fly(archive)
+    told: list[str] = []
+
+    async def flight(failure: Exception) -> None:
+        def refuse() -> None:
+            raise failure
+
+        monkeypatch.setattr(archive, "make_room", refuse)
+        told.clear()
+        heard = asyncio.Event()
+
+        def hear(err: TransientError) -> None:
+            told.append(str(err))
+            heard.set()
+
+        async with kept_room(archive, hear), asyncio.timeout(10.0):
+            await heard.wait()
+
+    asyncio.run(flight(OSError(5, "Input/output error")))
+    assert "cannot make room" in told[0]
+    assert "Input/output error" in told[0]
+    asyncio.run(flight(ZeroDivisionError("a fault")))
+    assert "not looked after any more" in told[0]

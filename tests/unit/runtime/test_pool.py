@@ -14,8 +14,10 @@ import pytest
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.core.types import Image, LineSet
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.loops import VirtualLoop
 from flightd.runtime.pool import Detection, DetectorPool
 from flightd.runtime.ring import FrameRing, FrameTicket
+from flightd.sim.lockstep import LockstepDetectors
 
 
 class MeanDetector:
@@ -123,3 +125,21 @@ def test_the_ring_refuses_foreign_names_and_slots() -> None:
         assert np.all(ring.pixels(0) == 0)
     finally:
         ring.close()
+
+
+def test_in_lockstep_a_detector_that_hangs_costs_one_picture() -> None:
+    """Time is held for it, so nothing but the machine's own clock can tell that it hangs."""
+
+    async def main() -> list[bool]:
+        ring, clock = FrameRing.create(4, 64, 36), LoopClock()
+        try:
+            with DetectorPool(partial(MeanDetector), 1, 0.3, clock) as pool:
+                await pool.ready()
+                detectors = LockstepDetectors(pool, clock, 0.045)
+                found = [await detectors.detect(ticket(ring, seq, 7)) for seq in (1, 13, 20, 21)]
+                return [detection is not None for detection in found]
+        finally:
+            ring.close()
+
+    with asyncio.Runner(loop_factory=lambda: VirtualLoop(patience_s=3.0)) as runner:
+        assert runner.run(main()) == [True, False, True, True]

@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
+from flightd.control.limits import Limits
 from flightd.core.errors import InputError
 
+_TILT_RAD, _CLIMB_MPS, _YAW_RATE_RADPS = (0.0, 0.52), (0.2, 2.0), (0.7, 6.11)
+"""The ranges in the maker's guide."""
 _PORT_NAMES = ("at", "navdata", "video", "control")
 
 
@@ -66,9 +69,9 @@ class ArDroneSettings:
 
     def __post_init__(self) -> None:
         bounds = {
-            "tilt_max_rad": (0.0, 0.52),
-            "climb_max_mps": (0.2, 2.0),
-            "yaw_rate_max_radps": (0.7, 6.11),
+            "tilt_max_rad": _TILT_RAD,
+            "climb_max_mps": _CLIMB_MPS,
+            "yaw_rate_max_radps": _YAW_RATE_RADPS,
             "height_max_m": (0.5, 100.0),
             "period_s": (0.005, 0.045),
             "setpoint_timeout_s": (0.02, 1.0),
@@ -80,9 +83,10 @@ class ArDroneSettings:
                 raise ValueError(f"{name} = {value} outside {low}..{high}")
 
 
-def settings_of(url: str) -> ArDroneSettings:
+def settings_of(url: str, limits: Limits | None = None) -> ArDroneSettings:
     """Settings for `ardrone://HOST`, with `?at=5556&navdata=5554&video=5555&control=5559&full=1` where they
-    differ from the drone's own ports and short navdata.
+    differ from the drone's own ports and short navdata; the drone's limits after `limits`, as near as its
+    ranges allow.
 
     Raises `InputError` for anything else.
     """
@@ -97,4 +101,13 @@ def settings_of(url: str) -> ArDroneSettings:
             "(other ports: ?at=5556&navdata=5554&video=5555&control=5559, all navdata: full=1)"
         )
     chosen: dict[str, Any] = {f"{name}_port": int(given[name]) for name in _PORT_NAMES if name in given}
+    if limits is not None:
+        chosen |= {
+            name: min(max(value, least), most)
+            for name, value, (least, most) in (
+                ("tilt_max_rad", limits.tilt_rad, _TILT_RAD),
+                ("climb_max_mps", max(limits.climb_mps, limits.descend_mps), _CLIMB_MPS),
+                ("yaw_rate_max_radps", limits.yaw_rate_radps, _YAW_RATE_RADPS),
+            )
+        }
     return ArDroneSettings(host=parts.hostname, full_navdata=given.get("full") == "1", **chosen)

@@ -1,0 +1,48 @@
+"""The world in a process of its own: what it dies of is told."""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import socket
+from pathlib import Path
+
+import pytest
+
+from flightd.cli.simulate import _run_world, _watch
+from flightd.config.paths import shipped
+from flightd.config.site_file import load_site
+from flightd.core.errors import FlightdError, RunError, UnavailableError
+from flightd.sim.world import WorldSpec
+
+
+def death_of(spec: WorldSpec, log: Path) -> FlightdError:
+    async def main() -> None:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_run_world, args=(spec, 1.0, log, theirs))
+        process.start()
+        theirs.close()
+        async with asyncio.timeout(60.0):
+            await _watch(process, ours)
+
+    with pytest.raises(FlightdError) as told:
+        asyncio.run(main())
+    return told.value
+
+
+def test_what_a_person_can_mend_is_told_as_it_is(tmp_path: Path) -> None:
+    site = load_site(shipped("site-demo.toml"))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        spec = WorldSpec(site, 1, ("127.0.0.1", 9), vehicle_ports=(taken.getsockname()[1],))
+        death = death_of(spec, tmp_path / "truth.mcap")
+    assert isinstance(death, UnavailableError)
+    assert "cannot listen" in str(death)
+
+
+def test_a_fault_of_the_world_itself_is_named(tmp_path: Path) -> None:
+    spec = WorldSpec(load_site(shipped("site-demo.toml")), 1, ("127.0.0.1", 9), vehicle_ports=(0, 0))
+    death = death_of(spec, tmp_path / "truth.mcap")
+    assert isinstance(death, RunError)
+    assert "the simulated world failed: ValueError" in str(death)
