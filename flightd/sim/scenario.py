@@ -24,9 +24,9 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from flightd.core.errors import InputError
 from flightd.sim.appearance import Appearance, preset
@@ -46,6 +46,11 @@ class CameraScenario(_Section):
     capture_delay_s: float = Field(0.060, ge=0, le=1)
     jitter_s: float = Field(0.003, ge=0, le=0.1)
     exposure_s: float = Field(0.004, gt=0, le=0.1)
+
+    @model_validator(mode="after")
+    def _exposure_fits(self) -> Self:
+        self.camera()  # knows what does not fit together
+        return self
 
     def camera(self) -> SimCamera:
         return SimCamera(

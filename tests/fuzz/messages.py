@@ -1,0 +1,67 @@
+"""Fuzz what comes over the ground link, at the daemon's desk and at the client's: `python -m
+tests.fuzz.messages COUNT`."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+from pathlib import Path
+
+from flightd.adapters.ground.audit import AuditEntry
+from flightd.adapters.ground.desk import Desk, Peer
+from flightd.adapters.ground.protocol import (
+    DECODE_ERRORS,
+    VERSION,
+    Accepted,
+    AskPicture,
+    Refused,
+    Role,
+    decode_answer,
+    decode_event,
+    decode_status,
+    encode,
+)
+from flightd.config.site_file import load_site
+from flightd.core.types import CommandKind
+from tests.fuzz.drive import Target, main
+from tests.fuzz.mutate import spoil_text
+
+_CONFIGS = Path(__file__).parents[2] / "configs"
+_OPERATOR, _VIEWER = Peer("ann", Role.OPERATOR, b"1"), Peer("bob", Role.VIEWER, b"2")
+
+
+def target(folder: Path) -> Target:
+    del folder  # no files here
+    audit: list[AuditEntry] = []
+    desk = Desk(load_site(_CONFIGS / "site-demo.toml"), "session", audit.append)
+    clock = itertools.count(10**12, 200_000_000)
+
+    def attempt(data: bytes) -> bool:
+        answer = desk.answer(data, _OPERATOR, next(clock))
+        desk.take_commands()
+        viewed = desk.answer(data, _VIEWER, next(clock))
+        assert not isinstance(viewed, Accepted), "a viewer's order was accepted"
+        assert not desk.take_commands(), "a viewer's order reached the flight"
+        audit.clear()
+        if not isinstance(answer, AskPicture):
+            assert decode_answer(encode(answer)) == answer
+        for decode in (decode_answer, decode_status, decode_event):
+            with contextlib.suppress(*DECODE_ERRORS):
+                decode(data)
+        return isinstance(answer, Refused)
+
+    head = b'{"version": %d, "id": "request-1", "op": ' % VERSION
+    orders = [head + b'"command", "command": "%s"}' % kind.encode() for kind in CommandKind]
+    seeds = (
+        *orders,
+        head + b'"command", "command": "goto", "node": "A2", "session": "session"}',
+        *(head + b'"%s"}' % op for op in (b"hello", b"status", b"picture", b"inventory", b"attend")),
+        head + b'"attend", "leave": true}',
+        encode(Accepted(request="request-1")),
+        b'{"version": 1, "session": "s", "seq": 1, "stamp_ns": 1, "level": "info", "name": "a", "text": "b"}',
+    )
+    return Target("messages", seeds, spoil_text, attempt)
+
+
+if __name__ == "__main__":
+    main(target)
