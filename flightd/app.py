@@ -24,7 +24,7 @@ from flightd.mission.legs import Pace
 from flightd.mission.plan import FlightPlan, VisitOrder, make_plan
 from flightd.mission.route import ordered_best
 from flightd.pilot import Pilot, TickInput, TickOutput
-from flightd.ports import Clock, Ground, PoseTaker, Recorder, Vehicle
+from flightd.ports import Clock, Ground, Monitor, PoseTaker, Recorder, Vehicle, Vitals
 from flightd.runtime.latency import LatencyBook
 from flightd.runtime.latest import Latest
 from flightd.runtime.pool import Detection, DetectorPool, Detectors
@@ -114,6 +114,7 @@ class Daemon:
         recorder: Recorder | None = None,
         observers: Sequence[Callable[[Status], None]] = (),
         ground: Ground | None = None,
+        monitors: Sequence[Monitor] = (),
     ) -> None:
         self._config = config
         self._clock = clock
@@ -121,6 +122,7 @@ class Daemon:
         self._recorder = recorder
         self._observers = observers
         self._ground = ground
+        self._monitors = monitors
         self._pilot = pilot_of(config, site)
         self._frames: Latest[FrameTicket] = Latest()
         self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock, config.control.limits())
@@ -140,6 +142,7 @@ class Daemon:
         self._status_ns = 0
         self._last_phase: Phase | None = None
         self._rate: list[int] = []
+        self._late_s: list[float] = []
 
     def command(self, command: Command) -> None:
         """Hand an operator's order to the next tick."""
@@ -177,8 +180,14 @@ class Daemon:
         self._vehicle.notify(event)
         if self._recorder is not None:
             self._recorder.record(Topic.EVENT, event.stamp_ns, event)
+        self._announce(event)
+
+    def _announce(self, event: Event) -> None:
+        """Tell everybody but the vehicle and the log of an event."""
         if self._ground is not None:
             self._ground.event(event)
+        for monitor in self._monitors:
+            monitor.event(event)
 
     async def _detect(self) -> None:
         """One frame after the other, as many of these loops as there are detector processes."""
@@ -212,6 +221,7 @@ class Daemon:
             due_ns += round(TICK_S * 1e9)
             await asyncio.sleep((due_ns - clock.now_ns()) * 1e-9)
             now_ns = clock.now_ns()
+            self._late_s.append((now_ns - due_ns) * 1e-9)
             due_ns = max(due_ns, now_ns - round(TICK_S * 1e9))  # late: leave ticks out, never bunch them
             output = self._tick(now_ns)
             if output.phase not in _OVER:
@@ -246,8 +256,7 @@ class Daemon:
             self._latency.forget()
         for event in output.events:
             self._vehicle.notify(event)
-            if self._ground is not None:
-                self._ground.event(event)
+            self._announce(event)
         self._tell(tick, output)
         return output
 
@@ -291,8 +300,29 @@ class Daemon:
             recorder.record(Topic.STATUS, now_ns, status)
         if self._ground is not None:
             self._ground.tell(status, tick, output)
+        vitals = self._vitals(status, tick)
+        for monitor in self._monitors:
+            monitor.tell(vitals)
         for observer in self._observers:
             observer(status)
+
+    def _vitals(self, status: Status, tick: TickInput) -> Vitals:
+        late_s, self._late_s = tuple(self._late_s), []
+        dropped = {"camera": self._frames.dropped, "detection": self._lost}
+        restarts = {"detector": self._detectors.replaced}
+        if self._recorder is not None:
+            dropped["recorder"] = self._recorder.dropped
+            restarts["recorder"] = self._recorder.restarts
+        return Vitals(
+            status=status,
+            vehicle=tick.vehicle,
+            ground_silent_s=tick.ground_silent_s,
+            tick_late_s=late_s,
+            latencies_ms=self._latency.drain(),
+            dropped=dropped,
+            restarts=restarts,
+            repeated_level=self._pump.stale,
+        )
 
     def _status(self, tick: TickInput, output: TickOutput) -> Status:
         vehicle = tick.vehicle

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from flightd.core.inventory import LocationRecord, Observation, PlannedLocation
@@ -86,6 +87,14 @@ class Recorder(Protocol):
     TransientError after a failure that another `run` may mend.
     """
 
+    @property
+    def dropped(self) -> int: ...
+
+    @property
+    def restarts(self) -> int:
+        """How often its own process died and was brought back."""
+        ...
+
     async def run(self) -> None: ...
 
     def record(self, topic: str, stamp_ns: int, message: object) -> None: ...
@@ -116,6 +125,39 @@ class Ground(Protocol):
     def picture_due(self, stamp_ns: int) -> bool: ...
 
     def picture(self, seq: int, stamp_ns: int, jpeg: bytes) -> None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Vitals:
+    """The daemon at one glance, and how it is doing itself; `ground_silent_s` as in TickInput.
+
+    `tick_late_s` and `latencies_ms` are those since the last status: how late each tick came, and for each
+    picture flown by the time of its stages.  The others count since the start: `dropped` what a full queue
+    or a lost worker cost, `restarts` what died and was brought back, each by the part's name;
+    `repeated_level` the set points that went out because no tick made one.
+    """
+
+    status: Status
+    vehicle: VehicleState | None
+    ground_silent_s: float
+    tick_late_s: tuple[float, ...]
+    latencies_ms: tuple[Mapping[str, float], ...]
+    dropped: Mapping[str, int]
+    restarts: Mapping[str, int]
+    repeated_level: int
+
+
+class Monitor(Protocol):
+    """Who watches the daemon: a service manager, metrics, a log.  Called by the control tick itself: nothing
+    here waits."""
+
+    def tell(self, vitals: Vitals) -> None:
+        """With each status."""
+        ...
+
+    def event(self, event: Event) -> None:
+        """At once when it happens."""
+        ...
 
 
 class Store(Protocol):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import signal
 import sys
 from collections.abc import AsyncIterator, Callable
-from contextlib import ExitStack, asynccontextmanager, nullcontext
+from contextlib import AsyncExitStack, asynccontextmanager, nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -38,8 +39,10 @@ def register(app: typer.Typer) -> None:
 def run(config: Annotated[Path, typer.Option(help="Configuration file.")]) -> None:
     """Fly the configured mission on a real vehicle, or on any peer that speaks like one.
 
-    SIGINT and SIGTERM hand the vehicle back at once.
+    SIGINT and SIGTERM hand the vehicle back at once (exit 130 and 143).  Started while its vehicle flies,
+    it keeps it level, reports, and lands.  Started anew by systemd it never starts a flight by itself.
     """
+    from flightd.cli import service
     from flightd.cli.flight_progress import FlightProgress
     from flightd.config.schema import load_config
     from flightd.config.site_file import load_site
@@ -52,40 +55,54 @@ def run(config: Annotated[Path, typer.Option(help="Configuration file.")]) -> No
             " mission.autostart = true"
         )
     site = load_site(chosen.mission.site)
-    with FlightProgress(shown=True) as progress:
-        result = asyncio.run(_until_signal(chosen, site, progress))
-    if result is None:
-        raise RunError("stopped by a signal; the vehicle was handed back")
+    journal = service.logs_to_journal(os.environ)
+    if service.was_started_before(os.environ):
+        chosen = chosen.model_copy(update={"mission": chosen.mission.model_copy(update={"autostart": False})})
+    service.note_start(os.environ)
+    with FlightProgress(shown=not journal) as progress:
+        result = asyncio.run(_until_signal(chosen, site, progress, journal=journal))
+    if isinstance(result, signal.Signals):
+        print(f"flightd: stopped by {result.name}; the vehicle was handed back", file=sys.stderr)
+        raise typer.Exit(128 + result)
     print(f"{result.reason}; {len(result.visited)} of {result.planned} nodes visited", file=sys.stderr)
     if result.phase is not Phase.DONE:
         raise RunError(f"mission {result.phase}: {result.reason}")
 
 
 async def _until_signal(
-    config: Config, site: Site, observer: Callable[[Status], None]
-) -> FlightResult | None:
-    """The flight's result, or None when a signal ended it."""
-    flight = asyncio.ensure_future(_fly(config, site, observer))
+    config: Config, site: Site, observer: Callable[[Status], None], *, journal: bool
+) -> FlightResult | signal.Signals:
+    """The flight's result, or the signal that ended it."""
+    flight = asyncio.ensure_future(_fly(config, site, observer, journal=journal))
     loop = asyncio.get_running_loop()
+    came: list[signal.Signals] = []
+
+    def end(number: signal.Signals) -> None:
+        came.append(number)
+        flight.cancel()
+
     for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, flight.cancel)
+        loop.add_signal_handler(number, end, number)
     await asyncio.wait([flight])
-    return None if flight.cancelled() else flight.result()
+    return came[0] if flight.cancelled() and came else flight.result()
 
 
-async def _fly(config: Config, site: Site, observer: Callable[[Status], None]) -> FlightResult:
+async def _fly(
+    config: Config, site: Site, observer: Callable[[Status], None], *, journal: bool
+) -> FlightResult:
     from flightd.app import Daemon, detector_pool, ground_link
+    from flightd.cli.service import monitors
     from flightd.runtime.clock import LoopClock
 
     clock = LoopClock()
-    with ExitStack() as stack:
+    async with monitors(config.metrics, os.environ, journal=journal) as watchers, AsyncExitStack() as stack:
         pool = stack.enter_context(detector_pool(config, site, clock))
         recorder, archive = _black_box(config, site, clock.now_ns()) or (None, None)
         if recorder is not None:
             stack.enter_context(recorder)
         ground = stack.enter_context(ground_link(config, site, clock) or nullcontext())
         await pool.ready()
-        daemon = Daemon(config, site, clock, pool, recorder, [observer], ground)
+        daemon = Daemon(config, site, clock, pool, recorder, [observer], ground, watchers)
         async with kept_room(archive, daemon.failed):
             return await daemon.fly()
 

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.ground import GroundConfig
+from flightd.config.metrics import MetricsConfig
 from flightd.config.vehicle import VehicleConfig
 from flightd.control.flight import FlightGains
 from flightd.control.limits import Limits
@@ -168,6 +169,12 @@ class MissionConfig(_Section):
     battery_home: _Share = Field(0.20, description="fly home below")
     battery_land: _Share = Field(0.10, description="land at once below")
     autostart: bool = Field(False, description="start without waiting for the start command")
+    recover_s: float = Field(
+        3.0,
+        ge=1,
+        le=600,
+        description="found flying at a restart: level for so long, for pilot or operator, then land",
+    )
 
     def flown_between_m(self) -> tuple[float, float]:
         """The heights that the legs of the flight are flown between, with room to spare."""
@@ -192,6 +199,7 @@ class MissionConfig(_Section):
             battery_home_frac=self.battery_home,
             battery_land_frac=self.battery_land,
             autostart=self.autostart,
+            recover_s=self.recover_s,
         )
 
     @model_validator(mode="after")
@@ -221,6 +229,7 @@ class Config(_Section):
     control: ControlConfig = ControlConfig()
     recorder: RecorderConfig = RecorderConfig()
     ground: GroundConfig = GroundConfig()
+    metrics: MetricsConfig = MetricsConfig()
 
     def heading_policy(self) -> HeadingPolicy:
         """The mission's heading, with which side of the down camera's picture lies along the nose."""
@@ -267,6 +276,8 @@ def load_table(path: Path) -> dict[str, Any]:
 
 def parse_config(table: dict[str, Any], path: Path) -> Config:
     """Check a table that was read from `path`; relative paths in it are taken from there."""
+    if key := _key_with_null(table):
+        raise InputError(f"config {path}: {key}: holds a null character; take it out")
     try:
         config = Config.model_validate(table)
     except ValidationError as err:
@@ -282,6 +293,14 @@ def parse_config(table: dict[str, Any], path: Path) -> Config:
             "vehicle": config.vehicle.beside(path.parent),
         }
     )
+
+
+def _key_with_null(value: object, key: str = "") -> str:
+    """The first key whose text no file system takes, or an empty text."""
+    if isinstance(value, str):
+        return key if "\0" in value else ""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return next(filter(None, (_key_with_null(item, f"{key}.{name}".strip(".")) for name, item in inner)), "")
 
 
 def _remedy(kind: str, message: str) -> str:

@@ -190,10 +190,15 @@ class VehicleState:
 
 
 class Demand(enum.StrEnum):
-    """What the mission wants of the vehicle; the adapter works towards it and retries by itself."""
+    """What the mission wants of the vehicle; the adapter works towards it and retries by itself.
+
+    KEEP takes over a vehicle that was found flying in the mode in which it obeys us, and nothing else: it
+    never arms, never changes the mode.
+    """
 
     HANDS_OFF = "hands_off"
     STANDBY = "standby"
+    KEEP = "keep"
     FLY = "fly"
     LAND = "land"
     DISARM = "disarm"
@@ -276,6 +281,7 @@ class Phase(enum.StrEnum):
     """What the mission is doing; the words of log, status and report."""
 
     PREFLIGHT = "preflight"
+    RECOVER = "recover"
     ARMING = "arming"
     TAKE_OFF = "take_off"
     ACQUIRE = "acquire"

@@ -10,6 +10,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, LandedState, Phase
 from flightd.grid.site import Site
 from flightd.grid.ways import NoWayError
+from flightd.mission.first_look import FirstLook
 from flightd.mission.guidance import GroundLost, Guidance, Guide, MissionParams, Senses
 from flightd.mission.plan import FlightPlan, HeadingPolicy, Stop, make_plan
 from flightd.mission.table import next_phase
@@ -18,6 +19,7 @@ from flightd.mission.watch import Lasting, Situation, Watch
 
 _DEMANDS = {
     Phase.PREFLIGHT: Demand.STANDBY,
+    Phase.RECOVER: Demand.KEEP,
     Phase.DONE: Demand.DISARM,
     Phase.ABORTED: Demand.DISARM,
     Phase.PILOT: Demand.HANDS_OFF,
@@ -47,6 +49,8 @@ class Mission:
         self._paused = False
         self._ground_lost = False
         self._started = params.autostart
+        self._first_look = FirstLook(params)
+        self._found_flying = False
         self._ordered: Trigger | None = None
         self._since_ns = 0
         self._limit_s = math.inf
@@ -113,7 +117,8 @@ class Mission:
             self._go_home(s.now_ns, "battery low", in_need=True)
         if (s.now_ns - self._since_ns) * 1e-9 > self._limit_s:
             found.add(Trigger.TIMED_OUT)
-        return found | self._watch.step(s, self._situation(Trigger.HOLD in found))
+        found |= self._watch.step(s, self._situation(Trigger.HOLD in found))
+        return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found
 
     def _situation(self, paused: bool) -> Situation:
         along_x = None
@@ -139,6 +144,11 @@ class Mission:
         """The trigger by which the present phase reaches its end, if it has."""
         p, v, goal = self._params, s.vehicle, self.goal
         match self.phase:
+            case Phase.PREFLIGHT if self._first_look.flies_already(s):
+                done, trigger = True, Trigger.FOUND_FLYING
+            case Phase.RECOVER:
+                done = (s.now_ns - self._since_ns) * 1e-9 >= p.recover_s
+                trigger = Trigger.UNATTENDED
             case Phase.PREFLIGHT:
                 done, trigger = self._started and not self._not_ready(s), Trigger.READY
             case Phase.ARMING:
@@ -165,6 +175,10 @@ class Mission:
             case _:
                 return set()
         return {trigger} if done else set()
+
+    def _adopting(self, s: Senses) -> bool:
+        """A vehicle found flying is given a moment to show that it obeys."""
+        return self.phase is Phase.RECOVER and (s.now_ns - self._since_ns) * 1e-9 < self._params.adopt_s
 
     def _not_ready(self, s: Senses) -> str:
         """Why the flight cannot start, or an empty text."""
@@ -216,6 +230,10 @@ class Mission:
         self._limit_s = self._time_limit_s(s)
         if phase is Phase.TAKE_OFF:
             self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m)
+        if phase is Phase.RECOVER and s.vehicle is not None:
+            self._found_flying = self._returning = True  # where it is, and so the way home, is not known
+            text = f"found flying in mode {s.vehicle.mode} at {s.height_m:.1f} m: level, then landing"
+            self._event(s.now_ns, EventLevel.ERROR, "restart", text)
 
     def _time_limit_s(self, s: Senses) -> float:
         """How long the phase just begun may take: a fixed slack, and a multiple of its way's own time."""
@@ -276,13 +294,16 @@ class Mission:
             return Guidance(self.phase, Guide.NONE, self._reference(0.0), demand)
         if self.phase is Phase.LAND:
             climb, demand = self._descend(s)
+        elif self.phase is Phase.RECOVER:
+            self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m)
+            climb = 0.0
         elif math.isnan(s.height_m) or s.telemetry_age_s > self._params.telemetry_hold_s:
             self._height.reset(self._height.position)  # no climb by heights of the past
             climb = 0.0
         else:
             self._height.step(self._params.height_m, s.dt_s)
             climb = self._height.velocity
-        guide = Guide.STEER if self._steer(s) else Guide.LEVEL
+        guide = Guide.STEER if not self._found_flying and self._steer(s) else Guide.LEVEL
         self._steering = guide is Guide.STEER
         return Guidance(self.phase, guide, self._reference(climb), demand)
 
@@ -294,7 +315,8 @@ class Mission:
         self._height.reset(height, -rate)
         blind = s.telemetry_age_s > p.telemetry_land_s
         standing = v is not None and v.landed is LandedState.ON_GROUND and not blind
-        return -rate, Demand.DISARM if standing else Demand.LAND if blind else Demand.FLY
+        by_itself = blind or self._found_flying
+        return -rate, Demand.DISARM if standing else Demand.LAND if by_itself else Demand.FLY
 
     def _steer(self, s: Senses) -> bool:
         """Move the reference towards where the phase wants it; False when the floor cannot be relied on."""

@@ -27,8 +27,10 @@ TABLE: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.PREFLIGHT: {
         Trigger.STOP: Phase.ABORTED,
         Trigger.LAND_HERE: Phase.ABORTED,
+        Trigger.FOUND_FLYING: Phase.RECOVER,
         Trigger.READY: Phase.ARMING,
     },
+    Phase.RECOVER: _SAFETY | {Trigger.UNATTENDED: Phase.LAND},
     Phase.ARMING: {
         Trigger.STOP: Phase.ABORTED,
         Trigger.LAND_HERE: Phase.ABORTED,

@@ -21,6 +21,8 @@ class Trigger(enum.Enum):
     LINES_LOST = "lines lost"
     HOLD = "pause ordered"
     LINES_FOUND = "lines found"
+    FOUND_FLYING = "found flying"
+    UNATTENDED = "nobody took over after the restart"
     READY = "ready"
     ARMED = "armed"
     AT_HEIGHT = "at flying height"

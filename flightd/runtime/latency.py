@@ -20,6 +20,7 @@ class LatencyBook:
         self._waiting: list[tuple[Detection, int]] = []
         self._totals_ms: deque[float] = deque(maxlen=_KEEP)
         self._transports_ms: deque[float] = deque(maxlen=_KEEP)
+        self._since: list[dict[str, float]] = []
         self.newest: dict[str, float] = {}
 
     def taken(self, detection: Detection, now_ns: int) -> None:
@@ -50,9 +51,15 @@ class LatencyBook:
                 "wire": wire,
                 "total": total,
             }
+            self._since.append(self.newest)
             self._totals_ms.append(total)
             self._transports_ms.append(transport)
         self._waiting.clear()
+
+    def drain(self) -> tuple[dict[str, float], ...]:
+        """The stages' times in ms of each picture since the last call, oldest first."""
+        since, self._since = tuple(self._since), []
+        return since
 
     def forget(self) -> None:
         """No set point goes out (not flying): the frames in waiting count for nothing."""

@@ -35,6 +35,11 @@ class Detect(Protocol):
 class Detectors(Protocol):
     """Pictures in, lines out, somewhere else."""
 
+    @property
+    def replaced(self) -> int:
+        """Workers that died or hung and were replaced."""
+        ...
+
     async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None: ...
 
 

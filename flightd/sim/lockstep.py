@@ -21,6 +21,10 @@ class LockstepDetectors:
         self._clock = clock
         self._latency_s = latency_s
 
+    @property
+    def replaced(self) -> int:
+        return self._inner.replaced
+
     async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None:
         started_ns = self._clock.now_ns()
         work = asyncio.ensure_future(self._inner.detect(ticket, with_jpeg))

@@ -273,6 +273,8 @@ class McapFile:
         entries: Entries = {}
         for inner in inner_records(unpacked(chunk)):
             if inner.opcode == Opcode.MESSAGE:
+                if len(inner.content) < MESSAGE_HEAD.size:
+                    raise DamagedRecordError("a message is shorter than its head")
                 channel_id, _, stamp_ns, _ = MESSAGE_HEAD.unpack_from(inner.content)
                 entries.setdefault(channel_id, []).append((stamp_ns, inner.offset))
         indexes, index = indexes_of(chunk, entries, record.offset, record.end - record.offset)

@@ -115,7 +115,7 @@ class FlightLogic:
         telemetry = self._telemetry
         landing = telemetry.major == Major.LANDING and self.demand is Demand.FLY and not self._sinking
         return (
-            self.demand in (Demand.FLY, Demand.LAND)
+            self.demand in (Demand.KEEP, Demand.FLY, Demand.LAND)
             and self.configured
             and self.linked(now_ns)
             and not self._over

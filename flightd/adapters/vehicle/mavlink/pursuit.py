@@ -25,7 +25,7 @@ _MODE_PAUSE_S = 0.5
 _REASON_NS = 2_000_000_000
 _HAND_BACK_S = 0.2
 _HAND_BACK_ANSWER_S = 0.06
-_ENGAGED = frozenset({Demand.FLY, Demand.LAND, Demand.DISARM})
+_ENGAGED = frozenset({Demand.KEEP, Demand.FLY, Demand.LAND, Demand.DISARM})
 
 
 class FirmwareRules(Protocol):
@@ -182,6 +182,10 @@ class Pursuit:
         firmware, held, armed = self._firmware, self._authority.held, self._telemetry.armed
         problem = firmware.not_fit() if demand is Demand.FLY else ""
         match demand:
+            case Demand.KEEP if (
+                held is None and armed and self._telemetry.custom_mode == firmware.flying_mode
+            ):
+                self._authority.ask(firmware.flying_mode, firmware.flying_mode)
             case Demand.FLY if problem:
                 self._refuse(problem)
             case Demand.FLY if held != firmware.flying_mode:

@@ -1,0 +1,81 @@
+"""Structured log lines: key=value with systemd's priority prefix, as the journal takes them from stderr."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import re
+from typing import TextIO
+
+from flightd.core.types import Event, EventLevel
+from flightd.ports import Vitals
+
+_PRIORITY = {EventLevel.INFO: 6, EventLevel.WARNING: 4, EventLevel.ERROR: 3}
+_PLAIN = re.compile(r"[\w.,:/@%+-]+")
+_STATUS_NS = 10_000_000_000
+
+
+def goes_to_journal(stream: TextIO, journal_stream: str) -> bool:
+    """Whether `stream` is the one that systemd tied to the journal; JOURNAL_STREAM holds device:inode."""
+    try:
+        found = os.fstat(stream.fileno())
+    except (OSError, ValueError):
+        return False
+    return journal_stream == f"{found.st_dev}:{found.st_ino}"
+
+
+def line(priority: int, **fields: object) -> str:
+    """`<6>event=phase text="hover -> turn: dwelled"`: values in quotes where a reader could mistake them."""
+    return f"<{priority}>" + " ".join(f"{key}={_value(value)}" for key, value in fields.items())
+
+
+class JournalMonitor:
+    """`ports.Monitor`: every event as a line, the status every ten seconds and at each change of phase."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out = out
+        self._said_ns = -(10**18)
+        self._phase = ""
+
+    def tell(self, vitals: Vitals) -> None:
+        status = vitals.status
+        if status.phase == self._phase and status.stamp_ns - self._said_ns < _STATUS_NS:
+            return
+        self._phase, self._said_ns = status.phase, status.stamp_ns
+        fields = {
+            "status": status.phase.value,
+            "reason": status.reason,
+            "node": status.node,
+            "goal": status.goal,
+            "nodes": f"{status.nodes_done}/{status.nodes_planned}",
+            "height_m": f"{status.height_m:.2f}",
+            "battery": f"{status.battery_frac:.2f}",
+            "fps": f"{status.fps:.0f}",
+            "latency_ms": f"{status.latency_ms.get('total', 0.0):.0f}",
+            "dropped": sum(vitals.dropped.values()),
+        }
+        self._write(line(6, **fields))
+
+    def event(self, event: Event) -> None:
+        self._write(line(_PRIORITY[event.level], event=event.name, text=event.text))
+
+    def _write(self, text: str) -> None:
+        self._out.write(text + "\n")
+        self._out.flush()
+
+
+class JournalFormatter(logging.Formatter):
+    """A logging record as such a line."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        priority = 3 if record.levelno >= logging.ERROR else 4 if record.levelno >= logging.WARNING else 6
+        text = record.getMessage()
+        if record.exc_info:
+            text = f"{text}\n{self.formatException(record.exc_info)}"
+        return line(priority, logger=record.name.removeprefix("flightd."), text=text)
+
+
+def _value(value: object) -> str:
+    text = str(value)
+    return text if _PLAIN.fullmatch(text) else json.dumps(text, ensure_ascii=False)
