@@ -14,6 +14,7 @@ from functools import partial
 
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.ground.link import ZmqGround
+from flightd.adapters.store.progress import LeftOver, ProgressFile
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError, TransientError
@@ -23,6 +24,7 @@ from flightd.grid.site import Site
 from flightd.mission.legs import Pace
 from flightd.mission.plan import FlightPlan, VisitOrder, make_plan
 from flightd.mission.route import ordered_best
+from flightd.mission.sorties import check_battery
 from flightd.pilot import Pilot, TickInput, TickOutput
 from flightd.ports import Clock, Ground, Monitor, PoseTaker, Recorder, Vehicle, Vitals
 from flightd.runtime.latency import LatencyBook
@@ -60,10 +62,26 @@ def plan_of(config: Config, site: Site) -> FlightPlan:
     mission = config.mission
     site = site.between(*config.mission.flown_between_m())
     visits: Sequence[str] = mission.nodes or site.serpentine_route()
-    pad, policy, yaw_rad = site.home.node, config.heading_policy(), math.radians(mission.start_yaw_deg)
+    start, policy, yaw_rad = (
+        start_of(config, site),
+        config.heading_policy(),
+        math.radians(mission.start_yaw_deg),
+    )
     if mission.order is VisitOrder.BEST:
-        visits = ordered_best(site, visits, pad, policy, Pace.of(mission.params()), yaw_rad)
-    return make_plan(site, visits, pad, pad, policy, yaw_rad)
+        visits = ordered_best(
+            site, visits, (start, site.home.node), policy, Pace.of(mission.params()), yaw_rad
+        )
+    return make_plan(site, visits, start, site.home.node, policy, yaw_rad)
+
+
+def start_of(config: Config, site: Site) -> str:
+    """The node of the pad on which the drone stands at first.  InputError when the site lacks that pad."""
+    wanted = config.mission.pad
+    pad = site.home if wanted is None else next((pad for pad in site.pads if pad.id == wanted), None)
+    if pad is None:
+        names = ", ".join(pad.id for pad in site.pads)
+        raise InputError(f"mission.pad {wanted!r}: site {site.name} has the pads {names}")
+    return pad.node
 
 
 def pilot_of(config: Config, site: Site) -> Pilot:
@@ -74,7 +92,10 @@ def pilot_of(config: Config, site: Site) -> Pilot:
             f" {site.name} ({site.ceiling_m} m)"
         )
     flown = site.between(*config.mission.flown_between_m())
-    return Pilot(flown, plan_of(config, site), config.heading_policy(), config.pilot_params(site))
+    plan = plan_of(config, site)
+    params = config.pilot_params(site)
+    check_battery(flown, plan, config.heading_policy(), params.mission)
+    return Pilot(flown, plan, config.heading_policy(), params)
 
 
 def profile_of(config: Config, site: Site) -> str:
@@ -115,6 +136,7 @@ class Daemon:
         observers: Sequence[Callable[[Status], None]] = (),
         ground: Ground | None = None,
         monitors: Sequence[Monitor] = (),
+        progress: ProgressFile | None = None,
     ) -> None:
         self._config = config
         self._clock = clock
@@ -123,6 +145,7 @@ class Daemon:
         self._observers = observers
         self._ground = ground
         self._monitors = monitors
+        self._progress = progress
         self._pilot = pilot_of(config, site)
         self._frames: Latest[FrameTicket] = Latest()
         self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock, config.control.limits())
@@ -160,6 +183,8 @@ class Daemon:
             parts["recorder"] = restarted(self._recorder.run, self.failed)
         if self._ground is not None:
             parts["ground"] = restarted(self._ground.run, self.failed)
+        if self._progress is not None:
+            parts["progress"] = restarted(self._progress.run, self.failed)
         try:
             async with asyncio.TaskGroup() as tasks:
                 services = [tasks.create_task(part, name=name) for name, part in parts.items()]
@@ -254,6 +279,8 @@ class Daemon:
             self._pose_taker.share_pose(output.pose, self._pad_m)
         if output.setpoint is None:
             self._latency.forget()
+        if self._progress is not None:
+            self._progress.put(LeftOver(self._pilot.mission.remaining, *self._pilot.mission.stand))
         for event in output.events:
             self._vehicle.notify(event)
             self._announce(event)

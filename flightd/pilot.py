@@ -82,9 +82,9 @@ class Pilot:
         self._params = params
         self._plan = plan
         self._site = site
+        self._mission = Mission(site, plan, policy, params.mission)
         self._begin()
         self._heights = HeightHistory()
-        self._mission = Mission(site, plan, policy, params.mission)
         self._control = FlightController(params.gains)
         self._limiter = Limiter(params.limits)
         self._armed = False
@@ -133,8 +133,9 @@ class Pilot:
 
     def _begin(self) -> None:
         """Stand on the pad and know nothing else."""
-        self._tracker = LineTracker(self._params.tracker, self._plan.start_yaw_rad)
-        self._localiser = GridLocaliser(self._site, self._plan.start, self._params.start_sigma_m)
+        node, yaw_rad = self._mission.stand
+        self._tracker = LineTracker(self._params.tracker, yaw_rad)
+        self._localiser = GridLocaliser(self._site, node, self._params.start_sigma_m)
 
     def _take(self, tick: TickInput) -> None:
         """Telemetry first: a frame needs the attitude and height of its exposure.
@@ -176,7 +177,7 @@ class Pilot:
 
     def _motion(self, pose: GridPose | None, height_m: float, dt_s: float) -> Motion:
         if pose is None:
-            return Motion(0.0, 0.0, 0.0, 0.0, self._plan.start_yaw_rad, 0.0, height_m)
+            return Motion(0.0, 0.0, 0.0, 0.0, self._mission.stand[1], 0.0, height_m)
         if self._last_yaw is not None:
             turned = math.remainder(pose.yaw_rad - self._last_yaw, math.tau)
             self._yaw_rate += min(1.0, dt_s / 0.05) * (turned / dt_s - self._yaw_rate)

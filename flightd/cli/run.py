@@ -28,6 +28,7 @@ EXAMPLES = """Examples:
 
   flightd run --config /etc/flightd/flightd.toml
   flightd run --config configs/ardupilot.toml
+  flightd run --config configs/ardupilot.toml --resume     after a battery swap that cut its power
 """
 
 
@@ -36,7 +37,13 @@ def register(app: typer.Typer) -> None:
     app.command("run", epilog=EXAMPLES)(run)
 
 
-def run(config: Annotated[Path, typer.Option(help="Configuration file.")]) -> None:
+def run(
+    config: Annotated[Path, typer.Option(help="Configuration file.")],
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Fly the stops that the last flight left over (mission.progress)."),
+    ] = False,
+) -> None:
     """Fly the configured mission on a real vehicle, or on any peer that speaks like one.
 
     SIGINT and SIGTERM hand the vehicle back at once (exit 130 and 143).  Started while its vehicle flies,
@@ -44,6 +51,7 @@ def run(config: Annotated[Path, typer.Option(help="Configuration file.")]) -> No
     """
     from flightd.cli import service
     from flightd.cli.flight_progress import FlightProgress
+    from flightd.cli.resume import resumed
     from flightd.config.schema import load_config
     from flightd.config.site_file import load_site
     from flightd.core.types import Phase
@@ -55,6 +63,7 @@ def run(config: Annotated[Path, typer.Option(help="Configuration file.")]) -> No
             " mission.autostart = true"
         )
     site = load_site(chosen.mission.site)
+    chosen = resumed(chosen, config, site, ordered=resume)
     journal = service.logs_to_journal(os.environ)
     if service.was_started_before(os.environ):
         chosen = chosen.model_copy(update={"mission": chosen.mission.model_copy(update={"autostart": False})})
@@ -90,6 +99,7 @@ async def _until_signal(
 async def _fly(
     config: Config, site: Site, observer: Callable[[Status], None], *, journal: bool
 ) -> FlightResult:
+    from flightd.adapters.store.progress import ProgressFile
     from flightd.app import Daemon, detector_pool, ground_link
     from flightd.cli.service import monitors
     from flightd.runtime.clock import LoopClock
@@ -102,7 +112,9 @@ async def _fly(
             stack.enter_context(recorder)
         ground = stack.enter_context(ground_link(config, site, clock) or nullcontext())
         await pool.ready()
-        daemon = Daemon(config, site, clock, pool, recorder, [observer], ground, watchers)
+        kept = config.mission.progress
+        progress = None if kept is None else ProgressFile(kept, site.name)
+        daemon = Daemon(config, site, clock, pool, recorder, [observer], ground, watchers, progress)
         async with kept_room(archive, daemon.failed):
             return await daemon.fly()
 

@@ -22,7 +22,7 @@ from typing import Any
 
 from flightd.adapters.camera.connect import ARDRONE_URL
 from flightd.adapters.recorder.recorder import Recorder
-from flightd.app import Daemon, FlightResult, detector_pool, ground_link, plan_of
+from flightd.app import Daemon, FlightResult, detector_pool, ground_link, plan_of, start_of
 from flightd.config.schema import Config
 from flightd.config.site_file import site_toml
 from flightd.core.errors import FlightdError, RunError, UnavailableError
@@ -254,11 +254,14 @@ def _spec(simulation: Simulation, camera_port: int, vehicle_ports: tuple[int, ..
         camera_address=("127.0.0.1", camera_port),
         vehicle="px4" if adapter == "mavsdk" else adapter,
         vehicle_ports=vehicle_ports,
+        start=start_of(simulation.config, simulation.site),
         start_yaw_rad=math.radians(simulation.config.mission.start_yaw_deg),
         camera=replace(scenario.camera.camera(), mount=simulation.config.camera.mount()),
         appearance=scenario.floor.look(),
         draught=scenario.wind.draught(),
         battery_frac=scenario.vehicle.battery,
+        battery_ah=scenario.vehicle.battery_ah,
+        swap_s=scenario.vehicle.swap_s,
         radio=scenario.vehicle.radio(),
         truth_url=simulation.truth_url,
     )

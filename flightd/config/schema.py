@@ -21,6 +21,7 @@ from flightd.control.pid import PidGains
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens, Mount
 from flightd.grid.site import Site
+from flightd.mission.battery import BatteryParams
 from flightd.mission.guidance import MissionParams
 from flightd.mission.plan import Heading, HeadingPolicy, VisitOrder
 from flightd.pilot import PilotParams
@@ -149,6 +150,7 @@ class MissionConfig(_Section):
     heading: Heading = Field(
         Heading.ALONG, description="along: nose in flight direction; shelf: nose to the shelf"
     )
+    pad: str | None = Field(None, description="id of the pad that it stands on at first; none: the home pad")
     start_yaw_deg: float = Field(
         0.0, ge=-180, le=180, description="heading on the pad, clockwise from the aisles"
     )
@@ -168,6 +170,10 @@ class MissionConfig(_Section):
     battery_start: _Share = Field(0.30, description="least charge to start")
     battery_home: _Share = Field(0.20, description="fly home below")
     battery_land: _Share = Field(0.10, description="land at once below")
+    progress: Path | None = Field(
+        None, description="file that keeps the stops still to be made, relative to this file"
+    )
+    resume: bool = Field(False, description="fly what that file holds, if anything, instead of the nodes")
     autostart: bool = Field(False, description="start without waiting for the start command")
     recover_s: float = Field(
         3.0,
@@ -209,6 +215,38 @@ class MissionConfig(_Section):
         return self
 
 
+class BatteryConfig(_Section):
+    """How long a battery flies, and what happens when it does not last."""
+
+    flight_s: float = Field(
+        600.0,
+        ge=30,
+        le=36_000,
+        description="hovering time of a full battery; measured in flight from then on",
+    )
+    capacity_wh: float | None = Field(None, gt=0, le=10_000, description="with hover_w, in place of flight_s")
+    hover_w: float | None = Field(None, gt=0, le=100_000, description="power that hovering takes")
+    reserve: float = Field(0.10, ge=0, le=0.5, description="charge that stays when it is back on the pad")
+    full: float = Field(0.90, gt=0, le=1, description="least charge of a battery put in to go on")
+    swap: bool = Field(
+        False,
+        description="wait on the charge pad for a fresh battery and go on; false: the mission ends there",
+    )
+    swap_wait_s: float = Field(1800.0, gt=0, le=86_400, description="give up waiting after this")
+
+    def params(self) -> BatteryParams:
+        flight_s = self.flight_s
+        if self.capacity_wh is not None and self.hover_w is not None:
+            flight_s = 3600.0 * self.capacity_wh / self.hover_w
+        return BatteryParams(flight_s, self.reserve, self.full, self.swap, self.swap_wait_s)
+
+    @model_validator(mode="after")
+    def _both_or_neither(self) -> Self:
+        if (self.capacity_wh is None) != (self.hover_w is None):
+            raise ValueError("capacity_wh and hover_w belong together: give both or neither")
+        return self
+
+
 class RecorderConfig(_Section):
     """The black box."""
 
@@ -227,6 +265,7 @@ class Config(_Section):
     vision: VisionConfig = VisionConfig()
     vehicle: VehicleConfig = VehicleConfig()
     control: ControlConfig = ControlConfig()
+    battery: BatteryConfig = BatteryConfig()
     recorder: RecorderConfig = RecorderConfig()
     ground: GroundConfig = GroundConfig()
     metrics: MetricsConfig = MetricsConfig()
@@ -253,6 +292,7 @@ class Config(_Section):
                 self.mission.params(),
                 ground_lost_s=self.ground.lost_s,
                 ground_lost=self.ground.lost_action,
+                battery=self.battery.params(),
             ),
         )
 
@@ -286,9 +326,11 @@ def parse_config(table: dict[str, Any], path: Path) -> Config:
         more = f" (and {len(err.errors()) - 1} more)" if len(err.errors()) > 1 else ""
         raise InputError(f"config {path}: {key}: {_remedy(first['type'], first['msg'])}{more}") from err
     site = (path.parent / config.mission.site).resolve()
+    kept = config.mission.progress
+    progress = None if kept is None else (path.parent / kept).resolve()
     return config.model_copy(
         update={
-            "mission": config.mission.model_copy(update={"site": site}),
+            "mission": config.mission.model_copy(update={"site": site, "progress": progress}),
             "ground": config.ground.beside(path.parent),
             "vehicle": config.vehicle.beside(path.parent),
         }

@@ -290,6 +290,7 @@ class Phase(enum.StrEnum):
     TURN = "turn"
     HOLD = "hold"
     LAND = "land"
+    SWAP = "swap"
     DONE = "done"
     ABORTED = "aborted"
     PILOT = "pilot"

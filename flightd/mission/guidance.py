@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from flightd.control.flight import Reference
 from flightd.core.types import Demand, GridPose, Phase, VehicleState
+from flightd.mission.battery import BatteryParams
 
 
 class GroundLost(enum.StrEnum):
@@ -58,6 +59,7 @@ class MissionParams:
     autostart: bool = True
     ground_lost_s: float = 5.0
     ground_lost: GroundLost = GroundLost.CONTINUE
+    battery: BatteryParams = field(default_factory=BatteryParams)
 
 
 class Guide(enum.Enum):

@@ -12,7 +12,10 @@ from flightd.grid.site import Site
 from flightd.grid.ways import NoWayError
 from flightd.mission.first_look import FirstLook
 from flightd.mission.guidance import GroundLost, Guidance, Guide, MissionParams, Senses
+from flightd.mission.legs import Legs, Pace
 from flightd.mission.plan import FlightPlan, HeadingPolicy, Stop, make_plan
+from flightd.mission.readiness import not_fresh, not_ready
+from flightd.mission.sorties import Sorties
 from flightd.mission.table import next_phase
 from flightd.mission.triggers import Trigger
 from flightd.mission.watch import Lasting, Situation, Watch
@@ -20,10 +23,12 @@ from flightd.mission.watch import Lasting, Situation, Watch
 _DEMANDS = {
     Phase.PREFLIGHT: Demand.STANDBY,
     Phase.RECOVER: Demand.KEEP,
+    Phase.SWAP: Demand.STANDBY,
     Phase.DONE: Demand.DISARM,
     Phase.ABORTED: Demand.DISARM,
     Phase.PILOT: Demand.HANDS_OFF,
 }
+_ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.DONE, Phase.ABORTED, Phase.PILOT}
 _TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
 
 
@@ -36,6 +41,12 @@ class Mission:
         self._policy = policy
         self._params = params
         self._watch = Watch(params)
+        self._sorties = Sorties(site, Legs(site, policy, Pace.of(params)), params.battery)
+        self._left_over: tuple[str, ...] = ()
+        self._short_of_charge = False
+        self._visited_before = 0
+        self.stand = (plan.start, plan.start_yaw_rad)
+        """The node on which the drone stands before it flies, and its heading there."""
         self._stops: list[Stop] = list(plan.stops)
         self._next = 0
         start = site.nodes[plan.start]
@@ -70,7 +81,7 @@ class Mission:
     @property
     def airborne(self) -> bool:
         """The mission believes the drone to fly and answers for it."""
-        return self.phase not in {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE, Phase.ABORTED, Phase.PILOT}
+        return self.phase not in _ON_GROUND
 
     def drain_events(self) -> tuple[Event, ...]:
         events, self._events = tuple(self._events), []
@@ -113,12 +124,31 @@ class Mission:
         found |= self._ground(s)
         if self._paused:
             found.add(Trigger.HOLD)
-        if self.airborne and not self._returning and self._watch.battery_low(s):
-            self._go_home(s.now_ns, "battery low", in_need=True)
+        self._battery(s)
         if (s.now_ns - self._since_ns) * 1e-9 > self._limit_s:
             found.add(Trigger.TIMED_OUT)
         found |= self._watch.step(s, self._situation(Trigger.HOLD in found))
+        found |= {Trigger.DOWN_TO_SWAP} if Trigger.DISARMED in found and self._swaps else set()
         return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found
+
+    def _battery(self, s: Senses) -> None:
+        """Turn back in time: below the fixed share, or when what is left only just brings it back."""
+        charge = math.nan if s.vehicle is None else s.vehicle.battery_frac
+        self._sorties.step(s.now_ns, charge, self.airborne)
+        if not self.airborne or self._returning or self.phase is Phase.LAND:
+            return
+        if self._watch.battery_low(s):
+            self._go_charge(s.now_ns, f"battery low: {charge:.0%}", in_need=True)
+            return
+        left_m = _distance(s, (self.goal.x_m, self.goal.y_m)) if self.phase is Phase.FOLLOW else 0.0
+        if math.isfinite(left_m) and (reason := self._sorties.why_return(self.goal.node, left_m)):
+            self._go_charge(s.now_ns, reason)
+
+    @property
+    def _swaps(self) -> bool:
+        """It lands on a pad for a fresh battery, with stops left and something done on the last one."""
+        done = len(self.visited) > self._visited_before
+        return self._on_pad_leg and self._short_of_charge and done and bool(self._left_over)
 
     def _situation(self, paused: bool) -> Situation:
         along_x = None
@@ -149,8 +179,8 @@ class Mission:
             case Phase.RECOVER:
                 done = (s.now_ns - self._since_ns) * 1e-9 >= p.recover_s
                 trigger = Trigger.UNATTENDED
-            case Phase.PREFLIGHT:
-                done, trigger = self._started and not self._not_ready(s), Trigger.READY
+            case Phase.PREFLIGHT | Phase.SWAP:
+                done, trigger = self._started and not self._grounded(s), Trigger.READY
             case Phase.ARMING:
                 ready = v is not None and v.armed and v.in_control and not math.isnan(s.height_m)
                 done, trigger = ready, Trigger.ARMED
@@ -180,22 +210,11 @@ class Mission:
         """A vehicle found flying is given a moment to show that it obeys."""
         return self.phase is Phase.RECOVER and (s.now_ns - self._since_ns) * 1e-9 < self._params.adopt_s
 
-    def _not_ready(self, s: Senses) -> str:
-        """Why the flight cannot start, or an empty text."""
-        p, v = self._params, s.vehicle
-        if v is None or s.telemetry_age_s > p.telemetry_hold_s:
-            return "no telemetry from the vehicle"
-        silent = self._ground_lost and p.ground_lost is not GroundLost.CONTINUE
-        low = f"battery at {v.battery_frac:.0%}, {p.battery_start_frac:.0%} needed to start"
-        checks = {
-            "the vehicle is armed already: disarm it first": v.armed,
-            "no height from the vehicle's range finder": math.isnan(v.height_m),
-            "no battery level from the vehicle": math.isnan(v.battery_frac),
-            low: v.battery_frac < p.battery_start_frac,
-            "no picture from the down camera": not s.frames_arrive,
-            "the ground station that attends this flight fell silent": silent,
-        }
-        return next((reason for reason, failed in checks.items() if failed), "")
+    def _grounded(self, s: Senses) -> str:
+        """Why it stays on the ground, or an empty text."""
+        silent = self._ground_lost and self._params.ground_lost is not GroundLost.CONTINUE
+        stale = not_fresh(s, self._params, len(self.remaining)) if self.phase is Phase.SWAP else ""
+        return stale or not_ready(s, self._params, silent)
 
     def _settled(self, s: Senses, condition: bool) -> bool:
         """True once `condition` has held for the settling time."""
@@ -209,6 +228,7 @@ class Mission:
         if before is Phase.HOVER and trigger in {Trigger.DWELLED, Trigger.ROUTE_DONE}:
             self._note_visit(s)
         if trigger is Trigger.DWELLED:
+            self._look_ahead(s)
             self._next += 1
         if trigger is Trigger.ARRIVED:
             self._anchor = (self.goal.x_m, self.goal.y_m)
@@ -228,6 +248,8 @@ class Mission:
         self._since_ns = s.now_ns
         self._settling = Lasting()
         self._limit_s = self._time_limit_s(s)
+        if phase is Phase.SWAP:
+            self._await_battery(s.now_ns)
         if phase is Phase.TAKE_OFF:
             self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m)
         if phase is Phase.RECOVER and s.vehicle is not None:
@@ -241,6 +263,8 @@ class Mission:
         match self.phase:
             case Phase.ARMING:
                 return p.arm_timeout_s
+            case Phase.SWAP:
+                return p.battery.swap_wait_s
             case Phase.TAKE_OFF:
                 way_s = p.height_m / p.climb_mps
             case Phase.TURN:
@@ -253,17 +277,51 @@ class Mission:
         return p.phase_slack_s + p.phase_share * way_s
 
     def _note_visit(self, s: Senses) -> None:
-        if self.goal.visit:
+        if self.goal.visit and not self._returning:  # a stop on the way home is none of the wanted ones
             self.visited.append(self.goal.node)
             self._event(s.now_ns, EventLevel.INFO, "visited", self.goal.node)
 
-    def _go_home(self, now_ns: int, reason: str, *, in_need: bool = False) -> None:
-        """Fly to the home pad; `in_need` by the shortest way, against one-way lines too."""
+    @property
+    def remaining(self) -> tuple[str, ...]:
+        """The stops that this mission still wants to visit, in order."""
+        ahead = (stop.node for stop in self._stops[self._next :] if stop.visit)
+        return self._left_over or tuple(ahead)
+
+    def _look_ahead(self, s: Senses) -> None:
+        """Turn back here rather than half-way to a stop that the battery does not reach."""
+        ahead = [stop.node for stop in self._stops[self._next + 1 :] if stop.visit]
+        if ahead and not self._returning and (why := self._sorties.why_not_on(self.goal.node, ahead[0])):
+            self._left_over = tuple(ahead)
+            self._go_charge(s.now_ns, why)
+
+    def _go_charge(self, now_ns: int, reason: str, *, in_need: bool = False) -> None:
+        """Fly to the charge pad that is reached soonest; with batteries swapped the rest is flown later."""
+        self._go_home(now_ns, reason, in_need=in_need, pad=self._sorties.way_back(self.goal.node).pad)
+        self._short_of_charge = self._params.battery.swap
+        self._aborting = not (self._short_of_charge and self._left_over)
+
+    def _await_battery(self, now_ns: int) -> None:
+        """Stand on the pad with the rest of the plan ahead."""
+        pad = self.goal
+        self.stand = (pad.node, pad.yaw_rad)
+        rest = make_plan(self._site, self._left_over, pad.node, self._plan.home, self._policy, pad.yaw_rad)
+        self._stops, self._next = list(rest.stops), 0
+        self._anchor = (pad.x_m, pad.y_m)
+        self._visited_before = len(self.visited)
+        self._returning = self._aborting = self._short_of_charge = False
+        self._started = self._params.autostart
+        text = f"{len(self._left_over)} stops left; change the battery on the pad at {pad.node}"
+        self._event(now_ns, EventLevel.WARNING, "swap", text)
+        self._left_over = ()
+
+    def _go_home(self, now_ns: int, reason: str, *, in_need: bool = False, pad: str | None = None) -> None:
+        """Fly to the home pad or another; `in_need` by the shortest way, against one-way lines too."""
+        self._left_over = self.remaining
         self._returning = True
         self._paused = False
         self._aborting = True
         self._event(now_ns, EventLevel.WARNING, "home", reason)
-        self._replan([], in_need=in_need)
+        self._replan([], in_need=in_need, home=pad)
 
     def _go_to(self, now_ns: int, node: str) -> None:
         if self._returning:
@@ -276,11 +334,17 @@ class Mission:
         else:
             self._event(now_ns, EventLevel.WARNING, "command", f"no node {node!r} on site {self._site.name}")
 
-    def _replan(self, visits: list[str], *, in_need: bool = False) -> None:
+    def _replan(self, visits: list[str], *, in_need: bool = False, home: str | None = None) -> None:
         """Finish the present leg, then fly over `visits` home.  NoWayError leaves everything as it is."""
         here = self.goal
         onward = make_plan(
-            self._site, visits, here.node, self._plan.home, self._policy, here.yaw_rad, in_need=in_need
+            self._site,
+            visits,
+            here.node,
+            home or self._plan.home,
+            self._policy,
+            here.yaw_rad,
+            in_need=in_need,
         )
         self._stops[self._next + 1 :] = onward.stops
 
@@ -288,8 +352,8 @@ class Mission:
 
     def _guide(self, s: Senses) -> Guidance:
         demand = _DEMANDS.get(self.phase, Demand.FLY)
-        if self.phase is Phase.PREFLIGHT:
-            self.reason = self._not_ready(s) or "waiting for the start command"
+        if self.phase in {Phase.PREFLIGHT, Phase.SWAP}:
+            self.reason = self._grounded(s) or "waiting for the start command"
         if not self.airborne:
             return Guidance(self.phase, Guide.NONE, self._reference(0.0), demand)
         if self.phase is Phase.LAND:

@@ -67,12 +67,17 @@ def best_order(
 
 
 def ordered_best(
-    site: Site, visits: Sequence[str], pad: str, policy: HeadingPolicy, pace: Pace, start_yaw_rad: float
+    site: Site,
+    visits: Sequence[str],
+    ends: tuple[str, str],
+    policy: HeadingPolicy,
+    pace: Pace,
+    start_yaw_rad: float,
 ) -> tuple[str, ...]:
-    """The visits, each once, in the quickest order from the pad and back to it.  NoWayError."""
+    """The visits, each once, in the quickest order between the two ends.  NoWayError."""
     for node in visits:
         site.require(node)
-    tour = best_order(Legs(site, policy, pace), visits, pad, pad, to_quarter(start_yaw_rad))
+    tour = best_order(Legs(site, policy, pace), visits, *ends, to_quarter(start_yaw_rad))
     return tuple(node for node in tour.nodes[:-1] if node in set(visits))
 
 

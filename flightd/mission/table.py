@@ -44,7 +44,17 @@ TABLE: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.HOVER: _ON_LINES | {Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
     Phase.TURN: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.TURNED: Phase.FOLLOW},
     Phase.HOLD: _SAFETY | {Trigger.LINES_LOST_LONG: Phase.LAND, Trigger.LINES_FOUND: Phase.ACQUIRE},
-    Phase.LAND: {Trigger.PILOT_TOOK: Phase.PILOT, Trigger.DISARMED: Phase.DONE},
+    Phase.LAND: {
+        Trigger.PILOT_TOOK: Phase.PILOT,
+        Trigger.DISARMED: Phase.DONE,
+        Trigger.DOWN_TO_SWAP: Phase.SWAP,
+    },
+    Phase.SWAP: {
+        Trigger.STOP: Phase.ABORTED,
+        Trigger.LAND_HERE: Phase.ABORTED,
+        Trigger.TIMED_OUT: Phase.ABORTED,
+        Trigger.READY: Phase.ARMING,
+    },
     Phase.DONE: {},
     Phase.ABORTED: {},
     Phase.PILOT: {},

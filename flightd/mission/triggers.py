@@ -9,6 +9,7 @@ class Trigger(enum.Enum):
     """Tried in this order: what keeps people safe stands first."""
 
     PILOT_TOOK = "the pilot took control"
+    DOWN_TO_SWAP = "down on the pad for a fresh battery"
     DISARMED = "the vehicle disarmed"
     STOP = "stop ordered"
     TELEMETRY_LOST = "vehicle telemetry lost"

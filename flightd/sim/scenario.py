@@ -18,6 +18,8 @@ gust_mps = 0.3           # root mean square of the gusts
 
 [vehicle]
 battery = 1.0            # charge at the start, 0..1
+battery_ah = 5.0         # its capacity; hovering takes 14 A
+swap_s = 30.0            # time in which somebody changes it on the charge pad; 0: nobody does
 """
 
 from __future__ import annotations
@@ -80,6 +82,8 @@ class WindScenario(_Section):
 
 class VehicleScenario(_Section):
     battery: float = Field(1.0, ge=0, le=1)
+    battery_ah: float = Field(5.0, gt=0.05, le=100)
+    swap_s: float = Field(30.0, ge=0, le=3600)
     radio_loss: float = Field(0.0, ge=0, le=1)
     radio_delay_ms: float = Field(0.0, ge=0, le=2000)
     radio_jitter_ms: float = Field(0.0, ge=0, le=2000)

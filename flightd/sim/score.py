@@ -10,6 +10,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 
 from flightd.core.types import Event, Phase, Status
 from flightd.grid.site import Site
@@ -18,6 +19,7 @@ from flightd.sim.kinematics import Kinematics
 
 _AT_NODE_M = 0.5
 """A node counts as visited rightly when the drone was within this of it (less than half a cell)."""
+_OFF_FLOOR_M = 0.3
 _ON_LINES = {Phase.FOLLOW, Phase.HOVER, Phase.TURN}
 
 
@@ -35,6 +37,7 @@ class Score:
     hover_error_p95_m: float | None
     landed_error_m: float | None
     flight_time_s: float
+    sorties: int
     min_shelf_distance_m: float | None
 
 
@@ -49,12 +52,12 @@ def score(
     final = statuses[-1] if statuses else None
     visits = [event for event in events if event.name == "visited"]
     right = [event for event in visits if _at_node(site, event, truth)]
-    flying = [t for t in truth if t.height_m > 0.3]
+    flying = [t for t in truth if t.height_m > _OFF_FLOOR_M]
     phases = _Phases(statuses)
     on_lines = [_off_line(site, t) for t in flying if phases.at(t.stamp_ns) in _ON_LINES]
     hover = _hover_errors(site, visits, truth, phases)
     pad = site.nodes[plan.home]
-    landed = truth[-1] if truth and truth[-1].height_m < 0.3 and flying else None
+    landed = truth[-1] if truth and truth[-1].height_m < _OFF_FLOOR_M and flying else None
     return Score(
         mission="completed" if final and final.phase is Phase.DONE else "aborted",
         reason=final.reason if final else "the daemon never spoke",
@@ -65,7 +68,11 @@ def score(
         cross_track_max_m=_rounded(max(on_lines, default=None)),
         hover_error_p95_m=_rounded(_p95(hover)),
         landed_error_m=_rounded(math.hypot(landed.x_m - pad.x_m, landed.y_m - pad.y_m)) if landed else None,
-        flight_time_s=round((flying[-1].stamp_ns - flying[0].stamp_ns) * 1e-9, 2) if flying else 0.0,
+        flight_time_s=_flight_time_s(truth),
+        sorties=sum(
+            after.phase is Phase.TAKE_OFF and before.phase is not Phase.TAKE_OFF
+            for before, after in pairwise(statuses)
+        ),
         min_shelf_distance_m=_rounded(min((_to_shelf(site, t) for t in flying), default=None)),
     )
 
@@ -132,6 +139,14 @@ def _to_shelf(site: Site, t: Kinematics) -> float:
         if t.height_m < shelf.height_m
     ]
     return min(distances, default=math.inf)
+
+
+def _flight_time_s(truth: Sequence[Kinematics]) -> float:
+    """Time off the floor, in all sorties together."""
+    spans = [
+        b.stamp_ns - a.stamp_ns for a, b in pairwise(truth) if min(a.height_m, b.height_m) > _OFF_FLOOR_M
+    ]
+    return round(sum(spans) * 1e-9, 2)
 
 
 def _rms(values: Sequence[float]) -> float | None:

@@ -16,13 +16,14 @@ from flightd.core.topics import Topic
 from flightd.core.types import Image
 from flightd.grid.site import Site
 from flightd.ports import Clock, Recorder
-from flightd.sim.airframe import Airframe
+from flightd.sim.airframe import Airframe, AirframeParams
 from flightd.sim.appearance import DEFAULT, Appearance
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.camera import CameraPeer
+from flightd.sim.crew import PadCrew
 from flightd.sim.external import ExternalVehicle, Placement
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.optics import SimCamera
@@ -37,18 +38,21 @@ class WorldSpec:
     """Everything that makes one simulated world; a port 0 takes any free one.  An AR.Drone has four:
     commands, navdata, video and configuration; it transmits its pictures itself.  With a `truth_url` the
     vehicle is an external simulator's, which stands on the pad, and only the camera is ours; `radio` lies
-    between a MAVLink autopilot and its companion."""
+    between a MAVLink autopilot and its companion.  With `swap_s` 0 nobody changes batteries."""
 
     site: Site
     seed: int
     camera_address: tuple[str, int]
     vehicle: Literal["ardupilot", "px4", "ardrone"] = "ardupilot"
     vehicle_ports: tuple[int, ...] = (0,)
+    start: str | None = None
     start_yaw_rad: float = 0.0
     camera: SimCamera = field(default_factory=SimCamera)
     appearance: Appearance = DEFAULT
     draught: Draught = field(default_factory=Draught)
     battery_frac: float = 1.0
+    battery_ah: float = 5.0
+    swap_s: float = 0.0
     radio: RadioParams = PERFECT
     truth_url: str = ""
 
@@ -71,8 +75,9 @@ class World:
     def __init__(self, spec: WorldSpec, clock: Clock, recorder: Recorder) -> None:
         self._clock = clock
         self._recorder = recorder
-        pad = spec.site.nodes[spec.site.home.node]
+        pad = spec.site.nodes[spec.start or spec.site.home.node]
         airframe = Airframe(
+            AirframeParams(battery_capacity_ah=spec.battery_ah),
             draught=spec.draught,
             seed=spec.seed,
             x_m=pad.x_m,
@@ -92,6 +97,8 @@ class World:
             (port,) = spec.vehicle_ports
             peer = Px4Peer if spec.vehicle == "px4" else ArduCopterPeer
             self.vehicle = peer(clock, airframe, PeerConfig(port=port, seed=spec.seed, radio=spec.radio))
+        own = not spec.truth_url
+        self._crew = PadCrew(spec.site, airframe, spec.swap_s) if own and spec.swap_s else None
         self.camera = CameraPeer(
             spec.site,
             spec.camera,
@@ -119,7 +126,13 @@ class World:
             tasks.create_task(self.vehicle.run(), name="autopilot")
             tasks.create_task(self.camera.run(), name="camera")
             tasks.create_task(self._log_truth(), name="truth")
+            if self._crew is not None:
+                tasks.create_task(self._crew.run(self._clock, self._at), name="crew")
             opened()
+
+    def _at(self, now_ns: int) -> None:
+        """Bring the vehicle up to the present."""
+        self.vehicle.truth_at(now_ns)
 
     async def _log_truth(self) -> None:
         while True:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
+    Command,
     Demand,
     Event,
     LandedState,
@@ -19,8 +20,9 @@ from flightd.core.types import (
 from flightd.grid.site import Site
 from flightd.mission.plan import FlightPlan, Heading, HeadingPolicy, make_plan
 from flightd.pilot import Pilot, PilotParams, TickInput, TickOutput
-from flightd.sim.airframe import Airframe, AirframeCommand
+from flightd.sim.airframe import Airframe, AirframeCommand, AirframeParams
 from flightd.sim.climb_loop import ClimbLoop
+from flightd.sim.crew import PadCrew
 from flightd.sim.ideal import EyeErrors, IdealEye
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.sensors import Sensors
@@ -60,13 +62,15 @@ class IdealFlight:
         draught: Draught | None = None,
         errors: EyeErrors | None = None,
         delay_ns: int = 68_000_000,
+        airframe: AirframeParams | None = None,
+        swap_s: float = 0.0,
     ) -> None:
         policy = policy or HeadingPolicy(Heading.ALONG)
         pad = site.home.node
         self.plan: FlightPlan = make_plan(site, visits or site.serpentine_route(), pad, pad, policy)
         self.pilot = Pilot(site, self.plan, policy, params)
         node = site.nodes[pad]
-        self.airframe = Airframe(draught=draught, seed=seed, x_m=node.x_m, y_m=node.y_m)
+        self.airframe = Airframe(airframe, draught=draught, seed=seed, x_m=node.x_m, y_m=node.y_m)
         self.sensors = Sensors(seed=seed)
         self._eye = IdealEye(site, params.tracker.lens, params.tracker.mount, errors, seed)
         self._climb = ClimbLoop()
@@ -77,6 +81,9 @@ class IdealFlight:
         self.in_control = True
         self.blind = False
         self.ground_silent_s = 0.0
+        self.commands: list[Command] = []
+        """Orders that the next tick takes."""
+        self._crew = PadCrew(site, self.airframe, swap_s) if swap_s else None
 
     def fly(self, limit_s: float = 600.0) -> Flown:
         flown = Flown()
@@ -103,12 +110,16 @@ class IdealFlight:
                 lines = []
                 while late and late[0][0] <= self._now_ns:
                     lines.append(late.popleft()[1])
+                if self._crew is not None:
+                    self._crew.look(self._now_ns)
+                orders, self.commands = tuple(self.commands), []
                 output = self.pilot.step(
                     TickInput(
                         self._now_ns,
                         tuple(lines),
                         self._state(),
                         tuple(attitudes),
+                        orders,
                         ground_silent_s=self.ground_silent_s,
                     )
                 )

@@ -26,6 +26,7 @@ PHASE_TONE: dict[Phase, str] = {
     Phase.TURN: "turn",
     Phase.HOLD: "hold",
     Phase.LAND: "climb",
+    Phase.SWAP: "ground",
     Phase.DONE: "ground",
     Phase.ABORTED: "bad",
     Phase.PILOT: "hold",

@@ -165,7 +165,7 @@ def _flight_time(flight: Flight) -> Figure | None:
     return None if seconds is None else Figure("Flight time", clock(seconds), "min")
 
 
-_ON_GROUND = frozenset({Phase.PREFLIGHT, Phase.ARMING, Phase.DONE, Phase.ABORTED})
+_ON_GROUND = frozenset({Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.DONE, Phase.ABORTED})
 
 
 def _latency(flight: Flight) -> Figure | None:

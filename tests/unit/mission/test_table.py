@@ -15,7 +15,9 @@ from flightd.mission.triggers import Trigger
 from flightd.sim.sites import random_site
 
 FLYING = [
-    p for p in Phase if p not in {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE, Phase.ABORTED, Phase.PILOT}
+    p
+    for p in Phase
+    if p not in {Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.DONE, Phase.ABORTED, Phase.PILOT}
 ]
 
 

@@ -1,0 +1,95 @@
+"""Charge as time: consumption learnt, ways back reckoned, plans cut into sorties."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flightd.config.site_file import load_site
+from flightd.core.errors import InputError
+from flightd.mission.battery import BatteryGauge, BatteryParams
+from flightd.mission.guidance import MissionParams
+from flightd.mission.legs import Legs, Pace
+from flightd.mission.plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.sorties import Sorties, check_battery
+
+LARGE = load_site(Path(__file__).parents[3] / "configs" / "site-large.toml")
+POLICY = HeadingPolicy(Heading.ALONG)
+LEGS = Legs(LARGE, POLICY, Pace.of(MissionParams()))
+S = 10**9
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(120, 3000), st.floats(120, 3000))
+def test_the_true_consumption_is_learnt_from_a_gauge_in_whole_percents(
+    believed_s: float, true_s: float
+) -> None:
+    gauge = BatteryGauge(believed_s)
+    for second in range(0, round(0.9 * true_s), 5):
+        gauge.step(second * S, round(1.0 - second / true_s, 2), True)
+    assert gauge.rate_per_s * true_s > 0.9, "never far too hopeful"
+    gauge.step(3000 * S, 1.0, False)
+    learnt = gauge.rate_per_s
+    gauge.step(3001 * S, 1.0, True)
+    assert gauge.rate_per_s == pytest.approx(learnt), "what was learnt outlives the swap"
+    if true_s > 600:
+        assert learnt * true_s == pytest.approx(1.0, abs=0.12 + 0.15 * true_s / believed_s)
+
+
+def test_a_gauge_that_says_nothing_leaves_the_belief() -> None:
+    gauge = BatteryGauge(500.0)
+    gauge.step(0, math.nan, True)
+    gauge.step(60 * S, math.nan, True)
+    assert gauge.rate_per_s == pytest.approx(1 / 500)
+
+
+def sorties(flight_s: float = 600.0) -> Sorties:
+    return Sorties(LARGE, LEGS, BatteryParams(flight_s=flight_s, reserve_frac=0.1))
+
+
+def test_it_turns_back_just_when_the_way_home_needs_what_is_left() -> None:
+    back = sorties().way_back("J10")
+    needed = back.seconds / 600.0 + 0.1
+    for charge, turns in ((needed + 0.005, False), (needed - 0.005, True), (math.nan, False)):
+        watch = sorties()
+        watch.step(0, charge, True)
+        assert bool(watch.why_return("J10", 0.0)) is turns
+    watch = sorties()
+    watch.step(0, needed + 0.005, True)
+    assert "the way back to A1" in watch.why_return("J10", 8.0), "the rest of the leg counts"
+
+
+def test_the_nearest_charge_pad_is_chosen() -> None:
+    pad = replace(LARGE.pads[0], id="dock", node="J10", start=False)
+    two = replace(LARGE, pads=(*LARGE.pads, pad))
+    watch = Sorties(two, Legs(two, POLICY, LEGS.pace), BatteryParams())
+    assert watch.way_back("I9").pad == "J10"
+    assert watch.way_back("B2").pad == "A1"
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.floats(260, 1500))
+def test_sorties_hold_every_visit_once_in_order_and_each_comes_back(flight_s: float) -> None:
+    visits = [node for node in LARGE.serpentine_route() if node != "A1"]
+    watch = sorties(flight_s)
+    cut = watch.cut("A1", visits)
+    assert list(itertools.chain(*cut)) == visits
+    for sortie in cut:
+        flown_s = LEGS.pace.take_off_s + sum(
+            LEGS.way_s(a, b) + LEGS.pace.dwell_s for a, b in itertools.pairwise(("A1", *sortie))
+        )
+        assert flown_s + watch.way_back(sortie[-1]).seconds <= 0.9 * flight_s + 1e-6
+
+
+def test_what_no_full_battery_reaches_is_refused_before_the_flight() -> None:
+    plan = make_plan(LARGE, ["A2", "J10"], "A1", "A1", POLICY)
+    check_battery(LARGE, plan, POLICY, MissionParams())
+    weak = MissionParams(battery=BatteryParams(flight_s=90.0))
+    with pytest.raises(InputError, match=r"battery\.flight_s = 90\) does not reach J10"):
+        check_battery(LARGE, plan, POLICY, weak)

@@ -1,0 +1,89 @@
+"""The file of stops left over: what survives, and what is refused."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from flightd.adapters.store.progress import LeftOver, NothingLeftError, ProgressFile, load_left_over
+from flightd.app import plan_of
+from flightd.cli.resume import resumed as take_up
+from flightd.config.schema import load_config
+from flightd.config.site_file import load_site
+from flightd.core.errors import InputError, TransientError
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+DEMO = load_site(CONFIGS / "site-demo.toml")
+LARGE = load_site(CONFIGS / "site-large.toml")
+
+
+async def kept(path: Path, *states: tuple[str, ...]) -> None:
+    """Put the states one after the other, with and without time to write, then lose the task."""
+    file = ProgressFile(path, "demo")
+    task = asyncio.ensure_future(file.run())
+    for i, state in enumerate(states):
+        file.put(LeftOver(state, "A1", 3.0))
+        if i % 2 == 0:
+            await asyncio.sleep(0.01)
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+def test_the_newest_state_is_on_disk_however_it_ends(tmp_path: Path) -> None:
+    path = tmp_path / "state" / "progress.json"
+    states = (("A2", "A3", "B1"), ("A3", "B1"), ("B1",))
+    for count, last in enumerate(states, start=1):
+        asyncio.run(kept(path, *states[:count]))
+        assert load_left_over(path, DEMO) == LeftOver(last, "A1", 3.0)
+    assert [file.name for file in path.parent.iterdir()] == ["progress.json"]
+
+
+def test_a_finished_plan_leaves_nothing_to_resume(tmp_path: Path) -> None:
+    path = tmp_path / "progress.json"
+    with pytest.raises(NothingLeftError, match="nothing to resume"):
+        load_left_over(path, DEMO)
+    asyncio.run(kept(path, ("A2",), ()))
+    with pytest.raises(NothingLeftError, match="every stop was made"):
+        load_left_over(path, DEMO)
+
+
+def test_another_sites_progress_and_rubbish_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "progress.json"
+    asyncio.run(kept(path, ("A2",)))
+    with pytest.raises(InputError, match="progress on site demo, not on large"):
+        load_left_over(path, LARGE)
+    for rubbish in ("{", "[]", '{"site": "demo"}', '{"site": "demo", "remaining": ["Z9"]}'):
+        path.write_text(rubbish)
+        with pytest.raises(InputError):
+            load_left_over(path, DEMO)
+
+
+def test_a_disk_that_refuses_is_trouble_not_the_end(tmp_path: Path) -> None:
+    (tmp_path / "state").write_text("a file where a folder should be")
+    file = ProgressFile(tmp_path / "state" / "progress.json", "demo")
+
+    async def run() -> None:
+        file.put(LeftOver(("A2",), "A1", 0.0))
+        await file.run()
+
+    with pytest.raises(TransientError, match="progress"):
+        asyncio.run(run())
+
+
+def test_what_is_left_over_takes_the_place_of_the_configured_nodes(tmp_path: Path) -> None:
+    config = load_config(CONFIGS / "sim.toml")
+    path = tmp_path / "progress.json"
+    with pytest.raises(InputError, match=r"mission\.progress names no file"):
+        take_up(config, path, DEMO, ordered=True)
+    mission = config.mission.model_copy(update={"progress": path, "resume": True})
+    config = config.model_copy(update={"mission": mission})
+    assert take_up(config, path, DEMO, ordered=False).mission.nodes == ()
+    with pytest.raises(InputError, match="nothing to resume"):
+        take_up(config, path, DEMO, ordered=True)
+    asyncio.run(kept(path, ("A3", "B1")))
+    resumed = take_up(config, path, DEMO, ordered=False).mission
+    assert (resumed.nodes, resumed.pad) == (("A3", "B1"), "home")
+    assert resumed.start_yaw_deg == pytest.approx(171.9, abs=0.1)
+    assert plan_of(config.model_copy(update={"mission": resumed}), DEMO).stops[0].visit
