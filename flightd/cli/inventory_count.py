@@ -6,7 +6,7 @@ import csv
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flightd.adapters.store.evidence import evidence_jpeg
 from flightd.adapters.store.sqlite import SqliteStore
@@ -17,6 +17,9 @@ from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
 from flightd.core.types import Image
 from flightd.vision.codes import read_codes
+
+if TYPE_CHECKING:
+    from flightd.replay.report.count import Count
 
 
 def count_pictures(folder: Path, paths: Sequence[Path], run: str) -> list[LocationRecord]:
@@ -68,6 +71,29 @@ def read_stock(path: Path) -> dict[str, list[str]]:
     except csv.Error as err:
         raise InputError(f"{path}: not CSV: {err}") from None
     return stock
+
+
+def counted_beside(log: Path, inventory: Path | None = None, expected: Path | None = None) -> Count | None:
+    """What was counted, for the report of `log`: the inventory in `inventory`, or beside the log if there
+    is one; compared with an `expected` stock.  Raises InputError when what is asked for is missing."""
+    from flightd.mission.stock import compare_stock
+    from flightd.replay.report.count import Count
+
+    stock = read_stock(expected) if expected is not None else None
+    folder = inventory or log.parent
+    if inventory is None and stock is None and not (folder / "inventory.db").exists():
+        return None
+    with SqliteStore(folder, create=False) as store:
+        records, evidence = store.locations(), store.evidence
+    differences = compare_stock(records, stock) if stock is not None else None
+
+    def picture(name: str) -> bytes | None:
+        try:
+            return evidence.path(name).read_bytes()
+        except (OSError, ValueError):
+            return None
+
+    return Count(records, picture, differences)
 
 
 def write_recount(

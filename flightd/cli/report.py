@@ -19,18 +19,27 @@ def report(
     out: Annotated[
         Path | None, typer.Option(metavar="F", help="Where to write the page; report.html beside LOG.")
     ] = None,
+    inventory: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="What was counted; inventory.db beside LOG.")
+    ] = None,
+    expected: Annotated[
+        Path | None, typer.Option(metavar="CSV", help="Expected stock to compare with: location,code.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
 ) -> None:
     """Make a report of a flight: one HTML file that needs nothing else.
 
-    truth.mcap and summary.json are used if they lie beside LOG.
+    truth.mcap, summary.json and inventory.db are used if they lie beside LOG.  With an inventory the page
+    shows the racks by state, the evidence pictures, the exceptions and what differs from the expected stock.
 
     \b
     flightd report out/flight.mcap
     flightd report /var/lib/flightd/flight.mcap --out flight.html
+    flightd report out/flight.mcap --expected stock.csv
     """
+    from flightd.cli.inventory_count import counted_beside
     from flightd.replay.report.page import write_report
 
     page = out if out is not None else log.with_name("report.html")
-    write_report(log, page)
+    write_report(log, page, counted_beside(log, inventory, expected))
     print(json.dumps({"report": str(page)}) if as_json else page)

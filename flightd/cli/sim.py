@@ -248,10 +248,11 @@ def _write_inventory(path: Path, visited: Sequence[str]) -> None:
 
 
 def _report(simulation: Any) -> Path:
+    from flightd.cli.inventory_count import counted_beside
     from flightd.replay.report.page import write_report
 
     path: Path = simulation.folder / "report.html"
-    write_report(simulation.flight_log, path)
+    write_report(simulation.flight_log, path, counted_beside(simulation.flight_log))
     return path
 
 

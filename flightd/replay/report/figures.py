@@ -157,11 +157,17 @@ def _codes(summary: Mapping[str, object]) -> Figure | None:
     return Figure("Codes read", number(read), f"of {number(expected)}", f"{number(wrong)} wrong", tone)
 
 
-def _flight_time(flight: Flight) -> Figure | None:
+def flight_time_s(flight: Flight) -> float | None:
+    """Time in the air, by the summary or else by the phases; None when it never flew."""
     seconds = _number(flight.summary, "flight_time_s")
     if seconds is None:
         airborne = [span.end_s - span.start_s for span in flight.phases if span.phase not in _ON_GROUND]
         seconds = sum(airborne) if airborne else None
+    return seconds
+
+
+def _flight_time(flight: Flight) -> Figure | None:
+    seconds = flight_time_s(flight)
     return None if seconds is None else Figure("Flight time", clock(seconds), "min")
 
 

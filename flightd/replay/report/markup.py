@@ -33,6 +33,12 @@ def element(name: str, *children: str, **attributes: object) -> str:
     return f"<{name}{written}>{''.join(children)}</{name}>"
 
 
+def table(heads: Iterable[str], rows: Iterable[str], name: str) -> str:
+    """A table of rows that are markup already, scrolled sideways where it is too wide."""
+    head = element("thead", element("tr", *(element("th", text(label), scope="col") for label in heads)))
+    return element("div", element("table", head, element("tbody", *rows), class_=name), class_="scroll")
+
+
 def number(value: float, digits: int = 2) -> str:
     """A number with at most `digits` decimals and no trailing zeros."""
     shown = f"{value:.{digits}f}"

@@ -11,13 +11,15 @@ from string import Template
 from flightd import __version__
 from flightd.core.errors import UnavailableError
 from flightd.replay.report.charts import strips, timeline
-from flightd.replay.report.figures import Figure, key_figures, outcome
+from flightd.replay.report.count import Count, count_figures
+from flightd.replay.report.figures import Figure, flight_time_s, key_figures, outcome
 from flightd.replay.report.flight import Flight
 from flightd.replay.report.frames import frames_section
 from flightd.replay.report.latency import latency_section
 from flightd.replay.report.load import load_flight
-from flightd.replay.report.markup import NOTHING, clock, element, number, text
+from flightd.replay.report.markup import NOTHING, clock, element, number, table, text
 from flightd.replay.report.plan import floor_plan
+from flightd.replay.report.stocktaking import inventory_section
 
 _EVENTS_SHOWN = 400
 
@@ -25,11 +27,12 @@ _STOPS_OPEN = 16
 """More stops than this are folded away."""
 
 
-def write_report(log: Path, out: Path) -> None:
-    """Write the report of `log` to `out`, with `truth.mcap` and `summary.json` if they lie beside it.
+def write_report(log: Path, out: Path, count: Count | None = None) -> None:
+    """Write the report of `log` to `out`, with `truth.mcap` and `summary.json` if they lie beside it, and
+    with what was counted.
 
     Raises InputError for a log that cannot be read, UnavailableError if `out` cannot be written."""
-    page = render(load_flight(log))
+    page = render(load_flight(log), count)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         out.write_text(page, encoding="utf-8")
@@ -37,19 +40,21 @@ def write_report(log: Path, out: Path) -> None:
         raise UnavailableError(f"{out}: cannot write the report: {err.strerror}") from None
 
 
-def render(flight: Flight) -> str:
+def render(flight: Flight, count: Count | None = None) -> str:
     """The report as HTML text."""
     ending = outcome(flight)
+    figures = (*(count_figures(count, flight_time_s(flight)) if count else ()), *key_figures(flight))
     return Template(_file("report.html")).substitute(
-        style=_file("report.css"),
-        script=_file("report.js"),
+        style=_file("report.css") + _file("inventory.css"),
+        script=_file("report.js") + _file("inventory.js"),
         title=text(f"{ending.headline} · {_site_name(flight)}"),
         site=text(_site_name(flight)),
         tone=ending.tone,
         headline=text(ending.headline),
         detail=text(ending.detail),
         facts=_facts(flight),
-        tiles="".join(_tile(figure) for figure in key_figures(flight)),
+        tiles="".join(_tile(figure) for figure in figures),
+        inventory=inventory_section(count, flight.site) if count else "",
         plan=floor_plan(flight),
         visits=_visits(flight),
         timeline=timeline(flight, strips(flight)),
@@ -117,19 +122,14 @@ def _visits(flight: Flight) -> str:
         row = (element("td", text(cell)) for cell in cells)
         rows.append(element("tr", *row, data_start=number(visit.start_s, 3)))
     note = "Errors: 95th percentile of the horizontal distance from the node during the stop."
-    table = _table(heads, rows, "visits") + element("p", note, class_="note")
+    stops = table(heads, rows, "visits") + element("p", note, class_="note")
     few = len(rows) <= _STOPS_OPEN
     title = element("summary", f"Stops ({len(rows)})")
-    return element("details", title, table, class_="stops", open="" if few else None)
+    return element("details", title, stops, class_="stops", open="" if few else None)
 
 
 def _centimetres(value_m: float) -> str:
     return f"{value_m * 100:.1f} cm" if math.isfinite(value_m) else NOTHING
-
-
-def _table(heads: list[str], rows: list[str], name: str) -> str:
-    head = element("thead", element("tr", *(element("th", text(label), scope="col") for label in heads)))
-    return element("div", element("table", head, element("tbody", *rows), class_=name), class_="scroll")
 
 
 def _events(flight: Flight) -> str:
@@ -146,9 +146,9 @@ def _events(flight: Flight) -> str:
         )
         for event in flight.events[:_EVENTS_SHOWN]
     ]
-    table = _table(["Time", "Level", "Event", ""], rows, "events")
+    shown = table(["Time", "Level", "Event", ""], rows, "events")
     missing = len(flight.events) - len(rows)
-    return table + (element("p", f"{missing} more in the log.", class_="note") if missing > 0 else "")
+    return shown + (element("p", f"{missing} more in the log.", class_="note") if missing > 0 else "")
 
 
 def _summary(flight: Flight) -> str:

@@ -1,0 +1,180 @@
+"""The inventory's part of the page: key figures, racks, exceptions, differences, and what a click shows."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping
+from datetime import UTC, datetime, timedelta
+
+import cv2
+import numpy as np
+
+from flightd.core.inventory import LocationRecord, LocationState
+from flightd.grid.site import Site
+from flightd.mission.stock import Outcome
+from flightd.replay.report.count import SETTLED, Count
+from flightd.replay.report.markup import NOTHING, element, table, text
+from flightd.replay.report.racks import STATE_NAMES, racks_section
+
+_PICTURES_BYTES = 12_000_000
+"""All pictures in the page together, before base64; those of exceptions come first."""
+_PICTURE_PX = 480
+_QUALITY = 60
+_ROWS = 300
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_ORDER = (
+    LocationState.UNREADABLE,
+    LocationState.OCCLUDED,
+    LocationState.SEVERAL,
+    LocationState.NOT_VISITED,
+)
+_REMEDIES = {
+    LocationState.UNREADABLE: "look at the label",
+    LocationState.OCCLUDED: "something stands before it",
+    LocationState.SEVERAL: "more than one code in one place",
+    LocationState.NOT_VISITED: "the flight did not get there",
+}
+
+
+def inventory_section(count: Count, site: Site | None) -> str:
+    """Racks, exceptions and differences, with the data that a click shows."""
+    parts = [
+        element("h2", "Racks"),
+        element("p", "Point to a place to read it, click for its picture.", class_="hint"),
+        racks_section(count, site),
+        element("h2", "Exceptions"),
+        _exceptions(count),
+    ]
+    if count.differences is not None:
+        parts += [element("h2", "Against the expected stock"), _differences(count)]
+    dialog = element("dialog", element("div", class_="look"), class_="look-box", aria_label="Location")
+    return element("section", *parts, class_="wide inventory") + dialog + _data(count)
+
+
+def _exceptions(count: Count) -> str:
+    found = [record for state in _ORDER for record in count.records if record.state is state]
+    if not found:
+        return element("p", "None: every location was counted, each with one code or empty.", class_="empty")
+    rows = [_exception(record) for record in found[:_ROWS]]
+    heads = ["Location", "State", "Codes", "Confidence", "Looked at", "What to do"]
+    return table(heads, rows, "exceptions") + _more(len(found) - len(rows), "flightd inventory show")
+
+
+def _exception(record: LocationRecord) -> str:
+    seen = record.observation
+    cells = [
+        element("td", element("b", text(record.code))),
+        element("td", element("i", class_=f"cell {record.state.value}"), text(STATE_NAMES[record.state])),
+        element("td", text(", ".join(record.texts) or NOTHING)),
+        element("td", f"{seen.confidence:.0%}" if seen else NOTHING),
+        element("td", _when(seen.utc_ns) if seen else NOTHING),
+        element("td", _REMEDIES[record.state]),
+    ]
+    return element("tr", *cells, data_code=record.code)
+
+
+def _differences(count: Count) -> str:
+    wrong = [line for line in count.differences or () if line.outcome not in SETTLED]
+    unknown = sum(line.outcome is Outcome.UNCOUNTED for line in count.differences or ())
+    note = (
+        f"{unknown:,} expected codes lie where nobody could see: nothing is said of them." if unknown else ""
+    )
+    tail = element("p", note, class_="note") if note else ""
+    if not wrong:
+        return element("p", "No difference.", class_="empty") + tail
+    rows = [
+        element(
+            "tr",
+            element("td", element("b", text(line.location))),
+            element("td", element("i", line.outcome.replace("_", " "), class_="level error")),
+            element("td", text(line.text if line.outcome is not Outcome.UNEXPECTED else NOTHING)),
+            element("td", text(line.text if line.outcome is Outcome.UNEXPECTED else line.found or NOTHING)),
+            element("td", text(line.found_at or NOTHING)),
+            element("td", f"{line.confidence:.0%}"),
+            data_code=line.location,
+        )
+        for line in wrong[:_ROWS]
+    ]
+    heads = ["Location", "Outcome", "Expected", "Found there", "Found at", "Confidence"]
+    return (
+        table(heads, rows, "differences") + _more(len(wrong) - len(rows), "flightd inventory compare") + tail
+    )
+
+
+def _more(missing: int, command: str) -> str:
+    return element("p", f"{missing:,} more: {command}.", class_="note") if missing > 0 else ""
+
+
+def _when(utc_ns: int) -> str:
+    return f"{_EPOCH + timedelta(microseconds=utc_ns // 1000):%Y-%m-%d %H:%M:%S}"
+
+
+# What a click shows
+
+
+def _data(count: Count) -> str:
+    outcomes = {code: outcome.value.replace("_", " ") for code, outcome in count.outcomes().items()}
+    looks = {record.code: _look(record, outcomes.get(record.code, "")) for record in count.records}
+    return _block("counted", looks) + _block("pictures", _pictures(count, outcomes))
+
+
+def _look(record: LocationRecord, outcome: str) -> dict[str, object]:
+    seen = record.observation
+    look: dict[str, object] = {"state": record.state.value, "name": STATE_NAMES[record.state]}
+    look["facts"] = [
+        [label, value]
+        for label, value in (
+            ("Codes", ", ".join(record.texts)),
+            ("Symbology", ", ".join(dict.fromkeys(read.symbology for read in seen.reads)) if seen else ""),
+            ("Confidence", f"{seen.confidence:.0%}" if seen else ""),
+            ("Looked at", f"{_when(seen.utc_ns)} UTC" if seen else ""),
+            ("From node", (seen.pose.node if seen and seen.pose else record.node)),
+            ("Height", f"{seen.pose.height_m:.2f} m" if seen and seen.pose else ""),
+            ("Run", seen.run if seen else ""),
+            ("Books", outcome),
+        )
+        if value
+    ]
+    if seen and seen.evidence:
+        look["picture"] = seen.evidence
+    return look
+
+
+def _pictures(count: Count, outcomes: Mapping[str, str]) -> dict[str, str]:
+    """Small JPEGs in base64 by name, as many as the page may carry; what needs a look comes first."""
+
+    def calm(record: LocationRecord) -> bool:
+        return record.code not in outcomes and record.state not in _ORDER
+
+    shown: dict[str, str] = {}
+    room = _PICTURES_BYTES
+    for record in sorted(count.records, key=calm):
+        name = record.observation.evidence if record.observation else ""
+        data = count.picture(name) if name and name not in shown else None
+        small = _small(data) if data else None
+        if small is None:
+            continue
+        room -= len(small)
+        if room < 0:
+            break
+        shown[name] = base64.b64encode(small).decode()
+    return shown
+
+
+def _small(jpeg: bytes) -> bytes | None:
+    """The picture at most 480 px wide; None for a file that is no picture."""
+    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    if picture is None:
+        return None
+    height_px, width_px = picture.shape[:2]
+    if width_px > _PICTURE_PX:
+        size = (_PICTURE_PX, max(1, round(height_px * _PICTURE_PX / width_px)))
+        picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+    return cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+
+
+def _block(name: str, value: object) -> str:
+    """Data for the script; nothing in it can end the element."""
+    data = json.dumps(value, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+    return f'<script type="application/json" id="{name}">{data}</script>'

@@ -1,0 +1,226 @@
+"""What the report shows of a count: each location once, nothing better than it is, nothing loaded."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from collections import Counter
+from html.parser import HTMLParser
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from flightd.cli.inventory_count import counted_beside
+from flightd.cli.main import app
+from flightd.core.errors import InputError
+from flightd.core.inventory import LocationRecord, LocationState, Observation
+from flightd.grid.site import Side, Site
+from flightd.mission.stock import Outcome
+from flightd.replay.report.count import Count, count_figures, percent
+from flightd.replay.report.load import load_flight
+from flightd.replay.report.page import render
+from flightd.replay.report.racks import racks_section
+from flightd.replay.report.stocktaking import inventory_section
+from tests.replay.synthetic_count import site_with_racks, state_of, write_count, write_stock
+from tests.replay.synthetic_flight import SITE_TOML, write_flight
+
+
+@pytest.fixture(scope="module")
+def site() -> Site:
+    return site_with_racks(SITE_TOML)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, site: Site) -> Path:
+    """A flight's folder with a count and the books beside the log."""
+    made = tmp_path_factory.mktemp("counted")
+    write_flight(made)
+    write_count(made, site)
+    write_stock(made / "stock.csv", site)
+    return made
+
+
+@pytest.fixture(scope="module")
+def count(folder: Path) -> Count:
+    found = counted_beside(folder / "flight.mcap", expected=folder / "stock.csv")
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def section(count: Count, site: Site) -> str:
+    return inventory_section(count, site)
+
+
+class Cells(HTMLParser):
+    """The places drawn: code, classes and text on hover, front by front."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.places: list[tuple[str, set[str], str]] = []
+        self.loaded: list[str] = []
+        self.feed(page)
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = {name: value or "" for name, value in attrs}
+        self.open.append(tag)
+        self.loaded += [value for name, value in given.items() if name in {"src", "href"}]
+        if tag == "button":
+            self.places.append((given["data-code"], set(given["class"].split()), given["title"]))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_every_location_is_drawn_once_in_its_state(section: str, count: Count) -> None:
+    cells = Cells(section)
+    drawn = {code: classes for code, classes, _ in cells.places}
+    assert len(drawn) == len(cells.places) == len(count.records)
+    assert all(record.state.value in drawn[record.code] for record in count.records)
+    assert cells.loaded == []
+
+
+def test_places_differing_from_the_books_are_marked_and_no_others(section: str, count: Count) -> None:
+    marked = {code for code, classes, _ in Cells(section).places if "differs" in classes}
+    wrong = [
+        line for line in count.differences or () if line.outcome not in {Outcome.MATCH, Outcome.UNCOUNTED}
+    ]
+    assert marked == {line.location for line in wrong} | {line.found_at for line in wrong if line.found_at}
+    assert marked
+
+
+def test_a_place_tells_its_codes_on_hover_and_no_label_becomes_markup(section: str, count: Count) -> None:
+    several = next(record for record in count.records if record.state is LocationState.SEVERAL)
+    title = next(title for code, _, title in Cells(section).places if code == several.code)
+    assert all(text in title for text in several.texts)
+    assert re.search(r"BOX <\d+>", title)
+    assert not re.search(r"BOX <\d", section)
+
+
+def test_fronts_are_drawn_as_they_are_seen_from_the_aisle(section: str, count: Count, site: Site) -> None:
+    order = [code for code, _, _ in Cells(racks_section(count, site)).places]
+    for side, rising in ((Side.LEFT, True), (Side.RIGHT, False)):
+        top = [
+            site.locations[code]
+            for code in order
+            if (at := site.locations[code]).aisle == "A" and at.side is side and at.level == 4
+        ]
+        xs = [at.x_m for at in top]
+        assert xs == sorted(xs, reverse=not rising)
+    first = [site.locations[code].level for code in order[:12]]
+    assert first == [4] * 3 + [3] * 3 + [2] * 3 + [1] * 3
+
+
+def test_the_exceptions_are_all_that_need_a_person(section: str, count: Count) -> None:
+    listed = re.search(r'class="exceptions".*?</table>', section, re.DOTALL)
+    assert listed is not None
+    codes = re.findall(r'data-code="([^"]+)"', listed[0])
+    calm = {LocationState.READ, LocationState.EMPTY}
+    assert sorted(codes) == sorted(record.code for record in count.records if record.state not in calm)
+
+
+def test_differences_are_those_of_the_comparison(section: str, count: Count) -> None:
+    listed = re.search(r'class="differences".*?</table>', section, re.DOTALL)
+    assert listed is not None
+    outcomes = Counter(re.findall(r'class="level error">([^<]+)', listed[0]))
+    expected = Counter(line.outcome.replace("_", " ") for line in count.differences or ())
+    assert outcomes == Counter({k: n for k, n in expected.items() if k not in {"match", "uncounted"}})
+
+
+def test_figures_say_what_was_counted(count: Count, site: Site) -> None:
+    figures = {figure.label: figure for figure in count_figures(count, 1800.0)}
+    states = Counter(state_of(number) for number in range(len(site.locations)))
+    looked = len(site.locations) - states[LocationState.NOT_VISITED]
+    read = states[LocationState.READ] + states[LocationState.SEVERAL]
+    assert figures["Coverage"].note == f"{looked} of {len(site.locations)} locations looked at"
+    assert figures["Coverage"].tone == "bad"
+    assert figures["Read rate"].note == f"{read} of {read + states[LocationState.UNREADABLE]} labels seen"
+    assert figures["Pace"].value == f"{2 * looked:,}"
+    assert 80.0 < float(figures["Confidence"].value) < 99.0
+    assert figures["Differences"].tone == "bad"
+
+
+@pytest.mark.parametrize(
+    ("part", "whole", "shown"),
+    [(9_999, 10_000, "99.9"), (10_000, 10_000, "100"), (1, 10_000, "0.1"), (0, 7, "0")],
+)
+def test_a_share_is_never_rounded_to_all_or_nothing(part: int, whole: int, shown: str) -> None:
+    assert percent(part, whole) == shown
+
+
+def data_of(section: str, name: str) -> dict[str, object]:
+    found = re.search(rf'id="{name}">(.*?)</script>', section, re.DOTALL)
+    assert found is not None
+    document: dict[str, object] = json.loads(found[1])
+    return document
+
+
+def test_a_click_shows_the_evidence_picture(section: str, count: Count) -> None:
+    looks, pictures = data_of(section, "counted"), data_of(section, "pictures")
+    assert set(looks) == {record.code for record in count.records}
+    for record in count.records:
+        look = looks[record.code]
+        assert isinstance(look, dict)
+        if record.observation is None:
+            assert "picture" not in look
+            continue
+        shown = base64.b64decode(str(pictures[look["picture"]]))
+        decoded = cv2.imdecode(np.frombuffer(shown, np.uint8), cv2.IMREAD_COLOR)
+        assert decoded is not None
+        assert decoded.shape == (270, 480, 3)
+
+
+def records(number: int, state: LocationState) -> list[LocationRecord]:
+    looks = [Observation("r", f"L{i}", i, state, 0.0, evidence=f"{i:064x}") for i in range(number)]
+    return [LocationRecord(look.location, "", look) for look in looks]
+
+
+def test_pictures_have_a_budget_and_those_of_exceptions_come_first() -> None:
+    noise = np.random.default_rng(1).integers(0, 255, (480, 480, 3), np.uint8)
+    jpeg = bytes(cv2.imencode(".jpg", noise, [cv2.IMWRITE_JPEG_QUALITY, 80])[1])
+    made = records(150, LocationState.EMPTY)
+    odd = Observation("r", "odd", 5, LocationState.UNREADABLE, 0.0, evidence="f" * 64)
+    page = inventory_section(Count([*made, LocationRecord("odd", "", odd)], lambda _name: jpeg), None)
+    pictures = data_of(page, "pictures")
+    assert next(iter(pictures)) == "f" * 64
+    assert 10 < len(pictures) < 150
+    assert len(page) < 20_000_000
+
+
+@pytest.mark.parametrize("picture", [None, b"no picture"])
+def test_evidence_that_is_gone_or_damaged_is_left_out(picture: bytes | None) -> None:
+    page = inventory_section(Count(records(2, LocationState.UNREADABLE), lambda _name: picture), None)
+    assert data_of(page, "pictures") == {}
+
+
+def test_locations_that_the_map_does_not_know_are_shown_too(count: Count, site: Site) -> None:
+    stray = records(3, LocationState.EMPTY)
+    page = racks_section(Count([*count.records, *stray]), site)
+    assert "Not on the map" in page
+    assert len(Cells(page).places) == len(count.records) + 3
+
+
+def test_the_page_has_the_inventory_only_where_there_is_one(folder: Path, count: Count) -> None:
+    flight = load_flight(folder / "flight.mcap")
+    assert 'id="counted"' in render(flight, count)
+    assert 'id="counted"' not in render(flight)
+
+
+def test_the_command_takes_the_inventory_beside_the_log_and_the_books(folder: Path, tmp_path: Path) -> None:
+    log, out = str(folder / "flight.mcap"), tmp_path / "r.html"
+    told = CliRunner().invoke(
+        app, ["report", log, "--out", str(out), "--expected", str(folder / "stock.csv"), "--json"]
+    )
+    assert json.loads(told.stdout) == {"report": str(out)}
+    assert "Against the expected stock" in out.read_text()
+    bare = write_flight(tmp_path / "bare")
+    assert counted_beside(bare) is None
+    for wrong in ({"inventory": tmp_path / "none"}, {"expected": folder / "stock.csv"}):
+        with pytest.raises(InputError, match=r"inventory\.db"):
+            counted_beside(bare, **wrong)
