@@ -1,6 +1,7 @@
 """The composition root: configuration -> adapters -> one TaskGroup.  The dataflow can be read here.
 
 camera -> latest slot -> detector processes -> tick (pilot) -> pump -> vehicle
+front camera -> latest slot -> code reader processes -> tick -> store
 vehicle, ground -> tick; tick -> recorder, ground, observers
 """
 
@@ -16,17 +17,20 @@ from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.ground.link import ZmqGround
 from flightd.adapters.store.progress import LeftOver, ProgressFile
 from flightd.adapters.vehicle.connect import connect_vehicle
-from flightd.config.schema import Config
+from flightd.config.schema import HEIGHT_ROOM_M, Config
 from flightd.core.errors import FlightdError, InputError, TransientError
 from flightd.core.topics import Topic
 from flightd.core.types import AttitudeSetpoint, Command, Event, EventLevel, Phase, Status
 from flightd.grid.site import Site
+from flightd.mission.assign import FrontSight
 from flightd.mission.legs import Pace
 from flightd.mission.plan import FlightPlan, VisitOrder, make_plan
 from flightd.mission.route import ordered_best
+from flightd.mission.scanner import Scanner
 from flightd.mission.sorties import check_battery
 from flightd.pilot import Pilot, TickInput, TickOutput
-from flightd.ports import Clock, Ground, Monitor, PoseTaker, Recorder, Vehicle, Vitals
+from flightd.ports import Camera, Clock, Ground, Monitor, PoseTaker, Recorder, Vehicle, Vitals
+from flightd.runtime.counting import Counting
 from flightd.runtime.latency import LatencyBook
 from flightd.runtime.latest import Latest
 from flightd.runtime.pool import Detection, DetectorPool, Detectors
@@ -60,7 +64,7 @@ class FlightResult:
 def plan_of(config: Config, site: Site) -> FlightPlan:
     """The flight plan that the configuration asks for, from the home pad and back."""
     mission = config.mission
-    site = site.between(*config.mission.flown_between_m())
+    site = site.between(*flown_between_m(config, site))
     visits: Sequence[str] = mission.nodes or site.serpentine_route()
     start, policy, yaw_rad = (
         start_of(config, site),
@@ -91,11 +95,36 @@ def pilot_of(config: Config, site: Site) -> Pilot:
             f"mission.height_m {config.mission.height_m} is not {CEILING_MARGIN_M} m below the ceiling of"
             f" {site.name} ({site.ceiling_m} m)"
         )
-    flown = site.between(*config.mission.flown_between_m())
-    plan = plan_of(config, site)
+    flown = site.between(*flown_between_m(config, site))
+    plan, policy = plan_of(config, site), config.heading_policy()
     params = config.pilot_params(site)
-    check_battery(flown, plan, config.heading_policy(), params.mission)
-    return Pilot(flown, plan, config.heading_policy(), params)
+    check_battery(flown, plan, policy, params.mission)
+    return Pilot(flown, plan, policy, params, scanner_of(config, site))
+
+
+def scanner_of(config: Config, site: Site) -> Scanner | None:
+    """What counts the shelves; None without a front camera or locations."""
+    front = config.front_camera
+    if not front.is_fitted or not site.locations:
+        return None
+    highest_m = site.ceiling_m - CEILING_MARGIN_M
+    if config.scan.min_height_m > highest_m:
+        raise InputError(
+            f"scan.min_height_m {config.scan.min_height_m} is not {CEILING_MARGIN_M} m below the ceiling of"
+            f" {site.name} ({site.ceiling_m} m)"
+        )
+    return Scanner(site, FrontSight(front.lens(), front.mount()), config.scan_params(highest_m))
+
+
+def flown_between_m(config: Config, site: Site) -> tuple[float, float]:
+    """The heights that the legs are flown between: with a scan, those of the labels too."""
+    low_m, high_m = config.mission.flown_between_m()
+    if not config.front_camera.is_fitted or not site.locations:
+        return low_m, high_m
+    scan = config.scan_params(site.ceiling_m - CEILING_MARGIN_M)
+    labels = [location.height_m for location in site.locations.values()]
+    highest_m = min(max(labels), scan.max_height_m)
+    return min(low_m, scan.min_height_m - HEIGHT_ROOM_M), max(high_m, highest_m + HEIGHT_ROOM_M)
 
 
 def profile_of(config: Config, site: Site) -> str:
@@ -118,9 +147,13 @@ def detector_of(config: Config, site: Site) -> Callable[[], Detector]:
     return partial(Detector, vision.method, profile_of(config, site), lens)
 
 
-def ground_link(config: Config, site: Site, clock: Clock) -> ZmqGround | None:
+def ground_link(
+    config: Config, site: Site, clock: Clock, counting: Counting | None = None
+) -> ZmqGround | None:
     """The link to ground stations, if the configuration wants one."""
-    return ZmqGround(config.ground, site, clock) if config.ground.listen else None
+    if not config.ground.listen:
+        return None
+    return ZmqGround(config.ground, site, clock, counting.places if counting is not None else None)
 
 
 class Daemon:
@@ -137,6 +170,7 @@ class Daemon:
         ground: Ground | None = None,
         monitors: Sequence[Monitor] = (),
         progress: ProgressFile | None = None,
+        counting: Counting | None = None,
     ) -> None:
         self._config = config
         self._clock = clock
@@ -155,6 +189,12 @@ class Daemon:
         pad = site.nodes[site.home.node]
         self._pad_m = (pad.x_m, pad.y_m) if config.vehicle.landing_target else None
         self._camera = connect_camera(config.camera, clock, self._frames.put, self._trouble, self._vehicle)
+        self._counting = counting if self._pilot.scans else None
+        self._front: Camera | None = None
+        if self._counting is not None:
+            self._front = connect_camera(
+                config.front_camera, clock, self._counting.frame, self._trouble, self._vehicle
+            )
         self._pump = SetpointPump(self._vehicle, clock, self._sent, TICK_S)
         self._latency = LatencyBook()
         self._detections: list[Detection] = []
@@ -185,6 +225,9 @@ class Daemon:
             parts["ground"] = restarted(self._ground.run, self.failed)
         if self._progress is not None:
             parts["progress"] = restarted(self._progress.run, self.failed)
+        if self._counting is not None and self._front is not None:
+            parts["front-camera"] = restarted(self._front.run, self.failed)
+            parts |= self._counting.begin(self._pilot.places, self._trouble)
         try:
             async with asyncio.TaskGroup() as tasks:
                 services = [tasks.create_task(part, name=name) for name, part in parts.items()]
@@ -269,6 +312,8 @@ class Daemon:
             tuple(self._vehicle.attitudes()),
             tuple(commands),
             self._ground.silent_s(now_ns) if self._ground is not None else 0.0,
+            self._counting.take() if self._counting is not None else (),
+            self._counting.take_counted() if self._counting is not None else (),
         )
         for detection in detections:
             self._latency.taken(detection, now_ns)
@@ -277,6 +322,8 @@ class Daemon:
         self._pump.set(output.setpoint)
         if self._pose_taker is not None and output.pose is not None:
             self._pose_taker.share_pose(output.pose, self._pad_m)
+        if self._counting is not None:
+            self._counting.keep(output)
         if output.setpoint is None:
             self._latency.forget()
         if self._progress is not None:
@@ -305,18 +352,7 @@ class Daemon:
         """Record what came in and went out; status ten times a second and at each change of phase."""
         now_ns, recorder = tick.now_ns, self._recorder
         if recorder is not None:
-            recorder.record(Topic.TICK, now_ns, tick)
-            recorder.record(Topic.DECISION, now_ns, output)
-            for lines in tick.lines:
-                recorder.record(Topic.LINES, lines.stamp_ns, lines)
-            if tick.vehicle is not None:
-                recorder.record(Topic.VEHICLE, now_ns, tick.vehicle)
-            if output.pose is not None:
-                recorder.record(Topic.POSE, now_ns, output.pose)
-            for command in tick.commands:
-                recorder.record(Topic.COMMAND, now_ns, command)
-            for event in output.events:
-                recorder.record(Topic.EVENT, event.stamp_ns, event)
+            _record(recorder, tick, output)
         self._rate = [stamp for stamp in self._rate if now_ns - stamp < 10**9]
         self._rate.extend([now_ns] * len(tick.lines))
         if now_ns - self._status_ns < _STATUS_NS and output.phase is self._last_phase:
@@ -387,6 +423,27 @@ class Daemon:
             latency_ms=self._latency.quantiles_ms(),
             setpoint_interval_ms=quantile,
         )
+
+
+def _record(recorder: Recorder, tick: TickInput, output: TickOutput) -> None:
+    """All that the pilot was given and answered, for the replay, and its parts for people."""
+    now_ns = tick.now_ns
+    recorder.record(Topic.TICK, now_ns, tick)
+    recorder.record(Topic.DECISION, now_ns, output)
+    for lines in tick.lines:
+        recorder.record(Topic.LINES, lines.stamp_ns, lines)
+    for codes in tick.codes:
+        recorder.record(Topic.CODES, codes.stamp_ns, codes)
+    for finding in output.findings:
+        recorder.record(Topic.FINDING, finding.stamp_ns, finding)
+    if tick.vehicle is not None:
+        recorder.record(Topic.VEHICLE, now_ns, tick.vehicle)
+    if output.pose is not None:
+        recorder.record(Topic.POSE, now_ns, output.pose)
+    for command in tick.commands:
+        recorder.record(Topic.COMMAND, now_ns, command)
+    for event in output.events:
+        recorder.record(Topic.EVENT, event.stamp_ns, event)
 
 
 def _first(group: ExceptionGroup[Exception]) -> Exception:

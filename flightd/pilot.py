@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from flightd.control.flight import FlightController, FlightGains, Motion
 from flightd.control.limits import Limiter, Limits
+from flightd.core.scanning import CodeSet, Finding, Place, Settled
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -24,10 +25,12 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.grid.localise import GridLocaliser
+from flightd.grid.past import PoseHistory
 from flightd.grid.site import Site
 from flightd.mission.guidance import Guide, MissionParams, Senses
 from flightd.mission.mission import Mission
 from flightd.mission.plan import FlightPlan, HeadingPolicy
+from flightd.mission.scanner import Scanner
 from flightd.tracking.height import HeightHistory
 from flightd.tracking.lines import LineTracker, TrackerParams, TrackSet
 
@@ -49,7 +52,8 @@ class PilotParams:
 @dataclass(frozen=True, slots=True)
 class TickInput:
     """What arrived since the last tick, oldest first.  `vehicle` is the newest state, None until there
-    is one; `ground_silent_s` the time since an attending ground station was heard, 0 if none attends."""
+    is one; `ground_silent_s` the time since an attending ground station was heard, 0 if none attends;
+    `counted` names locations that an earlier flight of the same count has booked."""
 
     now_ns: int
     lines: tuple[LineSet, ...] = ()
@@ -57,11 +61,15 @@ class TickInput:
     attitudes: tuple[Attitude, ...] = ()
     commands: tuple[Command, ...] = ()
     ground_silent_s: float = 0.0
+    codes: tuple[CodeSet, ...] = ()
+    counted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class TickOutput:
-    """What goes out.  `setpoint` is None when nothing may be sent (hands off, or not flying)."""
+    """What goes out.  `setpoint` is None when nothing may be sent (hands off, or not flying).
+
+    `findings` are pending until a later `settled` names their locations."""
 
     setpoint: AttitudeSetpoint | None
     demand: Demand
@@ -73,16 +81,26 @@ class TickOutput:
     pose: GridPose | None
     tracks: TrackSet | None
     events: tuple[Event, ...] = field(default=())
+    findings: tuple[Finding, ...] = ()
+    settled: tuple[Settled, ...] = ()
 
 
 class Pilot:
     """The whole flying state of one mission."""
 
-    def __init__(self, site: Site, plan: FlightPlan, policy: HeadingPolicy, params: PilotParams) -> None:
+    def __init__(
+        self,
+        site: Site,
+        plan: FlightPlan,
+        policy: HeadingPolicy,
+        params: PilotParams,
+        scanner: Scanner | None = None,
+    ) -> None:
         self._params = params
         self._plan = plan
         self._site = site
-        self._mission = Mission(site, plan, policy, params.mission)
+        self._scanner = scanner
+        self._mission = Mission(site, plan, policy, params.mission, scanner)
         self._begin()
         self._heights = HeightHistory()
         self._control = FlightController(params.gains)
@@ -97,6 +115,19 @@ class Pilot:
     def mission(self) -> Mission:
         return self._mission
 
+    @property
+    def scans(self) -> bool:
+        """Whether this flight counts shelves."""
+        return self._scanner is not None
+
+    def places(self, stamp_ns: int) -> tuple[Place, ...]:
+        """Which locations the front camera's picture exposed at `stamp_ns` is wanted for, and where it
+        shows them; none while nothing is scanned.  Changes nothing."""
+        if self._scanner is None or not self._scanner.looking:
+            return ()
+        pose = self._past.at(stamp_ns)
+        return self._scanner.places(pose) if pose is not None else ()
+
     def step(self, tick: TickInput) -> TickOutput:
         """Fly one tick."""
         now_ns = tick.now_ns
@@ -106,8 +137,11 @@ class Pilot:
         height_m = self._heights.at(now_ns)
         tracks = self._tracker.at(now_ns)
         pose = None if tracks is None else self._localiser.step(tracks, height_m)
+        if pose is not None:
+            self._past.add(pose)
         for command in tick.commands:
             self._mission.command(command, now_ns)
+        self._scan(tick)
         guidance = self._mission.step(self._senses(tick, dt_s, pose, height_m))
         motion = self._motion(pose, height_m, dt_s)
         if guidance.guide is Guide.NONE:
@@ -118,6 +152,7 @@ class Pilot:
         else:
             setpoint = self._limiter.apply(self._control.step(now_ns, motion, guidance.reference, dt_s))
         mission = self._mission
+        findings, settled = self._scanner.drain() if self._scanner is not None else ((), ())
         return TickOutput(
             setpoint=setpoint,
             demand=guidance.demand,
@@ -129,13 +164,27 @@ class Pilot:
             pose=pose,
             tracks=tracks,
             events=mission.drain_events(),
+            findings=findings,
+            settled=settled,
         )
+
+    def _scan(self, tick: TickInput) -> None:
+        """Give each picture's codes to the scan, with the pose at its exposure."""
+        if self._scanner is None:
+            return
+        if tick.counted:
+            self._scanner.skip(tick.counted)
+        for codes in tick.codes:
+            pose = self._past.at(codes.stamp_ns)
+            if pose is not None:
+                self._scanner.take(codes, pose)
 
     def _begin(self) -> None:
         """Stand on the pad and know nothing else."""
         node, yaw_rad = self._mission.stand
         self._tracker = LineTracker(self._params.tracker, yaw_rad)
         self._localiser = GridLocaliser(self._site, node, self._params.start_sigma_m)
+        self._past = PoseHistory(self._scanner.least_integrity if self._scanner else 0.0)
 
     def _take(self, tick: TickInput) -> None:
         """Telemetry first: a frame needs the attitude and height of its exposure.
@@ -149,6 +198,7 @@ class Pilot:
         self._armed = armed
         for sample in tick.attitudes:
             self._tracker.attitude(sample)
+            self._past.add_attitude(sample)
         if tick.vehicle is not None:
             v = tick.vehicle
             self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)

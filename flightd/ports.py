@@ -176,8 +176,16 @@ class Store(Protocol):
         """Keep a picture (JPEG, at most 50 KB) and return the name that an observation refers to."""
         ...
 
-    def commit(self, observation: Observation) -> None:
-        """Record one look at one location; the newest look is the location's state."""
+    def commit(self, observation: Observation, confirmed: bool = True) -> None:
+        """Record one look at one location; the newest confirmed look is the location's state."""
+        ...
+
+    def settle(self, run: str, locations: Iterable[str], confirmed: bool) -> None:
+        """Confirm or withdraw what is pending of a run (committed unconfirmed) at these locations."""
+        ...
+
+    def counted(self, run: str) -> frozenset[str]:
+        """The locations with a confirmed look of a run."""
         ...
 
     def locations(self) -> list[LocationRecord]:

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flightd.adapters.store.evidence import evidence_jpeg
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.cli.pictures import list_files, read_image
 from flightd.cli.progress import track
@@ -17,6 +16,7 @@ from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
 from flightd.core.types import Image
 from flightd.vision.codes import read_codes
+from flightd.vision.small_jpeg import evidence_jpeg
 
 if TYPE_CHECKING:
     from flightd.replay.report.count import Count

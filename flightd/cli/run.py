@@ -101,20 +101,24 @@ async def _fly(
 ) -> FlightResult:
     from flightd.adapters.store.progress import ProgressFile
     from flightd.app import Daemon, detector_pool, ground_link
+    from flightd.cli.flight_count import FlightCount
     from flightd.cli.service import monitors
     from flightd.runtime.clock import LoopClock
 
     clock = LoopClock()
     async with monitors(config.metrics, os.environ, journal=journal) as watchers, AsyncExitStack() as stack:
+        count = FlightCount(config, site, config.inventory.folder, stack)
+        config = count.config
         pool = stack.enter_context(detector_pool(config, site, clock))
         recorder, archive = _black_box(config, site, clock.now_ns()) or (None, None)
         if recorder is not None:
             stack.enter_context(recorder)
-        ground = stack.enter_context(ground_link(config, site, clock) or nullcontext())
+        counting = await count.begun(clock)
+        ground = stack.enter_context(ground_link(config, site, clock, counting) or nullcontext())
         await pool.ready()
         kept = config.mission.progress
         progress = None if kept is None else ProgressFile(kept, site.name)
-        daemon = Daemon(config, site, clock, pool, recorder, [observer], ground, watchers, progress)
+        daemon = Daemon(config, site, clock, pool, recorder, [observer], ground, watchers, progress, counting)
         async with kept_room(archive, daemon.failed):
             return await daemon.fly()
 

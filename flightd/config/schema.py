@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.ground import GroundConfig
 from flightd.config.metrics import MetricsConfig
+from flightd.config.scan import InventoryConfig, ScanConfig
 from flightd.config.vehicle import VehicleConfig
 from flightd.control.flight import FlightGains
 from flightd.control.limits import Limits
@@ -24,6 +25,7 @@ from flightd.grid.site import Site
 from flightd.mission.battery import BatteryParams
 from flightd.mission.guidance import MissionParams
 from flightd.mission.plan import Heading, HeadingPolicy, VisitOrder
+from flightd.mission.views import ScanParams
 from flightd.pilot import PilotParams
 from flightd.tracking.lines import TrackerParams
 from flightd.tracking.tilt import TiltCompensation
@@ -262,6 +264,8 @@ class Config(_Section):
     mission: MissionConfig
     camera: CameraConfig = CameraConfig()
     front_camera: FrontCameraConfig = FrontCameraConfig()
+    scan: ScanConfig = ScanConfig()
+    inventory: InventoryConfig = InventoryConfig()
     vision: VisionConfig = VisionConfig()
     vehicle: VehicleConfig = VehicleConfig()
     control: ControlConfig = ControlConfig()
@@ -275,6 +279,13 @@ class Config(_Section):
         camera = self.camera
         turned = abs(math.sin(math.radians(camera.mount_yaw_deg))) > math.sqrt(0.5)
         return HeadingPolicy(self.mission.heading, (camera.width_px > camera.height_px) == turned)
+
+    def scan_params(self, highest_m: float) -> ScanParams:
+        """How shelves are scanned, never above `highest_m`.  Facing the shelf, the picture's side that lies
+        across the nose sees along the aisle: three quarters of what it sees are kept to."""
+        camera = self.camera
+        half = min(camera.width_px / camera.fx_px, camera.height_px / camera.fy_px) / 2
+        return self.scan.params(highest_m, 0.75 * half)
 
     def pilot_params(self, site: Site) -> PilotParams:
         return PilotParams(
@@ -332,6 +343,7 @@ def parse_config(table: dict[str, Any], path: Path) -> Config:
         update={
             "mission": config.mission.model_copy(update={"site": site, "progress": progress}),
             "ground": config.ground.beside(path.parent),
+            "inventory": config.inventory.beside(path.parent),
             "vehicle": config.vehicle.beside(path.parent),
         }
     )

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from flightd.core.scanning import CodeSet, Finding
 from flightd.core.types import (
     AttitudeSetpoint,
     Command,
@@ -26,6 +27,8 @@ class Topic(enum.StrEnum):
     """
 
     LINES = "/lines"
+    CODES = "/codes"
+    FINDING = "/finding"
     POSE = "/pose"
     VEHICLE = "/vehicle"
     SETPOINT = "/setpoint"
@@ -66,6 +69,8 @@ RETAINED = frozenset({Topic.CONFIG, Topic.MAP, Topic.SCENARIO})
 MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(
     {
         Topic.LINES: LineSet,
+        Topic.CODES: CodeSet,
+        Topic.FINDING: Finding,
         Topic.POSE: GridPose,
         Topic.VEHICLE: VehicleState,
         Topic.SETPOINT: AttitudeSetpoint,

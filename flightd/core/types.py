@@ -288,6 +288,8 @@ class Phase(enum.StrEnum):
     FOLLOW = "follow"
     HOVER = "hover"
     TURN = "turn"
+    CLIMB = "climb"
+    SCAN = "scan"
     HOLD = "hold"
     LAND = "land"
     SWAP = "swap"

@@ -37,6 +37,7 @@ class MissionParams:
     arrive_mps: float = 0.10
     arrive_yaw_rad: float = math.radians(4.0)
     height_reached_m: float = 0.15
+    view_height_m: float = 0.08
     steer_above_m: float = 0.45
     land_mps: float = 0.35
     touch_mps: float = 0.20

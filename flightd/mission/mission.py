@@ -15,6 +15,8 @@ from flightd.mission.guidance import GroundLost, Guidance, Guide, MissionParams,
 from flightd.mission.legs import Legs, Pace
 from flightd.mission.plan import FlightPlan, HeadingPolicy, Stop, make_plan
 from flightd.mission.readiness import not_fresh, not_ready
+from flightd.mission.scan_phase import ScanPhase
+from flightd.mission.scanner import Scanner
 from flightd.mission.sorties import Sorties
 from flightd.mission.table import next_phase
 from flightd.mission.triggers import Trigger
@@ -33,9 +35,18 @@ _TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
 
 
 class Mission:
-    """One flight of one plan: call `step` at a fixed rate, `drain_events` for what happened."""
+    """One flight of one plan: call `step` at a fixed rate, `drain_events` for what happened.
 
-    def __init__(self, site: Site, plan: FlightPlan, policy: HeadingPolicy, params: MissionParams) -> None:
+    With a `scanner` the locations of each visited node are counted instead of a plain hover."""
+
+    def __init__(
+        self,
+        site: Site,
+        plan: FlightPlan,
+        policy: HeadingPolicy,
+        params: MissionParams,
+        scanner: Scanner | None = None,
+    ) -> None:
         self._site = site
         self._plan = plan
         self._policy = policy
@@ -47,6 +58,8 @@ class Mission:
         self._visited_before = 0
         self.stand = (plan.start, plan.start_yaw_rad)
         """The node on which the drone stands before it flies, and its heading there."""
+        self._scanner = scanner
+        self._scan = ScanPhase(scanner, params)
         self._stops: list[Stop] = list(plan.stops)
         self._next = 0
         start = site.nodes[plan.start]
@@ -71,6 +84,7 @@ class Mission:
         self._x = Profile(start.x_m, params.speed_mps, params.accel_mps2)
         self._y = Profile(start.y_m, params.speed_mps, params.accel_mps2)
         self._yaw = Profile(plan.start_yaw_rad, params.turn_rate_radps, params.turn_accel_radps2)
+        self._cruise_m = params.height_m
         self._height = Profile(0.0, params.climb_mps, params.climb_accel_mps2)
 
     @property
@@ -84,7 +98,8 @@ class Mission:
         return self.phase not in _ON_GROUND
 
     def drain_events(self) -> tuple[Event, ...]:
-        events, self._events = tuple(self._events), []
+        told = self._scanner.drain_events() if self._scanner else []
+        events, self._events = (*self._events, *told), []
         return events
 
     def command(self, command: Command, now_ns: int) -> None:
@@ -197,14 +212,29 @@ class Mission:
             case Phase.FOLLOW:
                 there = _distance(s, (goal.x_m, goal.y_m)) < p.arrive_m and _speed(s) < p.arrive_mps
                 done, trigger = self._settled(s, there), Trigger.ARRIVED
-            case Phase.HOVER:
-                dwell_s = p.dwell_s if goal.visit and not self._returning else 0.0
-                done = (s.now_ns - self._since_ns) * 1e-9 >= dwell_s
-                last = self._next + 1 >= len(self._stops)
-                trigger = Trigger.ROUTE_DONE if last else Trigger.DWELLED
+            case Phase.HOVER | Phase.CLIMB | Phase.SCAN:
+                done, trigger = self._at_node(s)
             case _:
                 return set()
         return {trigger} if done else set()
+
+    def _at_node(self, s: Senses) -> tuple[bool, Trigger]:
+        """Whether the dwell, the way to a view or the view is over, and what that leads to."""
+        goal, scan = self.goal, self._scan
+        due = not self._returning and scan.due(self.phase, goal)
+        if self.phase is Phase.CLIMB:
+            view = scan.view(self.phase)
+            away_m = _distance(s, (view.x_m, view.y_m)) if view is not None else math.inf
+            return self._settled(s, scan.at_view(s, away_m, _speed(s))) or not due, Trigger.AT_VIEW
+        over = Trigger.ROUTE_DONE if self._next + 1 >= len(self._stops) else Trigger.DWELLED
+        if self.phase is Phase.SCAN:
+            done = not due or scan.is_over(s.now_ns)
+            more = not self._returning and scan.due(self.phase, goal)
+            return done, Trigger.VIEW_DONE if more else over
+        if due:
+            return True, Trigger.SCAN_DUE
+        dwelt = not goal.visit or self._returning or scan.is_scanned(goal)
+        return (s.now_ns - self._since_ns) * 1e-9 >= (0.0 if dwelt else self._params.dwell_s), over
 
     def _adopting(self, s: Senses) -> bool:
         """A vehicle found flying is given a moment to show that it obeys."""
@@ -225,8 +255,9 @@ class Mission:
     def _change(self, s: Senses, phase: Phase, trigger: Trigger) -> None:
         before, self.phase = self.phase, phase
         planned = trigger is Trigger.ROUTE_DONE or before is Phase.LAND
-        if before is Phase.HOVER and trigger in {Trigger.DWELLED, Trigger.ROUTE_DONE}:
+        if trigger in {Trigger.DWELLED, Trigger.ROUTE_DONE}:
             self._note_visit(s)
+        self._scan.changed(s, before, phase, trigger, self.goal)
         if trigger is Trigger.DWELLED:
             self._look_ahead(s)
             self._next += 1
@@ -269,6 +300,8 @@ class Mission:
                 way_s = p.height_m / p.climb_mps
             case Phase.TURN:
                 way_s = math.pi / p.turn_rate_radps
+            case Phase.CLIMB:
+                way_s = self._scan.way_s(s)
             case Phase.FOLLOW:
                 here = _distance(s, (self.goal.x_m, self.goal.y_m))
                 way_s = (0.0 if math.isinf(here) else here) / p.speed_mps
@@ -365,7 +398,7 @@ class Mission:
             self._height.reset(self._height.position)  # no climb by heights of the past
             climb = 0.0
         else:
-            self._height.step(self._params.height_m, s.dt_s)
+            self._height.step(self._height_goal_m(), s.dt_s)
             climb = self._height.velocity
         guide = Guide.STEER if not self._found_flying and self._steer(s) else Guide.LEVEL
         self._steering = guide is Guide.STEER
@@ -394,16 +427,28 @@ class Mission:
             self._y.reset(pose.y_m, pose.vy_mps)
             self._yaw.reset(pose.yaw_rad)
         to_goal = self.phase in _TO_GOAL or self._on_pad_leg
-        x, y = (self.goal.x_m, self.goal.y_m) if to_goal else self._anchor
+        x, y, yaw = (*((self.goal.x_m, self.goal.y_m) if to_goal else self._anchor), self.goal.yaw_rad)
+        view = self._scan.view(self.phase)
+        if view is not None:
+            x, y, yaw = view.x_m, view.y_m, view.yaw_rad
         if math.hypot(self._x.position - pose.x_m, self._y.position - pose.y_m) < p.max_lead_m:
             self._x.step(x, s.dt_s)
             self._y.step(y, s.dt_s)
         else:  # wait for the vehicle at rest: a speed kept here would be fed forward and hold it off
             self._x.brake(s.dt_s)
             self._y.brake(s.dt_s)
-        if to_goal or self.phase is Phase.TURN:
-            self._yaw.step(self._yaw.position + wrap_pi(self.goal.yaw_rad - self._yaw.position), s.dt_s)
+        if to_goal or view is not None or self.phase is Phase.TURN:
+            self._yaw.step(self._yaw.position + wrap_pi(yaw - self._yaw.position), s.dt_s)
         return True
+
+    def _height_goal_m(self) -> float:
+        """The view's height while scanning; the legs between scanned nodes are flown at the last one's."""
+        view = self._scan.view(self.phase)
+        if view is not None:
+            self._cruise_m = view.height_m
+        elif self._returning or not self.goal.visit:
+            self._cruise_m = self._params.height_m
+        return self._cruise_m
 
     def _reference(self, climb_mps: float) -> Reference:
         return Reference(

@@ -41,7 +41,11 @@ TABLE: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.TAKE_OFF: _SAFETY | {Trigger.TIMED_OUT: Phase.LAND, Trigger.AT_HEIGHT: Phase.ACQUIRE},
     Phase.ACQUIRE: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.ACQUIRED: Phase.TURN},
     Phase.FOLLOW: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.ARRIVED: Phase.HOVER},
-    Phase.HOVER: _ON_LINES | {Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
+    Phase.HOVER: _ON_LINES
+    | {Trigger.SCAN_DUE: Phase.CLIMB, Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
+    Phase.CLIMB: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.AT_VIEW: Phase.SCAN},
+    Phase.SCAN: _ON_LINES
+    | {Trigger.VIEW_DONE: Phase.CLIMB, Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
     Phase.TURN: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.TURNED: Phase.FOLLOW},
     Phase.HOLD: _SAFETY | {Trigger.LINES_LOST_LONG: Phase.LAND, Trigger.LINES_FOUND: Phase.ACQUIRE},
     Phase.LAND: {

@@ -13,7 +13,7 @@ from typing import Any
 
 from flightd.core.errors import TransientError
 
-_PRELOAD = ["flightd.runtime.pool", "flightd.vision.detector"]
+_PRELOAD = ["flightd.runtime.pool", "flightd.vision.detector", "flightd.vision.shelf"]
 _READY = "ready"
 
 

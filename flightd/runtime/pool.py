@@ -1,4 +1,4 @@
-"""Detector processes: each takes one picture at a time from shared memory and answers with its lines.
+"""Worker processes: each takes one picture at a time from shared memory and answers what it found in it.
 
 A worker that dies or exceeds its time is killed and replaced; the picture it had counts as lost.  The
 pool never raises into its user: a lost picture is simply no answer (None).
@@ -11,7 +11,7 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol, Self, TypeAlias
+from typing import Any, Generic, Protocol, Self, TypeAlias, TypeVar
 
 import cv2
 
@@ -21,13 +21,25 @@ from flightd.ports import Clock
 from flightd.runtime.child import Child
 from flightd.runtime.ring import FrameRing, FrameTicket
 
+AskT = TypeVar("AskT")
+FoundT = TypeVar("FoundT")
+AskT_contra = TypeVar("AskT_contra", contravariant=True)
+FoundT_co = TypeVar("FoundT_co", covariant=True)
+
+_Lines: TypeAlias = "tuple[LineSet, bytes | None]"
 _MAX_RINGS = 4
 _HOPELESS = 8
 """Workers that died in a row without one being ready."""
 
 
+class Work(Protocol[AskT_contra, FoundT_co]):
+    """What runs in a worker: a picture and what is asked of it, the answer out."""
+
+    def __call__(self, bgr: Image, ticket: FrameTicket, ask: AskT_contra, /) -> FoundT_co: ...
+
+
 class Detect(Protocol):
-    """What runs in a worker: pixels in, lines out."""
+    """What finds lines: pixels in, lines out."""
 
     def detect(self, bgr: Image, seq: int = 0, stamp_ns: int = 0) -> LineSet: ...
 
@@ -54,30 +66,28 @@ class Detection:
     jpeg: bytes | None = None
 
 
-_Answer: TypeAlias = "tuple[LineSet, bytes | None] | str"
-"""Lines and the JPEG if one was wanted, or why there are none."""
+_Answer: TypeAlias = "tuple[Any] | str"
+"""What was found in the picture, or why nothing was."""
 
 
 class _Worker:
-    """Inside the process: answers (ticket, with_jpeg)."""
+    """Inside the process: answers (ticket, ask)."""
 
-    def __init__(self, make: Callable[[], Detect]) -> None:
+    def __init__(self, make: Callable[[], Work[Any, Any]]) -> None:
         cv2.setNumThreads(1)
-        self._detector = make()
+        self._work = make()
         self._rings: OrderedDict[str, FrameRing] = OrderedDict()
 
-    def __call__(self, request: tuple[FrameTicket, bool]) -> _Answer:
-        ticket, with_jpeg = request
+    def __call__(self, request: tuple[FrameTicket, Any]) -> _Answer:
+        ticket, ask = request
         try:
             ring = self._ring(ticket)
             ring.check(ticket.slot, ticket.seq)
-            pixels = ring.pixels(ticket.slot)
-            lines = self._detector.detect(pixels, ticket.seq, ticket.stamp_ns)
-            jpeg = cv2.imencode(".jpg", pixels)[1].tobytes() if with_jpeg else None
+            found = self._work(ring.pixels(ticket.slot), ticket, ask)
             ring.check(ticket.slot, ticket.seq)
         except (TransientError, UnavailableError, InputError, ValueError, cv2.error) as err:
             return str(err)
-        return lines, jpeg
+        return (found,)
 
     def _ring(self, ticket: FrameTicket) -> FrameRing:
         ring = self._rings.get(ticket.ring)
@@ -89,15 +99,18 @@ class _Worker:
         return ring
 
 
-class DetectorPool:
-    """`size` detector processes behind `detect`, replaced when they die.
+class PicturePool(Generic[AskT, FoundT]):
+    """`size` worker processes behind `ask`, replaced when they die.
 
-    `make` builds the detector inside each worker and must be picklable.  `timeout_s` is the time after
-    which a worker counts as hung.
+    `make` builds the work inside each worker and must be picklable.  `timeout_s` is the time after which a
+    worker counts as hung.  `name` says in messages what the workers do.
     """
 
-    def __init__(self, make: Callable[[], Detect], size: int, timeout_s: float, clock: Clock) -> None:
+    def __init__(
+        self, make: Callable[[], Work[AskT, FoundT]], size: int, timeout_s: float, clock: Clock, name: str
+    ) -> None:
         self._make = partial(_Worker, make)
+        self._name = name
         self._size = size
         self._timeout_s = timeout_s
         self._clock = clock
@@ -132,20 +145,19 @@ class DetectorPool:
         with self._clock.hold():
             while self._idle.qsize() < self._size:
                 if self._deaths >= _HOPELESS:
-                    raise UnavailableError("detector processes die as they start: is there memory left?")
+                    raise UnavailableError(f"{self._name} processes die as they start: is there memory left?")
                 self._changed.clear()
                 await self._changed.wait()
 
-    async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None:
-        """Lines of one picture (and its JPEG if wanted), or None when it was lost (counted in `lost`)."""
+    async def ask(self, ticket: FrameTicket, ask: AskT) -> FoundT | None:
+        """What is found in one picture, or None when it was lost (counted in `lost`)."""
         worker = await self._take()
-        started_ns = self._clock.now_ns()
         answer: _Answer
         try:
             async with asyncio.timeout(self._timeout_s):
-                answer = await worker.ask((ticket, with_jpeg))
+                answer = await worker.ask((ticket, ask))
         except TimeoutError:
-            answer = "the detector process hung"
+            answer = f"the {self._name} process hung"
             worker.kill()
         except TransientError as err:
             answer = str(err)
@@ -157,8 +169,8 @@ class DetectorPool:
         if isinstance(answer, str):
             self.lost[answer.split(":", maxsplit=1)[0]] += 1
             return None
-        lines, jpeg = answer
-        return Detection(ticket, lines, started_ns, self._clock.now_ns(), jpeg)
+        found: FoundT = answer[0]
+        return found
 
     async def _take(self) -> Child:
         """An idle worker that lives (one that died while idle has been replaced already)."""
@@ -186,3 +198,29 @@ class DetectorPool:
         self._changed.set()
         wait_s = 0.0 if self._deaths <= self._size else min(0.1 * 2.0 ** (self._deaths - self._size), 5.0)
         asyncio.get_running_loop().call_later(wait_s, self._add)
+
+
+class _DetectLines:
+    """Inside a detector process: lines, and the picture's JPEG if it is asked for."""
+
+    def __init__(self, make: Callable[[], Detect]) -> None:
+        self._detector = make()
+
+    def __call__(self, bgr: Image, ticket: FrameTicket, ask: bool) -> _Lines:
+        lines = self._detector.detect(bgr, ticket.seq, ticket.stamp_ns)
+        return lines, cv2.imencode(".jpg", bgr)[1].tobytes() if ask else None
+
+
+class DetectorPool(PicturePool[bool, _Lines]):
+    """Processes that find the lines; `make` builds the detector inside each and must be picklable."""
+
+    def __init__(self, make: Callable[[], Detect], size: int, timeout_s: float, clock: Clock) -> None:
+        super().__init__(partial(_DetectLines, make), size, timeout_s, clock, "detector")
+
+    async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None:
+        """Lines of one picture (and its JPEG if wanted), or None when it was lost."""
+        started_ns = self._clock.now_ns()
+        found = await self.ask(ticket, with_jpeg)
+        if found is None:
+            return None
+        return Detection(ticket, found[0], started_ns, self._clock.now_ns(), found[1])

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from flightd.core.scanning import CodeSet
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -19,6 +21,7 @@ from flightd.core.types import (
 )
 from flightd.grid.site import Site
 from flightd.mission.plan import FlightPlan, Heading, HeadingPolicy, make_plan
+from flightd.mission.scanner import Scanner
 from flightd.pilot import Pilot, PilotParams, TickInput, TickOutput
 from flightd.sim.airframe import Airframe, AirframeCommand, AirframeParams
 from flightd.sim.climb_loop import ClimbLoop
@@ -27,10 +30,13 @@ from flightd.sim.ideal import EyeErrors, IdealEye
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.sensors import Sensors
 from flightd.sim.wind import Draught
+from tests.sim.ideal_front import IdealFront
 
 STEP_NS = 5_000_000
 TICK_NS = 20_000_000
 FRAME_NS = 33_333_333
+FRONT_NS = 250_000_000
+READING_NS = 150_000_000
 
 
 @dataclass
@@ -64,11 +70,17 @@ class IdealFlight:
         delay_ns: int = 68_000_000,
         airframe: AirframeParams | None = None,
         swap_s: float = 0.0,
+        scanner: Scanner | None = None,
+        front: IdealFront | None = None,
     ) -> None:
         policy = policy or HeadingPolicy(Heading.ALONG)
         pad = site.home.node
         self.plan: FlightPlan = make_plan(site, visits or site.serpentine_route(), pad, pad, policy)
-        self.pilot = Pilot(site, self.plan, policy, params)
+        self.pilot = Pilot(site, self.plan, policy, params, scanner)
+        self._front = front
+        self._looked: deque[tuple[int, CodeSet]] = deque()
+        self._exposed: deque[Kinematics] = deque()
+        self._front_ns = 0
         node = site.nodes[pad]
         self.airframe = Airframe(airframe, draught=draught, seed=seed, x_m=node.x_m, y_m=node.y_m)
         self.sensors = Sensors(seed=seed)
@@ -84,6 +96,8 @@ class IdealFlight:
         self.commands: list[Command] = []
         """Orders that the next tick takes."""
         self._crew = PadCrew(site, self.airframe, swap_s) if swap_s else None
+        self.counted: tuple[str, ...] = ()
+        self.on_tick: Callable[[Phase, int], None] = lambda _phase, _now_ns: None
 
     def fly(self, limit_s: float = 600.0) -> Flown:
         flown = Flown()
@@ -105,6 +119,7 @@ class IdealFlight:
                 if not self.blind:
                     seen = self._eye.see(self.airframe.kinematics(self._now_ns), seq, self._now_ns)
                     late.append((self._now_ns + self._delay_ns, seen))
+            self._photograph()
             if self._now_ns >= tick_ns:
                 tick_ns += TICK_NS
                 lines = []
@@ -121,11 +136,14 @@ class IdealFlight:
                         tuple(attitudes),
                         orders,
                         ground_silent_s=self.ground_silent_s,
+                        codes=self._codes(),
+                        counted=self._take_counted(),
                     )
                 )
                 attitudes = []
                 setpoint = output.setpoint
                 self._obey(output.demand)
+                self.on_tick(output.phase, self._now_ns)
                 flown.outputs.append(output)
                 flown.events.extend(output.events)
                 flown.truth.append((output.phase, self.airframe.kinematics(self._now_ns)))
@@ -134,6 +152,30 @@ class IdealFlight:
         flown.phase, flown.reason = flown.outputs[-1].phase, flown.outputs[-1].reason
         flown.visited = list(self.pilot.mission.visited)
         return flown
+
+    def _photograph(self) -> None:
+        """The front camera's picture; its reader answers a while later."""
+        if self._front is None:
+            return
+        if self._now_ns >= self._front_ns:
+            self._front_ns = self._now_ns + FRONT_NS
+            self._exposed.append(self.airframe.kinematics(self._now_ns))
+        if self._exposed and self._exposed[0].stamp_ns + 60_000_000 <= self._now_ns:
+            then = self._exposed.popleft()
+            places = self.pilot.places(then.stamp_ns)
+            if places:
+                seen = self._front.see(then, places, then.stamp_ns)
+                self._looked.append((self._now_ns + READING_NS, seen))
+
+    def _take_counted(self) -> tuple[str, ...]:
+        counted, self.counted = self.counted, ()
+        return counted
+
+    def _codes(self) -> tuple[CodeSet, ...]:
+        sets = []
+        while self._looked and self._looked[0][0] <= self._now_ns:
+            sets.append(self._looked.popleft()[1])
+        return tuple(sets)
 
     def _obey(self, demand: Demand) -> None:
         if demand is Demand.FLY and not self._armed:

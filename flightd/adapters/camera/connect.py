@@ -9,6 +9,7 @@ from flightd.adapters.camera.shared import SharedCamera
 from flightd.adapters.vehicle.ardrone.camera import ArDroneCamera
 from flightd.adapters.vehicle.ardrone.settings import Camera as ArDroneView
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
+from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.schema import CameraConfig
 from flightd.core.errors import InputError
 from flightd.ports import Camera, Clock, Vehicle
@@ -19,7 +20,7 @@ ARDRONE_URL = "ardrone:"
 
 
 def connect_camera(
-    config: CameraConfig,
+    config: CameraConfig | FrontCameraConfig,
     clock: Clock,
     on_frame: Callable[[FrameTicket], None],
     on_trouble: Callable[[str], None],
@@ -29,6 +30,8 @@ def connect_camera(
 
     `on_trouble` hears, now and then, in a line for a person, why pictures are refused."""
     if config.url == ARDRONE_URL:
+        if isinstance(config, FrontCameraConfig):
+            raise InputError(f"front_camera.url {ARDRONE_URL!r}: the AR.Drone sends one camera at a time")
         if not isinstance(vehicle, ArDroneVehicle):
             raise InputError(f'camera.url {ARDRONE_URL!r} needs vehicle.kind = "ardrone"')
         return ArDroneCamera(vehicle, config.latency_s, clock, {ArDroneView.DOWN: on_frame})

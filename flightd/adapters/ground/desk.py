@@ -49,7 +49,12 @@ _ATTENDING = 64
 _TAKEN_OVER_NS = 3_000_000_000
 """Who attends but was silent for so long has been taken over from, once somebody else attends."""
 
-_FLYING = frozenset({Phase.TAKE_OFF, Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.HOLD})
+_FLYING = frozenset(
+    {
+        Phase.TAKE_OFF, Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.CLIMB, Phase.SCAN,
+        Phase.HOLD,
+    }
+)  # fmt: skip
 _NOT_OVER = _FLYING | {Phase.PREFLIGHT, Phase.RECOVER, Phase.ARMING, Phase.LAND, Phase.SWAP}
 
 POSSIBLE: Mapping[CommandKind, frozenset[Phase]] = {

@@ -1,8 +1,10 @@
 """The inventory in one SQLite file: write-ahead log, every commit through to the disk.
 
 One observation is one transaction, so a power cut loses at most the location in work.  Observations are
-named by their content and only ever added; a location's state is that of its newest one.  So writing the
-same again, or merging another drone's file in any order, ends in the same inventory.
+named by their content and only ever added; a location's state is that of its newest confirmed one.  One
+that is pending (the place it was seen at is not proven yet) counts for nothing; it is confirmed or
+withdrawn once, and withdrawn wins.  So writing the same again, or merging another drone's file in any
+order, ends in the same inventory.
 """
 
 from __future__ import annotations
@@ -26,9 +28,12 @@ from flightd.core.inventory import (
     StoredRead,
 )
 
-_VERSION = 1
+_VERSION = 2
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
+_PENDING, _CONFIRMED, _WITHDRAWN = range(3)
+"""Standing of an observation; where two stores differ, the greater one holds."""
+_FROM_1 = "ALTER TABLE observation ADD COLUMN standing INTEGER NOT NULL DEFAULT 1"
 _SCHEMA = """
 CREATE TABLE location (
     code TEXT PRIMARY KEY,
@@ -42,7 +47,8 @@ CREATE TABLE observation (
     state TEXT NOT NULL CHECK (state IN ('read', 'several', 'empty', 'unreadable', 'occluded')),
     confidence REAL NOT NULL CHECK (confidence BETWEEN 0 AND 1),
     node TEXT, x_m REAL, y_m REAL, height_m REAL, yaw_rad REAL,
-    evidence TEXT NOT NULL
+    evidence TEXT NOT NULL,
+    standing INTEGER NOT NULL DEFAULT 1
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX newest ON observation (location, utc_ns, id);
 CREATE TABLE code_read (
@@ -106,6 +112,9 @@ class SqliteStore:
                     self._db.execute(f"PRAGMA application_id = {_APPLICATION}")
                 elif application != _APPLICATION:
                     raise InputError(f"{self._file}: a database, but no inventory; choose another folder")
+                elif version == 1:
+                    self._db.execute(_FROM_1)
+                    self._db.execute(f"PRAGMA user_version = {_VERSION}")
                 elif version != _VERSION:
                     problem = f"format {version}, known here is {_VERSION}"
                     raise InputError(f"{self._file}: {problem}; use the flightd that wrote it")
@@ -152,24 +161,44 @@ class SqliteStore:
         """Keep a picture; see `EvidenceFolder.keep`."""
         return self.evidence.keep(jpeg)
 
-    def commit(self, observation: Observation) -> None:
+    def commit(self, observation: Observation, confirmed: bool = True) -> None:
         """Record one look.  A location never planned becomes known, with the node it was seen from."""
         with self._transaction():
-            self._insert(observation)
+            self._insert(observation, _CONFIRMED if confirmed else _PENDING)
 
-    def _insert(self, seen: Observation) -> None:
+    def settle(self, run: str, locations: Iterable[str], confirmed: bool) -> None:
+        """Confirm or withdraw what is pending of a run at these locations."""
+        standing = _CONFIRMED if confirmed else _WITHDRAWN
+        with self._transaction():
+            self._db.executemany(
+                "UPDATE observation SET standing = ? WHERE location = ? AND run = ? AND standing = ?",
+                [(standing, location, run, _PENDING) for location in locations],
+            )
+
+    def counted(self, run: str) -> frozenset[str]:
+        """The locations with a confirmed look of a run, whatever it told."""
+        with self._lock:
+            rows = self._db.execute(
+                "SELECT DISTINCT location FROM observation WHERE run = ? AND standing = ?", (run, _CONFIRMED)
+            ).fetchall()
+        return frozenset(row[0] for row in rows)
+
+    def _insert(self, seen: Observation, standing: int) -> None:
         pose = seen.pose
         node = pose.node if pose else ""
         self._db.execute("INSERT OR IGNORE INTO location VALUES (?, ?)", (seen.location, node))
         where = (pose.node, pose.x_m, pose.y_m, pose.height_m, pose.yaw_rad) if pose else (None,) * 5
         cursor = self._db.execute(
-            "INSERT OR IGNORE INTO observation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT OR IGNORE INTO observation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             (
                 seen.id, seen.run, seen.location, seen.utc_ns, seen.state.value, seen.confidence, *where,
-                seen.evidence,
+                seen.evidence, standing,
             ),
         )  # fmt: skip
         if cursor.rowcount == 0:
+            self._db.execute(
+                "UPDATE observation SET standing = max(standing, ?) WHERE id = ?", (standing, seen.id)
+            )
             return
         self._db.executemany(
             "INSERT INTO code_read VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
@@ -180,19 +209,21 @@ class SqliteStore:
         )
 
     def locations(self) -> list[LocationRecord]:
-        """Every location by its code, with its newest observation (of equally new ones, the greatest id)."""
+        """Every location by its code, with its newest confirmed observation (of equally new ones, the
+        greatest id)."""
         with self._lock:
-            newest = {seen.location: seen for seen in self._observations()}
+            looks = self._observations()
+            newest = {seen.location: seen for seen, standing in looks if standing == _CONFIRMED}
             rows = self._db.execute("SELECT code, node FROM location ORDER BY code").fetchall()
         return [LocationRecord(code, node, newest.get(code)) for code, node in rows]
 
     def history(self, location: str) -> list[Observation]:
-        """Every look at one location, oldest first."""
+        """Every look at one location, oldest first, pending and withdrawn ones too."""
         with self._lock:
-            return self._observations(location)
+            return [seen for seen, _ in self._observations(location)]
 
-    def _observations(self, location: str | None = None) -> list[Observation]:
-        """All looks, or those at one location, oldest first."""
+    def _observations(self, location: str | None = None) -> list[tuple[Observation, int]]:
+        """All looks, or those at one location, with their standing, oldest first."""
         reads: dict[str, list[StoredRead]] = {}
         for seen, symbology, text, sure, agreeing, quality, gs1 in self._db.execute(
             "SELECT observation, symbology, text, sure, agreeing, quality, gs1 FROM code_read "
@@ -203,26 +234,26 @@ class SqliteStore:
             reads.setdefault(seen, []).append(read)
         rows = self._db.execute(
             "SELECT id, run, location, utc_ns, state, confidence, evidence, "
-            "node, x_m, y_m, height_m, yaw_rad FROM observation "
+            "node, x_m, y_m, height_m, yaw_rad, standing FROM observation "
             "WHERE ?1 IS NULL OR location = ?1 ORDER BY utc_ns, id",
             (location,),
         )
-        return [_observation(row, tuple(reads.get(row[0], ()))) for row in rows]
+        return [(_observation(row[:-1], tuple(reads.get(row[0], ()))), row[-1]) for row in rows]
 
     def merge(self, other: SqliteStore) -> int:
         """Take in everything of another store, pictures included; returns how many looks were new."""
         with other._lock:
             planned = [PlannedLocation(record.code, record.node) for record in other.locations()]
             seen = other._observations()
-        for observation in seen:
+        for observation, _ in seen:
             if observation.evidence and other.evidence.path(observation.evidence).exists():
                 self.evidence.keep(other.evidence.path(observation.evidence).read_bytes())
         with self._transaction():
             before = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
             rows = [(location.code, location.node) for location in planned]
             self._db.executemany("INSERT OR IGNORE INTO location VALUES (?, ?)", rows)
-            for observation in seen:
-                self._insert(observation)
+            for observation, standing in seen:
+                self._insert(observation, standing)
             after = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
         return int(after - before)
 

@@ -24,6 +24,8 @@ PHASE_TONE: dict[Phase, str] = {
     Phase.FOLLOW: "follow",
     Phase.HOVER: "hover",
     Phase.TURN: "turn",
+    Phase.CLIMB: "climb",
+    Phase.SCAN: "hover",
     Phase.HOLD: "hold",
     Phase.LAND: "climb",
     Phase.SWAP: "ground",

@@ -20,7 +20,9 @@ Array: TypeAlias = NDArray[np.float64]
 Summary: TypeAlias = dict[str, object]
 
 NS_PER_S = 1e9
-FLYING = frozenset({Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.HOLD})
+FLYING = frozenset(
+    {Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.CLIMB, Phase.SCAN, Phase.HOLD}
+)
 """Phases in which the drone holds on to a line."""
 
 _WINDOW_S = 0.6

@@ -43,9 +43,11 @@ def test_every_flying_phase_lands_on_a_critical_battery_lost_links_or_an_order(p
         assert next_phase(phase, {trigger})[0] is Phase.LAND
 
 
-@pytest.mark.parametrize("phase", [Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN])
+@pytest.mark.parametrize(
+    "phase", [Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.CLIMB, Phase.SCAN]
+)
 def test_lost_lines_hold_before_any_progress(phase: Phase) -> None:
-    progress = {Trigger.ARRIVED, Trigger.DWELLED, Trigger.TURNED, Trigger.ACQUIRED}
+    progress = {Trigger.ARRIVED, Trigger.DWELLED, Trigger.TURNED, Trigger.ACQUIRED, Trigger.VIEW_DONE}
     assert next_phase(phase, progress | {Trigger.LINES_LOST})[0] is Phase.HOLD
 
 

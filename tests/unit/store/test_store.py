@@ -16,11 +16,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightd.adapters.store.evidence import MOST_BYTES, evidence_jpeg
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import LocationState, Observation, PlannedLocation, StoredRead
 from flightd.ports import Store
+from flightd.vision.small_jpeg import MOST_BYTES, evidence_jpeg
 from tests.unit.store.kill_at_random import look
 
 ROOT = Path(__file__).parents[3]

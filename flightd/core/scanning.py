@@ -1,0 +1,112 @@
+"""What flows between the front camera, the mission and the inventory while a shelf is scanned.
+
+Picture coordinates are centred: x right, y down from ((W-1)/2, (H-1)/2), as in `core.types.CodeRead`.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from flightd.core.inventory import LocationState
+from flightd.core.types import CodeRead
+
+Quad: TypeAlias = tuple[tuple[float, float], ...]
+"""Four corners in the picture: left top, right top, right bottom, left bottom as seen."""
+
+
+class Occupancy(enum.StrEnum):
+    """What a picture tells of one place without reading any code.
+
+    `EMPTY` is said only of an opening that is seen through to its back; whatever is in doubt is `UNSURE`.
+    """
+
+    EMPTY = "empty"
+    GOODS = "goods"
+    COVERED = "covered"
+    UNSURE = "unsure"
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A location as the picture is expected to show it: its opening, and how much of that is inside."""
+
+    location: str
+    quad_px: Quad
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceLook:
+    """What one picture shows of one location; `evidence` names the picture of it (SHA-256) or is empty."""
+
+    location: str
+    quad_px: Quad
+    share: float
+    occupancy: Occupancy
+    evidence: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class CodeSet:
+    """What the code reader saw in one picture of the front camera.  `timings_ms` by stage."""
+
+    frame_seq: int
+    stamp_ns: int
+    width_px: int
+    height_px: int
+    reads: tuple[CodeRead, ...]
+    places: tuple[PlaceLook, ...]
+    timings_ms: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyPose:
+    """The drone at one moment, as the map knows it, with standard deviations; angles as in `Attitude`.
+
+    `certain` says that the place on the grid was not in doubt then."""
+
+    stamp_ns: int
+    x_m: float
+    y_m: float
+    height_m: float
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+    sigma_x_m: float
+    sigma_y_m: float
+    sigma_yaw_rad: float
+    certain: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """The mission's verdict on one location, from where it was seen, at the flight clock's time.
+
+    Its place is not proven before the location is named in `Settled`: until then it is pending."""
+
+    stamp_ns: int
+    location: str
+    state: LocationState
+    confidence: float
+    reads: tuple[CodeRead, ...]
+    evidence: str
+    node: str
+    x_m: float
+    y_m: float
+    height_m: float
+    yaw_rad: float
+
+    def __post_init__(self) -> None:
+        if not all(map(math.isfinite, (self.x_m, self.y_m, self.height_m, self.yaw_rad))):
+            raise ValueError(f"{self.location}: the pose is not finite")
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """Locations whose pending findings are proven to be theirs, or withdrawn because they may not be."""
+
+    locations: tuple[str, ...]
+    confirmed: bool

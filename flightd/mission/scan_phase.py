@@ -1,0 +1,79 @@
+"""The scan as phases of the mission: when it is due, when a view is reached, what the scanner hears."""
+
+from __future__ import annotations
+
+import math
+
+from flightd.core.geometry import wrap_pi
+from flightd.core.types import Phase
+from flightd.mission.guidance import MissionParams, Senses
+from flightd.mission.plan import Stop
+from flightd.mission.scanner import Scanner
+from flightd.mission.triggers import Trigger
+from flightd.mission.views import View
+
+_TO_VIEW = (Phase.CLIMB, Phase.SCAN)
+_OVER = (Trigger.DWELLED, Trigger.ROUTE_DONE)
+
+
+class ScanPhase:
+    """The mission's side of scanning; without a scanner there is never anything to scan."""
+
+    def __init__(self, scanner: Scanner | None, params: MissionParams) -> None:
+        self._scanner = scanner
+        self._params = params
+        self._scanned = ""
+
+    def view(self, phase: Phase) -> View | None:
+        """Where to look from, None in phases that do not scan."""
+        return self._scanner.view if self._scanner is not None and phase in _TO_VIEW else None
+
+    def due(self, phase: Phase, stop: Stop) -> bool:
+        """Whether there is anything (left) to scan at the stop that is hovered at."""
+        if self._scanner is None or not stop.visit:
+            return False
+        if phase in _TO_VIEW:
+            return self._scanner.view is not None
+        return self._scanner.wants(stop.node) and stop.node != self._scanned
+
+    def is_scanned(self, stop: Stop) -> bool:
+        """Whether the hover at this stop follows its scan."""
+        return stop.node == self._scanned
+
+    def at_view(self, s: Senses, distance_m: float, speed_mps: float) -> bool:
+        """Whether the drone is at the view, level with it and facing the shelf."""
+        p, view = self._params, self.view(Phase.CLIMB)
+        if view is None or s.pose is None:
+            return False
+        there = distance_m < p.arrive_m and speed_mps < p.arrive_mps
+        level = abs(s.height_m - view.height_m) < p.view_height_m
+        return there and level and abs(wrap_pi(view.yaw_rad - s.pose.yaw_rad)) < p.arrive_yaw_rad
+
+    def is_over(self, now_ns: int) -> bool:
+        """Whether the view that is looked from has told enough."""
+        return self._scanner is None or self._scanner.step(now_ns)
+
+    def way_s(self, s: Senses) -> float:
+        """How long it may take to reach the view."""
+        p, view = self._params, self.view(Phase.CLIMB)
+        rise_m = abs(view.height_m - s.height_m) if view is not None else 0.0
+        return math.pi / p.turn_rate_radps + (0.0 if math.isnan(rise_m) else rise_m / p.climb_mps)
+
+    def changed(self, s: Senses, before: Phase, phase: Phase, trigger: Trigger, stop: Stop) -> None:
+        """Tell the scanner of a change of phase at (or on the way to) `stop`."""
+        scanner = self._scanner
+        if scanner is None:
+            return
+        certain = s.pose is not None and s.localised and s.pose.integrity >= scanner.least_integrity
+        if trigger is Trigger.ARRIVED:
+            scanner.reached(stop.node, certain)
+            self._scanned = ""
+        elif trigger is Trigger.SCAN_DUE and s.pose is not None:
+            scanner.arrive(stop.node, s.height_m, s.pose.yaw_rad)
+        elif trigger is Trigger.AT_VIEW:
+            scanner.begin(s.now_ns)
+        elif before in _TO_VIEW and phase not in _TO_VIEW:
+            scanner.leave()
+            self._scanned = stop.node if trigger in _OVER else ""
+        if trigger is Trigger.ROUTE_DONE:
+            scanner.home(certain)

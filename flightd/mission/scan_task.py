@@ -1,0 +1,121 @@
+"""The scan of one node: view after view until each location there has its one state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flightd.core.scanning import BodyPose, Finding
+from flightd.mission.assign import PlacedRead, ShelfLook
+from flightd.mission.tally import Tally, Verdict
+from flightd.mission.views import ScanParams, View, ViewPlanner
+
+
+class ScanTask:
+    """Pure state machine.  Fly to `view`, `begin` there, `take` what the pictures show, `step` until the
+    view is over; then `view` is the next one, None when nothing is left.  `drain` gives new findings."""
+
+    def __init__(self, node: str, views: Sequence[View], planner: ViewPlanner, params: ScanParams) -> None:
+        self.node = node
+        self._views = list(views)
+        self._planner = planner
+        self._params = params
+        self._open: dict[str, Tally] = {
+            code: Tally(params.pictures) for view in views for code in view.locations
+        }
+        self._begun_ns: int | None = None
+        self._now_ns = 0
+        self._findings: list[Finding] = []
+
+    @property
+    def view(self) -> View | None:
+        """Where to look from now."""
+        return self._views[0] if self._views else None
+
+    @property
+    def since_ns(self) -> int | None:
+        """Pictures exposed from then on count, None while the view is not reached."""
+        return self._begun_ns
+
+    @property
+    def looking(self) -> tuple[str, ...]:
+        """The locations that pictures are wanted of now."""
+        view = self.view
+        if view is None or self._begun_ns is None:
+            return ()
+        return self._left(view)
+
+    def begin(self, now_ns: int) -> None:
+        """The view is reached and the drone at rest."""
+        self._begun_ns = now_ns
+
+    def interrupt(self) -> None:
+        """The drone has left the view (a hold, a pilot): it must be reached again."""
+        self._begun_ns = None
+
+    def take(self, look: ShelfLook) -> None:
+        """One picture; those exposed on the way to the view tell nothing."""
+        view = self.view
+        if view is None or self._begun_ns is None or look.pose.stamp_ns < self._begun_ns:
+            return
+        places = {place.location: place for place in look.places}
+        reads: dict[str, list[PlacedRead]] = {}
+        for placed in look.reads:
+            reads.setdefault(placed.location, []).append(placed)
+        for code in self._left(view):
+            place, own = places.get(code), reads.get(code, [])
+            self._open[code].add(look.frame_seq, look.pose, place, own)
+            self._settle(code, final=False)
+
+    def step(self, now_ns: int) -> bool:
+        """True when the view is over; the next one, or another look at what is left of it, comes first."""
+        view = self.view
+        if view is None:
+            return True
+        if self._begun_ns is None:
+            return False
+        left = self._left(view)
+        waiting = any(not self._open[code].told for code in left)
+        if waiting and (now_ns - self._begun_ns) * 1e-9 < self._params.view_s:
+            return False
+        self._begun_ns = None
+        again = self._planner.retake(view, left)
+        if again is not None:
+            self._views[0] = again
+            return True
+        for code in left:
+            self._settle(code, final=True)
+            self._open.pop(code, None)
+        self._views.pop(0)
+        return True
+
+    def drain(self) -> tuple[Finding, ...]:
+        """The locations decided since the last call."""
+        found, self._findings = tuple(self._findings), []
+        return found
+
+    def _left(self, view: View) -> tuple[str, ...]:
+        return tuple(code for code in view.locations if code in self._open)
+
+    def _settle(self, code: str, final: bool) -> None:
+        verdict = self._open[code].verdict(final)
+        if verdict is not None:
+            del self._open[code]
+            self._findings.append(_finding(code, self.node, verdict))
+
+
+def _finding(location: str, node: str, verdict: Verdict) -> Finding:
+    """A verdict as a message, with the time and place of its last look."""
+    pose: BodyPose = verdict.pose
+    return Finding(
+        stamp_ns=pose.stamp_ns,
+        location=location,
+        state=verdict.state,
+        confidence=round(verdict.confidence, 4),
+        reads=verdict.reads,
+        evidence=verdict.evidence,
+        node=node,
+        x_m=pose.x_m,
+        y_m=pose.y_m,
+        height_m=pose.height_m,
+        yaw_rad=pose.yaw_rad,
+    )

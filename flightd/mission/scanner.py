@@ -1,0 +1,202 @@
+"""Scanning over a whole flight: which nodes still have locations to count, and which findings are proven.
+
+What is found at a node stays pending until the drone's place is proven: by a location label read there, or
+by arriving at `confirm_stops` further nodes without a doubt.  On a doubt everything pending is withdrawn,
+so that nothing is ever booked on a wrong location; its locations are left to count.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, field
+
+from flightd.core.inventory import LocationState
+from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
+from flightd.core.types import Event, EventLevel
+from flightd.grid.site import Site
+from flightd.mission.assign import Assigner, FrontSight, Sighting
+from flightd.mission.scan_task import ScanTask
+from flightd.mission.views import ScanParams, View, ViewPlanner
+
+
+@dataclass(slots=True)
+class _Pending:
+    """What was found at one node and is not proven; `stops` counts the nodes reached since."""
+
+    node: str
+    locations: list[str] = field(default_factory=list)
+    stops: int = 0
+
+
+class Scanner:
+    """The scan phase of a flight, for the mission to ask and for pictures to be given to."""
+
+    def __init__(self, site: Site, sight: FrontSight, params: ScanParams) -> None:
+        self._params = params
+        self._assigner = Assigner(site, sight, params.least_probability)
+        self._planner = ViewPlanner(site, sight, self._assigner, params)
+        self._planned = frozenset(site.locations)
+        self._done: set[str] = set()
+        self._tasks: dict[str, ScanTask] = {}
+        self._task: ScanTask | None = None
+        self._pending: list[_Pending] = []
+        self._found: list[Finding] = []
+        self._settled: list[Settled] = []
+        self._events: list[Event] = []
+        self._sightings: list[Sighting] = []
+        self.states: Counter[LocationState] = Counter()
+        self.doubted = False
+
+    # What the mission asks
+
+    @property
+    def least_integrity(self) -> float:
+        """The integrity from which a place counts as certain."""
+        return self._params.least_integrity
+
+    @property
+    def view(self) -> View | None:
+        """Where to look from now, None when the present node has nothing left."""
+        return self._task.view if self._task else None
+
+    def wants(self, node: str) -> bool:
+        """Whether locations of a node are left to count."""
+        return not self.doubted and any(code not in self._done for code in self._planner.locations(node))
+
+    def skip(self, locations: Iterable[str]) -> None:
+        """These need no look any more: an earlier flight of the same count has booked them."""
+        self._done.update(self._planned.intersection(locations))
+
+    def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:
+        """Begin or continue the scan of a node that is reached."""
+        self.leave()
+        left = frozenset(self._planner.locations(node)) - self._done
+        views = self._planner.views(node, left, height_m, yaw_rad)
+        self._task = ScanTask(node, views, self._planner, self._params)
+        if not self._pending or self._pending[-1].node != node:
+            self._pending.append(_Pending(node))
+
+    def begin(self, now_ns: int) -> None:
+        """The view is reached and the drone at rest."""
+        if self._task is not None:
+            self._task.begin(now_ns)
+
+    def interrupt(self) -> None:
+        """The view was left before it was over."""
+        if self._task is not None:
+            self._task.interrupt()
+
+    def step(self, now_ns: int) -> bool:
+        """True when the view is over; `view` is then the next one."""
+        over = self._task is None or self._task.step(now_ns)
+        self._gather()
+        return over
+
+    def leave(self) -> None:
+        """The node is left; what was not decided there stays to count."""
+        self._gather()
+        self._task = None
+
+    def reached(self, node: str, certain: bool) -> None:
+        """A node is reached: earlier findings are the surer for it, if the place is `certain`."""
+        if not certain:
+            return
+        for pending in self._pending:
+            pending.stops += pending.node != node
+        self._confirm([p for p in self._pending if p.stops >= self._params.confirm_stops])
+
+    def home(self, certain: bool) -> None:
+        """The flight has come back to its pad over known lines: everything is where it should be."""
+        if certain:
+            self._confirm(self._pending)
+
+    def doubt(self, now_ns: int, reason: str) -> None:
+        """The place may be another one: withdraw what is pending and assign nothing until `trust`."""
+        self.leave()
+        codes = [code for pending in self._pending for code in pending.locations]
+        if codes:
+            self._settled.append(Settled(tuple(codes), confirmed=False))
+            self._done.difference_update(codes)
+        self._pending.clear()
+        if not self.doubted:
+            text = f"{reason}; {len(codes)} findings withdrawn"
+            self._events.append(Event(now_ns, EventLevel.WARNING, "map_contradiction", text))
+        self.doubted = True
+
+    def trust(self) -> None:
+        """The place is known again."""
+        self.doubted = False
+
+    # What pictures bring
+
+    @property
+    def looking(self) -> bool:
+        """Whether the front camera's pictures are wanted now."""
+        return self._task is not None and bool(self._task.looking)
+
+    def places(self, pose: BodyPose) -> tuple[Place, ...]:
+        """The places wanted in a picture taken at `pose`; none for one that would not count."""
+        task = self._task
+        if task is None or task.since_ns is None or pose.stamp_ns < task.since_ns or not pose.certain:
+            return ()
+        return self._assigner.places(pose, task.looking)
+
+    def take(self, codes: CodeSet, pose: BodyPose) -> None:
+        """One picture and the pose at its exposure."""
+        view = self.view
+        if self._task is None or view is None or self.doubted:
+            return
+        look = self._assigner.look(codes, pose, (view.aisle, view.side))
+        self._sightings += look.sightings
+        for sighting in look.sightings:
+            if sighting.contradicts:
+                text = f"label {sighting.location} seen {sighting.off_m:+.2f} m from its place"
+                self.doubt(pose.stamp_ns, f"at {self._task.node}: {text}")
+                return
+        self._task.take(look)
+        self._gather()
+        if look.sightings:
+            self._confirm([p for p in self._pending if p.node == self._task.node])
+
+    # What goes out
+
+    def drain(self) -> tuple[tuple[Finding, ...], tuple[Settled, ...]]:
+        """New findings, and what has become of earlier ones."""
+        found, self._found = tuple(self._found), []
+        settled, self._settled = tuple(self._settled), []
+        return found, settled
+
+    def drain_events(self) -> list[Event]:
+        events, self._events = self._events, []
+        return events
+
+    def drain_sightings(self) -> tuple[Sighting, ...]:
+        """Location labels seen, for the localiser."""
+        sightings, self._sightings = tuple(self._sightings), []
+        return sightings
+
+    def _gather(self) -> None:
+        if self._task is None:
+            return
+        for found in self._task.drain():
+            self._found.append(found)
+            self._done.add(found.location)
+            self.states[found.state] += 1
+            self._pending[-1].locations.append(found.location)
+
+    def _confirm(self, proven: list[_Pending]) -> None:
+        codes = [code for pending in proven for code in pending.locations]
+        if codes:
+            self._settled.append(Settled(tuple(codes), confirmed=True))
+        for pending in proven:
+            pending.locations.clear()
+        present = self._task.node if self._task else ""
+        self._pending = [p for p in self._pending if p.locations or p.node == present]
+
+
+def nodes_to_count(site: Site, nodes: Iterable[str], counted: Collection[str]) -> tuple[str, ...]:
+    """Those of some nodes that a flight which goes on with a count must still visit, in their order: the
+    ones with a location that is not `counted`."""
+    left = {location.node for location in site.locations.values() if location.code not in counted}
+    return tuple(node for node in nodes if node in left)

@@ -1,0 +1,171 @@
+"""From where the locations of a node are looked at: which way, how high, how near."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flightd.core.geometry import wrap_pi
+from flightd.core.scanning import BodyPose
+from flightd.grid.cells import by_node
+from flightd.grid.site import Location, Side, Site
+from flightd.mission.assign import Assigner, FrontSight
+
+
+@dataclass(frozen=True, slots=True)
+class ScanParams:
+    """How shelves are scanned; SI units, radians.
+
+    A view ends when every location in it is decided, at the latest after `view_s`; what is undecided then
+    is looked at again from `retakes` other places, up to `step_m` nearer and `aside_m` along the aisle
+    (`aside_per_height` of the height: the node's own lines must stay in the down camera's picture).
+    """
+
+    min_height_m: float = 0.7
+    max_height_m: float = math.inf
+    pictures: int = 3
+    view_s: float = 2.0
+    retakes: int = 2
+    step_m: float = 0.25
+    aside_m: float = 0.4
+    aside_per_height: float = 0.35
+    clearance_m: float = 0.6
+    label_reach_m: float = 0.3
+    least_probability: float = 0.99
+    least_integrity: float = 0.99
+    confirm_stops: int = 2
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A place to look from.  `yaw_rad` is the drone's heading; `retake` counts the looks before."""
+
+    node: str
+    aisle: str
+    side: Side
+    x_m: float
+    y_m: float
+    height_m: float
+    yaw_rad: float
+    locations: tuple[str, ...]
+    retake: int = 0
+
+
+class ViewPlanner:
+    """The views of each node of a site, and where to look from again."""
+
+    def __init__(self, site: Site, sight: FrontSight, assigner: Assigner, params: ScanParams) -> None:
+        self._site = site
+        self._sight = sight
+        self._assigner = assigner
+        self._params = params
+        self._by_node = by_node(site.locations.values())
+
+    def locations(self, node: str) -> tuple[str, ...]:
+        """The codes of all locations that are counted from a node."""
+        return tuple(location.code for location in self._by_node.get(node, ()))
+
+    def views(self, node: str, wanted: frozenset[str], height_m: float, yaw_rad: float) -> list[View]:
+        """The views of the `wanted` locations of a node, in the order of least turning and climbing for a
+        drone that hovers there at `height_m`, heading `yaw_rad`: up one side, down the other."""
+        here = [location for location in self._by_node.get(node, ()) if location.code in wanted]
+        sides = sorted(
+            {location.side for location in here}, key=lambda side: abs(wrap_pi(self._yaw(side) - yaw_rad))
+        )
+        ordered: list[View] = []
+        for side in sides:
+            column = self._column(node, [location for location in here if location.side is side])
+            if column and abs(column[-1].height_m - height_m) < abs(column[0].height_m - height_m):
+                column.reverse()
+            ordered += column
+            height_m = column[-1].height_m if column else height_m
+        return ordered
+
+    def retake(self, view: View, left: Sequence[str]) -> View | None:
+        """Another place to look at what is `left` of a view, None after the last: nearer and squarely in
+        front of what is left on one hand, then of the other; where there is only one, from a little
+        farther and aside, where reflections fall otherwise."""
+        p = self._params
+        if view.retake >= p.retakes or not left:
+            return None
+        node = self._site.nodes[view.node]
+        hands = _hands([self._site.locations[code] for code in left], node.x_m)
+        places = hands[view.retake % len(hands)]
+        middle_m = math.fsum(place.x_m for place in places) / len(places)
+        label_m = math.fsum(place.height_m for place in places) / len(places)
+        shelf_m = places[0].y_m
+        towards = math.copysign(1.0, shelf_m - node.y_m)
+        room_m = max(0.0, abs(shelf_m - node.y_m) - p.clearance_m)
+        near = view.retake < len(hands)
+        step_m = min(p.step_m, room_m) if near else -p.step_m / 2
+        height_m = self._height(label_m, abs(shelf_m - node.y_m) - step_m)
+        most_m = min(p.aside_m, p.aside_per_height * height_m)
+        aside_m = _clamp(middle_m - node.x_m + (0.0 if near else p.step_m), most_m)
+        first, *_, last = self._site.aisle_nodes(view.aisle)
+        x_m = min(max(node.x_m + aside_m, first.x_m), last.x_m)  # the aisle's line ends behind its end nodes
+        return replace(
+            view,
+            x_m=x_m,
+            y_m=node.y_m + towards * step_m,
+            height_m=height_m,
+            locations=tuple(left),
+            retake=view.retake + 1,
+        )
+
+    def _column(self, node: str, places: Sequence[Location]) -> list[View]:
+        """One side's views from the lowest level up; levels whose labels fit one picture share a view."""
+        at = self._site.nodes[node]
+        groups: list[list[Location]] = []
+        for place in sorted(places, key=lambda place: place.height_m):
+            if groups and self._fits([*groups[-1], place], at.y_m):
+                groups[-1].append(place)
+            else:
+                groups.append([place])
+        return [self._view(node, group) for group in groups]
+
+    def _view(self, node: str, group: Sequence[Location]) -> View:
+        at, first = self._site.nodes[node], group[0]
+        middle_m = (group[0].height_m + group[-1].height_m) / 2
+        height_m = self._height(middle_m, abs(first.y_m - at.y_m))
+        codes = tuple(place.code for place in group)
+        return View(node, first.aisle, first.side, at.x_m, at.y_m, height_m, self._yaw(first.side), codes)
+
+    def _height(self, label_m: float, distance_m: float) -> float:
+        """Flying height at which the camera's axis meets the shelf at the labels' height."""
+        mount = self._sight.mount
+        forward_m, _, down_m = mount.offset_m
+        wanted = label_m + down_m - (distance_m - forward_m) * math.tan(mount.pitch_rad)
+        return min(max(wanted, self._params.min_height_m), self._params.max_height_m)
+
+    def _yaw(self, side: Side) -> float:
+        """The heading in which the camera faces a side; a side camera needs no turn."""
+        outward = math.pi / 2 if side is Side.RIGHT else -math.pi / 2
+        return wrap_pi(outward - self._sight.mount.yaw_rad)
+
+    def _fits(self, group: Sequence[Location], node_y_m: float) -> bool:
+        """Whether all labels of a group, with room around each, are in one picture."""
+        reach_m = self._params.label_reach_m
+        distance_m = abs(group[0].y_m - node_y_m)
+        low, high = group[0].height_m - reach_m, group[-1].height_m + reach_m
+        height_m = self._height((low + high) / 2, distance_m)
+        pose = BodyPose(
+            0, group[0].x_m, node_y_m, height_m, 0.0, 0.0, self._yaw(group[0].side), 0.0, 0.0, 0.0, True
+        )
+        view, lens = self._sight.view(pose), self._sight.lens
+        ends = np.array([(group[0].x_m, group[0].y_m, h_m) for h_m in (low, high)])
+        rows = view.project(ends)[:, 1]
+        return bool(np.all((rows >= 0.0) & (rows <= lens.height_px - 1)))
+
+
+def _clamp(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
+
+
+def _hands(places: Sequence[Location], x_m: float) -> list[list[Location]]:
+    """Places at higher x than the node and those at lower x; either may be missing."""
+    higher = [place for place in places if place.x_m >= x_m]
+    lower = [place for place in places if place.x_m < x_m]
+    return [hand for hand in (higher, lower) if hand]

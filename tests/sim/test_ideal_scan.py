@@ -1,0 +1,105 @@
+"""Whole missions that count shelves, flown by ideal sight and an ideal code reader."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+from flightd.config.schema import load_config
+from flightd.core.inventory import LocationState
+from flightd.core.scanning import Finding
+from flightd.core.types import Command, CommandKind, Phase
+from flightd.mission.scanner import Scanner
+from tests.sim.ideal_flight import Flown, IdealFlight
+from tests.sim.ideal_front import IdealFront, Label, Stock
+from tests.unit.mission.shelves import SIGHT, SITE
+
+CONFIG = load_config(Path(__file__).parents[2] / "configs" / "sim.toml")
+NODES = ("A2", "A3")
+PLACES = [place.code for place in SITE.locations.values() if place.node in NODES]
+EMPTY, TORN, COVERED, TWO, *READ = PLACES
+LABELS = {code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in [*READ, TORN]}
+STOCK = Stock(
+    LABELS | {TWO: [Label("FRONT", -0.1), Label("SECOND", 0.1)]},
+    frozenset({EMPTY}),
+    frozenset({TORN}),
+    frozenset({COVERED}),
+)
+
+
+def scan_flight(visits: tuple[str, ...] = NODES) -> IdealFlight:
+    scanner = Scanner(SITE, SIGHT, CONFIG.scan_params(4.0))
+    front = IdealFront(SITE, SIGHT, STOCK)
+    return IdealFlight(SITE, CONFIG.pilot_params(SITE), visits=visits, seed=5, scanner=scanner, front=front)
+
+
+def findings(flown: Flown) -> dict[str, Finding]:
+    found = [finding for output in flown.outputs for finding in output.findings]
+    assert len({finding.location for finding in found}) == len(found), "one state for each location"
+    return {finding.location: finding for finding in found}
+
+
+def test_a_flight_counts_every_location_of_its_nodes_and_proves_them_at_home() -> None:
+    flown = scan_flight().fly()
+    assert (flown.phase, flown.visited) == (Phase.DONE, list(NODES))
+    found = findings(flown)
+    assert {code: finding.state for code, finding in found.items()} == {
+        EMPTY: LocationState.EMPTY,
+        TORN: LocationState.UNREADABLE,
+        COVERED: LocationState.OCCLUDED,
+        TWO: LocationState.SEVERAL,
+    } | dict.fromkeys(READ, LocationState.READ)
+    for code in READ:
+        assert [read.text for read in found[code].reads] == [f"PALLET {code}"]
+    confirmed = {c for output in flown.outputs for s in output.settled if s.confirmed for c in s.locations}
+    assert confirmed == set(PLACES)
+    assert Counter(output.phase for output in flown.outputs)[Phase.SCAN] > 0
+
+
+def test_a_pause_amid_a_scan_loses_and_doubles_nothing() -> None:
+    flight = scan_flight()
+    paused: list[int] = []
+
+    def order(phase: Phase, now_ns: int) -> None:
+        mission = flight.pilot.mission
+        if phase is Phase.SCAN and not paused:
+            mission.command(Command("1", CommandKind.PAUSE), now_ns)
+            paused.append(now_ns)
+        elif phase is Phase.HOLD and now_ns - paused[0] > 3_000_000_000:
+            mission.command(Command("2", CommandKind.RESUME), now_ns)
+
+    flight.on_tick = order
+    flown = flight.fly()
+    assert flown.phase is Phase.DONE
+    assert set(findings(flown)) == set(PLACES)
+
+
+def test_going_home_ends_the_scan_at_once() -> None:
+    flight = scan_flight()
+
+    def order(phase: Phase, now_ns: int) -> None:
+        if phase is Phase.SCAN and flight.pilot.mission.goal.visit:
+            flight.pilot.mission.command(Command("1", CommandKind.HOME), now_ns)
+            flight.on_tick = lambda _phase, _now_ns: None
+
+    flight.on_tick = order
+    flown = flight.fly()
+    assert flown.phase is Phase.ABORTED
+    assert len(findings(flown)) < len(PLACES)
+
+
+def test_locations_counted_before_are_not_looked_at_again() -> None:
+    flight = scan_flight()
+    flight.counted = tuple(PLACES[:-1])
+    flown = flight.fly()
+    assert flown.visited == list(NODES)
+    assert set(findings(flown)) == {PLACES[-1]}
+
+
+def test_without_racks_the_drone_hovers_and_goes_on() -> None:
+    bare = replace(SITE, racks=(), locations={})
+    scanner = Scanner(bare, SIGHT, CONFIG.scan_params(4.0))
+    flown = IdealFlight(bare, CONFIG.pilot_params(bare), visits=("A2",), seed=5, scanner=scanner).fly()
+    assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
+    assert Phase.SCAN not in {output.phase for output in flown.outputs}

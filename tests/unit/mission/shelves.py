@@ -1,0 +1,67 @@
+"""A small site with racks and what the front camera sees of it, for the tests of scanning."""
+
+from __future__ import annotations
+
+from flightd.config.front_camera import FrontCameraConfig
+from flightd.config.site_file import parse_site
+from flightd.core.scanning import BodyPose, CodeSet, Occupancy, PlaceLook
+from flightd.core.types import CodeRead
+from flightd.mission.assign import FrontSight
+
+SITE = parse_site(
+    """
+[site]
+name = "shelves"
+
+[[aisle]]
+id = "A"
+x_m = 0.0
+y_m = 0.0
+spacing_m = [1.3, 1.3, 1.3]
+shelf_height_m = 2.4
+
+[[rack]]
+bay_width_m = 1.3
+levels_m = [0.9, 1.8]
+positions = 2
+
+[[pad]]
+id = "home"
+node = "A1"
+size_m = 0.5
+""",
+    "shelves",
+)
+SIGHT = FrontSight(FrontCameraConfig().lens(), FrontCameraConfig().mount())
+
+
+def pose(stamp_ns: int = 0, **changes: float | bool) -> BodyPose:
+    """A drone that hovers over A2 and faces the left shelf, very sure of it."""
+    values = {
+        "x_m": 1.3, "y_m": 0.0, "height_m": 0.9, "roll_rad": 0.0, "pitch_rad": 0.0, "yaw_rad": -1.5707963,
+        "sigma_x_m": 0.01, "sigma_y_m": 0.01, "sigma_yaw_rad": 0.003, "certain": True,
+    }  # fmt: skip
+    return BodyPose(stamp_ns, **{**values, **changes})  # type: ignore[arg-type]
+
+
+def read(
+    text: str, x_px: float = 0.0, y_px: float = 0.0, *, size_px: float = 40.0, sure: bool = True
+) -> CodeRead:
+    """A code around a point of the picture."""
+    h = size_px / 2
+    corners = ((x_px - h, y_px - h), (x_px + h, y_px - h), (x_px + h, y_px + h), (x_px - h, y_px + h))
+    return CodeRead("QR Code", text, corners, sure, 1, 1.0)
+
+
+def picture(
+    seq: int,
+    reads: tuple[CodeRead, ...] = (),
+    places: dict[str, Occupancy] | None = None,
+    stamp_ns: int | None = None,
+) -> CodeSet:
+    """What one picture showed; every place in full, with evidence named after picture and place."""
+    looks = tuple(
+        PlaceLook(code, ((-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0)), 1.0, seen, f"{seq}:{code}")
+        for code, seen in (places or {}).items()
+    )
+    return CodeSet(seq, seq * 250_000_000 if stamp_ns is None else stamp_ns, 1280, 800, reads, looks)

@@ -1,0 +1,252 @@
+"""Scanning a node: one state for each location, re-takes, time-outs; and what is booked, and when."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from flightd.core.inventory import LocationState
+from flightd.core.scanning import BodyPose, Finding, Occupancy
+from flightd.core.types import CodeRead
+from flightd.mission.scanner import Scanner, nodes_to_count
+from flightd.mission.views import ScanParams, View
+from tests.unit.mission.shelves import SIGHT, SITE, picture, pose, read
+
+PARAMS = ScanParams(max_height_m=4.0, aside_per_height=0.4)
+STEP_NS = 250_000_000
+
+
+class Hover:
+    """A scan of A2: answers each picture of the present view until the node is over."""
+
+    def __init__(self, params: ScanParams = PARAMS) -> None:
+        self.scanner = Scanner(SITE, SIGHT, params)
+        self.scanner.arrive("A2", 1.0, -math.pi / 2)
+        self.now_ns = 10**9
+        self.seq = 0
+        self.views: list[View] = []
+        self.found: dict[str, Finding] = {}
+
+    def at_view(self) -> View:
+        view = self.scanner.view
+        assert view is not None
+        self.scanner.begin(self.now_ns)
+        self.views.append(view)
+        return view
+
+    def look(self, show: dict[str, Occupancy], reads: dict[str, tuple[str, ...]] | None = None) -> bool:
+        """One picture at the view; True when the view is over."""
+        view = self.scanner.view
+        assert view is not None
+        self.now_ns += STEP_NS
+        self.seq += 1
+        here = pose(self.now_ns, x_m=view.x_m, y_m=view.y_m, height_m=view.height_m, yaw_rad=view.yaw_rad)
+        codes = [self._code(here, code, text) for code, texts in (reads or {}).items() for text in texts]
+        places = {code: seen for code, seen in show.items() if code in view.locations}
+        self.scanner.take(picture(self.seq, tuple(codes), places, self.now_ns), here)
+        over = self.scanner.step(self.now_ns)
+        self.gather()
+        return over
+
+    def _code(self, here: BodyPose, code: str, text: str) -> CodeRead:
+        (place,) = self.scanner._assigner.places(here, [code])
+        xs, ys = zip(*place.quad_px, strict=True)
+        # a second label of a place beside the first
+        aside = 0.2 * (max(xs) - min(xs)) * (1 if text.endswith("2") else 0)
+        return read(text, sum(xs) / 4 + aside, sum(ys) / 4)
+
+    def gather(self) -> None:
+        found, _ = self.scanner.drain()
+        self.found.update({finding.location: finding for finding in found})
+
+    def run(self, show: dict[str, Occupancy], reads: dict[str, tuple[str, ...]]) -> None:
+        """Show the same at every view to the end."""
+        while self.scanner.view is not None:
+            view = self.at_view()
+            while not self.look(show, {c: t for c, t in reads.items() if c in view.locations}):
+                pass
+            self.now_ns += STEP_NS
+
+
+LOCATIONS = tuple(place.code for place in SITE.locations.values() if place.node == "A2")
+GOODS = dict.fromkeys(LOCATIONS, Occupancy.GOODS)
+
+
+def test_every_state_is_told_and_each_location_has_exactly_one() -> None:
+    hover = Hover()
+    one, two, three, four, five, *rest = LOCATIONS
+    show = GOODS | {two: Occupancy.EMPTY, three: Occupancy.COVERED, five: Occupancy.UNSURE}
+    hover.run(show, {one: ("P1",), four: ("P1", "P2")} | {code: (f"{code} P",) for code in rest})
+    states = {code: finding.state for code, finding in hover.found.items()}
+    assert states == {
+        one: LocationState.READ,
+        two: LocationState.EMPTY,
+        three: LocationState.OCCLUDED,
+        four: LocationState.SEVERAL,
+        five: LocationState.UNREADABLE,
+    } | dict.fromkeys(rest, LocationState.READ)
+    assert [r.text for r in hover.found[one].reads] == ["P1"]
+    assert hover.found[one].evidence.endswith(one)
+
+
+def test_what_no_picture_showed_is_not_visited() -> None:
+    hover = Hover()
+    hover.run({}, {})
+    assert not hover.found
+    assert hover.scanner.wants("A2")
+
+
+def test_one_read_without_a_checksum_is_never_believed() -> None:
+    hover = Hover()
+    code = LOCATIONS[0]
+    hover.at_view()
+    here = pose(hover.now_ns + 1)
+    guess = replace(hover._code(here, code, "GUESS"), sure=False)
+    hover.scanner.take(picture(1, (guess,), {code: Occupancy.GOODS}, hover.now_ns + 1), here)
+    hover.run(GOODS, {})
+    assert hover.found[code].state is LocationState.UNREADABLE
+
+
+def test_two_texts_of_one_label_cancel_each_other() -> None:
+    hover = Hover(replace(PARAMS, retakes=0))
+    code = LOCATIONS[0]
+    hover.at_view()
+    for text in ("ONE", "ONE", "TWO", "TWO"):
+        hover.seq += 1
+        hover.now_ns += STEP_NS
+        here = pose(hover.now_ns)
+        label = replace(hover._code(here, code, "same place"), text=text)
+        hover.scanner.take(picture(hover.seq, (label,), {code: Occupancy.GOODS}, hover.now_ns), here)
+    hover.run(GOODS, {})
+    assert hover.found[code].state is LocationState.UNREADABLE
+
+
+def test_the_undecided_is_looked_at_again_from_nearer_and_then_given_up() -> None:
+    hover = Hover()
+    hover.run(GOODS, {code: (code + " P",) for code in LOCATIONS[1:]})
+    first, *again = [view for view in hover.views if LOCATIONS[0] in view.locations]
+    assert first.retake == 0
+    assert [view.retake for view in again] == [1, 2]
+    assert all(view.locations == (LOCATIONS[0],) for view in again)
+    assert abs(again[0].y_m) > 0.1, "nearer"
+    assert all(abs(SITE.locations[LOCATIONS[0]].y_m - view.y_m) >= PARAMS.clearance_m for view in again)
+    assert hover.found[LOCATIONS[0]].state is LocationState.UNREADABLE
+
+
+def test_a_view_without_pictures_times_out() -> None:
+    hover = Hover(replace(PARAMS, retakes=0))
+    hover.at_view()
+    assert not hover.scanner.step(hover.now_ns + round(0.9 * PARAMS.view_s * 1e9))
+    assert hover.scanner.step(hover.now_ns + round(1.1 * PARAMS.view_s * 1e9))
+
+
+def test_pictures_exposed_on_the_way_tell_nothing() -> None:
+    hover = Hover()
+    view = hover.at_view()
+    before = pose(hover.now_ns - 1)
+    assert hover.scanner.places(before) == ()
+    for seq in range(5):
+        shown = dict.fromkeys(view.locations, Occupancy.EMPTY)
+        hover.scanner.take(picture(seq, (), shown, hover.now_ns - 1), before)
+    hover.gather()
+    assert not hover.found
+
+
+def test_no_height_of_a_side_is_flown_twice() -> None:
+    views = Hover().scanner._planner.views("A2", frozenset(LOCATIONS), 1.0, -math.pi / 2)
+    heights = [(view.side, view.height_m) for view in views]
+    assert len(heights) == len(set(heights))
+    assert [view.height_m for view in views] == sorted(view.height_m for view in views[:2]) + sorted(
+        (view.height_m for view in views[2:]), reverse=True
+    )
+
+
+def counted_at(scanner: Scanner, node: str = "A2") -> None:
+    """Count everything of a node as empty."""
+    scanner.arrive(node, 1.0, -math.pi / 2)
+    now_ns = 10**9
+    while (view := scanner.view) is not None:
+        scanner.begin(now_ns)
+        over = False
+        while not over:
+            now_ns += STEP_NS
+            here = pose(now_ns, x_m=view.x_m, height_m=view.height_m, yaw_rad=view.yaw_rad)
+            shown = dict.fromkeys(view.locations, Occupancy.EMPTY)
+            scanner.take(picture(now_ns // STEP_NS, (), shown, now_ns), here)
+            over = scanner.step(now_ns)
+    scanner.leave()
+
+
+def test_findings_stay_pending_until_two_more_nodes_are_reached_without_a_doubt() -> None:
+    scanner = Scanner(SITE, SIGHT, PARAMS)
+    counted_at(scanner)
+    found, settled = scanner.drain()
+    assert {f.location for f in found} == set(LOCATIONS)
+    assert settled == ()
+    scanner.reached("A3", certain=True)
+    scanner.reached("A4", certain=False)
+    assert scanner.drain() == ((), ())
+    scanner.reached("A4", certain=True)
+    (proof,) = scanner.drain()[1]
+    assert proof.confirmed
+    assert set(proof.locations) == set(LOCATIONS)
+
+
+def test_coming_home_proves_everything() -> None:
+    scanner = Scanner(SITE, SIGHT, PARAMS)
+    counted_at(scanner)
+    scanner.home(certain=True)
+    assert [s.confirmed for s in scanner.drain()[1]] == [True]
+
+
+def test_a_contradicting_location_label_withdraws_what_is_pending() -> None:
+    scanner = Scanner(SITE, SIGHT, PARAMS)
+    counted_at(scanner)
+    scanner.drain()
+    scanner.arrive("A3", 1.0, -math.pi / 2)
+    scanner.begin(10**9)
+    wrong = next(p.code for p in SITE.locations.values() if p.node == "A1")
+    here = pose(10**9 + STEP_NS, x_m=2.6)
+    scanner.take(picture(1, (read(wrong),), {}, here.stamp_ns), here)
+    (withdrawn,) = scanner.drain()[1]
+    assert not withdrawn.confirmed
+    assert set(withdrawn.locations) == set(LOCATIONS)
+    assert [event.name for event in scanner.drain_events()] == ["map_contradiction"]
+    assert not scanner.wants("A3"), "nothing is assigned while the place is in doubt"
+    scanner.trust()
+    assert scanner.wants("A2"), "the withdrawn is left to count"
+
+
+def test_an_agreeing_location_label_proves_its_node_at_once() -> None:
+    hover = Hover()
+    hover.at_view()
+    one = LOCATIONS[0]
+    for _ in range(3):
+        hover.look(GOODS, {one: ("P1",)})
+    right = SITE.locations[one]
+    here = pose(hover.now_ns + 1)
+    x = (right.x_m - here.x_m) / 1.2 * SIGHT.lens.fx_px
+    hover.scanner.take(picture(99, (read(one, x, 0.0),), {}, here.stamp_ns), here)
+    assert [(s.confirmed, s.locations) for s in hover.scanner.drain()[1]] == [(True, (one,))]
+
+
+def test_a_count_that_goes_on_visits_only_what_is_left() -> None:
+    counted = {place.code for place in SITE.locations.values() if place.node != "A3"}
+    assert nodes_to_count(SITE, ("A1", "A2", "A3", "A4"), counted) == ("A3",)
+    scanner = Scanner(SITE, SIGHT, PARAMS)
+    scanner.skip(counted)
+    assert not scanner.wants("A2")
+    assert scanner.wants("A3")
+
+
+@pytest.mark.parametrize("offset_m", [-0.3, 0.0, 0.3])
+def test_a_re_take_at_the_end_of_an_aisle_stays_over_its_line(offset_m: float) -> None:
+    scanner = Scanner(SITE, SIGHT, PARAMS)
+    scanner.arrive("A1", 1.0, -math.pi / 2)
+    view = scanner.view
+    assert view is not None
+    shifted = scanner._planner.retake(replace(view, x_m=view.x_m + offset_m), view.locations)
+    assert shifted is not None
+    assert shifted.x_m >= SITE.nodes["A1"].x_m
