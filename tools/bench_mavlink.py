@@ -2,9 +2,11 @@
 """What MAVLink costs: the adapter over real loopback UDP, in shares of one core.
 
 A sender in its own process streams an autopilot's usual mixture at a fixed rate; the adapter parses it,
-keeps its state and streams setpoints at 50 Hz.  Measured is the adapter's processor time.
+keeps its state, gives its estimator the pose at 30 Hz and streams setpoints for the rest of what goes out.
+Measured is the adapter's processor time, and beside it that of bare asyncio sockets which carry the same
+datagrams in and out without a look at them: the difference is what MAVLink costs.
 
-    python tools/bench_mavlink.py [--rate 500] [--seconds 10] [--json]
+    python tools/bench_mavlink.py [--rate 500] [--out 500] [--seconds 10] [--json]
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import argparse
 import asyncio
 import json
 import multiprocessing
+import resource
 import sys
 import time
 from pathlib import Path
@@ -23,12 +26,17 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED_NOGPS, ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser, Message
+from flightd.adapters.vehicle.mavlink.outputs import PoseForm
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
-from flightd.core.types import AttitudeSetpoint, Demand
+from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
+from flightd.core.types import AttitudeSetpoint, Demand, GridPose
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.link import Channel, UdpLink
 
-SETPOINT_HZ = 50
+TICK_HZ = 50
+OTHERS_HZ = 32
+"""What goes out besides setpoints: the pose, heartbeat, time comparison."""
+POSE = GridPose(0, "A1", 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 1.5, (0.01,) * 9, 0.9)
 MIXTURE = ("attitude",) * 6 + ("distance", "position", "heartbeat", "battery")
 
 
@@ -81,19 +89,27 @@ def serve(rate_hz: float, ready: multiprocessing.Queue[int]) -> None:
     asyncio.run(Sender(rate_hz).run(ready))
 
 
-async def measure(port: int, seconds: float) -> dict[str, float]:
+async def measure(port: int, seconds: float, out_hz: float) -> dict[str, float]:
     clock = LoopClock()
-    vehicle = ArduPilotVehicle(f"udpout://127.0.0.1:{port}", clock)
+    vehicle = ArduPilotVehicle(
+        f"udpout://127.0.0.1:{port}", clock, MavlinkOptions(pose_form=PoseForm.ODOMETRY)
+    )
     running = asyncio.create_task(vehicle.run())
     vehicle.demand(Demand.FLY)
     await asyncio.sleep(2.0)
     received, sent = vehicle.link.received, vehicle.link.sent
-    cpu_s, wall_s = time.process_time(), time.perf_counter()
-    while time.perf_counter() - wall_s < seconds:
-        vehicle.send(AttitudeSetpoint(clock.now_ns()))
+    before, wall_s = resource.getrusage(resource.RUSAGE_SELF), time.perf_counter()
+    due = 0.0
+    while (passed_s := time.perf_counter() - wall_s) < seconds:
+        while due <= passed_s * (out_hz - OTHERS_HZ):
+            vehicle.send(AttitudeSetpoint(clock.now_ns()))
+            due += 1.0
+        vehicle.share_pose(POSE)
         vehicle.attitudes()
-        await asyncio.sleep(1.0 / SETPOINT_HZ)
-    cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s
+        await asyncio.sleep(1.0 / TICK_HZ)
+    after, wall_s = resource.getrusage(resource.RUSAGE_SELF), time.perf_counter() - wall_s
+    kernel_s = after.ru_stime - before.ru_stime
+    cpu_s = kernel_s + after.ru_utime - before.ru_utime
     received, sent = vehicle.link.received - received, vehicle.link.sent - sent
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
@@ -102,7 +118,37 @@ async def measure(port: int, seconds: float) -> dict[str, float]:
         "sent_per_s": sent / wall_s,
         "us_per_message": cpu_s / (received + sent) * 1e6,
         "core_share": cpu_s / wall_s,
+        "kernel_share": kernel_s / wall_s,
     }
+
+
+class Bare(asyncio.DatagramProtocol):
+    """Counts what comes in."""
+
+    def __init__(self) -> None:
+        self.received = 0
+
+    def datagram_received(self, *_: object) -> None:
+        self.received += 1
+
+
+async def measure_bare(port: int, seconds: float, out_hz: float) -> dict[str, float]:
+    """The same traffic through bare sockets, in the same rhythm."""
+    loop = asyncio.get_running_loop()
+    transport, counted = await loop.create_datagram_endpoint(Bare, remote_addr=("127.0.0.1", port))
+    frame = Codec(1).pack(attitude_target(0, 1, AttitudeSetpoint(0), 0.5, 0.5))
+    transport.sendto(frame)  # who has spoken is streamed to
+    await asyncio.sleep(1.0)
+    cpu_s, wall_s, due = time.process_time(), time.perf_counter(), 0.0
+    counted.received = 0
+    while (passed_s := time.perf_counter() - wall_s) < seconds:
+        while due <= passed_s * out_hz:
+            transport.sendto(frame)
+            due += 1.0
+        await asyncio.sleep(1.0 / TICK_HZ)
+    cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s
+    transport.close()
+    return {"bare_us": cpu_s / (counted.received + due) * 1e6, "bare_share": cpu_s / wall_s}
 
 
 def time_alone(count: int = 20_000) -> dict[str, float]:
@@ -111,32 +157,45 @@ def time_alone(count: int = 20_000) -> dict[str, float]:
     parser = FrameParser(codec)
     frame = codec.pack(dialect.MAVLink_attitude_message(1, 0.1, 0.2, 0.3, 0.0, 0.0, 0.0))
     setpoint = AttitudeSetpoint(0, 0.1, 0.1)
-    start = time.perf_counter()
+    start = time.process_time()
     for _ in range(count):
         parser.datagram(frame)
-    parse_us = (time.perf_counter() - start) / count * 1e6
-    start = time.perf_counter()
+    parse_us = (time.process_time() - start) / count * 1e6
+    start = time.process_time()
     for i in range(count):
         codec.pack(attitude_target(i, 1, setpoint, 0.5, 0.5))
-    return {"parse_us": parse_us, "pack_us": (time.perf_counter() - start) / count * 1e6}
+    return {"parse_us": parse_us, "pack_us": (time.process_time() - start) / count * 1e6}
 
 
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     arguments.add_argument("--rate", type=float, default=500.0, help="messages per second from the autopilot")
+    arguments.add_argument("--out", type=float, default=500.0, help="messages per second to it")
     arguments.add_argument("--seconds", type=float, default=10.0)
     arguments.add_argument("--json", action="store_true")
     options = arguments.parse_args()
     ready: multiprocessing.Queue[int] = multiprocessing.Queue()
     sender = multiprocessing.Process(target=serve, args=(options.rate, ready), daemon=True)
     sender.start()
-    result = asyncio.run(measure(ready.get(timeout=10), options.seconds)) | time_alone()
+    port = ready.get(timeout=10)
+    result = asyncio.run(measure(port, options.seconds, options.out)) | time_alone()
+    sender.terminate()
+    sender = multiprocessing.Process(target=serve, args=(options.rate, ready), daemon=True)
+    sender.start()
+    result |= asyncio.run(measure_bare(ready.get(timeout=10), options.seconds, options.out))
     sender.terminate()
     if options.json:
         print(json.dumps(result))
         return
     print(f"received {result['received_per_s']:.0f}/s, sent {result['sent_per_s']:.0f}/s")
-    print(f"{result['us_per_message']:.1f} us a message, {result['core_share']:.1%} of one core")
+    print(
+        f"{result['us_per_message']:.1f} us a message, {result['core_share']:.1%} of one core, "
+        f"{result['kernel_share']:.1%} of it in the kernel"
+    )
+    mavlink = result["core_share"] - result["bare_share"]
+    print(
+        f"bare sockets {result['bare_us']:.1f} us, {result['bare_share']:.1%}: MAVLink itself {mavlink:.1%}"
+    )
     print(f"alone: parse {result['parse_us']:.1f} us, pack a setpoint {result['pack_us']:.1f} us")
 
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import math
+import random
 import sys
 import threading
 import time
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from mavsdk.plugins.telemetry import LandedState as SdkLanded
@@ -14,6 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.adapters.vehicle.mavlink.timesync import ClockSync
 from flightd.adapters.vehicle.mavsdk.gate import FRESH_NS, SetpointGate, message_id
+from flightd.adapters.vehicle.mavsdk.library import whole_fields
 from flightd.adapters.vehicle.mavsdk.readings import Readings
 from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
 from flightd.cli.simulate import free_port
@@ -77,6 +82,43 @@ def test_a_landed_state_is_believed_for_a_second() -> None:
     readings.take_landed(SdkLanded.ON_GROUND, 5)
     assert readings.landed(5 + 10**9) is LandedState.ON_GROUND
     assert readings.landed(6 + 10**9) is LandedState.UNKNOWN
+
+
+def test_whatever_the_library_hands_over_nothing_raises_and_nothing_absurd_is_believed() -> None:
+    rng = random.Random(11)
+    odd = [math.nan, math.inf, -math.inf, 1e30, -1.0, 0.0, 0.7, 90.0, 270.0, 2**63, -(2**40), 255, 3]
+    readings = Readings(ClockSync())
+    for now_ns in range(0, 20_000 * 1_000_000, 1_000_000):
+
+        def some(*names: str) -> Any:
+            return SimpleNamespace(**{name: rng.choice(odd) for name in names})
+
+        whole = rng.choice([value for value in odd if isinstance(value, int)])
+        angles = some("roll_deg", "pitch_deg", "yaw_deg")
+        angles.timestamp_us = whole
+        sensor = some("current_distance_m", "minimum_distance_m", "maximum_distance_m")
+        sensor.orientation = some("pitch_deg")
+        readings.take_mode(whole, now_ns)
+        readings.take_landed(whole, now_ns)
+        readings.take_armed(bool(whole), now_ns)
+        readings.take_attitude(angles, now_ns)
+        readings.take_range(sensor, now_ns)
+        readings.take_velocity(SimpleNamespace(velocity=some("down_m_s")), now_ns)
+        readings.take_battery(some("id", "voltage_v", "remaining_percent"), now_ns)
+        state = readings.state(now_ns, in_control=False, refusal="")
+        if state is not None:
+            assert abs(state.attitude.roll_rad) < 10.0
+            assert not state.height_m < 0.0
+            assert not state.battery_frac > 1.0
+            assert state.attitude.stamp_ns <= now_ns
+    stamps = [sample.stamp_ns for sample in readings.attitudes()]
+    assert stamps == sorted(stamps)
+
+
+@pytest.mark.parametrize("document", ["", "{", "[]", "null", '{"tc1": 1}', '{"tc1": null, "ts1": {}}', "7"])
+def test_a_message_whose_fields_are_not_as_known_is_passed_over(document: str) -> None:
+    assert whole_fields(document, "tc1", "ts1") is None
+    assert whole_fields('{"tc1": "12", "ts1": 5}', "tc1", "ts1") == (12, 5)
 
 
 def test_a_tick_that_died_in_the_air_is_not_flown_on_and_px4s_own_failsafe_acts() -> None:

@@ -51,6 +51,15 @@ def _log(level: LogLevel, message: str, _file: str | None, _line: int) -> bool:
     return True
 
 
+def whole_fields(document: str, *names: str) -> tuple[int, ...] | None:
+    """Whole numbers out of the JSON in which the library hands a message over; None if one is missing."""
+    try:
+        fields = json.loads(document)
+        return tuple(int(fields[name]) for name in names)
+    except (ValueError, TypeError, KeyError, OverflowError):
+        return None
+
+
 class Plugins:
     """What the adapter uses of the library, for one vehicle."""
 
@@ -105,7 +114,8 @@ class Library:
             ack = await self.call(plugins.direct.send_command(self.command_message(command, *params)))
         except MavsdkError:
             return Answer(None)
-        return Answer(int(json.loads(ack.fields_json)["result"]))
+        fields = whole_fields(ack.fields_json, "result")
+        return Answer(None if fields is None else fields[0])
 
     def command_message(self, command: int, *params: float) -> MavlinkMessage:
         """COMMAND_LONG to the autopilot."""

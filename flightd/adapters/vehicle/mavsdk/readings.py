@@ -19,11 +19,12 @@ _STAMP_AGE_MAX_NS = 500_000_000
 _REBOOT_US = 1_000_000
 _DOWN_DEG = 270.0
 
+_MODES = {int(mode): mode for mode in FlightMode}
 _LANDED = {
-    SdkLanded.ON_GROUND: LandedState.ON_GROUND,
-    SdkLanded.IN_AIR: LandedState.IN_AIR,
-    SdkLanded.TAKING_OFF: LandedState.IN_AIR,
-    SdkLanded.LANDING: LandedState.IN_AIR,
+    int(SdkLanded.ON_GROUND): LandedState.ON_GROUND,
+    int(SdkLanded.IN_AIR): LandedState.IN_AIR,
+    int(SdkLanded.TAKING_OFF): LandedState.IN_AIR,
+    int(SdkLanded.LANDING): LandedState.IN_AIR,
 }
 
 
@@ -79,9 +80,9 @@ class Readings:
         self._attitudes.clear()
         return samples
 
-    def take_mode(self, mode: FlightMode, now_ns: int) -> None:
-        """The library passes the flight mode on with every HEARTBEAT."""
-        self.mode, self.heartbeat_ns = FlightMode(mode), now_ns
+    def take_mode(self, mode: int, now_ns: int) -> None:
+        """The library passes the flight mode on with every HEARTBEAT; one it has no name for is unknown."""
+        self.mode, self.heartbeat_ns = _MODES.get(mode, FlightMode.UNKNOWN), now_ns
 
     def take_attitude(self, angles: Any, now_ns: int) -> None:
         """An EulerAngle, degrees."""
@@ -132,7 +133,7 @@ class Readings:
         self.armed = bool(armed)
 
     def take_landed(self, state: int, now_ns: int) -> None:
-        self._landed, self._landed_ns = _LANDED.get(SdkLanded(state), LandedState.UNKNOWN), now_ns
+        self._landed, self._landed_ns = _LANDED.get(state, LandedState.UNKNOWN), now_ns
 
     def state(self, now_ns: int, *, in_control: bool, refusal: str) -> VehicleState | None:
         """Everything at one glance; None until heartbeat and attitude were heard."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 import math
 from collections import deque
@@ -32,7 +31,7 @@ from flightd.adapters.vehicle.mavlink.timesync import ClockSync
 from flightd.adapters.vehicle.mavlink.transport import make_transport
 from flightd.adapters.vehicle.mavsdk.commander import SdkCommander
 from flightd.adapters.vehicle.mavsdk.gate import SetpointGate
-from flightd.adapters.vehicle.mavsdk.library import Library, Plugins
+from flightd.adapters.vehicle.mavsdk.library import Library, Plugins, whole_fields
 from flightd.adapters.vehicle.mavsdk.line import Line
 from flightd.adapters.vehicle.mavsdk.readings import Readings
 from flightd.core.types import (
@@ -248,9 +247,9 @@ class MavsdkVehicle:
         self._pursuit.text(_SEVERITIES.get(text.type, _INFO), text.text, now_ns)
 
     def _compare(self, message: Any, now_ns: int) -> None:
-        fields = json.loads(message.fields_json)
-        if fields["tc1"] != 0:
-            self._sync.answered(int(fields["ts1"]), int(fields["tc1"]), now_ns)
+        fields = whole_fields(message.fields_json, "tc1", "ts1")
+        if fields is not None and fields[0] != 0:
+            self._sync.answered(fields[1], fields[0], now_ns)
 
     async def _compare_clocks(self, library: Library, plugins: Plugins) -> None:
         while True:
