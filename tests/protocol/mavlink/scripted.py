@@ -11,10 +11,20 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions, MavlinkVehicle
+from flightd.core.types import VehicleState
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.link import Channel, UdpLink
 
+SET_MODE, ARM, INTERVAL = 176, 400, 511
+GUIDED_NOGPS, ALT_HOLD, LAND = 20, 2, 9
 ARDUPILOT, PX4 = dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, dialect.MAV_AUTOPILOT_PX4
+
+
+def known(vehicle: Any) -> VehicleState:
+    """A copy of what the vehicle knows now: asked for twice, it may say something else."""
+    state = vehicle.state()
+    assert state is not None
+    return VehicleState(**{name: getattr(state, name) for name in VehicleState.__slots__})
 
 
 class ScriptedAutopilot:

@@ -1,4 +1,4 @@
-"""The ArduPilot adapter on the wire: what it sends, what it believes, how it retries and lets go."""
+"""The ArduPilot adapter on the wire: what it sends and believes, its modes, the pilot."""
 
 from __future__ import annotations
 
@@ -10,28 +10,24 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, ArduPilotVehicle
-from flightd.adapters.vehicle.mavlink.outputs import PoseForm
-from flightd.adapters.vehicle.mavlink.signing import Signing
-from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions, MavlinkVehicle
-from flightd.core.geometry import wrap_pi
-from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, GridPose, VehicleState
+from flightd.core.types import AttitudeSetpoint, Demand
 from flightd.runtime.clock import LoopClock
 from flightd.sim.airframe import Airframe
-from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
+from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.peer import PeerConfig
-from flightd.sim.autopilot.radio import RadioParams
-from tests.protocol.mavlink.scripted import PX4, ScriptedAutopilot, scripted
+from tests.protocol.mavlink.scripted import (
+    ALT_HOLD,
+    ARM,
+    GUIDED_NOGPS,
+    INTERVAL,
+    LAND,
+    PX4,
+    SET_MODE,
+    ScriptedAutopilot,
+    known,
+    scripted,
+)
 from tests.protocol.rig import Rig, ardupilot_rig, run_virtual
-
-SET_MODE, ARM, INTERVAL = 176, 400, 511
-GUIDED_NOGPS, ALT_HOLD, LAND = 20, 2, 9
-
-
-def known(vehicle: Any) -> VehicleState:
-    state = vehicle.state()
-    assert state is not None
-    return VehicleState(**{name: getattr(state, name) for name in VehicleState.__slots__})
-
 
 # What we are and ask
 
@@ -181,128 +177,7 @@ def test_another_firmware_is_recognised_and_not_flown() -> None:
     run_virtual(test)
 
 
-# Commands
-
-
-def test_an_unanswered_command_is_repeated_with_rising_confirmation() -> None:
-    async def test() -> None:
-        autopilot = ScriptedAutopilot()
-        autopilot.results[SET_MODE] = [None, None, 0]
-        async with scripted(autopilot) as (_, vehicle):
-            vehicle.demand(Demand.FLY)
-            await asyncio.sleep(3.0)
-            assert [m.confirmation for m in autopilot.commands(SET_MODE)] == [0, 1, 2]
-            assert known(vehicle).in_control
-
-    run_virtual(test)
-
-
-def test_a_dead_command_channel_is_told_and_tried_again_for_ever() -> None:
-    async def test() -> None:
-        autopilot = ScriptedAutopilot()
-        autopilot.results[ARM] = None
-        async with scripted(autopilot) as (_, vehicle):
-            vehicle.demand(Demand.FLY)
-            await asyncio.sleep(10.0)
-            assert known(vehicle).refusal == "arming: no answer"
-            assert len(autopilot.commands(ARM)) > 12
-            autopilot.results[ARM] = 0
-            await asyncio.sleep(3.0)
-            assert known(vehicle).armed
-            assert known(vehicle).refusal == ""
-
-    run_virtual(test)
-
-
-def test_in_progress_is_waited_for_and_strange_results_are_refusals() -> None:
-    async def test() -> None:
-        autopilot = ScriptedAutopilot()
-        autopilot.results[SET_MODE] = 5
-        async with scripted(autopilot) as (_, vehicle):
-            autopilot.obeys = False
-
-            def finish(message: Any) -> None:
-                if message.command == SET_MODE:
-                    ack = dialect.MAVLink_command_ack_message(SET_MODE, 0, 0, 0, 1, 191)
-                    asyncio.get_running_loop().call_later(2.0, autopilot.say, ack)
-
-            autopilot.after = finish
-            vehicle.demand(Demand.FLY)
-            await asyncio.sleep(1.9)
-            assert len(autopilot.commands(SET_MODE)) == 1
-            assert not known(vehicle).in_control
-            await asyncio.sleep(0.3)
-            assert known(vehicle).in_control
-        autopilot = ScriptedAutopilot()
-        autopilot.results[SET_MODE] = 42
-        async with scripted(autopilot) as (_, vehicle):
-            vehicle.demand(Demand.FLY)
-            await asyncio.sleep(1.0)
-            assert known(vehicle).refusal == "mode GUIDED_NOGPS: result 42"
-
-    run_virtual(test)
-
-
-def test_another_clients_acknowledgement_is_not_ours() -> None:
-    async def test() -> None:
-        autopilot = ScriptedAutopilot()
-        autopilot.results[SET_MODE] = None
-        autopilot.obeys = False
-        async with scripted(autopilot) as (_, vehicle):
-            foreign = dialect.MAVLink_command_ack_message(SET_MODE, 0, 0, 0, 255, 190)
-            autopilot.after = lambda message: autopilot.say(foreign)
-            vehicle.demand(Demand.FLY)
-            await asyncio.sleep(2.0)
-            assert not known(vehicle).in_control
-
-    run_virtual(test)
-
-
-def test_arming_is_retried_with_the_autopilots_reason_until_it_is_ready() -> None:
-    async def test() -> None:
-        async with ardupilot_rig(PeerConfig(ready_s=20.0)) as rig:
-            await asyncio.sleep(1.0)
-            rig.vehicle.demand(Demand.FLY)
-            await asyncio.sleep(3.0)
-            assert rig.known().refusal == "arming: failed (PreArm: Gyros still settling)"
-            assert rig.known().in_control
-            assert not rig.known().armed
-            assert 14.0 < await rig.until(lambda: rig.known().armed, 30.0) < 19.0
-            assert rig.known().refusal == ""
-
-    run_virtual(test)
-
-
-def test_the_disarm_delay_ends_the_attempt_and_a_new_demand_begins_another() -> None:
-    async def test() -> None:
-        async with ardupilot_rig() as rig:
-            await rig.until(lambda: rig.vehicle.state() is not None)
-            rig.vehicle.demand(Demand.FLY)
-            await rig.until(lambda: rig.known().armed)
-            await rig.until(lambda: not rig.known().armed, 12.0)  # nobody asked for a climb
-            await asyncio.sleep(5.0)
-            assert not rig.known().armed
-            rig.vehicle.demand(Demand.STANDBY)
-            rig.vehicle.demand(Demand.FLY)
-            await rig.until(lambda: rig.known().armed)
-
-    run_virtual(test)
-
-
-def test_a_disarm_demand_on_the_floor_never_disarms_the_pilot() -> None:
-    async def test() -> None:
-        async with ardupilot_rig() as rig:
-            await rig.take_off(1.0)
-            while rig.known().armed:
-                await rig.stream(0.1, climb_mps=-0.3)
-            rig.vehicle.demand(Demand.DISARM)
-            await asyncio.sleep(1.0)
-            assert rig.peer.pilot_mode(CopterMode.ALT_HOLD)
-            assert rig.peer.pilot_arm()
-            await asyncio.sleep(5.0)
-            assert rig.known().armed
-
-    run_virtual(test)
+# Modes and the pilot
 
 
 @pytest.mark.parametrize("has_position", [True, False])
@@ -328,7 +203,22 @@ def test_guided_flies_a_vehicle_that_knows_its_position_and_no_other(has_positio
     run_virtual(test)
 
 
-# The pilot
+def test_landing_mode_is_ours_but_takes_no_setpoints() -> None:
+    async def test() -> None:
+        async with scripted() as (autopilot, vehicle):
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(2.0)
+            vehicle.demand(Demand.LAND)
+            await asyncio.sleep(1.0)
+            assert autopilot.mode == LAND
+            assert known(vehicle).in_control
+            assert not vehicle.send(AttitudeSetpoint(0))
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(1.0)
+            assert autopilot.mode == GUIDED_NOGPS
+            assert vehicle.send(AttitudeSetpoint(0))
+
+    run_virtual(test)
 
 
 def test_no_retry_follows_when_the_pilot_takes_over_meanwhile() -> None:
@@ -389,252 +279,5 @@ def test_a_failsafe_of_the_autopilot_counts_as_a_take_over() -> None:
             await rig.until(lambda: not rig.known().in_control, 2.0)
             assert rig.known().mode == "LAND"
             assert not any(await rig.stream(1.0))
-
-    run_virtual(test)
-
-
-# The link
-
-
-def test_rates_that_a_ground_station_overwrote_are_asked_for_again() -> None:
-    async def test() -> None:
-        async with ardupilot_rig() as rig:
-            await asyncio.sleep(5.0)
-            assert isinstance(rig.vehicle, MavlinkVehicle)
-            requests = rig.vehicle.streams.requests
-            await asyncio.sleep(10.0)
-            assert rig.vehicle.streams.requests == requests
-            for channel in rig.peer.link.channels.values():
-                channel.stream(30, 250_000_000, round(asyncio.get_running_loop().time() * 1e9))
-            rig.vehicle.attitudes()
-            await asyncio.sleep(5.0)
-            rig.vehicle.attitudes()
-            await asyncio.sleep(1.0)
-            assert len(rig.vehicle.attitudes()) == pytest.approx(50, abs=3)
-
-    run_virtual(test)
-
-
-def test_a_denied_stream_is_not_asked_for_all_the_time() -> None:
-    async def test() -> None:
-        autopilot = ScriptedAutopilot()
-        autopilot.results[INTERVAL] = 2
-        async with scripted(autopilot) as (_, _vehicle):
-            await asyncio.sleep(20.0)
-            assert len(autopilot.commands(INTERVAL)) < 12
-
-    run_virtual(test)
-
-
-def test_a_rebooted_autopilot_is_heard_again_with_its_new_clock() -> None:
-    async def test() -> None:
-        async with ardupilot_rig() as rig:
-            await asyncio.sleep(10.0)
-            rig.peer.reboot()
-            await asyncio.sleep(10.0)
-            rig.vehicle.attitudes()
-            await asyncio.sleep(1.0)
-            samples = rig.vehicle.attitudes()
-            assert len(samples) == pytest.approx(50, abs=3)
-            now_ns = asyncio.get_running_loop().time() * 1e9
-            assert 0 <= now_ns - samples[-1].stamp_ns < 0.05e9
-            await rig.take_off()
-
-    run_virtual(test)
-
-
-def test_a_reboot_in_control_is_hands_off() -> None:
-    async def test() -> None:
-        async with ardupilot_rig() as rig:
-            await rig.until(lambda: rig.vehicle.state() is not None)
-            rig.vehicle.demand(Demand.FLY)
-            await rig.until(lambda: rig.known().armed)
-            rig.peer.reboot()
-            await asyncio.sleep(10.0)
-            assert not rig.known().in_control
-            assert not rig.known().armed
-            assert not any(await rig.stream(1.0))
-
-    run_virtual(test)
-
-
-def test_an_overtaken_heartbeat_is_no_take_over() -> None:
-    async def test() -> None:
-        autopilot = ScriptedAutopilot()
-        async with scripted(autopilot) as (_, vehicle):
-            vehicle.demand(Demand.FLY)
-            await asyncio.sleep(2.0)
-            (channel,) = autopilot.link.channels.values()
-            old = dialect.MAVLink_heartbeat_message(2, 3, 129, ALT_HOLD, 4, 3)
-            channel._packer.seq = (channel._packer.seq - 3) % 256
-            autopilot.say(old)
-            channel._packer.seq = (channel._packer.seq + 2) % 256
-            await asyncio.sleep(0.5)
-            assert known(vehicle).in_control
-            autopilot.say(old)  # the same, but new
-            await asyncio.sleep(0.1)
-            assert not known(vehicle).in_control
-
-    run_virtual(test)
-
-
-def test_a_poor_radio_is_flown_through() -> None:
-    async def test() -> None:
-        radio = RadioParams(loss=0.1, delay_s=0.02, jitter_s=0.02, doubled=0.05)
-        async with ardupilot_rig(PeerConfig(ready_s=0.5, radio=radio)) as rig:
-            await rig.take_off(1.5)
-            for rate in (0.3, -0.3):
-                sent = await rig.stream(5.0, yaw_rate_radps=rate)
-                assert all(sent)
-                assert rig.known().in_control
-            samples = rig.vehicle.attitudes()
-            stamps = [sample.stamp_ns for sample in samples]
-            assert stamps == sorted(stamps)
-            errors = [
-                abs(wrap_pi(s.yaw_rad - rig.peer.truth_at(s.stamp_ns).yaw_rad - 0.7)) for s in samples[-80:]
-            ]
-            assert sum(errors) / len(errors) < math.radians(1.0)  # 30 ms of a 17 deg/s turn are half a degree
-            rig.take_over()
-            assert await rig.until(lambda: not rig.known().in_control, 1.0) < 0.3
-
-    run_virtual(test)
-
-
-def test_either_side_may_start_first() -> None:
-    async def test() -> None:
-        async with ardupilot_rig(peer_runs=False) as rig:
-            rig.peer.link.close()  # nobody listens: the kernel answers with ICMP
-            await asyncio.sleep(5.0)
-            assert rig.vehicle.state() is None
-            address = rig.peer._address
-            rig.peer._address = None
-            rig.peer._config = PeerConfig(ready_s=0.5, port=address[1])
-            serving = asyncio.create_task(rig.peer.run())
-            await rig.take_off(1.0)
-            serving.cancel()
-            await asyncio.gather(serving, return_exceptions=True)
-
-    run_virtual(test)
-
-
-# Poses
-
-
-def test_the_grid_pose_is_shared_at_thirty_hertz_if_so_chosen() -> None:
-    async def test() -> None:
-        pose = GridPose(0, "A1", 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 1.5, (0.01,) * 9, 0.9)
-        near, far = (pose.x_m + 0.4, pose.y_m), (pose.x_m + 4.0, pose.y_m)
-        for form, pad_m, expected, targets in (
-            (PoseForm.ODOMETRY, near, 60, 60),
-            (PoseForm.ODOMETRY, far, 60, 0),
-            (None, near, 0, 0),
-        ):
-            async with scripted(pose_form=form) as (autopilot, vehicle):
-                autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, 150, 0, 0, 25, 0))
-                await asyncio.sleep(0.1)
-                for _ in range(100):
-                    autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, 150, 0, 0, 25, 0))
-                    vehicle.share_pose(pose, pad_m)
-                    await asyncio.sleep(0.02)
-                assert len(autopilot.all("ODOMETRY")) == pytest.approx(expected, abs=3)
-                assert len(autopilot.all("LANDING_TARGET")) == pytest.approx(targets, abs=3)
-
-    run_virtual(test)
-
-
-def test_an_estimator_that_gets_our_pose_gets_an_origin_until_it_reports_one() -> None:
-    async def test() -> None:
-        for form in (PoseForm.ODOMETRY, None):
-            async with scripted(pose_form=form, origin_deg=(47.5, -8.25)) as (autopilot, _):
-                await asyncio.sleep(9.0)
-                sent = autopilot.all("SET_GPS_GLOBAL_ORIGIN")
-                if form is None:
-                    assert not sent
-                    continue
-                assert len(sent) >= 2  # nobody answered
-                assert (sent[0].latitude, sent[0].longitude) == (475_000_000, -82_500_000)
-                autopilot.say(dialect.MAVLink_gps_global_origin_message(475_000_000, -82_500_000, 0, 0))
-                await asyncio.sleep(5.0)
-                known = len(autopilot.all("SET_GPS_GLOBAL_ORIGIN"))
-                await asyncio.sleep(10.0)
-                assert len(autopilot.all("SET_GPS_GLOBAL_ORIGIN")) == known
-                autopilot.say(dialect.MAVLink_attitude_message(1, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))  # a reboot
-                await asyncio.sleep(3.0)
-                assert len(autopilot.all("SET_GPS_GLOBAL_ORIGIN")) > known
-
-    run_virtual(test)
-
-
-# Texts
-
-
-def test_events_are_shown_as_texts_long_ones_in_chunks() -> None:
-    async def test() -> None:
-        async with scripted() as (autopilot, vehicle):
-            vehicle.notify(Event(0, EventLevel.WARNING, "phase", "hold"))
-            vehicle.notify(Event(0, EventLevel.ERROR, "long", "x" * 100))
-            await asyncio.sleep(0.1)
-            texts = autopilot.all("STATUSTEXT")
-            assert (texts[0].severity, texts[0].text, texts[0].id) == (4, "phase: hold", 0)
-            assert [t.chunk_seq for t in texts[1:]] == [0, 1, 2]
-            assert len({t.id for t in texts[1:]}) == 1
-            assert texts[1].id > 0
-            assert "".join(t.text for t in texts[1:]) == "long: " + "x" * 100
-
-    run_virtual(test)
-
-
-def test_a_reason_in_chunks_is_told_whole() -> None:
-    async def test() -> None:
-        autopilot = ScriptedAutopilot()
-        autopilot.results[ARM] = 4
-        async with scripted(autopilot) as (_, vehicle):
-
-            def explain(message: Any) -> None:
-                if message.command == ARM:
-                    for number, part in enumerate((b"PreArm: " + b"y" * 42, b"z" * 10)):
-                        autopilot.say(dialect.MAVLink_statustext_message(2, part, 9, number))
-
-            autopilot.after = explain
-            vehicle.demand(Demand.FLY)
-            await asyncio.sleep(2.0)
-            assert known(vehicle).refusal == "arming: failed (PreArm: " + "y" * 42 + "z" * 10 + ")"
-
-    run_virtual(test)
-
-
-def test_the_flight_over_a_signed_link() -> None:
-    async def test() -> None:
-        key, clock = bytes(range(32)), LoopClock()
-        peer = ArduCopterPeer(clock, Airframe(), PeerConfig(ready_s=0.5, signing_key=key))
-        host, port = await peer.open()
-        url = f"udpout://{host}:{port}"
-        signed = ArduPilotVehicle(url, clock, MavlinkOptions(signing=Signing(key, clock, 1_795_000_000.0)))
-        bare = ArduPilotVehicle(url, clock)
-        tasks = [asyncio.create_task(part.run()) for part in (peer, signed, bare)]
-        rig = Rig(signed, peer, lambda: None, lambda apart: None)
-        await rig.take_off(1.0)
-        assert len(peer.link.channels) == 1  # the unsigned one was never heard
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-    run_virtual(test)
-
-
-def test_landing_mode_is_ours_but_takes_no_setpoints() -> None:
-    async def test() -> None:
-        async with scripted() as (autopilot, vehicle):
-            vehicle.demand(Demand.FLY)
-            await asyncio.sleep(2.0)
-            vehicle.demand(Demand.LAND)
-            await asyncio.sleep(1.0)
-            assert autopilot.mode == LAND
-            assert known(vehicle).in_control
-            assert not vehicle.send(AttitudeSetpoint(0))
-            vehicle.demand(Demand.FLY)
-            await asyncio.sleep(1.0)
-            assert autopilot.mode == GUIDED_NOGPS
-            assert vehicle.send(AttitudeSetpoint(0))
 
     run_virtual(test)

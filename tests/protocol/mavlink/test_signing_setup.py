@@ -124,3 +124,22 @@ def test_restarts_in_quick_succession_do_not_lock_the_autopilot_out(tmp_path: Pa
         companion = Codec(1, 191, Signing(KEY, StoppedClock(), NOW_UNIX_S, state))
         assert FrameParser(companion).datagram(autopilot.pack(beat))
         companion.pack(beat)
+
+
+def test_the_flight_over_a_signed_link() -> None:
+    async def test() -> None:
+        key, clock = bytes(range(32)), LoopClock()
+        peer = ArduCopterPeer(clock, Airframe(), PeerConfig(ready_s=0.5, signing_key=key))
+        host, port = await peer.open()
+        url = f"udpout://{host}:{port}"
+        signed = ArduPilotVehicle(url, clock, MavlinkOptions(signing=Signing(key, clock, 1_795_000_000.0)))
+        bare = ArduPilotVehicle(url, clock)
+        tasks = [asyncio.create_task(part.run()) for part in (peer, signed, bare)]
+        rig = Rig(signed, peer, lambda: None, lambda apart: None)
+        await rig.take_off(1.0)
+        assert len(peer.link.channels) == 1  # the unsigned one was never heard
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    run_virtual(test)

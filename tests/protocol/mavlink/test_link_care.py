@@ -1,0 +1,218 @@
+"""The link in use: rates kept, reboots, a poor radio, either side first; poses and texts over it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.adapters.vehicle.mavlink.outputs import PoseForm
+from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
+from flightd.core.geometry import wrap_pi
+from flightd.core.types import Demand, Event, EventLevel, GridPose
+from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.autopilot.radio import RadioParams
+from tests.protocol.mavlink.scripted import (
+    ALT_HOLD,
+    ARM,
+    INTERVAL,
+    ScriptedAutopilot,
+    known,
+    scripted,
+)
+from tests.protocol.rig import ardupilot_rig, run_virtual
+
+
+def test_rates_that_a_ground_station_overwrote_are_asked_for_again() -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await asyncio.sleep(5.0)
+            assert isinstance(rig.vehicle, MavlinkVehicle)
+            requests = rig.vehicle.streams.requests
+            await asyncio.sleep(10.0)
+            assert rig.vehicle.streams.requests == requests
+            for channel in rig.peer.link.channels.values():
+                channel.stream(30, 250_000_000, round(asyncio.get_running_loop().time() * 1e9))
+            rig.vehicle.attitudes()
+            await asyncio.sleep(5.0)
+            rig.vehicle.attitudes()
+            await asyncio.sleep(1.0)
+            assert len(rig.vehicle.attitudes()) == pytest.approx(50, abs=3)
+
+    run_virtual(test)
+
+
+def test_a_denied_stream_is_not_asked_for_all_the_time() -> None:
+    async def test() -> None:
+        autopilot = ScriptedAutopilot()
+        autopilot.results[INTERVAL] = 2
+        async with scripted(autopilot) as (_, _vehicle):
+            await asyncio.sleep(20.0)
+            assert len(autopilot.commands(INTERVAL)) < 12
+
+    run_virtual(test)
+
+
+def test_a_rebooted_autopilot_is_heard_again_with_its_new_clock() -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await asyncio.sleep(10.0)
+            rig.peer.reboot()
+            await asyncio.sleep(10.0)
+            rig.vehicle.attitudes()
+            await asyncio.sleep(1.0)
+            samples = rig.vehicle.attitudes()
+            assert len(samples) == pytest.approx(50, abs=3)
+            now_ns = asyncio.get_running_loop().time() * 1e9
+            assert 0 <= now_ns - samples[-1].stamp_ns < 0.05e9
+            await rig.take_off()
+
+    run_virtual(test)
+
+
+def test_an_overtaken_heartbeat_is_no_take_over() -> None:
+    async def test() -> None:
+        autopilot = ScriptedAutopilot()
+        async with scripted(autopilot) as (_, vehicle):
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(2.0)
+            (channel,) = autopilot.link.channels.values()
+            old = dialect.MAVLink_heartbeat_message(2, 3, 129, ALT_HOLD, 4, 3)
+            channel._packer.seq = (channel._packer.seq - 3) % 256
+            autopilot.say(old)
+            channel._packer.seq = (channel._packer.seq + 2) % 256
+            await asyncio.sleep(0.5)
+            assert known(vehicle).in_control
+            autopilot.say(old)  # the same, but new
+            await asyncio.sleep(0.1)
+            assert not known(vehicle).in_control
+
+    run_virtual(test)
+
+
+def test_a_poor_radio_is_flown_through() -> None:
+    async def test() -> None:
+        radio = RadioParams(loss=0.1, delay_s=0.02, jitter_s=0.02, doubled=0.05)
+        async with ardupilot_rig(PeerConfig(ready_s=0.5, radio=radio)) as rig:
+            await rig.take_off(1.5)
+            for rate in (0.3, -0.3):
+                sent = await rig.stream(5.0, yaw_rate_radps=rate)
+                assert all(sent)
+                assert rig.known().in_control
+            samples = rig.vehicle.attitudes()
+            stamps = [sample.stamp_ns for sample in samples]
+            assert stamps == sorted(stamps)
+            errors = [
+                abs(wrap_pi(s.yaw_rad - rig.peer.truth_at(s.stamp_ns).yaw_rad - 0.7)) for s in samples[-80:]
+            ]
+            assert sum(errors) / len(errors) < math.radians(1.0)  # 30 ms of a 17 deg/s turn are half a degree
+            rig.take_over()
+            assert await rig.until(lambda: not rig.known().in_control, 1.0) < 0.3
+
+    run_virtual(test)
+
+
+def test_either_side_may_start_first() -> None:
+    async def test() -> None:
+        async with ardupilot_rig(peer_runs=False) as rig:
+            rig.peer.link.close()  # nobody listens: the kernel answers with ICMP
+            await asyncio.sleep(5.0)
+            assert rig.vehicle.state() is None
+            address = rig.peer._address
+            rig.peer._address = None
+            rig.peer._config = PeerConfig(ready_s=0.5, port=address[1])
+            serving = asyncio.create_task(rig.peer.run())
+            await rig.take_off(1.0)
+            serving.cancel()
+            await asyncio.gather(serving, return_exceptions=True)
+
+    run_virtual(test)
+
+
+# Poses
+
+
+def test_the_grid_pose_is_shared_at_thirty_hertz_if_so_chosen() -> None:
+    async def test() -> None:
+        pose = GridPose(0, "A1", 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 1.5, (0.01,) * 9, 0.9)
+        near, far = (pose.x_m + 0.4, pose.y_m), (pose.x_m + 4.0, pose.y_m)
+        for form, pad_m, expected, targets in (
+            (PoseForm.ODOMETRY, near, 60, 60),
+            (PoseForm.ODOMETRY, far, 60, 0),
+            (None, near, 0, 0),
+        ):
+            async with scripted(pose_form=form) as (autopilot, vehicle):
+                autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, 150, 0, 0, 25, 0))
+                await asyncio.sleep(0.1)
+                for _ in range(100):
+                    autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, 150, 0, 0, 25, 0))
+                    vehicle.share_pose(pose, pad_m)
+                    await asyncio.sleep(0.02)
+                assert len(autopilot.all("ODOMETRY")) == pytest.approx(expected, abs=3)
+                assert len(autopilot.all("LANDING_TARGET")) == pytest.approx(targets, abs=3)
+
+    run_virtual(test)
+
+
+def test_an_estimator_that_gets_our_pose_gets_an_origin_until_it_reports_one() -> None:
+    async def test() -> None:
+        for form in (PoseForm.ODOMETRY, None):
+            async with scripted(pose_form=form, origin_deg=(47.5, -8.25)) as (autopilot, _):
+                await asyncio.sleep(9.0)
+                sent = autopilot.all("SET_GPS_GLOBAL_ORIGIN")
+                if form is None:
+                    assert not sent
+                    continue
+                assert len(sent) >= 2  # nobody answered
+                assert (sent[0].latitude, sent[0].longitude) == (475_000_000, -82_500_000)
+                autopilot.say(dialect.MAVLink_gps_global_origin_message(475_000_000, -82_500_000, 0, 0))
+                await asyncio.sleep(5.0)
+                known = len(autopilot.all("SET_GPS_GLOBAL_ORIGIN"))
+                await asyncio.sleep(10.0)
+                assert len(autopilot.all("SET_GPS_GLOBAL_ORIGIN")) == known
+                autopilot.say(dialect.MAVLink_attitude_message(1, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))  # a reboot
+                await asyncio.sleep(3.0)
+                assert len(autopilot.all("SET_GPS_GLOBAL_ORIGIN")) > known
+
+    run_virtual(test)
+
+
+# Texts
+
+
+def test_events_are_shown_as_texts_long_ones_in_chunks() -> None:
+    async def test() -> None:
+        async with scripted() as (autopilot, vehicle):
+            vehicle.notify(Event(0, EventLevel.WARNING, "phase", "hold"))
+            vehicle.notify(Event(0, EventLevel.ERROR, "long", "x" * 100))
+            await asyncio.sleep(0.1)
+            texts = autopilot.all("STATUSTEXT")
+            assert (texts[0].severity, texts[0].text, texts[0].id) == (4, "phase: hold", 0)
+            assert [t.chunk_seq for t in texts[1:]] == [0, 1, 2]
+            assert len({t.id for t in texts[1:]}) == 1
+            assert texts[1].id > 0
+            assert "".join(t.text for t in texts[1:]) == "long: " + "x" * 100
+
+    run_virtual(test)
+
+
+def test_a_reason_in_chunks_is_told_whole() -> None:
+    async def test() -> None:
+        autopilot = ScriptedAutopilot()
+        autopilot.results[ARM] = 4
+        async with scripted(autopilot) as (_, vehicle):
+
+            def explain(message: Any) -> None:
+                if message.command == ARM:
+                    for number, part in enumerate((b"PreArm: " + b"y" * 42, b"z" * 10)):
+                        autopilot.say(dialect.MAVLink_statustext_message(2, part, 9, number))
+
+            autopilot.after = explain
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(2.0)
+            assert known(vehicle).refusal == "arming: failed (PreArm: " + "y" * 42 + "z" * 10 + ")"
+
+    run_virtual(test)
