@@ -81,6 +81,7 @@ def sim(
     with FlightProgress(shown=not as_json) as progress:
         simulation = Simulation(chosen, site, conditions, seed, factor, out, progress, truth_url)
         result = fly(simulation)
+    _write_truth(simulation)
     summary = _summary(simulation, result, time.monotonic() - started)
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     _write_inventory(out / "inventory.csv", result.visited)
@@ -124,10 +125,10 @@ def _configured(
     warehouse: str | None,
     vehicle: str | None,
     settings: Sequence[str],
-    camera: dict[str, Any],
+    cameras: dict[str, Any],
 ) -> tuple[Any, Any]:
-    """Configuration and site, with the command's own options laid over the file; `camera` are the
-    simulated camera's keys, which hold unless a setting says otherwise."""
+    """Configuration and site, with the command's own options laid over the file; `cameras` are the
+    simulated cameras' keys, which hold unless a setting says otherwise."""
     from flightd.config.paths import shipped
     from flightd.config.schema import load_table, parse_config
     from flightd.config.site_file import load_site
@@ -135,8 +136,8 @@ def _configured(
 
     path = path or shipped("sim.toml")
     table = load_table(path)
-    for name, value in camera.items():
-        _lay(table, f"camera.{name}", value)
+    for key, value in cameras.items():
+        _lay(table, key, value)
     if vehicle is not None:
         _lay(table, "vehicle.kind", vehicle)
     for setting in settings:
@@ -181,9 +182,19 @@ def _scenario(paths: Sequence[Path]) -> Any:
 
 
 def _camera_keys(scenario: Any) -> dict[str, Any]:
-    """The calibration of the simulated camera, as a configuration has it."""
-    lens = scenario.camera.camera().lens
+    """The calibration of the simulated cameras, as a configuration has it."""
+    down, front = scenario.camera.camera(), scenario.front_camera.camera()
     return {
+        **_calibration("camera", down),
+        **_calibration("front_camera", front),
+        "front_camera.exposure_s": front.exposure_s,
+        "front_camera.fps": front.fps,
+    }
+
+
+def _calibration(section: str, camera: Any) -> dict[str, Any]:
+    lens = camera.lens
+    keys = {
         "width_px": lens.width_px,
         "height_px": lens.height_px,
         "fx_px": lens.fx_px,
@@ -191,8 +202,9 @@ def _camera_keys(scenario: Any) -> dict[str, Any]:
         "cx_px": lens.cx_px,
         "cy_px": lens.cy_px,
         "distortion": lens.distortion,
-        "latency_s": scenario.camera.capture_delay_s,
+        "latency_s": camera.capture_delay_s,
     }
+    return {f"{section}.{key}": value for key, value in keys.items()}
 
 
 def _make_folder(out: Path) -> None:
@@ -238,6 +250,15 @@ def _summary(simulation: Any, result: Any, wall_s: float) -> dict[str, Any]:
         "seed": simulation.seed,
         "vehicle": simulation.config.vehicle.kind,
     }
+
+
+def _write_truth(simulation: Any) -> None:
+    """`truth-stock.json`, where there is stock."""
+    from flightd.cli.simulate import truth_of
+    from flightd.sim.racks.truth import write_truth
+
+    if truth := truth_of(simulation):
+        write_truth(simulation.folder / "truth-stock.json", truth, simulation.seed)
 
 
 def _write_inventory(path: Path, visited: Sequence[str]) -> None:

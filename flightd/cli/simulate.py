@@ -12,7 +12,6 @@ import contextlib
 import math
 import multiprocessing
 import signal
-import socket
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
@@ -20,9 +19,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from flightd.adapters.camera.connect import ARDRONE_URL
 from flightd.adapters.recorder.recorder import Recorder
 from flightd.app import Daemon, FlightResult, detector_pool, ground_link, plan_of, start_of
+from flightd.cli.sim_peers import Ports, connected, free_ports, has_front_camera
 from flightd.config.schema import Config
 from flightd.config.site_file import site_toml
 from flightd.core.errors import FlightdError, RunError, UnavailableError
@@ -32,8 +31,9 @@ from flightd.grid.site import Site
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.loops import ScaledLoop, VirtualLoop
 from flightd.sim.lockstep import LockstepDetectors
+from flightd.sim.racks.truth import LocationTruth, stock_truth
 from flightd.sim.scenario import Scenario
-from flightd.sim.world import World, WorldSpec
+from flightd.sim.world import FrontSpec, World, WorldSpec
 
 DETECTION_S = 0.008
 """Modelled time of a detection in lockstep: what a companion computer needs."""
@@ -91,8 +91,8 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
         recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=True))
         truth = stack.enter_context(Recorder(simulation.truth_log, lossless=True))
         pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
-        world, camera_port, ports = await _opened(simulation, clock, truth)
-        config = _connected(simulation.config, ports, camera_port)
+        world, ports = await _opened(simulation, clock, truth)
+        config = connected(simulation.config, ports)
         await pool.ready()
         daemon = Daemon(
             config,
@@ -110,31 +110,29 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
             await asyncio.wait([running])
 
 
-async def _opened(
-    simulation: Simulation, clock: LoopClock, truth: Recorder
-) -> tuple[World, int, tuple[int, ...]]:
-    """A world that listens, its camera's and its vehicle's ports.  A port that was free a moment ago may
-    have been taken by another simulation: then others are tried."""
+async def _opened(simulation: Simulation, clock: LoopClock, truth: Recorder) -> tuple[World, Ports]:
+    """A world that listens, and its ports.  A port that was free a moment ago may have been taken by
+    another simulation: then others are tried."""
     for attempt in range(1, _PORT_TRIES + 1):
-        camera_port, ports = free_port(), _vehicle_ports(simulation.config)
-        world = World(_spec(simulation, camera_port, ports), clock, truth)
+        ports = free_ports(simulation.config, simulation.site)
+        world = World(_spec(simulation, ports), clock, truth)
         try:
             await world.open()
         except UnavailableError:
             if attempt == _PORT_TRIES or simulation.truth_url:
                 raise
         else:
-            return world, camera_port, ports
+            return world, ports
     raise AssertionError("unreachable")
 
 
 async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
     _end_on_sigterm()
     clock = LoopClock()
-    ports, camera_port = _vehicle_ports(simulation.config), free_port()
+    ports = free_ports(simulation.config, simulation.site)
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    spec = _spec(simulation, camera_port, ports)
+    spec = _spec(simulation, ports)
     process = context.Process(
         target=_run_world, args=(spec, factor, simulation.truth_log, theirs), name="world"
     )
@@ -147,7 +145,7 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
         pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
         ground = stack.enter_context(ground_link(simulation.config, simulation.site, clock) or nullcontext())
         await pool.ready()
-        config = _connected(simulation.config, ports, camera_port)
+        config = connected(simulation.config, ports)
         if simulation.truth_url:
             config = config.model_copy(update={"vehicle": simulation.config.vehicle})
         daemon = Daemon(config, simulation.site, clock, pool, recorder, [simulation.observer], ground)
@@ -245,18 +243,19 @@ def _flight_recorder(simulation: Simulation, clock: LoopClock, lossless: bool) -
     return recorder
 
 
-def _spec(simulation: Simulation, camera_port: int, vehicle_ports: tuple[int, ...]) -> WorldSpec:
-    scenario = simulation.scenario
-    adapter = simulation.config.vehicle.kind
+def _spec(simulation: Simulation, ports: Ports) -> WorldSpec:
+    scenario, config = simulation.scenario, simulation.config
+    adapter = config.vehicle.kind
     return WorldSpec(
         site=simulation.site,
         seed=simulation.seed,
-        camera_address=("127.0.0.1", camera_port),
+        camera_address=("127.0.0.1", ports.camera),
         vehicle="px4" if adapter == "mavsdk" else adapter,
-        vehicle_ports=vehicle_ports,
-        start=start_of(simulation.config, simulation.site),
-        start_yaw_rad=math.radians(simulation.config.mission.start_yaw_deg),
-        camera=replace(scenario.camera.camera(), mount=simulation.config.camera.mount()),
+        vehicle_ports=ports.vehicle,
+        start=start_of(config, simulation.site),
+        start_yaw_rad=math.radians(config.mission.start_yaw_deg),
+        camera=replace(scenario.camera.camera(), mount=config.camera.mount()),
+        front=_front(simulation, ports.front_camera),
         appearance=scenario.floor.look(),
         draught=scenario.wind.draught(),
         battery_frac=scenario.vehicle.battery,
@@ -267,30 +266,18 @@ def _spec(simulation: Simulation, camera_port: int, vehicle_ports: tuple[int, ..
     )
 
 
-def _vehicle_ports(config: Config) -> tuple[int, ...]:
-    """Free ports for the simulated vehicle: one, or the AR.Drone's four."""
-    return tuple(free_port() for _ in range(4 if config.vehicle.kind == "ardrone" else 1))
+def _front(simulation: Simulation, port: int | None) -> FrontSpec | None:
+    if port is None:
+        return None
+    scenario = simulation.scenario
+    camera = replace(scenario.front_camera.camera(), mount=simulation.config.front_camera.mount())
+    return FrontSpec(("127.0.0.1", port), camera, scenario.racks.look())
 
 
-def _connected(config: Config, ports: tuple[int, ...], camera_port: int) -> Config:
-    """The configuration with the addresses of this simulation's peers."""
-    vehicle_url, camera_url = f"udpout://127.0.0.1:{ports[0]}", f"udp://127.0.0.1:{camera_port}"
-    if config.vehicle.kind == "ardrone":
-        query = "at={}&navdata={}&video={}&control={}".format(*ports)
-        vehicle_url, camera_url = f"ardrone://127.0.0.1?{query}", ARDRONE_URL
-    return config.model_copy(
-        update={
-            "vehicle": config.vehicle.model_copy(update={"url": vehicle_url}),
-            "camera": config.camera.model_copy(update={"url": camera_url}),
-        }
-    )
-
-
-def free_port() -> int:
-    """A UDP port of the loopback interface that nobody uses now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind(("127.0.0.1", 0))
-        except OSError as err:
-            raise UnavailableError(f"no free UDP port on 127.0.0.1: {err.strerror}") from err
-        return int(probe.getsockname()[1])
+def truth_of(simulation: Simulation) -> dict[str, LocationTruth]:
+    """What is really at every location of the simulated racks; empty without a front camera before them."""
+    if not has_front_camera(simulation.config, simulation.site):
+        return {}
+    scenario = simulation.scenario
+    focal_px = scenario.front_camera.camera().lens.fx_px
+    return stock_truth(simulation.site, scenario.racks.look(), focal_px, simulation.seed)

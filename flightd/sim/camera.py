@@ -1,4 +1,4 @@
-"""The simulated down camera: a peer that renders into shared memory and tells of each picture by UDP.
+"""A simulated camera: a peer that renders into shared memory and tells of each picture by UDP.
 
 It exposes at its own rate, renders in a process of its own and delivers after the capture delay, with
 jitter, as a real camera and its driver do.  Its clock is not the daemon's.
@@ -11,27 +11,48 @@ import math
 import random
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 from flightd.core.errors import TransientError
+from flightd.core.geometry import Lens
 from flightd.core.types import Image
-from flightd.grid.site import Site
 from flightd.ports import Clock
 from flightd.runtime.child import Child
 from flightd.runtime.notice import FrameNotice, encode_notice
 from flightd.runtime.ring import FrameRing
 from flightd.sim.kinematics import Kinematics
-from flightd.sim.renderer import Appearance, Renderer, SimCamera
 
 _SPARE_SLOTS = 8
 _CLOCK_OFFSET_NS = 7_300_000_000_000
 
 
+class Optics(Protocol):
+    """What a peer must know of its camera."""
+
+    @property
+    def lens(self) -> Lens: ...
+
+    @property
+    def fps(self) -> float: ...
+
+    @property
+    def capture_delay_s(self) -> float: ...
+
+    @property
+    def jitter_s(self) -> float: ...
+
+
+class PictureMaker(Protocol):
+    """Renders one camera's pictures."""
+
+    def render(self, kinematics: Kinematics, seq: int, out: Image | None = None) -> Image: ...
+
+
 class _RenderWorker:
     """Inside the process: answers (kinematics, seq, slot) by rendering into the ring."""
 
-    def __init__(self, site: Site, camera: SimCamera, appearance: Appearance, seed: int, ring: str) -> None:
-        self._renderer = Renderer(site, camera, appearance, seed)
+    def __init__(self, make: Callable[[], PictureMaker], camera: Optics, ring: str) -> None:
+        self._renderer = make()
         self._ring = FrameRing.attach(ring, _slots(camera), camera.lens.width_px, camera.lens.height_px)
 
     def __call__(self, request: tuple[Kinematics, int, int]) -> int:
@@ -42,14 +63,15 @@ class _RenderWorker:
 
 class CameraPeer:
     """Takes pictures of what `truth_at` says until cancelled, and sends notices of them to the daemon at
-    `address`; or, with `show`, hands the pictures themselves to a vehicle that transmits them."""
+    `address`; or, with `show`, hands the pictures themselves to a vehicle that transmits them.
+
+    `make` is called in the rendering process (it must be picklable); `seed` draws the delivery's jitter."""
 
     def __init__(
         self,
-        site: Site,
-        camera: SimCamera,
-        appearance: Appearance,
-        seed: int,
+        camera: Optics,
+        make: Callable[[], PictureMaker],
+        seed: str,
         address: tuple[str, int],
         truth_at: Callable[[int], Kinematics],
         clock: Clock,
@@ -60,8 +82,8 @@ class CameraPeer:
         self._address = address
         self._truth_at = truth_at
         self._clock = clock
-        self._random = random.Random(f"camera {seed}")
-        self._make = partial(_RenderWorker, site, camera, appearance, seed)
+        self._random = random.Random(seed)
+        self._make = partial(_RenderWorker, make, camera)
         self._ready = asyncio.Event()
         self._turn = asyncio.Lock()
         self.late = 0
@@ -138,6 +160,6 @@ class CameraPeer:
             return slot
 
 
-def _slots(camera: SimCamera) -> int:
+def _slots(camera: Optics) -> int:
     """As many pictures as are on their way at once, and some that are being looked at."""
     return math.ceil(camera.fps * (camera.capture_delay_s + 4 * camera.jitter_s)) + _SPARE_SLOTS

@@ -8,6 +8,30 @@ capture_delay_s = 0.060  # from mid-exposure to arrival
 jitter_s = 0.003
 exposure_s = 0.004
 
+[front_camera]           # where the site has racks
+width_px = 1280
+height_px = 800
+focal_px = 1000.0
+fps = 4
+exposure_s = 0.002
+capture_delay_s = 0.080
+jitter_s = 0.005
+focus_m = 1.2            # distance that is in focus
+
+[racks]                  # shares of all places; what is left over has one clean label
+empty = 0.12
+tilted = 0.08
+glossy = 0.06
+several = 0.05           # two labels
+torn = 0.03
+too_small = 0.02
+missing = 0.03           # goods without a label
+occluded = 0.03          # a sheet hangs before the goods
+location_labels = true   # each location's code on the beam below it
+seed = 1                 # of the goods; left out: the flight's
+noise = 2.0              # grey levels at mid grey
+exposure = 1.0           # brightness
+
 [floor]
 appearance = "default"   # default, clean, harsh, dim, glossy or worn
 
@@ -34,6 +58,9 @@ from flightd.core.errors import InputError
 from flightd.sim.appearance import Appearance, preset
 from flightd.sim.autopilot.radio import RadioParams
 from flightd.sim.optics import SimCamera, wide_lens
+from flightd.sim.racks.camera import FrontCamera, front_lens
+from flightd.sim.racks.look import RackLook
+from flightd.sim.racks.stock import StockShares
 from flightd.sim.wind import Draught
 
 
@@ -61,6 +88,62 @@ class CameraScenario(_Section):
             exposure_s=self.exposure_s,
             capture_delay_s=self.capture_delay_s,
             jitter_s=self.jitter_s,
+        )
+
+
+class FrontCameraScenario(_Section):
+    width_px: int = Field(1280, ge=64, le=4096)
+    height_px: int = Field(800, ge=64, le=4096)
+    focal_px: float = Field(1000.0, gt=50, le=20_000)
+    fps: float = Field(4.0, ge=0.5, le=60)
+    exposure_s: float = Field(0.002, gt=0, le=0.01)
+    capture_delay_s: float = Field(0.080, ge=0, le=1)
+    jitter_s: float = Field(0.005, ge=0, le=0.1)
+    focus_m: float = Field(1.2, gt=0.1, le=100)
+
+    def camera(self) -> FrontCamera:
+        return FrontCamera(
+            lens=front_lens(self.width_px, self.height_px, self.focal_px),
+            fps=self.fps,
+            exposure_s=self.exposure_s,
+            capture_delay_s=self.capture_delay_s,
+            jitter_s=self.jitter_s,
+            focus_m=self.focus_m,
+        )
+
+
+_USUAL = StockShares()
+
+
+class RacksScenario(_Section):
+    empty: float = Field(_USUAL.empty, ge=0, le=1)
+    tilted: float = Field(_USUAL.tilted, ge=0, le=1)
+    glossy: float = Field(_USUAL.glossy, ge=0, le=1)
+    several: float = Field(_USUAL.several, ge=0, le=1)
+    torn: float = Field(_USUAL.torn, ge=0, le=1)
+    too_small: float = Field(_USUAL.too_small, ge=0, le=1)
+    missing: float = Field(_USUAL.missing, ge=0, le=1)
+    occluded: float = Field(_USUAL.occluded, ge=0, le=1)
+    location_labels: bool = True
+    seed: int | None = Field(None, ge=0)
+    noise: float = Field(2.0, ge=0, le=20)
+    exposure: float = Field(1.0, gt=0, le=3)
+
+    @model_validator(mode="after")
+    def _shares_leave_room(self) -> Self:
+        self.shares()
+        return self
+
+    def shares(self) -> StockShares:
+        return StockShares(**{name: getattr(self, name) for name in StockShares.names()})
+
+    def look(self) -> RackLook:
+        return RackLook(
+            shares=self.shares(),
+            seed=self.seed,
+            location_labels=self.location_labels,
+            noise=self.noise,
+            exposure=self.exposure,
         )
 
 
@@ -97,6 +180,8 @@ class Scenario(_Section):
     """One simulated world's conditions."""
 
     camera: CameraScenario = CameraScenario()
+    front_camera: FrontCameraScenario = FrontCameraScenario()
+    racks: RacksScenario = RacksScenario()
     floor: FloorScenario = FloorScenario()
     wind: WindScenario = WindScenario()
     vehicle: VehicleScenario = VehicleScenario()

@@ -27,10 +27,23 @@ from flightd.sim.crew import PadCrew
 from flightd.sim.external import ExternalVehicle, Placement
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.optics import SimCamera
+from flightd.sim.racks.camera import FrontCamera
+from flightd.sim.racks.look import RackLook
+from flightd.sim.racks.renderer import FrontRenderer
+from flightd.sim.renderer import Renderer
 from flightd.sim.sensors import Sensors
 from flightd.sim.wind import Draught
 
 _TRUTH_PERIOD_S = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class FrontSpec:
+    """A front camera before racks, and the address that it reports to."""
+
+    address: tuple[str, int]
+    camera: FrontCamera = field(default_factory=FrontCamera)
+    look: RackLook = field(default_factory=RackLook)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +61,7 @@ class WorldSpec:
     start: str | None = None
     start_yaw_rad: float = 0.0
     camera: SimCamera = field(default_factory=SimCamera)
+    front: FrontSpec | None = None
     appearance: Appearance = DEFAULT
     draught: Draught = field(default_factory=Draught)
     battery_frac: float = 1.0
@@ -99,16 +113,27 @@ class World:
             self.vehicle = peer(clock, airframe, PeerConfig(port=port, seed=spec.seed, radio=spec.radio))
         own = not spec.truth_url
         self._crew = PadCrew(spec.site, airframe, spec.swap_s) if own and spec.swap_s else None
-        self.camera = CameraPeer(
-            spec.site,
-            spec.camera,
-            spec.appearance,
-            spec.seed,
-            spec.camera_address,
-            self.vehicle.truth_at,
-            clock,
-            show,
-        )
+        self._cameras = {
+            "camera": CameraPeer(
+                spec.camera,
+                partial(Renderer, spec.site, spec.camera, spec.appearance, spec.seed),
+                f"camera {spec.seed}",
+                spec.camera_address,
+                self.vehicle.truth_at,
+                clock,
+                show,
+            )
+        }
+        if spec.front is not None:
+            front = spec.front
+            self._cameras["front-camera"] = CameraPeer(
+                front.camera,
+                partial(FrontRenderer, spec.site, front.camera, front.look, spec.seed),
+                f"front camera {spec.seed}",
+                front.address,
+                self.vehicle.truth_at,
+                clock,
+            )
 
     async def open(self) -> tuple[str, int]:
         """Bind the vehicle's sockets; the address to which a daemon sends commands.  UnavailableError when
@@ -124,7 +149,8 @@ class World:
         await self.open()
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self.vehicle.run(), name="autopilot")
-            tasks.create_task(self.camera.run(), name="camera")
+            for name, camera in self._cameras.items():
+                tasks.create_task(camera.run(), name=name)
             tasks.create_task(self._log_truth(), name="truth")
             if self._crew is not None:
                 tasks.create_task(self._crew.run(self._clock, self._at), name="crew")

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.cli.simulate import free_port
+from flightd.cli.sim_peers import free_port
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.geometry import wrap_pi
 from flightd.runtime.clock import LoopClock

@@ -27,6 +27,7 @@ from flightd.sim.ardrone.server import ArDroneServer, Ports
 from flightd.sim.ardrone.video import Channel
 from flightd.sim.camera import CameraPeer
 from flightd.sim.optics import SimCamera
+from flightd.sim.renderer import Renderer
 from flightd.sim.sensors import Sensors
 
 _NOBODY = ("127.0.0.1", 9)
@@ -63,8 +64,10 @@ async def _serve(site: Site, ports: Ports, seed: int, battery_frac: float) -> No
     server = ArDroneServer(Drone(airframe, Sensors(seed=seed)), clock, ports)
     await server.open()
     print(f"AR.Drone 2.0 on {server.ports}", flush=True)
+    optics = SimCamera()
+    make = partial(Renderer, site, optics, DEFAULT, seed)
     show = partial(server.show, camera=Channel.BOTTOM)
-    camera = CameraPeer(site, SimCamera(), DEFAULT, seed, _NOBODY, server.truth_at, clock, show)
+    camera = CameraPeer(optics, make, f"camera {seed}", _NOBODY, server.truth_at, clock, show)
     async with asyncio.TaskGroup() as tasks:
         tasks.create_task(server.run(), name="drone")
         tasks.create_task(camera.run(), name="camera")

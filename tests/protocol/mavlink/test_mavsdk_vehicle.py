@@ -21,7 +21,7 @@ from flightd.adapters.vehicle.mavsdk.gate import FRESH_NS, SetpointGate, message
 from flightd.adapters.vehicle.mavsdk.library import whole_fields
 from flightd.adapters.vehicle.mavsdk.readings import Readings
 from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
-from flightd.cli.simulate import free_port
+from flightd.cli.sim_peers import free_port
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import Attitude, Demand, LandedState

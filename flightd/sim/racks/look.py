@@ -1,0 +1,25 @@
+"""What stands in the racks and how the front camera's picture comes out: one frozen set of shares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from flightd.sim.racks.stock import StockShares
+
+
+@dataclass(frozen=True, slots=True)
+class RackLook:
+    """`shares` of the places; `seed` of the goods, the flight's own when None; `location_labels` hangs a
+    small label with each location's code on the beam below it.  `noise` is the standard deviation in grey
+    levels at mid grey, `soft_px` the sigma of the lens blur, `exposure` scales the brightness, `flicker`
+    is the share of it that beats with the mains."""
+
+    shares: StockShares = field(default_factory=StockShares)
+    seed: int | None = None
+    location_labels: bool = True
+    noise: float = 2.0
+    soft_px: float = 0.5
+    vignetting: float = 0.2
+    exposure: float = 1.0
+    flicker: float = 0.01
+    motion_blur: bool = True

@@ -1,0 +1,99 @@
+"""The simulated front camera as a peer: its pictures reach a daemon's camera, with the right calibration."""
+
+import asyncio
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flightd.adapters.camera.shared import SharedCamera
+from flightd.cli.sim import _camera_keys, _configured
+from flightd.cli.sim_peers import free_port, has_front_camera
+from flightd.cli.simulate import Simulation, truth_of
+from flightd.config.schema import Config
+from flightd.config.site_file import load_site
+from flightd.core.types import Image
+from flightd.runtime.clock import LoopClock
+from flightd.runtime.loops import VirtualLoop
+from flightd.runtime.ring import FrameRing, FrameTicket
+from flightd.sim.camera import CameraPeer
+from flightd.sim.kinematics import Kinematics
+from flightd.sim.racks.camera import FrontCamera, front_lens
+from flightd.sim.racks.look import RackLook
+from flightd.sim.racks.renderer import FrontRenderer
+from flightd.sim.scenario import FrontCameraScenario, Scenario
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+SMALL = CONFIGS / "site-racks-small.toml"
+
+
+def hovering(stamp_ns: int) -> Kinematics:
+    return Kinematics(stamp_ns, 1.3, 0.0, 1.6, 0.0, 0.0, 0.0, 0.0, 0.0, -1.5708, 0.0, 0.0, 0.0)
+
+
+def test_pictures_arrive_at_their_rate_after_their_delay_as_they_were_rendered() -> None:
+    camera = FrontCamera(lens=front_lens(320, 200, 250.0), fps=5.0, capture_delay_s=0.08, jitter_s=0.0)
+    make = partial(FrontRenderer, load_site(SMALL), camera, RackLook(), 1)
+    taken: list[tuple[FrameTicket, int, Image]] = []
+
+    async def main() -> None:
+        clock, port = LoopClock(), free_port()
+
+        def take(ticket: FrameTicket) -> None:
+            ring = FrameRing.attach(ticket.ring, ticket.slots, ticket.width_px, ticket.height_px)
+            taken.append((ticket, clock.now_ns(), ring.pixels(ticket.slot).copy()))
+
+        address = f"udp://127.0.0.1:{port}"
+        listener = SharedCamera(address, (320, 200), 0.08, clock, take, pytest.fail)
+        peer = CameraPeer(camera, make, "front camera 1", ("127.0.0.1", port), hovering, clock)
+        listening = asyncio.ensure_future(listener.run())
+        await asyncio.sleep(0)
+        running = asyncio.ensure_future(peer.run())
+        await asyncio.sleep(1.5)
+        for task in (running, listening):
+            task.cancel()
+        await asyncio.wait([running, listening])
+        assert peer.late == 0
+
+    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+        runner.run(main())
+    assert 5 <= len(taken) <= 8
+    for ticket, arrival_ns, _ in taken:
+        assert arrival_ns - ticket.stamp_ns == pytest.approx(80e6, abs=5e6)
+    ticket, _, picture = taken[-1]
+    # the exposure's time only enters by the lamps' flicker
+    expected = make().render(hovering(0), ticket.seq)
+    assert np.abs(picture.astype(int) - expected).mean() < 3.0
+
+
+def configured(site: Path, *settings: str, scenario: Scenario = Scenario()) -> Config:  # noqa: B008
+    config, _ = _configured(None, str(site), None, settings, _camera_keys(scenario))
+    assert isinstance(config, Config)
+    return config
+
+
+def test_the_daemon_is_given_the_simulated_cameras_calibration() -> None:
+    scenario = Scenario(front_camera=FrontCameraScenario(width_px=1600, focal_px=1200.0, exposure_s=0.004))
+    front = configured(SMALL, scenario=scenario).front_camera
+    camera = scenario.front_camera.camera()
+    assert front.lens() == camera.lens
+    assert (front.fps, front.exposure_s, front.latency_s) == (4.0, 0.004, camera.capture_delay_s)
+
+
+def test_there_is_a_front_camera_where_there_are_racks_or_one_is_asked_for() -> None:
+    demo = load_site(CONFIGS / "site-large.toml")
+    small = load_site(SMALL)
+    assert has_front_camera(configured(SMALL), small)
+    assert not has_front_camera(configured(SMALL), demo)
+    assert has_front_camera(configured(SMALL, "front_camera.url=udp://127.0.0.1:5601"), demo)
+    assert not has_front_camera(configured(SMALL, "vehicle.kind=ardrone"), small)
+
+
+def test_the_truth_of_a_simulation_is_that_of_its_scenario_and_seed(tmp_path: Path) -> None:
+    config, site = configured(SMALL), load_site(SMALL)
+    here, there = (truth_of(Simulation(config, site, Scenario(), seed, None, tmp_path)) for seed in (1, 2))
+    assert here.keys() == site.locations.keys()
+    assert here != there
+    bare = load_site(CONFIGS / "site-large.toml")
+    assert truth_of(Simulation(config, bare, Scenario(), 1, None, tmp_path)) == {}
