@@ -126,34 +126,22 @@ def _order(context: Context, kind: str, node: str, as_json: bool) -> None:
         print(f"{kind} {node}".strip() + ": accepted")
 
 
-@app.command()
-def start(context: Context, as_json: AsJson = False) -> None:
-    """Start the mission that waits in preflight.
+def _add_order(kind: str, text: str) -> None:
+    def order(context: Context, as_json: AsJson = False) -> None:
+        _order(context, kind, "", as_json)
 
-    \b
-    flightctl start
-    """
-    _order(context, "start", "", as_json)
+    app.command(kind, help=f"{text}\n\n\b\nflightctl {kind}")(order)
 
 
-@app.command()
-def pause(context: Context, as_json: AsJson = False) -> None:
-    """Hold the position until `resume`.
-
-    \b
-    flightctl pause
-    """
-    _order(context, "pause", "", as_json)
-
-
-@app.command()
-def resume(context: Context, as_json: AsJson = False) -> None:
-    """Go on after `pause`.
-
-    \b
-    flightctl resume
-    """
-    _order(context, "resume", "", as_json)
+for _kind, _text in {
+    "start": "Start the mission that waits in preflight.",
+    "pause": "Hold the position until `resume`.",
+    "resume": "Go on after `pause`.",
+    "home": "Fly home along the lines and land on the pad.",
+    "land": "Land here and now.",
+    "stop": "End the mission: down at once, wherever it is.",
+}.items():
+    _add_order(_kind, _text)
 
 
 @app.command()
@@ -168,36 +156,6 @@ def goto(
     flightctl goto B3
     """
     _order(context, "goto", node, as_json)
-
-
-@app.command()
-def home(context: Context, as_json: AsJson = False) -> None:
-    """Fly home along the lines and land on the pad.
-
-    \b
-    flightctl home
-    """
-    _order(context, "home", "", as_json)
-
-
-@app.command()
-def land(context: Context, as_json: AsJson = False) -> None:
-    """Land here and now.
-
-    \b
-    flightctl land
-    """
-    _order(context, "land", "", as_json)
-
-
-@app.command()
-def stop(context: Context, as_json: AsJson = False) -> None:
-    """End the mission: down at once, wherever it is.
-
-    \b
-    flightctl stop
-    """
-    _order(context, "stop", "", as_json)
 
 
 @app.command()

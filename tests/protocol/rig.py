@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
-from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
@@ -20,13 +19,14 @@ from flightd.runtime.clock import LoopClock
 from flightd.runtime.loops import VirtualLoop
 from flightd.sim.airframe import Airframe
 from flightd.sim.ardrone.drone import Drone
-from flightd.sim.ardrone.server import ArDroneServer, Ports
+from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.sensors import Sensors
 from flightd.sim.wind import Draught
+from tests.protocol.ardrone.bench import ANY_PORTS, settings_for
 from tests.protocol.patience import PatientLoop
 
 CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
@@ -147,19 +147,8 @@ _PATIENT_PX4 = PeerConfig(ready_s=0.5, parameters={"COM_OF_LOSS_T": 6.5})
 async def ardrone_rig(**settings: Any) -> AsyncIterator[Rig]:
     clock = LoopClock()
     drone = Drone(Airframe(draught=CALM), Sensors())
-    async with ArDroneServer(drone, clock, Ports(at=0, navdata=0, video=0, control=0)) as server:
-        ports = server.ports
-        vehicle = ArDroneVehicle(
-            ArDroneSettings(
-                host=ports.host,
-                at_port=ports.at,
-                navdata_port=ports.navdata,
-                video_port=ports.video,
-                control_port=ports.control,
-                **settings,
-            ),
-            clock,
-        )
+    async with ArDroneServer(drone, clock, ANY_PORTS) as server:
+        vehicle = ArDroneVehicle(settings_for(server, **settings), clock)
 
         def cut(apart: bool) -> None:
             server.radio = not apart
