@@ -16,23 +16,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.fit import fit_lines, is_bent
+from flightd.vision.fit import fit_rows, is_bent
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, Strip, bisector
 
-TRIALS = 72
+TRIALS = 96
 MAX_SLOPE = 1.25
 """dv/du of a band described along its own axis; a little beyond the diagonal so that none falls between."""
 
 _MIN_CUTS = 5
-_ROUNDS = 2
+_WORTH_ANOTHER_ROUND = 8
 """Draws go to long bands first; what they leave over is drawn from once more, for the short ones."""
-_NEAR_SLABS, _FAR_SLABS = (3, 6), (14, 30)
-_SLAB_KEY = 1e6
+_SLAB_KEY, _SLABS_APART, _APART_PX = 1e6, 1 << 20, 1 << 17
 
-_RANDOM = np.random.default_rng(20190909).random((3, TRIALS))
+_DRAWS = np.random.default_rng(20190909)
 """The same draws for every frame: one frame, one answer."""
+_RANDOM = _DRAWS.random(TRIALS)
+_NEAR, _FAR = _DRAWS.integers(3, 6, TRIALS, endpoint=True), _DRAWS.integers(14, 30, TRIALS, endpoint=True)
+"""Slabs from a centroid to those that give its local slope and its partner."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +82,17 @@ def cut(mask: Image, grid: Grid, *, steep: bool, spacing: int) -> Cuts:
 def find(mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
     """Straight bands in the mask, each described along its own axis."""
     spacing = slab_spacing(cv2.countNonZero(mask) / mask.size)
+    both = [
+        _straightened(cut(mask, grid, steep=steep, spacing=spacing), plane, steep=steep)
+        for steep in (True, False)
+    ]
+    cuts = _Both.of(*both, grid.step)
     strips: list[Strip] = []
-    for steep in (True, False):
-        cuts = cut(mask, grid, steep=steep, spacing=spacing)
-        strips += _bands(_straightened(cuts, plane, steep=steep), grid.step, strips, steep=steep)
+    for fewest in (_MIN_CUTS, _WORTH_ANOTHER_ROUND):
+        left = np.flatnonzero(cuts.free)
+        if len(left) < fewest or not (found := _ransac(cuts, left)):
+            break
+        strips += found
     return strips
 
 
@@ -99,80 +108,114 @@ def _straightened(cuts: Cuts, plane: Plane, *, steep: bool) -> Cuts:
     return Cuts(cuts.slab, (u_low + u_high) / 2, low, high, cuts.whole, cuts.spacing_px)
 
 
-def _bands(cuts: Cuts, step: int, known: list[Strip], *, steep: bool) -> list[Strip]:
-    """The bands through the cuts, except those of the `known` bands, which run the other way."""
-    usable = cuts.whole.copy()
-    if known:
-        centre = (cuts.low + cuts.high) / 2
-        for other in known:
-            away = np.abs(cuts.u - other.centre.a - other.centre.b * centre)
-            usable &= away > max(step, 0.15 * other.width_px / other.cosine)
-    strips: list[Strip] = []
-    for _ in range(_ROUNDS):
-        left = np.flatnonzero(usable)
-        if len(left) < _MIN_CUTS:
-            break
-        found, free = _ransac(cuts, left, step, steep=steep)
-        strips += found
-        usable[left[~free]] = False
-        if not found:
-            break
-    return strips
+@dataclass(frozen=True, slots=True)
+class _Both:
+    """The cuts by rows (steep bands, the first `split`) and by columns (shallow ones) in one list.
 
-
-def _ransac(
-    cuts: Cuts, chosen: NDArray[np.intp], step: int, *, steep: bool
-) -> tuple[list[Strip], NDArray[np.bool_]]:
-    """Sequential RANSAC: one matrix of hypotheses against centroids serves all bands of a direction.
-
-    Returns the bands and which of the chosen cuts belong to none.
+    The columns' slabs are numbered far beyond the rows', and their centroids lie `apart` pixels beyond:
+    so no hypothesis in one direction finds a cut of the other near.  `ahead` is the way, along u, on
+    which more slabs lie.
     """
-    slab, u, low, high = cuts.slab[chosen], cuts.u[chosen], cuts.low[chosen], cuts.high[chosen]
-    middle, width = (low + high) / 2, high - low
+
+    slab: NDArray[np.intp]
+    ahead: NDArray[np.intp]
+    middle: Array
+    points: Array
+    free: NDArray[np.bool_]
+    split: int
+    spacing_px: float
+    step: int
+
+    @staticmethod
+    def of(rows: Cuts, columns: Cuts, step: int) -> _Both:
+        parts = []
+        for number, cuts in enumerate((rows, columns)):
+            w = cuts.whole
+            slab = cuts.slab[w]
+            points = np.stack((cuts.u, cuts.low, cuts.high)).compress(w, axis=1)
+            centre = (slab[0] + slab[-1]) / 2 if len(slab) else 0.0
+            parts.append((slab + number * _SLABS_APART, np.where(slab < centre, 1, -1), points))
+        slab, ahead = (np.concatenate((parts[0][k], parts[1][k])) for k in (0, 1))
+        split, n = len(parts[0][0]), len(slab)
+        points = np.empty((4, n))
+        points[0] = 1.0
+        points[1:, :split], points[1:, split:] = parts[0][2], parts[1][2]
+        middle = (points[2] + points[3]) / 2
+        middle[split:] += _APART_PX
+        return _Both(slab, ahead, middle, points, np.ones(n, np.bool_), split, rows.spacing_px, step)
+
+    def side(self, *, steep: bool) -> slice:
+        return slice(0, self.split) if steep else slice(self.split, None)
+
+    def take(self, strip: Strip) -> None:
+        """The cuts of a band that was found are no other's, in neither direction."""
+        b, step, width = strip.centre.b, self.step, strip.width_px / strip.cosine
+        for steep in (True, False):
+            side = self.side(steep=steep)
+            u, middle = self.points[1, side], self.middle[side]
+            if not steep:
+                middle = middle - _APART_PX
+            if steep == strip.steep:
+                away, reach = middle - strip.centre.a - b * u, step + 0.15 * width
+            else:
+                away, reach = u - strip.centre.a - b * middle, max(step, 0.15 * width)
+            self.free[side] &= np.abs(away) > reach
+
+
+def _ransac(cuts: _Both, chosen: NDArray[np.intp]) -> list[Strip]:
+    """Sequential RANSAC: one matrix of hypotheses against centroids serves all bands of both directions.
+
+    Takes the cuts of the bands it finds off the free ones, and those that made no band after all.
+    """
     strips: list[Strip] = []
-    free = np.ones(len(u), np.bool_)
-    i, j = _pairs(slab, u, middle)
-    b = (middle[j] - middle[i]) / (u[j] - u[i])
-    width_b = (width[j] - width[i]) / (u[j] - u[i])
+    step = cuts.step
+    u, low, high = cuts.points[1:].take(chosen, axis=1)
+    middle, width = cuts.middle[chosen], (high - low).astype(np.float32)
+    i, j = _pairs(cuts.slab[chosen], cuts.ahead[chosen], middle)
+    du = u[j] - u[i]
+    b, width_b = (middle[j] - middle[i]) / du, (width[j] - width[i]) / du
     good = (np.abs(b) <= MAX_SLOPE) & (np.abs(width[j] - width[i]) <= 0.25 * (width[j] + width[i]) + 2 * step)
-    if not good.any():
-        return strips, free
     i, b, width_b = i[good], b[good], width_b[good]
-    du = (u - u[i][:, None]).astype(np.float32)
-    off = np.abs((middle - middle[i][:, None]).astype(np.float32) - b.astype(np.float32)[:, None] * du)
-    expected = width.astype(np.float32)[i][:, None] + width_b.astype(np.float32)[:, None] * du
-    inlier = off <= step + 0.08 * expected
-    inlier &= np.abs(width.astype(np.float32) - expected) <= 2 * step + 0.25 * expected
+    if not len(i):
+        return strips
+    # off = v - (v_i + b (u - u_i)) for all hypotheses and cuts in one product each; likewise the widths.
+    ones = np.ones_like(u)
+    known = np.stack((u, ones))
+    expected = (np.stack((width_b, width[i] - width_b * u[i]), axis=1) @ known).astype(np.float32)
+    off = (middle - np.stack((b, middle[i] - b * u[i]), axis=1) @ known).astype(np.float32)
+    inlier = np.abs(off) <= step + 0.08 * expected
+    inlier &= np.abs(width - expected) <= 2 * step + 0.25 * expected
     votes = inlier.astype(np.float32)
+    free = np.ones(len(u), np.bool_)
     scores = votes.sum(axis=1)
     while scores[best := int(scores.argmax())] >= _MIN_CUTS:
         taken = inlier[best] & free
-        strip = _fit_band(u, low, high, np.flatnonzero(taken), step, cuts.spacing_px, steep=steep)
+        strip = _fit_band(cuts, chosen[taken], steep=bool(chosen[i[best]] < cuts.split))
         if strip is not None:
             strips.append(strip)
-            reach = step + 0.15 * (strip.high.at(0.0) - strip.low.at(0.0))
-            taken |= np.abs(middle - strip.centre.a - strip.centre.b * u) <= reach
-        free &= ~taken
+            cuts.take(strip)
+        cuts.free[chosen[taken]] = False
+        free = cuts.free[chosen]
         scores = votes @ free.astype(np.float32)
-    return strips, free
+    return strips
 
 
-def _pairs(slab: NDArray[np.intp], u: Array, middle: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _pairs(
+    slab: NDArray[np.intp], ahead: NDArray[np.intp], middle: Array
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Random centroids, each with a partner far along the band it seems to belong to.
 
     A nearby slab gives the local slope, which says where to look in a slab further on: nearly every pair
     lies on one band, where blind pairs on k bands would agree once in k.
     """
-    n = len(u)
-    i = (_RANDOM[0] * n).astype(np.intp) if n > TRIALS else np.arange(n)
-    draws = _RANDOM[:, : len(i)]
+    n = len(slab)
+    i = (_RANDOM * n).astype(np.intp) if n > TRIALS else np.arange(n)
     key = slab * _SLAB_KEY + middle
-    ahead = np.where(slab[i] - slab[0] < (slab[-1] - slab[0]) / 2, 1, -1)
-    near = ahead * np.rint(_NEAR_SLABS[0] + draws[1] * (_NEAR_SLABS[1] - _NEAR_SLABS[0])).astype(np.intp)
-    j, same = _nearest(key, slab, middle, slab[i] + near, middle[i])
-    i, ahead, j, draw = i[same], ahead[same], j[same], draws[2][same]
+    here, ahead = middle[i], ahead[i]
+    near, far = ahead * _NEAR[: len(i)], ahead * _FAR[: len(i)]
+    j, same = _nearest(key, slab, middle, slab[i] + near, here)
+    i, j, far = i[same], j[same], far[same]
     slope = (middle[j] - middle[i]) / (slab[j] - slab[i])
-    far = ahead * np.rint(_FAR_SLABS[0] + draw * (_FAR_SLABS[1] - _FAR_SLABS[0])).astype(np.intp)
     k, same = _nearest(key, slab, middle, slab[i] + far, middle[i] + slope * far)
     return i, np.where(same, k, j)
 
@@ -189,35 +232,34 @@ def _nearest(
     return np.where(use_after, after, before), after_ok | before_ok
 
 
-def _fit_band(
-    u: Array, low: Array, high: Array, members: NDArray[np.intp], step: int, spacing_px: float, *, steep: bool
-) -> Strip | None:
+def _fit_band(cuts: _Both, members: NDArray[np.intp], *, steep: bool) -> Strip | None:
     """Straight edges through the members' ends; None when they are too few, too short, or bent."""
+    step, spacing_px = cuts.step, cuts.spacing_px
     noise = step / math.sqrt(12)
+    side = cuts.points[:, cuts.side(steep=steep)]
+    _, u, low, high = side
+    inside = cuts.points.take(members, axis=1)
     for _ in range(2):
-        if len(members) < _MIN_CUTS:
+        if inside.shape[1] < _MIN_CUTS:
             return None
-        low_fit, high_fit = fit_lines(u[members], (low[members], high[members]), noise)
+        low_fit, high_fit = fit_rows(inside, noise)
         # Once more through all cuts that agree with both edges.
-        off_low = np.abs(low - low_fit.a - low_fit.b * u)
-        off_high = np.abs(high - high_fit.a - high_fit.b * u)
         limit = 1.2 * step + 0.05 * abs(high_fit.at(0.0) - low_fit.at(0.0))
-        members = np.flatnonzero((off_low <= limit) & (off_high <= limit))
-    if len(members) < _MIN_CUTS:
-        return None
+        agree = np.abs(low - low_fit.a - low_fit.b * u) <= limit
+        agree &= np.abs(high - high_fit.a - high_fit.b * u) <= limit
+        inside = side.compress(agree, axis=1)
+    count = inside.shape[1]
     centre = bisector(low_fit, high_fit)
-    inside = u[members]
-    if abs(centre.b) > MAX_SLOPE:
+    if count < _MIN_CUTS or abs(centre.b) > MAX_SLOPE:
         return None
-    reach = 0.3 * (float(inside.max()) - float(inside.min()))
+    u0, u1 = float(inside[1, 0]), float(inside[1, -1])
+    reach = 0.3 * (u1 - u0)
     middle = (low + high) / 2
     around = np.abs(middle - centre.a - centre.b * u) <= limit + 2 * step
-    around &= (u >= inside.min() - reach) & (u <= inside.max() + reach)
-    if is_bent((inside, middle[members]), (u[around], middle[around]), noise):
+    around &= (u >= u0 - reach) & (u <= u1 + reach)
+    core = inside[1], (inside[2] + inside[3]) / 2
+    if is_bent(core, (u[around], middle[around]), noise):
         return None
-    u0, u1 = float(inside.min()), float(inside.max())
     slabs = max(1.0, (u1 - u0) / spacing_px + 1)
-    strip = Strip(
-        steep, centre, low_fit, high_fit, u0 - spacing_px / 2, u1 + spacing_px / 2, len(members) / slabs
-    )
+    strip = Strip(steep, centre, low_fit, high_fit, u0 - spacing_px / 2, u1 + spacing_px / 2, count / slabs)
     return strip if strip.width_px > 0 else None

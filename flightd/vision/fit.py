@@ -17,25 +17,26 @@ stays below it."""
 
 def fit_line(u: Array, v: Array, sigma: float) -> LinearFit:
     """Least squares v = a + b u, each v good to at least `sigma`; the covariance follows the scatter."""
-    return fit_lines(u, (v,), sigma)[0]
+    return fit_rows(np.stack((np.ones_like(u), u, v)), sigma)[0]
 
 
-def fit_lines(u: Array, vs: tuple[Array, ...], sigma: float) -> list[LinearFit]:
-    """`fit_line` of each of `vs` over the same `u`."""
-    n = len(u)
-    mean_u = float(np.add.reduce(u)) / n
-    du = u - mean_u
-    suu = float(du @ du)
+def fit_rows(points: Array, sigma: float) -> list[LinearFit]:
+    """`fit_line` of each of the rows from the third on of the (K, N) `points`, whose first is ones and
+    whose second is u.  One product of the points with themselves holds all the sums."""
+    sums = (points @ points.T).tolist()
+    n, su, suu = sums[0][0], sums[0][1], sums[1][1]
+    mean_u = su / n
+    suu -= su * mean_u
     fits = []
-    for v in vs:
-        mean_v = float(np.add.reduce(v)) / n
-        dv = v - mean_v
-        suv = float(du @ dv)
+    for k in range(2, len(sums)):
+        sv, suv, svv = sums[0][k], sums[1][k], sums[k][k]
+        suv -= mean_u * sv
         b = suv / suu if suu > 0 else 0.0
-        variance = max(sigma * sigma, (float(dv @ dv) - b * suv) / max(1, n - 2))
+        variance = max(sigma * sigma, (svv - sv * sv / n - b * suv) / max(1.0, n - 2))
         var_b = variance / suu if suu > 0 else variance
-        var_a = variance / n + mean_u * mean_u * var_b
-        fits.append(LinearFit(mean_v - b * mean_u, b, var_a, var_b, -mean_u * var_b))
+        fits.append(
+            LinearFit(sv / n - b * mean_u, b, variance / n + mean_u * mean_u * var_b, var_b, -mean_u * var_b)
+        )
     return fits
 
 
@@ -55,21 +56,30 @@ def is_bent(core: tuple[Array, Array], around: tuple[Array, Array], sigma: float
 def sagitta(u: Array, v: Array, sigma: float) -> tuple[float, float, float]:
     """Height of the best parabola's arc over its chord, its standard deviation, and the chord."""
     n = len(u)
-    chord = float(u.max() - u.min()) if n >= 5 else 0.0
+    if n < 5:
+        return 0.0, math.inf, 0.0
+    first, last = float(u.min()), float(u.max())
+    chord = last - first
     if chord <= 0:
         return 0.0, math.inf, 0.0
-    t = (u - float(np.add.reduce(u)) / n) * (2 / chord)
+    rows = np.empty((4, n))
+    rows[0] = 1.0
+    t = np.multiply(u, 2 / chord, out=rows[1])
+    t -= (first + last) / chord
+    np.multiply(t, t, out=rows[2])
+    np.subtract(v, v[0], out=rows[3])
+    (_, s1, s2, sv), (_, _, s3, s1v), (_, _, s4, s2v), (_, _, _, svv) = (rows @ rows.T).tolist()
     # v = c0 + c1 t + c2 q with q the part of t^2 that no straight line explains: the sagitta is c2, to
     # within how unevenly the points lie.
-    tt = t * t
-    stt = float(t @ t)
-    q = tt - stt / n - (float(t @ tt) / stt) * t
-    sqq = float(q @ q)
+    stt, stq, stv = s2 - s1 * s1 / n, s3 - s1 * s2 / n, s1v - s1 * sv / n
+    if stt <= 1e-9 * n:
+        return 0.0, math.inf, chord
+    sqq, sqv = s4 - s2 * s2 / n - stq * stq / stt, s2v - s2 * sv / n - stq * stv / stt
     if sqq <= 1e-9 * n:
         return 0.0, math.inf, chord
-    c1, c2 = float(t @ v) / stt, float(q @ v) / sqq
-    residual = v - float(np.add.reduce(v)) / n - c1 * t - c2 * q
-    variance = max(sigma * sigma, float(residual @ residual) / max(1, n - 3))
+    c1, c2 = stv / stt, sqv / sqq
+    residual = svv - sv * sv / n - c1 * stv - c2 * sqv
+    variance = max(sigma * sigma, residual / max(1, n - 3))
     slope = math.hypot(1.0, c1 * 2 / chord)
     return c2 / slope, math.sqrt(variance / sqq) / slope, chord
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.fit import fit_line, fit_lines, is_bent
+from flightd.vision.fit import fit_rows, is_bent
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, LinearFit, Strip
@@ -88,7 +88,7 @@ def find(
     ys, xs = np.divmod(place, ridge.shape[1])
     radius = distance.ravel()[place].astype(float) * grid.step
     x, y = plane.ideal(grid.x(xs), grid.y(ys))
-    points = _Ridge(x, y, radius, np.ones(len(x), np.bool_), grid.step)
+    points = _Ridge(x, y, radius, np.ones(len(x)), np.ones(len(x), np.bool_), grid.step)
     strips = [_take_band(points, *_normal(seed), passes=1) for seed in seeds]
     need = max(_MIN_POINTS, round(_VOTE_SHARE * max(mask.shape)))
     if np.count_nonzero(points.free) >= need:
@@ -108,6 +108,7 @@ class _Ridge:
     x: Array
     y: Array
     radius: Array
+    ones: Array
     free: NDArray[np.bool_]
     step: int
 
@@ -174,22 +175,25 @@ def _fit_ridge(
     """A straight line through the ridge; None when too little of it is straight and of one width."""
     radius, step = ridge.radius, ridge.step
     noise = step / math.sqrt(6)
+    points = np.stack((ridge.ones, u, v, radius))
     for _ in range(passes):
         # The band may taper; where others cross or join it, the ridge is wider than its own line says.
-        half = fit_line(u[members], radius[members], noise)
-        off = np.abs(radius[members] - half.a - half.b * u[members])
-        kept = members[off <= 1.2 * step + 0.2 * radius[members]]
-        if len(kept) < _MIN_POINTS:
+        near = points.take(members, axis=1)
+        _, half = fit_rows(near, noise)
+        off = np.abs(near[3] - half.a - half.b * near[1])
+        near = near.compress(off <= 1.2 * step + 0.2 * near[3], axis=1)
+        if near.shape[1] < _MIN_POINTS:
             return None
-        fit, half = fit_lines(u[kept], (v[kept], radius[kept]), noise)
+        fit, half = fit_rows(near, noise)
         away = np.abs(v - fit.a - fit.b * u)
         members = np.flatnonzero((away <= 1.5 * step) & ridge.free)
         if len(members) < _MIN_POINTS:
             return None
-    first, last = float(u[kept].min()), float(u[kept].max())
+    along, across = near[1], near[2]
+    first, last = float(along.min()), float(along.max())
     reach = 0.3 * (last - first)
     around = (away <= 3 * step) & (u >= first - reach) & (u <= last + reach)
-    if is_bent((u[kept], v[kept]), (u[around], v[around]), noise):
+    if is_bent((along, across), (u[around], v[around]), noise):
         return None
     # The distance is to the first unpainted sample's centre: half a sample beyond the edge.
     stretch = math.hypot(1.0, fit.b)
@@ -201,5 +205,5 @@ def _fit_ridge(
     variance = step * step / 4
     low = LinearFit(fit.a - a, fit.b - b, fit.var_a + variance, fit.var_b, fit.cov_ab)
     high = LinearFit(fit.a + a, fit.b + b, fit.var_a + variance, fit.var_b, fit.cov_ab)
-    slabs = np.count_nonzero(np.bincount(((u[kept] - u0) / step).astype(np.intp)))
+    slabs = np.count_nonzero(np.bincount(((along - u0) / step).astype(np.intp)))
     return Strip(steep, fit, low, high, u0, u1, slabs * step / (u1 - u0))
