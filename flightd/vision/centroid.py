@@ -17,17 +17,19 @@ from numpy.typing import NDArray
 
 from flightd.core.types import Image
 from flightd.vision.fit import fit_rows, is_bent
-from flightd.vision.plane import Plane
+from flightd.vision.plane import Plane, shortest_length
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, Strip, bisector
 
-TRIALS = 96
+TRIALS = 80
 MAX_SLOPE = 1.25
 """dv/du of a band described along its own axis; a little beyond the diagonal so that none falls between."""
 
 _MIN_CUTS = 5
-_WORTH_ANOTHER_ROUND = 8
+_ROUNDS = 2
 """Draws go to long bands first; what they leave over is drawn from once more, for the short ones."""
+_WORTH_A_FIT = 0.6
+"""A band is fitted when so great a part of the slabs that the shortest band crosses vote for it."""
 _SLAB_KEY, _SLABS_APART, _APART_PX = 1e6, 1 << 20, 1 << 17
 
 _DRAWS = np.random.default_rng(20190909)
@@ -88,9 +90,12 @@ def find(mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
     ]
     cuts = _Both.of(*both, grid.step)
     strips: list[Strip] = []
-    for fewest in (_MIN_CUTS, _WORTH_ANOTHER_ROUND):
+    # A diagonal band crosses fewest slabs for its length.
+    crossed = shortest_length(plane) * math.sqrt(0.5) / cuts.spacing_px
+    fewest = max(_MIN_CUTS, math.ceil(_WORTH_A_FIT * crossed))
+    for _ in range(_ROUNDS):
         left = np.flatnonzero(cuts.free)
-        if len(left) < fewest or not (found := _ransac(cuts, left)):
+        if len(left) < fewest or not (found := _ransac(cuts, left, fewest)):
             break
         strips += found
     return strips
@@ -162,8 +167,9 @@ class _Both:
             self.free[side] &= np.abs(away) > reach
 
 
-def _ransac(cuts: _Both, chosen: NDArray[np.intp]) -> list[Strip]:
-    """Sequential RANSAC: one matrix of hypotheses against centroids serves all bands of both directions.
+def _ransac(cuts: _Both, chosen: NDArray[np.intp], fewest: int) -> list[Strip]:
+    """Sequential RANSAC: one matrix of hypotheses against centroids serves all bands of both directions,
+    down to those with the `fewest` votes.
 
     Takes the cuts of the bands it finds off the free ones, and those that made no band after all.
     """
@@ -188,7 +194,7 @@ def _ransac(cuts: _Both, chosen: NDArray[np.intp]) -> list[Strip]:
     votes = inlier.astype(np.float32)
     free = np.ones(len(u), np.bool_)
     scores = votes.sum(axis=1)
-    while scores[best := int(scores.argmax())] >= _MIN_CUTS:
+    while scores[best := int(scores.argmax())] >= fewest:
         taken = inlier[best] & free
         strip = _fit_band(cuts, chosen[taken], steep=bool(chosen[i[best]] < cuts.split))
         if strip is not None:

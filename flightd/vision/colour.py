@@ -141,11 +141,18 @@ def floor_field(small_bgr: Image, colour: str) -> Image:
     size = (min(_FIELD_WIDTH, width), max(round(height * min(_FIELD_WIDTH, width) / width), 1))
     cells = np.asarray(cv2.resize(small_bgr, size, interpolation=cv2.INTER_LINEAR), np.uint8)
     grey = np.asarray(cv2.cvtColor(cells, cv2.COLOR_BGR2GRAY), np.uint8)
-    frame = float(np.median(grey))
+    frame = _middle(grey.ravel())
     darkest, brightest = _LOCAL_RANGE.get(colour, _OTHER_LOCAL_RANGE)
-    floor = np.clip(cv2.medianBlur(grey, _NEIGHBOURHOOD), frame * darkest, frame * brightest)
-    tinted = np.clip(floor[..., None] * _floor_tint(cells[::2, ::2]), 1.0, 255.0)
-    return tinted.astype(np.uint8)
+    floor = np.asarray(cv2.medianBlur(grey, _NEIGHBOURHOOD), np.float32)
+    floor = np.minimum(np.maximum(floor, frame * darkest), frame * brightest)
+    tinted = floor[..., None] * _floor_tint(cells[::2, ::2])
+    return np.minimum(np.maximum(tinted, 1.0), 255.0).astype(np.uint8)
+
+
+def _middle(values: NDArray[np.uint8]) -> float:
+    """The median; of an even number, the upper of the two in the middle."""
+    middle = len(values) // 2
+    return float(np.partition(values, middle)[middle])
 
 
 def _floor_tint(cells: Image) -> NDArray[np.float64]:
@@ -206,7 +213,7 @@ def grow(levels: Levels) -> NDArray[np.uint8]:
     """
     strong = levels >= STRONG
     seeds = int(np.count_nonzero(strong))
-    if seeds * _FEWEST_SEEDS < np.count_nonzero(levels):
+    if seeds * _FEWEST_SEEDS < cv2.countNonZero(levels):
         return np.where(levels, np.uint8(255), np.uint8(0))
     kept = np.zeros(TABLE_SIZE, np.uint8)
     if levels.size < TABLE_SIZE * 2:  # too few pixels for more separate parts than 16 bits can number

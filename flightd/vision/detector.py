@@ -13,7 +13,7 @@ from flightd.core.geometry import Lens
 from flightd.core.types import Image, LineSet
 from flightd.vision import centroid, combine, evidence, junctions, naive, skeleton
 from flightd.vision.colour import ColourProfile, classify, grow, load_profile
-from flightd.vision.plane import Plane
+from flightd.vision.plane import Plane, shortest_length
 from flightd.vision.refine import refine
 from flightd.vision.sampling import Grid, grid_for, sample
 from flightd.vision.strip import Strip
@@ -92,7 +92,7 @@ class Detector:
             return naive.find(mask, grid, plane)
         guesses = self._guess(mask, grid, plane)
         mark("guess")
-        shortest = evidence.shortest_length(plane)
+        shortest = shortest_length(plane)
         if self.method != "combined":
             return evidence.select(guesses, shortest, [])
         frame = np.ascontiguousarray(bgr)

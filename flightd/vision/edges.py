@@ -22,7 +22,7 @@ from flightd.vision.strip import Array, Strip
 Floats: TypeAlias = NDArray[np.float32]
 Indices: TypeAlias = NDArray[np.intp]
 
-STATIONS = 384
+STATIONS = 320
 """Shared among all edges of a frame."""
 MIN_CONTRAST = 4.0
 """Grey levels between floor and paint below which there is no edge."""
@@ -35,7 +35,7 @@ _LUMA = np.array([[0.114, 0.587, 0.299]])
 _CHROMA = np.eye(3) - np.ones((3, 1)) @ _LUMA
 _TRUST = (_LUMA.T @ _LUMA + _CHROMA.T @ _CHROMA / CHROMA_VARIANCE).astype(np.float32)
 """Inverse of the noise's covariance in BGR, luma's variance being one."""
-_MIN_STATIONS, _MAX_STATIONS = 24, 128
+_MIN_STATIONS, _MAX_STATIONS = 24, 112
 _AGREE_PX = (4.0, 2.0)
 _GOLDEN = 0.6180339887498949
 

@@ -6,7 +6,6 @@ that a guess made from part of a band gets the band's true span, gaps included.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -150,7 +149,3 @@ def _explained(strip: Strip, others: list[Strip]) -> float:
         )
     return float(covered.mean())
 
-
-def shortest_length(plane: Plane) -> float:
-    """Shortest band reported, in pixels."""
-    return 0.08 * math.hypot(plane.width_px, plane.height_px)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -63,3 +64,8 @@ class Plane:
             xd * lens.fx_px + (lens.cx_px - centre_x),
             yd * lens.fy_px + (lens.cy_px - centre_y),
         )
+
+
+def shortest_length(plane: Plane) -> float:
+    """Shortest band reported, in pixels."""
+    return 0.08 * math.hypot(plane.width_px, plane.height_px)
