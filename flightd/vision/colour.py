@@ -15,6 +15,7 @@ its tint from grey only as much as cameras and lamps make it.
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
@@ -51,6 +52,10 @@ _OTHER_LOCAL_RANGE = (0.45, 2.2)
 _TINT_RANGE = (0.65, 1.55)
 _FEWEST_SEEDS = 20
 """One strong pixel in so many is enough to seed the bands of a picture."""
+
+_WEAK_BAND, _WEAK_LENGTH = 0.002, 0.15
+"""Weak pixels that touch no strong one are looked at when there are so many of all, and kept where they
+hang together over this part of the picture's diagonal."""
 
 _BRIGHT_FLOOR = 135.0
 _MAX_STRETCH = 3.0
@@ -215,12 +220,21 @@ def grow(levels: Levels) -> NDArray[np.uint8]:
     seeds = int(np.count_nonzero(strong))
     if seeds * _FEWEST_SEEDS < cv2.countNonZero(levels):
         return np.where(levels, np.uint8(255), np.uint8(0))
-    kept = np.zeros(TABLE_SIZE, np.uint8)
-    if levels.size < TABLE_SIZE * 2:  # too few pixels for more separate parts than 16 bits can number
-        _, parts = cv2.connectedComponents(levels, connectivity=8, ltype=cv2.CV_16U)
-        kept[parts[strong]] = 255
-        return _look_up(kept, np.asarray(parts, np.uint16))
-    count, many = cv2.connectedComponents(levels, connectivity=8, ltype=cv2.CV_32S)
-    kept = np.zeros(count, np.uint8)
-    kept[many[strong]] = 255
-    return kept.take(np.asarray(many))
+    few = levels.size < TABLE_SIZE * 2  # too few pixels for more separate parts than 16 bits can number
+    count, parts = cv2.connectedComponents(levels, connectivity=8, ltype=cv2.CV_16U if few else cv2.CV_32S)
+    kept = np.zeros(TABLE_SIZE if few else count, np.uint8)
+    kept[parts[strong]] = 255
+    mask = _look_up(kept, np.asarray(parts, np.uint16)) if few else kept.take(np.asarray(parts))
+    if cv2.countNonZero(levels) - cv2.countNonZero(mask) > _WEAK_BAND * levels.size:
+        mask |= _long_parts(np.where(mask, np.uint8(0), levels))
+    return mask
+
+
+def _long_parts(levels: Levels) -> NDArray[np.uint8]:
+    """(h, w) mask of the parts that are as long as a band: light that fell off along a whole line has left
+    no strong pixel on it, and what is no band does not pass the tests of shape and edge that follow."""
+    count, parts, stats, _ = cv2.connectedComponentsWithStats(levels, connectivity=8, ltype=cv2.CV_32S)
+    length = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
+    kept = np.where(length >= _WEAK_LENGTH * math.hypot(*levels.shape), np.uint8(255), np.uint8(0))
+    kept[0] = 0
+    return kept.take(np.asarray(parts))
