@@ -150,7 +150,7 @@ def floor_field(small_bgr: Image, colour: str) -> Image:
     darkest, brightest = _LOCAL_RANGE.get(colour, _OTHER_LOCAL_RANGE)
     floor = np.asarray(cv2.medianBlur(grey, _NEIGHBOURHOOD), np.float32)
     floor = np.minimum(np.maximum(floor, frame * darkest), frame * brightest)
-    tinted = floor[..., None] * _floor_tint(cells[::2, ::2])
+    tinted = floor[..., None] * _floor_tint(cells[::2, ::2], colour)
     return np.minimum(np.maximum(tinted, 1.0), 255.0).astype(np.uint8)
 
 
@@ -160,18 +160,31 @@ def _middle(values: NDArray[np.uint8]) -> float:
     return float(np.partition(values, middle)[middle])
 
 
-def _floor_tint(cells: Image) -> NDArray[np.float64]:
-    """(3,) colour of the less colourful half of the cells, in units of its brightness, within limits."""
+def _floor_tint(cells: Image, colour: str) -> NDArray[np.float64]:
+    """(3,) colour of the floor in units of its brightness, as far as the light makes it.
+
+    The light tints even the least colourful cells; the floor's own tint is the median of the less
+    colourful half, within limits about the light's.  White lines are themselves among the least colourful,
+    and on grass or a painted floor they have the light's tint, not the floor's: for them, half-way.
+    """
     pixels = cells.reshape(-1, 3)
     blue, green, red = pixels.T
     most = np.maximum(np.maximum(blue, green), red)
     saturation = (most - np.minimum(np.minimum(blue, green), red)) / (most + 8.0)
-    middle = len(pixels) // 2
-    plain = pixels[saturation <= np.partition(saturation, middle)[middle]]
-    plain.sort(axis=0)
-    colour = plain[len(plain) // 2] + 1.0
-    tint: NDArray[np.float64] = np.clip(colour / float(colour @ _LUMA_BGR), *_TINT_RANGE)
-    return tint
+    order = saturation.argsort()
+    light = _tint(pixels[order[: max(len(order) // 10, 1)]], 1.0)
+    floor = _tint(pixels[order[: len(order) // 2 + 1]], light)
+    return np.sqrt(light * floor) if colour == "white" else floor
+
+
+def _tint(pixels: Image, about: NDArray[np.float64] | float) -> NDArray[np.float64]:
+    """(3,) median colour in units of its brightness, within `_TINT_RANGE` about another."""
+    pixels.sort(axis=0)
+    colour = pixels[len(pixels) // 2] + 1.0
+    darkest, brightest = _TINT_RANGE
+    tint = colour / float(colour @ _LUMA_BGR)
+    limited: NDArray[np.float64] = np.minimum(np.maximum(tint, about * darkest), about * brightest)
+    return limited
 
 
 def level(small_bgr: Image, colour: str) -> Image:

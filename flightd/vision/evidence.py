@@ -127,7 +127,9 @@ def select(found: list[Evidence], shortest_px: float, known: list[Strip]) -> lis
     kept: list[Strip] = []
     for evidence in sorted(found, key=lambda e: -e.score):
         strip = evidence.strip
-        if evidence.length_px < max(shortest_px, 1.3 * strip.width_px):
+        if strip.length_px < 1.3 * strip.width_px:
+            continue
+        if evidence.length_px < max(shortest_px, 0.6 * strip.width_px):
             continue
         if _explained(strip, known + kept) <= 0.5:
             kept.append(strip)

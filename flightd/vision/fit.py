@@ -50,7 +50,7 @@ def is_bent(core: tuple[Array, Array], around: tuple[Array, Array], sigma: float
     if abs(wide) <= max(MAX_BOW * chord, 4 * wide_sigma):
         return False
     narrow, narrow_sigma, chord = sagitta(*core, sigma)
-    return narrow * wide > 0 and abs(narrow) > max(0.3 * MAX_BOW * chord, narrow_sigma)
+    return narrow * wide > 0 and abs(narrow) > max(0.5 * MAX_BOW * chord, narrow_sigma)
 
 
 def sagitta(u: Array, v: Array, sigma: float) -> tuple[float, float, float]:

@@ -20,14 +20,15 @@ _MIN_SHARE = 0.46
 """Of the stations that show paint between floor, the part at which the edges are where they should be."""
 _WORST_CLEAR = 0.6
 """Crossings and gaps excuse missing edges down to this clear part; a chain of blobs has less."""
-_COMPACT_ASPECT, _COMPACT_SHARE = 3.5, 0.20
-"""Below this length to width a blob may pass for a band: each unit less asks for that much more share."""
+_COMPACT_ASPECT, _COMPACT_SHARE, _COMPACT_FRAYED = 5.0, 0.14, 0.4
+"""Below this length to width a blob may pass for a band: each unit less asks for that much more share,
+and edges as sharp as a short line's are."""
 _USUAL_SCATTER_PX, _FRAYED_SHARE, _SHARP_SHARE = 0.7, 0.5, 0.2
 """A pixel of scatter more asks for so much more share, one less for so much less; points all over the
 window, on no edge at all, have 1.4."""
 _MAX_BOW = 0.006
 _MIN_BOW_PX = 1.2
-_PLAIN_CLEAR, _PLAIN_ASPECT, _PLAIN_LENGTH = 0.8, 8.0, 0.45
+_PLAIN_SUPPORT, _PLAIN_CLEAR, _PLAIN_ASPECT, _PLAIN_LENGTH = 0.85, 0.5, 8.0, 0.45
 _LENS_BOW = 0.004
 
 
@@ -62,7 +63,8 @@ def _unrefined(strip: Strip, plane: Plane) -> Strip | None:
     """A long clear band is believed even where its edges are not straight: a lens nobody calibrated bends
     them.  It keeps the guess, good to what such a lens does."""
     shortest = max(_PLAIN_ASPECT * strip.width_px, _PLAIN_LENGTH * min(plane.width_px, plane.height_px))
-    if strip.clear < _PLAIN_CLEAR or strip.length_px < shortest or strip.width_px < _MIN_WIDTH_PX:
+    solid = strip.support >= _PLAIN_SUPPORT and strip.clear >= _PLAIN_CLEAR
+    if not solid or strip.length_px < shortest or strip.width_px < _MIN_WIDTH_PX:
         return None
     off, turn = _LENS_BOW * strip.length_px, 2 * _LENS_BOW
     c = strip.centre
@@ -77,9 +79,13 @@ def _is_line(strip: Strip, lines: RobustLines, visible: Array, edges: list[int |
     share = sum(float(lines.points[e] / visible[e]) for e in seen) / 2
     aspect = strip.length_px / max(strip.width_px, 1.0)
     rough = max(float(lines.scatter[e]) for e in seen) - _USUAL_SCATTER_PX
-    need = _MIN_SHARE + _COMPACT_SHARE * max(0.0, _COMPACT_ASPECT - aspect)
-    need += rough * (_FRAYED_SHARE if rough > 0 else _SHARP_SHARE)
-    if share < need * max(_WORST_CLEAR, strip.clear):
+    compact = max(0.0, _COMPACT_ASPECT - aspect)
+    need = _MIN_SHARE + _COMPACT_SHARE * compact
+    need += rough * (_FRAYED_SHARE + _COMPACT_FRAYED * compact if rough > 0 else _SHARP_SHARE)
+    # Edges where there is no paint are something else's: then gaps are no excuse.
+    if share <= strip.support:
+        need *= max(_WORST_CLEAR, strip.clear)
+    if share < need:
         return False
     # A curve bends both edges the same way.
     bow = sum(float(lines.bow[e]) for e in seen) / len(seen)
