@@ -55,7 +55,7 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
             low, high = (None if e is None else lines.fit(e) for e in edges)
             refined.append(_assemble(strip, low, high))
         else:
-            refined.append(_unrefined(strip, plane))
+            refined.append(None if _is_curve(strip, lines, edges) else _unrefined(strip, plane))
     return refined
 
 
@@ -69,6 +69,14 @@ def _unrefined(strip: Strip, plane: Plane) -> Strip | None:
     off, turn = _LENS_BOW * strip.length_px, 2 * _LENS_BOW
     c = strip.centre
     return replace(strip, centre=replace(c, var_a=c.var_a + off * off, var_b=c.var_b + turn * turn))
+
+
+def _is_curve(strip: Strip, lines: RobustLines, edges: list[int | None]) -> bool:
+    """Whether both edges bend the same way by more than a lens bends them.  They are followed only some
+    pixels from a straight line: what bends further shows no more than that."""
+    bows = [float(lines.bow[e]) for e in edges if e is not None]
+    least = min(bows, key=abs, default=0.0)
+    return len({bow > 0 for bow in bows}) == 1 and abs(least) > max(_MIN_BOW_PX, _LENS_BOW * strip.length_px)
 
 
 def _is_line(strip: Strip, lines: RobustLines, visible: Array, edges: list[int | None]) -> bool:
