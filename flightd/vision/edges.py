@@ -24,8 +24,9 @@ Indices: TypeAlias = NDArray[np.intp]
 
 STATIONS = 320
 """Shared among all edges of a frame."""
-MIN_CONTRAST = 4.0
-"""Grey levels between floor and paint below which there is no edge."""
+_MIN_CONTRAST, _CONTRAST_PART, _DARK_CONTRAST = 4.0, 0.04, 1.2
+"""Grey levels between floor and paint below which there is no edge: less in a dark picture, whose paint
+differs by as large a part, down to what rounding to whole levels leaves."""
 CHROMA_VARIANCE = 3.0
 """How much noisier colour differences are than luma: sensors and codecs give them half the resolution."""
 FINE = 4
@@ -45,7 +46,7 @@ class Taps:
     """Pixels across the guessed edges: (E, S) places, (E, S, T) taps from floor to paint.
 
     `row` counts along u and `base` along v in raw pixels; tap t of an edge is pixel base + sign (t - half).
-    `seen` (E, S) tells which guessed places are in the picture.
+    `seen` (E, S) tells which guessed places are in the picture; edges need `least_contrast` grey levels.
     """
 
     steep: NDArray[np.bool_]
@@ -56,6 +57,7 @@ class Taps:
     seen: NDArray[np.bool_]
     profile: Floats
     contrast: Array
+    least_contrast: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +101,8 @@ def take(bgr: Image, strips: list[Strip], plane: Plane, half: int) -> Taps:
     index = (row * stride_u + base * stride_v)[:, :, None] + offset[:, None, :]
     pixels = bgr.reshape(-1, 3).take(index, axis=0).astype(np.float32)
     profile, contrast = _project(pixels, seen)
-    return Taps(steep, sign, row, base, half, seen, profile, contrast)
+    least = min(max(_CONTRAST_PART * float(pixels.mean()), _DARK_CONTRAST), _MIN_CONTRAST)
+    return Taps(steep, sign, row, base, half, seen, profile, contrast, least)
 
 
 def rough(taps: Taps) -> tuple[Array, Array]:
@@ -108,7 +111,7 @@ def rough(taps: Taps) -> tuple[Array, Array]:
     rise = p[..., 3:] + p[..., 2:-1] - p[..., 1:-2] - p[..., :-3]
     best = rise.argmax(axis=-1)
     strength = np.take_along_axis(rise, best[..., None], axis=-1)[..., 0]
-    found = (strength > np.maximum(0.5 * taps.contrast[:, None], 2 * MIN_CONTRAST)) & taps.seen
+    found = (strength > np.maximum(0.5 * taps.contrast[:, None], 2 * taps.least_contrast)) & taps.seen
     shift = best + (1.5 - taps.half)
     # The guess is nearly parallel: the edge is where most stations agree on the shift from it.
     agreed = row_medians(shift, found)[:, None]
@@ -133,7 +136,7 @@ def locate(taps: Taps, rough_a: Array, rough_b: Array, plane: Plane) -> Edges:
     usable &= taps.seen
     floor, paint = p[..., :2].mean(axis=-1), p[..., -2:].mean(axis=-1)
     step = paint - floor
-    usable &= step > np.maximum(0.35 * taps.contrast[:, None], MIN_CONTRAST)
+    usable &= step > np.maximum(0.35 * taps.contrast[:, None], taps.least_contrast)
     painted = (p - floor[..., None]).sum(axis=-1) / np.where(usable, step, 1.0)
     position = middle - taps.half + FINE + 0.5 - painted
     usable &= np.abs(position - expected) <= 2.5

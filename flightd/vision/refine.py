@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from flightd.core.types import Image
-from flightd.vision.edges import FINE, MIN_CONTRAST, locate, rough, take
+from flightd.vision.edges import FINE, locate, rough, take
 from flightd.vision.fit import RobustLines, robust_lines
 from flightd.vision.plane import Plane
 from flightd.vision.strip import Array, LinearFit, Strip, bisector
@@ -28,7 +28,9 @@ _USUAL_SCATTER_PX, _FRAYED_SHARE, _SHARP_SHARE = 0.7, 0.5, 0.2
 window, on no edge at all, have 1.4."""
 _MAX_BOW = 0.006
 _MIN_BOW_PX = 1.2
-_PLAIN_SUPPORT, _PLAIN_CLEAR, _PLAIN_ASPECT, _PLAIN_LENGTH = 0.85, 0.5, 8.0, 0.45
+_PLAIN_ASPECT, _PLAIN_LENGTH, _PLAIN_SUPPORT = 8.0, 0.45, 0.85
+_PLAIN_CLEAR, _PARTLY_CLEAR, _PLAIN_SHARE = 0.8, 0.5, 0.3
+"""A band is believed for its paint alone where it is so clear, or less where a part of its edges shows."""
 _LENS_BOW = 0.004
 
 
@@ -48,22 +50,24 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
     refined: list[Strip | None] = []
     for k, strip in enumerate(strips):
         edges = [
-            e if taps.contrast[e] > MIN_CONTRAST and lines.points[e] >= _MIN_POINTS else None
+            e if taps.contrast[e] > taps.least_contrast and lines.points[e] >= _MIN_POINTS else None
             for e in (2 * k, 2 * k + 1)
         ]
-        if _is_line(strip, lines, visible, edges):
+        share = sum(float(lines.points[e] / visible[e]) for e in edges if e is not None) / 2
+        if _is_line(strip, lines, share, edges):
             low, high = (None if e is None else lines.fit(e) for e in edges)
             refined.append(_assemble(strip, low, high))
         else:
-            refined.append(None if _is_curve(strip, lines, edges) else _unrefined(strip, plane))
+            refined.append(None if _is_curve(strip, lines, edges) else _unrefined(strip, share, plane))
     return refined
 
 
-def _unrefined(strip: Strip, plane: Plane) -> Strip | None:
+def _unrefined(strip: Strip, share: float, plane: Plane) -> Strip | None:
     """A long clear band is believed even where its edges are not straight: a lens nobody calibrated bends
-    them.  It keeps the guess, good to what such a lens does."""
+    them, and chalk on grass has none.  It keeps the guess, good to what such a lens does."""
     shortest = max(_PLAIN_ASPECT * strip.width_px, _PLAIN_LENGTH * min(plane.width_px, plane.height_px))
-    solid = strip.support >= _PLAIN_SUPPORT and strip.clear >= _PLAIN_CLEAR
+    clear = _PLAIN_CLEAR if share < _PLAIN_SHARE else _PARTLY_CLEAR
+    solid = strip.support >= _PLAIN_SUPPORT and strip.clear >= clear
     if not solid or strip.length_px < shortest or strip.width_px < _MIN_WIDTH_PX:
         return None
     off, turn = _LENS_BOW * strip.length_px, 2 * _LENS_BOW
@@ -79,12 +83,11 @@ def _is_curve(strip: Strip, lines: RobustLines, edges: list[int | None]) -> bool
     return len({bow > 0 for bow in bows}) == 1 and abs(least) > max(_MIN_BOW_PX, _LENS_BOW * strip.length_px)
 
 
-def _is_line(strip: Strip, lines: RobustLines, visible: Array, edges: list[int | None]) -> bool:
-    """Two straight edges, or one that is seen all along."""
+def _is_line(strip: Strip, lines: RobustLines, share: float, edges: list[int | None]) -> bool:
+    """Two straight edges, or one that is seen all along; `share` is the part of both that was found."""
     seen = [e for e in edges if e is not None]
     if not seen:
         return False
-    share = sum(float(lines.points[e] / visible[e]) for e in seen) / 2
     aspect = strip.length_px / max(strip.width_px, 1.0)
     rough = max(float(lines.scatter[e]) for e in seen) - _USUAL_SCATTER_PX
     compact = max(0.0, _COMPACT_ASPECT - aspect)
