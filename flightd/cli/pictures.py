@@ -49,6 +49,7 @@ def list_files(paths: Sequence[Path]) -> list[Path]:
 
 def pictures(path: Path) -> Iterator[Picture]:
     """The one picture of an image file, or every frame of a video."""
+    _refuse_streams(path)
     if path.suffix.lower() in VIDEO_SUFFIXES:
         yield from _frames(path)
     else:
@@ -60,6 +61,7 @@ def read_image(path: Path) -> Image:
 
     Raises InputError naming the file when it cannot be read or decoded.
     """
+    _refuse_streams(path)
     try:
         data = np.fromfile(path, np.uint8)
     except OSError as err:
@@ -77,6 +79,12 @@ def read_image(path: Path) -> Image:
     if decoded.dtype != np.uint8:
         raise InputError(f"{path}: pixels are {decoded.dtype}; convert the image to 8 or 16 bits")
     return np.ascontiguousarray(decoded, np.uint8)
+
+
+def _refuse_streams(path: Path) -> None:
+    """A pipe or a device may never end."""
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: not a file; save the picture as one first")
 
 
 def _frames(path: Path) -> Iterator[Picture]:

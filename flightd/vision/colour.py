@@ -246,7 +246,7 @@ def grow(levels: Levels) -> NDArray[np.uint8]:
 def _long_parts(levels: Levels) -> NDArray[np.uint8]:
     """(h, w) mask of the parts that are as long as a band: light that fell off along a whole line has left
     no strong pixel on it, and what is no band does not pass the tests of shape and edge that follow."""
-    count, parts, stats, _ = cv2.connectedComponentsWithStats(levels, connectivity=8, ltype=cv2.CV_32S)
+    _, parts, stats, _ = cv2.connectedComponentsWithStats(levels, connectivity=8, ltype=cv2.CV_32S)
     length = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
     kept = np.where(length >= _WEAK_LENGTH * math.hypot(*levels.shape), np.uint8(255), np.uint8(0))
     kept[0] = 0

@@ -150,4 +150,3 @@ def _explained(strip: Strip, others: list[Strip]) -> float:
             & (s <= other.u1 + reach)
         )
     return float(covered.mean())
-

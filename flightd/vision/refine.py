@@ -11,7 +11,7 @@ from flightd.core.types import Image
 from flightd.vision.edges import FINE, locate, rough, take
 from flightd.vision.fit import RobustLines, robust_lines
 from flightd.vision.plane import Plane
-from flightd.vision.strip import Array, LinearFit, Strip, bisector
+from flightd.vision.strip import LinearFit, Strip, bisector
 
 _CUTS_PX = (1.5, 0.7, 0.3)
 _MIN_POINTS = 6.0
