@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -151,6 +152,13 @@ def test_a_damaged_video_is_named(tmp_path: Path) -> None:
     path = tmp_path / "damaged.mp4"
     path.write_bytes(b"no video" * 100)
     assert str(path) in error_of("detect", path)
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path) -> None:
+    path = tmp_path / "pipe.png"
+    os.mkfifo(path)
+    assert str(path) in error_of("detect", path)
+    assert str(path) in error_of("detect", tmp_path)
 
 
 def test_a_tiny_image_is_named(tmp_path: Path) -> None:

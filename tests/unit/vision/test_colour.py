@@ -118,6 +118,22 @@ def test_growing_keeps_weak_pixels_only_where_they_touch_strong_ones() -> None:
     assert kept[2].tolist() == [0, 0, 0, 0, 255, 0, 0]
 
 
+def test_growing_keeps_a_long_weak_band_that_touches_no_strong_pixel() -> None:
+    levels = np.zeros((90, 160), np.uint8)
+    levels[20:26, 30:130] = 1
+    levels[60:80] = STRONG
+    levels[40:44, 70:80] = 1
+    mask = grow(levels)
+    assert mask[20:26, 30:130].all()
+    assert not mask[40:44].any()
+
+
+def test_white_on_grass_stays_white() -> None:
+    picture, inside = band("white", (52, 121, 96))
+    picture[inside] = (205, 215, 210)
+    assert np.array_equal(grow(classify(picture, load_profile("white"))) == 255, inside)
+
+
 def test_a_profile_survives_its_file_and_the_file_is_small(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     profile = ColourProfile("mine", rng.integers(0, 3, 65536).astype(np.uint8), "yellow", "abc", 0.97)

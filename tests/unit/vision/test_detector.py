@@ -174,6 +174,34 @@ def test_a_curve_is_not_a_straight_line(method: str, radius: float) -> None:
     assert Detector(method).detect(picture(ring)).lines == ()
 
 
+@pytest.mark.parametrize("sagitta_px", [12.0, 20.0, 60.0])
+def test_a_gentle_curve_is_not_a_straight_line(sagitta_px: float) -> None:
+    radius = (320.0**2 + sagitta_px**2) / (2 * sagitta_px)
+    x, y = grid(640, 360)
+    ring = np.clip(9.0 - np.abs(np.hypot(x, y - radius + sagitta_px / 2) - radius) + 0.5, 0, 1)
+    assert Detector().detect(picture(ring)).lines == ()
+
+
+def test_a_side_of_a_rounded_square_is_a_line() -> None:
+    sides = [Band(0.0 + side, 0.0, 14.0, -75.0, 75.0) for side in (-110.0, 110.0)]
+    x, y = grid(640, 360)
+    corner = np.hypot(np.maximum(np.abs(x) - 75, 0), np.maximum(np.abs(y) - 75, 0))
+    square = np.clip(7.0 - np.abs(corner - 35) + 0.5, 0, 1)
+    seen = Detector().detect(picture(square))
+    for side in sides:
+        line, rho, theta = nearest(seen, side)
+        assert abs(rho) < 1.0
+        assert abs(math.degrees(theta)) < 1.0
+
+
+def test_dark_and_dull_paint_is_found() -> None:
+    """A quarter of the light leaves eight grey levels between floor and paint."""
+    band = Band(40.0, 1.0, 24.0)
+    dull = 0.4 * coverage([band], *grid(640, 360))
+    seen = Detector().detect(picture(dull, light=0.25, noise=0.7))
+    assert_found(seen, [band], 0.3, 0.15)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_a_bare_floor_has_no_line(method: str) -> None:
     seen = Detector(method).detect(draw([]))
