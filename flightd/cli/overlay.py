@@ -28,9 +28,7 @@ def draw(bgr: Image, found: LineSet, title: str) -> Image:
         _band(canvas, line, _COLOURS[line.kind])
     for line in found.lines:
         _axis(canvas, line, _COLOURS[line.kind])
-    for junction in found.junctions:
-        _junction(canvas, junction)
-    taken: list[tuple[int, int, int, int]] = []
+    taken = [_junction(canvas, junction) for junction in found.junctions]
     for line in found.lines:
         _tag(canvas, line, _COLOURS[line.kind], taken)
     _write(canvas, title, 0, 0, _TRUTH)
@@ -104,11 +102,13 @@ def _band(canvas: Image, line: Line, colour: tuple[int, int, int]) -> None:
 def _axis(canvas: Image, line: Line, colour: tuple[int, int, int]) -> None:
     first, second = (_fixed(*end) for end in _ends(canvas, line))
     unit = _unit(canvas)
-    cv2.line(canvas, first, second, _SHADE, 3 * unit, cv2.LINE_AA, _SUBPIXEL_BITS)
+    shade = 3 * unit if line.width_px > 8 * unit else unit  # a thin band must still be seen beside it
+    cv2.line(canvas, first, second, _SHADE, shade, cv2.LINE_AA, _SUBPIXEL_BITS)
     cv2.line(canvas, first, second, colour, unit, cv2.LINE_AA, _SUBPIXEL_BITS)
 
 
-def _junction(canvas: Image, junction: Junction) -> None:
+def _junction(canvas: Image, junction: Junction) -> tuple[int, int, int, int]:
+    """Draw it; returns the box of its name (left, top, width, height)."""
     cx, cy = _centre(canvas)
     x, y, unit = junction.x_px + cx, junction.y_px + cy, _unit(canvas)
     for width, colour in ((4 * unit, _SHADE), (2 * unit, _JUNCTION)):
@@ -117,7 +117,9 @@ def _junction(canvas: Image, junction: Junction) -> None:
             cv2.line(canvas, _fixed(x, y), _fixed(*tip), colour, width, cv2.LINE_AA, _SUBPIXEL_BITS)
     cv2.circle(canvas, _fixed(x, y), (5 * unit) << _SUBPIXEL_BITS, _SHADE, -1, cv2.LINE_AA, _SUBPIXEL_BITS)
     cv2.circle(canvas, _fixed(x, y), (4 * unit) << _SUBPIXEL_BITS, _JUNCTION, -1, cv2.LINE_AA, _SUBPIXEL_BITS)
-    _write(canvas, junction.kind.value, round(x) + 8 * unit, round(y) + 6 * unit, _JUNCTION)
+    name, left, top = junction.kind.value, round(x) + 8 * unit, round(y) + 6 * unit
+    _write(canvas, name, left, top, _JUNCTION)
+    return left, top, *_extent(canvas, name)
 
 
 def _tag(
@@ -127,7 +129,7 @@ def _tag(
     cx, cy = _centre(canvas)
     text = f"{line.rho_px:+.1f} px  {math.degrees(line.theta_rad):.1f} deg  w {line.width_px:.0f}"
     width, height = _extent(canvas, text)
-    for share in (0.5, 0.3, 0.7, 0.15, 0.85):
+    for share in (0.5, 0.35, 0.65, 0.2, 0.8, 0.05, 0.95):
         x, y = line.point_at(line.start_px + share * line.span_px)
         left = min(max(round(x + cx), 0), canvas.shape[1] - width)
         top = min(max(round(y + cy), height), canvas.shape[0] - height)

@@ -53,9 +53,9 @@ _TINT_RANGE = (0.65, 1.55)
 _FEWEST_SEEDS = 20
 """One strong pixel in so many is enough to seed the bands of a picture."""
 
-_WEAK_BAND, _WEAK_LENGTH = 0.002, 0.15
+_WEAK_BAND, _WEAK_LENGTH, _WEAK_SAMPLES = 0.002, 0.15, 8.0
 """Weak pixels that touch no strong one are looked at when there are so many of all, and kept where they
-hang together over this part of the picture's diagonal."""
+hang together over this part of the picture's diagonal, and as many samples."""
 
 _BRIGHT_FLOOR = 135.0
 _MAX_STRETCH = 3.0
@@ -248,6 +248,7 @@ def _long_parts(levels: Levels) -> NDArray[np.uint8]:
     no strong pixel on it, and what is no band does not pass the tests of shape and edge that follow."""
     _, parts, stats, _ = cv2.connectedComponentsWithStats(levels, connectivity=8, ltype=cv2.CV_32S)
     length = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
-    kept = np.where(length >= _WEAK_LENGTH * math.hypot(*levels.shape), np.uint8(255), np.uint8(0))
+    enough = max(_WEAK_LENGTH * math.hypot(*levels.shape), _WEAK_SAMPLES)
+    kept = np.where(length >= enough, np.uint8(255), np.uint8(0))
     kept[0] = 0
     return kept.take(np.asarray(parts))

@@ -189,7 +189,7 @@ def test_a_side_of_a_rounded_square_is_a_line() -> None:
     square = np.clip(7.0 - np.abs(corner - 35) + 0.5, 0, 1)
     seen = Detector().detect(picture(square))
     for side in sides:
-        line, rho, theta = nearest(seen, side)
+        _, rho, theta = nearest(seen, side)
         assert abs(rho) < 1.0
         assert abs(math.degrees(theta)) < 1.0
 
