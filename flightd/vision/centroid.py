@@ -84,11 +84,9 @@ def cut(mask: Image, grid: Grid, *, steep: bool, spacing: int) -> Cuts:
 def find(mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
     """Straight bands in the mask, each described along its own axis."""
     spacing = slab_spacing(cv2.countNonZero(mask) / mask.size)
-    both = [
-        _straightened(cut(mask, grid, steep=steep, spacing=spacing), plane, steep=steep)
-        for steep in (True, False)
-    ]
-    cuts = _Both.of(*both, grid.step)
+    rows = _straightened(cut(mask, grid, steep=True, spacing=spacing), plane, steep=True)
+    columns = _straightened(cut(mask, grid, steep=False, spacing=spacing), plane, steep=False)
+    cuts = _Both.of(rows, columns, grid.step)
     strips: list[Strip] = []
     # A diagonal band crosses fewest slabs for its length.
     crossed = shortest_length(plane) * math.sqrt(0.5) / cuts.spacing_px
