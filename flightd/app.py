@@ -18,7 +18,7 @@ from flightd.adapters.ground.link import ZmqGround
 from flightd.adapters.store.progress import LeftOver, ProgressFile
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.config.schema import HEIGHT_ROOM_M, Config
-from flightd.core.errors import FlightdError, InputError, TransientError
+from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
 from flightd.core.topics import Topic
 from flightd.core.types import AttitudeSetpoint, Command, Event, EventLevel, Phase, Status
 from flightd.grid.site import Site
@@ -40,6 +40,7 @@ from flightd.runtime.supervise import restarted
 from flightd.vision.detector import Detector
 
 TICK_S = 0.02
+_FIRST_HEARD_S = 2.0
 CEILING_MARGIN_M = 0.5
 _STATUS_NS = 100_000_000
 _OVER = {Phase.DONE, Phase.ABORTED, Phase.PILOT}
@@ -206,6 +207,7 @@ class Daemon:
         self._last_phase: Phase | None = None
         self._rate: list[int] = []
         self._late_s: list[float] = []
+        self._flew = False
 
     def command(self, command: Command) -> None:
         """Hand an operator's order to the next tick."""
@@ -215,7 +217,7 @@ class Daemon:
         """Run everything until the mission is over; cancelled, the vehicle is handed back."""
         parts = {
             "vehicle": self._vehicle.run(),
-            "camera": restarted(self._camera.run, self.failed),
+            "camera": restarted(self._look, self.failed),
             "pump": self._pump.run(),
             **{f"detect-{i}": self._detect() for i in range(self._config.vision.workers)},
         }
@@ -237,6 +239,20 @@ class Daemon:
         except ExceptionGroup as group:
             raise _first(group) from group
         return self._result(output)
+
+    async def _look(self) -> None:
+        """The camera's run.  One that cannot be had ends the daemon, but not in the air: a vehicle that flies
+        needs the daemon more than the daemon its camera."""
+        try:
+            await self._camera.run()
+        except UnavailableError as err:
+            give_up_ns = self._clock.now_ns() + round(_FIRST_HEARD_S * 1e9)
+            while (state := self._vehicle.state()) is None and self._clock.now_ns() < give_up_ns:  # noqa: ASYNC110
+                await asyncio.sleep(TICK_S)
+            self._flew |= state is not None and state.armed
+            if not self._flew:
+                raise
+            raise TransientError(str(err)) from err
 
     def failed(self, err: TransientError) -> None:
         """A part that restarts has failed: tell people."""
@@ -406,11 +422,9 @@ class Daemon:
         )
 
     def _result(self, output: TickOutput) -> FlightResult:
-        intervals = sorted(self._pump.intervals_ns)
+        intervals = self._pump.intervals_ms
         quantile = {
-            name: round(intervals[min(int(share * len(intervals)), len(intervals) - 1)] * 1e-6, 2)
-            if intervals
-            else 0.0
+            name: round(intervals.quantile(share), 2)
             for name, share in (("p50", 0.5), ("p99", 0.99), ("max", 1.0))
         }
         return FlightResult(

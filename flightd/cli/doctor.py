@@ -47,6 +47,10 @@ def doctor(
     config: Annotated[Path, typer.Option(help="Configuration file.")],
     fix: Annotated[bool, typer.Option("--fix", help="Offer to set wrong parameters right.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="With --fix: do not ask.")] = False,
+    quick: Annotated[
+        bool,
+        typer.Option("--quick", help="Without camera and vehicle, in a second: before a service starts."),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
 ) -> None:
     """Say whether configuration, computer, camera and vehicle are fit to fly, and what to do if not.
@@ -61,18 +65,23 @@ def doctor(
     from flightd.config.schema import load_config
     from flightd.config.site_file import load_site
 
+    if quick and fix:
+        raise InputError("--quick looks at no vehicle: it does not go with --fix")
     if fix and not yes and not sys.stdin.isatty():
         raise InputError("--fix asks before it writes, and there is no terminal to ask on: add --yes")
     chosen = load_config(config)
     if fix and chosen.vehicle.kind == "ardrone":
         raise InputError("--fix is for autopilots with parameters; an AR.Drone is set up at each start")
     site = load_site(chosen.mission.site)
-    found = asyncio.run(_examine(chosen, site, config))
+    examine = _examine_machine if quick else _examine
+    found = asyncio.run(examine(chosen, site, config))
     if fix and found.report is not None:
         agreed = _agreed(found.report, ask=not yes)
         if agreed:
             found = _with_autopilot(found, asyncio.run(_fix(chosen, agreed)))
-    print(json.dumps(_document(config, found))) if as_json else _print(found)
+    print(json.dumps(_document(config, found))) if as_json else _print(
+        found, "no error found" if quick else "fit to fly"
+    )
     if found.errors:
         raise RunError(f"not fit to fly: {found.errors} {'error' if found.errors == 1 else 'errors'}")
 
@@ -112,6 +121,24 @@ async def _examine(config: Config, site: Site, path: Path) -> Diagnosis:
     checks += camera.judge_camera(config, pictures)
     checks += camera.check_vision(config, detector, pictures.picture)
     return Diagnosis([*checks, *autopilot.checks], autopilot.report)
+
+
+async def _examine_machine(config: Config, site: Site, path: Path) -> Diagnosis:
+    """What can be known without waiting for anything."""
+    from flightd.app import detector_of, pilot_of
+    from flightd.cli.checks import machine
+    from flightd.runtime.clock import LoopClock
+
+    detector_of(config, site)()
+    pilot_of(config, site)
+    checks = [
+        _check_plan(config, site, path),
+        machine.check_clock(),
+        machine.check_disk(config.recorder),
+        *machine.check_processor(config.vision.workers),
+        *_check_ground(config, site, LoopClock()),
+    ]
+    return Diagnosis(checks)
 
 
 def _check_plan(config: Config, site: Site, path: Path) -> Check:
@@ -176,7 +203,7 @@ def _change(found: Finding) -> str:
     return f"{found.name:<16} {found.value:g} -> {found.better:g}"
 
 
-def _print(found: Diagnosis) -> None:
+def _print(found: Diagnosis, verdict: str) -> None:
     for check in found.checks:
         label = typer.style(
             f"{check.level.upper() if check.level != 'ok' else 'ok':<8}", _COLOURS[check.level]
@@ -187,7 +214,7 @@ def _print(found: Diagnosis) -> None:
     if found.report is not None and found.report.unread:
         typer.echo(f"{'':<16} not known to this firmware: {', '.join(found.report.unread)}")
     if not found.errors:
-        typer.echo("fit to fly")
+        typer.echo(verdict)
 
 
 def _document(path: Path, found: Diagnosis) -> dict[str, Any]:

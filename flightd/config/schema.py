@@ -178,8 +178,8 @@ class MissionConfig(_Section):
     resume: bool = Field(False, description="fly what that file holds, if anything, instead of the nodes")
     autostart: bool = Field(False, description="start without waiting for the start command")
     recover_s: float = Field(
-        3.0,
-        ge=1,
+        2.0,
+        ge=1.5,
         le=600,
         description="found flying at a restart: level for so long, for pilot or operator, then land",
     )

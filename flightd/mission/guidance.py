@@ -50,7 +50,7 @@ class MissionParams:
     telemetry_land_s: float = 3.0
     arm_timeout_s: float = 60.0
     adopt_s: float = 1.5
-    recover_s: float = 3.0
+    recover_s: float = 2.0
     phase_slack_s: float = 20.0
     phase_share: float = 2.0
     battery_start_frac: float = 0.3

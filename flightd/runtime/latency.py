@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections import deque
 from itertools import pairwise
 
-import numpy as np
-
 from flightd.runtime.pool import Detection
+from flightd.runtime.series import Series
 
-_KEEP = 200_000
 _SAME_TICK_NS = 40_000_000
 
 
@@ -18,8 +15,7 @@ class LatencyBook:
 
     def __init__(self) -> None:
         self._waiting: list[tuple[Detection, int]] = []
-        self._totals_ms: deque[float] = deque(maxlen=_KEEP)
-        self._transports_ms: deque[float] = deque(maxlen=_KEEP)
+        self._totals_ms = Series()
         self._since: list[dict[str, float]] = []
         self.newest: dict[str, float] = {}
 
@@ -52,8 +48,7 @@ class LatencyBook:
                 "total": total,
             }
             self._since.append(self.newest)
-            self._totals_ms.append(total)
-            self._transports_ms.append(transport)
+            self._totals_ms.add(total)
         self._waiting.clear()
 
     def drain(self) -> tuple[dict[str, float], ...]:
@@ -67,7 +62,5 @@ class LatencyBook:
 
     def quantiles_ms(self) -> dict[str, float]:
         """p50 and p99 of the whole way, rounded to a hundredth; zeros before any frame was flown by."""
-        if not self._totals_ms:
-            return {"p50": 0.0, "p99": 0.0}
-        p50, p99 = np.percentile(np.array(self._totals_ms), [50, 99])
-        return {"p50": round(float(p50), 2), "p99": round(float(p99), 2)}
+        totals = self._totals_ms
+        return {name: round(totals.quantile(share), 2) for name, share in (("p50", 0.5), ("p99", 0.99))}

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections import deque
 from collections.abc import Callable
 
 from flightd.core.types import AttitudeSetpoint
 from flightd.ports import Clock, Vehicle
-
-_KEEP = 100_000
+from flightd.runtime.series import Series
 
 
 class SetpointPump:
@@ -37,7 +35,7 @@ class SetpointPump:
         self._fresh = asyncio.Event()
         self._last_ns: int | None = None
         self.stale = 0
-        self.intervals_ns: deque[int] = deque(maxlen=_KEEP)
+        self.intervals_ms = Series()
 
     def set(self, setpoint: AttitudeSetpoint | None) -> None:
         """The set point to send from now on."""
@@ -70,7 +68,7 @@ class SetpointPump:
             self._last_ns = None
             return
         if self._last_ns is not None:
-            self.intervals_ns.append(now_ns - self._last_ns)
+            self.intervals_ms.add((now_ns - self._last_ns) * 1e-6)
         self._last_ns = now_ns
         if fresh:
             self._on_sent(setpoint, now_ns)

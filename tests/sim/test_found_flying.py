@@ -1,0 +1,122 @@
+"""A daemon that is started while its vehicle flies, in virtual time and over real sockets."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+from pathlib import Path
+
+import pytest
+
+from flightd.app import Daemon, FlightResult
+from flightd.config.schema import Config, load_config
+from flightd.config.site_file import load_site
+from flightd.core.errors import UnavailableError
+from flightd.core.types import Phase, Status
+from flightd.runtime.clock import LoopClock
+from flightd.runtime.pool import Detection
+from flightd.runtime.ring import FrameTicket
+from flightd.sim.autopilot.copter import CopterMode
+from tests.protocol.rig import Rig, ardupilot_rig, run_virtual
+
+ROOT = Path(__file__).parents[2]
+SITE = load_site(ROOT / "configs" / "site-demo.toml")
+
+
+class NoDetectors:
+    """Nothing is seen, so nobody asks."""
+
+    replaced = 0
+
+    async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None:
+        raise AssertionError("there is no camera")
+
+
+async def config_of(rig: Rig) -> Config:
+    """A camera that cannot be had (its port is taken), and a flight that would start by itself."""
+    config = load_config(ROOT / "configs" / "sim.toml")
+    host, port = await rig.peer.open()
+    vehicle = config.vehicle.model_copy(update={"url": f"udpout://{host}:{port}"})
+    camera = config.camera.model_copy(update={"url": f"udp://{host}:{port}"})
+    return config.model_copy(update={"vehicle": vehicle, "camera": camera})
+
+
+async def died(rig: Rig) -> None:
+    """The process that flew is gone without a word."""
+    rig.cut(True)
+    assert rig.flying_task is not None
+    rig.flying_task.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await rig.flying_task
+    rig.cut(False)
+
+
+async def restarted(rig: Rig) -> tuple[FlightResult, list[Phase]]:
+    phases: list[Phase] = []
+
+    def note(status: Status) -> None:
+        phases.extend([status.phase] if status.phase not in phases[-1:] else [])
+
+    daemon = Daemon(await config_of(rig), SITE, LoopClock(), NoDetectors(), observers=[note])
+    async with asyncio.timeout(120):
+        return await daemon.fly(), phases
+
+
+@pytest.mark.parametrize("alone_s", [0.3, 5.0])
+def test_it_keeps_the_vehicle_level_reports_and_lands_it(alone_s: float) -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await rig.take_off(1.5)
+            await died(rig)
+            await asyncio.sleep(alone_s)
+            tilts, heights = [], []
+
+            async def watch() -> None:
+                while True:
+                    truth = rig.peer.truth()
+                    tilts.append(max(abs(truth.roll_rad), abs(truth.pitch_rad)))
+                    heights.append(truth.height_m)
+                    await asyncio.sleep(0.02)
+
+            watching = asyncio.create_task(watch())
+            result, phases = await restarted(rig)
+            watching.cancel()
+            assert phases[-3:] == [Phase.RECOVER, Phase.LAND, Phase.ABORTED]
+            assert result.phase is Phase.ABORTED
+            assert not rig.peer.armed
+            assert rig.peer.truth().height_m < 0.15
+            assert max(tilts) < math.radians(3)
+            assert max(heights) < 1.9, "it never climbs away"
+
+    run_virtual(test)
+
+
+def test_a_vehicle_that_the_pilot_has_is_left_alone() -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await rig.take_off(1.5)
+            rig.take_over()
+            await died(rig)
+            daemon = asyncio.create_task(restarted(rig))
+            await asyncio.sleep(8.0)
+            assert rig.peer.mode == CopterMode.ALT_HOLD
+            assert rig.peer.armed
+            assert rig.peer.truth().height_m > 1.0
+            daemon.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await daemon
+            assert rig.peer.armed, "handing back takes nothing from the pilot"
+
+    run_virtual(test)
+
+
+def test_on_the_floor_a_camera_that_is_gone_is_an_error() -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await died(rig)
+            with pytest.raises(UnavailableError):
+                await restarted(rig)
+            assert not rig.peer.armed
+
+    run_virtual(test)

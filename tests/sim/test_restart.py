@@ -1,0 +1,104 @@
+"""Killed in the air: what the vehicle does, what the daemon does when it is started anew, what is lost.
+
+In real time, by processes: nothing less shows it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from flightd.adapters.recorder.mcap_file import is_whole
+from flightd.core.topics import Topic
+from flightd.core.types import Event, Phase
+from flightd.replay.log import read_log
+from tests.sim.ground_rig import in_loop
+from tests.sim.service_rig import ServiceRig
+
+_UP = {Phase.ACQUIRE, Phase.TURN, Phase.FOLLOW, Phase.HOVER, Phase.HOLD}
+_GUIDED_TIMEOUT_S = 3.0
+"""Of the simulated autopilot, after which it levels by itself."""
+
+
+@pytest.mark.slow
+@in_loop
+async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp_path: Path) -> None:
+    rig = ServiceRig(tmp_path, ("A3",))
+    with rig.world():
+        first = await rig.start()
+        await rig.until(lambda status: status.phase in _UP, 120)
+        assert [message for message in rig.said if message.get("READY") == "1"]
+        assert [message for message in rig.said if message.get("WATCHDOG") == "1"]
+        killed_s = rig.kill()
+        await first.wait()
+        (log,) = rig.flights.rglob("flight.mcap")
+
+        await asyncio.sleep(_GUIDED_TIMEOUT_S + 1.0)
+        second = await rig.start()
+        phases: list[Phase] = []
+        async with asyncio.timeout(60):
+            async for status in rig.statuses():
+                phases += [status.phase] if status.phase not in phases[-1:] else []
+                if Phase.RECOVER not in phases:
+                    recovered_s = time.monotonic()
+                if status.phase is Phase.LAND:
+                    break
+            code = await second.wait()
+        landed_s = time.monotonic()
+        assert phases in ([Phase.PREFLIGHT, Phase.RECOVER, Phase.LAND], [Phase.RECOVER, Phase.LAND])
+        assert code == 1, "an aborted mission"
+        assert "nobody took over after the restart" in (tmp_path / "stderr").read_text()
+
+        third = await rig.start()
+        waiting = await rig.until(lambda status: status.vehicle is not None and status.fps > 0)
+        assert waiting.phase is Phase.PREFLIGHT
+        assert waiting.reason == "waiting for the start command", "in spite of autostart"
+        third.send_signal(signal.SIGTERM)
+        assert await asyncio.wait_for(third.wait(), 30) == 128 + signal.SIGTERM
+
+    truth = [(k.stamp_ns * 1e-9, k) for k in rig.truth()]
+    (height_m,) = [k.height_m for at_s, k in truth if at_s >= killed_s][:1]
+    alone = [k for at_s, k in truth if killed_s + _GUIDED_TIMEOUT_S + 0.5 < at_s < recovered_s]
+    assert alone, "the vehicle was alone in the air"
+    assert max(max(abs(k.roll_rad), abs(k.pitch_rad)) for k in alone) < math.radians(4)
+    assert all(abs(k.height_m - height_m) < 0.5 for k in alone)
+    assert [k for at_s, k in truth if at_s < landed_s][-1].height_m < 0.15, "it stands on the floor"
+    assert max(k.height_m for at_s, k in truth if at_s > landed_s) < 0.15, "and stays there"
+
+    assert is_whole(log), "finished by its writer, or mended by the second start"
+    cut = read_log(log)
+    assert cut.damage == ""
+    ticks = [entry.stamp_ns * 1e-9 for entry in cut.entries if entry.topic == Topic.TICK]
+    assert killed_s - ticks[-1] < 3.0, "no more than what had not reached the disk is lost"
+
+
+@pytest.mark.slow
+@in_loop
+async def test_every_child_may_be_killed_in_flight(tmp_path: Path) -> None:
+    rig = ServiceRig(tmp_path, ("A2",))
+    with rig.world():
+        daemon = await rig.start()
+        await rig.until(lambda status: status.phase is Phase.ACQUIRE, 120)
+        writers = [pid for pid, command in rig.children().items() if "recorder.writer" in command]
+        others = [pid for pid in rig.children() if pid not in writers]
+        assert len(writers) == 1
+        assert len(others) >= 2, "a detector and the process that forks them"
+        os.kill(writers[0], signal.SIGKILL)
+        await rig.until(lambda status: status.phase in _UP - {Phase.ACQUIRE}, 120)
+        for pid in others:
+            os.kill(pid, signal.SIGKILL)
+        async with asyncio.timeout(120):
+            code = await daemon.wait()
+    (log,) = rig.flights.rglob("flight.mcap")
+    flight = read_log(log)
+    events = [(event.name, event.text) for event in flight.messages(Event)]
+    recovered, landed = code == 0, any("-> land: lines lost" in text for _, text in events)
+    assert recovered or landed, events  # on a slow machine a new fork server takes longer than it may hold
+    assert any(name == "recorder_died" for name, _ in events)
+    assert is_whole(log)
+    assert rig.truth()[-1].height_m < 0.15

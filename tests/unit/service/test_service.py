@@ -1,0 +1,94 @@
+"""What surrounds the daemon: the mark of a restart, the unit file, the install script."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from flightd.cli.service import note_start, was_started_before
+
+SYSTEMD = Path(__file__).parents[3] / "systemd"
+UNIT = SYSTEMD / "flightd.service"
+
+
+def tool(name: str) -> str:
+    found = shutil.which(name)
+    if found is None:
+        pytest.skip(f"{name} is not installed here")
+    return found
+
+
+def test_a_restart_is_told_from_a_start_by_what_systemd_keeps(tmp_path: Path) -> None:
+    environment = {"RUNTIME_DIRECTORY": f"{tmp_path}:/elsewhere"}
+    assert not was_started_before(environment)
+    note_start(environment)
+    assert was_started_before(environment)
+
+
+def test_without_systemd_every_start_is_the_first(tmp_path: Path) -> None:
+    note_start({})
+    assert not was_started_before({})
+    unwritable = {"RUNTIME_DIRECTORY": str(tmp_path / "gone")}
+    note_start(unwritable)
+    assert not was_started_before(unwritable)
+
+
+def test_the_units_mark_is_the_daemons() -> None:
+    text = UNIT.read_text()
+    assert "RuntimeDirectory=flightd\n" in text
+    assert "RuntimeDirectoryPreserve=restart\n" in text
+    assert "test -e /run/flightd/started ||" in text
+
+
+def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path: Path) -> None:
+    analyze = tool("systemd-analyze")
+    program = tmp_path / "flightd"
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    copy = tmp_path / "flightd.service"  # verify wants the program to exist
+    copy.write_text(UNIT.read_text().replace("/opt/flightd/bin/flightd run", f"{program} run"))
+    result = subprocess.run([analyze, "verify", str(copy)], capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout + result.stderr) == (0, "")
+
+
+def test_the_services_exposure_is_low() -> None:
+    analyze = tool("systemd-analyze")
+    result = subprocess.run(
+        [analyze, "security", "--offline=true", "--no-pager", str(UNIT)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    found = re.search(r"exposure level for flightd\.service: ([\d.]+)", result.stdout)
+    if found is None:
+        pytest.skip(f"this systemd-analyze cannot rate a file: {result.stderr.strip()}")
+    assert float(found[1]) <= 2.5
+
+
+def test_the_install_script_is_sound() -> None:
+    script = SYSTEMD / "install.sh"
+    result = subprocess.run([tool("shellcheck"), script], capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout) == (0, "")
+
+
+@pytest.mark.parametrize("words", [["--sideways"], ["--root"], ["--root", "/nonexistent"], ["--extras"]])
+def test_the_install_script_refuses_what_it_does_not_know(words: list[str]) -> None:
+    result = subprocess.run([SYSTEMD / "install.sh", *words], capture_output=True, text=True, check=False)
+    assert result.returncode == 2
+    assert result.stderr.splitlines()[-1].startswith("install.sh: ")
+
+
+def test_every_rule_for_udev_compares_before_it_sets() -> None:
+    lines = [
+        line for line in (SYSTEMD / "99-flightd.rules").read_text().splitlines() if line[:1] not in {"", "#"}
+    ]
+    term = re.compile(r'[A-Z_]+(\{\w+\})?(==|!=|=|\+=)"[^"]*"')
+    for line in lines:
+        terms = [part.strip() for part in line.split(", ")]
+        assert all(term.fullmatch(part) for part in terms), line
+        kinds = ["==" in part for part in terms]
+        assert kinds == sorted(kinds, reverse=True)
