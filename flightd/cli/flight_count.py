@@ -22,16 +22,31 @@ from flightd.runtime.readers import ReaderPool, Readers
 from flightd.runtime.store_writer import StoreWriter
 
 
-class FlightCount:
-    """The inventory of one flight.  `config` visits only the nodes that the count still needs.
+def going_on(config: Config, site: Site, folder: Path | None) -> Config:
+    """The configuration of a flight that goes on with a count (`inventory.run`) in `folder`: it visits only
+    nodes with locations that are not booked yet.  InputError when there are none left."""
+    run = config.inventory.run
+    if not run or folder is None or not (folder / "inventory.db").exists():
+        return config
+    with SqliteStore(folder, create=False) as store:
+        counted = store.counted(run)
+    if not counted:
+        return config
+    nodes = nodes_to_count(site, config.mission.nodes or site.serpentine_route(), counted)
+    if not nodes:
+        raise InputError(
+            f"inventory.run {run!r}: every location is counted; give the next count another name"
+        )
+    return config.model_copy(update={"mission": config.mission.model_copy(update={"nodes": nodes})})
 
-    Raises InputError when nothing is left of it, and what the store raises."""
+
+class FlightCount:
+    """The inventory of one flight, kept in `folder` if one is given.  Raises what the store raises."""
 
     def __init__(
         self, config: Config, site: Site, folder: Path | None, stack: ExitStack | AsyncExitStack
     ) -> None:
-        self.config = config
-        self._site = site
+        self._scan = config.scan
         self._stack = stack
         self._store: SqliteStore | None = None
         self._run = config.inventory.run or f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
@@ -44,8 +59,6 @@ class FlightCount:
             PlannedLocation(location.code, location.node) for location in site.locations.values()
         )
         self._counted = self._store.counted(self._run)
-        if self._counted:
-            self._go_on()
 
     async def begun(
         self, clock: Clock, timed: Callable[[Readers], Readers] = lambda readers: readers
@@ -54,7 +67,7 @@ class FlightCount:
         None where nothing is scanned."""
         if not self.scans:
             return None
-        scan = self.config.scan
+        scan = self._scan
         pool = self._stack.enter_context(ReaderPool(scan.workers, scan.timeout_s, clock))
         await pool.ready()
         writer = None
@@ -64,15 +77,6 @@ class FlightCount:
                 StoreWriter(self._store, self._run, utc_at_zero_ns, clock, _to_stderr)
             )
         return Counting(timed(pool), scan.workers, writer, self._counted)
-
-    def _go_on(self) -> None:
-        mission = self.config.mission
-        nodes = nodes_to_count(self._site, mission.nodes or self._site.serpentine_route(), self._counted)
-        if not nodes:
-            raise InputError(
-                f"inventory.run {self._run!r}: every location is counted; give the next count another name"
-            )
-        self.config = self.config.model_copy(update={"mission": mission.model_copy(update={"nodes": nodes})})
 
 
 def _to_stderr(text: str) -> None:

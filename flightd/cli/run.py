@@ -50,6 +50,7 @@ def run(
     it keeps it level, reports, and lands.  Started anew by systemd it never starts a flight by itself.
     """
     from flightd.cli import service
+    from flightd.cli.flight_count import going_on
     from flightd.cli.flight_progress import FlightProgress
     from flightd.cli.resume import resumed
     from flightd.config.schema import load_config
@@ -64,6 +65,7 @@ def run(
         )
     site = load_site(chosen.mission.site)
     chosen = resumed(chosen, config, site, ordered=resume)
+    chosen = going_on(chosen, site, chosen.inventory.folder)
     journal = service.logs_to_journal(os.environ)
     if service.was_started_before(os.environ):
         chosen = chosen.model_copy(update={"mission": chosen.mission.model_copy(update={"autostart": False})})
@@ -108,7 +110,6 @@ async def _fly(
     clock = LoopClock()
     async with monitors(config.metrics, os.environ, journal=journal) as watchers, AsyncExitStack() as stack:
         count = FlightCount(config, site, config.inventory.folder, stack)
-        config = count.config
         pool = stack.enter_context(detector_pool(config, site, clock))
         recorder, archive = _black_box(config, site, clock.now_ns()) or (None, None)
         if recorder is not None:

@@ -61,7 +61,10 @@ def sim(
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json and nothing else.")] = False,
 ) -> None:
     """Fly a whole mission in the simulator and leave its log, report and summary."""
+    from flightd.cli.flight_count import going_on
     from flightd.cli.flight_progress import FlightProgress
+    from flightd.cli.sim_count import stock_summary
+    from flightd.cli.sim_peers import fitted
     from flightd.cli.simulate import Simulation, fly
     from flightd.sim.external import truth_address
 
@@ -76,15 +79,18 @@ def sim(
         chosen = chosen.model_copy(update={"vehicle": chosen.vehicle.model_copy(update={"url": vehicle_url})})
     if factor is None and chosen.ground.listen:
         print("flightd: the ground link is off in lockstep; --speed 1 turns it on", file=sys.stderr)
-    _make_folder(out)
+    chosen = fitted(chosen, site)
+    _make_folder(out, going_on=bool(chosen.inventory.run))
+    chosen = going_on(chosen, site, out)
     started = time.monotonic()
     with FlightProgress(shown=not as_json) as progress:
         simulation = Simulation(chosen, site, conditions, seed, factor, out, progress, truth_url)
         result = fly(simulation)
     _write_truth(simulation)
     summary = _summary(simulation, result, time.monotonic() - started)
+    summary |= stock_summary(simulation, summary["flight_time_s"])
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-    _write_inventory(out / "inventory.csv", result.visited)
+    _write_inventory(out, result.visited)
     report = _report(simulation)
     if as_json:
         print(json.dumps(summary, indent=2))
@@ -207,10 +213,15 @@ def _calibration(section: str, camera: Any) -> dict[str, Any]:
     return {f"{section}.{key}": value for key, value in keys.items()}
 
 
-def _make_folder(out: Path) -> None:
+def _make_folder(out: Path, *, going_on: bool) -> None:
+    """An empty place for the results; the inventory of a count that goes on stays."""
+    old = ["summary.json"]
+    if not going_on:
+        old += ["inventory.db", "inventory.db-wal", "inventory.db-shm"]
     try:
         out.mkdir(parents=True, exist_ok=True)
-        (out / "summary.json").unlink(missing_ok=True)
+        for name in old:
+            (out / name).unlink(missing_ok=True)
     except OSError as err:
         raise InputError(f"--out {out}: {err.strerror}; give a folder that can be written") from err
 
@@ -239,9 +250,6 @@ def _summary(simulation: Any, result: Any, wall_s: float) -> dict[str, Any]:
     )
     return {
         **as_summary(measured),
-        "codes_expected": 0,
-        "codes_read": 0,
-        "codes_wrong": 0,
         "frames": result.frames,
         "frames_dropped": result.frames_dropped,
         "latency_ms": result.latency_ms,
@@ -261,7 +269,14 @@ def _write_truth(simulation: Any) -> None:
         write_truth(simulation.folder / "truth-stock.json", truth, simulation.seed)
 
 
-def _write_inventory(path: Path, visited: Sequence[str]) -> None:
+def _write_inventory(out: Path, visited: Sequence[str]) -> None:
+    """What was counted, or where nothing is counted, what was visited."""
+    from flightd.cli.sim_count import inventory_csv
+
+    path = out / "inventory.csv"
+    if (data := inventory_csv(out)) is not None:
+        path.write_bytes(data)
+        return
     with path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow(["node", "visit", "code"])
@@ -275,6 +290,14 @@ def _report(simulation: Any) -> Path:
     path: Path = simulation.folder / "report.html"
     write_report(simulation.flight_log, path, counted_beside(simulation.flight_log))
     return path
+
+
+def _counted(summary: dict[str, Any]) -> str:
+    codes = f"{summary['codes_read']} of {summary['codes_expected']} codes, {summary['codes_wrong']} wrong"
+    empty = f"{summary['empty_right']} of {summary['empty_expected']} empty places"
+    rate = summary["locations_per_hour"]
+    visited = f"{summary['locations_visited']} of {summary['locations_planned']}"
+    return f"{visited} ({rate:.0f} an hour): {codes}; {empty}"
 
 
 def _print_summary(summary: dict[str, Any], report: Path) -> None:
@@ -298,6 +321,7 @@ def _print_summary(summary: dict[str, Any], report: Path) -> None:
         ("hover error, p95", metres("hover_error_p95_m")),
         ("landing error", metres("landed_error_m")),
         ("flight time", f"{simulated:.0f} s in {wall:.0f} s ({simulated / max(wall, 1e-9):.1f} x)"),
+        *([("locations", _counted(summary))] if summary.get("locations_planned") else []),
         ("frames", f"{summary['frames']}, {summary['frames_dropped']} dropped"),
         (
             "exposure to set point",

@@ -26,6 +26,14 @@ def has_front_camera(config: Config, site: Site) -> bool:
     return config.front_camera.is_fitted or (bool(site.locations) and config.vehicle.kind != "ardrone")
 
 
+def fitted(config: Config, site: Site) -> Config:
+    """The configuration with a front camera where one is simulated."""
+    if config.front_camera.is_fitted or not has_front_camera(config, site):
+        return config
+    front = config.front_camera.model_copy(update={"url": "udp://127.0.0.1:5601"})
+    return config.model_copy(update={"front_camera": front})
+
+
 def free_ports(config: Config, site: Site) -> Ports:
     """Ports for the vehicle (one, or the AR.Drone's four) and the cameras."""
     vehicle = tuple(free_port() for _ in range(4 if config.vehicle.kind == "ardrone" else 1))

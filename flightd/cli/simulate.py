@@ -21,6 +21,7 @@ from typing import Any
 
 from flightd.adapters.recorder.recorder import Recorder
 from flightd.app import Daemon, FlightResult, detector_pool, ground_link, plan_of, start_of
+from flightd.cli.flight_count import FlightCount
 from flightd.cli.sim_peers import Ports, connected, free_ports, has_front_camera
 from flightd.config.schema import Config
 from flightd.config.site_file import site_toml
@@ -30,13 +31,15 @@ from flightd.core.types import Status
 from flightd.grid.site import Site
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.loops import ScaledLoop, VirtualLoop
-from flightd.sim.lockstep import LockstepDetectors
+from flightd.sim.lockstep import LockstepDetectors, LockstepReaders
 from flightd.sim.racks.truth import LocationTruth, stock_truth
 from flightd.sim.scenario import Scenario
 from flightd.sim.world import FrontSpec, World, WorldSpec
 
 DETECTION_S = 0.008
 """Modelled time of a detection in lockstep: what a companion computer needs."""
+READING_S = 0.15
+"""And of reading the codes of one picture."""
 
 _PORT_TRIES = 5
 
@@ -93,6 +96,8 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
         pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
         world, ports = await _opened(simulation, clock, truth)
         config = connected(simulation.config, ports)
+        count = FlightCount(config, simulation.site, simulation.folder, stack)
+        counting = await count.begun(clock, lambda readers: LockstepReaders(readers, clock, READING_S))
         await pool.ready()
         daemon = Daemon(
             config,
@@ -101,6 +106,7 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
             LockstepDetectors(pool, clock, DETECTION_S),
             recorder,
             [simulation.observer],
+            counting=counting,
         )
         running = asyncio.ensure_future(world.run())
         try:
@@ -143,12 +149,24 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
         stack.callback(process.join, 15.0)
         stack.callback(ours.close)  # the world ends when its pipe closes, however this process ends
         pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
-        ground = stack.enter_context(ground_link(simulation.config, simulation.site, clock) or nullcontext())
-        await pool.ready()
         config = connected(simulation.config, ports)
         if simulation.truth_url:
             config = config.model_copy(update={"vehicle": simulation.config.vehicle})
-        daemon = Daemon(config, simulation.site, clock, pool, recorder, [simulation.observer], ground)
+        counting = await FlightCount(config, simulation.site, simulation.folder, stack).begun(clock)
+        ground = stack.enter_context(
+            ground_link(simulation.config, simulation.site, clock, counting) or nullcontext()
+        )
+        await pool.ready()
+        daemon = Daemon(
+            config,
+            simulation.site,
+            clock,
+            pool,
+            recorder,
+            [simulation.observer],
+            ground,
+            counting=counting,
+        )
         watch = asyncio.ensure_future(_watch(process, ours))
         try:
             return await _within_limit(simulation, daemon, watch)

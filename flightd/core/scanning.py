@@ -31,11 +31,13 @@ class Occupancy(enum.StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A location as the picture is expected to show it: its opening, and how much of that is inside."""
+    """A location as the picture is expected to show it: its cell and how much of that is inside, and the
+    core of the cell, which goods cover if there are any."""
 
     location: str
     quad_px: Quad
     share: float
+    core_px: Quad
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from flightd.grid.site import Location, Side, Site
 
+_CORE = (0.22, 0.18, 0.20)
+"""The core of a cell: parts of its width to each side of its middle, and parts of the spacing of the levels
+below and above its label.  Whatever stands in the place stands there."""
+_USUAL_SPACING_M, _MOST_SPACING_M = 0.7, 1.4
+"""Spacing of levels where there is only one; more than the most tells nothing of the goods."""
 _NEXT_M = 0.5
 """Height above the topmost labels that still belongs to their level where the shelf does not end before."""
 
@@ -25,18 +31,28 @@ class Cell:
     x1_m: float
     low_m: float
     high_m: float
+    label_m: float
+    spacing_m: float
+
+    @property
+    def core_m(self) -> tuple[tuple[float, float, float], ...]:
+        """(x, y, height) of the part that goods cover if there are any, corners in the same order."""
+        aside, below, above = _CORE
+        middle_m, half_m = (self.x0_m + self.x1_m) / 2, aside * (self.x1_m - self.x0_m)
+        low_m, high_m = self.label_m - below * self.spacing_m, self.label_m + above * self.spacing_m
+        return self._corners(middle_m - half_m, middle_m + half_m, low_m, high_m)
 
     @property
     def corners_m(self) -> tuple[tuple[float, float, float], ...]:
         """(x, y, height): left top, right top, right bottom, left bottom for someone who faces it."""
-        left, right = (self.x0_m, self.x1_m) if self.side is Side.LEFT else (self.x1_m, self.x0_m)
+        return self._corners(self.x0_m, self.x1_m, self.low_m, self.high_m)
+
+    def _corners(
+        self, x0_m: float, x1_m: float, low_m: float, high_m: float
+    ) -> tuple[tuple[float, float, float], ...]:
+        left, right = (x0_m, x1_m) if self.side is Side.LEFT else (x1_m, x0_m)
         y = self.y_m
-        return (
-            (left, y, self.high_m),
-            (right, y, self.high_m),
-            (right, y, self.low_m),
-            (left, y, self.low_m),
-        )
+        return (left, y, high_m), (right, y, high_m), (right, y, low_m), (left, y, low_m)
 
     def inside_probability(self, x_m: float, height_m: float, sigma_x_m: float, sigma_h_m: float) -> float:
         """Probability that the true point is inside, for a point measured with normal errors."""
@@ -76,8 +92,15 @@ def cells_of(site: Site) -> dict[str, Cell]:
             location.x_m + half_m,
             low,
             high,
+            location.height_m,
+            _spacing_m(levels),
         )
     return cells
+
+
+def _spacing_m(levels_m: Sequence[float]) -> float:
+    gaps = [b - a for a, b in itertools.pairwise(levels_m)]
+    return min([*gaps, _MOST_SPACING_M]) if gaps else _USUAL_SPACING_M
 
 
 def by_node(locations: Iterable[Location]) -> Mapping[str, tuple[Location, ...]]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.core.geometry import Lens, Matrix
-from flightd.core.scanning import BodyPose, CodeSet, Place, PlaceLook
+from flightd.core.scanning import BodyPose, CodeSet, Place, PlaceLook, Quad
 from flightd.core.types import CodeRead
 from flightd.core.view import CameraView, ForwardMount, Viewpoint
 from flightd.grid.cells import Cell, cells_of
@@ -101,16 +101,16 @@ class Assigner:
     def places(self, pose: BodyPose, locations: Iterable[str]) -> tuple[Place, ...]:
         """Where the picture taken at `pose` shows the cells, those out of the picture left out."""
         view, lens = self._sight.view(pose), self._sight.lens
-        centre = np.array(lens.centre_px)
         found = []
         for code in locations:
-            pixels = view.project(np.array(self.cells[code].corners_m))
+            cell = self.cells[code]
+            pixels = view.project(np.array([*cell.corners_m, *cell.core_m]))
             if not np.isfinite(pixels).all():
                 continue
-            share = _inside_share(pixels, lens)
+            share = _inside_share(pixels[:4], lens)
             if share >= _LEAST_SHARE:
-                quad = tuple((round(float(x), 1), round(float(y), 1)) for x, y in pixels - centre)
-                found.append(Place(code, quad, round(share, 3)))
+                quad, core = _quad(pixels[:4], lens), _quad(pixels[4:], lens)
+                found.append(Place(code, quad, round(share, 3), core))
         return tuple(found)
 
     def look(self, codes: CodeSet, pose: BodyPose, front: tuple[str, Side]) -> ShelfLook:
@@ -180,6 +180,11 @@ def _sigmas(pose: BodyPose, x_m: float, height_m: float, distance_m: float) -> t
     sigma_x = math.hypot(pose.sigma_x_m, turn * pose.sigma_yaw_rad, across * depth)
     rise = distance_m * (1.0 + upward**2)
     return sigma_x, math.hypot(_HEIGHT_SIGMA_M, rise * _TILT_SIGMA_RAD, upward * depth)
+
+
+def _quad(pixels: Matrix, lens: Lens) -> Quad:
+    centre_x, centre_y = lens.centre_px
+    return tuple((round(float(x) - centre_x, 1), round(float(y) - centre_y, 1)) for x, y in pixels)
 
 
 def _inside_share(pixels: Matrix, lens: Lens) -> float:

@@ -1,12 +1,14 @@
-"""Detection in lockstep with virtual time: the real processes, a modelled time."""
+"""Detection and reading in lockstep with virtual time: the real processes, a modelled time."""
 
 from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
 
+from flightd.core.scanning import Place
 from flightd.ports import Clock
 from flightd.runtime.pool import Detection, Detectors
+from flightd.runtime.readers import Readers, Reading
 from flightd.runtime.ring import FrameTicket
 
 
@@ -37,3 +39,21 @@ class LockstepDetectors:
         if detection is None:
             return None
         return replace(detection, started_ns=started_ns, finished_ns=self._clock.now_ns())
+
+
+class LockstepReaders:
+    """The same for the readers of codes."""
+
+    def __init__(self, inner: Readers, clock: Clock, latency_s: float) -> None:
+        self._inner = inner
+        self._clock = clock
+        self._latency_s = latency_s
+
+    async def read(self, ticket: FrameTicket, places: tuple[Place, ...]) -> Reading | None:
+        work = asyncio.ensure_future(self._inner.read(ticket, places))
+        try:
+            await asyncio.sleep(self._latency_s)
+            with self._clock.hold():
+                return await work
+        finally:
+            work.cancel()

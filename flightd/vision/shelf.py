@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import cv2
 import numpy as np
 
-from flightd.core.scanning import CodeSet, Occupancy, Place, PlaceLook
+from flightd.core.scanning import CodeSet, Occupancy, Place, PlaceLook, Quad
 from flightd.core.types import CodeRead, Image
 from flightd.vision.codes import read_codes
-from flightd.vision.occupancy import judge
+from flightd.vision.occupancy import judge, white_level
 from flightd.vision.small_jpeg import evidence_jpeg, picture_name
+
+Box: TypeAlias = tuple[int, int, int, int]
+"""(x0, y0, x1, y1) in pixels, far ends excluded."""
 
 _MARGIN = 0.1
 """Room around the wanted places, as a part of their size: a pose is never exact."""
-_INSET = (0.14, 0.18)
-"""Part of a place's width and height at its border that may show uprights and beams, not the opening."""
 
 
 def read_shelf(
@@ -32,9 +34,10 @@ def read_shelf(
     started = cv2.getTickCount()
     reads = _shifted(read_codes(np.ascontiguousarray(bgr[box[1] : box[3], box[0] : box[2]])), box, bgr)
     read = cv2.getTickCount()
+    white = white_level(bgr)
     looks, kept = [], {}
     for place in places:
-        look, jpeg = _look(bgr, place, reads)
+        look, jpeg = _look(bgr, place, reads, white)
         looks.append(look)
         if jpeg:
             kept[look.evidence] = jpeg
@@ -43,30 +46,28 @@ def read_shelf(
     return CodeSet(seq, stamp_ns, width, height, reads, tuple(looks), timings), kept
 
 
-def _around(places: Sequence[Place], width: int, height: int) -> tuple[int, int, int, int]:
-    """(x0, y0, x1, y1) of the places in pixels, far ends excluded; the whole picture if there are none."""
+def _around(places: Sequence[Place], width: int, height: int) -> Box:
+    """The pixels of all places with some room; the whole picture if there are none."""
     if not places:
         return 0, 0, width, height
-    boxes = np.array([_box(place, width, height, -_MARGIN, -_MARGIN) for place in places])
+    boxes = np.array([_box(place.quad_px, width, height, _MARGIN) for place in places])
     (x0, y0), (x1, y1) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
     return int(x0), int(y0), int(x1), int(y1)
 
 
-def _box(place: Place, width: int, height: int, inset_x: float, inset_y: float) -> tuple[int, int, int, int]:
-    """The pixels of a place, made smaller by parts of its size, inside the picture."""
+def _box(quad: Quad, width: int, height: int, room: float = 0.0) -> Box:
+    """The pixels around a quad with `room` as a part of its size, inside the picture."""
     centre = (width - 1) / 2, (height - 1) / 2
-    corners = np.array(place.quad_px) + centre
+    corners = np.array(quad) + centre
     low, high = corners.min(axis=0), corners.max(axis=0)
-    inset = (high - low) * (inset_x, inset_y)
-    low, high = low + inset, high - inset
+    spare = (high - low) * room
+    low, high = low - spare, high + spare
     x0, x1 = (int(np.clip(x, 0, width)) for x in (low[0], high[0] + 1))
     y0, y1 = (int(np.clip(y, 0, height)) for y in (low[1], high[1] + 1))
     return x0, y0, x1, y1
 
 
-def _shifted(
-    reads: Sequence[CodeRead], box: tuple[int, int, int, int], picture: Image
-) -> tuple[CodeRead, ...]:
+def _shifted(reads: Sequence[CodeRead], box: Box, picture: Image) -> tuple[CodeRead, ...]:
     """The reads of a part of the picture, in the whole picture's centred coordinates."""
     height, width = picture.shape[:2]
     dx, dy = (box[0] + box[2] - width) / 2, (box[1] + box[3] - height) / 2
@@ -76,22 +77,27 @@ def _shifted(
     )
 
 
-def _look(bgr: Image, place: Place, reads: Sequence[CodeRead]) -> tuple[PlaceLook, bytes]:
+def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> tuple[PlaceLook, bytes]:
     """What one place shows, and its picture."""
     height, width = bgr.shape[:2]
-    x0, y0, x1, y1 = _box(place, width, height, *_INSET)
     occupancy = Occupancy.UNSURE
-    if x1 > x0 and y1 > y0:
-        occupancy = judge(bgr[y0:y1, x0:x1])
-    if occupancy is not Occupancy.GOODS and any(_contains(place, read) for read in reads):
+    if any(_contains(place, read) for read in reads):
         occupancy = Occupancy.GOODS
-    x0, y0, x1, y1 = _box(place, width, height, 0.0, 0.0)
+    elif _is_inside(place.core_px, width, height):
+        x0, y0, x1, y1 = _box(place.core_px, width, height)
+        occupancy = judge(bgr[y0:y1, x0:x1], white)
+    x0, y0, x1, y1 = _box(place.quad_px, width, height)
     jpeg = evidence_jpeg(np.ascontiguousarray(bgr[y0:y1, x0:x1])) if x1 > x0 and y1 > y0 else b""
     name = picture_name(jpeg) if jpeg else ""
     return PlaceLook(place.location, place.quad_px, place.share, occupancy, name), jpeg
 
 
+def _is_inside(quad: Quad, width: int, height: int) -> bool:
+    return all(abs(x) <= (width - 1) / 2 and abs(y) <= (height - 1) / 2 for x, y in quad)
+
+
 def _contains(place: Place, read: CodeRead) -> bool:
+    """Whether a code is in the core of a place: one below may be the shelf's own label."""
     x, y = np.array(read.corners_px).mean(axis=0)
-    quad = np.array(place.quad_px, np.float32)
-    return cv2.pointPolygonTest(quad, (float(x), float(y)), False) >= 0
+    core = np.array(place.core_px, np.float32)
+    return cv2.pointPolygonTest(core, (float(x), float(y)), False) >= 0

@@ -1,0 +1,117 @@
+"""The writer of the inventory: order kept, disk failures told and waited out, nothing lost on the way."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.errors import UnavailableError
+from flightd.core.inventory import LocationRecord, LocationState, Observation, PlannedLocation
+from flightd.core.scanning import Finding, Settled
+from flightd.core.types import CodeRead
+from flightd.runtime.clock import LoopClock
+from flightd.runtime.loops import VirtualLoop
+from flightd.runtime.store_writer import StoreWriter
+
+READ = CodeRead("QR Code", "PALLET", ((0.0, 0.0),) * 4, True, 2, 1.0)
+
+
+def finding(number: int) -> Finding:
+    return Finding(number, f"A-{number}", LocationState.READ, 0.9, (READ,), "", "A1", 1.0, 2.0, 1.5, 0.1)
+
+
+class StubbornStore:
+    """A store whose disk refuses the first `refusals` writes, and takes `wait_s` for each other."""
+
+    def __init__(self, store: SqliteStore, refusals: int, wait_s: float = 0.0) -> None:
+        self._store = store
+        self._refusals = refusals
+        self._wait_s = wait_s
+
+    def plan(self, locations: Iterable[PlannedLocation]) -> None:
+        self._store.plan(locations)
+
+    def keep_evidence(self, jpeg: bytes) -> str:
+        return self._store.keep_evidence(jpeg)
+
+    def commit(self, observation: Observation, confirmed: bool = True) -> None:
+        time.sleep(self._wait_s)
+        if self._refusals:
+            self._refusals -= 1
+            raise UnavailableError("disk full")
+        self._store.commit(observation, confirmed)
+
+    def settle(self, run: str, locations: Iterable[str], confirmed: bool) -> None:
+        self._store.settle(run, locations, confirmed)
+
+    def counted(self, run: str) -> frozenset[str]:
+        return self._store.counted(run)
+
+    def locations(self) -> list[LocationRecord]:
+        return self._store.locations()
+
+
+async def write(store: StubbornStore, troubles: list[str], seconds: float) -> StoreWriter:
+    """Findings 0 to 9 with pictures, 0 to 4 confirmed, 5 withdrawn; run the writer for some time."""
+    with StoreWriter(store, "run", 10**18, LoopClock(), troubles.append) as writer:
+        for number in range(10):
+            writer.put(finding(number), b"picture %d" % number)
+        writer.settle(Settled(tuple(f"A-{n}" for n in range(5)), confirmed=True))
+        writer.settle(Settled(("A-5",), confirmed=False))
+        running = asyncio.ensure_future(writer.run(troubles.append))
+        await asyncio.sleep(seconds)
+        running.cancel()
+        await asyncio.wait([running])
+    return writer
+
+
+def run(folder: Path, refusals: int, seconds: float) -> tuple[list[LocationRecord], list[str], StoreWriter]:
+    troubles: list[str] = []
+    with SqliteStore(folder) as store:
+        with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+            writer = runner.run(write(StubbornStore(store, refusals), troubles, seconds))
+        return store.locations(), troubles, writer
+
+
+def test_findings_count_only_once_they_are_confirmed(tmp_path: Path) -> None:
+    records, troubles, writer = run(tmp_path, refusals=0, seconds=5.0)
+    states = {record.code: record.state for record in records}
+    assert states == {f"A-{n}": LocationState.READ if n < 5 else LocationState.NOT_VISITED for n in range(10)}
+    assert troubles == []
+    assert (writer.written, writer.waiting) == (12, 0)
+    assert all(record.observation.evidence for record in records if record.observation)
+
+
+def test_a_disk_that_refuses_is_told_and_tried_again(tmp_path: Path) -> None:
+    records, troubles, writer = run(tmp_path, refusals=3, seconds=60.0)
+    assert sum(record.state is LocationState.READ for record in records) == 5
+    assert troubles
+    assert "disk full" in troubles[0]
+    assert writer.waiting == 0
+
+
+def test_what_is_left_when_the_flight_ends_is_written_on_the_way_out(tmp_path: Path) -> None:
+    records, _, writer = run(tmp_path, refusals=0, seconds=0.0)
+    assert len(records) == 10
+    assert writer.waiting == 0
+
+
+def test_the_writer_never_holds_up_the_loop(tmp_path: Path) -> None:
+    async def main(store: StubbornStore) -> int:
+        ticks = 0
+        with StoreWriter(store, "run", 0, LoopClock(), lambda _: None) as writer:
+            running = asyncio.ensure_future(writer.run(lambda _: None))
+            for number in range(5):
+                writer.put(finding(number), b"")
+            while writer.waiting:
+                ticks += 1
+                await asyncio.sleep(0.002)
+            running.cancel()
+            await asyncio.wait([running])
+        return ticks
+
+    with SqliteStore(tmp_path) as store:
+        assert asyncio.run(main(StubbornStore(store, 0, wait_s=0.05))) > 5
