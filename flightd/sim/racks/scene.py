@@ -22,8 +22,8 @@ from flightd.sim.racks.stock import Goods, Place
 _REACH_M = 7.0
 """Along the aisle, what is farther is not drawn."""
 _SAME_PLANE_M = 0.05
-_KEPT = 160
-"""Pictures of goods and beams that are kept: those of four nodes with four levels; about 200 MB."""
+_KEPT = 96
+"""Pictures of goods and beams that are kept, more than one view holds; about 200 MB."""
 _BACKS = 8
 _LEAST_SLOPE = 0.15
 """Across the aisle per unit of ray: below this a picture looks along the face."""
