@@ -14,7 +14,7 @@ from flightd.mission.plan import VisitOrder
 
 
 def resumed(config: Config, path: Path, site: Site, *, ordered: bool) -> Config:
-    """The configuration of the file `path` with the stops left over in place of its own, if that is wanted."""
+    """The configuration of the file `path` with the stops left over in place of its own, if wanted."""
     kept = config.mission.progress
     if ordered and kept is None:
         raise InputError(f"config {path}: mission.progress names no file, so that nothing can be resumed")
