@@ -8,7 +8,7 @@ control turns its reference into a set point, the limits have the last word.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from flightd.control.flight import FlightController, FlightGains, Motion
 from flightd.control.limits import Limiter, Limits
@@ -25,6 +25,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.grid.localise import GridLocaliser
+from flightd.grid.pads import PadFinder
 from flightd.grid.past import PoseHistory
 from flightd.grid.site import Site
 from flightd.mission.guidance import Guide, MissionParams, Senses
@@ -139,10 +140,15 @@ class Pilot:
         pose = None if tracks is None else self._localiser.step(tracks, height_m)
         if pose is not None:
             self._past.add(pose)
+        if tracks is not None and pose is not None:
+            self._pads.step(tracks, pose)
+        by_pad = None if pose is None else self._pads.over(pose, self._localiser.ever_matched)
+        pose = by_pad or pose
         for command in tick.commands:
             self._mission.command(command, now_ns)
         self._scan(tick)
-        guidance = self._mission.step(self._senses(tick, dt_s, pose, height_m))
+        senses = replace(self._senses(tick, dt_s, pose, height_m), by_pad=by_pad is not None)
+        guidance = self._mission.step(senses)
         motion = self._motion(pose, height_m, dt_s)
         if guidance.guide is Guide.NONE:
             self._control.reset()
@@ -185,6 +191,7 @@ class Pilot:
         self._tracker = LineTracker(self._params.tracker, yaw_rad)
         self._localiser = GridLocaliser(self._site, node, self._params.start_sigma_m)
         self._past = PoseHistory(self._scanner.least_integrity if self._scanner else 0.0)
+        self._pads = PadFinder(self._site)
 
     def _take(self, tick: TickInput) -> None:
         """Telemetry first: a frame needs the attitude and height of its exposure.
@@ -223,6 +230,7 @@ class Pilot:
             telemetry_age_s=math.inf if v is None else (now_ns - v.attitude.stamp_ns) * 1e-9,
             vehicle=v,
             ground_silent_s=tick.ground_silent_s,
+            pad_m=self._pads.centre(self._mission.goal.node),
         )
 
     def _motion(self, pose: GridPose | None, height_m: float, dt_s: float) -> Motion:

@@ -237,7 +237,7 @@ def _summary(simulation: Any, result: Any, wall_s: float) -> dict[str, Any]:
     flight = read_log(simulation.flight_log, {Topic.STATUS, Topic.EVENT})
     truth = read_log(simulation.truth_log, {Topic.TRUTH}).entries
     measured = score(
-        simulation.site,
+        simulation.scenario.floor.site(simulation.site),
         plan_of(simulation.config, simulation.site),
         flight.messages(Status),
         flight.messages(Event),

@@ -265,7 +265,7 @@ def _spec(simulation: Simulation, ports: Ports) -> WorldSpec:
     scenario, config = simulation.scenario, simulation.config
     adapter = config.vehicle.kind
     return WorldSpec(
-        site=simulation.site,
+        site=scenario.floor.site(simulation.site),
         seed=simulation.seed,
         camera_address=("127.0.0.1", ports.camera),
         vehicle="px4" if adapter == "mavsdk" else adapter,

@@ -47,6 +47,7 @@
     size_m = 0.5
     start = true                 # missions may start here
     charge = true                # batteries are changed or charged here
+    offset_m = [0.0, 0.0]        # of its centre from the node, where it does not lie on it
 
 Map frame: x along the aisles, y to the right of x seen from above, metres.
 """
@@ -68,6 +69,9 @@ from flightd.grid.ways import KeepOut, OneWay
 
 _Metres = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 _Coordinate = Annotated[float, Field(ge=-10_000, le=10_000, allow_inf_nan=False)]
+
+
+_PadOffset = Annotated[float, Field(ge=-0.5, le=0.5, allow_inf_nan=False)]
 
 
 class _Table(BaseModel):
@@ -133,6 +137,7 @@ class _PadTable(_Table):
     size_m: float = Field(0.5, ge=0.2, le=3)
     start: bool = True
     charge: bool = True
+    offset_m: tuple[_PadOffset, _PadOffset] = (0.0, 0.0)
 
 
 class _SiteFile(_Table):
@@ -226,6 +231,7 @@ def site_toml(site: Site) -> str:
     for pad in site.pads:
         parts += ["", "[[pad]]", f"id = {_quoted(pad.id)}", f"node = {_quoted(pad.node)}"]
         parts += [f"size_m = {pad.size_m!r}"]
+        parts += [f"offset_m = [{pad.offset_m[0]!r}, {pad.offset_m[1]!r}]"] if any(pad.offset_m) else []
         parts += [f"{key} = false" for key, on in (("start", pad.start), ("charge", pad.charge)) if not on]
     return "\n".join(parts) + "\n"
 

@@ -108,6 +108,17 @@ class Junction:
 
 
 @dataclass(frozen=True, slots=True)
+class PadSight:
+    """A charge pad seen whole: its centre in centred image coordinates of a distortion-free camera, the
+    length of its sides, and how like a full square it looks, 0..1."""
+
+    x_px: float
+    y_px: float
+    side_px: float
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True)
 class LineSet:
     """What vision saw in one frame.  Lines are in pixels of a distortion-free pinhole camera when a
     lens was given to the detector.  `timings_ms` names each stage's time."""
@@ -120,6 +131,7 @@ class LineSet:
     junctions: tuple[Junction, ...]
     method: str
     timings_ms: dict[str, float] = field(default_factory=dict)
+    pads: tuple[PadSight, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

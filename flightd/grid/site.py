@@ -95,13 +95,15 @@ class PaintedLine:
 
 @dataclass(frozen=True, slots=True)
 class Pad:
-    """A square mat, its centre on a node; missions may `start` on it, batteries change where `charge`."""
+    """A square mat on a node, its centre `offset_m` (x, y) from it; missions may `start` on it, batteries
+    change where `charge`."""
 
     id: str
     node: str
     size_m: float
     start: bool = True
     charge: bool = True
+    offset_m: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,6 +233,11 @@ class Site:
             raise InputError(
                 f"site {self.name}: no node {node!r}; nodes are named like {next(iter(self.nodes))}"
             )
+
+    def pad_centre(self, pad: Pad) -> tuple[float, float]:
+        """Where the middle of a pad is on the map, metres."""
+        node = self.nodes[pad.node]
+        return node.x_m + pad.offset_m[0], node.y_m + pad.offset_m[1]
 
     def neighbours(self, node: str) -> tuple[str, ...]:
         """Nodes one edge away, in a fixed order.  KeyError for an unknown node."""

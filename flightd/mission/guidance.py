@@ -74,7 +74,9 @@ class Guide(enum.Enum):
 @dataclass(frozen=True, slots=True)
 class Senses:
     """All that the mission knows at one tick.  `pose` is None before the floor was seen; ages in
-    seconds, infinite when there never was any.  `ground_silent_s` is 0 while no ground station attends."""
+    seconds, infinite when there never was any.  `ground_silent_s` is 0 while no ground station attends.
+    `pad_m` is the centre of the goal's pad on the map, as seen or else as drawn; None where there is none.
+    `by_pad` says that the pose is only that over the pad: enough to climb straight up."""
 
     now_ns: int
     dt_s: float
@@ -87,6 +89,8 @@ class Senses:
     telemetry_age_s: float
     vehicle: VehicleState | None
     ground_silent_s: float = 0.0
+    pad_m: tuple[float, float] | None = None
+    by_pad: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from flightd.mission.scan_phase import ScanPhase
 from flightd.mission.scanner import Scanner
 from flightd.mission.sorties import Sorties
 from flightd.mission.table import next_phase
+from flightd.mission.touchdown import Touchdown
 from flightd.mission.triggers import Trigger
 from flightd.mission.watch import Lasting, Situation, Watch
 
@@ -31,6 +32,7 @@ _DEMANDS = {
     Phase.PILOT: Demand.HANDS_OFF,
 }
 _ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.DONE, Phase.ABORTED, Phase.PILOT}
+_BY_PAD = {Phase.TAKE_OFF, Phase.ACQUIRE, Phase.HOLD}
 _TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
 
 
@@ -52,6 +54,7 @@ class Mission:
         self._policy = policy
         self._params = params
         self._watch = Watch(params)
+        self._touchdown = Touchdown(params)
         self._sorties = Sorties(site, Legs(site, policy, Pace.of(params)), params.battery)
         self._left_over: tuple[str, ...] = ()
         self._short_of_charge = False
@@ -279,6 +282,8 @@ class Mission:
         self._since_ns = s.now_ns
         self._settling = Lasting()
         self._limit_s = self._time_limit_s(s)
+        if phase is Phase.LAND:
+            self._touchdown.begin()
         if phase is Phase.SWAP:
             self._await_battery(s.now_ns)
         if phase is Phase.TAKE_OFF:
@@ -407,27 +412,33 @@ class Mission:
     def _descend(self, s: Senses) -> tuple[float, Demand]:
         """Climb rate and demand of a landing: down until the vehicle says that it stands, then disarm."""
         p, v = self._params, s.vehicle
-        height = 0.0 if math.isnan(s.height_m) else s.height_m
-        rate = p.touch_mps if height < p.touch_below_m else p.land_mps
-        self._height.reset(height, -rate)
+        rate = self._touchdown.rate_mps(s, self._target(s))
+        self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
         blind = s.telemetry_age_s > p.telemetry_land_s
         standing = v is not None and v.landed is LandedState.ON_GROUND and not blind
         by_itself = blind or self._found_flying
         return -rate, Demand.DISARM if standing else Demand.LAND if by_itself else Demand.FLY
 
+    def _target(self, s: Senses) -> tuple[float, float] | None:
+        """The pad to come down on; None while it lands on none."""
+        return (s.pad_m or (self.goal.x_m, self.goal.y_m)) if self._on_pad_leg else None
+
     def _steer(self, s: Senses) -> bool:
         """Move the reference towards where the phase wants it; False when the floor cannot be relied on."""
         p, pose = self._params, s.pose
         too_low = self.phase is Phase.TAKE_OFF and s.height_m < p.steer_above_m
-        stale = min(s.x_age_s, s.y_age_s) > p.lines_hold_s or s.telemetry_age_s > p.telemetry_hold_s
-        if pose is None or stale or too_low or not s.localised:
+        unseen_s = self._touchdown.unseen_s(s, self._target(s))
+        stale = min(s.x_age_s, s.y_age_s) > unseen_s or s.telemetry_age_s > p.telemetry_hold_s
+        unknown = not (s.by_pad and self.phase in _BY_PAD) and (stale or not s.localised)
+        if pose is None or unknown or too_low:
             return False
         if not self._steering:
             self._x.reset(pose.x_m, pose.vx_mps)
             self._y.reset(pose.y_m, pose.vy_mps)
             self._yaw.reset(pose.yaw_rad)
         to_goal = self.phase in _TO_GOAL or self._on_pad_leg
-        x, y, yaw = (*((self.goal.x_m, self.goal.y_m) if to_goal else self._anchor), self.goal.yaw_rad)
+        at = self._target(s) or ((self.goal.x_m, self.goal.y_m) if to_goal else self._anchor)
+        x, y, yaw = (*at, self.goal.yaw_rad)
         view = self._scan.view(self.phase)
         if view is not None:
             x, y, yaw = view.x_m, view.y_m, view.yaw_rad

@@ -20,7 +20,7 @@ class PadCrew:
     """Changes the battery of a drone that has flown and stands on a charge pad with its motors off."""
 
     def __init__(self, site: Site, airframe: Airframe, swap_s: float) -> None:
-        self._pads = [site.nodes[pad.node] for pad in site.pads if pad.charge]
+        self._pads = [site.pad_centre(pad) for pad in site.pads if pad.charge]
         self._airframe = airframe
         self._swap_s = swap_s
         self._flown = False
@@ -38,7 +38,7 @@ class PadCrew:
         """See what stands on the pad and act when the time of a swap has passed."""
         frame = self._airframe
         self._flown |= not frame.on_floor
-        here = any(math.hypot(frame.x_m - pad.x_m, frame.y_m - pad.y_m) < _REACH_M for pad in self._pads)
+        here = any(math.hypot(frame.x_m - x_m, frame.y_m - y_m) < _REACH_M for x_m, y_m in self._pads)
         still = frame.on_floor and frame.collective < 0.01
         if not (self._flown and here and still and frame.battery_frac < _WORTH_FRAC):
             self._since_ns = None

@@ -60,9 +60,9 @@ class Floor:
         self._marks = FloorMarks(site, look, seed)
         self._strokes = [_stroke_box(line) for line in site.lines]
         self._mats = [
-            (node.x_m - half, node.y_m - half, node.x_m + half, node.y_m + half)
+            (x_m - half, y_m - half, x_m + half, y_m + half)
             for pad in site.pads
-            for node, half in ((site.nodes[pad.node], pad.size_m / 2),)
+            for (x_m, y_m), half in ((site.pad_centre(pad), pad.size_m / 2),)
         ]
         self._uprights, self._pallets = _shelf_feet(site) if look.concrete > 0.0 else ([], [])
         self._paint = _linear(_PAINT_SRGB[site.line_colour])

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.core.geometry import Lens, Mount, heading_rotation, level_from_body, normalise_line
-from flightd.core.types import Line, LineSet
-from flightd.grid.site import PaintedLine, Site
+from flightd.core.types import Line, LineSet, PadSight
+from flightd.grid.site import Pad, PaintedLine, Site
 from flightd.sim.kinematics import Kinematics
 
 _SAMPLES = 120
@@ -28,6 +28,7 @@ class EyeErrors:
     rho_px: float = 0.15
     theta_rad: float = 0.0005
     missed: float = 0.0
+    pad_px: float = 1.5
 
 
 class IdealEye:
@@ -52,7 +53,29 @@ class IdealEye:
             line for line in seen if line is not None and self._random.random() >= self._errors.missed
         )
         lens = self._lens
-        return LineSet(seq, stamp_ns, lens.width_px, lens.height_px, lines, (), "ideal")
+        pads = tuple(pad for pad in (self._pad(pad, image_from_map, eye) for pad in self._site.pads) if pad)
+        return LineSet(seq, stamp_ns, lens.width_px, lens.height_px, lines, (), "ideal", pads=pads)
+
+    def _pad(self, pad: Pad, image_from_map: np.ndarray, eye: np.ndarray) -> PadSight | None:
+        """The pad, if its whole square is in the picture."""
+        lens, half = self._lens, pad.size_m / 2
+        x_m, y_m = self._site.pad_centre(pad)
+        corners = np.array([[-1, 1, 1, -1, 0], [-1, -1, 1, 1, 0], [0, 0, 0, 0, 0]]) * half
+        rays = image_from_map @ (corners + np.array([[x_m], [y_m], [0.0]]) - eye[:, None])
+        if (rays[2] <= 0.05).any():
+            return None
+        u, v = lens.fx_px * rays[0] / rays[2] + lens.cx_px, lens.fy_px * rays[1] / rays[2] + lens.cy_px
+        if u.min() < 0 or v.min() < 0 or u.max() > lens.width_px - 1 or v.max() > lens.height_px - 1:
+            return None
+        sides = np.hypot(np.diff(u[[0, 1, 2, 3, 0]]), np.diff(v[[0, 1, 2, 3, 0]]))
+        blur = self._errors.pad_px
+        x_px, y_px = u[4] - lens.centre_px[0], v[4] - lens.centre_px[1]
+        return PadSight(
+            float(x_px) + self._random.gauss(0.0, blur),
+            float(y_px) + self._random.gauss(0.0, blur),
+            float(sides.mean()),
+            1.0,
+        )
 
     def _line(self, painted: PaintedLine, image_from_map: np.ndarray, eye: np.ndarray) -> Line | None:
         lens = self._lens

@@ -34,6 +34,7 @@ exposure = 1.0           # brightness
 
 [floor]
 appearance = "default"   # default, clean, harsh, dim, glossy or worn
+pad_off_m = [0.0, 0.0]   # how far the pads have been pushed from where the map has them, x and y
 
 [wind]
 mean_x_mps = 0.0         # steady draught in the map frame
@@ -49,12 +50,14 @@ swap_s = 30.0            # time in which somebody changes it on the charge pad; 
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from flightd.core.errors import InputError
+from flightd.grid.site import Site
 from flightd.sim.appearance import Appearance, preset
 from flightd.sim.autopilot.radio import RadioParams
 from flightd.sim.optics import SimCamera, wide_lens
@@ -62,6 +65,8 @@ from flightd.sim.racks.camera import FrontCamera, front_lens
 from flightd.sim.racks.look import RackLook
 from flightd.sim.racks.stock import StockShares
 from flightd.sim.wind import Draught
+
+_Shift = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
 
 
 class _Section(BaseModel):
@@ -149,6 +154,14 @@ class RacksScenario(_Section):
 
 class FloorScenario(_Section):
     appearance: Literal["default", "clean", "harsh", "dim", "glossy", "worn"] = "default"
+
+    pad_off_m: tuple[_Shift, _Shift] = (0.0, 0.0)
+
+    def site(self, site: Site) -> Site:
+        """The site as it really is: its pads pushed about."""
+        dx_m, dy_m = self.pad_off_m
+        pads = (replace(pad, offset_m=(pad.offset_m[0] + dx_m, pad.offset_m[1] + dy_m)) for pad in site.pads)
+        return replace(site, pads=tuple(pads))
 
     def look(self) -> Appearance:
         return preset(self.appearance)

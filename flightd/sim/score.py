@@ -56,7 +56,7 @@ def score(
     phases = _Phases(statuses)
     on_lines = [_off_line(site, t) for t in flying if phases.at(t.stamp_ns) in _ON_LINES]
     hover = _hover_errors(site, visits, truth, phases)
-    pad = site.nodes[plan.home]
+    pad_m = next(site.pad_centre(pad) for pad in site.pads if pad.node == plan.home)
     landed = truth[-1] if truth and truth[-1].height_m < _OFF_FLOOR_M and flying else None
     return Score(
         mission="completed" if final and final.phase is Phase.DONE else "aborted",
@@ -67,7 +67,7 @@ def score(
         cross_track_rms_m=_rounded(_rms(on_lines)),
         cross_track_max_m=_rounded(max(on_lines, default=None)),
         hover_error_p95_m=_rounded(_p95(hover)),
-        landed_error_m=_rounded(math.hypot(landed.x_m - pad.x_m, landed.y_m - pad.y_m)) if landed else None,
+        landed_error_m=_rounded(math.hypot(landed.x_m - pad_m[0], landed.y_m - pad_m[1])) if landed else None,
         flight_time_s=_flight_time_s(truth),
         sorties=sum(
             after.phase is Phase.TAKE_OFF and before.phase is not Phase.TAKE_OFF

@@ -89,22 +89,22 @@ class World:
     def __init__(self, spec: WorldSpec, clock: Clock, recorder: Recorder) -> None:
         self._clock = clock
         self._recorder = recorder
-        pad = spec.site.nodes[spec.start or spec.site.home.node]
+        start = spec.start or spec.site.home.node
+        pad = next(pad for pad in spec.site.pads if pad.node == start)
+        x_m, y_m = spec.site.pad_centre(pad)
         airframe = Airframe(
             AirframeParams(battery_capacity_ah=spec.battery_ah),
             draught=spec.draught,
             seed=spec.seed,
-            x_m=pad.x_m,
-            y_m=pad.y_m,
+            x_m=x_m,
+            y_m=y_m,
             yaw_rad=spec.start_yaw_rad,
             battery_frac=spec.battery_frac,
         )
         self.vehicle: VehiclePeer
         show: Callable[[Image, int], None] | None = None
         if spec.truth_url:
-            self.vehicle = ExternalVehicle(
-                spec.truth_url, clock, Placement(pad.x_m, pad.y_m, spec.start_yaw_rad)
-            )
+            self.vehicle = ExternalVehicle(spec.truth_url, clock, Placement(x_m, y_m, spec.start_yaw_rad))
         elif spec.vehicle == "ardrone":
             self.vehicle, show = _ardrone(spec, airframe, clock)
         else:

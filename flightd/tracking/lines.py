@@ -8,13 +8,14 @@ prediction, never truth.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount, wrap_pi
-from flightd.core.types import Attitude, LineSet
+from flightd.core.types import Attitude, LineSet, PadSight
 from flightd.tracking.attitude import AttitudeHistory
 from flightd.tracking.motion import AxisTracker, HeadingTracker, MotionNoise, TrackedLine
-from flightd.tracking.tilt import FloorView, GroundLine, TiltCompensation, ground_lines
+from flightd.tracking.tilt import FloorView, GroundLine, TiltCompensation, ground_lines, ground_point
 
 _STEP_NS = 20_000_000
 _PARALLEL_RAD = math.radians(20.0)
@@ -39,6 +40,15 @@ class TrackerParams:
 
 
 @dataclass(frozen=True, slots=True)
+class PadOffset:
+    """A pad on the floor: its centre from the drone in grid axes, and the length of its sides."""
+
+    x_m: float
+    y_m: float
+    side_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class TrackSet:
     """The tracks at one time, in grid axes (x along the aisles, y to the right of x).
 
@@ -56,6 +66,9 @@ class TrackSet:
     ay_mps2: float
     across_x: tuple[TrackedLine, ...]
     across_y: tuple[TrackedLine, ...]
+    pads: tuple[PadOffset, ...] = ()
+    pads_ns: int = 0
+    """Capture time of the frame in which the `pads` were seen."""
 
 
 class LineTracker:
@@ -72,6 +85,7 @@ class LineTracker:
         self._forget_ns = forget_ns
         self._lines_ns = 0
         self._stamp_ns = 0
+        self._pads: tuple[PadOffset, ...] = ()
         self.rejected = 0
 
     def attitude(self, sample: Attitude) -> None:
@@ -107,6 +121,7 @@ class LineTracker:
                 across_y.append((y, math.hypot(sigma, x * self._heading.sigma_rad), line.width_m))
             elif abs(math.cos(direction)) < math.sin(_PARALLEL_RAD):
                 across_x.append((x, math.hypot(sigma, y * self._heading.sigma_rad), line.width_m))
+        self._pads = _placed(lines.pads, view, yaw)
         self._x.update(across_x, lines.stamp_ns)
         self._y.update(across_y, lines.stamp_ns)
         if across_x or across_y:
@@ -155,6 +170,8 @@ class LineTracker:
                 for line in self._y.lines()
                 if line.seen_ns > known_ns
             ),
+            tuple(replace(pad, x_m=pad.x_m - moved_x, y_m=pad.y_m - moved_y) for pad in self._pads),
+            self._stamp_ns,
         )
 
     def _advance(self, stamp_ns: int) -> None:
@@ -196,3 +213,16 @@ class LineTracker:
             if abs(innovation) < max(math.radians(4.0), 4.0 * math.hypot(self._heading.sigma_rad, sigma)):
                 self._heading.update(innovation, sigma)
         return attitude.yaw_rad + self._heading.offset_rad
+
+
+def _placed(pads: Iterable[PadSight], view: FloorView, yaw_rad: float) -> tuple[PadOffset, ...]:
+    """The pads on the floor, in grid axes about the drone at the time of the frame."""
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    found = []
+    for pad in pads:
+        point = ground_point(pad.x_px, pad.y_px, view)
+        if point is not None:
+            forward, right, metres_per_px = point
+            x_m, y_m = cos * forward - sin * right, sin * forward + cos * right
+            found.append(PadOffset(x_m, y_m, pad.side_px * metres_per_px))
+    return tuple(found)

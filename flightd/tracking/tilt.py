@@ -56,6 +56,24 @@ class FloorView:
     sigma_tilt_rad: float
 
 
+def ground_point(x_px: float, y_px: float, view: FloorView) -> tuple[float, float, float] | None:
+    """(forward, right) in metres of a point of the floor seen at centred image coordinates, level frame of
+    the body, and metres per pixel there; None for what the view cannot place.  Always the exact form."""
+    roll, pitch = view.attitude.roll_rad, view.attitude.pitch_rad
+    if abs(roll) > _MAX_TILT_RAD or abs(pitch) > _MAX_TILT_RAD:
+        return None
+    lever: Matrix = np.asarray(level_from_body(roll, pitch) @ np.array(view.mount.offset_m), dtype=np.float64)
+    height_m = view.height_m - float(lever[2])
+    centre = view.lens.centre_px
+    homography = ground_homography(view.lens, view.mount, roll, pitch)
+    point = np.linalg.solve(homography, np.array([x_px + centre[0], y_px + centre[1], 1.0]))
+    if point[2] < 0.2 or not height_m > 0.02:  # the horizon, or nearly
+        return None
+    scale = height_m / float(point[2])
+    forward, right = float(point[0]) * scale + float(lever[0]), float(point[1]) * scale + float(lever[1])
+    return forward, right, height_m / view.lens.fx_px / float(point[2]) ** 1.5
+
+
 def ground_lines(lines: Sequence[Line], view: FloorView) -> list[GroundLine]:
     """The lines as they lie on the floor, without those that the view cannot place (horizon, no height)."""
     roll, pitch = view.attitude.roll_rad, view.attitude.pitch_rad

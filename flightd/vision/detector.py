@@ -11,7 +11,7 @@ import numpy as np
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
 from flightd.core.types import Image, LineSet
-from flightd.vision import centroid, combine, evidence, junctions, naive, skeleton
+from flightd.vision import centroid, combine, evidence, junctions, naive, pads, skeleton
 from flightd.vision.colour import ColourProfile, classify, grow, load_profile
 from flightd.vision.plane import Plane, shortest_length
 from flightd.vision.refine import refine
@@ -68,14 +68,17 @@ class Detector:
         height, width = bgr.shape[:2]
         plane = self._plane(width, height)
         grid = grid_for(width, height)
-        mask = _closed(grow(classify(sample(bgr, grid), self.profile)), _SPECKS)
+        small = sample(bgr, grid)
+        mask = _closed(grow(classify(small, self.profile)), _SPECKS)
         mark("colour")
         strips = self._find(bgr, mask, grid, plane, mark)
         lines = tuple(strip.to_line() for strip in strips)
         found = junctions.find(lines, mask, grid, plane)
         mark("junctions")
+        mats = pads.find(small, lines, grid, plane)
+        mark("pads")
         timings = {name: (end - begin) / 1e6 for (_, begin), (name, end) in pairwise(marks)}
-        return LineSet(seq, stamp_ns, width, height, lines, found, self.method, timings)
+        return LineSet(seq, stamp_ns, width, height, lines, found, self.method, timings, mats)
 
     def _plane(self, width: int, height: int) -> Plane:
         lens = self._lens

@@ -72,6 +72,7 @@ class IdealFlight:
         swap_s: float = 0.0,
         scanner: Scanner | None = None,
         front: IdealFront | None = None,
+        world: Site | None = None,
     ) -> None:
         policy = policy or HeadingPolicy(Heading.ALONG)
         pad = site.home.node
@@ -81,10 +82,11 @@ class IdealFlight:
         self._looked: deque[tuple[int, CodeSet]] = deque()
         self._exposed: deque[Kinematics] = deque()
         self._front_ns = 0
-        node = site.nodes[pad]
-        self.airframe = Airframe(airframe, draught=draught, seed=seed, x_m=node.x_m, y_m=node.y_m)
+        world = world or site
+        x_m, y_m = world.pad_centre(world.home)
+        self.airframe = Airframe(airframe, draught=draught, seed=seed, x_m=x_m, y_m=y_m)
         self.sensors = Sensors(seed=seed)
-        self._eye = IdealEye(site, params.tracker.lens, params.tracker.mount, errors, seed)
+        self._eye = IdealEye(world, params.tracker.lens, params.tracker.mount, errors, seed)
         self._climb = ClimbLoop()
         self._delay_ns = delay_ns
         self._armed = False

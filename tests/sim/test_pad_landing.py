@@ -1,0 +1,60 @@
+"""Landing on a charge pad that was pushed off its place on the map, and starting from one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from flightd.config.schema import load_config
+from flightd.config.site_file import load_site
+from flightd.core.types import Phase
+from flightd.grid.site import Site
+from flightd.sim.ideal import EyeErrors
+from flightd.sim.scenario import FloorScenario
+from tests.sim.ideal_flight import Flown, IdealFlight
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+CONFIG = load_config(CONFIGS / "sim.toml")
+DEMO = load_site(CONFIGS / "site-demo.toml")
+
+
+def pushed(seed: int, reach_m: float = 0.25) -> Site:
+    """The demo site with its pad pushed that far, another way for each seed."""
+    angle = 2.4 * seed
+    return FloorScenario(pad_off_m=(reach_m * math.cos(angle), reach_m * math.sin(angle))).site(DEMO)
+
+
+def fly(world: Site, seed: int, **others: object) -> tuple[Flown, float]:
+    """The flight, and how far from the pad's true centre it landed."""
+    params = CONFIG.pilot_params(DEMO)
+    params = replace(params, mission=replace(params.mission, dwell_s=0.2))
+    flown = IdealFlight(DEMO, params, visits=("A2",), seed=seed, world=world, **others).fly(120)  # type: ignore[arg-type]
+    last, (x_m, y_m) = flown.truth[-1][1], world.pad_centre(world.home)
+    return flown, math.hypot(last.x_m - x_m, last.y_m - y_m)
+
+
+@pytest.mark.parametrize("seed", range(2, 12))
+def test_it_lands_within_a_decimetre_of_a_pad_that_was_pushed_away(seed: int) -> None:
+    flown, error_m = fly(pushed(seed), seed)
+    assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
+    assert error_m <= 0.10
+
+
+def test_without_a_pad_in_sight_it_lands_on_the_node_of_the_map() -> None:
+    flown, _ = fly(DEMO, 3, errors=EyeErrors(pad_px=1e6))
+    last, node = flown.truth[-1][1], DEMO.nodes["A1"]
+    assert flown.phase is Phase.DONE
+    assert math.hypot(last.x_m - node.x_m, last.y_m - node.y_m) <= 0.15
+
+
+def test_a_line_that_is_out_of_sight_at_the_start_is_found_while_climbing() -> None:
+    world = pushed(4)
+    flown, _ = fly(world, 4)
+    low = [o for o, (_, k) in zip(flown.outputs, flown.truth, strict=True) if 0.12 < k.height_m < 0.35]
+    assert low[0].tracks is not None
+    assert not (low[0].tracks.across_x and low[0].tracks.across_y), "not both lines are in sight low down"
+    assert [o for o in flown.outputs if o.phase is Phase.ACQUIRE]
+    assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
