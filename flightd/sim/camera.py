@@ -65,7 +65,8 @@ class CameraPeer:
     """Takes pictures of what `truth_at` says until cancelled, and sends notices of them to the daemon at
     `address`; or, with `show`, hands the pictures themselves to a vehicle that transmits them.
 
-    `make` is called in the rendering process (it must be picklable); `seed` draws the delivery's jitter."""
+    `make` is called in the rendering process (it must be picklable); `seed` draws the delivery's jitter.
+    While `wanted` says no, no picture is taken."""
 
     def __init__(
         self,
@@ -76,7 +77,9 @@ class CameraPeer:
         truth_at: Callable[[int], Kinematics],
         clock: Clock,
         show: Callable[[Image, int], None] | None = None,
+        wanted: Callable[[], bool] = lambda: True,
     ) -> None:
+        self._wanted = wanted
         self._show = show
         self._camera = camera
         self._address = address
@@ -121,9 +124,11 @@ class CameraPeer:
                 seq += missed
                 self.late += missed
             await asyncio.sleep(max((exposure_ns - self._clock.now_ns()) * 1e-9, 0.0))
-            jitter_s = self._random.random() * self._camera.jitter_s
-            due_ns = exposure_ns + round((self._camera.capture_delay_s + jitter_s) * 1e9)
-            pictures.create_task(self._deliver(child, transport, self._truth_at(exposure_ns), seq, due_ns))
+            if self._wanted():
+                jitter_s = self._random.random() * self._camera.jitter_s
+                due_ns = exposure_ns + round((self._camera.capture_delay_s + jitter_s) * 1e9)
+                truth = self._truth_at(exposure_ns)
+                pictures.create_task(self._deliver(child, transport, truth, seq, due_ns))
             seq += 1
 
     async def _deliver(self, child: Child, transport: Any, truth: Kinematics, seq: int, due_ns: int) -> None:

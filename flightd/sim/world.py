@@ -103,10 +103,11 @@ class World:
         )
         self.vehicle: VehiclePeer
         show: Callable[[Image, int], None] | None = None
+        own_front: CameraPeer | None = None
         if spec.truth_url:
             self.vehicle = ExternalVehicle(spec.truth_url, clock, Placement(x_m, y_m, spec.start_yaw_rad))
         elif spec.vehicle == "ardrone":
-            self.vehicle, show = _ardrone(spec, airframe, clock)
+            self.vehicle, show, own_front = _ardrone(spec, airframe, clock)
         else:
             (port,) = spec.vehicle_ports
             peer = Px4Peer if spec.vehicle == "px4" else ArduCopterPeer
@@ -124,6 +125,8 @@ class World:
                 show,
             )
         }
+        if own_front is not None:
+            self._cameras["ardrone-front-camera"] = own_front
         if spec.front is not None:
             front = spec.front
             self._cameras["front-camera"] = CameraPeer(
@@ -169,10 +172,12 @@ class World:
 
 def _ardrone(
     spec: WorldSpec, airframe: Airframe, clock: Clock
-) -> tuple[VehiclePeer, Callable[[Image, int], None]]:
-    """The emulated AR.Drone and where its pictures go.  UnavailableError without its video library."""
+) -> tuple[VehiclePeer, Callable[[Image, int], None], CameraPeer]:
+    """The emulated AR.Drone, where the floor's pictures go, and its own front camera.  UnavailableError
+    without its video library."""
     try:
         from flightd.sim.ardrone.drone import Drone  # noqa: PLC0415 - its video needs an optional extra
+        from flightd.sim.ardrone.front import front_peer  # noqa: PLC0415
         from flightd.sim.ardrone.server import ArDroneServer, Ports  # noqa: PLC0415
         from flightd.sim.ardrone.video import Channel  # noqa: PLC0415
     except ModuleNotFoundError as err:
@@ -182,4 +187,6 @@ def _ardrone(
     drone = Drone(airframe, Sensors(seed=spec.seed))
     ports = Ports("127.0.0.1", *spec.vehicle_ports)
     server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)
-    return server, partial(server.show, camera=Channel.BOTTOM)
+    look = spec.front.look if spec.front is not None else RackLook()
+    front = front_peer(server, spec.site, look, spec.seed, clock)
+    return server, partial(server.show, camera=Channel.BOTTOM), front

@@ -1,9 +1,8 @@
 """An emulated AR.Drone 2.0 for anyone's client: `python -m flightd.sim.ardrone`.
 
 It stands on the charging pad of a simulated warehouse, flies in real time and streams what its bottom
-camera sees there; its front camera sees a plain horizon.  A client that insists on the drone's own address
-can be given it:
-`ip address add 192.168.1.1/32 dev lo`, then `--host 192.168.1.1`.
+camera sees there and its front camera of the racks.  A client that insists on the drone's own
+address can be given it: `ip address add 192.168.1.1/32 dev lo`, then `--host 192.168.1.1`.
 """
 
 from __future__ import annotations
@@ -23,10 +22,12 @@ from flightd.runtime.clock import LoopClock
 from flightd.sim.airframe import Airframe
 from flightd.sim.appearance import DEFAULT
 from flightd.sim.ardrone.drone import Drone
+from flightd.sim.ardrone.front import front_peer
 from flightd.sim.ardrone.server import ArDroneServer, Ports
 from flightd.sim.ardrone.video import Channel
 from flightd.sim.camera import CameraPeer
 from flightd.sim.optics import SimCamera
+from flightd.sim.racks.look import RackLook
 from flightd.sim.renderer import Renderer
 from flightd.sim.sensors import Sensors
 
@@ -68,9 +69,11 @@ async def _serve(site: Site, ports: Ports, seed: int, battery_frac: float) -> No
     make = partial(Renderer, site, optics, DEFAULT, seed)
     show = partial(server.show, camera=Channel.BOTTOM)
     camera = CameraPeer(optics, make, f"camera {seed}", _NOBODY, server.truth_at, clock, show)
+    front = front_peer(server, site, RackLook(), seed, clock)
     async with asyncio.TaskGroup() as tasks:
         tasks.create_task(server.run(), name="drone")
         tasks.create_task(camera.run(), name="camera")
+        tasks.create_task(front.run(), name="front camera")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from flightd.core.types import Image
 from flightd.ports import Clock
 from flightd.sim.airframe import Airframe
 from flightd.sim.ardrone.drone import Drone
-from flightd.sim.ardrone.horizon import horizon
 from flightd.sim.ardrone.video import Channel, Encoder, Packer, is_idr
 from flightd.sim.autopilot.radio import PERFECT, Radio, RadioParams
 from flightd.sim.kinematics import Kinematics
@@ -70,7 +69,6 @@ class ArDroneServer:
         self._navdata: asyncio.DatagramTransport | None = None
         self._client: Any = None
         self._servers: list[asyncio.Server] = []
-        self._has_front = False
         self._watchers: dict[asyncio.StreamWriter, _Stream] = {}
         self._readers: list[asyncio.StreamWriter] = []
         self._pending_configuration: list[bytes] = []
@@ -180,20 +178,10 @@ class ArDroneServer:
 
     def show(self, bgr: Image, stamp_ns: int | None = None, camera: Channel | None = None) -> None:
         """Stream one picture of `camera` (the one in use when left out) to whoever watches; (H, W, 3) of any
-        size, exposed at `stamp_ns` (now when left out).
-
-        Pictures of the other camera are dropped; while nobody has shown any of the front camera, those of
-        the bottom one call for a plain horizon in its place."""
-        if not self.radio:
+        size, exposed at `stamp_ns` (now when left out).  Pictures of the other camera are dropped."""
+        if not self.radio or (camera is not None and camera is not self.channel):
             return
-        stamp_ns = self._clock.now_ns() if stamp_ns is None else stamp_ns
-        self._has_front |= camera is Channel.FRONT
-        if camera is not None and camera is not self.channel:
-            if camera is Channel.FRONT or self._has_front:
-                return
-            truth = self.truth_at(stamp_ns)
-            bgr = horizon(truth.roll_rad, truth.pitch_rad)
-        timestamp_ms = stamp_ns // 1_000_000
+        timestamp_ms = (self._clock.now_ns() if stamp_ns is None else stamp_ns) // 1_000_000
         for writer, stream in list(self._watchers.items()):
             room = writer.transport.get_write_buffer_size() <= _VIDEO_BACKLOG_BYTES
             data = stream.frame(bgr, timestamp_ms, room=room)
