@@ -14,8 +14,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 from flightd.sim.dataset import COLOURS, write_dataset
-from flightd.sim.disturb import LEVELS
 from flightd.sim.scenes import LAYOUTS
+from flightd.sim.severity import LEVELS
 
 
 def size(text: str) -> tuple[int, int]:

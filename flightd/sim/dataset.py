@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from flightd.core.types import Image
 from flightd.sim import disturb
-from flightd.sim.disturb import LEVELS
 from flightd.sim.paint import Bend, break_band, coverage, floor_bgr, floor_texture, paint_bgr, wear
 from flightd.sim.scenes import (
     Layout,
@@ -31,6 +30,7 @@ from flightd.sim.scenes import (
     truth_nodes,
     visible_span,
 )
+from flightd.sim.severity import LEVELS
 from flightd.vision.labels import LabelledImage, LabelledLine, LabelledNode, Labels, write_labels
 
 COLOURS = ("yellow", "white", "red", "blue", "green", "black")
@@ -63,7 +63,7 @@ def generate(
 ) -> LabelledFrame:
     """The frame that belongs to these arguments.
 
-    `level` is a key of `disturb.LEVELS`.  Colour and layout are drawn from the seed unless given.  The
+    `level` is a key of `severity.LEVELS`.  Colour and layout are drawn from the seed unless given.  The
     label of a bent line (residual distortion) is the straight line nearest to its centre line.
     """
     severity = LEVELS[level]

@@ -13,6 +13,7 @@ from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.loops import VirtualLoop
 from flightd.sim.airframe import Airframe
+from flightd.sim.ardrone.commands import Command, parse
 from flightd.sim.ardrone.drone import Drone, DroneOptions
 from flightd.sim.ardrone.server import ArDroneServer, Ports
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
@@ -40,6 +41,24 @@ def make_drone(
     options: DroneOptions | None = None, *, battery_frac: float = 1.0, sensors: SensorParams | None = None
 ) -> Drone:
     return Drone(Airframe(seed=1, battery_frac=battery_frac), Sensors(sensors, seed=1), options)
+
+
+class Ear:
+    """Writes down every command that reaches the drone, and may swallow some."""
+
+    def __init__(self, drone: Drone, lose: Callable[[Command], bool] = lambda _command: False) -> None:
+        self.commands: list[tuple[int, Command]] = []
+        obey = drone.command
+
+        def hear(datagram: bytes, now_ns: int) -> None:
+            self.commands += [(now_ns, command) for command in parse(datagram)]
+            if not any(lose(command) for command in parse(datagram)):
+                obey(datagram, now_ns)
+
+        drone.command = hear  # type: ignore[method-assign]
+
+    def named(self, *names: str) -> list[Command]:
+        return [command for _, command in self.commands if command.name in names]
 
 
 class Bench:

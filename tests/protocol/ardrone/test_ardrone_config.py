@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import itertools
 import math
-from collections.abc import Callable
 
 import pytest
 
@@ -14,28 +13,10 @@ from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, Camera, p
 from flightd.control.limits import Limits
 from flightd.core.types import Demand
 from flightd.sim.ardrone import configuration
-from flightd.sim.ardrone.commands import Command, parse
+from flightd.sim.ardrone.commands import Command
 from flightd.sim.ardrone.configuration import Configuration, Ids
-from flightd.sim.ardrone.drone import Drone, DroneOptions
-from tests.protocol.ardrone.bench import Bench, bench, make_drone, virtually
-
-
-class Ear:
-    """Writes down every command that reaches the drone, and may swallow some."""
-
-    def __init__(self, drone: Drone, lose: Callable[[Command], bool] = lambda _command: False) -> None:
-        self.commands: list[tuple[int, Command]] = []
-        obey = drone.command
-
-        def hear(datagram: bytes, now_ns: int) -> None:
-            self.commands += [(now_ns, command) for command in parse(datagram)]
-            if not any(lose(command) for command in parse(datagram)):
-                obey(datagram, now_ns)
-
-        drone.command = hear  # type: ignore[method-assign]
-
-    def named(self, *names: str) -> list[Command]:
-        return [command for _, command in self.commands if command.name in names]
+from flightd.sim.ardrone.drone import DroneOptions
+from tests.protocol.ardrone.bench import Bench, Ear, bench, make_drone, virtually
 
 
 def in_force(b: Bench) -> dict[str, str]:

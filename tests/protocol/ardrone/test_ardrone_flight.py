@@ -12,8 +12,7 @@ from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.sim.ardrone.commands import Command
 from flightd.sim.ardrone.drone import BIT_CUTOUT, DroneOptions, Major
 from flightd.sim.sensors import SensorParams
-from tests.protocol.ardrone.bench import bench, make_drone, virtually
-from tests.protocol.ardrone.test_ardrone_config import Ear
+from tests.protocol.ardrone.bench import Ear, bench, make_drone, virtually
 
 
 def ref_bits(commands: list[Command]) -> list[int]:

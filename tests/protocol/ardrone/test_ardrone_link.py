@@ -14,8 +14,7 @@ from flightd.core.types import Demand
 from flightd.sim.ardrone.drone import Major
 from flightd.sim.ardrone.telemetry import Report, packet
 from flightd.sim.autopilot.radio import RadioParams
-from tests.protocol.ardrone.bench import bench, make_drone, virtually
-from tests.protocol.ardrone.test_ardrone_config import Ear
+from tests.protocol.ardrone.bench import Ear, bench, make_drone, virtually
 
 MS = 1_000_000
 

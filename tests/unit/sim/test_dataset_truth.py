@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flightd.sim.dataset import COLOURS, generate
-from flightd.sim.disturb import LEVELS
 from flightd.sim.paint import Bend, coverage
 from flightd.sim.scenes import LAYOUTS, Band, Scene, random_scene, truth_lines, truth_nodes, visible_span
+from flightd.sim.severity import LEVELS
 from flightd.vision.labels import LabelledLine
 
 
