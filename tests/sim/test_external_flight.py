@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import subprocess
 import sys
@@ -11,6 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
+from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
+from flightd.runtime.clock import LoopClock
+from flightd.runtime.loops import ScaledLoop
+from flightd.sim.external import ExternalVehicle, Placement
+from tests.protocol.rig import Rig
 
 ROOT = Path(__file__).parents[2]
 SHORT = 'mission.nodes=["A1", "A2"]'
@@ -47,9 +55,9 @@ def is_sound(summary: dict[str, Any]) -> bool:
 
 
 @contextmanager
-def simulator(kind: str) -> Iterator[list[str]]:
-    """Another simulator; the options that fly in it."""
-    command = [sys.executable, "-m", "tests.sim.sitl_stand_in", kind]
+def simulator(kind: str, speed: float = 1.0) -> Iterator[list[str]]:
+    """Another simulator, so many times as fast as the clock; the options that fly in it."""
+    command = [sys.executable, "-m", "tests.sim.sitl_stand_in", kind, "--speed", str(speed)]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, cwd=ROOT, stdin=pipe, stdout=pipe, text=True) as process:
         assert process.stdout is not None
@@ -72,6 +80,41 @@ def test_a_mission_is_flown_in_another_simulator_wherever_its_vehicle_stands(
     with simulator(kind) as options:
         summary = flown(tmp_path, *options)
     assert is_sound(summary), summary
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "speed"), [("ardupilot", 2.0), ("px4", 3.0)])
+def test_a_simulator_that_runs_at_another_speed_is_flown_in_its_own_time(
+    kind: str, speed: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Adapter and truth link on a clock of the same speed; without pictures, which only cost time."""
+
+    async def main(vehicle_url: str, truth_url: str) -> None:
+        clock = LoopClock()
+        make = Px4Vehicle if kind == "px4" else ArduPilotVehicle
+        vehicle, world = make(vehicle_url, clock), ExternalVehicle(truth_url, clock, Placement(0, 0, 0))
+        tasks = [asyncio.create_task(part.run()) for part in (world, vehicle)]
+        await world.open()
+        rig = Rig(vehicle, world, lambda: None, lambda apart: None)
+        await rig.take_off(1.5)
+        vehicle.attitudes()
+        start_m, start_s = world.truth().height_m, asyncio.get_running_loop().time()
+        await rig.stream(8.0, climb_mps=0.3)
+        passed_s = asyncio.get_running_loop().time() - start_s
+        samples = vehicle.attitudes()
+        assert world.truth().height_m - start_m == pytest.approx(0.3 * passed_s, rel=0.2)
+        assert len(samples) == pytest.approx(50 * passed_s, rel=0.15)
+        assert abs(samples[-1].yaw_rad - samples[0].yaw_rad) < 0.1
+        assert (samples[-1].stamp_ns - samples[0].stamp_ns) * 1e-9 == pytest.approx(passed_s, rel=0.1)
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
+
+    with simulator(kind, speed) as options:
+        addresses = options[3], options[5]
+        with asyncio.Runner(loop_factory=lambda: ScaledLoop(speed)) as runner:
+            runner.run(main(*addresses))
+    assert not [record for record in caplog.records if "times as fast" in record.message]
 
 
 @pytest.mark.slow
