@@ -3,7 +3,8 @@
     python -m tests.unit.store.kill_at_random 200 1 FOLDER
 
 Prints one JSON document: kills, commits that were reported before the kill, how many of those were lost,
-how many stores did not open sound.  Killing uses fork, so this is a program of its own.
+how many stores did not open sound.  Each look is committed pending and confirmed before it is reported.
+Killing uses fork, so this is a program of its own.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ def _write_until_killed(folder: Path, first: int, told: int) -> None:
     while True:
         evidence = store.keep_evidence(b"picture %d " % number * 500)
         seen = look(number, evidence=evidence)
-        store.commit(seen)
+        store.commit(seen, confirmed=False)
+        store.settle(seen.run, [seen.location], confirmed=True)
         os.write(told, f"{seen.id} {evidence}\n".encode())
         number += 1
 
@@ -66,6 +68,8 @@ def main() -> None:
             lost += len(told.keys() - held)
             lost += sum(not store.evidence.path(name).exists() for name in told.values())
         database = sqlite3.connect(folder / "inventory.db")
+        confirmed = {row[0] for row in database.execute("SELECT id FROM observation WHERE standing = 1")}
+        lost += len(told.keys() - confirmed)
         unsound += database.execute("PRAGMA integrity_check").fetchone() != ("ok",)
         database.close()
     print(json.dumps({"kills": kills, "commits": len(told), "lost": lost, "unsound": unsound}))

@@ -176,3 +176,50 @@ def test_a_state_that_its_reads_deny_cannot_be_made(state: str, texts: int) -> N
     reads = tuple(StoredRead("QR Code", f"T{n}", True, 1, 1.0) for n in range(texts))
     with pytest.raises(ValueError, match="A-1"):
         Observation("r", "A-1", 1, LocationState(state), 0.5, reads)
+
+
+def test_a_pending_look_counts_for_nothing_until_it_is_confirmed(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as store:
+        first, second = look(1), look(51)
+        assert first.location == second.location
+        store.commit(first)
+        store.commit(second, confirmed=False)
+        assert newest(store, first.location) == first.id
+        assert store.counted("other run") == frozenset()
+        store.settle(second.run, [second.location], confirmed=True)
+        assert newest(store, first.location) == second.id
+        assert store.counted(first.run) == {first.location}
+
+
+def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path / "a") as one, SqliteStore(tmp_path / "b") as other:
+        seen = look(1)
+        for store in (one, other):
+            store.commit(seen, confirmed=False)
+        one.settle(seen.run, [seen.location], confirmed=False)
+        other.settle(seen.run, [seen.location], confirmed=True)
+        one.settle(seen.run, [seen.location], confirmed=True)
+        one.commit(seen)
+        assert newest(one, seen.location) is None
+        other.merge(one)
+        assert newest(other, seen.location) is None
+        assert [kept.id for kept in other.history(seen.location)] == [seen.id]
+
+
+def test_an_inventory_of_the_first_format_is_taken_over_as_confirmed(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as store:
+        store.commit(look(1))
+    database = sqlite3.connect(tmp_path / "inventory.db")
+    database.execute("ALTER TABLE observation DROP COLUMN standing")
+    database.execute("PRAGMA user_version = 1")
+    database.close()
+    with SqliteStore(tmp_path) as store:
+        assert newest(store, look(1).location) == look(1).id
+        store.commit(look(2), confirmed=False)
+        assert newest(store, look(2).location) is None
+
+
+def newest(store: SqliteStore, location: str) -> str | None:
+    """The id of the observation that tells a location's state."""
+    record = next(record for record in store.locations() if record.code == location)
+    return record.observation.id if record.observation else None
