@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ from flightd.adapters.store.sqlite import SqliteStore
 from flightd.cli.pictures import list_files, read_image
 from flightd.cli.progress import track
 from flightd.config.schema import load_table, parse_config
-from flightd.core.errors import InputError
+from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
 from flightd.core.types import Image
 from flightd.vision.codes import read_codes
@@ -75,16 +76,24 @@ def read_stock(path: Path) -> dict[str, list[str]]:
 
 def counted_beside(log: Path, inventory: Path | None = None, expected: Path | None = None) -> Count | None:
     """What was counted, for the report of `log`: the inventory in `inventory`, or beside the log if there
-    is one; compared with an `expected` stock.  Raises InputError when what is asked for is missing."""
+    is one; compared with an `expected` stock.  Raises InputError when what is asked for is missing; one that
+    merely lies there and cannot be read is told and left out."""
     from flightd.mission.stock import compare_stock
     from flightd.replay.report.count import Count
 
     stock = read_stock(expected) if expected is not None else None
     folder = inventory or log.parent
-    if inventory is None and stock is None and not (folder / "inventory.db").exists():
+    asked = inventory is not None or stock is not None
+    if not asked and not (folder / "inventory.db").exists():
         return None
-    with SqliteStore(folder, create=False) as store:
-        records, evidence = store.locations(), store.evidence
+    try:
+        with SqliteStore(folder, create=False) as store:
+            records, evidence = store.locations(), store.evidence
+    except (InputError, UnavailableError) as err:
+        if asked:
+            raise
+        print(f"flightd: {err}; the report shows the flight alone", file=sys.stderr)
+        return None
     differences = compare_stock(records, stock) if stock is not None else None
 
     def picture(name: str) -> bytes | None:

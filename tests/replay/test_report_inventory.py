@@ -212,6 +212,16 @@ def test_the_page_has_the_inventory_only_where_there_is_one(folder: Path, count:
     assert 'id="counted"' not in render(flight)
 
 
+def test_a_damaged_inventory_that_nobody_asked_for_does_not_cost_the_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "inventory.db").write_bytes(b"no database at all" * 100)
+    assert counted_beside(tmp_path / "flight.mcap") is None
+    assert "the report shows the flight alone" in capsys.readouterr().err
+    with pytest.raises(InputError):
+        counted_beside(tmp_path / "flight.mcap", inventory=tmp_path)
+
+
 def test_the_command_takes_the_inventory_beside_the_log_and_the_books(folder: Path, tmp_path: Path) -> None:
     log, out = str(folder / "flight.mcap"), tmp_path / "r.html"
     told = CliRunner().invoke(
