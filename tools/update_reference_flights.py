@@ -3,8 +3,8 @@
 Each is the beginning of a simulated flight: all that the pilot was given and all that it decided, tick by
 tick, and a picture.  A test replays them: a change of behaviour shows there as drift.
 
-python tools/update_reference_flights.py                  says what drifts, exit 1 if anything does
-python tools/update_reference_flights.py --i-mean-it      says so and records them anew: commit them with
+python -m tools.update_reference_flights                  says what drifts, exit 1 if anything does
+python -m tools.update_reference_flights --i-mean-it      says so and records them anew: commit them with
                                                           the reason for the change
 """
 

@@ -1,4 +1,4 @@
-"""Kalman filters of one axis of the floor grid and of the grid's direction (filterpy).
+"""Kalman filters of one axis of the floor grid and of the grid's direction.
 
 `AxisTracker` holds, in one filter, the drone's velocity along one grid axis, the disturbance of its
 acceleration (wind, trim), and the offsets of all lines seen across that axis.  A line stands still, so
@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
 
 from flightd.core.geometry import Matrix
+from flightd.tracking.kalman import KalmanFilter
 
 _GATE_SIGMAS = 4.0
 
@@ -149,10 +149,7 @@ class AxisTracker:
         self._p = np.diag([noise.start_velocity_mps**2, noise.start_disturbance_mps2**2])
 
     def _filter(self) -> KalmanFilter:
-        n = len(self._x)
-        kf = KalmanFilter(dim_x=n, dim_z=1, dim_u=1)
-        kf.x, kf.P = self._x.reshape(n, 1), self._p
-        return kf
+        return KalmanFilter(self._x.reshape(-1, 1), self._p)
 
     def _keep(self, kf: KalmanFilter) -> None:
         self._x = np.asarray(kf.x, dtype=float).reshape(-1)
@@ -198,9 +195,7 @@ class HeadingTracker:
     and its drift; lines tell it modulo 90 degrees."""
 
     def __init__(self, offset_rad: float, sigma_rad: float, drift_radps: float = 0.002) -> None:
-        self._kf = KalmanFilter(dim_x=2, dim_z=1)
-        self._kf.x = np.array([[offset_rad], [0.0]])
-        self._kf.P = np.diag([sigma_rad**2, 0.005**2])
+        self._kf = KalmanFilter(np.array([[offset_rad], [0.0]]), np.diag([sigma_rad**2, 0.005**2]))
         self._kf.H = np.array([[1.0, 0.0]])
         self._drift = drift_radps
 
