@@ -19,6 +19,10 @@ from flightd.vision.strip import Array, Strip
 STATIONS = 48
 _INSIDE = np.array([-0.42, -0.25, -0.08, 0.08, 0.25, 0.42])
 """Where the paint is looked for, in widths from the centre line."""
+_PARTS = np.zeros((10, 3), np.float32)
+_PARTS[:6, 0] = _PARTS[6:8, 1] = _PARTS[8:, 2] = 1.0
+"""Which of the points across a band lie inside it, and which on its one and other side."""
+_BOTH_SIDES = np.ones(2, np.float32)
 _PLACES = (np.arange(STATIONS) + 0.5) / STATIONS
 
 
@@ -56,19 +60,18 @@ def weigh(strips: list[Strip], mask: Image, grid: Grid, plane: Plane) -> list[Ev
     v[..., 8], v[..., 9] = width / 2 + margin, width / 2 + beside
     v += (a + b * u)[..., None]
     painted, seen = _look_up(mask, grid, plane, steep[..., None], u[..., None], v)
-    inside = painted[..., :6]
-    filled = inside.sum(-1) >= 0.55 * np.maximum(seen[..., :6].sum(-1), 3)
-    beside_paint = painted[..., 6:].reshape(len(strips), STATIONS, 2, 2).any(-1)
-    band = filled * (1.0 - 0.5 * beside_paint.sum(-1))
+    counts = painted @ _PARTS
+    filled = counts[..., 0] >= 0.55 * np.maximum(seen @ _PARTS[:, 0], 3)
+    band = filled * (1.0 - 0.5 * np.minimum(counts[..., 1:], 1.0) @ _BOTH_SIDES)
     found = []
     for k, strip in enumerate(strips):
         span = _span(filled[k], band[k])
         if span is None:
             continue
         stretch = slice(*span)
-        places = filled[k, stretch]
-        count = int(np.count_nonzero(places))
-        if inside[k, stretch][places].sum(axis=0).min() < 0.3 * count:
+        places = filled[k, stretch].astype(np.float32)
+        count = int(places.sum())
+        if (places @ painted[k, stretch, :6]).min() < 0.3 * count:
             continue
         first, pace = float(u0[k, 0]), float(pitch[k, 0])
         stations = span[1] - span[0]
@@ -94,8 +97,8 @@ def _run(steep: NDArray[np.bool_], a: Array, b: Array, plane: Plane) -> tuple[Ar
 
 def _look_up(
     mask: Image, grid: Grid, plane: Plane, steep: NDArray[np.bool_], u: Array, v: Array
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Whether there is paint at each point, and whether the point is in the picture."""
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """1 where there is paint, and 1 where the point is in the picture; 0 elsewhere."""
     if plane.is_identity:
         x, y = np.where(steep, v, u), np.where(steep, u, v)
     else:
@@ -103,7 +106,8 @@ def _look_up(
     i, j = grid.column(x), grid.row(y)
     height, width = mask.shape
     seen = (i >= 0) & (i < width) & (j >= 0) & (j < height)
-    return mask.ravel().take(np.where(seen, j * width + i, 0)) * seen > 0, seen
+    there = seen.astype(np.float32)
+    return (mask.ravel().take(np.where(seen, j * width + i, 0)) != 0) * there, there
 
 
 def _span(filled: NDArray[np.bool_], band: Array) -> tuple[int, int] | None:
