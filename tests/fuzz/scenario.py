@@ -4,49 +4,34 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
+from flightd.sim import scenario
 from flightd.sim.scenario import load_scenario
 from tests.fuzz.drive import Target, in_one_line, main
 from tests.fuzz.mutate import spoil_text
 
-_EVERY_KEY = b"""
-[camera]
-width_px = 640
-height_px = 360
-fps = 30
-capture_delay_s = 0.060
-jitter_s = 0.003
-exposure_s = 0.004
-
-[floor]
-appearance = "default"
-
-[wind]
-mean_x_mps = 0.0
-mean_y_mps = 0.0
-gust_mps = 0.3
-
-[vehicle]
-battery = 1.0
-radio_loss = 0.0
-radio_delay_ms = 0.0
-radio_jitter_ms = 0.0
-"""
+_EVERY_KEY = ("[" + (scenario.__doc__ or "").partition("\n[")[2]).encode()
+"""The sample in the module's own description names every section."""
 
 
 def target(folder: Path) -> Target:
     path = folder / "scenario.toml"
+    site = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")
 
     def attempt(data: bytes) -> bool:
         path.write_bytes(data)
         try:
-            scenario = load_scenario(path)
+            read = load_scenario(path)
         except InputError as err:
             return in_one_line(err)
-        scenario.camera.camera()
-        scenario.floor.look()
-        scenario.wind.draught()
-        scenario.vehicle.radio()
+        read.camera.camera()
+        read.front_camera.camera()
+        read.racks.look()
+        read.floor.look()
+        read.floor.site(site)
+        read.wind.draught()
+        read.vehicle.radio()
         return False
 
     return Target("scenario", (_EVERY_KEY,), spoil_text, attempt)
