@@ -9,11 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from flightd.adapters.metrics.book import MetricsBook
 from flightd.app import Daemon, FlightResult
 from flightd.config.schema import Config, load_config
 from flightd.config.site_file import load_site
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Phase, Status
+from flightd.ports import Monitor
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.pool import Detection
 from flightd.runtime.ring import FrameTicket
@@ -52,13 +54,15 @@ async def died(rig: Rig) -> None:
     rig.cut(False)
 
 
-async def restarted(rig: Rig) -> tuple[FlightResult, list[Phase]]:
+async def restarted(rig: Rig, *monitors: Monitor) -> tuple[FlightResult, list[Phase]]:
     phases: list[Phase] = []
 
     def note(status: Status) -> None:
         phases.extend([status.phase] if status.phase not in phases[-1:] else [])
 
-    daemon = Daemon(await config_of(rig), SITE, LoopClock(), NoDetectors(), observers=[note])
+    daemon = Daemon(
+        await config_of(rig), SITE, LoopClock(), NoDetectors(), observers=[note], monitors=monitors
+    )
     async with asyncio.timeout(120):
         return await daemon.fly(), phases
 
@@ -80,7 +84,8 @@ def test_it_keeps_the_vehicle_level_reports_and_lands_it(alone_s: float) -> None
                     await asyncio.sleep(0.02)
 
             watching = asyncio.create_task(watch())
-            result, phases = await restarted(rig)
+            book = MetricsBook()
+            result, phases = await restarted(rig, book)
             watching.cancel()
             assert phases[-3:] == [Phase.RECOVER, Phase.LAND, Phase.ABORTED]
             assert result.phase is Phase.ABORTED
@@ -88,6 +93,10 @@ def test_it_keeps_the_vehicle_level_reports_and_lands_it(alone_s: float) -> None
             assert rig.peer.truth().height_m < 0.15
             assert max(tilts) < math.radians(3)
             assert max(heights) < 1.9, "it never climbs away"
+            told = book.exposition().decode()
+            assert 'flightd_phase{phase="aborted"} 1.0' in told
+            assert 'flightd_events_total{level="error",name="restart"} 1.0' in told
+            assert 'flightd_events_total{level="error",name="failure"}' in told, "the camera's"
 
     run_virtual(test)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -42,6 +44,22 @@ def test_the_units_mark_is_the_daemons() -> None:
     assert "RuntimeDirectory=flightd\n" in text
     assert "RuntimeDirectoryPreserve=restart\n" in text
     assert "test -e /run/flightd/started ||" in text
+
+
+def doctor(*words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "flightd", "doctor", "--quick", *words]
+    return subprocess.run(command, cwd=SYSTEMD.parent, capture_output=True, text=True, check=False)
+
+
+def test_the_quick_doctor_needs_neither_camera_nor_vehicle(tmp_path: Path) -> None:
+    found = json.loads(doctor("--config", "configs/sim.toml", "--json").stdout)
+    assert "config" in {check["name"] for check in found["checks"]}
+    assert {"camera", "vehicle"}.isdisjoint(check["name"] for check in found["checks"])
+    broken = tmp_path / "flightd.toml"
+    broken.write_text("[mission]\nsite = 1\n")
+    refused = doctor("--config", str(broken))
+    assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
+    assert "mission.site" in refused.stderr
 
 
 def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path: Path) -> None:
