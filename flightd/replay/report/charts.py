@@ -18,6 +18,7 @@ from flightd.replay.report.markup import MINUS, clock, element, number, path_dat
 
 PHASE_TONE: dict[Phase, str] = {
     Phase.PREFLIGHT: "ground",
+    Phase.RECOVER: "hold",
     Phase.ARMING: "ground",
     Phase.TAKE_OFF: "climb",
     Phase.ACQUIRE: "seek",
