@@ -23,6 +23,7 @@ from flightd.core.topics import Topic
 from flightd.core.types import AttitudeSetpoint, Command, Event, EventLevel, Phase, Status
 from flightd.grid.site import Site
 from flightd.mission.assign import FrontSight
+from flightd.mission.guidance import CEILING_MARGIN_M
 from flightd.mission.legs import Pace
 from flightd.mission.plan import FlightPlan, VisitOrder, make_plan
 from flightd.mission.route import ordered_best
@@ -41,7 +42,6 @@ from flightd.vision.detector import Detector
 
 TICK_S = 0.02
 _FIRST_HEARD_S = 2.0
-CEILING_MARGIN_M = 0.5
 _STATUS_NS = 100_000_000
 _OVER = {Phase.DONE, Phase.ABORTED, Phase.PILOT}
 _LINGER_NS = 1_500_000_000

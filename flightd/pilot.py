@@ -24,7 +24,7 @@ from flightd.core.types import (
     Phase,
     VehicleState,
 )
-from flightd.grid.localise import GridLocaliser
+from flightd.grid.localise import GridLocaliser, LocaliserParams
 from flightd.grid.pads import PadFinder
 from flightd.grid.past import PoseHistory
 from flightd.grid.site import Site
@@ -47,7 +47,7 @@ class PilotParams:
     limits: Limits
     mission: MissionParams
     max_sigma_m: float = 1.2
-    start_sigma_m: float = 0.15
+    localiser: LocaliserParams = field(default_factory=LocaliserParams)
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +189,7 @@ class Pilot:
         """Stand on the pad and know nothing else."""
         node, yaw_rad = self._mission.stand
         self._tracker = LineTracker(self._params.tracker, yaw_rad)
-        self._localiser = GridLocaliser(self._site, node, self._params.start_sigma_m)
+        self._localiser = GridLocaliser(self._site, node, self._params.localiser)
         self._past = PoseHistory(self._scanner.least_integrity if self._scanner else 0.0)
         self._pads = PadFinder(self._site)
 
@@ -218,6 +218,8 @@ class Pilot:
         now_ns, v = tick.now_ns, tick.vehicle
         x_ns, y_ns = self._localiser.seen_ns
         known = pose is not None and max(pose.covariance[0], pose.covariance[4]) < self._params.max_sigma_m**2
+        seeking = self._mission.phase is Phase.RELOCATE
+        doubted = seeking or (pose is not None and pose.integrity < self._params.mission.integrity_min)
         return Senses(
             now_ns=now_ns,
             dt_s=dt_s,
@@ -231,6 +233,8 @@ class Pilot:
             vehicle=v,
             ground_silent_s=tick.ground_silent_s,
             pad_m=self._pads.centre(self._mission.goal.node),
+            rivals=tuple(self._localiser.rivals()) if doubted else (),
+            way_out=self._localiser.way_out() if seeking else None,
         )
 
     def _motion(self, pose: GridPose | None, height_m: float, dt_s: float) -> Motion:

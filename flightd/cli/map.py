@@ -43,9 +43,15 @@ def check(
         float, typer.Option(help="Size of a module of the smallest label.", min=0.05, max=100)
     ] = 3.0,
     speed_mps: Annotated[float, typer.Option(help="Speed along the shelf while looking.", min=0)] = 0.3,
+    crossings: Annotated[
+        int, typer.Option(help="Name the nodes that look alike within so many crossings.", min=0, max=50)
+    ] = 2,
     as_json: AsJson = False,
 ) -> None:
     """Say whether a site file is sound, what it holds, and whether the labels will be read.
+
+    Nodes that look alike, and so do all ways of --crossings from them, cannot be told apart by a drone
+    that lost its place there: it flies on until it knows, or lands.
 
     With --fov-deg the front camera is held against the paper's rule D_X = 2 D_Y tan(sigma / 2), against
     2.5 pixels for each module and a blur of 0.75 module; exit 1 where it does not reach.
@@ -57,20 +63,31 @@ def check(
     """
     from flightd.config.site_file import load_site
     from flightd.grid.coverage import FrontView, check_coverage
+    from flightd.grid.likeness import alike
 
     site = load_site(site_file)
     facts = _facts(site)
+    groups = alike(site, crossings)
     reach = None
     if fov_deg is not None:
         view = FrontView(math.radians(fov_deg), width_px, exposure_ms / 1e3, module_mm / 1e3)
         reach = check_coverage(site, view, speed_mps)
     if as_json:
-        document = {"file": str(site_file), "ok": reach is None or not reach.problems, **facts}
+        document = {
+            "file": str(site_file),
+            "ok": reach is None or not reach.problems,
+            **facts,
+            "alike": groups,
+        }
         print(json.dumps(document | ({"scan": _scan_facts(reach)} if reach else {})))
     else:
         print(f"{site_file}: sound")
         for name, value in facts.items():
             _print_fact(name, value)
+        if groups:
+            shown = "; ".join(" ".join(group[:6]) + (" …" if len(group) > 6 else "") for group in groups[:4])
+            more = f"; and {len(groups) - 4} more groups" if len(groups) > 4 else ""
+            print(f"  alike         within {crossings} crossings: {shown}{more}")
         for name, value in _scan_facts(reach).items() if reach else ():
             if not isinstance(value, list):
                 _print_fact(name, value)

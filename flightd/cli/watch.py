@@ -25,7 +25,7 @@ _SILENT_S = 1.0
 _TRAIL_STEP_M = 0.1
 _STAGES = ("capture", "transport", "detection", "track", "wire", "total")
 _COLOURS = {EventLevel.INFO: "", EventLevel.WARNING: "yellow", EventLevel.ERROR: "bold red"}
-_ALARMING = {Phase.RECOVER, Phase.HOLD, Phase.LAND, Phase.ABORTED, Phase.PILOT}
+_ALARMING = {Phase.RECOVER, Phase.HOLD, Phase.RELOCATE, Phase.LAND, Phase.ABORTED, Phase.PILOT}
 
 
 class MapView(Static):

@@ -21,9 +21,10 @@ from flightd.control.limits import Limits
 from flightd.control.pid import PidGains
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens, Mount
+from flightd.grid.localise import LocaliserParams
 from flightd.grid.site import Site
 from flightd.mission.battery import BatteryParams
-from flightd.mission.guidance import MissionParams
+from flightd.mission.guidance import CEILING_MARGIN_M, MissionParams
 from flightd.mission.plan import Heading, HeadingPolicy, VisitOrder
 from flightd.mission.views import ScanParams
 from flightd.pilot import PilotParams
@@ -37,6 +38,10 @@ _Offset = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
 
 HEIGHT_ROOM_M = 0.4
 """Below and above the flying height, what a keep-out must leave free for a leg to pass it."""
+
+
+_RAGGED = 0.03
+"""Part of the picture's reach, per metre of height, in which lines are not found surely."""
 
 
 class _Section(BaseModel):
@@ -167,6 +172,10 @@ class MissionConfig(_Section):
     arrive_m: float = Field(0.08, gt=0, le=0.5)
     lines_hold_s: float = Field(0.25, gt=0, le=2, description="lines older than this: level and hold")
     lines_land_s: float = Field(6.0, gt=0, le=60, description="held for so long: land")
+    integrity_min: float = Field(
+        0.95, ge=0.5, lt=1, description="probability of the node below which it stops and relocates"
+    )
+    relocate_s: float = Field(30.0, gt=0, le=300, description="position not found again for so long: land")
     telemetry_hold_s: float = Field(0.3, gt=0, le=2)
     telemetry_land_s: float = Field(3.0, gt=0, le=30)
     battery_start: _Share = Field(0.30, description="least charge to start")
@@ -201,6 +210,8 @@ class MissionConfig(_Section):
             land_mps=self.land_mps,
             lines_hold_s=self.lines_hold_s,
             lines_land_s=self.lines_land_s,
+            integrity_min=self.integrity_min,
+            relocate_s=self.relocate_s,
             telemetry_hold_s=self.telemetry_hold_s,
             telemetry_land_s=self.telemetry_land_s,
             battery_start_frac=self.battery_start,
@@ -287,6 +298,17 @@ class Config(_Section):
         half = min(camera.width_px / camera.fx_px, camera.height_px / camera.fy_px) / 2
         return self.scan.params(highest_m, 0.75 * half)
 
+    def _localiser(self) -> LocaliserParams:
+        """What the down camera surely sees of the floor, at full tilt too."""
+        camera = self.camera
+        tilted = math.tan(math.radians(self.control.max_tilt_deg))
+        long, short = (
+            max(0.5 * pixels / focal - tilted - _RAGGED, 0.1)
+            for pixels, focal in ((camera.width_px, camera.fx_px), (camera.height_px, camera.fy_px))
+        )
+        across = abs(math.sin(math.radians(camera.mount_yaw_deg))) > math.sqrt(0.5)
+        return LocaliserParams(view_ahead=long if across else short, view_aside=short if across else long)
+
     def pilot_params(self, site: Site) -> PilotParams:
         return PilotParams(
             tracker=TrackerParams(
@@ -299,10 +321,12 @@ class Config(_Section):
                 self.control.horizontal.gains(), self.control.yaw.gains(), self.control.height.gains()
             ),
             limits=self.control.limits(),
+            localiser=self._localiser(),
             mission=replace(
                 self.mission.params(),
                 ground_lost_s=self.ground.lost_s,
                 ground_lost=self.ground.lost_action,
+                ceiling_m=site.ceiling_m - CEILING_MARGIN_M,
                 battery=self.battery.params(),
             ),
         )

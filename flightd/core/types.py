@@ -303,6 +303,7 @@ class Phase(enum.StrEnum):
     CLIMB = "climb"
     SCAN = "scan"
     HOLD = "hold"
+    RELOCATE = "relocate"
     LAND = "land"
     SWAP = "swap"
     DONE = "done"

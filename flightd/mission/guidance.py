@@ -10,6 +10,9 @@ from flightd.control.flight import Reference
 from flightd.core.types import Demand, GridPose, Phase, VehicleState
 from flightd.mission.battery import BatteryParams
 
+CEILING_MARGIN_M = 0.5
+"""Nothing is flown nearer to the ceiling."""
+
 
 class GroundLost(enum.StrEnum):
     """What to do when the ground station that attends the flight falls silent."""
@@ -58,6 +61,14 @@ class MissionParams:
     battery_land_frac: float = 0.1
     max_lead_m: float = 0.35
     autostart: bool = True
+    integrity_min: float = 0.95
+    doubt_s: float = 0.3
+    first_look_s: float = 3.0
+    settled_s: float = 0.5
+    relocate_look_s: float = 4.0
+    relocate_s: float = 30.0
+    relocate_climb_m: float = 1.0
+    ceiling_m: float = math.inf
     ground_lost_s: float = 5.0
     ground_lost: GroundLost = GroundLost.CONTINUE
     battery: BatteryParams = field(default_factory=BatteryParams)
@@ -76,7 +87,9 @@ class Senses:
     """All that the mission knows at one tick.  `pose` is None before the floor was seen; ages in
     seconds, infinite when there never was any.  `ground_silent_s` is 0 while no ground station attends.
     `pad_m` is the centre of the goal's pad on the map, as seen or else as drawn; None where there is none.
-    `by_pad` says that the pose is only that over the pad: enough to climb straight up."""
+    `by_pad` says that the pose is only that over the pad: enough to climb straight up.
+    While the position is sought again, `rivals` are the nodes where the drone may be with their
+    probability, and `way_out` a move that is safe at all of them."""
 
     now_ns: int
     dt_s: float
@@ -91,6 +104,8 @@ class Senses:
     ground_silent_s: float = 0.0
     pad_m: tuple[float, float] | None = None
     by_pad: bool = False
+    rivals: tuple[tuple[str, float], ...] = ()
+    way_out: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)

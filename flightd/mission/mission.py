@@ -15,6 +15,7 @@ from flightd.mission.guidance import GroundLost, Guidance, Guide, MissionParams,
 from flightd.mission.legs import Legs, Pace
 from flightd.mission.plan import FlightPlan, HeadingPolicy, Stop, make_plan
 from flightd.mission.readiness import not_fresh, not_ready
+from flightd.mission.relocate import Relocator
 from flightd.mission.scan_phase import ScanPhase
 from flightd.mission.scanner import Scanner
 from flightd.mission.sorties import Sorties
@@ -55,6 +56,7 @@ class Mission:
         self._params = params
         self._watch = Watch(params)
         self._touchdown = Touchdown(params)
+        self._relocator = Relocator(params)
         self._sorties = Sorties(site, Legs(site, policy, Pace.of(params)), params.battery)
         self._left_over: tuple[str, ...] = ()
         self._short_of_charge = False
@@ -128,7 +130,10 @@ class Mission:
 
     def step(self, senses: Senses) -> Guidance:
         """Advance by one tick."""
-        phase, trigger = next_phase(self.phase, self._triggers(senses))
+        doubts = self._relocator.step(senses, self.phase, (senses.now_ns - self._since_ns) * 1e-9)
+        if self._relocator.jumped:
+            self._correct(senses)
+        phase, trigger = next_phase(self.phase, self._triggers(senses) | doubts)
         if trigger is not None:
             self._change(senses, phase, trigger)
         return self._guide(senses)
@@ -206,7 +211,7 @@ class Mission:
                 done, trigger = s.height_m > p.height_m - p.height_reached_m, Trigger.AT_HEIGHT
             case Phase.ACQUIRE:
                 done, trigger = (
-                    self._settled(s, s.localised and _speed(s) < 2 * p.arrive_mps),
+                    self._settled(s, s.localised and _sure(s, p) and _speed(s) < 2 * p.arrive_mps),
                     Trigger.ACQUIRED,
                 )
             case Phase.TURN:
@@ -231,13 +236,14 @@ class Mission:
             return self._settled(s, scan.at_view(s, away_m, _speed(s))) or not due, Trigger.AT_VIEW
         over = Trigger.ROUTE_DONE if self._next + 1 >= len(self._stops) else Trigger.DWELLED
         if self.phase is Phase.SCAN:
-            done = not due or scan.is_over(s.now_ns)
+            done = not due or (scan.is_over(s.now_ns) and _sure(s, self._params))
             more = not self._returning and scan.due(self.phase, goal)
             return done, Trigger.VIEW_DONE if more else over
         if due:
             return True, Trigger.SCAN_DUE
         dwelt = not goal.visit or self._returning or scan.is_scanned(goal)
-        return (s.now_ns - self._since_ns) * 1e-9 >= (0.0 if dwelt else self._params.dwell_s), over
+        dwell_s = 0.0 if dwelt else self._params.dwell_s
+        return (s.now_ns - self._since_ns) * 1e-9 >= dwell_s and _sure(s, self._params), over
 
     def _adopting(self, s: Senses) -> bool:
         """A vehicle found flying is given a moment to show that it obeys."""
@@ -266,7 +272,7 @@ class Mission:
             self._next += 1
         if trigger is Trigger.ARRIVED:
             self._anchor = (self.goal.x_m, self.goal.y_m)
-        if phase is Phase.HOLD or (phase is Phase.LAND and not planned):
+        if phase in {Phase.HOLD, Phase.RELOCATE} or (phase is Phase.LAND and not planned):
             self._anchor = (s.pose.x_m, s.pose.y_m) if s.pose is not None else self._anchor
         self._on_pad_leg = phase is Phase.LAND and planned
         unplanned = phase in {Phase.LAND, Phase.ABORTED, Phase.PILOT} and not planned
@@ -277,13 +283,15 @@ class Mission:
             refused = trigger is Trigger.TIMED_OUT and s.vehicle is not None and s.vehicle.refusal
             self.reason = f"{trigger.value}: {s.vehicle.refusal}" if refused and s.vehicle else trigger.value
         self._aborting |= unplanned
-        level = EventLevel.WARNING if unplanned or phase is Phase.HOLD else EventLevel.INFO
+        stopped = phase in {Phase.HOLD, Phase.RELOCATE}
+        level = EventLevel.WARNING if unplanned or stopped else EventLevel.INFO
         self._event(s.now_ns, level, "phase", f"{before.value} -> {self.phase.value}: {self.reason}")
         self._since_ns = s.now_ns
         self._settling = Lasting()
         self._limit_s = self._time_limit_s(s)
         if phase is Phase.LAND:
             self._touchdown.begin()
+        self._relocate(s, trigger)
         if phase is Phase.SWAP:
             self._await_battery(s.now_ns)
         if phase is Phase.TAKE_OFF:
@@ -313,6 +321,44 @@ class Mission:
             case _:
                 way_s = 0.0
         return p.phase_slack_s + p.phase_share * way_s
+
+    def _relocate(self, s: Senses, trigger: Trigger) -> None:
+        """Begin to look for the position, or go on from where it was found."""
+        if trigger is Trigger.POSITION_SURE:
+            self._rejoin(s)
+        elif self.phase is Phase.RELOCATE:
+            self._relocator.begin()
+            places = ", ".join(f"{node} {share:.0%}" for node, share in s.rivals[:5])
+            if places:
+                self._event(s.now_ns, EventLevel.WARNING, "position", f"doubted, it may be {places}")
+
+    def _correct(self, s: Senses) -> None:
+        """The drone is not where it was believed to be: what was held in metres moves along."""
+        dx, dy = self._relocator.jump_m
+        if s.pose is None or not self.airborne:
+            return
+        self._event(s.now_ns, EventLevel.WARNING, "position", f"corrected: it is {s.pose.node}")
+        self._steering = False
+        if self.phase is Phase.LAND and self._on_pad_leg:  # not across the floor at landing height
+            self._on_pad_leg, self._anchor = False, (s.pose.x_m, s.pose.y_m)
+            self._aborting, self.reason = True, "the position was corrected while landing"
+        else:
+            self._anchor = (self._anchor[0] + dx, self._anchor[1] + dy)
+
+    def _rejoin(self, s: Senses) -> None:
+        """From where the drone turned out to be: over the nearest node along open lines to the goal."""
+        goal = self.goal
+        if s.pose is None:
+            return
+        self._event(s.now_ns, EventLevel.INFO, "position", f"sure again: {s.pose.node}")
+        node = self._site.nodes[s.pose.node]
+        if node.id == goal.node:
+            return
+        way = make_plan(
+            self._site, [goal.node], node.id, goal.node, self._policy, s.pose.yaw_rad, in_need=True
+        ).stops[:-1]
+        first = Stop(node.id, node.x_m, node.y_m, way[0].yaw_rad, False)
+        self._stops[self._next : self._next + 1] = [first, *way[:-1], goal]
 
     def _note_visit(self, s: Senses) -> None:
         if self.goal.visit and not self._returning:  # a stop on the way home is none of the wanted ones
@@ -403,7 +449,9 @@ class Mission:
             self._height.reset(self._height.position)  # no climb by heights of the past
             climb = 0.0
         else:
-            self._height.step(self._height_goal_m(), s.dt_s)
+            height_m = self._height_goal_m()
+            seeking = self.phase is Phase.RELOCATE
+            self._height.step(self._relocator.height_m(height_m) if seeking else height_m, s.dt_s)
             climb = self._height.velocity
         guide = Guide.STEER if not self._found_flying and self._steer(s) else Guide.LEVEL
         self._steering = guide is Guide.STEER
@@ -436,6 +484,8 @@ class Mission:
             self._x.reset(pose.x_m, pose.vx_mps)
             self._y.reset(pose.y_m, pose.vy_mps)
             self._yaw.reset(pose.yaw_rad)
+        if self.phase is Phase.RELOCATE:
+            self._anchor = self._relocator.next_look(s, self._anchor)
         to_goal = self.phase in _TO_GOAL or self._on_pad_leg
         at = self._target(s) or ((self.goal.x_m, self.goal.y_m) if to_goal else self._anchor)
         x, y, yaw = (*at, self.goal.yaw_rad)
@@ -485,3 +535,7 @@ def _distance(s: Senses, to: tuple[float, float]) -> float:
 
 def _speed(s: Senses) -> float:
     return math.inf if s.pose is None else math.hypot(s.pose.vx_mps, s.pose.vy_mps)
+
+
+def _sure(s: Senses, p: MissionParams) -> bool:
+    return s.pose is not None and s.pose.integrity >= p.integrity_min

@@ -21,7 +21,8 @@ _SAFETY = {
     Trigger.LAND_HERE: Phase.LAND,
     Trigger.GROUND_LOST: Phase.LAND,
 }
-_ON_LINES = _SAFETY | {Trigger.LINES_LOST: Phase.HOLD, Trigger.HOLD: Phase.HOLD}
+_SEEING = _SAFETY | {Trigger.LINES_LOST: Phase.HOLD, Trigger.HOLD: Phase.HOLD}
+_ON_LINES = _SEEING | {Trigger.POSITION_DOUBTED: Phase.RELOCATE}
 
 TABLE: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.PREFLIGHT: {
@@ -48,6 +49,11 @@ TABLE: Mapping[Phase, Mapping[Trigger, Phase]] = {
     | {Trigger.VIEW_DONE: Phase.CLIMB, Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
     Phase.TURN: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.TURNED: Phase.FOLLOW},
     Phase.HOLD: _SAFETY | {Trigger.LINES_LOST_LONG: Phase.LAND, Trigger.LINES_FOUND: Phase.ACQUIRE},
+    Phase.RELOCATE: _SEEING
+    | {
+        Trigger.POSITION_UNKNOWN: Phase.LAND,
+        Trigger.POSITION_SURE: Phase.ACQUIRE,
+    },
     Phase.LAND: {
         Trigger.PILOT_TOOK: Phase.PILOT,
         Trigger.DISARMED: Phase.DONE,

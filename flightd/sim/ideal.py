@@ -1,4 +1,4 @@
-"""Perfect sight: the lines that a camera would see of the map, computed instead of rendered.
+"""Perfect sight: the lines and junctions that a camera would see of the map, computed instead of rendered.
 
 For tests and studies of everything behind the pixels: tracking, localisation, mission and control fly
 by these lines a hundred times faster than by pictures.
@@ -13,12 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.core.geometry import Lens, Mount, heading_rotation, level_from_body, normalise_line
-from flightd.core.types import Line, LineSet, PadSight
+from flightd.core.types import Junction, JunctionKind, Line, LineSet, PadSight
+from flightd.grid.paint import ARM_DIRECTIONS, PaintMap
 from flightd.grid.site import Pad, PaintedLine, Site
 from flightd.sim.kinematics import Kinematics
 
 _SAMPLES = 120
 _MIN_SPAN_PX = 30.0
+_BORDER_PX = 5.0
+_ARM_M = 0.1
+_KINDS = {1: JunctionKind.END, 2: JunctionKind.CORNER, 3: JunctionKind.TEE, 4: JunctionKind.CROSS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +46,12 @@ class IdealEye:
         self._mount = mount
         self._errors = errors or EyeErrors()
         self._random = random.Random(f"eye {seed}")
+        paint = PaintMap.of(site)
+        self._features = [
+            (float(x), float(y), int(arms))
+            for features in (paint.crossings, paint.ends)
+            for (x, y), arms in zip(features.at_m, features.arms, strict=True)
+        ]
 
     def see(self, pose: Kinematics, seq: int, stamp_ns: int) -> LineSet:
         """The lines in the picture exposed at `pose`, in pixels of a distortion-free camera."""
@@ -53,8 +63,9 @@ class IdealEye:
             line for line in seen if line is not None and self._random.random() >= self._errors.missed
         )
         lens = self._lens
+        junctions = self._junctions(image_from_map, eye)
         pads = tuple(pad for pad in (self._pad(pad, image_from_map, eye) for pad in self._site.pads) if pad)
-        return LineSet(seq, stamp_ns, lens.width_px, lens.height_px, lines, (), "ideal", pads=pads)
+        return LineSet(seq, stamp_ns, lens.width_px, lens.height_px, lines, junctions, "ideal", pads=pads)
 
     def _pad(self, pad: Pad, image_from_map: np.ndarray, eye: np.ndarray) -> PadSight | None:
         """The pad, if its whole square is in the picture."""
@@ -76,6 +87,35 @@ class IdealEye:
             float(sides.mean()),
             1.0,
         )
+
+    def _junctions(self, image_from_map: np.ndarray, eye: np.ndarray) -> tuple[Junction, ...]:
+        """The crossings and ends in the picture, a little away from its border."""
+        found = []
+        for x, y, arms in self._features:
+            here = self._pixel(x, y, image_from_map, eye)
+            if here is None:
+                continue
+            tips = [
+                self._pixel(x + _ARM_M * dx, y + _ARM_M * dy, image_from_map, eye)
+                for bit, (dx, dy) in enumerate(ARM_DIRECTIONS)
+                if arms >> bit & 1
+            ]
+            angles = tuple(math.atan2(tip[1] - here[1], tip[0] - here[0]) for tip in tips if tip is not None)
+            if len(angles) == len(tips):
+                found.append(Junction(_KINDS[len(angles)], here[0], here[1], angles))
+        return tuple(found)
+
+    def _pixel(
+        self, x_m: float, y_m: float, image_from_map: np.ndarray, eye: np.ndarray
+    ) -> tuple[float, float] | None:
+        """Centred image coordinates of a point of the floor, None near or beyond the border."""
+        lens = self._lens
+        a, b, c = (float(v) for v in image_from_map @ (np.array([x_m, y_m, 0.0]) - eye))
+        if c < 0.05:
+            return None
+        (cu, cv) = lens.centre_px
+        u, v = lens.fx_px * a / c + lens.cx_px - cu, lens.fy_px * b / c + lens.cy_px - cv
+        return (u, v) if abs(u) < cu - _BORDER_PX and abs(v) < cv - _BORDER_PX else None
 
     def _line(self, painted: PaintedLine, image_from_map: np.ndarray, eye: np.ndarray) -> Line | None:
         lens = self._lens

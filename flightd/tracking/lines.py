@@ -14,7 +14,8 @@ from dataclasses import dataclass, field, replace
 from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount, wrap_pi
 from flightd.core.types import Attitude, LineSet, PadSight
 from flightd.tracking.attitude import AttitudeHistory
-from flightd.tracking.motion import AxisTracker, HeadingTracker, MotionNoise, TrackedLine
+from flightd.tracking.junctions import FloorJunction, floor_junctions
+from flightd.tracking.motion import AxisTracker, HeadingTracker, MotionNoise, SeenLine, TrackedLine
 from flightd.tracking.tilt import FloorView, GroundLine, TiltCompensation, ground_lines, ground_point
 
 _STEP_NS = 20_000_000
@@ -53,7 +54,8 @@ class TrackSet:
     """The tracks at one time, in grid axes (x along the aisles, y to the right of x).
 
     `across_x` are the lines that cross the x axis (parallel to y), offsets in x; `across_y` the others.
-    `lines_ns` is the capture time of the newest frame in which any line was taken.
+    `lines_ns` is the capture time of the newest frame in which any line was taken; `junctions` are those
+    of the newest frame, taken at `junctions_ns`.
     """
 
     stamp_ns: int
@@ -69,6 +71,8 @@ class TrackSet:
     pads: tuple[PadOffset, ...] = ()
     pads_ns: int = 0
     """Capture time of the frame in which the `pads` were seen."""
+    junctions: tuple[FloorJunction, ...] = ()
+    junctions_ns: int = 0
 
 
 class LineTracker:
@@ -86,6 +90,7 @@ class LineTracker:
         self._lines_ns = 0
         self._stamp_ns = 0
         self._pads: tuple[PadOffset, ...] = ()
+        self._junctions: tuple[FloorJunction, ...] = ()
         self.rejected = 0
 
     def attitude(self, sample: Attitude) -> None:
@@ -109,8 +114,8 @@ class LineTracker:
         low, high = (share * params.width_m for share in params.width_share)
         on_floor = [line for line in ground_lines(lines.lines, view) if low <= line.width_m <= high]
         yaw = self._turn(on_floor, attitude)
-        across_x: list[tuple[float, float, float]] = []
-        across_y: list[tuple[float, float, float]] = []
+        across_x: list[SeenLine] = []
+        across_y: list[SeenLine] = []
         cos, sin = math.cos(yaw), math.sin(yaw)
         for line in on_floor:
             sigma = max(line.sigma_m, params.min_sigma_m)
@@ -118,12 +123,17 @@ class LineTracker:
             y = sin * line.forward_m + cos * line.right_m
             direction = line.theta_rad + yaw
             if abs(math.sin(direction)) < math.sin(_PARALLEL_RAD):
-                across_y.append((y, math.hypot(sigma, x * self._heading.sigma_rad), line.width_m))
+                spread = math.hypot(sigma, x * self._heading.sigma_rad)
+                ends = sorted(cos * forward - sin * right for forward, right in line.ends_m)
+                across_y.append(SeenLine(y, spread, line.width_m, ends[0], ends[1]))
             elif abs(math.cos(direction)) < math.sin(_PARALLEL_RAD):
-                across_x.append((x, math.hypot(sigma, y * self._heading.sigma_rad), line.width_m))
+                spread = math.hypot(sigma, y * self._heading.sigma_rad)
+                ends = sorted(sin * forward + cos * right for forward, right in line.ends_m)
+                across_x.append(SeenLine(x, spread, line.width_m, ends[0], ends[1]))
         self._pads = _placed(lines.pads, view, yaw)
         self._x.update(across_x, lines.stamp_ns)
         self._y.update(across_y, lines.stamp_ns)
+        self._junctions = floor_junctions(lines.junctions, view, yaw)
         if across_x or across_y:
             self._lines_ns = lines.stamp_ns
         return True
@@ -160,17 +170,13 @@ class LineTracker:
             vy,
             ax,
             ay,
-            tuple(
-                replace(line, offset_m=line.offset_m - moved_x)
-                for line in self._x.lines()
-                if line.seen_ns > known_ns
-            ),
-            tuple(
-                replace(line, offset_m=line.offset_m - moved_y)
-                for line in self._y.lines()
-                if line.seen_ns > known_ns
-            ),
+            tuple(_moved(line, moved_x, moved_y) for line in self._x.lines() if line.seen_ns > known_ns),
+            tuple(_moved(line, moved_y, moved_x) for line in self._y.lines() if line.seen_ns > known_ns),
             tuple(replace(pad, x_m=pad.x_m - moved_x, y_m=pad.y_m - moved_y) for pad in self._pads),
+            self._stamp_ns,
+            tuple(
+                replace(seen, dx_m=seen.dx_m - moved_x, dy_m=seen.dy_m - moved_y) for seen in self._junctions
+            ),
             self._stamp_ns,
         )
 
@@ -226,3 +232,13 @@ def _placed(pads: Iterable[PadSight], view: FloorView, yaw_rad: float) -> tuple[
             x_m, y_m = cos * forward - sin * right, sin * forward + cos * right
             found.append(PadOffset(x_m, y_m, pad.side_px * metres_per_px))
     return tuple(found)
+
+
+def _moved(line: TrackedLine, across_m: float, along_m: float) -> TrackedLine:
+    """The line as the drone sees it after moving so far across it and along it."""
+    return replace(
+        line,
+        offset_m=line.offset_m - across_m,
+        from_m=line.from_m - along_m,
+        to_m=line.to_m - along_m,
+    )

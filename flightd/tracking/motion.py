@@ -9,6 +9,7 @@ makes, g tan(tilt).  Offsets are in metres on the floor: a change of height move
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,7 +33,8 @@ class MotionNoise:
 
 @dataclass(frozen=True, slots=True)
 class TrackedLine:
-    """One line across an axis: `offset_m` from the drone along the axis, at the time of the set."""
+    """One line across an axis: `offset_m` from the drone along the axis, at the time of the set.  When
+    last seen it was in view from `from_m` to `to_m` along itself, from the drone; equal where unknown."""
 
     id: int
     offset_m: float
@@ -40,6 +42,18 @@ class TrackedLine:
     width_m: float
     seen_ns: int
     hits: int
+    from_m: float = 0.0
+    to_m: float = 0.0
+
+
+class SeenLine(NamedTuple):
+    """A line across an axis in one frame, from the drone; `from_m` to `to_m` is its visible part."""
+
+    offset_m: float
+    sigma_m: float
+    width_m: float
+    from_m: float = 0.0
+    to_m: float = 0.0
 
 
 @dataclass(slots=True)
@@ -47,6 +61,8 @@ class _Track:
     id: int
     width_m: float
     seen_ns: int
+    from_m: float
+    to_m: float
     hits: int = 1
 
 
@@ -89,6 +105,8 @@ class AxisTracker:
                 t.width_m,
                 t.seen_ns,
                 t.hits,
+                t.from_m,
+                t.to_m,
             )
             for i, t in enumerate(self._tracks)
         ]
@@ -114,16 +132,17 @@ class AxisTracker:
         kf.predict(u=np.array([[accel_mps2]]))
         self._keep(kf)
 
-    def update(self, measured: list[tuple[float, float, float]], stamp_ns: int) -> list[float]:
-        """Take (offset_m, sigma_m, width_m) of the lines seen at `stamp_ns`; return the normalised
-        innovations of those that belonged to a known line.  The others start new lines."""
+    def update(self, measured: list[SeenLine], stamp_ns: int) -> list[float]:
+        """Take the lines seen at `stamp_ns`; return the normalised innovations of those that belonged to
+        a known line.  The others start new lines."""
         innovations: list[float] = []
         taken: set[int] = set()
-        fresh: list[tuple[float, float, float]] = []
-        for offset, sigma, width in sorted(measured, key=lambda m: m[1]):
+        fresh: list[SeenLine] = []
+        for line in sorted(measured, key=lambda m: m.sigma_m):
+            offset, sigma = line.offset_m, line.sigma_m
             index = self._nearest(offset, sigma, taken)
             if index is None:
-                fresh.append((offset, sigma, width))
+                fresh.append(line)
                 continue
             taken.add(index)
             kf = self._filter()
@@ -135,9 +154,10 @@ class AxisTracker:
             self._keep(kf)
             track = self._tracks[index]
             track.seen_ns, track.hits = stamp_ns, track.hits + 1
-            track.width_m += 0.2 * (width - track.width_m)
-        for offset, sigma, width in fresh:
-            self._add(offset, sigma, width, stamp_ns)
+            track.width_m += 0.2 * (line.width_m - track.width_m)
+            track.from_m, track.to_m = line.from_m, line.to_m
+        for line in fresh:
+            self._add(line, stamp_ns)
         self._forget(stamp_ns)
         return innovations
 
@@ -169,14 +189,14 @@ class AxisTracker:
                 best, best_distance = i, distance
         return best
 
-    def _add(self, offset: float, sigma: float, width: float, stamp_ns: int) -> None:
+    def _add(self, line: SeenLine, stamp_ns: int) -> None:
         n = len(self._x)
-        self._x = np.append(self._x, offset)
+        self._x = np.append(self._x, line.offset_m)
         grown = np.zeros((n + 1, n + 1))
         grown[:n, :n] = self._p
-        grown[n, n] = sigma**2
+        grown[n, n] = line.sigma_m**2
         self._p = grown
-        self._tracks.append(_Track(self._next_id, width, stamp_ns))
+        self._tracks.append(_Track(self._next_id, line.width_m, stamp_ns, line.from_m, line.to_m))
         self._next_id += 1
 
     def _forget(self, stamp_ns: int) -> None:

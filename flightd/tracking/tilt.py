@@ -29,8 +29,8 @@ class TiltCompensation(enum.StrEnum):
 @dataclass(frozen=True, slots=True)
 class GroundLine:
     """A line on the floor in the level frame of the body (core.geometry: right cos(theta) - forward
-    sin(theta) = rho), with the middle of its visible part (forward, right) and the standard
-    deviations of the offset there and of theta."""
+    sin(theta) = rho), with the middle and both ends of its visible part (forward, right) and the
+    standard deviations of the offset in the middle and of theta."""
 
     rho_m: float
     theta_rad: float
@@ -39,6 +39,7 @@ class GroundLine:
     sigma_m: float
     sigma_theta_rad: float
     width_m: float
+    ends_m: tuple[tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,4 +134,37 @@ def _place(
         math.hypot(math.sqrt(max(variance_px, 1e-4)) * metres_per_px, height_m * view.sigma_tilt_rad),
         math.hypot(line.sigma_theta_rad, view.sigma_tilt_rad * 0.5),
         line.width_px * metres_per_px,
+        (
+            _on_floor(line.point_at(line.start_px), inverse, centre, height_m, lever),
+            _on_floor(line.point_at(line.end_px), inverse, centre, height_m, lever),
+        ),
     )
+
+
+def floor_points(points_px: Sequence[tuple[float, float]], view: FloorView) -> list[tuple[float, float]]:
+    """(forward, right) on the floor, in the level frame of the body, of points of the picture (centred
+    image coordinates), by the exact homography; [] when the view cannot place them."""
+    roll, pitch = view.attitude.roll_rad, view.attitude.pitch_rad
+    lever: Matrix = np.asarray(level_from_body(roll, pitch) @ np.array(view.mount.offset_m), dtype=np.float64)
+    height_m = view.height_m - float(lever[2])
+    if not height_m > 0.02 or abs(roll) > _MAX_TILT_RAD or abs(pitch) > _MAX_TILT_RAD:
+        return []
+    homography = ground_homography(view.lens, view.mount, roll, pitch)
+    inverse: Matrix = np.asarray(np.linalg.inv(homography), dtype=np.float64)
+    return [_on_floor(point, inverse, view.lens.centre_px, height_m, lever) for point in points_px]
+
+
+def _on_floor(
+    point_px: tuple[float, float],
+    inverse: Matrix,
+    centre: tuple[float, float],
+    height_m: float,
+    lever: Matrix,
+) -> tuple[float, float]:
+    """(forward, right) of a picture's point below a camera `height_m` up; far away near the horizon."""
+    x, y, w = (
+        float(row[0]) * (point_px[0] + centre[0]) + float(row[1]) * (point_px[1] + centre[1]) + float(row[2])
+        for row in inverse
+    )
+    scale = height_m / max(w, 0.1)
+    return x * scale + float(lever[0]), y * scale + float(lever[1])

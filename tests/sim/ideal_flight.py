@@ -73,6 +73,7 @@ class IdealFlight:
         scanner: Scanner | None = None,
         front: IdealFront | None = None,
         world: Site | None = None,
+        carried_to: str = "",
     ) -> None:
         policy = policy or HeadingPolicy(Heading.ALONG)
         pad = site.home.node
@@ -84,6 +85,8 @@ class IdealFlight:
         self._front_ns = 0
         world = world or site
         x_m, y_m = world.pad_centre(world.home)
+        if carried_to:
+            x_m, y_m = site.nodes[carried_to].x_m, site.nodes[carried_to].y_m
         self.airframe = Airframe(airframe, draught=draught, seed=seed, x_m=x_m, y_m=y_m)
         self.sensors = Sensors(seed=seed)
         self._eye = IdealEye(world, params.tracker.lens, params.tracker.mount, errors, seed)

@@ -52,7 +52,7 @@ _TAKEN_OVER_NS = 3_000_000_000
 _FLYING = frozenset(
     {
         Phase.TAKE_OFF, Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.CLIMB, Phase.SCAN,
-        Phase.HOLD,
+        Phase.HOLD, Phase.RELOCATE,
     }
 )  # fmt: skip
 _NOT_OVER = _FLYING | {Phase.PREFLIGHT, Phase.RECOVER, Phase.ARMING, Phase.LAND, Phase.SWAP}

@@ -28,6 +28,7 @@ PHASE_TONE: dict[Phase, str] = {
     Phase.CLIMB: "climb",
     Phase.SCAN: "hover",
     Phase.HOLD: "hold",
+    Phase.RELOCATE: "hold",
     Phase.LAND: "climb",
     Phase.SWAP: "ground",
     Phase.DONE: "ground",

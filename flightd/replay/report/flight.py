@@ -21,8 +21,11 @@ Summary: TypeAlias = dict[str, object]
 
 NS_PER_S = 1e9
 FLYING = frozenset(
-    {Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.CLIMB, Phase.SCAN, Phase.HOLD}
-)
+    {
+        Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.CLIMB, Phase.SCAN, Phase.HOLD,
+        Phase.RELOCATE,
+    }
+)  # fmt: skip
 """Phases in which the drone holds on to a line."""
 
 _WINDOW_S = 0.6

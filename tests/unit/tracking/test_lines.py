@@ -13,7 +13,7 @@ from flightd.sim.ideal import EyeErrors, IdealEye
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.sites import random_site
 from flightd.tracking.lines import LineTracker, TrackerParams
-from flightd.tracking.motion import AxisTracker, MotionNoise
+from flightd.tracking.motion import AxisTracker, MotionNoise, SeenLine
 
 LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)
 HEIGHT_M = 1.6
@@ -121,7 +121,7 @@ def test_tracked_sigmas_are_honest() -> None:
                 v += (accel + push - noise.drag_per_s * v) * dt
                 axis.predict(dt, 0.0)
             if step < 40:
-                axis.update([(0.5 - x + rng.gauss(0, 0.01), 0.01, 0.075)], step)
+                axis.update([SeenLine(0.5 - x + rng.gauss(0, 0.01), 0.01, 0.075)], step)
         (line,) = axis.lines()
         errors.append((line.offset_m - (0.5 - x)) / line.sigma_m)
     spread = (sum(e * e for e in errors) / len(errors)) ** 0.5
@@ -132,9 +132,9 @@ def test_a_false_line_nearby_starts_a_track_of_its_own() -> None:
     axis = AxisTracker(MotionNoise(), gate_m=0.35, forget_ns=10**9)
     for step in range(20):
         axis.predict(1 / 30, 0.0)
-        axis.update([(0.2, 0.005, 0.075), (0.9, 0.005, 0.075)], step * FRAME_NS)
+        axis.update([SeenLine(0.2, 0.005, 0.075), SeenLine(0.9, 0.005, 0.075)], step * FRAME_NS)
     first = axis.lines()
-    axis.update([(0.2, 0.005, 0.075), (0.5, 0.005, 0.075)], 21 * FRAME_NS)
+    axis.update([SeenLine(0.2, 0.005, 0.075), SeenLine(0.5, 0.005, 0.075)], 21 * FRAME_NS)
     assert [round(line.offset_m, 2) for line in first] == [0.2, 0.9]
     assert len(axis.lines()) == 3
     axis.update([], 10**10)
