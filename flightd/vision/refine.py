@@ -20,9 +20,9 @@ _MIN_SHARE = 0.46
 """Of the stations that show paint between floor, the part at which the edges are where they should be."""
 _WORST_CLEAR = 0.6
 """Crossings and gaps excuse missing edges down to this clear part; a chain of blobs has less."""
-_COMPACT_ASPECT, _COMPACT_SHARE, _COMPACT_FRAYED = 5.0, 0.14, 0.4
+_COMPACT_ASPECT, _COMPACT_SHARE, _COMPACT_CLEAR, _COMPACT_FRAYED = 5.0, 0.14, 0.03, 0.4
 """Below this length to width a blob may pass for a band: each unit less asks for that much more share,
-and edges as sharp as a short line's are."""
+less excuse by its clear part, and edges as sharp as a short line's are."""
 _USUAL_SCATTER_PX, _FRAYED_SHARE, _SHARP_SHARE = 0.7, 0.5, 0.2
 """A pixel of scatter more asks for so much more share, one less for so much less; points all over the
 window, on no edge at all, have 1.4."""
@@ -95,7 +95,7 @@ def _is_line(strip: Strip, lines: RobustLines, share: float, edges: list[int | N
     need += rough * (_FRAYED_SHARE + _COMPACT_FRAYED * compact if rough > 0 else _SHARP_SHARE)
     # Edges where there is no paint are something else's: then gaps are no excuse.
     if share <= strip.support:
-        need *= max(_WORST_CLEAR, strip.clear)
+        need *= max(_WORST_CLEAR + _COMPACT_CLEAR * compact, strip.clear)
     if share < need:
         return False
     # A curve bends both edges the same way.
