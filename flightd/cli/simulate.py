@@ -41,6 +41,8 @@ DETECTION_S = 0.008
 READING_S = 0.15
 """And of reading the codes of one picture."""
 
+_SCAN_S = 30.0
+"""More than the count of one location can take, re-takes included."""
 _PORT_TRIES = 5
 
 
@@ -189,7 +191,11 @@ async def _watch(process: Any, pipe: Connection) -> None:
 
 async def _within_limit(simulation: Simulation, daemon: Daemon, beside: asyncio.Future[None]) -> FlightResult:
     """The flight, unless it takes far longer than its plan can, or what runs beside it fails."""
-    limit_s = 120.0 + 60.0 * (len(plan_of(simulation.config, simulation.site).stops) + 1)
+    stops = plan_of(simulation.config, simulation.site).stops
+    limit_s = 120.0 + 60.0 * (len(stops) + 1)
+    if has_front_camera(simulation.config, simulation.site):
+        wanted = {stop.node for stop in stops if stop.visit}
+        limit_s += _SCAN_S * sum(place.node in wanted for place in simulation.site.locations.values())
     flight = asyncio.ensure_future(daemon.fly())
     parts: list[asyncio.Future[Any]] = [flight, beside]
     try:

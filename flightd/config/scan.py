@@ -26,7 +26,7 @@ class ScanConfig(BaseModel):
     aside_m: float = Field(0.4, ge=0, le=1, description="and how far along the aisle")
     clearance_m: float = Field(0.8, ge=0.2, le=5, description="never nearer to the shelf than this")
     least_integrity: float = Field(
-        0.99, ge=0.5, lt=1, description="a picture counts where the place is at least so sure"
+        0.97, ge=0.5, lt=1, description="a picture counts where the place is at least so sure"
     )
     confirm_stops: int = Field(
         2, ge=1, le=20, description="nodes reached without a doubt until a node's count is booked"

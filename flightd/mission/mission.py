@@ -64,7 +64,7 @@ class Mission:
         self.stand = (plan.start, plan.start_yaw_rad)
         """The node on which the drone stands before it flies, and its heading there."""
         self._scanner = scanner
-        self._scan = ScanPhase(scanner, params)
+        self._scan = ScanPhase(site, scanner, params, policy)
         self._stops: list[Stop] = list(plan.stops)
         self._next = 0
         start = site.nodes[plan.start]
@@ -269,7 +269,9 @@ class Mission:
         self._scan.changed(s, before, phase, trigger, self.goal)
         if trigger is Trigger.DWELLED:
             self._look_ahead(s)
+            before_stop = self.goal
             self._next += 1
+            self._stops[self._next] = self._scan.heading_kept(s, before_stop, self.goal)
         if trigger is Trigger.ARRIVED:
             self._anchor = (self.goal.x_m, self.goal.y_m)
         if phase in {Phase.HOLD, Phase.RELOCATE} or (phase is Phase.LAND and not planned):

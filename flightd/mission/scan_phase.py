@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Phase
+from flightd.grid.site import Site
 from flightd.mission.guidance import MissionParams, Senses
-from flightd.mission.plan import Stop
+from flightd.mission.plan import Heading, HeadingPolicy, Stop
 from flightd.mission.scanner import Scanner
 from flightd.mission.triggers import Trigger
 from flightd.mission.views import View
@@ -19,7 +21,11 @@ _OVER = (Trigger.DWELLED, Trigger.ROUTE_DONE)
 class ScanPhase:
     """The mission's side of scanning; without a scanner there is never anything to scan."""
 
-    def __init__(self, scanner: Scanner | None, params: MissionParams) -> None:
+    def __init__(
+        self, site: Site, scanner: Scanner | None, params: MissionParams, policy: HeadingPolicy
+    ) -> None:
+        self._site = site
+        self._heading = policy.heading
         self._scanner = scanner
         self._params = params
         self._scanned = ""
@@ -58,6 +64,16 @@ class ScanPhase:
         p, view = self._params, self.view(Phase.CLIMB)
         rise_m = abs(view.height_m - s.height_m) if view is not None else 0.0
         return math.pi / p.turn_rate_radps + (0.0 if math.isnan(rise_m) else rise_m / p.climb_mps)
+
+    def heading_kept(self, s: Senses, before: Stop, stop: Stop) -> Stop:
+        """The next stop, flown to backwards where that saves half a turn: along an aisle with the nose to
+        the shelf, either side will do, and the drone faces one of them after a scan."""
+        scanned = self._scanner is not None and self.is_scanned(before)
+        sideways = self._site.nodes[before.node].aisle == self._site.nodes[stop.node].aisle
+        if not scanned or not sideways or self._heading is not Heading.SHELF or s.pose is None:
+            return stop
+        turned = abs(wrap_pi(stop.yaw_rad - s.pose.yaw_rad)) > math.pi * 0.75
+        return replace(stop, yaw_rad=wrap_pi(stop.yaw_rad + math.pi)) if turned else stop
 
     def changed(self, s: Senses, before: Phase, phase: Phase, trigger: Trigger, stop: Stop) -> None:
         """Tell the scanner of a change of phase at (or on the way to) `stop`."""

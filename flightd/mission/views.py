@@ -35,7 +35,7 @@ class ScanParams:
     clearance_m: float = 0.6
     label_reach_m: float = 0.3
     least_probability: float = 0.99
-    least_integrity: float = 0.99
+    least_integrity: float = 0.97
     confirm_stops: int = 2
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from flightd.config.schema import load_config
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import Finding
 from flightd.core.types import Command, CommandKind, Phase
+from flightd.mission.plan import Heading, HeadingPolicy
 from flightd.mission.scanner import Scanner
 from tests.sim.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal_front import IdealFront, Label, Stock
@@ -103,3 +105,14 @@ def test_without_racks_the_drone_hovers_and_goes_on() -> None:
     flown = IdealFlight(bare, CONFIG.pilot_params(bare), visits=("A2",), seed=5, scanner=scanner).fly()
     assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
     assert Phase.SCAN not in {output.phase for output in flown.outputs}
+
+
+def test_with_the_nose_to_the_shelf_no_leg_begins_with_half_a_turn() -> None:
+    scanner = Scanner(SITE, SIGHT, CONFIG.scan_params(4.0))
+    front, policy = IdealFront(SITE, SIGHT, STOCK), HeadingPolicy(Heading.SHELF)
+    params = CONFIG.pilot_params(SITE)
+    flight = IdealFlight(SITE, params, policy=policy, visits=NODES, seed=5, scanner=scanner, front=front)
+    flown = flight.fly()
+    assert set(findings(flown)) == set(PLACES)
+    sides = [phase for phase, k in flown.truth if phase is Phase.TURN]
+    assert len(sides) * 0.02 < 0.5 * len(NODES) * math.pi / params.mission.turn_rate_radps
