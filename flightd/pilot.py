@@ -175,7 +175,8 @@ class Pilot:
         )
 
     def _scan(self, tick: TickInput) -> None:
-        """Give each picture's codes to the scan, with the pose at its exposure."""
+        """Give each picture's codes to the scan, with the pose at its exposure, and the location labels
+        among them to the localiser."""
         if self._scanner is None:
             return
         if tick.counted:
@@ -184,6 +185,8 @@ class Pilot:
             pose = self._past.at(codes.stamp_ns)
             if pose is not None:
                 self._scanner.take(codes, pose)
+        for seen in self._scanner.drain_sightings():
+            self._localiser.sighted(seen.location, seen.dx_m, seen.dy_m)
 
     def _begin(self) -> None:
         """Stand on the pad and know nothing else."""

@@ -60,11 +60,13 @@ class PlacedRead:
 class Sighting:
     """A location label: what it says and where the map has it, against where it was seen from.
 
+    `dx_m`, `dy_m` are from the drone to the label, in map axes (the way to the shelf is the map's own);
     `off_m` is how far along the aisle the label is from where its location should be (+ x)."""
 
     location: str
     stamp_ns: int
-    x_m: float
+    dx_m: float
+    dy_m: float
     off_m: float
     contradicts: bool
 
@@ -123,7 +125,7 @@ class Assigner:
                 continue
             if read.text in self._locations:
                 if read.believed:
-                    sightings.append(self._sighting(read, codes.stamp_ns, where, front))
+                    sightings.append(self._sighting(read, pose, where, front))
             else:
                 stock.append(self._placed(read, pose, where, front))
         return ShelfLook(codes.frame_seq, pose, tuple(stock), codes.places, tuple(sightings))
@@ -160,7 +162,7 @@ class Assigner:
     def _sighting(
         self,
         read: CodeRead,
-        stamp_ns: int,
+        pose: BodyPose,
         where: tuple[float, float, float],
         front: tuple[str, Side],
     ) -> Sighting:
@@ -168,7 +170,8 @@ class Assigner:
         off_m = where[0] - home.x_m
         elsewhere = (home.aisle, home.side) != front
         far = abs(off_m) >= _BAY_SHARE * self._bay_m[home.aisle, home.side]
-        return Sighting(read.text, stamp_ns, where[0], off_m, elsewhere or far)
+        dx_m, dy_m = where[0] - pose.x_m, self._fronts[front][0].y_m - pose.y_m
+        return Sighting(read.text, pose.stamp_ns, dx_m, dy_m, off_m, elsewhere or far)
 
 
 def _sigmas(pose: BodyPose, x_m: float, height_m: float, distance_m: float) -> tuple[float, float]:

@@ -81,7 +81,11 @@ class ScanPhase:
         if scanner is None:
             return
         certain = s.pose is not None and s.localised and s.pose.integrity >= scanner.least_integrity
-        if trigger is Trigger.ARRIVED:
+        if trigger is Trigger.POSITION_DOUBTED:
+            scanner.doubt(s.now_ns, "the position is doubted")
+        elif trigger is Trigger.POSITION_SURE:
+            scanner.trust()
+        elif trigger is Trigger.ARRIVED:
             scanner.reached(stop.node, certain)
             self._scanned = ""
         elif trigger is Trigger.SCAN_DUE and s.pose is not None:

@@ -250,3 +250,16 @@ def test_a_re_take_at_the_end_of_an_aisle_stays_over_its_line(offset_m: float) -
     shifted = scanner._planner.retake(replace(view, x_m=view.x_m + offset_m), view.locations)
     assert shifted is not None
     assert shifted.x_m >= SITE.nodes["A1"].x_m
+
+
+def test_a_location_label_is_told_to_the_localiser_with_its_way_from_the_drone() -> None:
+    hover = Hover()
+    view = hover.at_view()
+    label = SITE.locations[view.locations[0]]
+    here = pose(hover.now_ns + 1)
+    x = (label.x_m - here.x_m) / 1.2 * SIGHT.lens.fx_px
+    hover.scanner.take(picture(1, (read(label.code, x, 0.0),), {}, here.stamp_ns), here)
+    (sighting,) = hover.scanner.drain_sightings()
+    assert sighting.location == label.code
+    assert sighting.dx_m == pytest.approx(label.x_m - here.x_m, abs=0.01)
+    assert sighting.dy_m == pytest.approx(label.y_m - here.y_m, abs=0.01)
