@@ -45,6 +45,8 @@ gust_mps = 0.3           # root mean square of the gusts
 battery = 1.0            # charge at the start, 0..1
 battery_ah = 5.0         # its capacity; hovering takes 14 A
 swap_s = 30.0            # time in which somebody changes it on the charge pad; 0: nobody does
+start_offset_m = [0.0, 0.0]  # how far from the pad it really stands at the start, x and y
+start_yaw_deg = 0.0      # how far it is turned from the heading in which it should stand, + to the right
 """
 
 from __future__ import annotations
@@ -67,6 +69,7 @@ from flightd.sim.racks.stock import StockShares
 from flightd.sim.wind import Draught
 
 _Shift = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
+_Carried = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
 
 
 class _Section(BaseModel):
@@ -180,6 +183,8 @@ class VehicleScenario(_Section):
     battery: float = Field(1.0, ge=0, le=1)
     battery_ah: float = Field(5.0, gt=0.05, le=100)
     swap_s: float = Field(30.0, ge=0, le=3600)
+    start_offset_m: tuple[_Carried, _Carried] = (0.0, 0.0)
+    start_yaw_deg: float = Field(0.0, ge=-180, le=180)
     radio_loss: float = Field(0.0, ge=0, le=1)
     radio_delay_ms: float = Field(0.0, ge=0, le=2000)
     radio_jitter_ms: float = Field(0.0, ge=0, le=2000)

@@ -51,7 +51,8 @@ class WorldSpec:
     """Everything that makes one simulated world; a port 0 takes any free one.  An AR.Drone has four:
     commands, navdata, video and configuration; it transmits its pictures itself.  With a `truth_url` the
     vehicle is an external simulator's, which stands on the pad, and only the camera is ours; `radio` lies
-    between a MAVLink autopilot and its companion.  With `swap_s` 0 nobody changes batteries."""
+    between a MAVLink autopilot and its companion.  With `swap_s` 0 nobody changes batteries.  The vehicle
+    stands `start_offset_m` (x, y) away from the start pad's centre."""
 
     site: Site
     seed: int
@@ -60,6 +61,7 @@ class WorldSpec:
     vehicle_ports: tuple[int, ...] = (0,)
     start: str | None = None
     start_yaw_rad: float = 0.0
+    start_offset_m: tuple[float, float] = (0.0, 0.0)
     camera: SimCamera = field(default_factory=SimCamera)
     front: FrontSpec | None = None
     appearance: Appearance = DEFAULT
@@ -91,7 +93,8 @@ class World:
         self._recorder = recorder
         start = spec.start or spec.site.home.node
         pad = next(pad for pad in spec.site.pads if pad.node == start)
-        x_m, y_m = spec.site.pad_centre(pad)
+        pad_x_m, pad_y_m = spec.site.pad_centre(pad)
+        x_m, y_m = pad_x_m + spec.start_offset_m[0], pad_y_m + spec.start_offset_m[1]
         airframe = Airframe(
             AirframeParams(battery_capacity_ah=spec.battery_ah),
             draught=spec.draught,
