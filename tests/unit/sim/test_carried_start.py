@@ -1,4 +1,4 @@
-"""A scenario may carry the drone off before it flies: the world stands it elsewhere, the daemon is not told."""
+"""A scenario may carry the drone off before it flies: it stands elsewhere, the daemon is not told."""
 
 from __future__ import annotations
 
