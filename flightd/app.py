@@ -20,7 +20,7 @@ from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.config.schema import HEIGHT_ROOM_M, Config
 from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
 from flightd.core.topics import Topic
-from flightd.core.types import AttitudeSetpoint, Command, Event, EventLevel, Phase, Status
+from flightd.core.types import AttitudeSetpoint, Command, Event, EventLevel, Health, Phase, Status
 from flightd.grid.site import Site
 from flightd.mission.assign import FrontSight
 from flightd.mission.guidance import CEILING_MARGIN_M
@@ -44,6 +44,8 @@ TICK_S = 0.02
 _FIRST_HEARD_S = 2.0
 _STATUS_NS = 100_000_000
 _OVER = {Phase.DONE, Phase.ABORTED, Phase.PILOT}
+_SILENT_NS = 30_000_000_000
+"""A vehicle that nobody heard for so long after the mission's end is not waited for."""
 _LINGER_NS = 1_500_000_000
 """Time after the mission's end in which the vehicle is still watched (disarming)."""
 
@@ -312,7 +314,8 @@ class Daemon:
                 continue
             over_ns = over_ns or now_ns
             state = self._vehicle.state()
-            down = state is None or not state.armed
+            silent = state is not None and now_ns - state.attitude.stamp_ns > _SILENT_NS
+            down = state is None or not state.armed or silent
             if down and now_ns - over_ns > _LINGER_NS:
                 return output
 
@@ -330,6 +333,7 @@ class Daemon:
             self._ground.silent_s(now_ns) if self._ground is not None else 0.0,
             self._counting.take() if self._counting is not None else (),
             self._counting.take_counted() if self._counting is not None else (),
+            self._health(now_ns),
         )
         for detection in detections:
             self._latency.taken(detection, now_ns)
@@ -349,6 +353,15 @@ class Daemon:
             self._announce(event)
         self._tell(tick, output)
         return output
+
+    def _health(self, now_ns: int) -> Health:
+        recorder = self._recorder
+        return Health(
+            self._latency.recent_p99_s(now_ns),
+            self._detectors.replaced,
+            recorder.restarts if recorder is not None else 0,
+            recorder.error if recorder is not None else "",
+        )
 
     def _fresh(self) -> list[Detection]:
         """Detections since the last tick in the order of their frames; one overtaken is dropped."""

@@ -11,15 +11,17 @@ import math
 from dataclasses import dataclass, field, replace
 
 from flightd.control.flight import FlightController, FlightGains, Motion
-from flightd.control.limits import Limiter, Limits
+from flightd.control.limits import Limiter, Limits, Surroundings
 from flightd.core.scanning import CodeSet, Finding, Place, Settled
 from flightd.core.types import (
+    HEALTHY,
     Attitude,
     AttitudeSetpoint,
     Command,
     Demand,
     Event,
     GridPose,
+    Health,
     LineSet,
     Phase,
     VehicleState,
@@ -28,14 +30,17 @@ from flightd.grid.localise import GridLocaliser, LocaliserParams
 from flightd.grid.pads import PadFinder
 from flightd.grid.past import PoseHistory
 from flightd.grid.site import Site
-from flightd.mission.guidance import Guide, MissionParams, Senses
+from flightd.mission.caution import Caution
+from flightd.mission.guidance import Guidance, Guide, MissionParams, Senses
 from flightd.mission.mission import Mission
 from flightd.mission.plan import FlightPlan, HeadingPolicy
 from flightd.mission.scanner import Scanner
 from flightd.tracking.height import HeightHistory
 from flightd.tracking.lines import LineTracker, TrackerParams, TrackSet
+from flightd.tracking.pictures import PictureWatch
 
 _FRAMES_ARRIVE_S = 0.5
+_TOUCHDOWN_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +69,7 @@ class TickInput:
     ground_silent_s: float = 0.0
     codes: tuple[CodeSet, ...] = ()
     counted: tuple[str, ...] = ()
+    health: Health = HEALTHY
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +116,8 @@ class Pilot:
         self._last_ns: int | None = None
         self._last_yaw: float | None = None
         self._yaw_rate = 0.0
-        self._frame_ns = -math.inf
+        self._pictures = PictureWatch()
+        self._caution = Caution(site, params.mission)
 
     @property
     def mission(self) -> Mission:
@@ -147,16 +154,11 @@ class Pilot:
         for command in tick.commands:
             self._mission.command(command, now_ns)
         self._scan(tick)
-        senses = replace(self._senses(tick, dt_s, pose, height_m), by_pad=by_pad is not None)
+        senses = self._senses(tick, dt_s, pose, height_m, tracks)
+        senses = replace(senses, by_pad=by_pad is not None)
         guidance = self._mission.step(senses)
-        motion = self._motion(pose, height_m, dt_s)
-        if guidance.guide is Guide.NONE:
-            self._control.reset()
-            setpoint = None
-        elif guidance.guide is Guide.LEVEL or pose is None:
-            setpoint = self._limiter.apply(self._control.level(now_ns, motion, guidance.reference, dt_s))
-        else:
-            setpoint = self._limiter.apply(self._control.step(now_ns, motion, guidance.reference, dt_s))
+        setpoint = self._setpoint(senses, guidance)
+        self._caution.steered(guidance, pose)
         mission = self._mission
         findings, settled = self._scanner.drain() if self._scanner is not None else ((), ())
         return TickOutput(
@@ -213,11 +215,12 @@ class Pilot:
             v = tick.vehicle
             self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
         for lines in tick.lines:
-            self._frame_ns = max(self._frame_ns, lines.stamp_ns)
-            if armed:
+            if self._pictures.take(lines) and armed:
                 self._tracker.frame(lines, self._heights.at(lines.stamp_ns))
 
-    def _senses(self, tick: TickInput, dt_s: float, pose: GridPose | None, height_m: float) -> Senses:
+    def _senses(
+        self, tick: TickInput, dt_s: float, pose: GridPose | None, height_m: float, tracks: TrackSet | None
+    ) -> Senses:
         now_ns, v = tick.now_ns, tick.vehicle
         x_ns, y_ns = self._localiser.seen_ns
         known = pose is not None and max(pose.covariance[0], pose.covariance[4]) < self._params.max_sigma_m**2
@@ -229,7 +232,7 @@ class Pilot:
             pose=pose,
             localised=known and all(self._localiser.ever_matched),
             height_m=height_m,
-            frames_arrive=(now_ns - self._frame_ns) * 1e-9 < _FRAMES_ARRIVE_S,
+            frames_arrive=self._pictures.age_s(now_ns) < _FRAMES_ARRIVE_S,
             x_age_s=(now_ns - x_ns) * 1e-9 if x_ns else math.inf,
             y_age_s=(now_ns - y_ns) * 1e-9 if y_ns else math.inf,
             telemetry_age_s=math.inf if v is None else (now_ns - v.attitude.stamp_ns) * 1e-9,
@@ -238,7 +241,38 @@ class Pilot:
             pad_m=self._pads.centre(self._mission.goal.node),
             rivals=tuple(self._localiser.rivals()) if doubted else (),
             way_out=self._localiser.way_out() if seeking else None,
+            warnings=self._caution.step(
+                now_ns, dt_s, pose, height_m, tracks, self._tracker, self._pictures, tick.health
+            ),
         )
+
+    def _setpoint(self, senses: Senses, guidance: Guidance) -> AttitudeSetpoint | None:
+        """What control makes of the guidance, within the limits; None when nothing may be sent."""
+        now_ns, dt_s, pose = senses.now_ns, senses.dt_s, senses.pose
+        motion = self._motion(pose, self._caution.height_m(senses.height_m), dt_s)
+        control, reference = self._control, guidance.reference
+        sight_s = min(senses.x_age_s, senses.y_age_s)
+        if guidance.guide is Guide.NONE:
+            control.reset()
+            return None
+        if guidance.guide is Guide.LEVEL or pose is None:
+            wanted, age_s = control.level(now_ns, motion, reference, dt_s), 0.0
+        elif guidance.guide is Guide.BRAKE:
+            push = self._caution.push_mps2
+            wanted = control.rest(now_ns, motion, reference, dt_s, push, reckoned=guidance.reckoned)
+            age_s = senses.telemetry_age_s
+        else:
+            wanted = control.step(now_ns, motion, reference, dt_s)
+            # above the pad the mission steers on without lines: by the mat, or the motion last known
+            by_mat = senses.by_pad or (guidance.phase is Phase.LAND and sight_s < _TOUCHDOWN_S)
+            age_s = senses.telemetry_age_s if by_mat else max(sight_s, senses.telemetry_age_s)
+        around = Surroundings(
+            headroom_m=senses.warnings.headroom_m,
+            back=self._caution.back(pose) if senses.localised else None,
+            data_age_s=age_s,
+            at_once=guidance.at_once,
+        )
+        return self._limiter.apply(wanted, around)
 
     def _motion(self, pose: GridPose | None, height_m: float, dt_s: float) -> Motion:
         if pose is None:

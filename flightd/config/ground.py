@@ -8,7 +8,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from flightd.mission.guidance import GroundLost
+from flightd.mission.guidance import LossAction
 
 
 class GroundConfig(BaseModel):
@@ -33,8 +33,8 @@ class GroundConfig(BaseModel):
         2.0, ge=0, le=10, description="most preview pictures per second, all clients together"
     )
     lost_s: float = Field(5.0, ge=1, le=600, description="who attends and is silent for so long is lost")
-    lost_action: GroundLost = Field(
-        GroundLost.CONTINUE, description="when the last who attends is lost: continue, hold, home or land"
+    lost_action: LossAction = Field(
+        LossAction.CONTINUE, description="when the last who attends is lost: continue, hold, home or land"
     )
 
     @model_validator(mode="after")

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.ground import GroundConfig
+from flightd.config.hazards import HazardConfig
 from flightd.config.metrics import MetricsConfig
 from flightd.config.scan import InventoryConfig, ScanConfig
 from flightd.config.vehicle import VehicleConfig
@@ -127,7 +128,9 @@ class ControlConfig(_Section):
     )
     max_tilt_deg: float = Field(10.0, gt=0, le=30, description="roll and pitch, each")
     max_tilt_rate_degps: float = Field(60.0, gt=0, le=360, description="change of a tilt set point")
+    max_jerk_mps3: float = Field(12.0, gt=0.5, le=100, description="change of the horizontal acceleration")
     max_yaw_rate_degps: float = Field(45.0, gt=0, le=180)
+    max_yaw_accel_degps2: float = Field(180.0, gt=5, le=2000)
     max_climb_mps: float = Field(0.8, gt=0, le=3)
     max_descend_mps: float = Field(0.6, gt=0, le=3)
     tilt_compensation: TiltCompensation = Field(
@@ -141,6 +144,8 @@ class ControlConfig(_Section):
             math.radians(self.max_yaw_rate_degps),
             self.max_climb_mps,
             self.max_descend_mps,
+            self.max_jerk_mps3,
+            math.radians(self.max_yaw_accel_degps2),
         )
 
 
@@ -171,7 +176,7 @@ class MissionConfig(_Section):
     settle_s: float = Field(0.4, ge=0, le=10)
     arrive_m: float = Field(0.08, gt=0, le=0.5)
     lines_hold_s: float = Field(0.25, gt=0, le=2, description="lines older than this: level and hold")
-    lines_land_s: float = Field(6.0, gt=0, le=60, description="held for so long: land")
+    lines_land_s: float = Field(4.0, gt=0, le=60, description="held for so long: land")
     integrity_min: float = Field(
         0.95, ge=0.5, lt=1, description="probability of the node below which it stops and relocates"
     )
@@ -284,6 +289,7 @@ class Config(_Section):
     recorder: RecorderConfig = RecorderConfig()
     ground: GroundConfig = GroundConfig()
     metrics: MetricsConfig = MetricsConfig()
+    hazards: HazardConfig = HazardConfig()
 
     def heading_policy(self) -> HeadingPolicy:
         """The mission's heading, with which side of the down camera's picture lies along the nose."""
@@ -328,6 +334,7 @@ class Config(_Section):
                 ground_lost=self.ground.lost_action,
                 ceiling_m=site.ceiling_m - CEILING_MARGIN_M,
                 battery=self.battery.params(),
+                hazards=self.hazards.params(),
             ),
         )
 

@@ -9,6 +9,9 @@ from flightd.control.pid import Pid, PidGains
 from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.core.types import AttitudeSetpoint
 
+_TRIM_MPS2 = 0.35
+"""The most that is leaned against a push which is no longer measured: two degrees."""
+
 
 @dataclass(frozen=True, slots=True)
 class FlightGains:
@@ -81,6 +84,36 @@ class FlightController:
         """Level and straight, height held: what is flown without a view of the floor.  The integrals
         stand still, ready for when the view comes back."""
         return AttitudeSetpoint(now_ns, 0.0, 0.0, 0.0, self._climb(motion, reference, dt_s))
+
+    def rest(
+        self,
+        now_ns: int,
+        motion: Motion,
+        reference: Reference,
+        dt_s: float,
+        push_mps2: tuple[float, float],
+        *,
+        reckoned: bool,
+    ) -> AttitudeSetpoint:
+        """Come to rest by the velocity alone (`reckoned`: it is known), then lean only against the steady
+        push as it was last known (grid axes), at most `_TRIM_MPS2`; straight, height held."""
+        ax, ay = (-min(max(push, -_TRIM_MPS2), _TRIM_MPS2) for push in push_mps2)
+        moving = (motion.vx_mps, motion.vy_mps, motion.yaw_rad)
+        if not all(map(math.isfinite, moving)):
+            return self.level(now_ns, motion, reference, dt_s)
+        if reckoned:
+            gains = self._gains.horizontal
+            most = gains.output_limit
+            ax = min(max(ax - gains.kd * motion.vx_mps, -most), most)
+            ay = min(max(ay - gains.kd * motion.vy_mps, -most), most)
+        cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+        return AttitudeSetpoint(
+            now_ns,
+            math.atan2(-sin * ax + cos * ay, GRAVITY_MPS2),
+            -math.atan2(cos * ax + sin * ay, GRAVITY_MPS2),
+            0.0,
+            self._climb(motion, reference, dt_s),
+        )
 
     def _tilted(
         self, now_ns: int, ax: float, ay: float, motion: Motion, reference: Reference, dt_s: float

@@ -2,21 +2,47 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+from flightd.core.geometry import GRAVITY_MPS2
 from flightd.core.types import AttitudeSetpoint
+
+_GAP_S = 0.1
+"""A longer gap between two set points counts as this long."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Largest magnitudes.  Tilt is limited in roll and pitch each; `tilt_rate` bounds how fast a tilt set
-    point may change (which bounds the jerk: g times the rate)."""
+    """Largest magnitudes.  Tilt and its rate are limited in roll and pitch each; `jerk_mps3` is that of
+    the horizontal acceleration g tan(tilt) as a vector.  By data older than `stale_s` nothing leans or
+    turns."""
 
     tilt_rad: float
     tilt_rate_radps: float
     yaw_rate_radps: float
     climb_mps: float
     descend_mps: float
+    jerk_mps3: float = 12.0
+    yaw_accel_radps2: float = 3.0
+    stale_s: float = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What the limits have to know.  `headroom_m` is the way up to the ceiling (NaN: unknown, inf: none
+    above), `back` the unit vector (forward, right) into the corridor that was left, None inside it;
+    `data_age_s` the age of the oldest thing that the lean was computed from.  `at_once`: an emergency stop
+    is not kept waiting by the rates."""
+
+    headroom_m: float = math.inf
+    back: tuple[float, float] | None = None
+    data_age_s: float = 0.0
+    at_once: bool = False
+
+
+OPEN = Surroundings()
+"""No ceiling, no walls, fresh data."""
 
 
 class Limiter:
@@ -26,25 +52,71 @@ class Limiter:
         self._limits = limits
         self._last = AttitudeSetpoint(0)
 
-    def apply(self, wanted: AttitudeSetpoint) -> AttitudeSetpoint:
-        """The nearest set point within the limits.  A gap of more than 0.1 s counts as 0.1 s."""
-        limits = self._limits
-        dt_s = min(max((wanted.stamp_ns - self._last.stamp_ns) * 1e-9, 0.0), 0.1)
-        swing = limits.tilt_rate_radps * dt_s
+    def apply(self, wanted: AttitudeSetpoint, around: Surroundings = OPEN) -> AttitudeSetpoint:
+        """The nearest set point within the limits.
+
+        Rates bend to nothing but `at_once`, and then only towards level: a lean that became forbidden is
+        taken back as fast as they allow, and never grows meanwhile.
+        """
+        limits, last = self._limits, self._last
+        dt_s = min(max((wanted.stamp_ns - last.stamp_ns) * 1e-9, 0.0), _GAP_S)
+        roll, pitch, yaw_rate = wanted.roll_rad, wanted.pitch_rad, wanted.yaw_rate_radps
+        if around.at_once or not around.data_age_s <= limits.stale_s:  # NaN is stale, too
+            roll = pitch = yaw_rate = 0.0
+        roll, pitch = _clamp(roll, limits.tilt_rad), _clamp(pitch, limits.tilt_rad)
+        if around.back is not None:
+            roll, pitch = _inwards(roll, pitch, around.back)
+            most = max(abs(roll), abs(pitch), limits.tilt_rad) / limits.tilt_rad
+            roll, pitch = roll / most, pitch / most
+        if not around.at_once:
+            roll, pitch = self._swing(roll, pitch, dt_s)
+            yaw_rate = last.yaw_rate_radps + _clamp(
+                yaw_rate - last.yaw_rate_radps, limits.yaw_accel_radps2 * dt_s
+            )
+        climb = min(max(wanted.climb_mps, -limits.descend_mps), limits.climb_mps)
+        if not around.headroom_m > 0.0:  # NaN is no headroom
+            climb = min(climb, 0.0)
         limited = AttitudeSetpoint(
-            wanted.stamp_ns,
-            _slew(self._last.roll_rad, _clamp(wanted.roll_rad, limits.tilt_rad), swing),
-            _slew(self._last.pitch_rad, _clamp(wanted.pitch_rad, limits.tilt_rad), swing),
-            _clamp(wanted.yaw_rate_radps, limits.yaw_rate_radps),
-            min(max(wanted.climb_mps, -limits.descend_mps), limits.climb_mps),
+            wanted.stamp_ns, roll, pitch, _clamp(yaw_rate, limits.yaw_rate_radps), climb
         )
         self._last = limited
         return limited
 
+    def _swing(self, roll: float, pitch: float, dt_s: float) -> tuple[float, float]:
+        """As far from the last lean towards this one as tilt rate and jerk allow in `dt_s`."""
+        last, limits = self._last, self._limits
+        # both axes by the same share, so that a lean which leads back never leads out on its way
+        d_roll, d_pitch = roll - last.roll_rad, pitch - last.pitch_rad
+        widest = max(abs(d_roll), abs(d_pitch))
+        share = min(1.0, limits.tilt_rate_radps * dt_s / widest) if widest else 1.0
+        roll, pitch = last.roll_rad + share * d_roll, last.pitch_rad + share * d_pitch
+        change = GRAVITY_MPS2 * math.hypot(
+            math.tan(roll) - math.tan(last.roll_rad), math.tan(pitch) - math.tan(last.pitch_rad)
+        )
+        most = limits.jerk_mps3 * dt_s
+        if change <= most:
+            return roll, pitch
+        part = most / change
+        return (
+            math.atan(math.tan(last.roll_rad) + part * (math.tan(roll) - math.tan(last.roll_rad))),
+            math.atan(math.tan(last.pitch_rad) + part * (math.tan(pitch) - math.tan(last.pitch_rad))),
+        )
+
+
+def outward(setpoint: AttitudeSetpoint, back: tuple[float, float]) -> float:
+    """Acceleration of a set point away from where `back` points, m/s^2; negative when it leans back."""
+    forward, right = -math.tan(setpoint.pitch_rad), math.tan(setpoint.roll_rad)
+    return -GRAVITY_MPS2 * (forward * back[0] + right * back[1])
+
+
+def _inwards(roll: float, pitch: float, back: tuple[float, float]) -> tuple[float, float]:
+    """The lean without its part that points out of the corridor."""
+    forward, right = -math.tan(pitch), math.tan(roll)
+    along = forward * back[0] + right * back[1]
+    if along >= 0.0:
+        return roll, pitch
+    return math.atan(right - along * back[1]), -math.atan(forward - along * back[0])
+
 
 def _clamp(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
-
-
-def _slew(last: float, wanted: float, swing: float) -> float:
-    return last + _clamp(wanted - last, swing)

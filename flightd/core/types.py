@@ -119,6 +119,20 @@ class PadSight:
 
 
 @dataclass(frozen=True, slots=True)
+class PictureCheck:
+    """Whether a picture shows anything: a fingerprint of its pixels (equal only for the same picture),
+    their mean, 0..255, and their spread (standard deviation of the liveliest channel)."""
+
+    fingerprint: int
+    mean: float
+    spread: float
+
+
+UNCHECKED = PictureCheck(-1, 127.5, 127.5)
+"""Nobody looked at the pixels: nothing is said against them."""
+
+
+@dataclass(frozen=True, slots=True)
 class LineSet:
     """What vision saw in one frame.  Lines are in pixels of a distortion-free pinhole camera when a
     lens was given to the detector.  `timings_ms` names each stage's time."""
@@ -132,6 +146,7 @@ class LineSet:
     method: str
     timings_ms: dict[str, float] = field(default_factory=dict)
     pads: tuple[PadSight, ...] = ()
+    picture: PictureCheck = UNCHECKED
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +200,7 @@ class VehicleState:
     `in_control` says that the autopilot is in the mode in which it obeys our setpoints (or, while LAND
     is demanded, in its landing mode) *and* that we asked for that mode: False means hands off.
     `height_m` is above the floor below, along the vertical; NaN when no range finder speaks.
+    `stamps_refused` counts attitudes whose own time made no sense (the arrival's was taken).
     """
 
     attitude: Attitude
@@ -199,6 +215,7 @@ class VehicleState:
     battery_v: float
     heartbeat_ns: int
     refusal: str = ""
+    stamps_refused: int = 0
 
 
 class Demand(enum.StrEnum):
@@ -252,6 +269,21 @@ class GridPose:
     height_m: float
     covariance: tuple[float, ...]
     integrity: float
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """How the daemon itself does: `latency_p99_s` from exposure to the wire over the last second (0
+    without a frame flown by), detector processes replaced and writers of the log started again so far,
+    and why the disk refuses the log ("" while it does not)."""
+
+    latency_p99_s: float = 0.0
+    detectors_replaced: int = 0
+    recorder_restarts: int = 0
+    recorder_error: str = ""
+
+
+HEALTHY = Health()
 
 
 class EventLevel(enum.StrEnum):

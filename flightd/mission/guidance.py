@@ -7,20 +7,42 @@ import math
 from dataclasses import dataclass, field
 
 from flightd.control.flight import Reference
-from flightd.core.types import Demand, GridPose, Phase, VehicleState
+from flightd.core.types import HEALTHY, Demand, GridPose, Health, Phase, VehicleState
 from flightd.mission.battery import BatteryParams
 
 CEILING_MARGIN_M = 0.5
 """Nothing is flown nearer to the ceiling."""
 
 
-class GroundLost(enum.StrEnum):
-    """What to do when the ground station that attends the flight falls silent."""
+class LossAction(enum.StrEnum):
+    """What to do when something is lost that flying itself does not need: ground station, flight log."""
 
     CONTINUE = "continue"
     HOLD = "hold"
     HOME = "home"
     LAND = "land"
+
+
+@dataclass(frozen=True, slots=True)
+class HazardParams:
+    """When things count as wrong, and for how long that is borne; SI units, radians."""
+
+    heartbeat_land_s: float = 5.0
+    height_share: float = 0.25
+    heading_rad: float = math.radians(5.0)
+    disagree_s: float = 0.4
+    push_mps2: float = 0.8
+    off_m: float = 0.5
+    push_s: float = 2.0
+    headroom_m: float = 0.5
+    corridor_m: float = 0.6
+    outside_s: float = 0.2
+    latency_s: float = 0.25
+    overload_s: float = 3.0
+    brake_s: float = 2.0
+    search_s: float = 1.0
+    search_climb_m: float = 0.4
+    record_lost: LossAction = LossAction.HOME
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +66,10 @@ class MissionParams:
     steer_above_m: float = 0.45
     land_mps: float = 0.35
     touch_mps: float = 0.20
+    blind_mps: float = 0.5
     touch_below_m: float = 0.35
     lines_hold_s: float = 0.25
-    lines_land_s: float = 6.0
+    lines_land_s: float = 4.0
     lines_found_s: float = 1.0
     followed_hold_s: float = 0.8
     telemetry_hold_s: float = 0.3
@@ -70,16 +93,46 @@ class MissionParams:
     relocate_climb_m: float = 1.0
     ceiling_m: float = math.inf
     ground_lost_s: float = 5.0
-    ground_lost: GroundLost = GroundLost.CONTINUE
+    ground_lost: LossAction = LossAction.CONTINUE
     battery: BatteryParams = field(default_factory=BatteryParams)
+    hazards: HazardParams = HazardParams()
 
 
 class Guide(enum.Enum):
-    """What control is to do: nothing at all, level with height held, or steer to the reference."""
+    """What control is to do: nothing at all, level with height held, come to rest by the velocity as it is
+    reckoned and stay, or steer to the reference."""
 
     NONE = "none"
     LEVEL = "level"
+    BRAKE = "brake"
     STEER = "steer"
+
+
+@dataclass(frozen=True, slots=True)
+class Warnings:
+    """How far what the mission senses can be believed.
+
+    Pictures: age of the newest, and since when they are the same or show nothing.  `heading_error_rad` is
+    what the lines say against the vehicle's heading, `height_share` the lines' width against the map's
+    (1: they agree), `push_mps2` the acceleration that no lean explains, `off_m` the distance from the
+    reference while steering, `headroom_m` the way up to the ceiling's margin, `outside_m` how far outside
+    the corridor, whose nearest line is at `line_m`; `tick_s` the mean time between ticks."""
+
+    picture_age_s: float = 0.0
+    frozen_s: float = 0.0
+    blank_s: float = 0.0
+    heading_error_rad: float = 0.0
+    height_share: float = 1.0
+    push_mps2: float = 0.0
+    off_m: float = 0.0
+    headroom_m: float = math.inf
+    outside_m: float = 0.0
+    line_m: tuple[float, float] = (0.0, 0.0)
+    tick_s: float = 0.02
+    health: Health = HEALTHY
+
+
+ALL_WELL = Warnings()
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,13 +159,17 @@ class Senses:
     by_pad: bool = False
     rivals: tuple[tuple[str, float], ...] = ()
     way_out: tuple[float, float] | None = None
+    warnings: Warnings = ALL_WELL
 
 
 @dataclass(frozen=True, slots=True)
 class Guidance:
-    """What the mission wants: guide, reference (grid axes), demand on the vehicle."""
+    """What the mission wants: guide, reference (grid axes), demand on the vehicle.  `reckoned` says that
+    the velocity is still known while the floor is not seen, `at_once` that nothing may delay levelling."""
 
     phase: Phase
     guide: Guide
     reference: Reference
     demand: Demand
+    reckoned: bool = False
+    at_once: bool = False

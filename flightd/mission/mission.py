@@ -11,7 +11,8 @@ from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, 
 from flightd.grid.site import Site
 from flightd.grid.ways import NoWayError
 from flightd.mission.first_look import FirstLook
-from flightd.mission.guidance import GroundLost, Guidance, Guide, MissionParams, Senses
+from flightd.mission.guidance import Guidance, Guide, LossAction, MissionParams, Senses
+from flightd.mission.hazards import ACTIONS, Action, triggers_of
 from flightd.mission.legs import Legs, Pace
 from flightd.mission.plan import FlightPlan, HeadingPolicy, Stop, make_plan
 from flightd.mission.readiness import not_fresh, not_ready
@@ -19,7 +20,7 @@ from flightd.mission.relocate import Relocator
 from flightd.mission.scan_phase import ScanPhase
 from flightd.mission.scanner import Scanner
 from flightd.mission.sorties import Sorties
-from flightd.mission.table import next_phase
+from flightd.mission.table import TABLE, next_phase
 from flightd.mission.touchdown import Touchdown
 from flightd.mission.triggers import Trigger
 from flightd.mission.watch import Lasting, Situation, Watch
@@ -35,6 +36,11 @@ _DEMANDS = {
 _ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.DONE, Phase.ABORTED, Phase.PILOT}
 _BY_PAD = {Phase.TAKE_OFF, Phase.ACQUIRE, Phase.HOLD}
 _TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
+_SETTLE_S = 3.0
+"""The most that a landing waits for the drone to come to rest."""
+_REST_MPS = 0.15
+_AGAIN_S = 1.0
+"""A hazard that was away for longer is told anew."""
 
 
 class Mission:
@@ -70,13 +76,15 @@ class Mission:
         start = site.nodes[plan.start]
         self._anchor = (start.x_m, start.y_m)
         self.phase = Phase.PREFLIGHT
-        self.reason = ""
+        self.reason = self._cause = ""
         self.visited: list[str] = []
         self._aborting = False
         self._returning = False
         self._on_pad_leg = False
         self._paused = False
+        self._stopped = False
         self._ground_lost = False
+        self._hazards: dict[Trigger, int] = {}
         self._started = params.autostart
         self._first_look = FirstLook(params)
         self._found_flying = False
@@ -133,9 +141,12 @@ class Mission:
         doubts = self._relocator.step(senses, self.phase, (senses.now_ns - self._since_ns) * 1e-9)
         if self._relocator.jumped:
             self._correct(senses)
-        phase, trigger = next_phase(self.phase, self._triggers(senses) | doubts)
+        triggers = self._triggers(senses) | doubts
+        self._tell_hazards(triggers, senses.now_ns)
+        phase, trigger = next_phase(self.phase, triggers)
         if trigger is not None:
             self._change(senses, phase, trigger)
+            self._ordered = None if trigger is self._ordered else self._ordered
         return self._guide(senses)
 
     # What has happened
@@ -151,6 +162,9 @@ class Mission:
         if (s.now_ns - self._since_ns) * 1e-9 > self._limit_s:
             found.add(Trigger.TIMED_OUT)
         found |= self._watch.step(s, self._situation(Trigger.HOLD in found))
+        if Trigger.RECORD_LOST in found:
+            found.remove(Trigger.RECORD_LOST)
+            found |= self._lost(self._params.hazards.record_lost, Trigger.RECORD_LOST, s.now_ns)
         found |= {Trigger.DOWN_TO_SWAP} if Trigger.DISARMED in found and self._swaps else set()
         return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found
 
@@ -173,6 +187,27 @@ class Mission:
         done = len(self.visited) > self._visited_before
         return self._on_pad_leg and self._short_of_charge and done and bool(self._left_over)
 
+    def _lost(self, action: LossAction, trigger: Trigger, now_ns: int) -> set[Trigger]:
+        """What the configured action makes of something lost."""
+        self._note_hazard(trigger, action.value, now_ns)
+        if action is LossAction.HOME and self.airborne and not self._returning:
+            self._go_home(now_ns, trigger.value, in_need=True)
+        return {LossAction.HOLD: {Trigger.HOLD}, LossAction.LAND: {trigger}}.get(action, set())
+
+    def _tell_hazards(self, triggers: set[Trigger], now_ns: int) -> None:
+        asked = triggers & ACTIONS.keys()
+        if self.phase in {Phase.TAKE_OFF, Phase.LAND}:  # near the floor lines come and go
+            asked &= TABLE[self.phase].keys() | triggers_of(Action.REPORT, Action.HOME)
+        for trigger in sorted(asked, key=list(Trigger).index):
+            self._note_hazard(trigger, ACTIONS[trigger].value, now_ns)
+
+    def _note_hazard(self, trigger: Trigger, action: str, now_ns: int) -> None:
+        """Say once that a hazard was found."""
+        last_ns = self._hazards.get(trigger)
+        self._hazards[trigger] = now_ns
+        if last_ns is None or (now_ns - last_ns) * 1e-9 > _AGAIN_S:
+            self._event(now_ns, EventLevel.WARNING, "hazard", f"{trigger.value}: {action}")
+
     def _situation(self, paused: bool) -> Situation:
         along_x = None
         if self.phase is Phase.FOLLOW:
@@ -187,11 +222,7 @@ class Mission:
             self._ground_lost = lost
             text = f"silent for {s.ground_silent_s:.1f} s: {action.value}" if lost else "heard again"
             self._event(s.now_ns, EventLevel.WARNING if lost else EventLevel.INFO, "ground_link", text)
-        if not lost:
-            return set()
-        if action is GroundLost.HOME and self.airborne and not self._returning:
-            self._go_home(s.now_ns, "ground link lost", in_need=True)
-        return {GroundLost.HOLD: {Trigger.HOLD}, GroundLost.LAND: {Trigger.GROUND_LOST}}.get(action, set())
+        return self._lost(action, Trigger.GROUND_LOST, s.now_ns) if lost else set()
 
     def _progress(self, s: Senses) -> set[Trigger]:
         """The trigger by which the present phase reaches its end, if it has."""
@@ -251,7 +282,7 @@ class Mission:
 
     def _grounded(self, s: Senses) -> str:
         """Why it stays on the ground, or an empty text."""
-        silent = self._ground_lost and self._params.ground_lost is not GroundLost.CONTINUE
+        silent = self._ground_lost and self._params.ground_lost is not LossAction.CONTINUE
         stale = not_fresh(s, self._params, len(self.remaining)) if self.phase is Phase.SWAP else ""
         return stale or not_ready(s, self._params, silent)
 
@@ -263,7 +294,8 @@ class Mission:
 
     def _change(self, s: Senses, phase: Phase, trigger: Trigger) -> None:
         before, self.phase = self.phase, phase
-        planned = trigger is Trigger.ROUTE_DONE or before is Phase.LAND
+        self._stopped |= trigger is Trigger.STOP
+        planned = (trigger is Trigger.ROUTE_DONE or before is Phase.LAND) and not self._stopped
         if trigger in {Trigger.DWELLED, Trigger.ROUTE_DONE}:
             self._note_visit(s)
         self._scan.changed(s, before, phase, trigger, self.goal)
@@ -276,14 +308,17 @@ class Mission:
             self._anchor = (self.goal.x_m, self.goal.y_m)
         if phase in {Phase.HOLD, Phase.RELOCATE} or (phase is Phase.LAND and not planned):
             self._anchor = (s.pose.x_m, s.pose.y_m) if s.pose is not None else self._anchor
+        if trigger is Trigger.CORRIDOR_LEFT:
+            self._anchor = s.warnings.line_m
         self._on_pad_leg = phase is Phase.LAND and planned
         unplanned = phase in {Phase.LAND, Phase.ABORTED, Phase.PILOT} and not planned
         if phase is Phase.DONE:
             self.phase = Phase.ABORTED if self._aborting else Phase.DONE
-            self.reason = self.reason if self._aborting else "landed on the pad"
+            self._cause = self._cause if self._aborting else "landed on the pad"
         else:
             refused = trigger is Trigger.TIMED_OUT and s.vehicle is not None and s.vehicle.refusal
-            self.reason = f"{trigger.value}: {s.vehicle.refusal}" if refused and s.vehicle else trigger.value
+            self._cause = f"{trigger.value}: {s.vehicle.refusal}" if refused and s.vehicle else trigger.value
+        self.reason = self._cause
         self._aborting |= unplanned
         stopped = phase in {Phase.HOLD, Phase.RELOCATE}
         level = EventLevel.WARNING if unplanned or stopped else EventLevel.INFO
@@ -442,27 +477,55 @@ class Mission:
             self.reason = self._grounded(s) or "waiting for the start command"
         if not self.airborne:
             return Guidance(self.phase, Guide.NONE, self._reference(0.0), demand)
+        self._steering = not (self._stopped or self._found_flying) and self._steer(s)
         if self.phase is Phase.LAND:
             climb, demand = self._descend(s)
+            refused = demand is Demand.DISARM and s.vehicle is not None and s.vehicle.refusal
+            self.reason = f"{self._cause}: {s.vehicle.refusal}" if refused and s.vehicle else self._cause
         elif self.phase is Phase.RECOVER:
             self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m)
             climb = 0.0
-        elif math.isnan(s.height_m) or s.telemetry_age_s > self._params.telemetry_hold_s:
+        elif (
+            math.isnan(s.height_m)
+            or s.telemetry_age_s > self._params.telemetry_hold_s
+            or abs(s.warnings.height_share - 1.0) > self._params.hazards.height_share
+        ):
             self._height.reset(self._height.position)  # no climb by heights of the past
             climb = 0.0
         else:
-            height_m = self._height_goal_m()
-            seeking = self.phase is Phase.RELOCATE
-            self._height.step(self._relocator.height_m(height_m) if seeking else height_m, s.dt_s)
+            self._height.step(self._wanted_height_m(), s.dt_s)
             climb = self._height.velocity
-        guide = Guide.STEER if not self._found_flying and self._steer(s) else Guide.LEVEL
-        self._steering = guide is Guide.STEER
-        return Guidance(self.phase, guide, self._reference(climb), demand)
+        guide = Guide.STEER if self._steering else Guide.BRAKE if self._may_brake(s) else Guide.LEVEL
+        reckoned = min(s.x_age_s, s.y_age_s) < self._params.hazards.brake_s
+        return Guidance(self.phase, guide, self._reference(climb), demand, reckoned, self._stopped)
+
+    def _may_brake(self, s: Senses) -> bool:
+        """Without a view of the floor, but with an attitude by which to reckon on from the last one."""
+        heard = s.telemetry_age_s <= self._params.telemetry_hold_s
+        known = heard and s.pose is not None and not self._found_flying
+        return known and not self._stopped and self.phase is not Phase.TAKE_OFF
+
+    def _wanted_height_m(self) -> float:
+        """Flying height; a little more in search of lines that stay lost."""
+        p, h = self._params, self._params.hazards
+        if self.phase is Phase.RELOCATE:
+            return self._relocator.height_m(self._height_goal_m())
+        if self.phase is not Phase.HOLD or self._watch.unseen_s < h.search_s:
+            return self._height_goal_m()
+        highest_m = self._site.ceiling_m - h.headroom_m
+        return max(p.height_m, min(self._height_goal_m() + h.search_climb_m, highest_m))
 
     def _descend(self, s: Senses) -> tuple[float, Demand]:
-        """Climb rate and demand of a landing: down until the vehicle says that it stands, then disarm."""
+        """Climb rate and demand of a landing: at rest first, unless stopped or out of sight; down until
+        the vehicle says that it stands; then disarm."""
         p, v = self._params, s.vehicle
+        moving = self._steering and _speed(s) > _REST_MPS
+        if moving and not self._on_pad_leg and (s.now_ns - self._since_ns) * 1e-9 < _SETTLE_S:
+            self._height.reset(self._height.position)
+            return 0.0, Demand.FLY
         rate = self._touchdown.rate_mps(s, self._target(s))
+        if rate == p.land_mps and not self._steering:  # what drifts unseen should not do so for long
+            rate = p.blind_mps
         self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
         blind = s.telemetry_age_s > p.telemetry_land_s
         standing = v is not None and v.landed is LandedState.ON_GROUND and not blind

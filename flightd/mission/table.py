@@ -1,7 +1,8 @@
 """The mission's transition table: every phase against every trigger, as data.
 
 `TABLE[phase][trigger]` is the next phase; a trigger that a phase does not list leaves it as it is.
-Triggers are tried in the order of the enum: what keeps people safe stands first.
+Triggers are tried in the order of the enum: what keeps people safe stands first.  What hazards ask for
+comes from their own table.
 """
 
 from __future__ import annotations
@@ -9,20 +10,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from flightd.core.types import Phase
+from flightd.mission.hazards import ACTIONS, PHASE_OF, Action, triggers_of
 from flightd.mission.triggers import Trigger
 
 _SAFETY = {
-    Trigger.PILOT_TOOK: Phase.PILOT,
+    trigger: PHASE_OF[ACTIONS[trigger]] for trigger in triggers_of(Action.HANDS_OFF, Action.STOP, Action.LAND)
+} | {
     Trigger.DISARMED: Phase.ABORTED,
-    Trigger.STOP: Phase.LAND,
-    Trigger.TELEMETRY_LOST: Phase.LAND,
-    Trigger.HEIGHT_LOST: Phase.LAND,
-    Trigger.BATTERY_CRITICAL: Phase.LAND,
     Trigger.LAND_HERE: Phase.LAND,
     Trigger.GROUND_LOST: Phase.LAND,
+    Trigger.RECORD_LOST: Phase.LAND,
 }
-_SEEING = _SAFETY | {Trigger.LINES_LOST: Phase.HOLD, Trigger.HOLD: Phase.HOLD}
-_ON_LINES = _SEEING | {Trigger.POSITION_DOUBTED: Phase.RELOCATE}
+_SEEING = _SAFETY | dict.fromkeys(triggers_of(Action.HOLD) | {Trigger.HOLD}, Phase.HOLD)
+_ON_LINES = _SEEING | dict.fromkeys(triggers_of(Action.RELOCATE), Phase.RELOCATE)
 
 TABLE: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.PREFLIGHT: {
@@ -48,7 +48,12 @@ TABLE: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.SCAN: _ON_LINES
     | {Trigger.VIEW_DONE: Phase.CLIMB, Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
     Phase.TURN: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.TURNED: Phase.FOLLOW},
-    Phase.HOLD: _SAFETY | {Trigger.LINES_LOST_LONG: Phase.LAND, Trigger.LINES_FOUND: Phase.ACQUIRE},
+    Phase.HOLD: _SAFETY
+    | {
+        Trigger.HAZARD_LASTS: Phase.LAND,
+        Trigger.LINES_LOST_LONG: Phase.LAND,
+        Trigger.LINES_FOUND: Phase.ACQUIRE,
+    },
     Phase.RELOCATE: _SEEING
     | {
         Trigger.POSITION_UNKNOWN: Phase.LAND,
@@ -58,6 +63,8 @@ TABLE: Mapping[Phase, Mapping[Trigger, Phase]] = {
         Trigger.PILOT_TOOK: Phase.PILOT,
         Trigger.DISARMED: Phase.DONE,
         Trigger.DOWN_TO_SWAP: Phase.SWAP,
+        Trigger.VANISHED: Phase.ABORTED,
+        Trigger.STOP: Phase.LAND,
     },
     Phase.SWAP: {
         Trigger.STOP: Phase.ABORTED,

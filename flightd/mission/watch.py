@@ -3,13 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from dataclasses import dataclass
+from typing import TypeAlias
 
+from flightd.core.types import VehicleState
 from flightd.mission.guidance import MissionParams, Senses
+from flightd.mission.hazards import Action, triggers_of
 from flightd.mission.triggers import Trigger
 
 _HEARTBEAT_S = 2.0
 """A heartbeat comes each second; older than this, modes and arming are those of the past."""
+_GIVE_UP_S = 60.0
+"""A vehicle that nobody heard for so long while it should land is not waited for."""
+_TICK_S = 0.06
+_GAP_S = 0.5
+_NEWS_S = 1.0
+"""Something that was replaced is news for so long."""
+_JUMPED = 3
+"""So many attitudes with a senseless time are no stray datagram."""
+
+_HOLDING = triggers_of(Action.HOLD)
+_Conditions: TypeAlias = dict[Trigger, tuple[bool, float]]
+"""Whether each hazard's condition holds now, and for how long it is borne."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,19 +53,52 @@ class Lasting:
         return (now_ns - self._since_ns) * 1e-9
 
 
+class Counted:
+    """Whether a count has lately risen, by at least `step` at once or within the time it is news."""
+
+    def __init__(self, least: int = 1) -> None:
+        self._least = least
+        self._base = 0
+        self._count = 0
+        self._risen_ns: int | None = None
+
+    def step(self, count: int, now_ns: int) -> bool:
+        if count > self._count:
+            self._risen_ns = now_ns
+        elif self._risen_ns is not None and (now_ns - self._risen_ns) * 1e-9 > _NEWS_S:
+            self._risen_ns, self._base = None, count
+        self._count = count
+        return self._risen_ns is not None and count - self._base >= self._least
+
+
 class Watch:
     """Call `step` at each tick: the triggers of all hazards that hold, and of lines found again."""
 
     def __init__(self, params: MissionParams) -> None:
         self._params = params
-        self._no_height = Lasting()
+        self._lasting: defaultdict[Trigger, Lasting] = defaultdict(Lasting)
+        self._trouble = Lasting()
+        self._detectors, self._writers, self._stamps = Counted(), Counted(), Counted(_JUMPED)
         self._seen = Lasting()
         self._unseen_ns: int | None = None
+        self.unseen_s = 0.0
+        """For how long the lines have been lost, glimpses not counted."""
 
     def step(self, s: Senses, situation: Situation) -> set[Trigger]:
-        found = self._vehicle(s) if situation.airborne else set()
-        found |= self._links(s)
-        return found | self._sight(s, situation)
+        conditions = self._links(s) | self._daemon(s)
+        found = self._sight(s, situation)
+        if s.vehicle is not None:
+            found |= self._authority(s, s.vehicle) if situation.airborne else set()
+            conditions |= self._vehicle(s, s.vehicle)
+        conditions |= self._pictures(s) | self._place(s)
+        for trigger, (present, borne_s) in conditions.items():
+            holds = present and situation.airborne
+            if self._lasting[trigger].step(holds, s.now_ns) >= borne_s and holds:
+                found.add(trigger)
+        holding = found & (_HOLDING - {Trigger.LINES_LOST})
+        if self._trouble.step(bool(holding), s.now_ns) > self._params.lines_land_s:
+            found.add(Trigger.HAZARD_LASTS)
+        return found - {Trigger.LINES_FOUND} if holding else found
 
     def ground_lost(self, s: Senses) -> bool:
         return s.ground_silent_s > self._params.ground_lost_s
@@ -58,29 +107,63 @@ class Watch:
         p = self._params
         return s.vehicle is not None and p.battery_land_frac <= s.vehicle.battery_frac < p.battery_home_frac
 
-    def _vehicle(self, s: Senses) -> set[Trigger]:
-        p, v = self._params, s.vehicle
-        if v is None:
-            return set()
-        found = set()
+    def _authority(self, s: Senses, v: VehicleState) -> set[Trigger]:
         silent_s = max(s.telemetry_age_s, (s.now_ns - v.heartbeat_ns) * 1e-9 - _HEARTBEAT_S)
-        heard = silent_s < p.telemetry_hold_s
-        if heard and not v.armed:
-            found.add(Trigger.DISARMED)
-        elif heard and not v.in_control:  # silence is no pilot: a lost link is a lost link
-            found.add(Trigger.PILOT_TOOK)
-        if v.battery_frac < p.battery_land_frac:
-            found.add(Trigger.BATTERY_CRITICAL)
-        return found
+        if silent_s >= self._params.telemetry_hold_s:
+            return set()
+        if not v.armed:
+            return {Trigger.DISARMED}
+        return set() if v.in_control else {Trigger.PILOT_TOOK}  # silence is no pilot: a lost link is lost
 
-    def _links(self, s: Senses) -> set[Trigger]:
+    def _vehicle(self, s: Senses, v: VehicleState) -> _Conditions:
+        p, h = self._params, self._params.hazards
+        heartbeat_s = (s.now_ns - v.heartbeat_ns) * 1e-9
+        jumped = self._stamps.step(v.stamps_refused, s.now_ns) or s.dt_s > _GAP_S
+        return {
+            Trigger.HEARTBEAT_LOST: (heartbeat_s > h.heartbeat_land_s, 0.0),
+            Trigger.BATTERY_CRITICAL: (v.battery_frac < p.battery_land_frac, 0.0),
+            Trigger.BATTERY_LOW: (self.battery_low(s), 0.0),
+            Trigger.CLOCK_JUMP: (jumped, 0.0),
+        }
+
+    def _links(self, s: Senses) -> _Conditions:
         p = self._params
-        found = set()
-        if s.telemetry_age_s > p.telemetry_land_s:
-            found.add(Trigger.TELEMETRY_LOST)
-        if self._no_height.step(math.isnan(s.height_m), s.now_ns) > p.telemetry_land_s:
-            found.add(Trigger.HEIGHT_LOST)
-        return found
+        age_s = s.telemetry_age_s
+        beat_s = math.inf if s.vehicle is None else (s.now_ns - s.vehicle.heartbeat_ns) * 1e-9
+        return {
+            Trigger.TELEMETRY_STALE: (age_s > p.telemetry_hold_s, 0.0),
+            Trigger.TELEMETRY_LOST: (age_s > p.telemetry_land_s, 0.0),
+            Trigger.VANISHED: (max(age_s, beat_s) > p.telemetry_land_s, _GIVE_UP_S),
+            Trigger.HEIGHT_LOST: (math.isnan(s.height_m), p.telemetry_land_s),
+        }
+
+    def _daemon(self, s: Senses) -> _Conditions:
+        h, w, health = self._params.hazards, s.warnings, s.warnings.health
+        slow = health.latency_p99_s > h.latency_s or w.tick_s > _TICK_S
+        return {
+            Trigger.OVERLOAD: (slow, h.overload_s),
+            Trigger.RECORD_LOST: (bool(health.recorder_error), 0.0),
+            Trigger.DETECTOR_LOST: (self._detectors.step(health.detectors_replaced, s.now_ns), 0.0),
+            Trigger.RECORDER_DEAD: (self._writers.step(health.recorder_restarts, s.now_ns), 0.0),
+        }
+
+    def _pictures(self, s: Senses) -> _Conditions:
+        borne_s, w = self._params.lines_hold_s, s.warnings
+        return {
+            Trigger.CAMERA_FROZEN: (w.frozen_s > borne_s, 0.0),
+            Trigger.CAMERA_BLIND: (w.blank_s > borne_s, 0.0),
+            Trigger.FRAMES_STALE: (w.picture_age_s > borne_s, 0.0),
+        }
+
+    def _place(self, s: Senses) -> _Conditions:
+        h, w = self._params.hazards, s.warnings
+        return {
+            Trigger.HEIGHT_WRONG: (abs(w.height_share - 1.0) > h.height_share, h.disagree_s),
+            Trigger.ATTITUDE_WRONG: (abs(w.heading_error_rad) > h.heading_rad, h.disagree_s),
+            Trigger.WIND: (w.push_mps2 > h.push_mps2 or w.off_m > h.off_m, h.push_s),
+            Trigger.CEILING_LEFT: (w.headroom_m < 0.0, h.outside_s),
+            Trigger.CORRIDOR_LEFT: (w.outside_m > 0.0 and s.localised, h.outside_s),
+        }
 
     def _sight(self, s: Senses, situation: Situation) -> set[Trigger]:
         """Lines lost and found.  The time without lines runs on through short glimpses: only lines that
@@ -93,8 +176,8 @@ class Watch:
             self._unseen_ns = s.now_ns
         elif seen_s > p.lines_found_s:
             self._unseen_ns = None
-        unseen_s = 0.0 if self._unseen_ns is None else (s.now_ns - self._unseen_ns) * 1e-9
-        if lost and unseen_s > p.lines_land_s:
+        self.unseen_s = 0.0 if self._unseen_ns is None else (s.now_ns - self._unseen_ns) * 1e-9
+        if lost and self.unseen_s > p.lines_land_s:
             return {Trigger.LINES_LOST, Trigger.LINES_LOST_LONG}
         if lost:
             return {Trigger.LINES_LOST}

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import deque
 from itertools import pairwise
 
 from flightd.runtime.pool import Detection
 from flightd.runtime.series import Series
 
 _SAME_TICK_NS = 40_000_000
+_RECENT_NS = 1_000_000_000
 
 
 class LatencyBook:
@@ -17,6 +19,7 @@ class LatencyBook:
         self._waiting: list[tuple[Detection, int]] = []
         self._totals_ms = Series()
         self._since: list[dict[str, float]] = []
+        self._recent: deque[tuple[int, float]] = deque()
         self.newest: dict[str, float] = {}
 
     def taken(self, detection: Detection, now_ns: int) -> None:
@@ -49,6 +52,7 @@ class LatencyBook:
             }
             self._since.append(self.newest)
             self._totals_ms.add(total)
+            self._recent.append((now_ns, total))
         self._waiting.clear()
 
     def drain(self) -> tuple[dict[str, float], ...]:
@@ -59,6 +63,13 @@ class LatencyBook:
     def forget(self) -> None:
         """No set point goes out (not flying): the frames in waiting count for nothing."""
         self._waiting.clear()
+
+    def recent_p99_s(self, now_ns: int) -> float:
+        """p99 of the whole way over the last second, seconds; 0 when no frame was flown by."""
+        while self._recent and now_ns - self._recent[0][0] > _RECENT_NS:
+            self._recent.popleft()
+        totals = sorted(total for _, total in self._recent)
+        return totals[min(int(0.99 * len(totals)), len(totals) - 1)] * 1e-3 if totals else 0.0
 
     def quantiles_ms(self) -> dict[str, float]:
         """p50 and p99 of the whole way, rounded to a hundredth; zeros before any frame was flown by."""

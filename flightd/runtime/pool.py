@@ -120,7 +120,12 @@ class PicturePool(Generic[AskT, FoundT]):
         self._deaths = 0
         self._changed = asyncio.Event()
         self.lost: Counter[str] = Counter()
-        self.replaced = 0
+        self._replaced = 0
+
+    @property
+    def replaced(self) -> int:
+        """Processes that died or hung and were replaced."""
+        return self._replaced
 
     @property
     def pids(self) -> tuple[int, ...]:
@@ -193,7 +198,7 @@ class PicturePool(Generic[AskT, FoundT]):
         self._workers.discard(worker)
         if not self._open:
             return
-        self.replaced += 1
+        self._replaced += 1
         self._deaths += 1
         self._changed.set()
         wait_s = 0.0 if self._deaths <= self._size else min(0.1 * 2.0 ** (self._deaths - self._size), 5.0)

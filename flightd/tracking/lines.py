@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from statistics import median
 
 from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount, wrap_pi
 from flightd.core.types import Attitude, LineSet, PadSight
@@ -20,6 +21,10 @@ from flightd.tracking.tilt import FloorView, GroundLine, TiltCompensation, groun
 
 _STEP_NS = 20_000_000
 _PARALLEL_RAD = math.radians(20.0)
+_WIDTH_GAIN = 0.15
+_AGREEING, _DOUBTED = 0.15, 0.2
+_SAME_RAD = math.radians(3.0)
+_DISPUTE_NS, _SHOWN_NS = 600_000_000, 1_500_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +60,7 @@ class TrackSet:
 
     `across_x` are the lines that cross the x axis (parallel to y), offsets in x; `across_y` the others.
     `lines_ns` is the capture time of the newest frame in which any line was taken; `junctions` are those
-    of the newest frame, taken at `junctions_ns`.
+    of the newest frame, taken at `junctions_ns`; `push` is the steady acceleration that no lean explains.
     """
 
     stamp_ns: int
@@ -73,6 +78,8 @@ class TrackSet:
     """Capture time of the frame in which the `pads` were seen."""
     junctions: tuple[FloorJunction, ...] = ()
     junctions_ns: int = 0
+    push_x_mps2: float = 0.0
+    push_y_mps2: float = 0.0
 
 
 class LineTracker:
@@ -92,6 +99,15 @@ class LineTracker:
         self._pads: tuple[PadOffset, ...] = ()
         self._junctions: tuple[FloorJunction, ...] = ()
         self.rejected = 0
+        self.height_share = 1.0
+        """The height told lately against that by the lines' width; 1 when they agree."""
+        self._widths_agreed = False
+        self._dispute = _Dispute()
+
+    @property
+    def heading_error_rad(self) -> float:
+        """What all lines lately said against the vehicle's heading; 0 while any of them agrees."""
+        return self._dispute.error_rad
 
     def attitude(self, sample: Attitude) -> None:
         self._history.add(sample)
@@ -103,6 +119,7 @@ class LineTracker:
         """Take the lines of one frame seen at `height_m`; False when it could not be used (older than
         the last, no attitude at its exposure, no height)."""
         attitude = self._history.at(lines.stamp_ns)
+        height_m = self._believed_height_m(lines, height_m)
         if attitude is None or self._heading is None or not height_m > 0 or lines.stamp_ns <= self._stamp_ns:
             self.rejected += 1
             return False
@@ -112,7 +129,8 @@ class LineTracker:
             params.lens, params.mount, attitude, height_m, params.compensation, params.sigma_tilt_rad
         )
         low, high = (share * params.width_m for share in params.width_share)
-        on_floor = [line for line in ground_lines(lines.lines, view) if low <= line.width_m <= high]
+        seen = ground_lines(lines.lines, view)
+        on_floor = [line for line in seen if low <= line.width_m <= high]
         yaw = self._turn(on_floor, attitude)
         across_x: list[SeenLine] = []
         across_y: list[SeenLine] = []
@@ -178,6 +196,8 @@ class LineTracker:
                 replace(seen, dx_m=seen.dx_m - moved_x, dy_m=seen.dy_m - moved_y) for seen in self._junctions
             ),
             self._stamp_ns,
+            push_x_mps2=self._x.disturbance_mps2,
+            push_y_mps2=self._y.disturbance_mps2,
         )
 
     def _advance(self, stamp_ns: int) -> None:
@@ -211,6 +231,8 @@ class LineTracker:
     def _turn(self, on_floor: list[GroundLine], attitude: Attitude) -> float:
         """Correct the heading by every line near a grid direction; return the yaw at exposure."""
         assert self._heading is not None
+        told: list[float] = []
+        agreed = False
         for line in on_floor:
             yaw = attitude.yaw_rad + self._heading.offset_rad
             # a line of the grid has direction -yaw or 90 deg - yaw in the level frame
@@ -218,7 +240,54 @@ class LineTracker:
             sigma = max(line.sigma_theta_rad, math.radians(0.2))
             if abs(innovation) < max(math.radians(4.0), 4.0 * math.hypot(self._heading.sigma_rad, sigma)):
                 self._heading.update(innovation, sigma)
+                agreed = True
+            told.append(innovation)
+        if self._dispute.step(told, agreed, attitude.stamp_ns):
+            self._heading.restart(self._dispute.error_rad, self._params.start_yaw_sigma_rad)
         return attitude.yaw_rad + self._heading.offset_rad
+
+    def _believed_height_m(self, lines: LineSet, told_m: float) -> float:
+        """The height told, unless there is none or the width of the lines contradicts it: then theirs."""
+        if not lines.lines:
+            return told_m
+        scale = self._params.width_m * self._params.lens.fx_px
+        heights_m = [scale / line.width_px for line in lines.lines if line.width_px > 0]
+        if not told_m > 0 or not heights_m:
+            return median(heights_m) if heights_m else told_m
+        by_width_m = min(heights_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
+        self._widths_agreed |= abs(told_m / by_width_m - 1.0) < _AGREEING
+        if not self._widths_agreed:  # then it is the line that is another
+            return told_m
+        self.height_share += _WIDTH_GAIN * (told_m / by_width_m - self.height_share)
+        return by_width_m if abs(self.height_share - 1.0) > _DOUBTED else told_m
+
+
+class _Dispute:
+    """Lines that all contradict the vehicle's heading, and by the same angle, frame after frame."""
+
+    def __init__(self) -> None:
+        self.error_rad = 0.0
+        self._since_ns = 0
+        self._settled_ns: int | None = None
+
+    def step(self, told: list[float], agreed: bool, stamp_ns: int) -> bool:
+        """Take what one frame's lines say; True when the lines have it.  The error is then shown for a
+        while longer, so that nobody overlooks it."""
+        if self._settled_ns is not None:
+            if stamp_ns - self._settled_ns > _SHOWN_NS:
+                self._settled_ns, self.error_rad = None, 0.0
+            return False
+        if agreed or not told:
+            self.error_rad = 0.0
+            return False
+        error = median(told)
+        if not self.error_rad or abs(error - self.error_rad) > _SAME_RAD:
+            self._since_ns = stamp_ns
+        self.error_rad = error
+        if stamp_ns - self._since_ns < _DISPUTE_NS:
+            return False
+        self._settled_ns = stamp_ns
+        return True
 
 
 def _placed(pads: Iterable[PadSight], view: FloorView, yaw_rad: float) -> tuple[PadOffset, ...]:

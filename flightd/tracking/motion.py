@@ -227,6 +227,11 @@ class HeadingTracker:
     def sigma_rad(self) -> float:
         return float(np.sqrt(self._kf.P[0, 0]))
 
+    def restart(self, innovation_rad: float, sigma_rad: float) -> None:
+        """The vehicle's yaw has jumped: the offset is another one, as uncertain as at the start."""
+        self._kf.x = np.array([[self.offset_rad + innovation_rad], [0.0]])
+        self._kf.P = np.diag([sigma_rad**2, 0.005**2])
+
     def predict(self, dt_s: float) -> None:
         self._kf.F = np.array([[1.0, dt_s], [0.0, 1.0]])
         self._kf.Q = np.diag([self._drift**2 * dt_s, (self._drift * 0.1) ** 2 * dt_s])

@@ -13,6 +13,7 @@ from flightd.core.geometry import Lens
 from flightd.core.types import Image, LineSet
 from flightd.vision import centroid, combine, evidence, junctions, naive, pads, skeleton
 from flightd.vision.colour import ColourProfile, classify, grow, load_profile
+from flightd.vision.picture import check_picture
 from flightd.vision.plane import Plane, shortest_length
 from flightd.vision.refine import refine
 from flightd.vision.sampling import Grid, grid_for, sample
@@ -78,7 +79,8 @@ class Detector:
         mats = pads.find(small, lines, grid, plane)
         mark("pads")
         timings = {name: (end - begin) / 1e6 for (_, begin), (name, end) in pairwise(marks)}
-        return LineSet(seq, stamp_ns, width, height, lines, found, self.method, timings, mats)
+        picture = check_picture(bgr)
+        return LineSet(seq, stamp_ns, width, height, lines, found, self.method, timings, mats, picture)
 
     def _plane(self, width: int, height: int) -> Plane:
         lens = self._lens

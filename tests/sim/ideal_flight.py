@@ -5,18 +5,22 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import CodeSet
 from flightd.core.types import (
+    HEALTHY,
     Attitude,
     AttitudeSetpoint,
     Command,
     Demand,
     Event,
+    Health,
     LandedState,
     LineSet,
     Phase,
+    PictureCheck,
     VehicleState,
 )
 from flightd.grid.site import Site
@@ -37,6 +41,25 @@ TICK_NS = 20_000_000
 FRAME_NS = 33_333_333
 FRONT_NS = 250_000_000
 READING_NS = 150_000_000
+
+
+@dataclass
+class Faults:
+    """What is wrong just now; a test changes it in flight."""
+
+    blind: bool = False
+    frozen: bool = False
+    blank: bool = False
+    bare: bool = False
+    late_ns: int = 0
+    silent: bool = False
+    heartless: bool = False
+    rangeless: bool = False
+    yaw_rad: float = 0.0
+    height_m: float = 0.0
+    battery: float | None = None
+    stamps_refused: int = 0
+    health: Health = HEALTHY
 
 
 @dataclass
@@ -96,7 +119,11 @@ class IdealFlight:
         self._now_ns = 1_000_000_000_000
         self._yaw_target = 0.0
         self.in_control = True
-        self.blind = False
+        self.faults = Faults()
+        self._told: VehicleState | None = None
+        self._beat_ns = self._now_ns
+        self._range = (0.1, self._now_ns)
+        self._last_seen: LineSet | None = None
         self.ground_silent_s = 0.0
         self.commands: list[Command] = []
         """Orders that the next tick takes."""
@@ -116,14 +143,14 @@ class IdealFlight:
         while self._now_ns < end_ns:
             self._now_ns += STEP_NS
             self._step(setpoint)
-            if self._now_ns % 10_000_000 == 0:
+            if self._now_ns % 10_000_000 == 0 and not self.faults.silent:
                 attitudes.append(self._attitude())
             if self._now_ns >= frame_ns:
                 frame_ns += FRAME_NS
                 seq += 1
-                if not self.blind:
-                    seen = self._eye.see(self.airframe.kinematics(self._now_ns), seq, self._now_ns)
-                    late.append((self._now_ns + self._delay_ns, seen))
+                if not self.faults.blind:
+                    due_ns = self._now_ns + self._delay_ns + self.faults.late_ns
+                    late.append((due_ns, self._see(seq)))
             self._photograph()
             if self._now_ns >= tick_ns:
                 tick_ns += TICK_NS
@@ -143,6 +170,7 @@ class IdealFlight:
                         ground_silent_s=self.ground_silent_s,
                         codes=self._codes(),
                         counted=self._take_counted(),
+                        health=self.faults.health,
                     )
                 )
                 attitudes = []
@@ -219,26 +247,48 @@ class IdealFlight:
         )
         self.sensors.update(dt_s, self.airframe)
 
+    def _see(self, seq: int) -> LineSet:
+        faults = self.faults
+        seen = self._eye.see(self.airframe.kinematics(self._now_ns), seq, self._now_ns)
+        seen = replace(seen, picture=PictureCheck(seq, 120.0, 40.0))
+        if faults.bare:
+            seen = replace(seen, lines=())
+        if faults.blank:
+            seen = replace(seen, lines=(), picture=PictureCheck(0, 0.0, 0.0))
+        if faults.frozen and self._last_seen is not None:
+            seen = replace(self._last_seen, frame_seq=seq, stamp_ns=self._now_ns)
+        self._last_seen = seen
+        return seen
+
     def _attitude(self) -> Attitude:
         s = self.sensors
-        return Attitude(self._now_ns, s.roll_rad, s.pitch_rad, s.yaw_rad)
+        return Attitude(self._now_ns, s.roll_rad, s.pitch_rad, wrap_pi(s.yaw_rad + self.faults.yaw_rad))
 
     def _state(self) -> VehicleState:
+        faults = self.faults
+        if faults.silent and self._told is not None:
+            return self._told
         on_floor = self.airframe.on_floor
-        height = round(self.airframe.height_m, 2)
-        return VehicleState(
+        if not faults.rangeless:
+            self._range = (round(self.airframe.height_m + faults.height_m, 2), self._now_ns)
+        if not faults.heartless:
+            self._beat_ns = self._now_ns
+        battery = self.airframe.battery_frac if faults.battery is None else faults.battery
+        self._told = VehicleState(
             attitude=self._attitude(),
-            height_m=height,
-            height_stamp_ns=self._now_ns,
+            height_m=math.nan if self._now_ns - self._range[1] > 10**9 else self._range[0],
+            height_stamp_ns=self._range[1],
             climb_mps=self.sensors.climb_mps,
             mode="GUIDED_NOGPS",
             in_control=self._armed and self.in_control,
             armed=self._armed,
             landed=LandedState.ON_GROUND if on_floor else LandedState.IN_AIR,
-            battery_frac=self.airframe.battery_frac,
+            battery_frac=battery,
             battery_v=12.0,
-            heartbeat_ns=self._now_ns,
+            heartbeat_ns=self._beat_ns,
+            stamps_refused=faults.stamps_refused,
         )
+        return self._told
 
 
 def rms_off_line(flown: Flown, site: Site) -> float:

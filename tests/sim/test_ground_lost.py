@@ -12,7 +12,7 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.types import Phase
-from flightd.mission.guidance import GroundLost
+from flightd.mission.guidance import LossAction
 from flightd.pilot import TickInput, TickOutput
 from tests.sim.ideal_flight import Flown, IdealFlight
 
@@ -21,7 +21,7 @@ SITE = load_site(CONFIGS / "site-demo.toml")
 LOST_S = 5.0
 
 
-def flown(action: GroundLost, silence: Callable[[int], float]) -> Flown:
+def flown(action: LossAction, silence: Callable[[int], float]) -> Flown:
     """A short flight in which `silence(ticks since it first followed a line)` gives the link's silence."""
     params = load_config(CONFIGS / "sim.toml").pilot_params(SITE)
     mission = replace(params.mission, ground_lost=action, ground_lost_s=LOST_S)
@@ -55,42 +55,42 @@ def told(flight: Flown) -> list[str]:
 @pytest.mark.parametrize(
     ("action", "end", "visited"),
     [
-        (GroundLost.CONTINUE, Phase.DONE, ["A1", "A2", "A3"]),
-        (GroundLost.HOME, Phase.ABORTED, ["A1"]),
-        (GroundLost.LAND, Phase.ABORTED, ["A1"]),
+        (LossAction.CONTINUE, Phase.DONE, ["A1", "A2", "A3"]),
+        (LossAction.HOME, Phase.ABORTED, ["A1"]),
+        (LossAction.LAND, Phase.ABORTED, ["A1"]),
     ],
 )
-def test_a_lost_link_does_what_is_configured(action: GroundLost, end: Phase, visited: list[str]) -> None:
+def test_a_lost_link_does_what_is_configured(action: LossAction, end: Phase, visited: list[str]) -> None:
     flight = flown(action, for_ever)
     assert flight.phase is end
     assert flight.visited[: len(visited)] == visited
-    assert ("A3" in flight.visited) == (action is GroundLost.CONTINUE)
+    assert ("A3" in flight.visited) == (action is LossAction.CONTINUE)
     assert told(flight) == [f"silent for {LOST_S:.1f} s: {action}"]
 
 
 def test_lost_for_good_it_goes_home_and_lands_on_the_pad() -> None:
-    flight = flown(GroundLost.HOME, for_ever)
+    flight = flown(LossAction.HOME, for_ever)
     pad, end = SITE.nodes[SITE.home.node], flight.truth[-1][1]
     assert abs(end.x_m - pad.x_m) < 0.15
     assert abs(end.y_m - pad.y_m) < 0.15
 
 
 def test_a_hold_ends_when_the_link_is_back_and_the_mission_completes() -> None:
-    flight = flown(GroundLost.HOLD, back_after_8_s)
+    flight = flown(LossAction.HOLD, back_after_8_s)
     assert Phase.HOLD in {output.phase for output in flight.outputs}
     assert (flight.phase, flight.visited) == (Phase.DONE, ["A1", "A2", "A3"])
     assert told(flight) == [f"silent for {LOST_S:.1f} s: hold", "heard again"]
 
 
 def test_silence_shorter_than_the_limit_is_nothing() -> None:
-    flight = flown(GroundLost.LAND, lambda ticks: min(ticks * 0.02, LOST_S - 0.1))
+    flight = flown(LossAction.LAND, lambda ticks: min(ticks * 0.02, LOST_S - 0.1))
     assert flight.phase is Phase.DONE
     assert told(flight) == []
 
 
 def test_who_fell_silent_on_the_ground_keeps_it_there() -> None:
     params = load_config(CONFIGS / "sim.toml").pilot_params(SITE)
-    mission = replace(params.mission, ground_lost=GroundLost.HOME)
+    mission = replace(params.mission, ground_lost=LossAction.HOME)
     flight = IdealFlight(SITE, replace(params, mission=mission), visits=("A1", "A2"))
     flight.ground_silent_s = 60.0
     grounded = flight.fly(10.0)

@@ -53,7 +53,7 @@ def test_lines_lost_make_it_level_hold_and_land() -> None:
     def watch(tick):  # type: ignore[no-untyped-def]
         output = step(tick)
         if output.phase is Phase.FOLLOW and not lost_ns and output.goal == "A2":
-            flight.blind = True
+            flight.faults.blind = True
             lost_ns.append(tick.now_ns)
         return output
 
@@ -63,9 +63,14 @@ def test_lines_lost_make_it_level_hold_and_land() -> None:
     first = held[0]
     assert first.setpoint is not None
     assert (first.setpoint.stamp_ns - lost_ns[0]) * 1e-9 < 0.45
-    level = held[30].setpoint
-    assert level is not None
-    assert (level.roll_rad, level.pitch_rad, level.yaw_rate_radps) == (0.0, 0.0, 0.0)
+    lost_at = next(k for o, (_, k) in zip(flown.outputs, flown.truth, strict=True) if o is first)
+    at_rest = next(k for o, (_, k) in zip(flown.outputs, flown.truth, strict=True) if o is held[60])
+    assert math.hypot(at_rest.vx_mps, at_rest.vy_mps) < 0.15
+    assert math.hypot(at_rest.x_m - lost_at.x_m, at_rest.y_m - lost_at.y_m) < 1.0
+    still = held[150].setpoint
+    assert still is not None
+    assert max(abs(still.roll_rad), abs(still.pitch_rad)) < math.radians(2.1), "only the trim is left"
+    assert still.yaw_rate_radps == 0.0
     assert flown.phase is Phase.ABORTED
     assert not flight.airframe.height_m > 0.2
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.control.limits import Limiter, Limits
 from flightd.control.pid import Pid, PidGains
 from flightd.control.profile import Profile
-from flightd.core.types import AttitudeSetpoint
 
 GAINS = PidGains(kp=2.0, ki=1.0, kd=1.0, integral_limit=0.5, output_limit=1.0)
-LIMITS = Limits(math.radians(10), math.radians(60), math.radians(45), 0.8, 0.6)
 finite = st.floats(-1e3, 1e3)
 
 
@@ -78,23 +73,3 @@ def test_a_waiting_reference_comes_to_rest_and_feeds_nothing_forward(
         assert abs(profile.acceleration) <= 0.5 + 1e-9
     assert (profile.velocity, profile.acceleration) == (0.0, 0.0)
     assert abs(profile.position - began) <= left_m + 1e-6
-
-
-@given(st.lists(st.tuples(finite, finite, finite, finite, st.integers(0, 200)), min_size=1, max_size=40))
-def test_nothing_beyond_the_limits_reaches_the_wire(
-    steps: list[tuple[float, float, float, float, int]],
-) -> None:
-    limiter, now_ns, last = Limiter(LIMITS), 10**9, AttitudeSetpoint(0)
-    for roll, pitch, yaw_rate, climb, gap_ms in steps:
-        gap_ns = gap_ms * 1_000_000
-        now_ns += gap_ns
-        out = limiter.apply(AttitudeSetpoint(now_ns, roll, pitch, yaw_rate, climb))
-        assert abs(out.roll_rad) <= LIMITS.tilt_rad + 1e-12
-        assert abs(out.pitch_rad) <= LIMITS.tilt_rad + 1e-12
-        assert abs(out.yaw_rate_radps) <= LIMITS.yaw_rate_radps
-        assert -LIMITS.descend_mps <= out.climb_mps <= LIMITS.climb_mps
-        if last.stamp_ns:
-            swing = LIMITS.tilt_rate_radps * min(gap_ns * 1e-9, 0.1) + 1e-9
-            assert abs(out.roll_rad - last.roll_rad) <= swing
-            assert abs(out.pitch_rad - last.pitch_rad) <= swing
-        last = out

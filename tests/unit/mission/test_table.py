@@ -9,8 +9,9 @@ import pytest
 
 from flightd.core.errors import InputError
 from flightd.core.types import Phase
+from flightd.mission.hazards import Action, triggers_of
 from flightd.mission.plan import Heading, HeadingPolicy, make_plan
-from flightd.mission.table import TABLE, next_phase
+from flightd.mission.table import next_phase
 from flightd.mission.triggers import Trigger
 from flightd.sim.sites import random_site
 
@@ -21,13 +22,39 @@ FLYING = [
 ]
 
 
+_PROGRESS = {
+    (Phase.PREFLIGHT, Trigger.READY): Phase.ARMING,
+    (Phase.PREFLIGHT, Trigger.FOUND_FLYING): Phase.RECOVER,
+    (Phase.SWAP, Trigger.READY): Phase.ARMING,
+    (Phase.HOVER, Trigger.SCAN_DUE): Phase.CLIMB,
+    (Phase.CLIMB, Trigger.AT_VIEW): Phase.SCAN,
+    (Phase.SCAN, Trigger.VIEW_DONE): Phase.CLIMB,
+    (Phase.SCAN, Trigger.DWELLED): Phase.TURN,
+    (Phase.LAND, Trigger.DOWN_TO_SWAP): Phase.SWAP,
+    (Phase.ARMING, Trigger.ARMED): Phase.TAKE_OFF,
+    (Phase.TAKE_OFF, Trigger.AT_HEIGHT): Phase.ACQUIRE,
+    (Phase.ACQUIRE, Trigger.ACQUIRED): Phase.TURN,
+    (Phase.TURN, Trigger.TURNED): Phase.FOLLOW,
+    (Phase.FOLLOW, Trigger.ARRIVED): Phase.HOVER,
+    (Phase.HOVER, Trigger.DWELLED): Phase.TURN,
+    (Phase.HOVER, Trigger.ROUTE_DONE): Phase.LAND,
+    (Phase.HOLD, Trigger.LINES_FOUND): Phase.ACQUIRE,
+    (Phase.RELOCATE, Trigger.POSITION_SURE): Phase.ACQUIRE,
+    (Phase.LAND, Trigger.DISARMED): Phase.DONE,
+}
+_SAFE = {Phase.HOLD, Phase.RELOCATE, Phase.LAND, Phase.ABORTED, Phase.PILOT}
+
+
 @pytest.mark.parametrize("phase", list(Phase))
 @pytest.mark.parametrize("trigger", list(Trigger))
-def test_every_phase_answers_every_trigger(phase: Phase, trigger: Trigger) -> None:
+def test_a_trigger_leads_on_as_planned_or_into_safety(phase: Phase, trigger: Trigger) -> None:
     following, taken = next_phase(phase, {trigger})
-    assert following in Phase
-    assert (taken is None) == (trigger not in TABLE[phase])
-    if taken is None:
+    if (phase, trigger) in _PROGRESS:
+        assert following is _PROGRESS[phase, trigger]
+    elif taken is not None:
+        assert following in _SAFE
+        assert phase not in {Phase.LAND, Phase.HOLD} or following is not Phase.HOLD, "never back to waiting"
+    else:
         assert following is phase
 
 
@@ -38,8 +65,8 @@ def test_the_pilot_wins_over_everything_else_in_the_air(phase: Phase) -> None:
 
 @pytest.mark.parametrize("phase", [p for p in FLYING if p is not Phase.LAND])
 def test_every_flying_phase_lands_on_a_critical_battery_lost_links_or_an_order(phase: Phase) -> None:
-    lost = (Trigger.BATTERY_CRITICAL, Trigger.TELEMETRY_LOST, Trigger.GROUND_LOST)
-    for trigger in (*lost, Trigger.LAND_HERE, Trigger.STOP):
+    lost = triggers_of(Action.LAND, Action.STOP) | {Trigger.GROUND_LOST, Trigger.RECORD_LOST}
+    for trigger in (*lost, Trigger.LAND_HERE):
         assert next_phase(phase, {trigger})[0] is Phase.LAND
 
 

@@ -14,6 +14,7 @@ from flightd.core.types import Attitude, LandedState, VehicleState
 _ATTITUDES_MAX = 512
 _NS_PER_MS = 1_000_000
 _STAMP_AGE_MAX_NS = 500_000_000
+_AHEAD_NS = 50_000_000
 _RANGE_STALE_NS = 500_000_000
 _CLIMB_STALE_NS = 1_000_000_000
 _LANDED_STALE_NS = 1_000_000_000
@@ -48,6 +49,7 @@ class Telemetry:
         self._battery_frac = math.nan
         self._battery_v = math.nan
         self.heartbeat_ns = 0
+        self._stamps_refused = 0
         self.custom_mode: int | None = None
         self.armed = False
 
@@ -126,6 +128,7 @@ class Telemetry:
             battery_v=self._battery_v,
             heartbeat_ns=self.heartbeat_ns,
             refusal=refusal,
+            stamps_refused=self._stamps_refused,
         )
 
     def _take_attitude(self, message: Message, now_ns: int) -> bool:
@@ -138,6 +141,7 @@ class Telemetry:
         if rebooted:
             self._sync.reset()
         stamp_ns = self._stamp(boot_ms, now_ns)
+        self._stamps_refused += rebooted or self._is_senseless(boot_ms, now_ns)
         last_ns = stamp_ns - 1 if self._attitude is None or rebooted else self._attitude.stamp_ns
         if stamp_ns >= last_ns:
             self._attitude = sample = Attitude(stamp_ns, *angles)
@@ -178,6 +182,11 @@ class Telemetry:
             self._battery_v = millivolt / 1000.0
         if 0 <= remaining_pc <= 100:
             self._battery_frac = remaining_pc / 100.0
+
+    def _is_senseless(self, boot_ms: int, now_ns: int) -> bool:
+        """By the clocks as they were compared, a stamp long past or yet to come."""
+        ours_ns = self._sync.to_ours(boot_ms * _NS_PER_MS)
+        return ours_ns is not None and not -_STAMP_AGE_MAX_NS <= ours_ns - now_ns <= _AHEAD_NS
 
     def _stamp(self, boot_ms: int, now_ns: int) -> int:
         """Our time of an autopilot stamp; the arrival while the clocks are not yet compared or when the

@@ -1,0 +1,98 @@
+"""The limits before the wire, for any stream of set points whatsoever."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flightd.control.limits import Limiter, Limits, Surroundings, outward
+from flightd.core.geometry import GRAVITY_MPS2
+from flightd.core.types import AttitudeSetpoint
+
+LIMITS = Limits(math.radians(10), math.radians(60), math.radians(45), 0.8, 0.6, 9.0, 3.0, 0.4)
+STEP_NS = 20_000_000
+finite = st.floats(-100, 100)
+wish = st.tuples(finite, finite, finite, finite, st.integers(0, 200))
+wishes = st.lists(wish, min_size=1, max_size=30)
+direction = st.floats(-math.pi, math.pi)
+
+
+def stream(
+    wanted: list[tuple[float, float, float, float, int]], around: Surroundings, limiter: Limiter | None = None
+) -> list[AttitudeSetpoint]:
+    limiter, now_ns = limiter or Limiter(LIMITS), 10**9
+    limiter.apply(AttitudeSetpoint(now_ns))
+    out = [AttitudeSetpoint(now_ns)]
+    for roll, pitch, yaw_rate, climb, gap_ms in wanted:
+        now_ns += gap_ms * 1_000_000
+        out.append(limiter.apply(AttitudeSetpoint(now_ns, roll, pitch, yaw_rate, climb), around))
+    return out
+
+
+AROUND = [Surroundings(), Surroundings(back=(0.6, -0.8)), Surroundings(data_age_s=9.0)]
+
+
+@given(wishes, st.sampled_from(AROUND))
+def test_nothing_beyond_the_limits_reaches_the_wire(
+    wanted: list[tuple[float, float, float, float, int]], around: Surroundings
+) -> None:
+    for last, out in pairwise(stream(wanted, around)):
+        dt_s = min((out.stamp_ns - last.stamp_ns) * 1e-9, 0.1)
+        assert max(abs(out.roll_rad), abs(out.pitch_rad)) <= LIMITS.tilt_rad + 1e-9
+        assert abs(out.yaw_rate_radps) <= LIMITS.yaw_rate_radps
+        assert -LIMITS.descend_mps <= out.climb_mps <= LIMITS.climb_mps
+        swing = LIMITS.tilt_rate_radps * dt_s + 1e-9
+        assert abs(out.roll_rad - last.roll_rad) <= swing
+        assert abs(out.pitch_rad - last.pitch_rad) <= swing
+        assert abs(out.yaw_rate_radps - last.yaw_rate_radps) <= LIMITS.yaw_accel_radps2 * dt_s + 1e-9
+        change = GRAVITY_MPS2 * math.hypot(
+            math.tan(out.roll_rad) - math.tan(last.roll_rad),
+            math.tan(out.pitch_rad) - math.tan(last.pitch_rad),
+        )
+        assert change <= LIMITS.jerk_mps3 * dt_s + 1e-9
+
+
+@given(wishes, wishes, direction)
+def test_outside_the_corridor_no_lean_grows_outwards(
+    before: list[tuple[float, float, float, float, int]],
+    after: list[tuple[float, float, float, float, int]],
+    angle: float,
+) -> None:
+    limiter, back = Limiter(LIMITS), (math.cos(angle), math.sin(angle))
+    last = stream(before, Surroundings(), limiter)[-1]
+    now_ns = last.stamp_ns
+    for roll, pitch, yaw_rate, climb, _ in after:
+        now_ns += STEP_NS
+        out = limiter.apply(AttitudeSetpoint(now_ns, roll, pitch, yaw_rate, climb), Surroundings(back=back))
+        assert outward(out, back) <= max(outward(last, back), 0.0) + 0.02
+        last = out
+    for _ in range(40):
+        now_ns += STEP_NS
+        last = limiter.apply(AttitudeSetpoint(now_ns, 0.3, -0.3), Surroundings(back=back))
+    assert outward(last, back) <= 0.01
+
+
+@given(wishes, st.floats(max_value=0.0) | st.just(math.nan))
+def test_nothing_climbs_at_the_ceiling_or_where_nobody_knows_it(
+    wanted: list[tuple[float, float, float, float, int]], headroom_m: float
+) -> None:
+    assert all(out.climb_mps <= 0 for out in stream(wanted, Surroundings(headroom_m=headroom_m))[1:])
+
+
+@given(wishes, st.floats(0.41, 1e9) | st.sampled_from([math.inf, math.nan]))
+def test_nothing_leans_by_stale_data(
+    wanted: list[tuple[float, float, float, float, int]], age_s: float
+) -> None:
+    for out in stream(wanted, Surroundings(data_age_s=age_s)):
+        assert (out.roll_rad, out.pitch_rad, out.yaw_rate_radps) == (0.0, 0.0, 0.0)
+
+
+@given(wishes)
+def test_an_emergency_stop_is_level_at_once(wanted: list[tuple[float, float, float, float, int]]) -> None:
+    limiter = Limiter(LIMITS)
+    last = stream(wanted, Surroundings(), limiter)[-1]
+    out = limiter.apply(AttitudeSetpoint(last.stamp_ns + 1, 0.1, 0.1, 0.5, -0.3), Surroundings(at_once=True))
+    assert (out.roll_rad, out.pitch_rad, out.yaw_rate_radps, out.climb_mps) == (0.0, 0.0, 0.0, -0.3)

@@ -1,0 +1,42 @@
+"""The hazard table: complete, true to the configuration, and the one that README prints."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from flightd.config.schema import Config
+from flightd.mission.hazards import HAZARDS, Action, Hazard, markdown
+from flightd.mission.triggers import Trigger
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_readme_prints_the_table() -> None:
+    assert markdown() in (ROOT / "README.md").read_text(encoding="utf-8"), "print it: hazards.markdown()"
+
+
+def test_names_are_unique_and_a_trigger_has_one_action() -> None:
+    names = [row.name for row in HAZARDS]
+    assert len(set(names)) == len(names)
+    actions = {(row.trigger, row.action) for row in HAZARDS}
+    assert len(actions) == len({row.trigger for row in HAZARDS})
+
+
+@pytest.mark.parametrize("row", HAZARDS, ids=lambda row: row.name)
+def test_a_row_names_only_keys_that_exist(row: Hazard) -> None:
+    for section, key in re.findall(r"`(\w+)\.(\w+)`", row.found_by + row.then):
+        assert key in Config.model_fields[section].annotation.model_fields  # type: ignore[union-attr]
+    assert (ROOT / row.test).is_file()
+
+
+def test_the_mission_answers_every_hazard_that_asks_for_something() -> None:
+    from flightd.mission.table import TABLE
+
+    answered = {trigger for row in TABLE.values() for trigger in row}
+    below = {Action.REPORT, Action.HOME}
+    silent = {row.trigger for row in HAZARDS if row.action not in below} - answered
+    assert silent == set()
+    assert Trigger.LINES_LOST in answered
