@@ -289,6 +289,7 @@ def triggers_of(*actions: Action) -> frozenset[Trigger]:
 def markdown() -> str:
     """The table as README prints it."""
     lines = ["| hazard | found by | action | then |", "|---|---|---|---|"]
-    for row in HAZARDS:
-        lines.append(f"| {row.name.replace('_', ' ')} | {row.found_by} | {row.action} | {row.then} |")
+    lines += [
+        f"| {row.name.replace('_', ' ')} | {row.found_by} | {row.action} | {row.then} |" for row in HAZARDS
+    ]
     return "\n".join(lines) + "\n"
