@@ -147,7 +147,8 @@ def detector_of(config: Config, site: Site) -> Callable[[], Detector]:
     """What makes the detector that configuration and map ask for (in its own process, where it flies)."""
     camera, vision = config.camera, config.vision
     lens = camera.lens() if camera.lens().is_distorted else None
-    return partial(Detector, vision.method, profile_of(config, site), lens)
+    profile = profile_of(config, site)
+    return partial(Detector, vision.method, profile, lens, markers=site.marker_set)
 
 
 def ground_link(

@@ -6,7 +6,7 @@ import itertools
 import math
 from xml.sax.saxutils import escape
 
-from flightd.grid.site import Edge, LineColour, Node, PaintedLine, Shelf, Side, Site
+from flightd.grid.site import Edge, LineColour, Marker, Node, PaintedLine, Shelf, Side, Site
 
 _PX_PER_M = 64.0
 _MARGIN_M = 1.1
@@ -63,6 +63,7 @@ class _Plan:
             *itertools.chain.from_iterable(self._shelf(shelf) for shelf in site.shelves),
             *self._pads(),
             *self._lines(),
+            *self._markers(),
             *self._keep_outs(),
             *itertools.chain.from_iterable(self._restriction(edge) for edge in site.edges),
             *self._steps(),
@@ -157,6 +158,21 @@ class _Plan:
                 f'<text class="step" x="{beside:.1f}" y="{below:.1f}">{name}</text>',
             ]
         return parts
+
+    def _markers(self) -> list[str]:
+        return list(itertools.chain.from_iterable(self._marker(marker) for marker in self._site.markers))
+
+    def _marker(self, marker: Marker) -> list[str]:
+        """The square with a white point in its first corner, and its number."""
+        x, y = self._at(marker.x_m, marker.y_m)
+        half = marker.size_m / 2 * _PX_PER_M
+        turn = f"translate({x:.1f} {y:.1f}) rotate({math.degrees(marker.yaw_rad):.1f})"
+        return [
+            f'<g class="marker" transform="{turn}"><path d="M{-half:.1f} {-half:.1f}h{2 * half:.1f}'
+            f'v{2 * half:.1f}h{-2 * half:.1f}Z" fill="#111"/>'
+            f'<circle cx="{-half / 2:.1f}" cy="{-half / 2:.1f}" r="{half / 4:.1f}" fill="#fff"/></g>',
+            _middle(x, y + 1.5 * half + 9, f"#{marker.id}"),
+        ]
 
     def _steps(self) -> list[str]:
         """The spacing between neighbours of an aisle, in metres, above the line."""

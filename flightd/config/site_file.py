@@ -49,6 +49,14 @@
     charge = true                # batteries are changed or charged here
     offset_m = [0.0, 0.0]        # of its centre from the node, where it does not lie on it
 
+    [[marker]]                   # a printed floor marker by which the place is known; may be left out
+    id = 7
+    dictionary = "4x4_50"        # or 4x4_250, 5x5_100, 6x6_250, apriltag_16h5, apriltag_36h11; one a site
+    x_m = 1.5                    # its centre, beside the paint
+    y_m = 0.4
+    size_m = 0.2                 # of the black square; a pale rim a module wide around it
+    yaw_deg = 0.0                # of its upper edge against x, clockwise from above
+
 Map frame: x along the aisles, y to the right of x seen from above, metres.
 """
 
@@ -63,8 +71,9 @@ from typing import Annotated, Any, cast
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from flightd.core.errors import InputError
+from flightd.core.markers import MarkerDictionary
 from flightd.grid.layout import LayoutError, lay_out
-from flightd.grid.site import Aisle, LineColour, Pad, Rack, Side, Site
+from flightd.grid.site import Aisle, LineColour, Marker, Pad, Rack, Side, Site
 from flightd.grid.ways import KeepOut, OneWay
 
 _Metres = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
@@ -140,6 +149,19 @@ class _PadTable(_Table):
     offset_m: tuple[_PadOffset, _PadOffset] = (0.0, 0.0)
 
 
+class _MarkerTable(_Table):
+    id: int = Field(ge=0, le=10_000)
+    dictionary: MarkerDictionary
+    x_m: _Coordinate
+    y_m: _Coordinate
+    size_m: float = Field(0.2, ge=0.03, le=2)
+    yaw_deg: float = Field(0.0, ge=-180, le=180)
+
+    def marker(self) -> Marker:
+        turned = math.radians(round(self.yaw_deg, 9))
+        return Marker(self.id, self.dictionary, self.x_m, self.y_m, self.size_m, turned)
+
+
 class _SiteFile(_Table):
     site: _SiteTable
     aisle: tuple[_AisleTable, ...] = Field(min_length=1)
@@ -148,6 +170,7 @@ class _SiteFile(_Table):
     keep_out: tuple[_KeepOutTable, ...] = ()
     rack: tuple[_RackTable, ...] = ()
     pad: tuple[_PadTable, ...] = Field(min_length=1)
+    marker: tuple[_MarkerTable, ...] = Field((), max_length=1000)
 
 
 def load_site(path: Path) -> Site:
@@ -184,6 +207,7 @@ def parse_site(text: str, source: str) -> Site:
             one_way_crosses=[cross.nodes for cross in file.cross if cross.one_way],
             blocked=[blocked.nodes for blocked in file.blocked],
             keep_outs=[area.area() for area in file.keep_out],
+            markers=[marker.marker() for marker in file.marker],
         )
     except LayoutError as err:
         raise InputError(f"{source}: {err}") from None
@@ -233,6 +257,10 @@ def site_toml(site: Site) -> str:
         parts += [f"size_m = {pad.size_m!r}"]
         parts += [f"offset_m = [{pad.offset_m[0]!r}, {pad.offset_m[1]!r}]"] if any(pad.offset_m) else []
         parts += [f"{key} = false" for key, on in (("start", pad.start), ("charge", pad.charge)) if not on]
+    for marker in site.markers:
+        parts += ["", "[[marker]]", f"id = {marker.id}", f"dictionary = {_quoted(marker.dictionary)}"]
+        parts += [f"x_m = {marker.x_m!r}", f"y_m = {marker.y_m!r}", f"size_m = {marker.size_m!r}"]
+        parts += [f"yaw_deg = {round(math.degrees(marker.yaw_rad), 9)!r}"]
     return "\n".join(parts) + "\n"
 
 
@@ -285,6 +313,7 @@ def _fields(location: tuple[int | str, ...]) -> list[str]:
         "keep_out": _KeepOutTable,
         "rack": _RackTable,
         "pad": _PadTable,
+        "marker": _MarkerTable,
     }
     table = tables[cast(str, location[0])] if len(location) > 1 else _SiteFile
     return list(table.model_fields)

@@ -133,6 +133,17 @@ UNCHECKED = PictureCheck(-1, 127.5, 127.5)
 
 
 @dataclass(frozen=True, slots=True)
+class MarkerSight:
+    """A floor marker seen whole: its number, its centre in centred image coordinates of a distortion-free
+    camera, and the mean length of its sides."""
+
+    id: int
+    x_px: float
+    y_px: float
+    side_px: float
+
+
+@dataclass(frozen=True, slots=True)
 class LineSet:
     """What vision saw in one frame.  Lines are in pixels of a distortion-free pinhole camera when a
     lens was given to the detector.  `timings_ms` names each stage's time."""
@@ -147,6 +158,7 @@ class LineSet:
     timings_ms: dict[str, float] = field(default_factory=dict)
     pads: tuple[PadSight, ...] = ()
     picture: PictureCheck = UNCHECKED
+    markers: tuple[MarkerSight, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,17 +1,19 @@
-"""What is wrong with a site's one-way and blocked lines, keep-outs and pads: checks for the layout."""
+"""What is wrong with a site's one-way and blocked lines, keep-outs, pads, markers: checks for the layout."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from flightd.grid.site import Site
+from flightd.grid.site import Marker, PaintedLine, Site
 
 
 def mistakes(site: Site) -> Iterator[tuple[str, str]]:
     """(key, problem) of each mistake, in the words of the site file."""
     yield from _blocked(site)
     yield from _keep_outs(site)
+    yield from _markers(site)
     trapped = replace(site, blocked=(), keep_outs=()).cut_off
     if trapped:
         node = next(node for node in site.nodes if node in trapped)
@@ -52,3 +54,27 @@ def _keep_outs(site: Site) -> Iterator[tuple[str, str]]:
             )
         elif area.touches(home.x_m, home.y_m, home.x_m, home.y_m):
             yield key, f"covers {home.id}, where missions start; move it or the home pad"
+
+
+def _markers(site: Site) -> Iterator[tuple[str, str]]:
+    seen: set[int] = set()
+    for i, marker in enumerate(site.markers):
+        key, kind = f"marker[{i}] ({marker.id})", marker.dictionary
+        if kind is not site.markers[0].dictionary:
+            yield f"{key}.dictionary", f"{kind} beside {site.markers[0].dictionary}; a site has only one"
+        elif marker.id >= kind.numbers:
+            yield f"{key}.id", f"{kind} has no number {marker.id}; take one of 0 to {kind.numbers - 1}"
+        elif marker.id in seen:
+            yield f"{key}.id", f"{marker.id} lies elsewhere already; every number once"
+        elif any(_touch(marker, line) for line in site.lines):
+            yield key, "lies on a painted line, which would hide it; move it beside"
+        seen.add(marker.id)
+
+
+def _touch(marker: Marker, line: PaintedLine) -> bool:
+    """Whether a line runs through the marker or the pale rim that it needs, a module wide."""
+    turned = abs(math.cos(marker.yaw_rad)) + abs(math.sin(marker.yaw_rad))
+    half = marker.size_m * (0.5 + 1.0 / marker.dictionary.modules) * turned + line.width_m / 2
+    clear_x = max(line.x0_m, line.x1_m) < marker.x_m - half or min(line.x0_m, line.x1_m) > marker.x_m + half
+    clear_y = max(line.y0_m, line.y1_m) < marker.y_m - half or min(line.y0_m, line.y1_m) > marker.y_m + half
+    return not (clear_x or clear_y)

@@ -11,7 +11,19 @@ from collections.abc import Collection, Iterable, Sequence
 
 from flightd.grid.closures import mistakes
 from flightd.grid.racks import RackError, place_locations
-from flightd.grid.site import Aisle, Edge, LineColour, Node, Pad, PaintedLine, Rack, Shelf, Side, Site
+from flightd.grid.site import (
+    Aisle,
+    Edge,
+    LineColour,
+    Marker,
+    Node,
+    Pad,
+    PaintedLine,
+    Rack,
+    Shelf,
+    Side,
+    Site,
+)
 from flightd.grid.ways import KeepOut, OneWay
 
 SAME_X_M = 0.01
@@ -44,6 +56,7 @@ def lay_out(
     one_way_crosses: Collection[tuple[str, str]] = (),
     blocked: Sequence[tuple[str, str]] = (),
     keep_outs: Sequence[KeepOut] = (),
+    markers: Sequence[Marker] = (),
 ) -> Site:
     """Make the site, or raise LayoutError naming the part that does not fit.
 
@@ -77,6 +90,7 @@ def lay_out(
         locations=locations,
         blocked=tuple(blocked),
         keep_outs=tuple(keep_outs),
+        markers=tuple(markers),
     )
     for key, problem in mistakes(site):
         raise LayoutError(key, problem)

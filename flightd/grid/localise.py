@@ -27,6 +27,7 @@ import numpy as np
 
 from flightd.core.types import GridPose
 from flightd.grid.evidence import SensorModel, crossing_likelihood, end_likelihood, fix_likelihood
+from flightd.grid.fixes import FixBook
 from flightd.grid.landmarks import Landmark, LandmarkBook
 from flightd.grid.nodes import NodeIndex
 from flightd.grid.paint import PaintMap
@@ -87,6 +88,7 @@ class GridLocaliser:
         self._nodes = NodeIndex(site)
         self._places = Places(self._paint, self._model)
         self._marks = LandmarkBook()
+        self._fixes = FixBook(site)
         self._judged: tuple[list[float], list[float]] = ([], [])
         self._seen_ns = [0, 0]
         self._ever_matched = [False, False]
@@ -156,9 +158,11 @@ class GridLocaliser:
 
     def sighted(self, location: str, dx_m: float, dy_m: float, sigma_m: float = 0.3) -> None:
         """The label of a location was read by the front camera (`dx_m`, `dy_m`) from the drone, in map
-        axes.  A location that the site does not have says nothing."""
+        axes.  A location that the site does not have says nothing, nor does a label that has been seen
+        here before: one that hangs wrong would not hang better the second time."""
         known = self._site.locations.get(location)
-        if known is not None:
+        here = self._places.at_m[self._places.best]
+        if known is not None and self._fixes.is_new(location, float(here[0]), float(here[1])):
             self._fix(known.x_m - dx_m, known.y_m - dy_m, sigma_m)
 
     # The parts of a step
@@ -207,6 +211,8 @@ class GridLocaliser:
             tracks.junctions, float(here[0]), float(here[1]), sure_m, self._leave_m(height_m)
         ):
             self._weigh_mark(mark)
+        for known, seen in self._fixes.markers(tracks.markers, float(here[0]), float(here[1])):
+            self.marker((known.x_m, known.y_m), seen.x_m, seen.y_m)
 
     def _weigh_mark(self, mark: Landmark) -> None:
         places = self._places
@@ -256,6 +262,7 @@ class GridLocaliser:
         if places.weights[likeliest] > _SWITCH * places.weights[places.best]:
             jump = places.at_m[likeliest] - places.at_m[places.best]
             self._marks.shift(float(jump[0]), float(jump[1]))
+            self._fixes.shift(float(jump[0]), float(jump[1]))
             for axis in (0, 1):
                 self._judged[axis][:] = [at + float(jump[axis]) for at in self._judged[axis]]
             places.best = likeliest

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from flightd.core.errors import InputError
+from flightd.core.markers import MarkerDictionary, MarkerSet
 from flightd.grid.ways import KeepOut, NoWayError, OneWay, Ways
 
 
@@ -107,6 +108,19 @@ class Pad:
 
 
 @dataclass(frozen=True, slots=True)
+class Marker:
+    """A square marker on the floor, its centre at (`x_m`, `y_m`), black border included `size_m` wide;
+    at `yaw_rad` 0 its upper edge runs along x."""
+
+    id: int
+    dictionary: MarkerDictionary
+    x_m: float
+    y_m: float
+    size_m: float = 0.2
+    yaw_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Shelf:
     """One unbroken shelf front: a vertical rectangle over y = `y_m` from `x0_m` to `x1_m`, floor to
     `height_m`, facing its aisle."""
@@ -168,6 +182,7 @@ class Site:
     locations: Mapping[str, Location] = field(default_factory=dict)
     blocked: tuple[tuple[str, str], ...] = ()
     keep_outs: tuple[KeepOut, ...] = ()
+    markers: tuple[Marker, ...] = ()
 
     @cached_property
     def _ways(self) -> Ways:
@@ -219,6 +234,13 @@ class Site:
     def _order(self, node: str) -> tuple[float, float, str]:
         there = self.nodes[node]
         return there.y_m, there.x_m, node
+
+    @property
+    def marker_set(self) -> MarkerSet | None:
+        """What to look for on the floor; None without markers."""
+        if not self.markers:
+            return None
+        return MarkerSet(self.markers[0].dictionary, tuple(marker.id for marker in self.markers))
 
     @property
     def home(self) -> Pad:

@@ -16,6 +16,7 @@ from flightd.grid.site import LineColour, PaintedLine, Side, Site
 from flightd.sim.appearance import Appearance
 from flightd.sim.lighting import Lighting
 from flightd.sim.marks import FloorMarks
+from flightd.sim.signs import FloorSigns
 from flightd.sim.texture import NoiseField, Patch
 
 Floats: TypeAlias = NDArray[np.float32]
@@ -58,6 +59,7 @@ class Floor:
         self._lighting = lighting
         self._noise = NoiseField(seed)
         self._marks = FloorMarks(site, look, seed)
+        self._signs = FloorSigns(site)
         self._strokes = [_stroke_box(line) for line in site.lines]
         self._mats = [
             (x_m - half, y_m - half, x_m + half, y_m + half)
@@ -76,6 +78,7 @@ class Floor:
             rubber = 1.0 + 0.12 * self._noise.mix(patch, "mat", {0.004: 1.0, 0.03: 0.6})
             _lay(colour, _linear(_MAT_SRGB) * rubber[..., None], mats)
         self._lay_paint(colour, patch, mats)
+        self._signs.lay(colour, patch)
         shade = self._marks.shade(patch)
         if mats is not None:  # the mat lies on the marks
             shade += (1.0 - shade) * mats

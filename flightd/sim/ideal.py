@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.core.geometry import Lens, Mount, heading_rotation, level_from_body, normalise_line
-from flightd.core.types import Junction, JunctionKind, Line, LineSet, PadSight
+from flightd.core.types import Junction, JunctionKind, Line, LineSet, MarkerSight, PadSight
 from flightd.grid.paint import ARM_DIRECTIONS, PaintMap
 from flightd.grid.site import Pad, PaintedLine, Site
 from flightd.sim.kinematics import Kinematics
@@ -65,12 +65,33 @@ class IdealEye:
         lens = self._lens
         junctions = self._junctions(image_from_map, eye)
         pads = tuple(pad for pad in (self._pad(pad, image_from_map, eye) for pad in self._site.pads) if pad)
-        return LineSet(seq, stamp_ns, lens.width_px, lens.height_px, lines, junctions, "ideal", pads=pads)
+        markers = tuple(
+            MarkerSight(marker.id, *square)
+            for marker in self._site.markers
+            if (square := self._square(marker.x_m, marker.y_m, marker.size_m, image_from_map, eye))
+        )
+        return LineSet(
+            seq,
+            stamp_ns,
+            lens.width_px,
+            lens.height_px,
+            lines,
+            junctions,
+            "ideal",
+            pads=pads,
+            markers=markers,
+        )
 
     def _pad(self, pad: Pad, image_from_map: np.ndarray, eye: np.ndarray) -> PadSight | None:
         """The pad, if its whole square is in the picture."""
-        lens, half = self._lens, pad.size_m / 2
-        x_m, y_m = self._site.pad_centre(pad)
+        seen = self._square(*self._site.pad_centre(pad), pad.size_m, image_from_map, eye)
+        return PadSight(*seen, 1.0) if seen else None
+
+    def _square(
+        self, x_m: float, y_m: float, size_m: float, image_from_map: np.ndarray, eye: np.ndarray
+    ) -> tuple[float, float, float] | None:
+        """Centre and mean side of a square on the floor, in pixels, if it is wholly in the picture."""
+        lens, half = self._lens, size_m / 2
         corners = np.array([[-1, 1, 1, -1, 0], [-1, -1, 1, 1, 0], [0, 0, 0, 0, 0]]) * half
         rays = image_from_map @ (corners + np.array([[x_m], [y_m], [0.0]]) - eye[:, None])
         if (rays[2] <= 0.05).any():
@@ -81,11 +102,10 @@ class IdealEye:
         sides = np.hypot(np.diff(u[[0, 1, 2, 3, 0]]), np.diff(v[[0, 1, 2, 3, 0]]))
         blur = self._errors.pad_px
         x_px, y_px = u[4] - lens.centre_px[0], v[4] - lens.centre_px[1]
-        return PadSight(
+        return (
             float(x_px) + self._random.gauss(0.0, blur),
             float(y_px) + self._random.gauss(0.0, blur),
             float(sides.mean()),
-            1.0,
         )
 
     def _junctions(self, image_from_map: np.ndarray, eye: np.ndarray) -> tuple[Junction, ...]:

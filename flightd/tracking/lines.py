@@ -11,9 +11,10 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from statistics import median
+from typing import TypeVar
 
 from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount, wrap_pi
-from flightd.core.types import Attitude, LineSet, PadSight
+from flightd.core.types import Attitude, LineSet, MarkerSight, PadSight
 from flightd.tracking.attitude import AttitudeHistory
 from flightd.tracking.junctions import FloorJunction, floor_junctions
 from flightd.tracking.motion import AxisTracker, HeadingTracker, MotionNoise, SeenLine, TrackedLine
@@ -25,6 +26,7 @@ _WIDTH_GAIN = 0.15
 _AGREEING, _DOUBTED = 0.15, 0.2
 _SAME_RAD = math.radians(3.0)
 _DISPUTE_NS, _SHOWN_NS = 600_000_000, 1_500_000_000
+_Square = TypeVar("_Square", PadSight, MarkerSight)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +57,23 @@ class PadOffset:
 
 
 @dataclass(frozen=True, slots=True)
+class MarkerOffset:
+    """A floor marker: its centre from the drone in grid axes, and the length of its sides."""
+
+    id: int
+    x_m: float
+    y_m: float
+    side_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class TrackSet:
     """The tracks at one time, in grid axes (x along the aisles, y to the right of x).
 
     `across_x` are the lines that cross the x axis (parallel to y), offsets in x; `across_y` the others.
-    `lines_ns` is the capture time of the newest frame in which any line was taken; `junctions` are those
-    of the newest frame, taken at `junctions_ns`; `push` is the steady acceleration that no lean explains.
+    `lines_ns` is the capture time of the newest frame in which any line was taken; `junctions` and
+    `markers` are those of the newest frame, taken at `junctions_ns`; `push` is the steady acceleration that
+    no lean explains.
     """
 
     stamp_ns: int
@@ -80,6 +93,7 @@ class TrackSet:
     junctions_ns: int = 0
     push_x_mps2: float = 0.0
     push_y_mps2: float = 0.0
+    markers: tuple[MarkerOffset, ...] = ()
 
 
 class LineTracker:
@@ -98,6 +112,7 @@ class LineTracker:
         self._stamp_ns = 0
         self._pads: tuple[PadOffset, ...] = ()
         self._junctions: tuple[FloorJunction, ...] = ()
+        self._markers: tuple[MarkerOffset, ...] = ()
         self.rejected = 0
         self.height_share = 1.0
         """The height told lately against that by the lines' width; 1 when they agree."""
@@ -148,7 +163,9 @@ class LineTracker:
                 spread = math.hypot(sigma, y * self._heading.sigma_rad)
                 ends = sorted(sin * forward + cos * right for forward, right in line.ends_m)
                 across_x.append(SeenLine(x, spread, line.width_m, ends[0], ends[1]))
-        self._pads = _placed(lines.pads, view, yaw)
+        self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in _placed(lines.pads, view, yaw))
+        marks = _placed(lines.markers, view, yaw)
+        self._markers = tuple(MarkerOffset(mark.id, x, y, side) for mark, x, y, side in marks)
         self._x.update(across_x, lines.stamp_ns)
         self._y.update(across_y, lines.stamp_ns)
         self._junctions = floor_junctions(lines.junctions, view, yaw)
@@ -198,6 +215,9 @@ class LineTracker:
             self._stamp_ns,
             push_x_mps2=self._x.disturbance_mps2,
             push_y_mps2=self._y.disturbance_mps2,
+            markers=tuple(
+                replace(mark, x_m=mark.x_m - moved_x, y_m=mark.y_m - moved_y) for mark in self._markers
+            ),
         )
 
     def _advance(self, stamp_ns: int) -> None:
@@ -290,17 +310,20 @@ class _Dispute:
         return True
 
 
-def _placed(pads: Iterable[PadSight], view: FloorView, yaw_rad: float) -> tuple[PadOffset, ...]:
-    """The pads on the floor, in grid axes about the drone at the time of the frame."""
+def _placed(
+    squares: Iterable[_Square], view: FloorView, yaw_rad: float
+) -> list[tuple[_Square, float, float, float]]:
+    """Each square with its centre on the floor, in grid axes about the drone at the time of the frame, and
+    the length of its sides; without those that the view cannot place."""
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     found = []
-    for pad in pads:
-        point = ground_point(pad.x_px, pad.y_px, view)
+    for square in squares:
+        point = ground_point(square.x_px, square.y_px, view)
         if point is not None:
             forward, right, metres_per_px = point
             x_m, y_m = cos * forward - sin * right, sin * forward + cos * right
-            found.append(PadOffset(x_m, y_m, pad.side_px * metres_per_px))
-    return tuple(found)
+            found.append((square, x_m, y_m, square.side_px * metres_per_px))
+    return found
 
 
 def _moved(line: TrackedLine, across_m: float, along_m: float) -> TrackedLine:

@@ -10,9 +10,11 @@ import numpy as np
 
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
-from flightd.core.types import Image, LineSet
+from flightd.core.markers import MarkerSet
+from flightd.core.types import Image, LineSet, MarkerSight
 from flightd.vision import centroid, combine, evidence, junctions, naive, pads, skeleton
 from flightd.vision.colour import ColourProfile, classify, grow, load_profile
+from flightd.vision.markers import MarkerFinder
 from flightd.vision.picture import check_picture
 from flightd.vision.plane import Plane, shortest_length
 from flightd.vision.refine import refine
@@ -34,8 +36,8 @@ class Detector:
     """Finds the painted lines of one colour in frame after frame.
 
     `method` is one of METHODS; `profile` a colour profile or the name of one.  With a `lens` the lines
-    are those of a distortion-free camera.  `now_ns`, when given, times the stages.  Not thread-safe: one
-    detector for each worker.
+    are those of a distortion-free camera.  Floor markers are looked for when `markers` says
+    which.  `now_ns`, when given, times the stages.  Not thread-safe: one detector for each worker.
     """
 
     def __init__(
@@ -45,6 +47,7 @@ class Detector:
         lens: Lens | None = None,
         *,
         zhang_suen: bool = False,
+        markers: MarkerSet | None = None,
         now_ns: Callable[[], int] | None = None,
     ) -> None:
         if method not in METHODS:
@@ -53,6 +56,7 @@ class Detector:
         self.profile = load_profile(profile) if isinstance(profile, str) else profile
         self._lens = lens
         self._zhang_suen = zhang_suen
+        self._markers = MarkerFinder(markers) if markers is not None else None
         self._now_ns = now_ns or _no_clock
 
     def detect(self, bgr: Image, seq: int = 0, stamp_ns: int = 0) -> LineSet:
@@ -78,9 +82,13 @@ class Detector:
         mark("junctions")
         mats = pads.find(small, lines, grid, plane)
         mark("pads")
+        signs: tuple[MarkerSight, ...] = ()
+        if self._markers is not None:
+            signs = self._markers.find(small, grid, plane)
+            mark("markers")
         timings = {name: (end - begin) / 1e6 for (_, begin), (name, end) in pairwise(marks)}
         picture = check_picture(bgr)
-        return LineSet(seq, stamp_ns, width, height, lines, found, self.method, timings, mats, picture)
+        return LineSet(seq, stamp_ns, width, height, lines, found, self.method, timings, mats, picture, signs)
 
     def _plane(self, width: int, height: int) -> Plane:
         lens = self._lens

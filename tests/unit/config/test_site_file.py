@@ -83,7 +83,7 @@ def test_a_site_goes_to_another_process() -> None:
     ("old", "new", "words"),
     [
         ("[site]", "[site", "not valid TOML"),
-        ("[site]", "[sight]", "unknown key; known here: site, aisle, cross, blocked, keep_out, rack, pad"),
+        ("[site]", "[sight]", "unknown key; known here: site, aisle, cross, blocked, keep_out, rack, pad, "),
         ('name = "small"', "", "site.name: missing; add it"),
         ("line_width_m = 0.06", "line_width_m = 0.2", "site.line_width_m: Input should be less than"),
         ("line_width_m = 0.06", 'line_colour = "mauve"', "site.line_colour: Input should be 'yellow'"),

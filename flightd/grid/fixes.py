@@ -1,0 +1,57 @@
+"""Things of known place that the drone sees, each told once: floor markers and shelf labels.
+
+A marker that lies wrong lies wrong in every frame, so that only its first sight says anything; it may speak
+again when the drone has been away.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+from flightd.grid.site import Marker, Site
+from flightd.tracking.lines import MarkerOffset
+
+_AWAY_M = 2.0
+_FRAMES = 3
+"""A marker is believed after so many frames."""
+_SIZE_SHARE = 0.3
+
+
+class FixBook:
+    """What has spoken already; points are those of the place believed in."""
+
+    def __init__(self, site: Site) -> None:
+        self._markers = {marker.id: marker for marker in site.markers}
+        self._frames: Counter[int] = Counter()
+        self._told: dict[str, tuple[float, float]] = {}
+
+    def shift(self, dx_m: float, dy_m: float) -> None:
+        """The place believed in is another now."""
+        self._told = {key: (x + dx_m, y + dy_m) for key, (x, y) in self._told.items()}
+
+    def is_new(self, key: str, x_m: float, y_m: float) -> bool:
+        """Whether this thing, seen by a drone at (`x_m`, `y_m`), has not spoken here yet; it has now."""
+        self._told = {
+            told: at for told, at in self._told.items() if math.hypot(at[0] - x_m, at[1] - y_m) < _AWAY_M
+        }
+        if key in self._told:
+            return False
+        self._told[key] = (x_m, y_m)
+        return True
+
+    def markers(
+        self, seen: Sequence[MarkerOffset], x_m: float, y_m: float
+    ) -> list[tuple[Marker, MarkerOffset]]:
+        """Take one frame's markers; those of the map that have become sure with it."""
+        sure = []
+        for sight in seen:
+            marker = self._markers.get(sight.id)
+            if marker is None or abs(sight.side_m - marker.size_m) > _SIZE_SHARE * marker.size_m:
+                continue
+            self._frames[sight.id] += 1
+            if self._frames[sight.id] >= _FRAMES and self.is_new(f"marker {sight.id}", x_m, y_m):
+                self._frames[sight.id] = 0
+                sure.append((marker, sight))
+        return sure
