@@ -141,7 +141,7 @@ class Mission:
         doubts = self._relocator.step(senses, self.phase, (senses.now_ns - self._since_ns) * 1e-9)
         if self._relocator.jumped:
             self._correct(senses)
-        triggers = self._triggers(senses) | doubts
+        triggers = self._triggers(senses) | doubts | self._scan.doubts(self.phase)
         self._tell_hazards(triggers, senses.now_ns)
         phase, trigger = next_phase(self.phase, triggers)
         if trigger is not None:

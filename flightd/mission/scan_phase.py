@@ -34,6 +34,11 @@ class ScanPhase:
         """Where to look from, None in phases that do not scan."""
         return self._scanner.view if self._scanner is not None and phase in _TO_VIEW else None
 
+    def doubts(self, phase: Phase) -> set[Trigger]:
+        """What a shelf that contradicts the place asks for, until the place is sure again."""
+        doubted = self._scanner is not None and self._scanner.doubted and phase is not Phase.RELOCATE
+        return {Trigger.POSITION_DOUBTED} if doubted else set()
+
     def due(self, phase: Phase, stop: Stop) -> bool:
         """Whether there is anything (left) to scan at the stop that is hovered at."""
         if self._scanner is None or not stop.visit:

@@ -19,6 +19,9 @@ from flightd.mission.assign import Assigner, FrontSight, Sighting
 from flightd.mission.scan_task import ScanTask
 from flightd.mission.views import ScanParams, View, ViewPlanner
 
+_SAME_OFF_M = 0.3
+"""A label seen so near to where it was found to hang wrong still hangs there."""
+
 
 @dataclass(slots=True)
 class _Pending:
@@ -45,6 +48,8 @@ class Scanner:
         self._settled: list[Settled] = []
         self._events: list[Event] = []
         self._sightings: list[Sighting] = []
+        self._accused: dict[str, float] = {}
+        self._overruled: dict[str, float] = {}
         self.states: Counter[LocationState] = Counter()
         self.doubted = False
 
@@ -119,14 +124,16 @@ class Scanner:
             self._settled.append(Settled(tuple(codes), confirmed=False))
             self._done.difference_update(codes)
         self._pending.clear()
-        if not self.doubted:
+        if not self.doubted and (codes or self._accused):
             text = f"{reason}; {len(codes)} findings withdrawn"
             self._events.append(Event(now_ns, EventLevel.WARNING, "map_contradiction", text))
         self.doubted = True
 
     def trust(self) -> None:
-        """The place is known again."""
+        """The place is known again; labels that still contradict it hang wrong."""
         self.doubted = False
+        self._overruled |= self._accused
+        self._accused.clear()
 
     # What pictures bring
 
@@ -149,14 +156,18 @@ class Scanner:
             return
         look = self._assigner.look(codes, pose, (view.aisle, view.side))
         self._sightings += look.sightings
-        for sighting in look.sightings:
-            if sighting.contradicts:
-                text = f"label {sighting.location} seen {sighting.off_m:+.2f} m from its place"
-                self.doubt(pose.stamp_ns, f"at {self._task.node}: {text}")
-                return
+        against = [seen for seen in look.sightings if seen.contradicts and not self._is_overruled(seen)]
+        if against:
+            self._accused = {seen.location: seen.off_m for seen in against}
+            text = f"label {against[0].location} seen {against[0].off_m:+.2f} m from its place"
+            self.doubt(pose.stamp_ns, f"at {self._task.node}: {text}")
+            return
         self._task.take(look)
         self._gather()
-        if look.sightings:
+        agreeing = [seen.location for seen in look.sightings if not seen.contradicts]
+        for location in agreeing:
+            self._overruled.pop(location, None)
+        if agreeing:
             self._confirm([p for p in self._pending if p.node == self._task.node])
 
     # What goes out
@@ -175,6 +186,11 @@ class Scanner:
         """Location labels seen, for the localiser."""
         sightings, self._sightings = tuple(self._sightings), []
         return sightings
+
+    def _is_overruled(self, seen: Sighting) -> bool:
+        """Whether this label has contradicted in the same way before, and the place proved right."""
+        known_m = self._overruled.get(seen.location)
+        return known_m is not None and abs(known_m - seen.off_m) < _SAME_OFF_M
 
     def _gather(self) -> None:
         if self._task is None:
