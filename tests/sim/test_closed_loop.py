@@ -119,7 +119,7 @@ def _with_sim_lens(config: Config) -> Config:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_detectors_killed_in_flight_are_replaced_and_the_mission_completes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -72,7 +72,7 @@ def simulator(kind: str, speed: float = 1.0) -> Iterator[list[str]]:
             process.kill()
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 def test_a_mission_is_flown_in_another_simulator_wherever_its_vehicle_stands(
     kind: str, tmp_path: Path
@@ -82,7 +82,7 @@ def test_a_mission_is_flown_in_another_simulator_wherever_its_vehicle_stands(
     assert is_sound(summary), summary
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @pytest.mark.parametrize(("kind", "speed"), [("ardupilot", 2.0), ("px4", 3.0)])
 def test_a_simulator_that_runs_at_another_speed_is_flown_in_its_own_time(
     kind: str, speed: float, caplog: pytest.LogCaptureFixture
@@ -117,7 +117,7 @@ def test_a_simulator_that_runs_at_another_speed_is_flown_in_its_own_time(
     assert not [record for record in caplog.records if "times as fast" in record.message]
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_mission_is_flown_through_mavsdk_in_real_time_without_being_told_to(tmp_path: Path) -> None:
     summary = flown(tmp_path, "--vehicle", "mavsdk")
     assert is_sound(summary), summary

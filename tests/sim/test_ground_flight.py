@@ -25,7 +25,7 @@ def free_tcp_port() -> int:
         return int(probe.getsockname()[1])
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @in_loop
 async def test_a_flight_is_started_watched_and_landed_from_the_ground(tmp_path: Path) -> None:
     address = Address("127.0.0.1", free_tcp_port(), free_tcp_port())

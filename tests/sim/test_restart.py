@@ -25,7 +25,7 @@ _GUIDED_TIMEOUT_S = 3.0
 """Of the simulated autopilot, after which it levels by itself."""
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @in_loop
 async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp_path: Path) -> None:
     rig = ServiceRig(tmp_path, ("A3",))
@@ -76,7 +76,7 @@ async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp
     assert killed_s - ticks[-1] < 3.0, "no more than what had not reached the disk is lost"
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 @in_loop
 async def test_every_child_may_be_killed_in_flight(tmp_path: Path) -> None:
     rig = ServiceRig(tmp_path, ("A2",))
