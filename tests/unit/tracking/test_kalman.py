@@ -1,9 +1,10 @@
-"""The filter against what is known of filters in closed form."""
+"""The filter against closed forms, and step for step against filterpy's."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from filterpy.kalman import KalmanFilter as Reference
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -44,3 +45,25 @@ def test_the_covariance_stays_one_over_many_sharp_measurements() -> None:
     assert np.linalg.eigvalsh(kf.P).min() > 0.0
     assert np.allclose(kf.P, kf.P.T)
     assert float(kf.x[1, 0]) == pytest.approx(0.05, rel=0.01)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 4))
+def test_it_steps_as_the_usual_library_does(seed: int, n: int) -> None:
+    random = np.random.default_rng(seed)
+    spread = random.normal(size=(n, n))
+    kf = KalmanFilter(random.normal(size=(n, 1)), spread @ spread.T + np.eye(n))
+    usual = Reference(dim_x=n, dim_z=1, dim_u=1)
+    usual.x, usual.P = kf.x.copy(), kf.P.copy()
+    kf.F = usual.F = np.eye(n) + 0.1 * random.normal(size=(n, n))
+    kf.B = usual.B = random.normal(size=(n, 1))
+    kf.Q = usual.Q = np.diag(random.uniform(1e-6, 1e-2, n))
+    kf.H = usual.H = random.normal(size=(1, n))
+    for _ in range(20):
+        control, measured = random.normal(size=(1, 1)), random.normal(size=(1, 1))
+        noise = np.array([[random.uniform(0.01, 1.0)]])
+        for each in (kf, usual):
+            each.predict(u=control)
+        kf.update(measured, noise)
+        usual.update(measured, R=noise)
+        np.testing.assert_allclose(kf.x, usual.x, rtol=1e-7, atol=1e-9)
+        np.testing.assert_allclose(kf.P, usual.P, rtol=1e-7, atol=1e-9)
