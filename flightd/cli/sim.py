@@ -7,7 +7,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,6 +22,8 @@ EXAMPLES = """Examples:
   flightd sim --speed 1                        in real time, over UDP between processes
   flightd sim --warehouse configs/site-large.toml --out /tmp/large
   flightd sim --truth-url tcp:127.0.0.1:5762 --vehicle-url tcp:127.0.0.1:5760   ArduCopter's SITL flies
+  flightd sim --scenario camera_frozen --scenario wind.toml    what goes wrong, by name or file
+  flightd sim --scenario all                   every hazard in turn, and one table
   flightd sim --set mission.heading=shelf --set control.tilt_compensation=none
 """
 
@@ -47,7 +49,10 @@ def sim(
         str | None,
         typer.Option(help="max (lockstep, the default), or a multiple of real time.", show_default=False),
     ] = None,
-    scenario: Annotated[list[Path] | None, typer.Option(help="Scenario file.")] = None,
+    scenario: Annotated[
+        list[str] | None,
+        typer.Option(help="Name or file of a scenario; several are laid over each other; all: each in turn."),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for log, report and summary.")] = Path("out/sim"),
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE over the configuration.")
@@ -64,28 +69,42 @@ def sim(
     from flightd.cli.flight_count import going_on
     from flightd.cli.flight_progress import FlightProgress
     from flightd.cli.sim_count import stock_summary
+    from flightd.cli.sim_faults import check_faults
     from flightd.cli.sim_peers import fitted
+    from flightd.cli.sim_sweep import SHORT_ROUTE, sweep
     from flightd.cli.simulate import Simulation, fly
     from flightd.sim.external import truth_address
+    from flightd.sim.scenario import Scenario
+    from flightd.sim.scenario_files import load_scenarios
 
     external = bool(truth_url or vehicle_url)
     if external and not (truth_url and vehicle_url):
         raise InputError("--truth-url and --vehicle-url belong together: give both or neither")
-    conditions = _scenario(scenario or [])
-    chosen, site = _configured(config, warehouse, vehicle, settings or [], _camera_keys(conditions))
-    factor = _factor(speed, _own_clock(chosen.vehicle.kind, truth_url))
-    if external:
-        truth_address(truth_url)
-        chosen = chosen.model_copy(update={"vehicle": chosen.vehicle.model_copy(update={"url": vehicle_url})})
-    if factor is None and chosen.ground.listen:
-        print("flightd: the ground link is off in lockstep; --speed 1 turns it on", file=sys.stderr)
-    chosen = fitted(chosen, site)
-    _make_folder(out, going_on=bool(chosen.inventory.run))
-    chosen = going_on(chosen, site, out)
+
+    def prepare(conditions: Scenario, folder: Path, route: list[str]) -> Simulation:
+        keys = _camera_keys(conditions)
+        chosen, site = _configured(config, warehouse, vehicle, [*route, *(settings or [])], keys)
+        factor = _factor(speed, _own_clock(chosen.vehicle.kind, truth_url), clock=conditions.needs_real_time)
+        if external:
+            truth_address(truth_url)
+            update = {"vehicle": chosen.vehicle.model_copy(update={"url": vehicle_url})}
+            chosen = chosen.model_copy(update=update)
+        if factor is None and chosen.ground.listen:
+            print("flightd: the ground link is off in lockstep; --speed 1 turns it on", file=sys.stderr)
+        chosen = fitted(chosen, site)
+        check_faults(conditions.fault, chosen, site, external=external)
+        _make_folder(folder, going_on=bool(chosen.inventory.run))
+        chosen = going_on(chosen, site, folder)
+        return Simulation(chosen, site, conditions, seed, factor, folder, truth_url=truth_url)
+
+    if scenario == ["all"]:
+        sweep(lambda conditions, name: prepare(conditions, out / name, [SHORT_ROUTE]), as_json=as_json)
+        return
+    conditions = load_scenarios(scenario) if scenario else Scenario()
+    simulation = prepare(conditions, out, [])
     started = time.monotonic()
     with FlightProgress(shown=not as_json) as progress:
-        simulation = Simulation(chosen, site, conditions, seed, factor, out, progress, truth_url)
-        result = fly(simulation)
+        result = fly(replace(simulation, observer=progress))
     _write_truth(simulation)
     summary = _summary(simulation, result, time.monotonic() - started)
     summary |= stock_summary(simulation, summary["flight_time_s"])
@@ -105,8 +124,15 @@ def _own_clock(vehicle: str, truth_url: str) -> str:
     return "MAVSDK" if vehicle == "mavsdk" else "an external simulator" if truth_url else ""
 
 
-def _factor(speed: str | None, own_clock: str) -> float | None:
-    """Multiple of real time, None for lockstep."""
+def _factor(speed: str | None, own_clock: str, *, clock: bool = False) -> float | None:
+    """Multiple of real time, None for lockstep; `clock`: the scenario makes sense by the clock only."""
+    if clock and speed in {None, "max"}:
+        if speed == "max":
+            raise InputError(
+                "--speed max: faults of processes and of the ground link need the clock: --speed 1"
+            )
+        print("flightd: this scenario is flown in real time (--speed 1)", file=sys.stderr)
+        return 1.0
     if speed is None:
         return 1.0 if own_clock else None
     try:
@@ -177,14 +203,6 @@ def _value(text: str) -> object:
         return tomllib.loads(f"v = {text}")["v"]
     except tomllib.TOMLDecodeError:
         return text
-
-
-def _scenario(paths: Sequence[Path]) -> Any:
-    from flightd.sim.scenario import Scenario, load_scenario
-
-    if len(paths) > 1:
-        raise InputError("--scenario: give one file")
-    return load_scenario(paths[0]) if paths else Scenario()
 
 
 def _camera_keys(scenario: Any) -> dict[str, Any]:

@@ -8,24 +8,24 @@ or a multiple of it; only then does the ground link run, whose sockets have thre
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import math
 import multiprocessing
 import signal
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from flightd.adapters.recorder.recorder import Recorder
 from flightd.app import Daemon, FlightResult, detector_pool, ground_link, plan_of, start_of
 from flightd.cli.flight_count import FlightCount
+from flightd.cli.sim_faults import LauncherFaults, attended
 from flightd.cli.sim_peers import Ports, connected, free_ports, has_front_camera
+from flightd.cli.sim_world import run_world, watch_world
 from flightd.config.schema import Config
 from flightd.config.site_file import site_toml
-from flightd.core.errors import FlightdError, RunError, UnavailableError
+from flightd.core.errors import RunError, UnavailableError
 from flightd.core.topics import Document, Topic
 from flightd.core.types import Status
 from flightd.grid.site import Site
@@ -96,7 +96,8 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
         recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=True))
         truth = stack.enter_context(Recorder(simulation.truth_log, lossless=True))
         pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
-        world, ports = await _opened(simulation, clock, truth)
+        faults = LauncherFaults(simulation.scenario.fault, pool, recorder)
+        world, ports = await _opened(simulation, clock, truth, faults)
         config = connected(simulation.config, ports)
         count = FlightCount(config, simulation.site, simulation.folder, stack)
         counting = await count.begun(clock, lambda readers: LockstepReaders(readers, clock, READING_S))
@@ -110,20 +111,23 @@ async def _lockstep(simulation: Simulation) -> FlightResult:
             [simulation.observer],
             counting=counting,
         )
-        running = asyncio.ensure_future(world.run())
+        beside = [asyncio.ensure_future(part) for part in (world.run(), faults.run())]
         try:
-            return await _within_limit(simulation, daemon, running)
+            return await _within_limit(simulation, daemon, *beside)
         finally:
-            running.cancel()
-            await asyncio.wait([running])
+            for part in beside:
+                part.cancel()
+            await asyncio.wait(beside)
 
 
-async def _opened(simulation: Simulation, clock: LoopClock, truth: Recorder) -> tuple[World, Ports]:
+async def _opened(
+    simulation: Simulation, clock: LoopClock, truth: Recorder, faults: LauncherFaults
+) -> tuple[World, Ports]:
     """A world that listens, and its ports.  A port that was free a moment ago may have been taken by
     another simulation: then others are tried."""
     for attempt in range(1, _PORT_TRIES + 1):
         ports = free_ports(simulation.config, simulation.site)
-        world = World(_spec(simulation, ports), clock, truth)
+        world = World(_spec(simulation, ports), clock, truth, faults.tell)
         try:
             await world.open()
         except UnavailableError:
@@ -142,7 +146,7 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
     ours, theirs = context.Pipe()
     spec = _spec(simulation, ports)
     process = context.Process(
-        target=_run_world, args=(spec, factor, simulation.truth_log, theirs), name="world"
+        target=run_world, args=(spec, factor, simulation.truth_log, theirs), name="world"
     )
     with ExitStack() as stack:
         recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=False))
@@ -151,13 +155,12 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
         stack.callback(process.join, 15.0)
         stack.callback(ours.close)  # the world ends when its pipe closes, however this process ends
         pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
-        config = connected(simulation.config, ports)
+        config = attended(connected(simulation.config, ports), simulation.scenario.fault)
         if simulation.truth_url:
             config = config.model_copy(update={"vehicle": simulation.config.vehicle})
         counting = await FlightCount(config, simulation.site, simulation.folder, stack).begun(clock)
-        ground = stack.enter_context(
-            ground_link(simulation.config, simulation.site, clock, counting) or nullcontext()
-        )
+        ground = stack.enter_context(ground_link(config, simulation.site, clock, counting) or nullcontext())
+        faults = LauncherFaults(simulation.scenario.fault, pool, recorder, ground)
         await pool.ready()
         daemon = Daemon(
             config,
@@ -169,27 +172,19 @@ async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
             ground,
             counting=counting,
         )
-        watch = asyncio.ensure_future(_watch(process, ours))
+        parts = watch_world(process, ours, faults.tell), faults.run()
+        beside = [asyncio.ensure_future(part) for part in parts]
         try:
-            return await _within_limit(simulation, daemon, watch)
+            return await _within_limit(simulation, daemon, *beside)
         finally:
-            watch.cancel()
+            for part in beside:
+                part.cancel()
+            await asyncio.wait(beside)
 
 
-async def _watch(process: Any, pipe: Connection) -> None:
-    """Return when the world's process has died; raises what it died of."""
-    loop, died = asyncio.get_running_loop(), asyncio.Event()
-    loop.add_reader(process.sentinel, died.set)
-    try:
-        await died.wait()
-    finally:
-        loop.remove_reader(process.sentinel)
-    with contextlib.suppress(EOFError):
-        if pipe.poll():
-            raise pipe.recv()
-
-
-async def _within_limit(simulation: Simulation, daemon: Daemon, beside: asyncio.Future[None]) -> FlightResult:
+async def _within_limit(
+    simulation: Simulation, daemon: Daemon, *beside: asyncio.Future[None]
+) -> FlightResult:
     """The flight, unless it takes far longer than its plan can, or what runs beside it fails."""
     stops = plan_of(simulation.config, simulation.site).stops
     limit_s = 120.0 + 60.0 * (len(stops) + 1)
@@ -197,7 +192,7 @@ async def _within_limit(simulation: Simulation, daemon: Daemon, beside: asyncio.
         wanted = {stop.node for stop in stops if stop.visit}
         limit_s += _SCAN_S * sum(place.node in wanted for place in simulation.site.locations.values())
     flight = asyncio.ensure_future(daemon.fly())
-    parts: list[asyncio.Future[Any]] = [flight, beside]
+    parts: list[asyncio.Future[Any]] = [flight, *beside]
     try:
         await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED, timeout=limit_s)
     finally:
@@ -206,56 +201,12 @@ async def _within_limit(simulation: Simulation, daemon: Daemon, beside: asyncio.
         await asyncio.wait([flight])
     if over:
         return flight.result()
-    if beside.done():
-        beside.result()
+    for part in beside:
+        if part.done():
+            part.result()
+    if any(part.done() for part in beside):
         raise RunError("the simulated world ended before the flight")
     raise RunError(f"the flight was not over after {limit_s:.0f} s of its own time")
-
-
-def _run_world(spec: WorldSpec, factor: float, log: Path, pipe: Connection) -> None:
-    """The world's process: lives until the other end of `pipe` closes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    async def main() -> None:
-        closed = asyncio.Event()
-        asyncio.get_running_loop().add_reader(pipe.fileno(), closed.set)
-        with Recorder(log) as recorder:
-            world = World(spec, LoopClock(), recorder)
-            parts: tuple[Coroutine[Any, Any, Any], ...] = (world.run(), recorder.run(), closed.wait())
-            tasks = [asyncio.ensure_future(part) for part in parts]
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-            for task in tasks:
-                task.cancel()
-            await asyncio.wait(tasks)
-            for task in tasks:
-                if not task.cancelled():
-                    task.result()
-
-    try:
-        with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
-            runner.run(main())
-    except Exception as err:
-        pipe.send(_reason(err))
-        if not isinstance(_reason(err), UnavailableError):
-            raise
-
-
-def _reason(err: Exception) -> FlightdError:
-    """The error that a person can do something about, out of an error or a group of them; a fault of the
-    world itself as a RunError."""
-    leaves = list(_leaves(err))
-    told = next((leaf for leaf in leaves if isinstance(leaf, FlightdError)), None)
-    if told is not None:
-        return UnavailableError(str(told))
-    return RunError(f"the simulated world failed: {type(leaves[0]).__name__}: {leaves[0]}")
-
-
-def _leaves(err: BaseException) -> Iterator[BaseException]:
-    if isinstance(err, BaseExceptionGroup):
-        for part in err.exceptions:
-            yield from _leaves(part)
-    else:
-        yield err
 
 
 def _flight_recorder(simulation: Simulation, clock: LoopClock, lossless: bool) -> Recorder:
@@ -288,6 +239,7 @@ def _spec(simulation: Simulation, ports: Ports) -> WorldSpec:
         swap_s=scenario.vehicle.swap_s,
         radio=scenario.vehicle.radio(),
         truth_url=simulation.truth_url,
+        faults=scenario.fault,
     )
 
 

@@ -20,7 +20,7 @@ from flightd.core.types import (
 
 
 class Topic(enum.StrEnum):
-    """Names of the streams in `flight.mcap`; TRUTH and SCENARIO are in the simulator's `truth.mcap`.
+    """Names of the streams in `flight.mcap`; TRUTH, SCENARIO and FAULT are in the simulator's `truth.mcap`.
 
     TICK and DECISION are all that the pilot was given and all that it answered (`pilot.TickInput`,
     `pilot.TickOutput`), so that a flight can be replayed; the others are for people and their tools.
@@ -42,6 +42,7 @@ class Topic(enum.StrEnum):
     MAP = "/map"
     TRUTH = "/truth"
     SCENARIO = "/scenario"
+    FAULT = "/fault"
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,7 +44,8 @@ PHASE_OF = {
 
 @dataclass(frozen=True, slots=True)
 class Hazard:
-    """One row.  `trigger` is what tells the mission (None: answered below it), `test` where it is flown."""
+    """One row.  `trigger` is what tells the mission (None: answered below it), `test` where it is flown; the
+    shipped scenario that makes it happen bears its `name`."""
 
     name: str
     trigger: Trigger | None
@@ -288,8 +289,9 @@ def triggers_of(*actions: Action) -> frozenset[Trigger]:
 
 def markdown() -> str:
     """The table as README prints it."""
-    lines = ["| hazard | found by | action | then |", "|---|---|---|---|"]
+    lines = ["| hazard | scenario | found by | action | then |", "|---|---|---|---|---|"]
     lines += [
-        f"| {row.name.replace('_', ' ')} | {row.found_by} | {row.action} | {row.then} |" for row in HAZARDS
+        f"| {row.name.replace('_', ' ')} | `{row.name}` | {row.found_by} | {row.action} | {row.then} |"
+        for row in HAZARDS
     ]
     return "\n".join(lines) + "\n"

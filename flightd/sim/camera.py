@@ -10,8 +10,11 @@ import asyncio
 import math
 import random
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
+
+import cv2
 
 from flightd.core.errors import TransientError
 from flightd.core.geometry import Lens
@@ -61,6 +64,19 @@ class _RenderWorker:
         return seq
 
 
+@dataclass(slots=True)
+class CameraTrouble:
+    """What is wrong with a camera just now."""
+
+    gone: bool = False
+    late_s: float = 0.0
+    frozen: bool = False
+    level: int | None = None
+    """Every pixel is of this grey level."""
+    turn_deg: float = 0.0
+    """The picture turned clockwise about its middle."""
+
+
 class CameraPeer:
     """Takes pictures of what `truth_at` says until cancelled, and sends notices of them to the daemon at
     `address`; or, with `show`, hands the pictures themselves to a vehicle that transmits them.
@@ -90,6 +106,9 @@ class CameraPeer:
         self._ready = asyncio.Event()
         self._turn = asyncio.Lock()
         self.late = 0
+        self.trouble = CameraTrouble()
+        self._kept: Image | None = None
+        self._newest = 0
 
     async def run(self) -> None:
         loop, lens = asyncio.get_running_loop(), self._camera.lens
@@ -124,14 +143,18 @@ class CameraPeer:
                 seq += missed
                 self.late += missed
             await asyncio.sleep(max((exposure_ns - self._clock.now_ns()) * 1e-9, 0.0))
-            if self._wanted():
+            if self._wanted() and not self.trouble.gone:
                 jitter_s = self._random.random() * self._camera.jitter_s
                 due_ns = exposure_ns + round((self._camera.capture_delay_s + jitter_s) * 1e9)
                 truth = self._truth_at(exposure_ns)
+                due_ns += round(self.trouble.late_s * 1e9)
                 pictures.create_task(self._deliver(child, transport, truth, seq, due_ns))
             seq += 1
 
     async def _deliver(self, child: Child, transport: Any, truth: Kinematics, seq: int, due_ns: int) -> None:
+        early_s = self._camera.capture_delay_s + self._camera.jitter_s
+        # a late picture is drawn late: the ring holds no more than the usual delay's
+        await asyncio.sleep(max((due_ns - self._clock.now_ns()) * 1e-9 - early_s, 0.0))
         rendering = asyncio.ensure_future(self._render(child, truth, seq))
         try:
             await asyncio.sleep((due_ns - self._clock.now_ns()) * 1e-9)
@@ -161,8 +184,28 @@ class CameraPeer:
         async with self._turn:
             slot = self._ring.begin(seq)
             await child.ask((truth, seq, slot))
+            self._spoil(self._ring.pixels(slot))
+            self._newest = slot
             self._ring.publish(slot, seq, truth.stamp_ns)
             return slot
+
+    def _spoil(self, picture: Image) -> None:
+        """What is wrong with the camera shows."""
+        trouble = self.trouble
+        if not trouble.frozen:
+            self._kept = None
+        elif self._kept is None:
+            self._kept = self._ring.pixels(self._newest).copy()
+        if self._kept is not None:
+            picture[:] = self._kept
+        if trouble.level is not None:
+            picture[:] = trouble.level
+        if trouble.turn_deg:
+            lens = self._camera.lens
+            middle = (lens.width_px - 1) / 2, (lens.height_px - 1) / 2
+            turn = cv2.getRotationMatrix2D(middle, -trouble.turn_deg, 1.0)
+            size = lens.width_px, lens.height_px
+            picture[:] = cv2.warpAffine(picture, turn, size, borderMode=cv2.BORDER_REPLICATE)
 
 
 def _slots(camera: Optics) -> int:

@@ -6,6 +6,7 @@ as the map does.  Colour is worked out as reflectance times light and stored wit
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -54,8 +55,12 @@ def _gamma_table() -> Image:
 class Floor:
     """Paints patches of one warehouse's floor; the same patch always looks the same."""
 
-    def __init__(self, site: Site, look: Appearance, lighting: Lighting, seed: int) -> None:
+    def __init__(
+        self, site: Site, look: Appearance, lighting: Lighting, seed: int, bare: Sequence[Box] = ()
+    ) -> None:
+        """Within the `bare` boxes there is no paint."""
         self._look = look
+        self._bare = list(bare)
         self._lighting = lighting
         self._noise = NoiseField(seed)
         self._marks = FloorMarks(site, look, seed)
@@ -135,6 +140,9 @@ class Floor:
             if mats is not None:  # the mat is newer than the floor
                 gone *= 1.0 - 0.8 * mats
             cover *= 1.0 - gone
+        bare = self._cover(patch, self._bare, None)
+        if bare is not None:
+            cover *= 1.0 - bare
         paint = np.broadcast_to(self._paint, colour.shape).copy()
         if self._look.dirt > 0.0:
             film = self._noise.mix(patch, "film", {1.3: 0.3, 0.3: 0.3, 0.07: 0.25, 0.02: 0.2, 0.005: 0.25})

@@ -8,6 +8,7 @@ light that depends on the picture (vignetting, mirrored lamps, the drone's own s
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,7 +21,7 @@ from flightd.core.view import Viewpoint
 from flightd.grid.site import Site
 from flightd.sim.appearance import DEFAULT, Appearance
 from flightd.sim.effects import Sensor, blur_kernel
-from flightd.sim.floor import Floor
+from flightd.sim.floor import Box, Floor
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.lighting import Lighting
 from flightd.sim.optics import Floats, RayTable, SimCamera, floor_viewpoint, smear_px
@@ -42,13 +43,19 @@ class Renderer:
     on what was rendered before.  Not for use from several threads at once."""
 
     def __init__(
-        self, site: Site, camera: SimCamera, appearance: Appearance = DEFAULT, seed: int = 0
+        self,
+        site: Site,
+        camera: SimCamera,
+        appearance: Appearance = DEFAULT,
+        seed: int = 0,
+        bare: Sequence[Box] = (),
     ) -> None:
+        """Within the `bare` boxes (x0, y0, x1, y1 on the map) the floor has no paint."""
         self._camera = camera
         self._look = appearance
         self._rays = RayTable(camera.lens)
         self._lighting = Lighting(site, appearance, seed)
-        self._tiles = TiledFloor(Floor(site, appearance, self._lighting, seed))
+        self._tiles = TiledFloor(Floor(site, appearance, self._lighting, seed, bare))
         self._sensor = Sensor(camera.lens, appearance, seed)
 
     def render(self, kinematics: Kinematics, seq: int, out: Image | None = None) -> Image:

@@ -47,21 +47,30 @@ battery_ah = 5.0         # its capacity; hovering takes 14 A
 swap_s = 30.0            # time in which somebody changes it on the charge pad; 0: nobody does
 start_offset_m = [0.0, 0.0]  # how far from the pad it really stands at the start, x and y
 start_yaw_deg = 0.0      # how far it is turned from the heading in which it should stand, + to the right
+
+[[fault]]                # any number of them; the kinds and their keys are in `fault_spec`
+kind = "camera_frozen"
+at_x_m = 2.2             # or at_node = "A2", or at_s = 12.0 after take-off
+at_y_m = 0.0
+duration_s = 3.0         # left out: to the end
+
+[expect]                 # what `--scenario all` holds the flight to
+hazard = "camera_frozen" # as in `mission.hazards`
+found_s = 0.5            # after the first fault began; without faults after take-off
+ends = "landed"          # completed, home, landed, handed over
 """
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from flightd.core.errors import InputError
 from flightd.grid.site import Site
 from flightd.sim.appearance import Appearance, preset
 from flightd.sim.autopilot.radio import RadioParams
+from flightd.sim.fault_spec import Fault
 from flightd.sim.optics import SimCamera, wide_lens
 from flightd.sim.racks.camera import FrontCamera, front_lens
 from flightd.sim.racks.look import RackLook
@@ -194,6 +203,14 @@ class VehicleScenario(_Section):
         return RadioParams(self.radio_loss, self.radio_delay_ms / 1000, self.radio_jitter_ms / 1000)
 
 
+class Expectation(_Section):
+    """How a flight of this scenario should go: which hazard is found, how soon, and how it ends."""
+
+    hazard: str = Field(min_length=1, max_length=40)
+    found_s: float = Field(1.0, gt=0, le=600)
+    ends: Literal["completed", "home", "landed", "handed over"]
+
+
 class Scenario(_Section):
     """One simulated world's conditions."""
 
@@ -203,17 +220,9 @@ class Scenario(_Section):
     floor: FloorScenario = FloorScenario()
     wind: WindScenario = WindScenario()
     vehicle: VehicleScenario = VehicleScenario()
+    fault: tuple[Fault, ...] = ()
+    expect: Expectation | None = None
 
-
-def load_scenario(path: Path) -> Scenario:
-    """Read a scenario file; InputError names the file, the key and the remedy."""
-    try:
-        return Scenario.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except OSError as err:
-        raise InputError(f"scenario {path}: {err.strerror}; give the path of a TOML file") from err
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as err:
-        raise InputError(f"scenario {path}: not TOML: {err}") from err
-    except ValidationError as err:
-        first = err.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"scenario {path}: {key}: {first['msg'].lower()}") from err
+    @property
+    def needs_real_time(self) -> bool:
+        return any(fault.real_time for fault in self.fault)

@@ -73,7 +73,7 @@ def score(
             after.phase is Phase.TAKE_OFF and before.phase is not Phase.TAKE_OFF
             for before, after in pairwise(statuses)
         ),
-        min_shelf_distance_m=_rounded(min((_to_shelf(site, t) for t in flying), default=None)),
+        min_shelf_distance_m=_rounded(min((shelf_distance_m(site, t) for t in flying), default=None)),
     )
 
 
@@ -132,7 +132,8 @@ def _hover_errors(
     return errors
 
 
-def _to_shelf(site: Site, t: Kinematics) -> float:
+def shelf_distance_m(site: Site, t: Kinematics) -> float:
+    """From the drone to the nearest shelf that stands as high as it flies; infinite without one."""
     distances = [
         math.hypot(max(shelf.x0_m - t.x_m, 0.0, t.x_m - shelf.x1_m), t.y_m - shelf.y_m)
         for shelf in site.shelves

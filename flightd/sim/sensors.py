@@ -32,11 +32,23 @@ class SensorParams:
     range_dropout: float = 0.005
 
 
+@dataclass(slots=True)
+class SensorFault:
+    """What is wrong with the sensors just now, beyond their usual errors."""
+
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    yaw_rad: float = 0.0
+    range_m: float = 0.0
+    range_lost: bool = False
+
+
 class Sensors:
     """Estimates of one airframe; `update` after each of its steps."""
 
     def __init__(self, params: SensorParams | None = None, seed: int = 0) -> None:
         self.params = p = params or SensorParams()
+        self.fault = SensorFault()
         self._rng = rng = random.Random(seed)
         self._roll_bias = rng.uniform(-p.tilt_bias_rad, p.tilt_bias_rad)
         self._pitch_bias = rng.uniform(-p.tilt_bias_rad, p.tilt_bias_rad)
@@ -49,16 +61,16 @@ class Sensors:
     @property
     def roll_error_rad(self) -> float:
         """Estimate minus truth."""
-        return self._roll_bias + self._roll_wander
+        return self._roll_bias + self._roll_wander + self.fault.roll_rad
 
     @property
     def pitch_error_rad(self) -> float:
-        return self._pitch_bias + self._pitch_wander
+        return self._pitch_bias + self._pitch_wander + self.fault.pitch_rad
 
     @property
     def yaw_error_rad(self) -> float:
         """Estimate minus truth, the compass's heading of the map's x axis included."""
-        return self._yaw_error
+        return self._yaw_error + self.fault.yaw_rad
 
     def update(self, dt_s: float, airframe: Airframe) -> None:
         """Follow the airframe's present truth after `dt_s`."""
@@ -73,7 +85,7 @@ class Sensors:
         self._yaw_error += self._yaw_drift * dt_s
         self.roll_rad = airframe.roll_rad + self.roll_error_rad
         self.pitch_rad = airframe.pitch_rad + self.pitch_error_rad
-        self.yaw_rad = wrap_pi(airframe.yaw_rad + self._yaw_error)
+        self.yaw_rad = wrap_pi(airframe.yaw_rad + self.yaw_error_rad)
         self.height_m = airframe.height_m - airframe.params.rest_height_m + self._baro_wander
         self.climb_mps = airframe.climb_mps + self._climb_error
 
@@ -85,9 +97,9 @@ class Sensors:
         """One range finder sample along the body's z axis, quantised; 0 when nothing came back."""
         p = self.params
         tilt_cos = airframe.tilt_cos
-        if tilt_cos < 0.3 or self._rng.random() < p.range_dropout:
+        if tilt_cos < 0.3 or self._rng.random() < p.range_dropout or self.fault.range_lost:
             return 0.0
-        distance = airframe.height_m / tilt_cos + self._rng.gauss(0.0, p.range_noise_m)
+        distance = airframe.height_m / tilt_cos + self._rng.gauss(0.0, p.range_noise_m) + self.fault.range_m
         if not p.range_min_m <= distance <= p.range_max_m:
             return 0.0
         return round(distance / p.range_step_m) * p.range_step_m

@@ -25,6 +25,8 @@ from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.camera import CameraPeer
 from flightd.sim.crew import PadCrew
 from flightd.sim.external import ExternalVehicle, Placement
+from flightd.sim.fault_spec import Fault
+from flightd.sim.faults import Told, WorldFaults, bare_boxes
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.optics import SimCamera
 from flightd.sim.racks.camera import FrontCamera
@@ -52,7 +54,7 @@ class WorldSpec:
     commands, navdata, video and configuration; it transmits its pictures itself.  With a `truth_url` the
     vehicle is an external simulator's, which stands on the pad, and only the camera is ours; `radio` lies
     between a MAVLink autopilot and its companion.  With `swap_s` 0 nobody changes batteries.  The vehicle
-    stands `start_offset_m` (x, y) away from the start pad's centre."""
+    stands `start_offset_m` (x, y) away from the start pad's centre.  `faults` go wrong on the way."""
 
     site: Site
     seed: int
@@ -71,6 +73,7 @@ class WorldSpec:
     swap_s: float = 0.0
     radio: RadioParams = PERFECT
     truth_url: str = ""
+    faults: tuple[Fault, ...] = ()
 
 
 class VehiclePeer(Protocol):
@@ -88,7 +91,10 @@ class VehiclePeer(Protocol):
 class World:
     """The running peers.  `open` binds the vehicle's port, `run` lives until cancelled."""
 
-    def __init__(self, spec: WorldSpec, clock: Clock, recorder: Recorder) -> None:
+    def __init__(
+        self, spec: WorldSpec, clock: Clock, recorder: Recorder, tell: Told = lambda _index, _begins: None
+    ) -> None:
+        """`tell` hears of the faults that are not the world's own.  InputError for one at an unknown node."""
         self._clock = clock
         self._recorder = recorder
         start = spec.start or spec.site.home.node
@@ -120,7 +126,14 @@ class World:
         self._cameras = {
             "camera": CameraPeer(
                 spec.camera,
-                partial(Renderer, spec.site, spec.camera, spec.appearance, spec.seed),
+                partial(
+                    Renderer,
+                    spec.site,
+                    spec.camera,
+                    spec.appearance,
+                    spec.seed,
+                    bare_boxes(spec.faults, spec.site),
+                ),
                 f"camera {spec.seed}",
                 spec.camera_address,
                 self.vehicle.truth_at,
@@ -141,6 +154,8 @@ class World:
                 clock,
             )
 
+        self._faults = WorldFaults(spec.faults, spec.site, self._cameras, airframe, self.vehicle, tell)
+
     async def open(self) -> tuple[str, int]:
         """Bind the vehicle's sockets; the address to which a daemon sends commands.  UnavailableError when
         a port is taken or an external simulator does not tell its truth."""
@@ -158,6 +173,8 @@ class World:
             for name, camera in self._cameras.items():
                 tasks.create_task(camera.run(), name=name)
             tasks.create_task(self._log_truth(), name="truth")
+            faults = self._faults.run(self._clock, self.vehicle.truth_at, self._recorder)
+            tasks.create_task(faults, name="faults")
             if self._crew is not None:
                 tasks.create_task(self._crew.run(self._clock, self._at), name="crew")
             opened()

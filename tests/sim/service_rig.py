@@ -20,8 +20,8 @@ from typing import Any
 
 from flightd.adapters.ground.client import Address, GroundClient
 from flightd.adapters.ground.protocol import StatusReport
-from flightd.cli import simulate
 from flightd.cli.sim_peers import free_port
+from flightd.cli.sim_world import run_world
 from flightd.config.site_file import load_site
 from flightd.core.topics import Topic
 from flightd.replay.log import read_log
@@ -93,7 +93,7 @@ class ServiceRig:
             camera=CAMERA.__class__(**_fields(CAMERA) | {"mount": _turned(CAMERA.mount)}),
         )
         log = self.folder / "truth.mcap"
-        process = context.Process(target=simulate._run_world, args=(spec, 1.0, log, theirs), name="world")
+        process = context.Process(target=run_world, args=(spec, 1.0, log, theirs), name="world")
         process.start()
         theirs.close()
         try:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from flightd.cli.simulate import _run_world, _watch
+from flightd.cli.sim_world import run_world, watch_world
 from flightd.config.paths import shipped
 from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError, RunError, UnavailableError
@@ -20,11 +20,11 @@ def death_of(spec: WorldSpec, log: Path) -> FlightdError:
     async def main() -> None:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        process = context.Process(target=_run_world, args=(spec, 1.0, log, theirs))
+        process = context.Process(target=run_world, args=(spec, 1.0, log, theirs))
         process.start()
         theirs.close()
         async with asyncio.timeout(60.0):
-            await _watch(process, ours)
+            await watch_world(process, ours, lambda _index, _begins: None)
 
     with pytest.raises(FlightdError) as told:
         asyncio.run(main())

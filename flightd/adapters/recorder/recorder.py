@@ -97,6 +97,15 @@ class Recorder:
         return self._refused + lost_with_process + self._tally.lost
 
     @property
+    def path(self) -> Path:
+        return self._path
+
+    @property
+    def pid(self) -> int:
+        """The writing process."""
+        return self._child.pid
+
+    @property
     def restarts(self) -> int:
         """How often the writing process died and was brought back."""
         return self._restarts

@@ -58,6 +58,7 @@ class ArduCopterPeer(AutopilotPeer):
     """A copter on the floor, disarmed, in STABILIZE, until somebody talks to it."""
 
     takes_keys = True
+    pilots_mode = CopterMode.ALT_HOLD
 
     def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
         config = config or PeerConfig()

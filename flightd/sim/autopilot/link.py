@@ -77,6 +77,8 @@ class UdpLink(asyncio.DatagramProtocol):
         self.channels: dict[Address, Channel] = {}
         self.muted = False
         """A cut cable: nothing goes out, nothing comes in."""
+        self.withheld: set[int] = set()
+        """Ids of messages that are not sent."""
 
     async def open(self, host: str, port: int) -> Address:
         """Bind; port 0 takes a free one.  Returns the address bound."""
@@ -108,7 +110,7 @@ class UdpLink(asyncio.DatagramProtocol):
         return channel
 
     def send(self, channel: Channel, message: Message) -> None:
-        if self._transport is not None and not self.muted:
+        if self._transport is not None and not self.muted and message.get_msgId() not in self.withheld:
             frame = channel.pack(message, self._parser.signing.timestamp)
             self.down.carry(lambda: self._out(frame, channel.address))
 

@@ -76,6 +76,9 @@ class AutopilotPeer(abc.ABC):
     takes_keys = False
     """Whether SETUP_SIGNING is obeyed (on the ground)."""
 
+    pilots_mode: int
+    """The mode into which a pilot's switch takes it: he flies, it keeps the height."""
+
     def __init__(
         self, clock: Clock, airframe: Airframe, config: PeerConfig, parameters: ParameterServer
     ) -> None:
@@ -169,6 +172,10 @@ class AutopilotPeer(abc.ABC):
         self.link.broadcast(
             dialect.MAVLink_statustext_message(severity, text.encode("ascii", "replace")[:50])
         )
+
+    def jump_clock(self, jump_ns: int) -> None:
+        """The boot clock goes on from elsewhere; streams keep their rates."""
+        self._boot_ns -= jump_ns
 
     def reboot(self) -> None:
         """Power cycle: the boot clock starts again, streams are forgotten, motors stop."""

@@ -49,6 +49,8 @@ class Px4Peer(AutopilotPeer):
     """A PX4 multicopter on the floor, disarmed, in ALTCTL.  Its hover thrust is the airframe's, which
     MPC_THR_HOVER does not know."""
 
+    pilots_mode = Px4Mode.ALTCTL
+
     def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
         config = config or PeerConfig()
         parameters = ParameterServer({**PX4_PARAMETERS, **config.parameters}, bytewise=True)

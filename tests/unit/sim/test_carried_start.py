@@ -16,7 +16,7 @@ from flightd.core.errors import InputError
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.loops import VirtualLoop
 from flightd.sim.kinematics import Kinematics
-from flightd.sim.scenario import load_scenario
+from flightd.sim.scenario_files import load_scenario
 from flightd.sim.world import World
 
 CONFIGS = Path(__file__).parents[3] / "configs"

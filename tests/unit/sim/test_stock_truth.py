@@ -16,7 +16,7 @@ from flightd.sim.racks.look import RackLook
 from flightd.sim.racks.stock import Condition, Place, Situation, StockShares, stock
 from flightd.sim.racks.symbols import Symbol, Symbology
 from flightd.sim.racks.truth import LocationTruth, score_stock, stock_truth, write_truth
-from flightd.sim.scenario import load_scenario
+from flightd.sim.scenario_files import load_scenario
 
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-racks.toml")
 FOCAL_PX = 1000.0
