@@ -75,11 +75,11 @@ def told(flown: Flown, name: str) -> list[str]:
     return [event.text for event in flown.events if event.name == name]
 
 
-def landed_at(flown: Flown) -> str:
+def landed_at(flown: Flown, within_m: float = 0.15) -> str:
     last = flown.truth[-1][1]
     node = DEMO.nearest(last.x_m, last.y_m)
     assert last.height_m < 0.2
-    assert abs(last.x_m - node.x_m) + abs(last.y_m - node.y_m) < 0.15
+    assert abs(last.x_m - node.x_m) + abs(last.y_m - node.y_m) < within_m
     return node.id
 
 
@@ -109,12 +109,13 @@ def test_ordered_home_it_lands_there_with_the_rest_unvisited() -> None:
     assert flight.pilot.mission.remaining == ROW[1:]
 
 
-@pytest.mark.parametrize("order", [CommandKind.LAND, CommandKind.STOP])
-def test_ordered_down_it_lands_where_it_is(order: CommandKind) -> None:
+@pytest.mark.parametrize(("order", "within_m"), [(CommandKind.LAND, 0.15), (CommandKind.STOP, 0.6)])
+def test_ordered_down_it_lands_where_it_is(order: CommandKind, within_m: float) -> None:
+    """A stop goes down level and unsteered: the draught carries it."""
     flight = IdealFlight(DEMO, params(), visits=ROW)
     when(flight, (lambda o: o.phase is Phase.HOVER and o.goal == "A3", order, ""))
     flown = flight.fly()
-    assert (flown.phase, landed_at(flown)) == (Phase.ABORTED, "A3")
+    assert (flown.phase, landed_at(flown, within_m)) == (Phase.ABORTED, "A3")
 
 
 def test_a_closed_line_is_flown_round_and_what_it_cuts_off_is_refused() -> None:
