@@ -177,6 +177,10 @@ class _CountedTransport(asyncio.DatagramTransport):
     def get_extra_info(self, name: str, default: Any = None) -> Any:
         return self._inner.get_extra_info(name, default)
 
+    def get_write_buffer_size(self) -> int:
+        size: int = self._inner.get_write_buffer_size()  # type: ignore[attr-defined]  # not in the stubs
+        return size
+
     def close(self) -> None:
         self._inner.close()
 

@@ -146,6 +146,37 @@ def test_thrust_that_means_something_else_than_configured_is_not_flown(options: 
     run_virtual(test)
 
 
+def test_a_vehicle_found_flying_is_not_steered_before_the_meaning_of_thrust_is_known() -> None:
+    async def test() -> None:
+        autopilot = ScriptedAutopilot()
+        autopilot.parameters, autopilot.mode, autopilot.armed = {}, GUIDED_NOGPS, True
+        async with scripted(autopilot) as (_, vehicle):
+            vehicle.demand(Demand.KEEP)
+            await asyncio.sleep(1.0)
+            assert known(vehicle).refusal == "GUID_OPTIONS not read yet"
+            assert not known(vehicle).in_control
+            assert not vehicle.send(AttitudeSetpoint(0))
+            autopilot.parameters = {"GUID_OPTIONS": 8}
+            await asyncio.sleep(10.0)
+            assert (known(vehicle).in_control, known(vehicle).refusal) == (True, "")
+            assert vehicle.send(AttitudeSetpoint(0))
+
+    run_virtual(test)
+
+
+def test_a_clock_that_leaps_back_in_the_air_does_not_change_what_thrust_means() -> None:
+    async def test() -> None:
+        async with ardupilot_rig(PeerConfig(ready_s=0.5, parameters={"GUID_OPTIONS": 8})) as rig:
+            await rig.take_off(1.5)
+            height_m = rig.peer.truth().height_m
+            rig.peer.parameters.answer = lambda *_: None  # nor are parameters answered any more
+            rig.peer.link.broadcast(dialect.MAVLink_attitude_message(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            assert all(await rig.stream(3.0))
+            assert rig.peer.truth().height_m == pytest.approx(height_m, abs=0.15)
+
+    run_virtual(test)
+
+
 # Whom we believe
 
 

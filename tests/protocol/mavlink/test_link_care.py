@@ -7,9 +7,13 @@ import math
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser
 from flightd.adapters.vehicle.mavlink.outputs import PoseForm
+from flightd.adapters.vehicle.mavlink.statustext import TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Demand, Event, EventLevel, GridPose
@@ -216,3 +220,29 @@ def test_a_reason_in_chunks_is_told_whole() -> None:
             assert known(vehicle).refusal == "arming: failed (PreArm: " + "y" * 42 + "z" * 10 + ")"
 
     run_virtual(test)
+
+
+@given(st.text("ab", max_size=300))
+def test_long_texts_end_where_they_end(text: str) -> None:
+    messages = make_texts(4, text, 7)
+    heard = TextAssembler()
+    told = [whole for message in messages for whole in heard.add(_sent(message))]
+    assert told == [(4, text[:199])]
+
+
+def test_texts_from_a_sender_that_never_changes_their_id_are_told_and_do_not_pile_up() -> None:
+    heard = TextAssembler()
+    texts = [f"{number:050}" for number in range(100)]
+    told = [
+        text
+        for part in texts
+        for _ in range(2)  # a poor radio doubles them
+        for _, text in heard.add(_sent(dialect.MAVLink_statustext_message(4, part.encode(), 1, 0)))
+    ]
+    assert told == texts[:-1]
+
+
+def _sent(message: Any) -> Any:
+    """The message as it arrives."""
+    (heard,) = FrameParser(Codec(1)).datagram(Codec(1).pack(message))
+    return heard

@@ -77,6 +77,54 @@ def test_the_gate_passes_set_points_only_while_they_are_fresh_and_all_else_alway
     assert gate.held_back == 3
 
 
+_SET_MODE = dialect.MAVLink_command_long_message(1, 1, 176, 1, 1, 6, 0, 0, 0, 0, 0)
+_COMMANDS = (
+    _SET_MODE,
+    dialect.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0),
+    dialect.MAVLink_command_int_message(1, 1, 0, 176, 0, 0, 1, 6, 0, 0, 0, 0, 0),
+    dialect.MAVLink_set_mode_message(1, 1, 6 << 16),
+)
+
+
+@pytest.mark.parametrize("v1", [False, True])
+def test_the_gate_passes_changes_of_mode_and_arming_only_while_we_command(v1: bool) -> None:
+    gate = SetpointGate()
+    for message in _COMMANDS:
+        frame = _packed(message, v1=v1)
+        gate.commanding = False
+        assert not gate.passes(frame, 5), message
+        gate.commanding = True
+        assert gate.passes(frame, 5), message
+    gate.commanding = False
+    assert gate.passes(_packed(dialect.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0)), 5)
+
+
+def test_the_library_repeats_no_change_of_mode_once_we_let_go() -> None:
+    async def test() -> None:
+        async with mavsdk_rig() as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            heard = []
+
+            def deaf(channel: Any, message: Message, now_ns: int) -> None:
+                if message.command == 176:
+                    heard.append(message)  # neither obeyed nor answered
+                else:
+                    answer(channel, message, now_ns)
+
+            answer, rig.peer._answer = rig.peer._answer, deaf
+            rig.vehicle.demand(Demand.FLY)
+            await rig.until(lambda: bool(heard))
+            rig.vehicle.demand(Demand.HANDS_OFF)
+            await asyncio.sleep(0.1)
+            heard.clear()
+            await asyncio.sleep(2.5)
+            assert not heard
+            assert isinstance(rig.vehicle, MavsdkVehicle)
+            assert rig.vehicle.gate.held_back > 0
+
+    run_real(test)
+
+
 def test_a_landed_state_is_believed_for_a_second() -> None:
     readings = Readings(ClockSync())
     readings.take_landed(SdkLanded.ON_GROUND, 5)

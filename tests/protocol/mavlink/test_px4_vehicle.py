@@ -102,6 +102,20 @@ def test_the_hover_thrust_is_found_whatever_the_airframe(hover: float) -> None:
     run_virtual(test)
 
 
+def test_the_hover_thrust_that_was_found_is_not_lost_to_a_parameter_that_comes_late() -> None:
+    async def test() -> None:
+        async with px4_rig() as rig:
+            answer, rig.peer.parameters.answer = rig.peer.parameters.answer, lambda *_: None
+            await rig.take_off(1.5)
+            rig.peer.parameters["MPC_THR_HOVER"] = 0.8
+            rig.peer.parameters.answer = answer
+            for _ in range(80):
+                await rig.stream(0.1)
+                assert abs(rig.peer.truth().climb_mps) < 0.2
+
+    run_virtual(test)
+
+
 def test_thrust_is_cut_after_touch_down_so_that_it_reports_landed() -> None:
     async def test() -> None:
         async with px4_rig() as rig:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 import socket
 from collections.abc import AsyncIterator
@@ -16,6 +17,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser
 from flightd.adapters.vehicle.mavlink.endpoint import Endpoint, EndpointKind, parse_endpoint
+from flightd.adapters.vehicle.mavlink.transport import TcpTransport, UdpTransport
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
@@ -23,6 +25,25 @@ from flightd.sim.airframe import Airframe
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.peer import PeerConfig
 from tests.protocol.rig import Rig, run_virtual
+
+
+class StandingSocket:
+    """In the place of a transport's socket: it takes nothing until it `runs`."""
+
+    def __init__(self, transport: Any) -> None:
+        transport = getattr(transport, "_inner", transport)
+        self._socket = transport._sock
+        self.runs = False
+        self.sent: list[bytes] = []
+        transport._sock = self
+
+    def send(self, data: bytes) -> None:
+        if not self.runs:
+            raise BlockingIOError
+        self.sent.append(data)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._socket, name)
 
 
 @pytest.mark.parametrize(
@@ -218,6 +239,65 @@ def test_a_stalled_tcp_line_drops_what_is_new_instead_of_piling_it_up() -> None:
             assert accepted < 400_000
             server.close()
             await server.wait_closed()
+
+    run_virtual(test)
+
+
+def test_a_stalled_network_drops_datagrams_instead_of_piling_them_up() -> None:
+    async def test() -> None:
+        line = UdpTransport(parse_endpoint("udpout://127.0.0.1:9"))
+        await line.open()
+        standing = StandingSocket(line._transport)
+        assert [line.send(b"old")] + [line.send(b"new") for _ in range(20)] == [True] + [False] * 20
+        await asyncio.sleep(0.05)
+        standing.runs = True
+        await asyncio.sleep(0.05)
+        assert line.send(b"newest")
+        assert standing.sent == [b"old", b"newest"]
+        line.close()
+
+    asyncio.run(test())  # virtual time would wait for what is never delivered
+
+
+def test_a_called_socket_of_another_network_is_opened_anew() -> None:
+    async def test() -> None:
+        for url, number, opened_anew in (
+            ("udpout://127.0.0.1:9", errno.EINVAL, True),
+            ("udpout://127.0.0.1:9", errno.ENETUNREACH, True),
+            ("udpout://127.0.0.1:9", errno.ECONNREFUSED, False),
+            ("udpin://127.0.0.1:0", errno.ENETUNREACH, False),
+        ):
+            kind, _, place = url.partition("://")
+            line = UdpTransport(Endpoint(EndpointKind(kind), "127.0.0.1", int(place.rpartition(":")[2])))
+            losses: list[int] = []
+            line.lost = lambda losses=losses: losses.append(1)  # type: ignore[misc]
+            await line.open()
+            line.error_received(OSError(number, "no way out"))
+            assert bool(losses) is opened_anew, (url, number)
+            line.close()
+
+    run_virtual(test)
+
+
+def test_a_tcp_port_that_never_answers_is_called_again_soon() -> None:
+    async def test() -> None:
+        with socket.socket() as full:
+            full.bind(("127.0.0.1", 0))
+            full.listen(0)
+            place = full.getsockname()
+            waiting = []
+            for _ in range(4):  # more than it queues: what comes then is not even refused
+                caller = socket.socket()
+                caller.setblocking(False)
+                caller.connect_ex(place)
+                waiting.append(caller)
+            line = TcpTransport(Endpoint(EndpointKind.TCP, *place))
+            began_s = asyncio.get_running_loop().time()
+            with pytest.raises(OSError, match="timed out"):
+                await line.open()
+            assert asyncio.get_running_loop().time() - began_s < 5.0
+            for caller in waiting:
+                caller.close()
 
     run_virtual(test)
 

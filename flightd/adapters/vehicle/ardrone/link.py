@@ -11,6 +11,7 @@ from flightd.adapters.vehicle.ardrone.at import AtCommand, AtEncoder
 from flightd.adapters.vehicle.ardrone.navdata import WAKE_UP, Navdata, NavdataError, NavdataOrder, parse
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.ports import Clock
+from flightd.runtime.datagrams import is_stalled
 
 _log = logging.getLogger(__name__)
 
@@ -43,6 +44,7 @@ class Link:
         self.sent_ns = 0
         self.bad_packets = 0
         self.stale_packets = 0
+        self.dropped = 0
 
     async def tend(self) -> None:
         """Open or reopen the sockets and wake the drone as its silence asks for; call at every beat."""
@@ -56,8 +58,11 @@ class Link:
             self._navdata.sendto(WAKE_UP)
 
     def send(self, *commands: AtCommand) -> None:
-        """One group of commands, at once; lost when there is no network."""
+        """One group of commands, at once; lost when there is no network or it takes no more."""
         if self._at is None or not commands:
+            return
+        if is_stalled(self._at):
+            self.dropped += 1
             return
         self.sent_ns = self._clock.now_ns()
         for datagram in self._encoder.datagrams([commands]):

@@ -33,8 +33,8 @@ _THRUST_IS_COLLECTIVE = 8
 
 class ArduPilotVehicle(MavlinkVehicle):
     """An ArduCopter.  With bit 3 of GUID_OPTIONS thrust is collective and our own height loop flies;
-    until that parameter is known the vehicle is not armed, for the thrust that holds the height would
-    then be half of full power."""
+    until that parameter is known the vehicle is neither armed nor taken over, for the thrust that holds
+    the height would then be half of full power."""
 
     firmware = Firmware.ARDUPILOT
     flying_mode: int = GUIDED_NOGPS
@@ -53,6 +53,7 @@ class ArduPilotVehicle(MavlinkVehicle):
         super().__init__(url, clock, options)
         self.flying_mode = flying_mode
         self._raw_thrust = options.raw_thrust
+        self._flies_raw = False
         self._origin: Origin | None = None
         if options.pose_form is not None:
             self._origin = Origin(self.link, self._commander, options.system_id, options.origin_deg)
@@ -93,10 +94,14 @@ class ArduPilotVehicle(MavlinkVehicle):
     def _thrust_is_raw(self) -> bool | None:
         """Whether thrust is collective; None while the parameter is not known."""
         found = self.parameters.get(_GUID_OPTIONS)
-        return None if found is None else bool(int(found[1]) & _THRUST_IS_COLLECTIVE)
+        if found is None:
+            return None
+        self._flies_raw = bool(int(found[1]) & _THRUST_IS_COLLECTIVE)
+        return self._flies_raw
 
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
-        if self._thrust_is_raw():
+        raw = self._thrust_is_raw()
+        if self._flies_raw if raw is None else raw:  # it is read anew in the air: it is what it was
             return self._steering.collective(setpoint, now_ns)
         return climb_thrust(
             setpoint.climb_mps,

@@ -64,6 +64,8 @@ class MavlinkLink:
         self.system_status = dialect.MAV_STATE_STANDBY
         self.firmware: Firmware | None = None
         self.sent = 0
+        self.dropped = 0
+        """What no line could take."""
         self.received = 0
         transport.received = self._received
         transport.lost = self._lost.set
@@ -119,6 +121,7 @@ class MavlinkLink:
         """Pack and hand over one message; False when the line could not take it."""
         out = self._transport.send(self._codec.pack(message))
         self.sent += out
+        self.dropped += not out
         return out
 
     def _received(self, data: bytes, source: Source) -> None:

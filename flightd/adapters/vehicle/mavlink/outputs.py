@@ -21,6 +21,7 @@ _VISION = dialect.MAV_ESTIMATOR_TYPE_VISION
 _HEIGHT_VARIANCE_M2 = 0.02**2
 _TILT_VARIANCE_RAD2 = math.radians(0.5) ** 2
 _SPEED_VARIANCE_M2PS2 = 0.05**2
+_UNKNOWN_CLIMB_VARIANCE_M2PS2 = 1.0
 
 
 class PoseForm(StrEnum):
@@ -41,14 +42,18 @@ class PoseOutput:
         self._due_ns = 0
         self._resets = 0
 
-    def make(self, now_ns: int, pose: GridPose, attitude: Attitude, height_m: float) -> Message | None:
-        """The message for a pose, or None while none is due or the height is unknown (NaN)."""
+    def make(
+        self, now_ns: int, pose: GridPose, attitude: Attitude, height_m: float, climb_mps: float
+    ) -> Message | None:
+        """The message for a pose, or None while none is due or the height is unknown (NaN); an unknown
+        climb rate (NaN) goes out as none, with a variance that says so."""
         self._watch(pose)
         if now_ns < self._due_ns or math.isnan(height_m):
             return None
         self._due_ns = max(self._due_ns + self._period_ns, now_ns + self._period_ns // 2)
-        make = odometry if self._form is PoseForm.ODOMETRY else vision_position
-        return make(pose, attitude, height_m, self._resets)
+        if self._form is PoseForm.ODOMETRY:
+            return odometry(pose, attitude, height_m, climb_mps, self._resets)
+        return vision_position(pose, attitude, height_m, self._resets)
 
     def _watch(self, pose: GridPose) -> None:
         """A fix that moved further than its own velocity explains is a jump."""
@@ -61,11 +66,13 @@ class PoseOutput:
             self._resets = (self._resets + 1) % 256
 
 
-def odometry(pose: GridPose, attitude: Attitude, height_m: float, resets: int) -> Message:
+def odometry(pose: GridPose, attitude: Attitude, height_m: float, climb_mps: float, resets: int) -> Message:
     """ODOMETRY in LOCAL_FRD with velocities in BODY_FRD: the one pair of frames that ArduPilot takes, and
     PX4 takes it too."""
     q = quaternion(attitude.roll_rad, attitude.pitch_rad, pose.yaw_rad)
-    forward, right, down = _to_body(q, pose.vx_mps, pose.vy_mps, 0.0)
+    climbs = not math.isnan(climb_mps)
+    forward, right, down = _to_body(q, pose.vx_mps, pose.vy_mps, -climb_mps if climbs else 0.0)
+    down_variance = _SPEED_VARIANCE_M2PS2 if climbs else _UNKNOWN_CLIMB_VARIANCE_M2PS2
     return dialect.MAVLink_odometry_message(
         pose.stamp_ns // 1000,
         dialect.MAV_FRAME_LOCAL_FRD,
@@ -81,7 +88,7 @@ def odometry(pose: GridPose, attitude: Attitude, height_m: float, resets: int) -
         math.nan,
         math.nan,
         _pose_covariance(pose),
-        _upper_triangle([_SPEED_VARIANCE_M2PS2] * 3 + [math.radians(5.0) ** 2] * 3),
+        _upper_triangle([_SPEED_VARIANCE_M2PS2] * 2 + [down_variance] + [math.radians(5.0) ** 2] * 3),
         resets,
         _VISION,
         max(1, round(100 * min(max(pose.integrity, 0.0), 1.0))),
@@ -104,21 +111,19 @@ def vision_position(pose: GridPose, attitude: Attitude, height_m: float, resets:
 
 
 def landing_target(
-    firmware: Firmware, pose: GridPose, pad_m: tuple[float, float], height_m: float
+    firmware: Firmware, pose: GridPose, attitude: Attitude, pad_m: tuple[float, float], height_m: float
 ) -> Message:
     """LANDING_TARGET for a pad at map position `pad_m`, in the frame that the firmware wants.
 
-    ArduPilot: the vector from the level body in BODY_FRD, its length above zero.  PX4: the pad's place
-    in the local frame, which is the map's when it fuses our poses.
+    ArduPilot: the vector in BODY_FRD, which it turns by roll and pitch too, its length above zero.  PX4:
+    the pad's place in the local frame, which is the map's when it fuses our poses.
     """
-    dx, dy = pad_m[0] - pose.x_m, pad_m[1] - pose.y_m
-    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     if firmware is Firmware.PX4:
         frame, place, distance_m = dialect.MAV_FRAME_LOCAL_NED, (*pad_m, 0.0), 0.0
     else:
-        down_m = max(height_m, 0.01)
+        q = quaternion(attitude.roll_rad, attitude.pitch_rad, pose.yaw_rad)
         frame = dialect.MAV_FRAME_BODY_FRD
-        place = (dx * cos + dy * sin, dy * cos - dx * sin, down_m)
+        place = _to_body(q, pad_m[0] - pose.x_m, pad_m[1] - pose.y_m, max(height_m, 0.01))
         distance_m = math.hypot(*place)
     return dialect.MAVLink_landing_target_message(
         pose.stamp_ns // 1000,

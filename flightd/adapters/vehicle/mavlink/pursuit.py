@@ -112,6 +112,11 @@ class Pursuit:
         return self._demand is Demand.FLY and not self._authority.taken and not self.is_silent
 
     @property
+    def may_command(self) -> bool:
+        """Whether the mission wants something of a vehicle that nobody has taken from us."""
+        return self.is_engaged and not self._authority.taken
+
+    @property
     def stands(self) -> bool:
         """On the floor, as far as the autopilot knows."""
         says = self._telemetry.landed(self._clock.now_ns())
@@ -180,14 +185,16 @@ class Pursuit:
         if demand not in _ENGAGED or self._authority.taken or self.is_silent:
             return
         firmware, held, armed = self._firmware, self._authority.held, self._telemetry.armed
-        problem = firmware.not_fit() if demand is Demand.FLY else ""
+        takes_over = demand is Demand.FLY or (demand is Demand.KEEP and held is None)
+        problem = firmware.not_fit() if takes_over else ""
         match demand:
+            case Demand.FLY | Demand.KEEP if problem:
+                self._refuse(problem)
             case Demand.KEEP if (
                 held is None and armed and self._telemetry.custom_mode == firmware.flying_mode
             ):
+                self._refused = ""
                 self._authority.ask(firmware.flying_mode, firmware.flying_mode)
-            case Demand.FLY if problem:
-                self._refuse(problem)
             case Demand.FLY if held != firmware.flying_mode:
                 await self._ask_mode(firmware.flying_mode)
             case Demand.FLY if not armed and not self._was_armed:

@@ -83,9 +83,9 @@ class Px4Vehicle(MavlinkVehicle):
         return self._steering.collective(setpoint, now_ns)
 
     def _guess_hover(self) -> None:
-        """Start from the autopilot's own idea of the hover thrust."""
+        """Start from the autopilot's own idea of the hover thrust; in the air the loop knows better."""
         found = self.parameters.get(("MPC_THR_HOVER",))
-        if found is not None and not self._guessed:
+        if found is not None and not self._guessed and not self._steering.height.in_air:
             self._guessed = True
             self._steering.height.hover = min(max(found[1], 0.1), 0.8)
 

@@ -149,6 +149,10 @@ def _keep(state: Path | None, timestamp: int) -> None:
         return
     with contextlib.suppress(OSError):
         fd, name = tempfile.mkstemp(dir=state.parent, prefix=state.name)
-        with os.fdopen(fd, "w", encoding="ascii") as out:
-            out.write(str(timestamp))
-        Path(name).replace(state)
+        try:
+            with os.fdopen(fd, "w", encoding="ascii") as out:
+                out.write(str(timestamp))
+            Path(name).replace(state)
+        except OSError:
+            Path(name).unlink()  # else a full disk gathers one each half minute
+            raise

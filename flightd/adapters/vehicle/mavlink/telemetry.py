@@ -12,6 +12,7 @@ from flightd.adapters.vehicle.mavlink.timesync import ClockSync
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _ATTITUDES_MAX = 512
+_HEIGHTS_MAX = 64
 _NS_PER_MS = 1_000_000
 _STAMP_AGE_MAX_NS = 500_000_000
 _AHEAD_NS = 50_000_000
@@ -43,7 +44,7 @@ class Telemetry:
         self._range_ns = 0
         self._climb_mps = math.nan
         self._climb_ns = 0
-        self._heights: deque[tuple[int, int]] = deque()
+        self._heights: deque[tuple[int, int]] = deque(maxlen=_HEIGHTS_MAX)
         self._landed = LandedState.UNKNOWN
         self._landed_ns = 0
         self._battery_frac = math.nan

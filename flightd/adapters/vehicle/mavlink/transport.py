@@ -14,6 +14,7 @@ from typing import Any, TypeAlias
 
 from flightd.adapters.vehicle.mavlink.endpoint import Endpoint, EndpointKind
 from flightd.core.errors import InputError, UnavailableError
+from flightd.runtime.datagrams import is_stalled
 
 Source: TypeAlias = tuple[str, int] | None
 """Address a datagram came from; None on a stream."""
@@ -21,6 +22,13 @@ Source: TypeAlias = tuple[str, int] | None
 _RECEIVE_BUFFER_BYTES = 1 << 20
 _BACKLOG_MAX_BYTES = 4096
 """More than this unsent means a stalled link: what is new is dropped, stale setpoints must not pile up."""
+_SEND_BUFFER_BYTES = 16_384
+"""Nor may they in the kernel, whose own choice holds half a minute of them."""
+_CONNECT_S = 3.0
+_UNHEARD_MS = 5_000
+"""A TCP line whose other end acknowledges nothing for so long is dead, though nobody has said so."""
+_MOVED = frozenset({errno.EINVAL, errno.EADDRNOTAVAIL, errno.ENETUNREACH, errno.ENETDOWN})
+"""What a called UDP socket says once this computer has left its network or has another address there."""
 
 
 class Transport(abc.ABC):
@@ -72,6 +80,7 @@ class UdpTransport(Transport, asyncio.DatagramProtocol):
             raise
         sock = self._transport.get_extra_info("socket")
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
 
     @property
     def address(self) -> tuple[str, int]:
@@ -81,7 +90,7 @@ class UdpTransport(Transport, asyncio.DatagramProtocol):
         return name
 
     def send(self, data: bytes) -> bool:
-        if self._transport is None:
+        if self._transport is None or is_stalled(self._transport):
             return False
         if self.endpoint.kind is EndpointKind.UDP_OUT:
             self._transport.sendto(data)
@@ -100,7 +109,11 @@ class UdpTransport(Transport, asyncio.DatagramProtocol):
         self.received(data, (addr[0], addr[1]))
 
     def error_received(self, exc: Exception) -> None:
-        """Nobody listens there yet (ICMP): the vehicle may boot later."""
+        """Nobody listens there yet (ICMP): the vehicle may boot later.  A socket of another network is
+        opened anew."""
+        calls = self.endpoint.kind is EndpointKind.UDP_OUT
+        if calls and isinstance(exc, OSError) and exc.errno in _MOVED:
+            self.lost()
 
     def connection_lost(self, exc: Exception | None) -> None:
         if exc is not None:
@@ -118,9 +131,16 @@ class TcpTransport(Transport, asyncio.Protocol):
 
     async def open(self) -> None:
         loop = asyncio.get_running_loop()
-        self._transport, _ = await loop.create_connection(
-            lambda: self, self.endpoint.host, self.endpoint.port
-        )
+        try:
+            async with asyncio.timeout(_CONNECT_S):
+                self._transport, _ = await loop.create_connection(
+                    lambda: self, self.endpoint.host, self.endpoint.port
+                )
+        except TimeoutError as err:
+            raise OSError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT)) from err
+        sock = self._transport.get_extra_info("socket")
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNHEARD_MS)
 
     def send(self, data: bytes) -> bool:
         transport = self._transport

@@ -164,11 +164,11 @@ class MavlinkVehicle(abc.ABC):
         attitude, height_m = self._telemetry.attitude, self._telemetry.height_m(now_ns)
         if self._pose_output is None or attitude is None:
             return
-        message = self._pose_output.make(now_ns, pose, attitude, height_m)
+        message = self._pose_output.make(now_ns, pose, attitude, height_m, self._telemetry.climb_mps(now_ns))
         if message is not None:
             self.link.send(message)
             if pad_m is not None and math.dist(pad_m, (pose.x_m, pose.y_m)) < _PAD_NEAR_M:
-                self.link.send(landing_target(self.firmware, pose, pad_m, height_m))
+                self.link.send(landing_target(self.firmware, pose, attitude, pad_m, height_m))
 
     # The firmware
 

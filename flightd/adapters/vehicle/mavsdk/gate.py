@@ -1,12 +1,18 @@
-"""The gate between MAVSDK and the wire: set points pass only while the mission is alive.
+"""The gate between MAVSDK and the wire: set points pass only while the mission is alive, changes of mode and
+arming only while the vehicle is ours to command.
 
 MAVSDK repeats the newest attitude set point 20 times a second by itself, on a thread of its own, until
-told otherwise: a dead control loop would be kept flying at its last tilt.
+told otherwise: a dead control loop would be kept flying at its last tilt.  It also repeats a command that was
+not answered, for more than a second: the pilot who took over meanwhile would lose the vehicle again.
 """
 
 from __future__ import annotations
 
 SET_ATTITUDE_TARGET = 82
+_SET_MODE, _COMMAND_INT, _COMMAND_LONG = 11, 75, 76
+_COMMAND_AT = 28
+"""Where both COMMAND messages have their command on the wire, from the payload's start."""
+_DO_SET_MODE, _ARM_DISARM = 176, 400
 
 FRESH_NS = 200_000_000
 """A set point older than this does not go out any more; less than any autopilot's own time-out."""
@@ -23,13 +29,24 @@ def message_id(frame: bytes) -> int | None:
     return None
 
 
+def commands_flight(frame: bytes) -> bool:
+    """Whether this frame changes the mode, arms or disarms."""
+    kind = message_id(frame)
+    if kind not in {_COMMAND_INT, _COMMAND_LONG}:
+        return kind == _SET_MODE
+    at = _COMMAND_AT + (10 if frame[0] == _V2 else 6)
+    return int.from_bytes(frame[at : at + 2], "little") in {_DO_SET_MODE, _ARM_DISARM}
+
+
 class SetpointGate:
-    """Passes every frame but attitude set points; those only for `FRESH_NS` after each `refresh`."""
+    """Passes attitude set points only for `FRESH_NS` after each `refresh`, commands that change who flies
+    only while it is `commanding`, everything else always."""
 
     def __init__(self) -> None:
         self._until_ns = 0
+        self.commanding = False
         self.held_back = 0
-        """Repeats of old set points that were kept from the wire."""
+        """Repeats of old set points and commands that were kept from the wire."""
 
     def refresh(self, now_ns: int) -> None:
         """A set point was made now."""
@@ -41,7 +58,11 @@ class SetpointGate:
 
     def passes(self, frame: bytes, now_ns: int) -> bool:
         """Whether this frame may go out."""
-        if now_ns < self._until_ns or message_id(frame) != SET_ATTITUDE_TARGET:
+        if message_id(frame) == SET_ATTITUDE_TARGET:
+            passes = now_ns < self._until_ns
+        else:
+            passes = self.commanding or not commands_flight(frame)
+        if passes:
             return True
         self.held_back += 1
         return False

@@ -261,7 +261,8 @@ class MavsdkVehicle:
     # Set points
 
     def _mind_gate(self) -> None:
-        """Shut it as soon as nobody here may steer any more."""
+        """Shut it as soon as nobody here may steer any more, or command."""
+        self.gate.commanding = self._pursuit.may_command
         if not self._pursuit.may_steer and not self._pursuit.wants_flight:
             self.gate.close()
 
