@@ -84,7 +84,9 @@ def sim(
     def prepare(conditions: Scenario, folder: Path, route: list[str]) -> Simulation:
         keys = _camera_keys(conditions)
         chosen, site = _configured(config, warehouse, vehicle, [*route, *(settings or [])], keys)
-        factor = _factor(speed, _own_clock(chosen.vehicle.kind, truth_url), clock=conditions.needs_real_time)
+        clock = conditions.needs_real_time
+        wanted = None if route and not clock else speed  # of all, only those that need the clock
+        factor = _factor(wanted, _own_clock(chosen.vehicle.kind, truth_url), clock=clock)
         if external:
             truth_address(truth_url)
             update = {"vehicle": chosen.vehicle.model_copy(update={"url": vehicle_url})}

@@ -132,7 +132,8 @@ class WindChange(_Fault):
 
 
 class VehicleFault(_Fault):
-    """A pilot moves his mode switch, or the autopilot starts anew in the air (its motors stop)."""
+    """A pilot moves his mode switch and at the fault's end lets it land; or the autopilot starts anew in the
+    air (its motors stop)."""
 
     by_vehicle = True
     kind: Literal["pilot", "vehicle_reboot"]

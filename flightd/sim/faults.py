@@ -200,7 +200,7 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
             wrong.range_lost = on
         case ClockJump():
             vehicle.jump_clock(round(fault.jump_s * 1e9) * (1 if on else -1))
-        case VehicleFault(kind="pilot") if on:
-            vehicle.pilot_mode(vehicle.pilots_mode)
+        case VehicleFault(kind="pilot"):
+            vehicle.pilot_mode(vehicle.pilots_mode if on else vehicle.landing_mode)
         case VehicleFault() if on:
             vehicle.reboot()

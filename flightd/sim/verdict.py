@@ -50,7 +50,8 @@ def judge(
     truth: Sequence[Kinematics],
 ) -> Verdict:
     """`begun_ns` are the times at which faults began; all in time order."""
-    flying = [t for t in truth if t.height_m > _OFF_FLOOR_M]
+    ours_ns = next((status.stamp_ns for status in statuses if status.phase is Phase.PILOT), math.inf)
+    flying = [t for t in truth if t.height_m > _OFF_FLOOR_M and t.stamp_ns < ours_ns]  # then it is his
     if not flying:
         return Verdict(row.name, None, row.action.value, (), "never flew", None, 0.0, False, "never flew")
     start_ns = min(begun_ns, default=flying[0].stamp_ns)

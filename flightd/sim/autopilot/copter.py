@@ -59,6 +59,7 @@ class ArduCopterPeer(AutopilotPeer):
 
     takes_keys = True
     pilots_mode = CopterMode.ALT_HOLD
+    landing_mode = CopterMode.LAND
 
     def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
         config = config or PeerConfig()

@@ -79,6 +79,8 @@ class AutopilotPeer(abc.ABC):
     pilots_mode: int
     """The mode into which a pilot's switch takes it: he flies, it keeps the height."""
 
+    landing_mode: int
+
     def __init__(
         self, clock: Clock, airframe: Airframe, config: PeerConfig, parameters: ParameterServer
     ) -> None:

@@ -50,6 +50,7 @@ class Px4Peer(AutopilotPeer):
     MPC_THR_HOVER does not know."""
 
     pilots_mode = Px4Mode.ALTCTL
+    landing_mode = Px4Mode.AUTO_LAND
 
     def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
         config = config or PeerConfig()
