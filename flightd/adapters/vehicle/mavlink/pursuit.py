@@ -102,9 +102,10 @@ class Pursuit:
 
     @property
     def may_steer(self) -> bool:
-        """Whether setpoints may go out."""
-        flying = self._authority.held == self._firmware.flying_mode
-        return self.is_engaged and flying and not self.is_silent
+        """Whether setpoints may go out.  Heartbeats that fail to come do not end them: an autopilot whose
+        setpoints stop flies on by the last lean until its own time-out, and one that a pilot has taken
+        meanwhile passes over them."""
+        return self.is_engaged and self._authority.held == self._firmware.flying_mode
 
     @property
     def wants_flight(self) -> bool:
