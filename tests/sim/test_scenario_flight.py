@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -36,7 +37,7 @@ def test_two_faults_in_one_flight_are_done_found_and_answered(tmp_path: Path) ->
     assert result.exit_code != 0  # a flight that had to land is no completed mission
     summary = json.loads((out / "summary.json").read_text())
     assert summary["mission"] == "aborted"
-    notes = [entry.message for entry in read_log(out / "truth.mcap", {Topic.FAULT}).entries]
+    notes: list[Any] = [entry.message for entry in read_log(out / "truth.mcap", {Topic.FAULT}).entries]
     assert [(note["kind"], note["began"]) for note in notes] == [("battery", True), ("camera_black", True)]
     began_ns = notes[1]["stamp_ns"]
     told = [event for event in read_log(out / "flight.mcap").messages(Event) if event.name == "hazard"]
