@@ -29,6 +29,7 @@ from flightd.mission.plan import FlightPlan, VisitOrder, make_plan
 from flightd.mission.route import ordered_best
 from flightd.mission.scanner import Scanner
 from flightd.mission.sorties import check_battery
+from flightd.mission.views import view_height_m
 from flightd.pilot import Pilot, TickInput, TickOutput
 from flightd.ports import Camera, Clock, Ground, Monitor, PoseTaker, Recorder, Vehicle, Vitals
 from flightd.runtime.counting import Counting
@@ -101,8 +102,9 @@ def pilot_of(config: Config, site: Site) -> Pilot:
     flown = site.between(*flown_between_m(config, site))
     plan, policy = plan_of(config, site), config.heading_policy()
     params = config.pilot_params(site)
-    check_battery(flown, plan, policy, params.mission)
-    return Pilot(flown, plan, policy, params, scanner_of(config, site))
+    scanner = scanner_of(config, site)
+    check_battery(flown, plan, policy, params.mission, scanner)
+    return Pilot(flown, plan, policy, params, scanner)
 
 
 def scanner_of(config: Config, site: Site) -> Scanner | None:
@@ -120,14 +122,16 @@ def scanner_of(config: Config, site: Site) -> Scanner | None:
 
 
 def flown_between_m(config: Config, site: Site) -> tuple[float, float]:
-    """The heights that the legs are flown between: with a scan, those of the labels too."""
+    """The heights that are flown between: with a scan, those of its views too."""
     low_m, high_m = config.mission.flown_between_m()
     if not config.front_camera.is_fitted or not site.locations:
         return low_m, high_m
-    scan = config.scan_params(site.ceiling_m - CEILING_MARGIN_M)
-    labels = [location.height_m for location in site.locations.values()]
-    highest_m = min(max(labels), scan.max_height_m)
-    return min(low_m, scan.min_height_m - HEIGHT_ROOM_M), max(high_m, highest_m + HEIGHT_ROOM_M)
+    scan, mount = config.scan_params(site.ceiling_m - CEILING_MARGIN_M), config.front_camera.mount()
+    views_m = [
+        view_height_m(place.height_m, abs(place.y_m - site.nodes[place.node].y_m), mount, scan)
+        for place in site.locations.values()
+    ]
+    return min(low_m, min(views_m) - HEIGHT_ROOM_M), max(high_m, max(views_m) + HEIGHT_ROOM_M)
 
 
 def profile_of(config: Config, site: Site) -> str:

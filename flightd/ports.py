@@ -189,6 +189,10 @@ class Store(Protocol):
         """Confirm or withdraw what is pending of a run (committed unconfirmed) at these locations."""
         ...
 
+    def withdraw_pending(self, run: str) -> None:
+        """Withdraw all that is pending of a run: the flights that saw it are over."""
+        ...
+
     def counted(self, run: str) -> frozenset[str]:
         """The locations with a confirmed look of a run."""
         ...

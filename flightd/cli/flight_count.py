@@ -22,9 +22,10 @@ from flightd.runtime.readers import ReaderPool, Readers
 from flightd.runtime.store_writer import StoreWriter
 
 
-def going_on(config: Config, site: Site, folder: Path | None) -> Config:
+def going_on(config: Config, site: Site, folder: Path | None, *, in_air: bool = False) -> Config:
     """The configuration of a flight that goes on with a count (`inventory.run`) in `folder`: it visits only
-    nodes with locations that are not booked yet.  InputError when there are none left."""
+    nodes with locations that are not booked yet.  InputError when there are none left, unless the flight
+    may be `in_air` already (the daemon was started anew)."""
     run = config.inventory.run
     if not run or folder is None or not (folder / "inventory.db").exists():
         return config
@@ -33,6 +34,8 @@ def going_on(config: Config, site: Site, folder: Path | None) -> Config:
     if not counted:
         return config
     nodes = nodes_to_count(site, config.mission.nodes or site.serpentine_route(), counted)
+    if not nodes and in_air:
+        return config
     if not nodes:
         raise InputError(
             f"inventory.run {run!r}: every location is counted; give the next count another name"
@@ -58,6 +61,7 @@ class FlightCount:
         self._store.plan(
             PlannedLocation(location.code, location.node) for location in site.locations.values()
         )
+        self._store.withdraw_pending(self._run)
         self._counted = self._store.counted(self._run)
 
     async def begun(

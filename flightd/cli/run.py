@@ -65,9 +65,10 @@ def run(
         )
     site = load_site(chosen.mission.site)
     chosen = resumed(chosen, config, site, ordered=resume)
-    chosen = going_on(chosen, site, chosen.inventory.folder)
+    again = service.was_started_before(os.environ)
+    chosen = going_on(chosen, site, chosen.inventory.folder, in_air=again)
     journal = service.logs_to_journal(os.environ)
-    if service.was_started_before(os.environ):
+    if again:
         chosen = chosen.model_copy(update={"mission": chosen.mission.model_copy(update={"autostart": False})})
     service.note_start(os.environ)
     with FlightProgress(shown=not journal) as progress:

@@ -45,11 +45,12 @@ class FrontSight:
 
 @dataclass(frozen=True, slots=True)
 class PlacedRead:
-    """A code on the shelf front.  `location` is empty where no cell is surely its own; `probability` is
-    that of the best cell.  `size_m` is the larger side of the code."""
+    """A code on the shelf front.  `location` is empty where no cell is surely its own; `likeliest` is the
+    best cell and `probability` that of it.  `size_m` is the larger side of the code."""
 
     read: CodeRead
     location: str
+    likeliest: str
     x_m: float
     height_m: float
     size_m: float
@@ -157,7 +158,8 @@ class Assigner:
         scored = ((cell.inside_probability(x_m, height_m, sigma_x, sigma_h), cell) for cell in cells)
         best, cell = max(scored, key=lambda pair: pair[0])
         sure = best >= self._least and pose.certain
-        return PlacedRead(read, cell.location if sure else "", x_m, height_m, size_m, best)
+        location = cell.location if sure else ""
+        return PlacedRead(read, location, cell.location, x_m, height_m, size_m, best)
 
     def _sighting(
         self,

@@ -40,6 +40,9 @@ def profile_s(distance: float, speed: float, accel: float) -> float:
 class Pace:
     """How fast this mission moves: seconds for each kind of part."""
 
+    height_m: float
+    climb_mps: float
+    climb_accel_mps2: float
     speed_mps: float
     accel_mps2: float
     turn_rate_radps: float
@@ -52,6 +55,9 @@ class Pace:
     @classmethod
     def of(cls, p: MissionParams) -> Pace:
         return cls(
+            p.height_m,
+            p.climb_mps,
+            p.climb_accel_mps2,
             p.speed_mps,
             p.accel_mps2,
             p.turn_rate_radps,
@@ -65,6 +71,10 @@ class Pace:
     def leg_s(self, metres: float) -> float:
         """A straight leg from rest to rest, settled at its end."""
         return profile_s(metres, self.speed_mps, self.accel_mps2) + self.settle_s
+
+    def climb_s(self, metres: float) -> float:
+        """Up or down from one height to another, settled there."""
+        return profile_s(abs(metres), self.climb_mps, self.climb_accel_mps2) + self.settle_s
 
     def turn_s(self, angle_rad: float) -> float:
         """A turn on the spot; settling is waited for even where nothing is to be turned."""

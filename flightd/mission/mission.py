@@ -63,7 +63,7 @@ class Mission:
         self._watch = Watch(params)
         self._touchdown = Touchdown(params)
         self._relocator = Relocator(params)
-        self._sorties = Sorties(site, Legs(site, policy, Pace.of(params)), params.battery)
+        self._sorties = Sorties(site, Legs(site, policy, Pace.of(params)), params.battery, scanner)
         self._left_over: tuple[str, ...] = ()
         self._short_of_charge = False
         self._visited_before = 0
@@ -267,7 +267,7 @@ class Mission:
             return self._settled(s, scan.at_view(s, away_m, _speed(s))) or not due, Trigger.AT_VIEW
         over = Trigger.ROUTE_DONE if self._next + 1 >= len(self._stops) else Trigger.DWELLED
         if self.phase is Phase.SCAN:
-            done = not due or (scan.is_over(s.now_ns) and _sure(s, self._params))
+            done = not due or (_sure(s, self._params) and scan.is_over(s.now_ns))
             more = not self._returning and scan.due(self.phase, goal)
             return done, Trigger.VIEW_DONE if more else over
         if due:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from flightd.core.scanning import BodyPose, Finding
+from flightd.core.scanning import BodyPose, Finding, Occupancy
 from flightd.mission.assign import PlacedRead, ShelfLook
 from flightd.mission.tally import Tally, Verdict
 from flightd.mission.views import ScanParams, View, ViewPlanner
@@ -48,10 +49,6 @@ class ScanTask:
         """The view is reached and the drone at rest."""
         self._begun_ns = now_ns
 
-    def interrupt(self) -> None:
-        """The drone has left the view (a hold, a pilot): it must be reached again."""
-        self._begun_ns = None
-
     def take(self, look: ShelfLook) -> None:
         """One picture; those exposed on the way to the view tell nothing."""
         view = self.view
@@ -61,8 +58,11 @@ class ScanTask:
         reads: dict[str, list[PlacedRead]] = {}
         for placed in look.reads:
             reads.setdefault(placed.location, []).append(placed)
+        doubtful = {placed.likeliest for placed in look.reads if not placed.location}
         for code in self._left(view):
             place, own = places.get(code), reads.get(code, [])
+            if place is not None and code in doubtful:  # somebody's code: not an empty place
+                place = replace(place, occupancy=Occupancy.UNSURE)
             self._open[code].add(look.frame_seq, look.pose, place, own)
             self._settle(code, final=False)
 

@@ -7,17 +7,16 @@ so that nothing is ever booked on a wrong location; its locations are left to co
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 
-from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
 from flightd.core.types import Event, EventLevel
 from flightd.grid.site import Site
 from flightd.mission.assign import Assigner, FrontSight, Sighting
+from flightd.mission.legs import Pace
 from flightd.mission.scan_task import ScanTask
-from flightd.mission.views import ScanParams, View, ViewPlanner
+from flightd.mission.views import ScanParams, View, ViewPlanner, views_s
 
 _SAME_OFF_M = 0.3
 """A label seen so near to where it was found to hang wrong still hangs there."""
@@ -50,7 +49,6 @@ class Scanner:
         self._sightings: list[Sighting] = []
         self._accused: dict[str, float] = {}
         self._overruled: dict[str, float] = {}
-        self.states: Counter[LocationState] = Counter()
         self.doubted = False
 
     # What the mission asks
@@ -67,7 +65,15 @@ class Scanner:
 
     def wants(self, node: str) -> bool:
         """Whether locations of a node are left to count."""
-        return not self.doubted and any(code not in self._done for code in self._planner.locations(node))
+        return not self.doubted and bool(self._left(node))
+
+    def stop_s(self, node: str, pace: Pace) -> float:
+        """How long the count of what is left at a node takes, each view looked from once; 0 where nothing
+        is to be counted."""
+        if not self.wants(node):
+            return 0.0
+        views = self._planner.views(node, self._left(node), pace.height_m, 0.0)
+        return views_s(views, pace, self._params.view_s)
 
     def skip(self, locations: Iterable[str]) -> None:
         """These need no look any more: an earlier flight of the same count has booked them."""
@@ -76,8 +82,7 @@ class Scanner:
     def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:
         """Begin or continue the scan of a node that is reached."""
         self.leave()
-        left = frozenset(self._planner.locations(node)) - self._done
-        views = self._planner.views(node, left, height_m, yaw_rad)
+        views = self._planner.views(node, self._left(node), height_m, yaw_rad)
         self._task = ScanTask(node, views, self._planner, self._params)
         if not self._pending or self._pending[-1].node != node:
             self._pending.append(_Pending(node))
@@ -86,11 +91,6 @@ class Scanner:
         """The view is reached and the drone at rest."""
         if self._task is not None:
             self._task.begin(now_ns)
-
-    def interrupt(self) -> None:
-        """The view was left before it was over."""
-        if self._task is not None:
-            self._task.interrupt()
 
     def step(self, now_ns: int) -> bool:
         """True when the view is over; `view` is then the next one."""
@@ -192,13 +192,15 @@ class Scanner:
         known_m = self._overruled.get(seen.location)
         return known_m is not None and abs(known_m - seen.off_m) < _SAME_OFF_M
 
+    def _left(self, node: str) -> frozenset[str]:
+        return frozenset(self._planner.locations(node)) - self._done
+
     def _gather(self) -> None:
         if self._task is None:
             return
         for found in self._task.drain():
             self._found.append(found)
             self._done.add(found.location)
-            self.states[found.state] += 1
             self._pending[-1].locations.append(found.location)
 
     def _confirm(self, proven: list[_Pending]) -> None:

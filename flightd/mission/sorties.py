@@ -12,16 +12,25 @@ from flightd.mission.battery import BatteryGauge, BatteryParams
 from flightd.mission.guidance import MissionParams
 from flightd.mission.legs import Legs, Pace
 from flightd.mission.plan import FlightPlan, HeadingPolicy
+from flightd.mission.scanner import Scanner
 
 
-def check_battery(site: Site, plan: FlightPlan, policy: HeadingPolicy, params: MissionParams) -> None:
-    """InputError when a full battery does not reach one of the stops and come back with its reserve."""
-    sorties = Sorties(site, Legs(site, policy, Pace.of(params)), params.battery)
+def check_battery(
+    site: Site,
+    plan: FlightPlan,
+    policy: HeadingPolicy,
+    params: MissionParams,
+    scanner: Scanner | None = None,
+) -> None:
+    """InputError when a full battery does not reach one of the stops, last for what is done there, and come
+    back with its reserve."""
+    sorties = Sorties(site, Legs(site, policy, Pace.of(params)), params.battery, scanner)
     far = sorties.out_of_reach([stop.node for stop in plan.stops if stop.visit])
     if far:
         raise InputError(
             f"site {site.name}: a full battery (battery.flight_s = {params.battery.flight_s:g}) does not"
-            f" reach {far[0]} and come back with its reserve; add a charge pad, or leave the node out"
+            f" reach {far[0]}, last for the stop there and come back with its reserve; add a charge pad, or"
+            " leave the node out"
         )
 
 
@@ -34,11 +43,14 @@ class WayBack:
 
 
 class Sorties:
-    """The battery against the ways of one site.  `step` at each tick; the rest answers questions."""
+    """The battery against the ways of one site.  `step` at each tick; the rest answers questions.
 
-    def __init__(self, site: Site, legs: Legs, params: BatteryParams) -> None:
+    With a `scanner` a stop lasts as long as what it has left to count there."""
+
+    def __init__(self, site: Site, legs: Legs, params: BatteryParams, scanner: Scanner | None = None) -> None:
         self._site = site
         self._legs = legs
+        self._scanner = scanner
         self._params = params
         self._gauge = BatteryGauge(params.flight_s)
         self._ways: dict[str, WayBack] = {}
@@ -100,13 +112,18 @@ class Sorties:
                 cuts.append(tuple(sortie))
                 pad = self.way_back(here).pad
                 sortie, flown_s, on_s = [], self._legs.pace.take_off_s, self._legs.way_s(pad, there)
-            flown_s += on_s + self._legs.pace.dwell_s
+            flown_s += on_s + self._stop_s(there)
             sortie.append(there)
             here = there
         return (*cuts, tuple(sortie)) if sortie else tuple(cuts)
 
     def _out_s(self, on_s: float, there: str) -> float:
-        return on_s + self._legs.pace.dwell_s + self.way_back(there).seconds
+        return on_s + self._stop_s(there) + self.way_back(there).seconds
+
+    def _stop_s(self, node: str) -> float:
+        pace = self._legs.pace
+        counted_s = self._scanner.stop_s(node, pace) if self._scanner is not None else 0.0
+        return counted_s or pace.dwell_s
 
     def _fresh_frac(self, pad: str, node: str) -> float:
         on_s = self._legs.way_s(pad, node)

@@ -10,9 +10,11 @@ import numpy as np
 
 from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import BodyPose
+from flightd.core.view import ForwardMount
 from flightd.grid.cells import by_node
 from flightd.grid.site import Location, Side, Site
 from flightd.mission.assign import Assigner, FrontSight
+from flightd.mission.legs import Pace
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,11 +136,7 @@ class ViewPlanner:
         return View(node, first.aisle, first.side, at.x_m, at.y_m, height_m, self._yaw(first.side), codes)
 
     def _height(self, label_m: float, distance_m: float) -> float:
-        """Flying height at which the camera's axis meets the shelf at the labels' height."""
-        mount = self._sight.mount
-        forward_m, _, down_m = mount.offset_m
-        wanted = label_m + down_m - (distance_m - forward_m) * math.tan(mount.pitch_rad)
-        return min(max(wanted, self._params.min_height_m), self._params.max_height_m)
+        return view_height_m(label_m, distance_m, self._sight.mount, self._params)
 
     def _yaw(self, side: Side) -> float:
         """The heading in which the camera faces a side; a side camera needs no turn."""
@@ -158,6 +156,24 @@ class ViewPlanner:
         ends = np.array([(group[0].x_m, group[0].y_m, h_m) for h_m in (low, high)])
         rows = view.project(ends)[:, 1]
         return bool(np.all((rows >= 0.0) & (rows <= lens.height_px - 1)))
+
+
+def views_s(views: Sequence[View], pace: Pace, look_s: float) -> float:
+    """Seconds over `views` in their order, from the flying height on: climbing and turning at once, then
+    settling, and `look_s` from each."""
+    total, height_m, yaw_rad = 0.0, pace.height_m, views[0].yaw_rad + math.pi if views else 0.0
+    for view in views:
+        way_s = max(pace.climb_s(view.height_m - height_m), pace.turn_s(wrap_pi(view.yaw_rad - yaw_rad)))
+        total += way_s + look_s
+        height_m, yaw_rad = view.height_m, view.yaw_rad
+    return total
+
+
+def view_height_m(label_m: float, distance_m: float, mount: ForwardMount, params: ScanParams) -> float:
+    """Flying height at which the camera's axis meets the shelf at the labels' height, as far as it may."""
+    forward_m, _, down_m = mount.offset_m
+    wanted = label_m + down_m - (distance_m - forward_m) * math.tan(mount.pitch_rad)
+    return min(max(wanted, params.min_height_m), params.max_height_m)
 
 
 def _clamp(value: float, limit: float) -> float:

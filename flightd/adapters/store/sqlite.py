@@ -141,12 +141,21 @@ class SqliteStore:
                 self._db.execute("BEGIN IMMEDIATE")
                 try:
                     yield
+                    self._db.execute("COMMIT")
                 except BaseException:
-                    self._db.execute("ROLLBACK")
+                    if self._db.in_transaction:  # a failed commit may leave it open, or have ended it
+                        self._db.execute("ROLLBACK")
                     raise
-                self._db.execute("COMMIT")
-            except sqlite3.OperationalError as err:
+            except sqlite3.Error as err:
                 raise UnavailableError(f"{self._file}: cannot be written: {err}") from err
+
+    @contextmanager
+    def _reading(self) -> Iterator[None]:
+        with self._lock:
+            try:
+                yield
+            except sqlite3.Error as err:
+                raise UnavailableError(f"{self._file}: cannot be read: {err}") from err
 
     def plan(self, locations: Iterable[PlannedLocation]) -> None:
         """Make locations known; the node of a known one follows the newest plan."""
@@ -175,9 +184,17 @@ class SqliteStore:
                 [(standing, location, run, _PENDING) for location in locations],
             )
 
+    def withdraw_pending(self, run: str) -> None:
+        """Withdraw what earlier flights of a run left pending: nobody is left to prove it."""
+        with self._transaction():
+            self._db.execute(
+                "UPDATE observation SET standing = ? WHERE run = ? AND standing = ?",
+                (_WITHDRAWN, run, _PENDING),
+            )
+
     def counted(self, run: str) -> frozenset[str]:
         """The locations with a confirmed look of a run, whatever it told."""
-        with self._lock:
+        with self._reading():
             rows = self._db.execute(
                 "SELECT DISTINCT location FROM observation WHERE run = ? AND standing = ?", (run, _CONFIRMED)
             ).fetchall()
@@ -211,7 +228,7 @@ class SqliteStore:
     def locations(self) -> list[LocationRecord]:
         """Every location by its code, with its newest confirmed observation (of equally new ones, the
         greatest id)."""
-        with self._lock:
+        with self._reading():
             looks = self._observations()
             newest = {seen.location: seen for seen, standing in looks if standing == _CONFIRMED}
             rows = self._db.execute("SELECT code, node FROM location ORDER BY code").fetchall()
@@ -219,7 +236,7 @@ class SqliteStore:
 
     def history(self, location: str) -> list[Observation]:
         """Every look at one location, oldest first, pending and withdrawn ones too."""
-        with self._lock:
+        with self._reading():
             return [seen for seen, _ in self._observations(location)]
 
     def _observations(self, location: str | None = None) -> list[tuple[Observation, int]]:
@@ -242,7 +259,7 @@ class SqliteStore:
 
     def merge(self, other: SqliteStore) -> int:
         """Take in everything of another store, pictures included; returns how many looks were new."""
-        with other._lock:
+        with other._reading():
             planned = [PlannedLocation(record.code, record.node) for record in other.locations()]
             seen = other._observations()
         for observation, _ in seen:

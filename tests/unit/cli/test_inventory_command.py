@@ -17,9 +17,12 @@ import zxingcpp
 from typer.testing import CliRunner
 
 from flightd.adapters.store.sqlite import SqliteStore
+from flightd.app import flown_between_m
+from flightd.cli.flight_count import going_on
 from flightd.cli.inventory_formats import as_csv, as_epcis, as_xlsx
 from flightd.cli.main import app
 from flightd.config.schema import load_config
+from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, StoredRead
 
@@ -208,6 +211,33 @@ def test_bad_stock_files_are_refused(counted: Path, tmp_path: Path, text: str, w
     stock = tmp_path / "stock.csv"
     stock.write_text(text)
     assert words in error_of("compare", counted, stock)
+
+
+def test_a_count_with_nothing_left_is_refused_on_the_ground_and_never_in_the_air(tmp_path: Path) -> None:
+    site = load_site(CONFIGS / "site-racks.toml")
+    config = load_config(CONFIGS / "sim.toml")
+    config = config.model_copy(update={"inventory": config.inventory.model_copy(update={"run": "monday"})})
+    with SqliteStore(tmp_path) as store:
+        for number, code in enumerate(site.locations):
+            store.commit(Observation("monday", code, number, LocationState.EMPTY, 0.9))
+    with pytest.raises(InputError, match="every location is counted"):
+        going_on(config, site, tmp_path)
+    assert going_on(config, site, tmp_path, in_air=True) is config
+
+
+def test_the_heights_flown_between_hold_the_views_of_a_tilted_front_camera() -> None:
+    site, config = load_site(CONFIGS / "site-racks.toml"), load_config(CONFIGS / "sim.toml")
+    level = config.front_camera.model_copy(update={"url": "folder:front"})
+    tilted = level.model_copy(update={"mount_pitch_deg": -30.0})
+    lows, highs = zip(
+        *(
+            flown_between_m(config.model_copy(update={"front_camera": camera}), site)
+            for camera in (level, tilted)
+        ),
+        strict=True,
+    )
+    assert highs[1] > highs[0] + 0.3, "looking down on the labels, it flies higher"
+    assert lows[1] >= lows[0]
 
 
 def test_bad_arguments_are_refused(counted: Path, tmp_path: Path) -> None:

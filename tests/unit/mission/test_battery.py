@@ -17,7 +17,10 @@ from flightd.mission.battery import BatteryGauge, BatteryParams
 from flightd.mission.guidance import MissionParams
 from flightd.mission.legs import Legs, Pace
 from flightd.mission.plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.scanner import Scanner
 from flightd.mission.sorties import Sorties, check_battery
+from flightd.mission.views import ScanParams
+from tests.unit.mission import shelves
 
 LARGE = load_site(Path(__file__).parents[3] / "configs" / "site-large.toml")
 POLICY = HeadingPolicy(Heading.ALONG)
@@ -93,3 +96,28 @@ def test_what_no_full_battery_reaches_is_refused_before_the_flight() -> None:
     weak = MissionParams(battery=BatteryParams(flight_s=90.0))
     with pytest.raises(InputError, match=r"battery\.flight_s = 90\) does not reach J10"):
         check_battery(LARGE, plan, POLICY, weak)
+
+
+def test_what_is_left_to_count_at_a_stop_counts_as_flying_time() -> None:
+    params = MissionParams()
+    legs = Legs(shelves.SITE, POLICY, Pace.of(params))
+    scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanParams(max_height_m=4.0))
+    battery = BatteryParams(flight_s=600.0, reserve_frac=0.1)
+    counting = Sorties(shelves.SITE, legs, battery, scanner)
+    scan_s = scanner.stop_s("A3", legs.pace)
+    assert scan_s > 2 * len(shelves.SITE.racks[0].levels_m) * ScanParams().view_s
+    needed = 0.1 + (legs.way_s("A2", "A3") + scan_s + counting.way_back("A3").seconds) / 600.0
+    for charge, short in ((needed + 0.002, False), (needed - 0.002, True)):
+        counting.step(0, charge, False)
+        assert bool(counting.why_not_on("A2", "A3")) is short
+    scanner.skip(shelves.SITE.locations)
+    assert not counting.why_not_on("A2", "A3"), "nothing left: a plain stop"
+
+
+def test_a_count_that_no_battery_lasts_for_is_refused_before_the_flight() -> None:
+    site, params = shelves.SITE, MissionParams(battery=BatteryParams(flight_s=70.0))
+    plan = make_plan(site, ["A2"], "A1", "A1", POLICY)
+    check_battery(site, plan, POLICY, params)
+    scanner = Scanner(site, shelves.SIGHT, ScanParams(max_height_m=4.0, view_s=20.0))
+    with pytest.raises(InputError, match="does not reach A2, last for the stop there"):
+        check_battery(site, plan, POLICY, params, scanner)

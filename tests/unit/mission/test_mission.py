@@ -18,10 +18,14 @@ from flightd.core.types import (
     Phase,
     VehicleState,
 )
+from flightd.grid.site import Site
 from flightd.mission.guidance import Guidance, Guide, MissionParams, Senses
 from flightd.mission.mission import Mission
 from flightd.mission.plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.scanner import Scanner
+from flightd.mission.views import ScanParams
 from flightd.sim.sites import random_site
+from tests.unit.mission import shelves
 
 SITE = random_site(3)
 POLICY = HeadingPolicy(Heading.ALONG)
@@ -31,10 +35,14 @@ TICK_NS = 20_000_000
 class Flight:
     """Feeds a mission with senses: by default all is well and the drone is wherever the mission wants."""
 
-    def __init__(self, params: MissionParams | None = None) -> None:
-        home = SITE.home.node
-        plan = make_plan(SITE, SITE.serpentine_route(), home, home, POLICY)
-        self.mission = Mission(SITE, plan, POLICY, params or MissionParams(dwell_s=1.0))
+    def __init__(
+        self, params: MissionParams | None = None, site: Site = SITE, scanner: Scanner | None = None
+    ) -> None:
+        home = site.home.node
+        plan = make_plan(site, site.serpentine_route(), home, home, POLICY)
+        self.mission = Mission(site, plan, POLICY, params or MissionParams(dwell_s=1.0), scanner)
+        self.site = site
+        self.integrity = 1.0
         self.now_ns = 10**12
         self.guidance: Guidance | None = None
         state = VehicleState(
@@ -72,7 +80,7 @@ class Flight:
                 if not math.isnan(self.senses.height_m):
                     self.senses = replace(self.senses, height_m=height)
                 r = g.reference
-                node = SITE.nearest(r.x_m, r.y_m)
+                node = self.site.nearest(r.x_m, r.y_m)
                 pose = GridPose(
                     self.now_ns,
                     node.id,
@@ -85,7 +93,7 @@ class Flight:
                     r.vy_mps,
                     height,
                     (0.0,) * 9,
-                    1.0,
+                    self.integrity,
                 )
                 self.senses = replace(self.senses, pose=pose)
             if g is not None and g.demand is Demand.FLY:
@@ -249,3 +257,17 @@ def test_home_is_refused_on_the_floor() -> None:
     flight.order(CommandKind.START)
     flight.to(Phase.FOLLOW)
     assert any("home refused" in event.text for event in flight.mission.drain_events())
+
+
+def test_a_moment_of_doubt_as_a_view_ends_does_not_hold_the_scan_for_ever() -> None:
+    scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanParams(max_height_m=4.0, view_s=2.0, retakes=0))
+    flight = Flight(MissionParams(view_height_m=0.15), shelves.SITE, scanner)
+    flight.to(Phase.SCAN)
+    first = scanner.view
+    flight.run(1.9)
+    flight.integrity = 0.9
+    flight.run(0.2)
+    flight.integrity = 1.0
+    assert flight.phase is Phase.SCAN
+    flight.to(Phase.CLIMB, 1.0)
+    assert scanner.view is not first

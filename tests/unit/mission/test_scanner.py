@@ -219,6 +219,22 @@ def test_a_contradicting_location_label_withdraws_what_is_pending() -> None:
     assert scanner.wants("A2"), "the withdrawn is left to count"
 
 
+def test_a_code_that_may_be_its_own_is_no_empty_place() -> None:
+    hover = Hover(replace(PARAMS, retakes=0))
+    code = LOCATIONS[0]
+    hover.at_view()
+    border = hover.scanner._assigner.cells[code].x0_m
+    for _ in range(5):
+        hover.seq += 1
+        hover.now_ns += STEP_NS
+        here = pose(hover.now_ns)
+        x = (border + 0.02 - here.x_m) / 1.2 * SIGHT.lens.fx_px
+        stray = read("PALLET", x, 0.0)
+        hover.scanner.take(picture(hover.seq, (stray,), {code: Occupancy.EMPTY}, hover.now_ns), here)
+    hover.run({code: Occupancy.EMPTY}, {})
+    assert hover.found[code].state is LocationState.UNREADABLE
+
+
 def test_an_agreeing_location_label_proves_its_node_at_once() -> None:
     hover = Hover()
     hover.at_view()

@@ -47,6 +47,9 @@ class StubbornStore:
     def settle(self, run: str, locations: Iterable[str], confirmed: bool) -> None:
         self._store.settle(run, locations, confirmed)
 
+    def withdraw_pending(self, run: str) -> None:
+        self._store.withdraw_pending(run)
+
     def counted(self, run: str) -> frozenset[str]:
         return self._store.counted(run)
 

@@ -223,3 +223,31 @@ def newest(store: SqliteStore, location: str) -> str | None:
     """The id of the observation that tells a location's state."""
     record = next(record for record in store.locations() if record.code == location)
     return record.observation.id if record.observation else None
+
+
+def test_what_an_ended_flight_left_pending_is_never_confirmed_by_the_next(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as store:
+        old, new, other = look(51), look(1), look(2)
+        assert old.location == new.location
+        assert (old.run, old.utc_ns > new.utc_ns) == (new.run, True), "a clock that was set back"
+        store.commit(old, confirmed=False)
+        store.commit(other)
+        store.withdraw_pending(old.run)
+        store.commit(new, confirmed=False)
+        store.settle(new.run, [new.location], confirmed=True)
+        assert newest(store, new.location) == new.id
+        assert newest(store, other.location) == other.id
+
+
+def test_a_file_that_breaks_in_flight_is_a_disk_that_refuses(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as store:
+        for number in range(200):
+            store.commit(look(number))
+    file = tmp_path / "inventory.db"
+    whole = file.read_bytes()
+    file.write_bytes(whole[:16384] + b"\xff" * (len(whole) - 16384))
+    with SqliteStore(tmp_path, create=False) as store:
+        with pytest.raises(UnavailableError, match="cannot be read"):
+            store.locations()
+        with pytest.raises(UnavailableError, match="cannot be written"):
+            store.commit(look(1000))
