@@ -20,7 +20,9 @@ from flightd.sim.kinematics import Kinematics
 _AT_NODE_M = 0.5
 """A node counts as visited rightly when the drone was within this of it (less than half a cell)."""
 _OFF_FLOOR_M = 0.3
-_ON_LINES = {Phase.FOLLOW, Phase.HOVER, Phase.TURN}
+_AT_STOP = {Phase.HOVER, Phase.CLIMB, Phase.SCAN}
+"""A scan's views are all straight above the node."""
+_ON_LINES = _AT_STOP | {Phase.FOLLOW, Phase.TURN, Phase.ACQUIRE, Phase.HOLD}
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,12 +123,12 @@ def _to_segment(x: float, y: float, site: Site, a: str, b: str) -> float:
 def _hover_errors(
     site: Site, visits: Iterable[Event], truth: Sequence[Kinematics], phases: _Phases
 ) -> list[float]:
-    """Distances from the node during its whole dwell, for each visit."""
+    """Distances from the node during its whole dwell or scan, for each visit."""
     errors: list[float] = []
     for visit in visits:
         node = site.nodes.get(visit.text)
         index = bisect_left(truth, visit.stamp_ns, key=lambda t: t.stamp_ns) - 1
-        while node is not None and index >= 0 and phases.at(truth[index].stamp_ns) is Phase.HOVER:
+        while node is not None and index >= 0 and phases.at(truth[index].stamp_ns) in _AT_STOP:
             errors.append(math.hypot(truth[index].x_m - node.x_m, truth[index].y_m - node.y_m))
             index -= 1
     return errors
