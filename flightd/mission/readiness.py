@@ -19,6 +19,9 @@ def not_ready(s: Senses, p: MissionParams, ground_silent: bool) -> str:
         "no battery level from the vehicle": math.isnan(v.battery_frac),
         low: v.battery_frac < p.battery_start_frac,
         "no picture from the down camera": not s.frames_arrive,
+        f"pictures are more than {p.hazards.latency_s * 1e3:.0f} ms old when they have been looked at": (
+            s.warnings.picture_age_s > p.hazards.latency_s
+        ),
         "the ground station that attends this flight fell silent": ground_silent,
     }
     return next((reason for reason, failed in checks.items() if failed), "")

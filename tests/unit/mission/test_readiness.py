@@ -1,0 +1,42 @@
+"""What keeps a flight on the ground."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flightd.core.types import Attitude, LandedState, VehicleState
+from flightd.mission.guidance import ALL_WELL, MissionParams, Senses
+from flightd.mission.readiness import not_ready
+
+PARAMS = MissionParams()
+VEHICLE = VehicleState(
+    attitude=Attitude(10**9, 0.0, 0.0, 0.0),
+    height_m=0.1,
+    height_stamp_ns=10**9,
+    climb_mps=0.0,
+    mode="STABILIZE",
+    in_control=False,
+    armed=False,
+    landed=LandedState.ON_GROUND,
+    battery_frac=1.0,
+    battery_v=12.6,
+    heartbeat_ns=10**9,
+)
+READY = Senses(
+    now_ns=10**9,
+    dt_s=0.02,
+    pose=None,
+    localised=False,
+    height_m=0.1,
+    frames_arrive=True,
+    x_age_s=0.0,
+    y_age_s=0.0,
+    telemetry_age_s=0.0,
+    vehicle=VEHICLE,
+)
+
+
+def test_late_pictures_keep_it_on_the_ground() -> None:
+    assert not not_ready(READY, PARAMS, ground_silent=False)
+    late = replace(READY, warnings=replace(ALL_WELL, picture_age_s=PARAMS.hazards.latency_s + 0.05))
+    assert "pictures are more than 250 ms old" in not_ready(late, PARAMS, ground_silent=False)
