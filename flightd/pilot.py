@@ -157,7 +157,8 @@ class Pilot:
         senses = self._senses(tick, dt_s, pose, height_m, tracks)
         senses = replace(senses, by_pad=by_pad is not None)
         guidance = self._mission.step(senses)
-        setpoint = self._setpoint(senses, guidance)
+        push_mps2 = (tracks.push_x_mps2, tracks.push_y_mps2) if tracks is not None else (0.0, 0.0)
+        setpoint = self._setpoint(senses, guidance, push_mps2)
         self._caution.steered(guidance, pose)
         mission = self._mission
         findings, settled = self._scanner.drain() if self._scanner is not None else ((), ())
@@ -246,7 +247,9 @@ class Pilot:
             ),
         )
 
-    def _setpoint(self, senses: Senses, guidance: Guidance) -> AttitudeSetpoint | None:
+    def _setpoint(
+        self, senses: Senses, guidance: Guidance, push: tuple[float, float]
+    ) -> AttitudeSetpoint | None:
         """What control makes of the guidance, within the limits; None when nothing may be sent."""
         now_ns, dt_s, pose = senses.now_ns, senses.dt_s, senses.pose
         motion = self._motion(pose, self._caution.height_m(senses.height_m), dt_s)
@@ -258,7 +261,6 @@ class Pilot:
         if guidance.guide is Guide.LEVEL or pose is None:
             wanted, age_s = control.level(now_ns, motion, reference, dt_s), 0.0
         elif guidance.guide is Guide.BRAKE:
-            push = self._caution.push_mps2
             wanted = control.rest(now_ns, motion, reference, dt_s, push, reckoned=guidance.reckoned)
             age_s = senses.telemetry_age_s
         else:

@@ -132,7 +132,7 @@ class ControlConfig(_Section):
     max_yaw_rate_degps: float = Field(45.0, gt=0, le=180)
     max_yaw_accel_degps2: float = Field(180.0, gt=5, le=2000)
     max_climb_mps: float = Field(0.8, gt=0, le=3)
-    max_descend_mps: float = Field(0.6, gt=0, le=3)
+    max_descend_mps: float = Field(0.9, gt=0, le=3)
     tilt_compensation: TiltCompensation = Field(
         TiltCompensation.EXACT, description="exact, first_order or none"
     )

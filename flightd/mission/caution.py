@@ -14,6 +14,8 @@ from flightd.tracking.pictures import PictureWatch
 _TICK_MEMORY_S = 1.0
 _PUSH_MEMORY_S = 2.0
 _FRESH_NS = 250_000_000
+_KNOWN_M = 0.3
+"""A position less certain than this (standard deviation) cannot tell whether the corridor is left."""
 
 
 class Caution:
@@ -51,8 +53,9 @@ class Caution:
         outside_m, line_m = 0.0, (0.0, 0.0)
         if pose is not None:
             near = self._corridor.nearest(pose.x_m, pose.y_m)
-            outside_m = max(near.distance_m - self._corridor.half_width_m, 0.0)
             line_m = (near.x_m, near.y_m)
+            if _across_sigma_m(pose, line_m) < _KNOWN_M:
+                outside_m = max(near.distance_m - self._corridor.half_width_m, 0.0)
         return Warnings(
             picture_age_s=pictures.age_s(now_ns),
             frozen_s=pictures.frozen_s(now_ns),
@@ -88,3 +91,11 @@ class Caution:
             return None
         cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
         return cos * back[0] + sin * back[1], -sin * back[0] + cos * back[1]
+
+
+def _across_sigma_m(pose: GridPose, line_m: tuple[float, float]) -> float:
+    """Standard deviation of the position towards the nearest line."""
+    dx, dy = line_m[0] - pose.x_m, line_m[1] - pose.y_m
+    square = dx * dx + dy * dy
+    xx, xy, yy = pose.covariance[0], pose.covariance[1], pose.covariance[4]
+    return math.sqrt(max(dx * dx * xx + 2.0 * dx * dy * xy + dy * dy * yy, 0.0) / square) if square else 0.0

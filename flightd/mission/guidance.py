@@ -35,13 +35,16 @@ class HazardParams:
     off_m: float = 0.5
     push_s: float = 2.0
     headroom_m: float = 0.5
-    corridor_m: float = 0.6
+    corridor_m: float = 0.45
     outside_s: float = 0.2
     latency_s: float = 0.25
     overload_s: float = 3.0
-    brake_s: float = 2.0
-    search_s: float = 1.0
-    search_climb_m: float = 0.4
+    brake_s: float = 2.4
+    search_s: float = 0.0
+    search_climb_m: float = 0.3
+    search_land_s: float = 1.4
+    blind_land_s: float = 2.2
+    blind_m: float = 0.5
     record_lost: LossAction = LossAction.HOME
 
 
@@ -66,7 +69,8 @@ class MissionParams:
     steer_above_m: float = 0.45
     land_mps: float = 0.35
     touch_mps: float = 0.20
-    blind_mps: float = 0.5
+    blind_mps: float = 0.9
+    touch_blind_mps: float = 0.3
     touch_below_m: float = 0.35
     lines_hold_s: float = 0.25
     lines_land_s: float = 4.0

@@ -57,6 +57,10 @@ class Hazard:
 
 _FAST = "tests/sim/test_hazards.py"
 _HOLD = "brake, hold; on when it is over; land after `mission.lines_land_s`"
+_BLIND = (
+    "brake by dead reckoning and sink to `hazards.blind_m` at once; up and on when it is over; land after"
+    " `hazards.blind_land_s`"
+)
 
 HAZARDS: tuple[Hazard, ...] = (
     Hazard(
@@ -162,7 +166,8 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "corridor_left",
         Trigger.CORRIDOR_LEFT,
-        "position further than `hazards.corridor_m` from the lines of the map",
+        "position further than `hazards.corridor_m` from the lines of the map, seen or reckoned, as long"
+        " as it is known to 0.3 m",
         Action.HOLD,
         "no set point leans further out; back to the nearest line, land after `mission.lines_land_s`",
         _FAST,
@@ -182,7 +187,7 @@ HAZARDS: tuple[Hazard, ...] = (
         " position too uncertain",
         Action.HOLD,
         "brake by dead reckoning, hold; after `hazards.search_s` climb by `hazards.search_climb_m` to see"
-        " more; land after `mission.lines_land_s`, glimpses not counted",
+        " more; land after `hazards.search_land_s`, or with glimpses after `mission.lines_land_s`",
         _FAST,
     ),
     Hazard(
@@ -190,7 +195,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.CAMERA_FROZEN,
         "the same picture for `mission.lines_hold_s`; a repeated one is never used",
         Action.HOLD,
-        _HOLD,
+        _BLIND,
         _FAST,
     ),
     Hazard(
@@ -198,7 +203,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.CAMERA_BLIND,
         "black, white or flat pictures for `mission.lines_hold_s`",
         Action.HOLD,
-        _HOLD,
+        _BLIND,
         _FAST,
     ),
     Hazard(
@@ -206,7 +211,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.FRAMES_STALE,
         "newest picture exposed more than `mission.lines_hold_s` ago",
         Action.HOLD,
-        _HOLD + "; the camera is opened again",
+        _BLIND + "; the camera is opened again",
         _FAST,
     ),
     Hazard(
@@ -214,7 +219,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.FRAMES_STALE,
         "no picture at all: as stale ones",
         Action.HOLD,
-        _HOLD + "; the camera is opened again",
+        _BLIND + "; the camera is opened again",
         _FAST,
     ),
     Hazard(

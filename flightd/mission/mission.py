@@ -36,6 +36,8 @@ _DEMANDS = {
 _ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.DONE, Phase.ABORTED, Phase.PILOT}
 _BY_PAD = {Phase.TAKE_OFF, Phase.ACQUIRE, Phase.HOLD}
 _TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
+_STOPPED = (Phase.HOLD, Phase.RELOCATE, Phase.ACQUIRE)
+"""Where a leg that was interrupted goes on from."""
 _SETTLE_S = 3.0
 """The most that a landing waits for the drone to come to rest."""
 _REST_MPS = 0.15
@@ -82,6 +84,7 @@ class Mission:
         self._returning = False
         self._on_pad_leg = False
         self._paused = False
+        self._leg_along_x: bool | None = None
         self._stopped = False
         self._ground_lost = False
         self._hazards: dict[Trigger, int] = {}
@@ -209,10 +212,12 @@ class Mission:
             self._event(now_ns, EventLevel.WARNING, "hazard", f"{trigger.value}: {action}")
 
     def _situation(self, paused: bool) -> Situation:
-        along_x = None
         if self.phase is Phase.FOLLOW:
-            along_x = abs(self.goal.x_m - self._anchor[0]) >= abs(self.goal.y_m - self._anchor[1])
-        return Situation(self.airborne, paused, along_x)
+            dx, dy = self.goal.x_m - self._anchor[0], self.goal.y_m - self._anchor[1]
+            self._leg_along_x = abs(dx) >= abs(dy)
+        elif self.phase not in _STOPPED:
+            self._leg_along_x = None
+        return Situation(self.airborne, paused, self._leg_along_x, self.phase is Phase.HOLD)
 
     def _ground(self, s: Senses) -> set[Trigger]:
         """What a lost ground link asks for, by the configured action; the link's return ends a hold."""
@@ -308,7 +313,7 @@ class Mission:
             self._anchor = (self.goal.x_m, self.goal.y_m)
         if phase in {Phase.HOLD, Phase.RELOCATE} or (phase is Phase.LAND and not planned):
             self._anchor = (s.pose.x_m, s.pose.y_m) if s.pose is not None else self._anchor
-        if trigger is Trigger.CORRIDOR_LEFT:
+        if phase is Phase.HOLD and s.localised:
             self._anchor = s.warnings.line_m
         self._on_pad_leg = phase is Phase.LAND and planned
         unplanned = phase in {Phase.LAND, Phase.ABORTED, Phase.PILOT} and not planned
@@ -492,6 +497,9 @@ class Mission:
         ):
             self._height.reset(self._height.position)  # no climb by heights of the past
             climb = 0.0
+        elif self.phase is Phase.HOLD and self._watch.blind.is_blind:
+            climb = -self._watch.blind.sink_mps(s.height_m)
+            self._height.reset(s.height_m, climb)
         else:
             self._height.step(self._wanted_height_m(), s.dt_s)
             climb = self._height.velocity
@@ -524,8 +532,8 @@ class Mission:
             self._height.reset(self._height.position)
             return 0.0, Demand.FLY
         rate = self._touchdown.rate_mps(s, self._target(s))
-        if rate == p.land_mps and not self._steering:  # what drifts unseen should not do so for long
-            rate = p.blind_mps
+        if rate > 0.0 and not self._steering:  # what drifts unseen should not do so for long
+            rate = self._watch.blind.rate_mps(s.height_m)
         self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
         blind = s.telemetry_age_s > p.telemetry_land_s
         standing = v is not None and v.landed is LandedState.ON_GROUND and not blind

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flightd.core.types import VehicleState
+from flightd.mission.blind import Blind
 from flightd.mission.guidance import MissionParams, Senses
 from flightd.mission.hazards import Action, triggers_of
 from flightd.mission.triggers import Trigger
@@ -30,11 +31,13 @@ _Conditions: TypeAlias = dict[Trigger, tuple[bool, float]]
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """What the mission is at: in the air, paused, on a leg along the map's x axis (None: on no leg)."""
+    """What the mission is at: in the air, paused, on or stopped on a leg along the map's x axis (None: on no
+    leg), holding."""
 
     airborne: bool
     paused: bool
     leg_along_x: bool | None
+    holds: bool = False
 
 
 class Lasting:
@@ -80,6 +83,7 @@ class Watch:
         self._trouble = Lasting()
         self._detectors, self._writers, self._stamps = Counted(), Counted(), Counted(_JUMPED)
         self._seen = Lasting()
+        self.blind = Blind(params)
         self._unseen_ns: int | None = None
         self.unseen_s = 0.0
         """For how long the lines have been lost, glimpses not counted."""
@@ -162,29 +166,25 @@ class Watch:
             Trigger.ATTITUDE_WRONG: (abs(w.heading_error_rad) > h.heading_rad, h.disagree_s),
             Trigger.WIND: (w.push_mps2 > h.push_mps2 or w.off_m > h.off_m, h.push_s),
             Trigger.CEILING_LEFT: (w.headroom_m < 0.0, h.outside_s),
-            Trigger.CORRIDOR_LEFT: (w.outside_m > 0.0 and s.localised, h.outside_s),
+            Trigger.CORRIDOR_LEFT: (w.outside_m > 0.0, h.outside_s),
         }
 
     def _sight(self, s: Senses, situation: Situation) -> set[Trigger]:
-        """Lines lost and found.  The time without lines runs on through short glimpses: only lines that
-        stay for a while end it."""
+        """Lines lost and found; on a leg the line that is followed must be seen, whatever else is.  The time
+        without lines runs on through short glimpses: only lines that stay for a while end it."""
         p = self._params
         lost = min(s.x_age_s, s.y_age_s) > p.lines_hold_s or not s.localised
-        lost = lost or self._off_line(s, situation.leg_along_x)
+        self.blind.step(s, situation.leg_along_x)
+        borne_s = p.lines_hold_s if situation.holds else p.followed_hold_s
+        lost = lost or self.blind.unseen_s > borne_s
         seen_s = self._seen.step(not lost, s.now_ns)
         if lost and self._unseen_ns is None:
             self._unseen_ns = s.now_ns
         elif seen_s > p.lines_found_s:
             self._unseen_ns = None
         self.unseen_s = 0.0 if self._unseen_ns is None else (s.now_ns - self._unseen_ns) * 1e-9
-        if lost and self.unseen_s > p.lines_land_s:
+        if lost and (self.unseen_s > p.lines_land_s or self.blind.too_long):
             return {Trigger.LINES_LOST, Trigger.LINES_LOST_LONG}
         if lost:
             return {Trigger.LINES_LOST}
         return {Trigger.LINES_FOUND} if seen_s > p.lines_hold_s and not situation.paused else set()
-
-    def _off_line(self, s: Senses, along_x: bool | None) -> bool:
-        """On a leg, the line that is followed must be seen, whatever else is."""
-        if along_x is None:
-            return False
-        return (s.y_age_s if along_x else s.x_age_s) > self._params.followed_hold_s

@@ -72,8 +72,8 @@ class TrackSet:
 
     `across_x` are the lines that cross the x axis (parallel to y), offsets in x; `across_y` the others.
     `lines_ns` is the capture time of the newest frame in which any line was taken; `junctions` and
-    `markers` are those of the newest frame, taken at `junctions_ns`; `push` is the steady acceleration that
-    no lean explains.
+    `markers` are those of the newest frame, taken at `junctions_ns`; `push` is the acceleration that no
+    lean explains, as far as it is expected to last.
     """
 
     stamp_ns: int
@@ -189,8 +189,9 @@ class LineTracker:
             step_ns = min(_STEP_NS, now_ns - stamp_ns)
             ax, ay = self._accel(stamp_ns + step_ns // 2)
             dt_s = step_ns * 1e-9
-            ax += self._x.disturbance_mps2 - self._x.drag_per_s * vx
-            ay += self._y.disturbance_mps2 - self._y.drag_per_s * vy
+            ahead_s = (stamp_ns + step_ns // 2 - self._stamp_ns) * 1e-9
+            ax += self._x.disturbance_after(ahead_s) - self._x.drag_per_s * vx
+            ay += self._y.disturbance_after(ahead_s) - self._y.drag_per_s * vy
             moved_x += vx * dt_s + 0.5 * ax * dt_s * dt_s
             moved_y += vy * dt_s + 0.5 * ay * dt_s * dt_s
             vx += ax * dt_s
@@ -213,8 +214,8 @@ class LineTracker:
                 replace(seen, dx_m=seen.dx_m - moved_x, dy_m=seen.dy_m - moved_y) for seen in self._junctions
             ),
             self._stamp_ns,
-            push_x_mps2=self._x.disturbance_mps2,
-            push_y_mps2=self._y.disturbance_mps2,
+            push_x_mps2=self._x.disturbance_after((now_ns - self._stamp_ns) * 1e-9),
+            push_y_mps2=self._y.disturbance_after((now_ns - self._stamp_ns) * 1e-9),
             markers=tuple(
                 replace(mark, x_m=mark.x_m - moved_x, y_m=mark.y_m - moved_y) for mark in self._markers
             ),

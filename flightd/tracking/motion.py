@@ -8,6 +8,7 @@ makes, g tan(tilt).  Offsets are in metres on the floor: a change of height move
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,11 +18,16 @@ from flightd.core.geometry import Matrix
 from flightd.tracking.kalman import KalmanFilter
 
 _GATE_SIGMAS = 4.0
+_UNSEEN_S = 0.1
+"""An axis without a line for so long is reckoned: the gust that was last felt on it fades."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionNoise:
-    """What the model does not know, as densities (per square root of a second) and starting sigmas."""
+    """What the model does not know, as densities (per square root of a second) and starting sigmas.
+
+    A disturbance is a steady part (trim, draught: its mean over `steady_s`) and a gust that fades within
+    `gust_s`."""
 
     accel_mps2: float = 0.2
     disturbance_mps2: float = 0.15
@@ -29,6 +35,8 @@ class MotionNoise:
     start_velocity_mps: float = 0.3
     start_disturbance_mps2: float = 0.2
     max_disturbance_mps2: float = 1.0
+    gust_s: float = 2.5
+    steady_s: float = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +86,8 @@ class AxisTracker:
         self._tracks: list[_Track] = []
         self._x = np.zeros(2)
         self._p = np.diag([noise.start_velocity_mps**2, noise.start_disturbance_mps2**2])
+        self._steady_mps2 = 0.0
+        self._unseen_s = 0.0
 
     @property
     def velocity_mps(self) -> float:
@@ -90,6 +100,11 @@ class AxisTracker:
     @property
     def disturbance_mps2(self) -> float:
         return float(self._x[1])
+
+    def disturbance_after(self, ahead_s: float) -> float:
+        """What is expected of the disturbance so much later: the gust in it fades."""
+        steady = self._steady_mps2
+        return steady + (self.disturbance_mps2 - steady) * math.exp(-ahead_s / self._noise.gust_s)
 
     @property
     def drag_per_s(self) -> float:
@@ -131,6 +146,12 @@ class AxisTracker:
         kf.Q[1, 1] += noise.disturbance_mps2**2 * dt_s
         kf.predict(u=np.array([[accel_mps2]]))
         self._keep(kf)
+        if self._unseen_s > _UNSEEN_S:
+            self._x[1] = self.disturbance_after(dt_s)
+        else:
+            share = min(dt_s / noise.steady_s, 1.0)
+            self._steady_mps2 += share * (self.disturbance_mps2 - self._steady_mps2)
+        self._unseen_s += dt_s
 
     def update(self, measured: list[SeenLine], stamp_ns: int) -> list[float]:
         """Take the lines seen at `stamp_ns`; return the normalised innovations of those that belonged to
@@ -145,6 +166,7 @@ class AxisTracker:
                 fresh.append(line)
                 continue
             taken.add(index)
+            self._unseen_s = 0.0
             kf = self._filter()
             kf.H = np.zeros((1, len(self._x)))
             kf.H[0, 2 + index] = 1.0

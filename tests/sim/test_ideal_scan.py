@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+
+import pytest
 
 from flightd.config.schema import load_config
 from flightd.core.inventory import LocationState
@@ -30,10 +33,11 @@ STOCK = Stock(
 )
 
 
-def scan_flight(visits: tuple[str, ...] = NODES) -> IdealFlight:
+def scan_flight(visits: tuple[str, ...] = NODES, seed: int = 5) -> IdealFlight:
     scanner = Scanner(SITE, SIGHT, CONFIG.scan_params(4.0))
     front = IdealFront(SITE, SIGHT, STOCK)
-    return IdealFlight(SITE, CONFIG.pilot_params(SITE), visits=visits, seed=5, scanner=scanner, front=front)
+    params = CONFIG.pilot_params(SITE)
+    return IdealFlight(SITE, params, visits=visits, seed=seed, scanner=scanner, front=front)
 
 
 def findings(flown: Flown) -> dict[str, Finding]:
@@ -116,3 +120,26 @@ def test_with_the_nose_to_the_shelf_no_leg_begins_with_half_a_turn() -> None:
     assert set(findings(flown)) == set(PLACES)
     sides = [phase for phase, k in flown.truth if phase is Phase.TURN]
     assert len(sides) * 0.02 < 0.5 * len(NODES) * math.pi / params.mission.turn_rate_radps
+
+
+@pytest.mark.parametrize("phase", [Phase.CLIMB, Phase.SCAN])
+@pytest.mark.parametrize("seed", range(1, 1 + int(os.environ.get("FLIGHTD_SEEDS", "2"))))
+def test_going_blind_in_front_of_a_shelf_is_down_before_it_drifts_there(phase: Phase, seed: int) -> None:
+    flight = scan_flight(("A2",), seed)
+
+    def blind(now: Phase, _now_ns: int) -> None:
+        flight.faults.blank |= now is phase and flight.airframe.height_m > 1.0
+
+    flight.on_tick = blind
+    flown = flight.fly(60)
+    assert flight.faults.blank
+    assert flown.phase is Phase.ABORTED
+    assert flown.truth[-1][1].height_m < 0.2
+    nearest = min(
+        math.hypot(max(s.x0_m - k.x_m, 0.0, k.x_m - s.x1_m), k.y_m - s.y_m)
+        for s in SITE.shelves
+        for _, k in flown.truth
+    )
+    assert nearest > 0.3, "half the width of the drone"
+    events = [event.text for event in flown.events if event.name == "hazard"]
+    assert any("camera" in text for text in events), events
