@@ -303,7 +303,7 @@ class Mission:
         planned = (trigger is Trigger.ROUTE_DONE or before is Phase.LAND) and not self._stopped
         if trigger in {Trigger.DWELLED, Trigger.ROUTE_DONE}:
             self._note_visit(s)
-        self._scan.changed(s, before, phase, trigger, self.goal)
+        self._scan.changed(s, before, phase, trigger, self.goal, self._relocator.shift_m)
         if trigger is Trigger.DWELLED:
             self._look_ahead(s)
             before_stop = self.goal
@@ -389,9 +389,10 @@ class Mission:
 
     def _rejoin(self, s: Senses) -> None:
         """From where the drone turned out to be: over the nearest node along open lines to the goal."""
-        goal = self.goal
         if s.pose is None:
             return
+        self._go_back(s.now_ns)
+        goal = self.goal
         self._event(s.now_ns, EventLevel.INFO, "position", f"sure again: {s.pose.node}")
         node = self._site.nodes[s.pose.node]
         if node.id == goal.node:
@@ -401,6 +402,26 @@ class Mission:
         ).stops[:-1]
         first = Stop(node.id, node.x_m, node.y_m, way[0].yaw_rad, False)
         self._stops[self._next : self._next + 1] = [first, *way[:-1], goal]
+
+    def _go_back(self, now_ns: int) -> None:
+        """Put nodes whose count was withdrawn before what is left, near as they are; they are left for the
+        next battery where the way leads home already."""
+        due = self._scan.take_due(self.visited)
+        if not due:
+            return
+        if not self._returning:
+            nodes = [*due, *(stop.node for stop in self._stops[self._next :] if stop.visit)]
+            home, yaw_rad = self._plan.home, self.goal.yaw_rad
+            try:
+                rest = make_plan(self._site, nodes, due[0], home, self._policy, yaw_rad)
+            except NoWayError as err:
+                self._event(now_ns, EventLevel.WARNING, "recount", f"{', '.join(due)} left out: {err}")
+                return
+            self._stops[self._next :] = rest.stops
+        else:
+            self._left_over = (*due, *self._left_over)
+        self.visited = [node for node in self.visited if node not in due]
+        self._event(now_ns, EventLevel.WARNING, "recount", f"{', '.join(due)} to visit again")
 
     def _note_visit(self, s: Senses) -> None:
         if self.goal.visit and not self._returning:  # a stop on the way home is none of the wanted ones

@@ -19,7 +19,8 @@ _SPEED_SHARE = 3.0
 
 
 class Relocator:
-    """Call `step` at each tick, first of all; then `jump_m` says how far the position jumped with it."""
+    """Call `step` at each tick, first of all; then `jump_m` says how far the position jumped with it, and
+    `shift_m` how far in all since it was last sure for a while."""
 
     def __init__(self, params: MissionParams) -> None:
         self._params = params
@@ -30,6 +31,12 @@ class Relocator:
         self._moved = False
         self._doubted_ns: int | None = None
         self.jump_m = (0.0, 0.0)
+        self._shift = (0.0, 0.0)
+
+    @property
+    def shift_m(self) -> float:
+        """How far off the position was when the doubt began, as far as it is known by now."""
+        return math.hypot(*self._shift)
 
     @property
     def jumped(self) -> bool:
@@ -47,6 +54,7 @@ class Relocator:
             patience_s = p.first_look_s if phase is Phase.ACQUIRE else p.doubt_s
             if sure_s > p.settled_s and not self._moved:
                 self._doubted_ns = None
+                self._shift = (0.0, 0.0)
             doubted = (
                 self._moved or min(doubt_s, phase_s if phase is Phase.ACQUIRE else math.inf) > patience_s
             )
@@ -83,5 +91,6 @@ class Relocator:
             dx, dy = at[0] - self._last[0], at[1] - self._last[1]
             if max(abs(dx), abs(dy)) > _JUMP_M + _SPEED_SHARE * self._params.speed_mps * s.dt_s:
                 self.jump_m = (dx, dy)
+                self._shift = (self._shift[0] + dx, self._shift[1] + dy)
                 self._moved = s.height_m > self._params.steer_above_m
         self._last = at

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Phase
@@ -15,6 +17,9 @@ from flightd.mission.triggers import Trigger
 from flightd.mission.views import View
 
 _TO_VIEW = (Phase.CLIMB, Phase.SCAN)
+_ENDS = (Phase.LAND, Phase.DONE, Phase.ABORTED, Phase.PILOT)
+_SAME_SHARE = 0.5
+"""A position that is corrected by less than this part of the way to the nearest other place is the same."""
 _OVER = (Trigger.DWELLED, Trigger.ROUTE_DONE)
 
 
@@ -29,6 +34,7 @@ class ScanPhase:
         self._scanner = scanner
         self._params = params
         self._scanned = ""
+        self._apart_m = _least_apart_m(site)
 
     def view(self, phase: Phase) -> View | None:
         """Where to look from, None in phases that do not scan."""
@@ -80,16 +86,28 @@ class ScanPhase:
         turned = abs(wrap_pi(stop.yaw_rad - s.pose.yaw_rad)) > math.pi * 0.75
         return replace(stop, yaw_rad=wrap_pi(stop.yaw_rad + math.pi)) if turned else stop
 
-    def changed(self, s: Senses, before: Phase, phase: Phase, trigger: Trigger, stop: Stop) -> None:
-        """Tell the scanner of a change of phase at (or on the way to) `stop`."""
+    def take_due(self, visited: Sequence[str]) -> tuple[str, ...]:
+        """Those of the `visited` nodes that must be visited once more, to count what was withdrawn."""
+        due = self._scanner.take_due() if self._scanner is not None else ()
+        return tuple(node for node in due if node in visited)
+
+    def changed(
+        self, s: Senses, before: Phase, phase: Phase, trigger: Trigger, stop: Stop, shift_m: float
+    ) -> None:
+        """Tell the scanner of a change of phase at (or on the way to) `stop`; `shift_m` is how far off the
+        position was that was doubted."""
         scanner = self._scanner
         if scanner is None:
             return
         certain = s.pose is not None and s.localised and s.pose.integrity >= scanner.least_integrity
         if trigger is Trigger.POSITION_DOUBTED:
-            scanner.doubt(s.now_ns, "the position is doubted")
+            scanner.doubt()
         elif trigger is Trigger.POSITION_SURE:
+            if shift_m >= _SAME_SHARE * self._apart_m:
+                scanner.withdraw(s.now_ns, f"the position was {shift_m:.2f} m off")
             scanner.trust()
+        elif phase in _ENDS and scanner.doubted:
+            scanner.withdraw(s.now_ns, "the position was not found again")
         elif trigger is Trigger.ARRIVED:
             scanner.reached(stop.node, certain)
             self._scanned = ""
@@ -102,3 +120,10 @@ class ScanPhase:
             self._scanned = stop.node if trigger in _OVER else ""
         if trigger is Trigger.ROUTE_DONE:
             scanner.home(certain)
+
+
+def _least_apart_m(site: Site) -> float:
+    """The distance between the two neighbouring nodes or lines of a site that are nearest to each other."""
+    rows = sorted({aisle.y_m for aisle in site.aisles})
+    along = (spacing_m for aisle in site.aisles for spacing_m in aisle.spacing_m)
+    return min((*along, *(b - a for a, b in pairwise(rows))), default=math.inf)

@@ -1,12 +1,14 @@
 """Scanning over a whole flight: which nodes still have locations to count, and which findings are proven.
 
 What is found at a node stays pending until the drone's place is proven: by a location label read there, or
-by arriving at `confirm_stops` further nodes without a doubt.  On a doubt everything pending is withdrawn,
-so that nothing is ever booked on a wrong location; its locations are left to count.
+by arriving at `confirm_stops` further nodes without a doubt.  On a doubt nothing more is assigned; where it
+ends elsewhere or not at all, or a label contradicts the place, everything pending is withdrawn, so that
+nothing is ever booked on a wrong location; its locations are left to count, and its node is due again.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 
@@ -49,6 +51,8 @@ class Scanner:
         self._sightings: list[Sighting] = []
         self._accused: dict[str, float] = {}
         self._overruled: dict[str, float] = {}
+        self._due: list[str] = []
+        self._again: Counter[str] = Counter()
         self.doubted = False
 
     # What the mission asks
@@ -105,7 +109,7 @@ class Scanner:
 
     def reached(self, node: str, certain: bool) -> None:
         """A node is reached: earlier findings are the surer for it, if the place is `certain`."""
-        if not certain:
+        if not certain or self.doubted:
             return
         for pending in self._pending:
             pending.stops += pending.node != node
@@ -113,27 +117,40 @@ class Scanner:
 
     def home(self, certain: bool) -> None:
         """The flight has come back to its pad over known lines: everything is where it should be."""
-        if certain:
+        if certain and not self.doubted:
             self._confirm(self._pending)
 
-    def doubt(self, now_ns: int, reason: str) -> None:
-        """The place may be another one: withdraw what is pending and assign nothing until `trust`."""
+    def doubt(self) -> None:
+        """The place may be another one: assign nothing, and keep what is pending, until `trust`."""
+        self.leave()
+        self.doubted = True
+
+    def withdraw(self, now_ns: int, reason: str) -> None:
+        """The place was or may have been another one: what is pending counts no more."""
         self.leave()
         codes = [code for pending in self._pending for code in pending.locations]
         if codes:
             self._settled.append(Settled(tuple(codes), confirmed=False))
             self._done.difference_update(codes)
+        self._due += [p.node for p in self._pending if p.locations and p.node not in self._due]
         self._pending.clear()
-        if not self.doubted and (codes or self._accused):
+        if codes or (self._accused and not self.doubted):
             text = f"{reason}; {len(codes)} findings withdrawn"
             self._events.append(Event(now_ns, EventLevel.WARNING, "map_contradiction", text))
-        self.doubted = True
 
     def trust(self) -> None:
         """The place is known again; labels that still contradict it hang wrong."""
         self.doubted = False
         self._overruled |= self._accused
         self._accused.clear()
+
+    def take_due(self) -> tuple[str, ...]:
+        """The nodes to fly to once more, their findings having been withdrawn, in the order of their first
+        visit; each at most `revisits` times in a flight."""
+        due = [node for node in self._due if self._again[node] < self._params.revisits]
+        self._again.update(due)
+        self._due.clear()
+        return tuple(due)
 
     # What pictures bring
 
@@ -160,7 +177,8 @@ class Scanner:
         if against:
             self._accused = {seen.location: seen.off_m for seen in against}
             text = f"label {against[0].location} seen {against[0].off_m:+.2f} m from its place"
-            self.doubt(pose.stamp_ns, f"at {self._task.node}: {text}")
+            self.withdraw(pose.stamp_ns, f"at {self._task.node}: {text}")
+            self.doubted = True
             return
         self._task.take(look)
         self._gather()

@@ -23,7 +23,8 @@ class ScanParams:
 
     A view ends when every location in it is decided, at the latest after `view_s`; what is undecided then
     is looked at again from `retakes` other places, up to `step_m` nearer and `aside_m` along the aisle
-    (`aside_per_height` of the height: the node's own lines must stay in the down camera's picture).
+    (`aside_per_height` of the height: the node's own lines must stay in the down camera's picture).  A node
+    whose findings had to be withdrawn is flown to again, at most `revisits` times.
     """
 
     min_height_m: float = 0.7
@@ -39,6 +40,7 @@ class ScanParams:
     least_probability: float = 0.99
     least_integrity: float = 0.97
     confirm_stops: int = 2
+    revisits: int = 2
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,7 +64,7 @@ def score(
         mission="completed" if final and final.phase is Phase.DONE else "aborted",
         reason=final.reason if final else "the daemon never spoke",
         nodes_planned=plan.visits,
-        nodes_visited=len(visits),
+        nodes_visited=len({visit.text for visit in visits}),
         nodes_miscounted=len(visits) - len(right),
         cross_track_rms_m=_rounded(_rms(on_lines)),
         cross_track_max_m=_rounded(max(on_lines, default=None)),

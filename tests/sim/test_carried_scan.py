@@ -111,7 +111,8 @@ def test_what_was_counted_before_the_labels_told_is_withdrawn() -> None:
     assert {code for codes in withdrawn for code in codes} == places_of("A3")
     assert flown.phase is Phase.DONE
     found = booked(flown)
-    assert found == {code: (f"PALLET {code}",) for code in places_of("A2")}
+    assert found == {code: (f"PALLET {code}",) for code in places_of("A3", "A2")}, "A3 is visited again"
+    assert sorted(flown.visited) == ["A2", "A3"]
 
 
 def test_one_label_that_hangs_wrong_costs_a_look_and_nothing_else() -> None:

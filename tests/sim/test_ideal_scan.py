@@ -143,3 +143,28 @@ def test_going_blind_in_front_of_a_shelf_is_down_before_it_drifts_there(phase: P
     assert nearest > 0.3, "half the width of the drone"
     events = [event.text for event in flown.events if event.name == "hazard"]
     assert any("camera" in text for text in events), events
+
+
+@pytest.mark.parametrize("elsewhere", [False, True])
+def test_a_doubt_on_the_way_costs_no_location(elsewhere: bool) -> None:
+    """It ends where it began and all stays, or it ends elsewhere and what is withdrawn is counted again."""
+    scanner, doubted = Scanner(SITE, SIGHT, CONFIG.scan_params(4.0)), list[str]()
+    front, params = IdealFront(SITE, SIGHT, STOCK), CONFIG.pilot_params(SITE)
+    flight = IdealFlight(SITE, params, visits=NODES, seed=5, scanner=scanner, front=front)
+
+    def doubt(phase: Phase, now_ns: int) -> None:
+        visited = flight.pilot.mission.visited
+        if phase is Phase.FOLLOW and visited and not doubted:
+            doubted.append(visited[0])
+            scanner.doubt()
+            if elsewhere:
+                scanner.withdraw(now_ns, "elsewhere")
+
+    flight.on_tick = doubt
+    flown = flight.fly()
+    assert (flown.phase, set(flown.visited), len(flown.visited)) == (Phase.DONE, set(NODES), len(NODES))
+    settled = [s for output in flown.outputs for s in output.settled]
+    assert {code for s in settled if s.confirmed for code in s.locations} == set(PLACES)
+    assert any(not s.confirmed for s in settled) is elsewhere
+    visits = [event.text for event in flown.events if event.name == "visited"]
+    assert visits.count(doubted[0]) == 1 + elsewhere

@@ -279,3 +279,31 @@ def test_a_location_label_is_told_to_the_localiser_with_its_way_from_the_drone()
     assert sighting.location == label.code
     assert sighting.dx_m == pytest.approx(label.x_m - here.x_m, abs=0.01)
     assert sighting.dy_m == pytest.approx(label.y_m - here.y_m, abs=0.01)
+
+
+def test_a_doubt_alone_keeps_what_is_pending_but_proves_nothing_meanwhile() -> None:
+    scanner = Scanner(SITE, SIGHT, PARAMS)
+    counted_at(scanner)
+    scanner.drain()
+    scanner.doubt()
+    for node in ("A3", "A4"):
+        scanner.reached(node, certain=True)
+    scanner.home(certain=True)
+    assert scanner.drain() == ((), ())
+    scanner.trust()
+    scanner.home(certain=True)
+    assert [set(s.locations) for s in scanner.drain()[1] if s.confirmed] == [set(LOCATIONS)]
+    assert scanner.take_due() == ()
+
+
+def test_a_node_whose_findings_were_withdrawn_is_due_again_but_not_for_ever() -> None:
+    scanner = Scanner(SITE, SIGHT, PARAMS)
+    due = []
+    for _ in range(PARAMS.revisits + 1):
+        counted_at(scanner)
+        scanner.doubt()
+        scanner.withdraw(1, "elsewhere")
+        scanner.trust()
+        due.append(scanner.take_due())
+        assert scanner.wants("A2")
+    assert due == [("A2",)] * PARAMS.revisits + [()]
