@@ -19,6 +19,8 @@ _WHOLE_SHARE = 0.9
 hold a second label."""
 _SAME_LABEL = 0.5
 """Two codes nearer to each other than this part of their size are one label."""
+_LEAST_EMPTY = 2
+"""Looks that must agree before a place is said to be empty, however little time there was."""
 _SURE_TEXT = 0.999
 _AGREED_TEXT = 0.99
 _SEEN_EMPTY = 0.995
@@ -103,7 +105,8 @@ class Tally:
             settled = self._enough and self._quiet >= 2 and self._agreed(believed)
             return self._with_codes(believed, self._pose) if settled or final else None
         empty = self._seen[Occupancy.EMPTY]
-        if (self._enough or (final and self.looks)) and empty == self.looks and not self._spots:
+        seen_enough = self._enough or (final and self.looks >= _LEAST_EMPTY)
+        if seen_enough and empty == self.looks and not self._spots:
             return Verdict(LocationState.EMPTY, _SEEN_EMPTY, (), self._evidence, self._pose)
         if not final or not self.looks:
             return None

@@ -307,3 +307,16 @@ def test_a_node_whose_findings_were_withdrawn_is_due_again_but_not_for_ever() ->
         due.append(scanner.take_due())
         assert scanner.wants("A2")
     assert due == [("A2",)] * PARAMS.revisits + [()]
+
+
+@pytest.mark.parametrize(("pictures", "state"), [(1, LocationState.UNREADABLE), (2, LocationState.EMPTY)])
+def test_one_picture_never_makes_a_place_empty(pictures: int, state: LocationState) -> None:
+    hover = Hover(replace(PARAMS, retakes=0))
+    view = hover.at_view()
+    code = view.locations[0]
+    for _ in range(pictures):
+        hover.look({code: Occupancy.EMPTY})
+    hover.now_ns += round(PARAMS.view_s * 1e9)
+    assert hover.scanner.step(hover.now_ns)
+    hover.gather()
+    assert hover.found[code].state is state
