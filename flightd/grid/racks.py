@@ -18,6 +18,9 @@ _WIDTH = re.compile(r"0?[1-9]?")
 _FITS_M = 1e-6
 
 
+_MOST_DIGITS = 4
+
+
 class RackError(ValueError):
     """A rack does not fit; the message is `key: problem` in the words of the site file."""
 
@@ -70,6 +73,31 @@ def place_locations(
                 ordered = sorted(fronts[aisle, side], key=lambda shelf: shelf.x0_m)
                 _fill(key, rack, ordered, by_aisle[aisle], found)
     return found
+
+
+def code_form(racks: Iterable[Rack]) -> re.Pattern[str]:
+    """What location codes of these racks look like, places that the map lacks included.
+
+    A pattern without a separator looks like any number, and adds no form: nothing is taken for a code by it.
+    """
+    forms = set()
+    for rack in racks:
+        parts = list(string.Formatter().parse(rack.pattern))
+        if any(not char.isalnum() for literal, *_ in parts for char in literal):
+            letters = max(map(len, rack.aisles))
+            forms.add(
+                "".join(re.escape(text) + _form(name, width, letters) for text, name, width, _ in parts)
+            )
+    return re.compile("|".join(sorted(forms)) or r"(?!)")
+
+
+def _form(name: str | None, width: str | None, letters: int) -> str:
+    if name is None:
+        return ""
+    if name == "aisle":
+        return rf"[^\W_]{{1,{letters}}}"
+    least = max(1, int(width or 1))
+    return "[LR]" if name == "side" else rf"\d{{{least},{max(least, _MOST_DIGITS)}}}"
 
 
 def _check_pattern(key: str, pattern: str) -> None:

@@ -1,7 +1,8 @@
 """Which location a code belongs to, by geometry: the ray through the code meets the shelf front in a cell.
 
 A read that may as well be a neighbour's is given to nobody.  Labels whose text is a location code are no
-stock: they tell where the drone really is, and so contradict a wrong place on the map.
+stock: they tell where the drone really is, and so contradict a wrong place on the map.  Nor is what has the
+form of a location code but is not on the map.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from flightd.core.scanning import BodyPose, CodeSet, Place, PlaceLook, Quad
 from flightd.core.types import CodeRead
 from flightd.core.view import CameraView, ForwardMount, Viewpoint
 from flightd.grid.cells import Cell, cells_of
+from flightd.grid.racks import code_form
 from flightd.grid.site import Side, Site
 
 _DEPTH_SIGMA_M = 0.05
@@ -74,13 +76,14 @@ class Sighting:
 
 @dataclass(frozen=True, slots=True)
 class ShelfLook:
-    """One picture, sorted by location."""
+    """One picture, sorted by location; `strangers` are location codes that the map lacks."""
 
     frame_seq: int
     pose: BodyPose
     reads: tuple[PlacedRead, ...]
     places: tuple[PlaceLook, ...]
     sightings: tuple[Sighting, ...]
+    strangers: tuple[str, ...] = ()
 
 
 class Assigner:
@@ -90,6 +93,7 @@ class Assigner:
         self._sight = sight
         self._least = least_probability
         self._locations = site.locations
+        self._form = code_form(site.racks)
         self._bay_m = {
             (aisle, side): rack.bay_width_m
             for rack in site.racks
@@ -120,6 +124,7 @@ class Assigner:
         """Everything of one picture taken at `pose` while facing the shelf `front` (aisle, side)."""
         stock: list[PlacedRead] = []
         sightings: list[Sighting] = []
+        strangers: list[str] = []
         for read in codes.reads:
             where = self._on_front(read, pose, front)
             if where is None:
@@ -127,9 +132,13 @@ class Assigner:
             if read.text in self._locations:
                 if read.believed:
                     sightings.append(self._sighting(read, pose, where, front))
+            elif self._form.fullmatch(read.text):
+                strangers += [read.text] * read.believed
             else:
                 stock.append(self._placed(read, pose, where, front))
-        return ShelfLook(codes.frame_seq, pose, tuple(stock), codes.places, tuple(sightings))
+        return ShelfLook(
+            codes.frame_seq, pose, tuple(stock), codes.places, tuple(sightings), tuple(strangers)
+        )
 
     def _on_front(
         self, read: CodeRead, pose: BodyPose, front: tuple[str, Side]

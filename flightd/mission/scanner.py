@@ -51,6 +51,7 @@ class Scanner:
         self._sightings: list[Sighting] = []
         self._accused: dict[str, float] = {}
         self._overruled: dict[str, float] = {}
+        self._strangers: set[str] = set()
         self._due: list[str] = []
         self._again: Counter[str] = Counter()
         self.doubted = False
@@ -173,6 +174,11 @@ class Scanner:
             return
         look = self._assigner.look(codes, pose, (view.aisle, view.side))
         self._sightings += look.sightings
+        for text in look.strangers:
+            if text not in self._strangers:
+                self._strangers.add(text)
+                told = f"label {text}, seen from {self._task.node}, is not on the map: not counted as stock"
+                self._events.append(Event(pose.stamp_ns, EventLevel.WARNING, "unknown_location", told))
         against = [seen for seen in look.sightings if seen.contradicts and not self._is_overruled(seen)]
         if against:
             self._accused = {seen.location: seen.off_m for seen in against}

@@ -10,6 +10,7 @@ import pytest
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, Finding, Occupancy
 from flightd.core.types import CodeRead
+from flightd.grid.racks import code_form
 from flightd.mission.scanner import Scanner, nodes_to_count
 from flightd.mission.views import ScanParams, View
 from tests.unit.mission.shelves import SIGHT, SITE, picture, pose, read
@@ -320,3 +321,19 @@ def test_one_picture_never_makes_a_place_empty(pictures: int, state: LocationSta
     assert hover.scanner.step(hover.now_ns)
     hover.gather()
     assert hover.found[code].state is state
+
+
+def test_a_location_label_that_the_map_lacks_is_no_stock() -> None:
+    hover = Hover(replace(PARAMS, retakes=0))
+    code = LOCATIONS[0]
+    hover.run(GOODS, {code: ("AL-77-1-2",)})
+    assert hover.found[code].state is LocationState.UNREADABLE
+    assert [event.name for event in hover.scanner.drain_events()] == ["unknown_location"]
+
+
+def test_codes_of_goods_do_not_look_like_locations() -> None:
+    form = code_form(SITE.racks)
+    assert all(form.fullmatch(code) for code in SITE.locations)
+    assert not any(form.fullmatch(text) for text in ("4006381333931", "PALLET AL-01-1-1", "AL-01-1", "LOT-7"))
+    numbers = [replace(rack, pattern="{bay:02}{level}{position}") for rack in SITE.racks]
+    assert not code_form(numbers).fullmatch("0711"), "any number would look like it"
