@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.connect import signing_of
+from flightd.adapters.vehicle.mavlink.beats import too_slow
 from flightd.adapters.vehicle.mavlink.examination import Examination, Report
 from flightd.adapters.vehicle.mavlink.fitness import Job
 from flightd.adapters.vehicle.mavlink.link import Firmware
@@ -21,6 +22,7 @@ _FIRMWARES = {"ardupilot": Firmware.ARDUPILOT, "px4": Firmware.PX4, "mavsdk": Fi
 _NAMES = {Firmware.ARDUPILOT: "ArduCopter", Firmware.PX4: "PX4"}
 _CABLE = "check vehicle.url, cable (TX to RX), baud rate and power; is another flightd running?"
 _KEY = "; does the autopilot have the same signing key?"
+_BEATS = "grant SET_MESSAGE_INTERVAL of HEARTBEAT (newer firmware), or a faster line; else warn the pilot"
 _POLL_S = 0.1
 _PATIENCE_S = 8.0
 
@@ -75,6 +77,11 @@ def judge(config: VehicleConfig, report: Report) -> list[Check]:
         checks.append(error("vehicle", f"{text}; it is armed", "disarm it: nothing is changed while it is"))
     else:
         checks.append(ok("vehicle", text))
+    slow = too_slow(report.heartbeat_hz)
+    if slow:
+        checks.append(warning("heartbeat", slow, _BEATS))
+    else:
+        checks.append(ok("heartbeat", f"{report.heartbeat_hz:.0f} heartbeats a second"))
     for found in report.findings:
         remedy = (
             "choose it yourself, in a ground station"

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from flightd.adapters.vehicle.mavlink.beats import too_slow
 from flightd.adapters.vehicle.mavlink.examination import Examination
 from flightd.adapters.vehicle.mavlink.fitness import RULES, judge
 from flightd.adapters.vehicle.mavlink.link import Firmware
@@ -65,6 +66,21 @@ def test_px4s_whole_numbers_are_read_and_written_as_bytes() -> None:
             (left,) = await examination.fix(report.findings)
             assert left.name == "COM_RCL_EXCEPT"  # a person must say whether there is RC
             assert peer.parameters["COM_OBL_RC_ACT"] == 4
+
+    run_virtual(test)
+
+
+def test_the_rate_of_heartbeats_is_measured_and_a_slow_one_is_named() -> None:
+    async def test() -> None:
+        async with examined(ArduCopterPeer) as (_, examination):
+            report = await examination.report()
+            assert report.heartbeat_hz == pytest.approx(20.0, abs=2.0)
+            assert too_slow(report.heartbeat_hz) == ""
+        async with examined(ArduCopterPeer) as (peer, examination):
+            peer._set_interval = lambda *_: 2  # type: ignore[method-assign]  # firmware that denies it
+            report = await examination.report()
+            assert report.heartbeat_hz == pytest.approx(1.0)
+            assert "seen up to 1.0 s late" in too_slow(report.heartbeat_hz)
 
     run_virtual(test)
 

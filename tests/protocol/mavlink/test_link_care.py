@@ -246,3 +246,19 @@ def _sent(message: Any) -> Any:
     """The message as it arrives."""
     (heard,) = FrameParser(Codec(1)).datagram(Codec(1).pack(message))
     return heard
+
+
+def test_heartbeats_too_rare_to_see_a_take_over_in_time_are_told_once() -> None:
+    async def test() -> None:
+        for hz, told in ((1.0, 1), (20.0, 0)):
+            autopilot = ScriptedAutopilot()
+            autopilot.results[INTERVAL] = 2  # denied
+            async with scripted(autopilot, beats=False):
+                beating = asyncio.create_task(autopilot.run(hz))
+                await asyncio.sleep(60.0)
+                texts = [m.text for m in autopilot.all("STATUSTEXT") if m.text.startswith("heartbeat_rate")]
+                beating.cancel()
+                await asyncio.wait([beating])
+            assert len(texts) == told
+
+    run_virtual(test)

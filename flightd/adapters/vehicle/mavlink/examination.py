@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.adapters.vehicle.mavlink.beats import BEATS_HZ, Beats
 from flightd.adapters.vehicle.mavlink.codec import Codec, Message
 from flightd.adapters.vehicle.mavlink.commands import Commander
 from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
@@ -20,17 +22,20 @@ from flightd.adapters.vehicle.mavlink.transport import make_transport
 from flightd.core.errors import UnavailableError
 from flightd.ports import Clock
 
+_BEATS_WINDOW_S = 1.0
+
 
 @dataclass(frozen=True, slots=True)
 class Report:
     """What was found.  `version` is "" when the autopilot does not tell; `unread` are parameters that it
-    does not have, under their newest names."""
+    does not have, under their newest names; `heartbeat_hz` is the rate that it keeps when asked for ours."""
 
     firmware: Firmware
     version: str
     armed: bool
     findings: tuple[Finding, ...]
     unread: tuple[str, ...]
+    heartbeat_hz: float
 
 
 class Examination:
@@ -45,6 +50,7 @@ class Examination:
         job: Job | None = None,
     ) -> None:
         self._url = url
+        self._clock = clock
         self._system_id = system_id
         self._job = job or Job()
         transport = make_transport(parse_endpoint(url))
@@ -55,6 +61,8 @@ class Examination:
         self._armed = self._signs = False
         self._has_key = signing is not None
         self._version = ""
+        self._beats = Beats(_BEATS_WINDOW_S)
+        self._heartbeat_hz = math.nan
 
     @asynccontextmanager
     async def connected(self, patience_s: float = 5.0) -> AsyncIterator[None]:
@@ -104,7 +112,10 @@ class Examination:
             if self._signs and not self._has_key:
                 remedy = "it signs its messages: give its key as vehicle.signing_key"
             raise UnavailableError(f"{self._url}: the autopilot is heard but does not answer; {remedy}")
-        return Report(firmware, self._version, self._armed, tuple(findings), tuple(unread))
+        if math.isnan(self._heartbeat_hz):
+            self._heartbeat_hz = await self._measure_beats()
+        found_all = (tuple(findings), tuple(unread), self._heartbeat_hz)
+        return Report(firmware, self._version, self._armed, *found_all)
 
     async def fix(self, findings: Sequence[Finding]) -> list[Finding]:
         """Write the better values and read them back; the findings that remain.  Nothing is written to
@@ -116,9 +127,18 @@ class Examination:
                 remaining.append(finding)
         return remaining
 
-    def _take(self, message: Message, _now_ns: int) -> None:
+    async def _measure_beats(self) -> float:
+        """The rate of its heartbeats once the one that a flight needs was asked for."""
+        beat, period_us = dialect.MAVLINK_MSG_ID_HEARTBEAT, round(1e6 / BEATS_HZ)
+        await self._commander.send(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, beat, period_us)
+        self._beats.start(self._clock.now_ns())
+        await asyncio.sleep(_BEATS_WINDOW_S)
+        return self._beats.rate_hz(self._clock.now_ns())
+
+    def _take(self, message: Message, now_ns: int) -> None:
         match message.get_type():
             case "HEARTBEAT":
+                self._beats.heard(now_ns)
                 self._signs = bool(message.get_header().incompat_flags & dialect.MAVLINK_IFLAG_SIGNED)
                 self._armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
                 self._parameters.bytewise = self._link.firmware is Firmware.PX4

@@ -12,6 +12,7 @@ from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.adapters.vehicle.mavlink.beats import BEATS_HZ, Beats, too_slow
 from flightd.adapters.vehicle.mavlink.codec import Codec, Message
 from flightd.adapters.vehicle.mavlink.commands import Commander
 from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
@@ -32,6 +33,7 @@ from flightd.core.types import (
     AttitudeSetpoint,
     Demand,
     Event,
+    EventLevel,
     GridPose,
     VehicleState,
 )
@@ -40,7 +42,7 @@ from flightd.ports import Clock
 _LOG = logging.getLogger(__name__)
 
 RATES_HZ: dict[int, float] = {
-    dialect.MAVLINK_MSG_ID_HEARTBEAT: 20.0,  # a take-over must be seen within 100 ms
+    dialect.MAVLINK_MSG_ID_HEARTBEAT: BEATS_HZ,
     dialect.MAVLINK_MSG_ID_ATTITUDE: 50.0,
     dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR: 20.0,
     dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 25.0,
@@ -50,6 +52,7 @@ RATES_HZ: dict[int, float] = {
 }
 
 _SYNC_FAST_S, _SYNC_SLOW_S = 0.1, 1.0
+_BEATS_SETTLE_S, _BEATS_WINDOW_S, _BEATS_CHECK_S = 5.0, 3.0, 1.0
 _PAD_NEAR_M = 1.0
 """Further away the pad is not shown: a landing of last resort must not set out for it."""
 
@@ -106,6 +109,7 @@ class MavlinkVehicle(abc.ABC):
         self._texts = TextAssembler()
         self._text_id = 0
         self._heard = asyncio.Event()
+        self._beats = Beats(_BEATS_WINDOW_S)
 
     # The port
 
@@ -196,6 +200,7 @@ class MavlinkVehicle(abc.ABC):
         tasks.create_task(self._once_heard(self._compare_clocks), name="mavlink timesync")
         tasks.create_task(self._once_heard(self.streams.run), name="mavlink streams")
         tasks.create_task(self._once_heard(self._read_parameters), name="mavlink parameters")
+        tasks.create_task(self._once_heard(self._mind_beats), name="mavlink heartbeat rate")
 
     # Receiving
 
@@ -217,6 +222,7 @@ class MavlinkVehicle(abc.ABC):
                     self._rebooted()
                 if message.get_type() == "HEARTBEAT":
                     self._heard.set()
+                    self._beats.heard(now_ns)
                     self._pursuit.heartbeat(now_ns)
 
     def _rebooted(self) -> None:
@@ -236,6 +242,19 @@ class MavlinkVehicle(abc.ABC):
 
     async def _read_parameters(self) -> None:
         await self.parameters.keep(self.parameter_names)
+
+    async def _mind_beats(self) -> None:
+        """Tell people once, when the heartbeats stay too far apart to see a take-over in time."""
+        await asyncio.sleep(_BEATS_SETTLE_S)  # the rate has been asked for meanwhile
+        self._beats.start(self._clock.now_ns())
+        while True:
+            await asyncio.sleep(_BEATS_CHECK_S)
+            now_ns = self._clock.now_ns()
+            problem = "" if self._pursuit.is_silent else too_slow(self._beats.rate_hz(now_ns))
+            if problem:
+                _LOG.warning("%s", problem)
+                self.notify(Event(now_ns, EventLevel.WARNING, "heartbeat_rate", problem))
+                return
 
     async def _compare_clocks(self) -> None:
         while True:
