@@ -10,7 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, ArduPilotVehicle
-from flightd.core.types import AttitudeSetpoint, Demand
+from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.runtime.clock import LoopClock
 from flightd.sim.airframe import Airframe
 from flightd.sim.autopilot.copter import ArduCopterPeer
@@ -298,6 +298,28 @@ def test_an_accepted_mode_that_never_shows_is_not_held_for_long() -> None:
             await asyncio.sleep(1.0)
             assert not known(vehicle).in_control
             assert not vehicle.send(AttitudeSetpoint(0))
+
+    run_virtual(test)
+
+
+@pytest.mark.parametrize(("distance_cm", "disarms"), [(10, True), (150, False), (None, False)])
+def test_leaving_it_disarms_only_what_the_range_finder_too_has_on_the_floor(
+    distance_cm: int | None, disarms: bool
+) -> None:
+    async def test() -> None:
+        async with scripted() as (autopilot, vehicle):
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(2.5)
+            assert known(vehicle).in_control
+            assert known(vehicle).armed
+            if distance_cm is not None:
+                down = dialect.MAV_SENSOR_ROTATION_PITCH_270
+                autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, distance_cm, 0, 1, down, 0))
+            autopilot.say(dialect.MAVLink_extended_sys_state_message(0, 1))
+            await asyncio.sleep(0.1)
+            assert known(vehicle).landed is LandedState.ON_GROUND
+        assert [m.param1 for m in autopilot.commands(ARM)] == ([1, 0] if disarms else [1])
+        assert (autopilot.commands(SET_MODE)[-1].param2 == LAND) is not disarms
 
     run_virtual(test)
 

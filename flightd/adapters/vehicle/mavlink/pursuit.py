@@ -23,6 +23,8 @@ _STEP_S = 0.05
 _ARM_PAUSE_S = 1.0
 _MODE_PAUSE_S = 0.5
 _REASON_NS = 2_000_000_000
+_FLOOR_M = 0.3
+"""Higher than this by the range finder the motors are not stopped, whatever the autopilot says."""
 _HAND_BACK_S = 0.2
 _HAND_BACK_ANSWER_S = 0.06
 _ENGAGED = frozenset({Demand.KEEP, Demand.FLY, Demand.LAND, Demand.DISARM})
@@ -52,6 +54,8 @@ class Heard(Protocol):
     def custom_mode(self) -> int | None: ...
 
     def landed(self, now_ns: int) -> LandedState: ...
+
+    def height_m(self, now_ns: int) -> float: ...
 
 
 class Commands(Protocol):
@@ -169,12 +173,13 @@ class Pursuit:
             await self._pause(_STEP_S)
 
     async def hand_back(self) -> None:
-        """Leave the vehicle in a state that needs no companion: landing, or disarmed on the floor."""
+        """Leave the vehicle in a state that needs no companion: landing, or disarmed when both the autopilot
+        and the range finder have it on the floor."""
         if self._authority.held != self._firmware.flying_mode or not self._telemetry.armed:
             return
         command: int = dialect.MAV_CMD_DO_SET_MODE
         params = self._firmware.mode_params(self._firmware.landing_mode)
-        if self.stands:
+        if self.stands and self._telemetry.height_m(self._clock.now_ns()) < _FLOOR_M:  # not when unknown
             command, params = dialect.MAV_CMD_COMPONENT_ARM_DISARM, (0.0,)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_HAND_BACK_S):
