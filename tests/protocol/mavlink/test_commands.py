@@ -12,6 +12,7 @@ from flightd.sim.autopilot.copter import CopterMode
 from flightd.sim.autopilot.peer import PeerConfig
 from tests.protocol.mavlink.scripted import (
     ARM,
+    LAND,
     SET_MODE,
     ScriptedAutopilot,
     known,
@@ -75,6 +76,34 @@ def test_in_progress_is_waited_for_and_strange_results_are_refusals() -> None:
             vehicle.demand(Demand.FLY)
             await asyncio.sleep(1.0)
             assert known(vehicle).refusal == "mode GUIDED_NOGPS: result 42"
+
+    run_virtual(test)
+
+
+def test_a_command_that_stays_in_progress_is_given_up_and_never_holds_back_a_landing() -> None:
+    async def test() -> None:
+        autopilot = ScriptedAutopilot()
+        autopilot.results[ARM] = 5
+        async with scripted(autopilot) as (_, vehicle):
+
+            def still_busy(message: Any) -> None:
+                if message.command == ARM:
+                    busy = dialect.MAVLink_command_ack_message(ARM, 5, 0, 0, 1, 191)
+                    for second in range(1, 60):
+                        asyncio.get_running_loop().call_later(second, autopilot.say, busy)
+
+            autopilot.after = still_busy
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(5.0)
+            assert len(autopilot.commands(ARM)) == 1
+            assert known(vehicle).refusal == ""
+            await asyncio.sleep(7.0)
+            assert known(vehicle).refusal == "arming: in progress"
+            await asyncio.sleep(3.0)  # it is asked again by now
+            assert len(autopilot.commands(ARM)) == 2
+            vehicle.demand(Demand.LAND)
+            await asyncio.sleep(0.2)
+            assert autopilot.mode == LAND
 
     run_virtual(test)
 

@@ -23,7 +23,8 @@ _RESULTS = {
 }
 
 _ANSWER_S = 0.3
-_IN_PROGRESS_S = 3.0
+_IN_PROGRESS_S, _IN_PROGRESS_MAX_S = 3.0, 10.0
+_LOOK_S = 0.05
 _ATTEMPTS = 4
 
 
@@ -60,32 +61,44 @@ class Commander:
         wanted: Callable[[], bool] = lambda: True,
     ) -> Answer:
         """Send with confirmation 0, 1, 2, 3 until answered within `patience_s`; an answer `in progress`
-        extends the wait.  It is not repeated once `wanted` says that nobody wants it any more."""
+        extends the wait, up to 10 s.  It is neither repeated nor waited for once `wanted` says that nobody
+        wants it any more: what is wanted instead must not wait behind it."""
         async with self._locks.setdefault(command, asyncio.Lock()):
             for confirmation in range(_ATTEMPTS):
                 if not wanted():
                     break
-                result = await self._once(command, confirmation, params, patience_s)
+                result = await self._once(command, confirmation, params, patience_s, wanted)
                 if result is not None:
                     return Answer(result)
         return Answer(None)
 
     async def _once(
-        self, command: int, confirmation: int, params: tuple[float, ...], wait_s: float
+        self,
+        command: int,
+        confirmation: int,
+        params: tuple[float, ...],
+        patience_s: float,
+        wanted: Callable[[], bool],
     ) -> int | None:
+        loop, in_progress = asyncio.get_running_loop(), int(dialect.MAV_RESULT_IN_PROGRESS)
         self._post(command, confirmation, params)
-        while True:
-            waiting = self._waiting[command] = asyncio.get_running_loop().create_future()
-            try:
-                async with asyncio.timeout(wait_s):
-                    result: int = await waiting
-            except TimeoutError:
-                return None
-            finally:
-                self._waiting.pop(command, None)
-            if result != int(dialect.MAV_RESULT_IN_PROGRESS):
-                return result
-            wait_s = _IN_PROGRESS_S
+        until_s, last_s = loop.time() + patience_s, loop.time() + _IN_PROGRESS_MAX_S
+        waiting = self._waiting[command] = loop.create_future()
+        try:
+            while wanted():
+                rest_s = until_s - loop.time()
+                if rest_s <= 0.0:
+                    return in_progress if until_s >= last_s else None
+                await asyncio.wait([waiting], timeout=min(rest_s, _LOOK_S))
+                if not waiting.done():
+                    continue
+                if waiting.result() != in_progress:
+                    return waiting.result()
+                until_s = min(loop.time() + _IN_PROGRESS_S, last_s)
+                waiting = self._waiting[command] = loop.create_future()
+            return None
+        finally:
+            self._waiting.pop(command, None)
 
     def _post(self, command: int, confirmation: int, params: tuple[float, ...]) -> None:
         filled = [*params, *[0.0] * (7 - len(params))]
