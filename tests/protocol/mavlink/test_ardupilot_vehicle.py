@@ -252,6 +252,26 @@ def test_landing_mode_is_ours_but_takes_no_setpoints() -> None:
     run_virtual(test)
 
 
+def test_a_landing_that_is_acknowledged_but_never_shown_is_asked_for_again() -> None:
+    async def test() -> None:
+        async with scripted() as (autopilot, vehicle):
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(2.0)
+            assert known(vehicle).in_control
+            autopilot.obeys = False  # as if the acknowledgement were a late one, of the mode before
+            autopilot.heard.clear()
+            vehicle.demand(Demand.LAND)
+            await asyncio.sleep(3.0)
+            assert len(autopilot.commands(SET_MODE)) > 3
+            assert known(vehicle).in_control, "nobody took it over"
+            autopilot.obeys = True
+            await asyncio.sleep(1.0)
+            assert autopilot.mode == LAND
+            assert known(vehicle).in_control
+
+    run_virtual(test)
+
+
 def test_no_retry_follows_when_the_pilot_takes_over_meanwhile() -> None:
     async def test() -> None:
         autopilot = ScriptedAutopilot()

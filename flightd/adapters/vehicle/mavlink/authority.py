@@ -39,8 +39,12 @@ class Authority:
         self._before_until_ns = None
 
     def accepted(self, mode: int, now_ns: int) -> None:
-        """The autopilot acknowledged our request."""
-        if mode == self._asked and not self.taken and self._held != mode:
+        """The autopilot acknowledged our request.
+
+        From one mode of ours to another only a HEARTBEAT leads: an acknowledgement names the command, not
+        the mode, and may be the belated one of the request before.
+        """
+        if mode == self._asked and not self.taken and self._held is None:
             self._held = mode
             self._before_until_ns = now_ns + _GRACE_NS
 
