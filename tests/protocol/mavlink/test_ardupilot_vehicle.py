@@ -156,8 +156,9 @@ def test_a_vehicle_found_flying_is_not_steered_before_the_meaning_of_thrust_is_k
             assert known(vehicle).refusal == "GUID_OPTIONS not read yet"
             assert not known(vehicle).in_control
             assert not vehicle.send(AttitudeSetpoint(0))
+            await asyncio.sleep(10.0)  # however often an answer is lost
             autopilot.parameters = {"GUID_OPTIONS": 8}
-            await asyncio.sleep(10.0)
+            await asyncio.sleep(0.6)
             assert (known(vehicle).in_control, known(vehicle).refusal) == (True, "")
             assert vehicle.send(AttitudeSetpoint(0))
 

@@ -40,6 +40,7 @@ class ArduPilotVehicle(MavlinkVehicle):
     flying_mode: int = GUIDED_NOGPS
     landing_mode = LAND
     parameter_names = (_GUID_OPTIONS, _SPEED_UP, _SPEED_DOWN)
+    required_names = (_GUID_OPTIONS,)
 
     def __init__(
         self,

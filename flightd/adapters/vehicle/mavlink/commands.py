@@ -23,6 +23,7 @@ _RESULTS = {
 }
 
 _ANSWER_S = 0.3
+_IN_PROGRESS = int(dialect.MAV_RESULT_IN_PROGRESS)
 _IN_PROGRESS_S, _IN_PROGRESS_MAX_S = 3.0, 10.0
 _LOOK_S = 0.05
 _ATTEMPTS = 4
@@ -61,8 +62,8 @@ class Commander:
         wanted: Callable[[], bool] = lambda: True,
     ) -> Answer:
         """Send with confirmation 0, 1, 2, 3 until answered within `patience_s`; an answer `in progress`
-        extends the wait, up to 10 s.  It is neither repeated nor waited for once `wanted` says that nobody
-        wants it any more: what is wanted instead must not wait behind it."""
+        extends the wait, up to 10 s.  Once `wanted` says that nobody wants it any more it is not
+        repeated, nor waited for while in progress: what is wanted instead must not wait behind it."""
         async with self._locks.setdefault(command, asyncio.Lock()):
             for confirmation in range(_ATTEMPTS):
                 if not wanted():
@@ -80,20 +81,33 @@ class Commander:
         patience_s: float,
         wanted: Callable[[], bool],
     ) -> int | None:
-        loop, in_progress = asyncio.get_running_loop(), int(dialect.MAV_RESULT_IN_PROGRESS)
         self._post(command, confirmation, params)
-        until_s, last_s = loop.time() + patience_s, loop.time() + _IN_PROGRESS_MAX_S
+        waiting = self._waiting[command] = asyncio.get_running_loop().create_future()
+        try:
+            async with asyncio.timeout(patience_s):
+                result: int = await waiting
+        except TimeoutError:
+            return None
+        finally:
+            self._waiting.pop(command, None)
+        return result if result != _IN_PROGRESS else await self._outcome(command, wanted)
+
+    async def _outcome(self, command: int, wanted: Callable[[], bool]) -> int | None:
+        """The result of a command in progress; None when it falls silent or is not wanted any more."""
+        loop = asyncio.get_running_loop()
+        last_s, until_s = loop.time() + _IN_PROGRESS_MAX_S, loop.time() + _IN_PROGRESS_S
         waiting = self._waiting[command] = loop.create_future()
         try:
             while wanted():
                 rest_s = until_s - loop.time()
                 if rest_s <= 0.0:
-                    return in_progress if until_s >= last_s else None
+                    return _IN_PROGRESS if until_s >= last_s else None
                 await asyncio.wait([waiting], timeout=min(rest_s, _LOOK_S))
                 if not waiting.done():
                     continue
-                if waiting.result() != in_progress:
-                    return waiting.result()
+                result: int = waiting.result()
+                if result != _IN_PROGRESS:
+                    return result
                 until_s = min(loop.time() + _IN_PROGRESS_S, last_s)
                 waiting = self._waiting[command] = loop.create_future()
             return None

@@ -63,12 +63,16 @@ class Parameters:
             self._heard[str(message.param_id)] = _Stored(value, kind)
             self._arrived.set()
 
-    async def keep(self, wanted: tuple[Names, ...]) -> None:
-        """Fill in what is missing of `wanted` until cancelled."""
+    async def keep(self, wanted: tuple[Names, ...], required: tuple[Names, ...] = ()) -> None:
+        """Fill in what is missing of `wanted` until cancelled; what is `required` to fly comes first and is
+        asked for without a pause: a vehicle found flying waits for it."""
         while True:
-            for names in wanted:
+            missing = [names for names in required if self.get(names) is None]
+            for names in missing or wanted:
                 await self.read(names)
-            await asyncio.sleep(_AGAIN_S if any(self.get(names) is None for names in wanted) else _REST_S)
+            if not missing:
+                complete = all(self.get(names) is not None for names in wanted)
+                await asyncio.sleep(_REST_S if complete else _AGAIN_S)
 
     async def read(self, names: Names) -> tuple[str, float] | None:
         """The parameter, asked for if it is not known yet; None when no name was answered."""

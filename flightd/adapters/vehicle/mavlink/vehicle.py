@@ -88,7 +88,9 @@ class MavlinkVehicle(abc.ABC):
     prime_s: float = 0.0
     """How long setpoints have to stream before the flying mode is entered."""
     parameter_names: ClassVar[tuple[Names, ...]]
-    """What has to be known of the autopilot's parameters."""
+    """What is asked for of the autopilot's parameters."""
+    required_names: ClassVar[tuple[Names, ...]] = ()
+    """Those of them without which it is not flown."""
     rates_hz: ClassVar[dict[int, float]] = RATES_HZ
 
     def __init__(self, url: str, clock: Clock, options: MavlinkOptions = DEFAULTS) -> None:
@@ -241,7 +243,7 @@ class MavlinkVehicle(abc.ABC):
         await work()
 
     async def _read_parameters(self) -> None:
-        await self.parameters.keep(self.parameter_names)
+        await self.parameters.keep(self.parameter_names, self.required_names)
 
     async def _mind_beats(self) -> None:
         """Tell people once, when the heartbeats stay too far apart to see a take-over in time."""
