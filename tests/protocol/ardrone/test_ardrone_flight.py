@@ -8,11 +8,14 @@ import math
 
 import pytest
 
+from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, LandedState
+from flightd.runtime.clock import LoopClock
 from flightd.sim.ardrone.commands import Command
 from flightd.sim.ardrone.drone import BIT_CUTOUT, DroneOptions, Major
+from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.sensors import SensorParams
-from tests.protocol.ardrone.bench import Ear, bench, make_drone, virtually
+from tests.protocol.ardrone.bench import ANY_PORTS, Ear, bench, ended, make_drone, settings_for, virtually
 
 
 def ref_bits(commands: list[Command]) -> list[int]:
@@ -327,6 +330,54 @@ def test_hands_off_in_the_air_hovers_once_and_falls_silent() -> None:
             assert ear.named("PCMD")[0].integer(0) == 0
             await asyncio.sleep(1.5)
             assert drone.major == Major.LANDING, "nobody took over: it lands itself"
+
+    virtually(main)
+
+
+def test_a_drone_found_flying_that_nobody_asks_for_is_held_then_landed() -> None:
+    async def main() -> None:
+        drone = make_drone()
+        clock = LoopClock()
+        seen: list[int] = []
+        async with ArDroneServer(drone, clock, ANY_PORTS) as server:
+            serving = asyncio.create_task(server.run())
+            for number in range(1, 200):
+                drone.command(b"AT*REF=%d,290718208\r" % number, clock.now_ns())
+                await asyncio.sleep(0.03)
+            seen.append(drone.major)
+            vehicle = ArDroneVehicle(settings_for(server, unattended_s=6.0), clock)
+            running = asyncio.create_task(vehicle.run())
+            await asyncio.sleep(5.5)
+            seen.append(drone.major)
+            await asyncio.sleep(1.5)
+            seen.append(drone.major)
+            state = vehicle.state()
+            assert state is not None
+            assert "nothing demanded" in state.refusal
+            await asyncio.sleep(8.0)
+            seen.append(drone.major)
+            assert seen == [Major.HOVERING, Major.HOVERING, Major.LANDING, Major.LANDED]
+            await ended(running)
+            await ended(serving)
+
+    virtually(main)
+
+
+def test_what_another_pilot_starts_in_hands_off_is_not_interfered_with() -> None:
+    async def main() -> None:
+        drone = make_drone()
+        async with bench(drone) as b:
+            await b.configured()
+            b.vehicle.demand(Demand.HANDS_OFF)
+            await asyncio.sleep(0.5)
+            obey = drone.command
+            ear = Ear(drone)
+            obey(b"AT*COMWDG=1\r", b.clock.now_ns())
+            for number in range(5000, 5400):
+                obey(b"AT*REF=%d,290718208\r" % number, b.clock.now_ns())
+                await asyncio.sleep(0.03)
+            assert drone.major == Major.HOVERING
+            assert ear.named("REF", "PCMD") == []
 
     virtually(main)
 

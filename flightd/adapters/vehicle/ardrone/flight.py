@@ -3,7 +3,9 @@
 Pure: time is an argument, commands are the result.  The rules:
 
 - Before the first navdata, and on the ground in HANDS_OFF, only COMWDG keeps the link awake: a daemon that
-  starts beside a flying drone must not land it by accident.
+  starts beside a flying drone must not land it by accident.  One that is found flying is held in place for
+  `unattended_s`; if nothing is demanded by then, nobody is coming, and it lands.  One that stood and took
+  off in HANDS_OFF is another pilot's: not a word from us.
 - FLY: flat trim once per boot of the drone, then REF with the fly bit, repeated, until the drone leaves
   LANDED.  LAND lands.  STANDBY and DISARM never change what the drone does, their fly bit follows the
   telemetry: the motors stop at the end of a landing, and in the air nothing of ours ever cuts them.
@@ -73,6 +75,8 @@ class FlightLogic:
         self._flew = False
         self._sinking = False
         self._hushed = False
+        self._stood = False
+        self._alone_since_ns: int | None = None
         self._over = ""
 
     # what others say
@@ -83,9 +87,9 @@ class FlightLogic:
             return
         self._hushed = demand is Demand.HANDS_OFF and self._telemetry.airborne
         self.demand = demand
-        self._flew = self._sinking = False
+        self._flew = self._sinking = self._stood = False
         self._over = ""
-        self._asked_ns = self._press_ns = self._setpoint = None
+        self._asked_ns = self._press_ns = self._setpoint = self._alone_since_ns = None
 
     def forget_drone(self) -> None:
         """The drone came up anew: it has to be configured and trimmed again."""
@@ -149,6 +153,8 @@ class FlightLogic:
     def commands(self, now_ns: int) -> list[AtCommand]:
         """The commands of this beat; none at all means radio silence."""
         telemetry = self._telemetry
+        if self.heard and self.demand is Demand.HANDS_OFF:
+            self._watch(now_ns)
         if self._hushed:
             return []
         if not self.heard or (self.demand is Demand.HANDS_OFF and not telemetry.airborne):
@@ -186,6 +192,17 @@ class FlightLogic:
         elif not self._sinking and telemetry.major in (Major.LANDING, Major.LANDED):
             self._over = f"the drone landed by itself, battery at {telemetry.battery_percent} %"
 
+    def _watch(self, now_ns: int) -> None:
+        """Of a drone that is to be left alone: whether another flies it, or nobody does any more."""
+        if not self._telemetry.airborne:
+            self._stood = True
+        elif self._stood:
+            self._hushed = True
+        elif self._alone_since_ns is None:
+            self._alone_since_ns = now_ns
+        elif now_ns - self._alone_since_ns >= self._settings.unattended_s * 1e9:
+            self._over = f"found flying, nothing demanded for {self._settings.unattended_s:g} s: landing"
+
     def _may_take_off(self, now_ns: int) -> bool:
         telemetry = self._telemetry
         landed = telemetry.major in (Major.LANDED, Major.INIT, Major.DEFAULT)
@@ -200,7 +217,7 @@ class FlightLogic:
                 self._asked_ns = now_ns
             going_up = telemetry.airborne and not self._over and not self._sinking
             return starting or going_up
-        return self.demand is not Demand.LAND and self._stays_up(now_ns)
+        return self.demand is not Demand.LAND and not self._over and self._stays_up(now_ns)
 
     def _stays_up(self, now_ns: int) -> bool:
         """The drone flies and is not landing, as far as we know; after a lost link it will have landed, and

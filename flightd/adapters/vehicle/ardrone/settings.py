@@ -36,6 +36,7 @@ class ArDroneSettings:
     The limits are what the drone's own loops are set to; setpoints travel as fractions of them.  Indoor
     defaults are the drone's own (12 deg, 0.7 m/s, 100 deg/s).  `full_navdata` asks for 200 packets a
     second with all options instead of 15 short ones: fresher attitude for a hundred times the air time.
+    A drone found flying is held for `unattended_s`, then landed if nothing has been demanded.
     `standing_height_m` is the sonar above the floor while the drone stands, when it cannot measure.
     """
 
@@ -63,6 +64,7 @@ class ArDroneSettings:
     telemetry_stale_s: float = 0.5
     link_lost_s: float = 2.0
     take_off_patience_s: float = 3.0
+    unattended_s: float = 10.0
     land_below_m: float = 0.35
     standing_height_m: float = 0.10
     camera_settle_s: float = 0.3
