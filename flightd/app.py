@@ -31,7 +31,7 @@ from flightd.mission.scanner import Scanner
 from flightd.mission.sorties import check_battery
 from flightd.mission.views import view_height_m
 from flightd.pilot import Pilot, TickInput, TickOutput
-from flightd.ports import Camera, Clock, Ground, Monitor, PoseTaker, Recorder, Vehicle, Vitals
+from flightd.ports import Camera, Clock, CountsDrops, Ground, Monitor, PoseTaker, Recorder, Vehicle, Vitals
 from flightd.runtime.counting import Counting
 from flightd.runtime.latency import LatencyBook
 from flightd.runtime.latest import Latest
@@ -407,6 +407,8 @@ class Daemon:
         late_s, self._late_s = tuple(self._late_s), []
         dropped = {"camera": self._frames.dropped, "detection": self._lost}
         restarts = {"detector": self._detectors.replaced}
+        if isinstance(self._vehicle, CountsDrops):
+            dropped["vehicle"] = self._vehicle.dropped
         if self._recorder is not None:
             dropped["recorder"] = self._recorder.dropped
             restarts["recorder"] = self._recorder.restarts

@@ -67,6 +67,14 @@ class PoseTaker(Protocol):
         ...
 
 
+@runtime_checkable
+class CountsDrops(Protocol):
+    """A vehicle that counts what its link could not take."""
+
+    @property
+    def dropped(self) -> int: ...
+
+
 class Camera(Protocol):
     """The down camera.  `run` delivers tickets of pictures in shared memory until cancelled; it raises
     TransientError when the source failed and another `run` may succeed."""

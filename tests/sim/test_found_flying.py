@@ -97,6 +97,7 @@ def test_it_keeps_the_vehicle_level_reports_and_lands_it(alone_s: float) -> None
             assert 'flightd_phase{phase="aborted"} 1.0' in told
             assert 'flightd_events_total{level="error",name="restart"} 1.0' in told
             assert 'flightd_events_total{level="error",name="failure"}' in told, "the camera's"
+            assert 'flightd_dropped_total{queue="vehicle"}' in told
 
     run_virtual(test)
 

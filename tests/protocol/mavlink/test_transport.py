@@ -237,6 +237,7 @@ def test_a_stalled_tcp_line_drops_what_is_new_instead_of_piling_it_up() -> None:
             beat = dialect.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
             accepted = sum(vehicle.link.send(beat) for _ in range(400_000))  # 8 MB
             assert accepted < 400_000
+            assert vehicle.dropped >= 400_000 - accepted
             server.close()
             await server.wait_closed()
 

@@ -120,6 +120,11 @@ class ArDroneVehicle:
     def notify(self, event: Event) -> None:
         """An AR.Drone has no ground station to show anything on."""
 
+    @property
+    def dropped(self) -> int:
+        """Groups of commands that the network could not take."""
+        return self._link.dropped
+
     # Camera
 
     def select_camera(self, camera: Camera) -> None:

@@ -163,6 +163,11 @@ class MavlinkVehicle(abc.ABC):
         for text in make_texts(SEVERITIES[event.level], f"{event.name}: {event.text}", self._text_id):
             self.link.send(text)
 
+    @property
+    def dropped(self) -> int:
+        """Messages that the link could not take."""
+        return self.link.dropped
+
     def share_pose(self, pose: GridPose, pad_m: tuple[float, float] | None = None) -> None:
         """Give the autopilot's estimator the grid pose, at 30 Hz at most, if a `pose_form` was chosen; with
         `pad_m`, a place on the map, also the target of its precision landing while it is near."""
