@@ -40,6 +40,8 @@ _ASK_S = 2.0
 _RANGE_S = 0.04
 _AHEAD_MAX_S = 0.1
 _SAMPLES = 1000
+_WAITING_MAX = 4096
+"""Bytes that may wait for a simulator that does not read; what is said beyond is said again later."""
 _GPS_BLEND = 0.1
 """Share of each position sample that is believed against the integrated velocity: latitude and longitude
 come in steps of a centimetre."""
@@ -174,6 +176,7 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
 
     `open` waits for the first truth; a lost link is found again, the warehouse staying where it is.  The
     distance to our floor goes back as DISTANCE_SENSOR, for an autopilot whose range finder is fed so.
+    The truth is that of the first autopilot heard: another vehicle on the same link tells nothing.
     """
 
     def __init__(self, url: str, clock: Clock, placement: Placement, patience_s: float = 30.0) -> None:
@@ -187,6 +190,7 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
         self._mav.robust_parsing = True
         self._transport: Any = None
         self._peer: tuple[str, int] | None = None
+        self._system_id: int | None = None
         self._range = SensorParams()
         self._pace = PaceWatch()
         self._first = asyncio.Event()
@@ -295,7 +299,7 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
             self._send(dialect.MAVLink_command_long_message(1, 1, command, 0, *params))
 
     def _send(self, message: Message) -> None:
-        if self._transport is None:
+        if self._transport is None or self._transport.get_write_buffer_size() > _WAITING_MAX:
             return
         frame = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
@@ -322,10 +326,17 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
         self._mav.buf, self._mav.buf_index = bytearray(), 0  # a broken datagram must not eat the next one
         self.data_received(data)
 
+    def _is_vehicle(self, message: Message) -> bool:
+        if message.get_srcComponent() != dialect.MAV_COMP_ID_AUTOPILOT1:
+            return False
+        if self._system_id is None:
+            self._system_id = message.get_srcSystem()
+        return bool(message.get_srcSystem() == self._system_id)
+
     def data_received(self, data: bytes) -> None:
         now_ns = self._clock.now_ns()
         for message in self._mav.parse_buffer(data) or ():
-            if message.get_type().startswith(("BAD_DATA", "UNKNOWN")):
+            if message.get_type().startswith(("BAD_DATA", "UNKNOWN")) or not self._is_vehicle(message):
                 continue
             if message.get_type() == "ATTITUDE":
                 self._mind_pace(message.time_boot_ms, now_ns)

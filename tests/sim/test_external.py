@@ -195,8 +195,13 @@ def test_a_simulator_on_udp_is_heard_and_told_the_distance_to_our_floor() -> Non
         opening = asyncio.create_task(vehicle.open())
         await asyncio.sleep(0.1)
         transport, sitl = await loop.create_datagram_endpoint(UdpSitl, remote_addr=("127.0.0.1", port))
+        other = dialect.MAVLink(None, srcSystem=2, srcComponent=1)  # another vehicle, and not an autopilot:
+        gimbal = dialect.MAVLink(None, srcSystem=1, srcComponent=154)  # neither is believed
         for step in range(400):
             transport.sendto(b"\xfd\x1c\x00" + bytes(3))  # a torn frame costs no other
+            transport.sendto(hil(9.0).pack(gimbal))
+            if step:
+                transport.sendto(hil(5.0).pack(other))
             transport.sendto(hil(1.5 if step else 0.0).pack(sitl.mav))
             await asyncio.sleep(0.01)
         await opening
@@ -212,6 +217,29 @@ def test_a_simulator_on_udp_is_heard_and_told_the_distance_to_our_floor() -> Non
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
         transport.close()
+        await asyncio.sleep(0.01)
+
+    run_virtual(test)
+
+
+def test_what_a_stalled_simulator_does_not_read_is_not_piled_up() -> None:
+    async def test() -> None:
+        Sitl.connections, Sitl.climbed_m = [], 0.0
+        loop = asyncio.get_running_loop()
+        server = await loop.create_server(Sitl, "127.0.0.1", 0)
+        vehicle = ExternalVehicle(f"tcp:127.0.0.1:{server.sockets[0].getsockname()[1]}", LoopClock(), PAD)
+        opening = asyncio.create_task(vehicle.open())
+        await Sitl.fly(0.5)
+        await opening
+        Sitl.connections[0].transport.pause_reading()
+        for _ in range(100_000):  # far more than the sockets hold
+            vehicle._ask()
+        waiting = vehicle._transport.get_write_buffer_size()
+        assert 0 < waiting < 5000
+        await vehicle._let_go()
+        Sitl.connections[0].transport.abort()
+        server.close()
+        await server.wait_closed()
         await asyncio.sleep(0.01)
 
     run_virtual(test)
