@@ -32,6 +32,7 @@ _METRES_PER_DEGREE = 111_319.49
 _WANTED_HZ = 100
 _TRUTH_IDS = (
     dialect.MAVLINK_MSG_ID_SIM_STATE,
+    dialect.MAVLINK_MSG_ID_SIMSTATE,
     dialect.MAVLINK_MSG_ID_HIL_STATE_QUATERNION,
     dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
     dialect.MAVLINK_MSG_ID_ATTITUDE,
@@ -77,7 +78,8 @@ class TruthReader:
     """Folds a simulator's messages into the true motion on the map.
 
     SIM_STATE (ArduPilot) and HIL_STATE_QUATERNION (PX4) are truth; LOCAL_POSITION_NED with ATTITUDE, the
-    autopilot's own estimate, serves until one of them is heard.
+    autopilot's own estimate, serves until one of them is heard.  SIMSTATE (older ArduPilot) is true of
+    attitude and place but tells neither height nor velocity: those stay LOCAL_POSITION_NED's.
     """
 
     def __init__(self, placement: Placement) -> None:
@@ -86,6 +88,7 @@ class TruthReader:
         self._start: _Motion | None = None
         self._has_truth = False
         self._attitude: Message | None = None
+        self._simstate: Message | None = None
         self._blend: tuple[int, float, float] | None = None
 
     def take(self, message: Message, now_ns: int) -> Kinematics | None:
@@ -116,8 +119,18 @@ class TruthReader:
                 attitude = euler(*message.attitude_quaternion)
                 rates = (message.rollspeed, message.pitchspeed, message.yawspeed)
                 return _Motion(north, east, up, vn, ve, -vd, *attitude, rates)
+            case "SIMSTATE":
+                if self._simstate is None and not self._has_truth:
+                    self._start = None  # as estimated, it was another place
+                self._simstate = message
             case "ATTITUDE":
                 self._attitude = message
+            case "LOCAL_POSITION_NED" if not self._has_truth and self._simstate is not None:
+                s = self._simstate
+                north, east, _ = self._place(s.lat, s.lng, 0.0)
+                north, east = self._smooth(now_ns, north, east, message.vx, message.vy)
+                motion = (north, east, -message.z, message.vx, message.vy, -message.vz)
+                return _Motion(*motion, s.roll, s.pitch, s.yaw, (s.xgyro, s.ygyro, s.zgyro))
             case "LOCAL_POSITION_NED" if not self._has_truth and self._attitude is not None:
                 a = self._attitude
                 rates = (a.rollspeed, a.pitchspeed, a.yawspeed)

@@ -111,6 +111,24 @@ def test_px4s_ground_truth_is_read() -> None:
     assert truth.yaw_rad == pytest.approx(math.pi / 2)
 
 
+def test_simstate_corrects_where_the_autopilot_believes_to_be() -> None:
+    def simstate(north: float) -> Any:
+        place = (round((LAT0 + north / METRES_PER_DEGREE) * 1e7), round(LON0 * 1e7))
+        return dialect.MAVLink_simstate_message(0.1, 0.0, 0.0, 0.0, 0.0, -9.8, 0.0, 0.0, 0.2, *place)
+
+    reader = TruthReader(Placement(0.0, 0.0, 0.0))
+    assert reader.take(dialect.MAVLink_attitude_message(0, 0.0, 0.0, 0.7, 0.0, 0.0, 0.0), 0) is None
+    estimate = dialect.MAVLink_local_position_ned_message(0, 40.0, -30.0, -0.2, 0.0, 0.0, 0.0)
+    assert read(reader, estimate, 0).x_m == pytest.approx(0.0)
+    for step in range(201):  # a metre ahead, the estimate astray
+        assert reader.take(simstate(0.005 * step), step * 10_000_000) is None
+        estimate = dialect.MAVLink_local_position_ned_message(0, 40.0, -30.0, -1.2, 0.5, 0.0, -0.3)
+        truth = read(reader, estimate, step * 10_000_000)
+    assert (truth.x_m, truth.y_m) == pytest.approx((1.0, 0.0), abs=0.02)
+    assert (truth.climb_mps, truth.roll_rad, truth.yaw_rate_radps) == pytest.approx((0.3, 0.1, 0.2))
+    assert truth.yaw_rad == pytest.approx(0.0)
+
+
 class Sitl(asyncio.Protocol):
     """A simulator that climbs at 0.5 m/s and tells it once it has been asked."""
 
