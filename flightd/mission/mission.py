@@ -318,6 +318,9 @@ class Mission:
         self._on_pad_leg = phase is Phase.LAND and planned
         unplanned = phase in {Phase.LAND, Phase.ABORTED, Phase.PILOT} and not planned
         if phase is Phase.DONE:
+            if not self._aborting and self._scan.blind:
+                self._aborting, self._cause = True, self._scan.blind
+                self._event(s.now_ns, EventLevel.ERROR, "not_counted", self._cause)
             self.phase = Phase.ABORTED if self._aborting else Phase.DONE
             self._cause = self._cause if self._aborting else "landed on the pad"
         else:

@@ -45,6 +45,11 @@ class ScanPhase:
         doubted = self._scanner is not None and self._scanner.doubted and phase is not Phase.RELOCATE
         return {Trigger.POSITION_DOUBTED} if doubted else set()
 
+    @property
+    def blind(self) -> str:
+        """Why nothing is counted although it should be, or an empty text."""
+        return self._scanner.blind if self._scanner is not None else ""
+
     def due(self, phase: Phase, stop: Stop) -> bool:
         """Whether there is anything (left) to scan at the stop that is hovered at."""
         if self._scanner is None or not stop.visit:

@@ -20,6 +20,8 @@ from flightd.mission.legs import Pace
 from flightd.mission.scan_task import ScanTask
 from flightd.mission.views import ScanParams, View, ViewPlanner, views_s
 
+_BLIND_NODES = 3
+"""Scans in a row without a single picture after which the reader is taken to be dead."""
 _SAME_OFF_M = 0.3
 """A label seen so near to where it was found to hang wrong still hangs there."""
 
@@ -52,6 +54,7 @@ class Scanner:
         self._accused: dict[str, float] = {}
         self._overruled: dict[str, float] = {}
         self._strangers: set[str] = set()
+        self._begun = self._begun_blind = 0
         self._due: list[str] = []
         self._again: Counter[str] = Counter()
         self.doubted = False
@@ -67,6 +70,13 @@ class Scanner:
     def view(self) -> View | None:
         """Where to look from now, None when the present node has nothing left."""
         return self._task.view if self._task else None
+
+    @property
+    def blind(self) -> str:
+        """Why the count is none, or an empty text: no picture was read at the last nodes, nor is it yet."""
+        if not self._begun or self._begun_blind < min(_BLIND_NODES, self._begun):
+            return ""
+        return f"no picture of a shelf was read at the last {self._begun_blind} of {self._begun} scans"
 
     def wants(self, node: str) -> bool:
         """Whether locations of a node are left to count."""
@@ -89,6 +99,7 @@ class Scanner:
         self.leave()
         views = self._planner.views(node, self._left(node), height_m, yaw_rad)
         self._task = ScanTask(node, views, self._planner, self._params)
+        self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
         if not self._pending or self._pending[-1].node != node:
             self._pending.append(_Pending(node))
 
@@ -186,6 +197,7 @@ class Scanner:
             self.withdraw(pose.stamp_ns, f"at {self._task.node}: {text}")
             self.doubted = True
             return
+        self._begun_blind = 0
         self._task.take(look)
         self._gather()
         agreeing = [seen.location for seen in look.sightings if not seen.contradicts]

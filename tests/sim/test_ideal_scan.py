@@ -13,7 +13,7 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import Finding
-from flightd.core.types import Command, CommandKind, Phase
+from flightd.core.types import Command, CommandKind, EventLevel, Phase
 from flightd.mission.plan import Heading, HeadingPolicy
 from flightd.mission.scanner import Scanner
 from tests.sim.ideal_flight import Flown, IdealFlight
@@ -168,3 +168,14 @@ def test_a_doubt_on_the_way_costs_no_location(elsewhere: bool) -> None:
     assert any(not s.confirmed for s in settled) is elsewhere
     visits = [event.text for event in flown.events if event.name == "visited"]
     assert visits.count(doubted[0]) == 1 + elsewhere
+
+
+def test_a_reader_that_never_answers_is_no_completed_count() -> None:
+    scanner = Scanner(SITE, SIGHT, CONFIG.scan_params(4.0))
+    flight = IdealFlight(SITE, CONFIG.pilot_params(SITE), visits=("A2",), seed=5, scanner=scanner)
+    flown = flight.fly()
+    assert flown.phase is Phase.ABORTED
+    assert "no picture of a shelf was read" in flown.reason
+    assert [event.level for event in flown.events if event.name == "not_counted"] == [EventLevel.ERROR]
+    pad = flown.truth[-1][1]
+    assert math.hypot(pad.x_m, pad.y_m) < 0.3, "it comes home all the same"
