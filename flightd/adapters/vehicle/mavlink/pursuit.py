@@ -13,12 +13,14 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.authority import Authority
 from flightd.adapters.vehicle.mavlink.commands import Answer
-from flightd.core.types import Demand, LandedState
+from flightd.core.types import Attitude, Demand, LandedState
 from flightd.ports import Clock
 
 _LOG = logging.getLogger(__name__)
 
 _SILENT_NS = 3_000_000_000
+_TELLING_NS = 500_000_000
+"""An attitude this young shows that the line is alive, whatever has become of the heartbeats."""
 _STEP_S = 0.05
 _ARM_PAUSE_S = 1.0
 _MODE_PAUSE_S = 0.5
@@ -52,6 +54,9 @@ class Heard(Protocol):
 
     @property
     def custom_mode(self) -> int | None: ...
+
+    @property
+    def attitude(self) -> Attitude | None: ...
 
     def landed(self, now_ns: int) -> LandedState: ...
 
@@ -106,10 +111,15 @@ class Pursuit:
 
     @property
     def may_steer(self) -> bool:
-        """Whether setpoints may go out.  Heartbeats that fail to come do not end them: an autopilot whose
-        setpoints stop flies on by the last lean until its own time-out, and one that a pilot has taken
-        meanwhile passes over them."""
-        return self.is_engaged and self._authority.held == self._firmware.flying_mode
+        """Whether setpoints may go out.  Heartbeats alone that fail to come do not end them: an autopilot
+        whose setpoints stop flies on by the last lean until its own time-out, and one that a pilot has
+        taken meanwhile passes over them."""
+        flying = self._authority.held == self._firmware.flying_mode
+        return self.is_engaged and flying and (not self.is_silent or self._tells())
+
+    def _tells(self) -> bool:
+        attitude = self._telemetry.attitude
+        return attitude is not None and self._clock.now_ns() - attitude.stamp_ns < _TELLING_NS
 
     @property
     def wants_flight(self) -> bool:

@@ -53,6 +53,11 @@ class Readings:
         self.heartbeat_ns = 0
 
     @property
+    def attitude(self) -> Attitude | None:
+        """The newest attitude."""
+        return self._attitude
+
+    @property
     def yaw_rad(self) -> float | None:
         """The newest measured heading."""
         return None if self._attitude is None else self._attitude.yaw_rad
