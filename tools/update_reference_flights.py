@@ -34,7 +34,7 @@ class Reference:
 
     name: str
     options: tuple[str, ...]
-    seconds: float = 11.0
+    seconds: float = 10.0
 
 
 REFERENCES = (
