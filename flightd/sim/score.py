@@ -63,7 +63,7 @@ def score(
     return Score(
         mission="completed" if final and final.phase is Phase.DONE else "aborted",
         reason=final.reason if final else "the daemon never spoke",
-        nodes_planned=plan.visits,
+        nodes_planned=len({stop.node for stop in plan.stops if stop.visit}),
         nodes_visited=len({visit.text for visit in visits}),
         nodes_miscounted=len(visits) - len(right),
         cross_track_rms_m=_rounded(_rms(on_lines)),
