@@ -67,8 +67,12 @@ class FlightResult:
 
 def plan_of(config: Config, site: Site) -> FlightPlan:
     """The flight plan that the configuration asks for, from the home pad and back."""
+    return _plan_on(config, site.between(*flown_between_m(config, site)))
+
+
+def _plan_on(config: Config, site: Site) -> FlightPlan:
+    """The plan on a site that has only the keep-outs of the heights flown."""
     mission = config.mission
-    site = site.between(*flown_between_m(config, site))
     visits: Sequence[str] = mission.nodes or site.serpentine_route()
     start, policy, yaw_rad = (
         start_of(config, site),
@@ -100,7 +104,7 @@ def pilot_of(config: Config, site: Site) -> Pilot:
             f" {site.name} ({site.ceiling_m} m)"
         )
     flown = site.between(*flown_between_m(config, site))
-    plan, policy = plan_of(config, site), config.heading_policy()
+    plan, policy = _plan_on(config, flown), config.heading_policy()
     params = config.pilot_params(site)
     scanner = scanner_of(config, site)
     check_battery(flown, plan, policy, params.mission, scanner)

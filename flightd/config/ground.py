@@ -6,15 +6,14 @@ import ipaddress
 from pathlib import Path
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from flightd.config.section import Section
 from flightd.mission.guidance import LossAction
 
 
-class GroundConfig(BaseModel):
+class GroundConfig(Section):
     """The link to ground stations (ZMQ): off until it is told where to listen."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     listen: str = Field(
         "",

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from flightd.config.section import Section
 from flightd.mission.guidance import HazardParams, LossAction
 
 
-class HazardConfig(BaseModel):
+class HazardConfig(Section):
     """Thresholds and times of the hazards that have no place elsewhere.  Lengths in m, times in s."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     heartbeat_land_s: float = Field(5.0, ge=2, le=60, description="no heartbeat for so long: land")
     height_share: float = Field(

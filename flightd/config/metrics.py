@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from flightd.config.ground import is_loopback
+from flightd.config.section import Section
 
 
-class MetricsConfig(BaseModel):
+class MetricsConfig(Section):
     """Prometheus metrics over HTTP: off until it is told where to listen."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     listen: str = Field(
         "",

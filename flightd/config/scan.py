@@ -5,15 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from flightd.config.section import Section
 from flightd.mission.views import ScanParams
 
 
-class ScanConfig(BaseModel):
+class ScanConfig(Section):
     """How the front camera counts the locations of a shelf.  Lengths in m, times in s."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     min_height_m: float = Field(0.8, ge=0.5, le=20, description="lowest flight along a shelf")
     max_height_m: float | None = Field(
@@ -58,10 +57,8 @@ class ScanConfig(BaseModel):
         )
 
 
-class InventoryConfig(BaseModel):
+class InventoryConfig(Section):
     """Where the count is kept."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     folder: Path | None = Field(
         None,

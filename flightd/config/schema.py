@@ -9,19 +9,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.ground import GroundConfig
 from flightd.config.hazards import HazardConfig
 from flightd.config.metrics import MetricsConfig
 from flightd.config.scan import InventoryConfig, ScanConfig
+from flightd.config.section import FocalX, FocalY, Height, OpticsSection, Section, Width
 from flightd.config.vehicle import VehicleConfig
 from flightd.control.flight import FlightGains
 from flightd.control.limits import Limits
 from flightd.control.pid import PidGains
 from flightd.core.errors import InputError
-from flightd.core.geometry import Lens, Mount
+from flightd.core.geometry import Mount
 from flightd.grid.localise import LocaliserParams
 from flightd.grid.site import Site
 from flightd.mission.battery import BatteryParams
@@ -34,8 +35,6 @@ from flightd.tracking.tilt import TiltCompensation
 
 _Positive = Annotated[float, Field(gt=0, le=1e4, allow_inf_nan=False)]
 _Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
-_Bend = Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)]
-_Offset = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
 
 HEIGHT_ROOM_M = 0.4
 """Below and above the flying height, what a keep-out must leave free for a leg to pass it."""
@@ -45,11 +44,7 @@ _RAGGED = 0.03
 """Part of the picture's reach, per metre of height, in which lines are not found surely."""
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class CameraConfig(_Section):
+class CameraConfig(OpticsSection):
     """The down camera: where its pictures come from, its lens and how it is mounted."""
 
     url: str = Field(
@@ -57,38 +52,21 @@ class CameraConfig(_Section):
         description="udp://HOST:PORT (notices of pictures in shared memory), device:/dev/videoN, "
         "file:PATH (a video), folder:PATH (pictures)",
     )
-    width_px: int = Field(640, ge=16, le=7680, description="picture width")
-    height_px: int = Field(360, ge=16, le=4320, description="picture height")
+    width_px: Width = 640
+    height_px: Height = 360
     fps: float = Field(30.0, gt=0, le=240, description="frame rate asked for")
-    fx_px: float = Field(381.4, gt=1, le=20000, description="focal length in x (80 deg across 640 px)")
-    fy_px: float = Field(381.4, gt=1, le=20000, description="focal length in y")
-    cx_px: float | None = Field(
-        None, allow_inf_nan=False, description="principal point x; the picture's middle when left out"
-    )
-    cy_px: float | None = Field(
-        None, allow_inf_nan=False, description="principal point y; the picture's middle when left out"
-    )
-    distortion: tuple[_Bend, _Bend, _Bend, _Bend, _Bend] = Field(
-        (0.0, 0.0, 0.0, 0.0, 0.0), description="k1 k2 p1 p2 k3, OpenCV's order"
-    )
+    fx_px: FocalX = 381.4  # 80 deg across 640 px
+    fy_px: FocalY = 381.4
     mount_yaw_deg: float = Field(0.0, ge=-180, le=180, description="turn of the camera, clockwise from above")
-    mount_offset_m: tuple[_Offset, _Offset, _Offset] = Field(
-        (0.0, 0.0, 0.0), description="camera from the range finder's origin: forward, right, down"
-    )
     latency_s: float = Field(
         0.060, ge=0, le=1, description="from mid-exposure to arrival, least delay of the path"
     )
-
-    def lens(self) -> Lens:
-        cx = (self.width_px - 1) / 2 if self.cx_px is None else self.cx_px
-        cy = (self.height_px - 1) / 2 if self.cy_px is None else self.cy_px
-        return Lens(self.width_px, self.height_px, self.fx_px, self.fy_px, cx, cy, self.distortion)
 
     def mount(self) -> Mount:
         return Mount(math.radians(self.mount_yaw_deg), self.mount_offset_m)
 
 
-class VisionConfig(_Section):
+class VisionConfig(Section):
     """How lines are found, and by how many processes."""
 
     method: Literal["combined", "centroid", "skeleton", "naive"] = Field(
@@ -103,7 +81,7 @@ class VisionConfig(_Section):
     )
 
 
-class PidConfig(_Section):
+class PidConfig(Section):
     kp: float = Field(ge=0, le=100)
     ki: float = Field(ge=0, le=100)
     kd: float = Field(ge=0, le=100)
@@ -114,7 +92,7 @@ class PidConfig(_Section):
         return PidGains(self.kp, self.ki, self.kd, self.integral_limit, self.output_limit)
 
 
-class ControlConfig(_Section):
+class ControlConfig(Section):
     """Loops and limits; the limits have the last word before the wire."""
 
     horizontal: PidConfig = Field(
@@ -149,7 +127,7 @@ class ControlConfig(_Section):
         )
 
 
-class MissionConfig(_Section):
+class MissionConfig(Section):
     """What to fly and how fast.  Lengths in m, times in s."""
 
     site: Path = Field(description="site file, relative to this file")
@@ -233,7 +211,7 @@ class MissionConfig(_Section):
         return self
 
 
-class BatteryConfig(_Section):
+class BatteryConfig(Section):
     """How long a battery flies, and what happens when it does not last."""
 
     flight_s: float = Field(
@@ -265,7 +243,7 @@ class BatteryConfig(_Section):
         return self
 
 
-class RecorderConfig(_Section):
+class RecorderConfig(Section):
     """The black box."""
 
     folder: Path | None = Field(None, description="where flights are recorded; none: not at all")
@@ -274,7 +252,7 @@ class RecorderConfig(_Section):
     picture_fps: float = Field(2.0, ge=0, le=60, description="pictures recorded per second")
 
 
-class Config(_Section):
+class Config(Section):
     """The whole file."""
 
     mission: MissionConfig

@@ -68,8 +68,9 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, cast
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
+from flightd.config.section import Section
 from flightd.core.errors import InputError
 from flightd.core.markers import MarkerDictionary
 from flightd.grid.layout import LayoutError, lay_out
@@ -83,18 +84,14 @@ _Coordinate = Annotated[float, Field(ge=-10_000, le=10_000, allow_inf_nan=False)
 _PadOffset = Annotated[float, Field(ge=-0.5, le=0.5, allow_inf_nan=False)]
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class _SiteTable(_Table):
+class _SiteTable(Section):
     name: str = Field(min_length=1, max_length=80)
     line_width_m: float = Field(0.075, ge=0.05, le=0.10)
     line_colour: LineColour = LineColour.YELLOW
     ceiling_m: _Metres = 6.0
 
 
-class _AisleTable(_Table):
+class _AisleTable(Section):
     id: str = Field(pattern=r"^[A-Z]{1,3}$")
     x_m: _Coordinate
     y_m: _Coordinate
@@ -107,16 +104,16 @@ class _AisleTable(_Table):
     one_way: OneWay | None = None
 
 
-class _CrossTable(_Table):
+class _CrossTable(Section):
     nodes: tuple[str, str]
     one_way: bool = False
 
 
-class _BlockedTable(_Table):
+class _BlockedTable(Section):
     nodes: tuple[str, str]
 
 
-class _KeepOutTable(_Table):
+class _KeepOutTable(Section):
     x0_m: _Coordinate
     y0_m: _Coordinate
     x1_m: _Coordinate
@@ -129,7 +126,7 @@ class _KeepOutTable(_Table):
         return KeepOut(self.x0_m, self.y0_m, self.x1_m, self.y1_m, self.from_m, to_m)
 
 
-class _RackTable(_Table):
+class _RackTable(Section):
     aisles: tuple[str, ...] | None = Field(None, min_length=1)
     sides: tuple[Side, ...] = Field((Side.LEFT, Side.RIGHT), min_length=1)
     bay_width_m: float = Field(ge=0.2, le=50)
@@ -140,7 +137,7 @@ class _RackTable(_Table):
     pattern: str = Field("{aisle}{side}-{bay:02}-{level}-{position}", min_length=1, max_length=100)
 
 
-class _PadTable(_Table):
+class _PadTable(Section):
     id: str = Field(min_length=1, max_length=40)
     node: str
     size_m: float = Field(0.5, ge=0.2, le=3)
@@ -149,7 +146,7 @@ class _PadTable(_Table):
     offset_m: tuple[_PadOffset, _PadOffset] = (0.0, 0.0)
 
 
-class _MarkerTable(_Table):
+class _MarkerTable(Section):
     id: int = Field(ge=0, le=10_000)
     dictionary: MarkerDictionary
     x_m: _Coordinate
@@ -162,7 +159,7 @@ class _MarkerTable(_Table):
         return Marker(self.id, self.dictionary, self.x_m, self.y_m, self.size_m, turned)
 
 
-class _SiteFile(_Table):
+class _SiteFile(Section):
     site: _SiteTable
     aisle: tuple[_AisleTable, ...] = Field(min_length=1)
     cross: tuple[_CrossTable, ...] = ()
@@ -305,7 +302,7 @@ def _key(location: tuple[int | str, ...], tables: dict[str, Any]) -> str:
 
 
 def _fields(location: tuple[int | str, ...]) -> list[str]:
-    tables: dict[str, type[_Table]] = {
+    tables: dict[str, type[Section]] = {
         "site": _SiteTable,
         "aisle": _AisleTable,
         "cross": _CrossTable,

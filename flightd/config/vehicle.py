@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from flightd.config.section import Section
 
 
-class VehicleConfig(BaseModel):
+class VehicleConfig(Section):
     """The link to the autopilot, and what it is given besides setpoints."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["ardupilot", "px4", "ardrone", "mavsdk"] = Field(
         "ardupilot", description="which adapter flies"

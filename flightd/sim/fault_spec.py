@@ -9,17 +9,16 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from flightd.config.section import Section
 from flightd.core.types import CommandKind
 
 _Finite = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 _Angle = Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)]
 
 
-class _Fault(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
+class _Fault(Section):
     by_vehicle: ClassVar[bool] = False
     """The simulated MAVLink autopilot does it; an AR.Drone or a vehicle from elsewhere cannot."""
     by_airframe: ClassVar[bool] = False

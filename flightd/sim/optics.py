@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flightd.core.distortion import undistorted
 from flightd.core.geometry import Lens, Mount
+from flightd.core.types import Image
 from flightd.core.view import AnyMount, Viewpoint
 from flightd.sim.kinematics import Kinematics
 
@@ -124,3 +125,14 @@ def moved(k: Kinematics, dt_s: float) -> Kinematics:
         pitch_rad=k.pitch_rad + k.pitch_rate_radps * dt_s,
         yaw_rad=k.yaw_rad + k.yaw_rate_radps * dt_s,
     )
+
+
+def picture_for(lens: Lens, out: Image | None = None) -> Image:
+    """Where a camera with this lens draws its picture: `out`, or a new one.  ValueError where `out` does
+    not fit."""
+    picture = np.empty((lens.height_px, lens.width_px, 3), np.uint8) if out is None else out
+    if picture.shape != (lens.height_px, lens.width_px, 3) or picture.dtype != np.uint8:
+        raise ValueError(
+            f"out is {picture.shape} {picture.dtype}, the camera makes {lens.width_px}x{lens.height_px}"
+        )
+    return picture

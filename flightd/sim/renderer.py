@@ -24,7 +24,7 @@ from flightd.sim.effects import Sensor, blur_kernel
 from flightd.sim.floor import Box, Floor
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.lighting import Lighting
-from flightd.sim.optics import Floats, RayTable, SimCamera, floor_viewpoint, smear_px
+from flightd.sim.optics import Floats, RayTable, SimCamera, floor_viewpoint, picture_for, smear_px
 from flightd.sim.tiles import Ahead, TiledFloor
 
 __all__ = ["Appearance", "Renderer", "SimCamera"]
@@ -62,12 +62,7 @@ class Renderer:
         """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise.
 
         With `out` (same shape, uint8, contiguous) the picture is written there and `out` returned."""
-        lens = self._camera.lens
-        picture = np.empty((lens.height_px, lens.width_px, 3), np.uint8) if out is None else out
-        if picture.shape != (lens.height_px, lens.width_px, 3) or picture.dtype != np.uint8:
-            raise ValueError(
-                f"out is {picture.shape} {picture.dtype}, the camera makes {lens.width_px}x{lens.height_px}"
-            )
+        picture = picture_for(self._camera.lens, out)
         view = floor_viewpoint(kinematics, self._camera.mount)
         x_m, y_m = self._rays.floor(view)
         foot, footprint_m = (view.x_m, view.y_m), self._rays.footprint_m(view)

@@ -65,8 +65,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from flightd.config.section import Section
 from flightd.grid.site import Site
 from flightd.sim.appearance import Appearance, preset
 from flightd.sim.autopilot.radio import RadioParams
@@ -81,11 +82,7 @@ _Shift = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
 _Carried = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class CameraScenario(_Section):
+class CameraScenario(Section):
     width_px: int = Field(640, ge=64, le=3840)
     height_px: int = Field(360, ge=36, le=2160)
     fps: float = Field(30.0, gt=1, le=120)
@@ -108,7 +105,7 @@ class CameraScenario(_Section):
         )
 
 
-class FrontCameraScenario(_Section):
+class FrontCameraScenario(Section):
     width_px: int = Field(1280, ge=64, le=4096)
     height_px: int = Field(800, ge=64, le=4096)
     focal_px: float = Field(1000.0, gt=50, le=20_000)
@@ -132,7 +129,7 @@ class FrontCameraScenario(_Section):
 _USUAL = StockShares()
 
 
-class RacksScenario(_Section):
+class RacksScenario(Section):
     empty: float = Field(_USUAL.empty, ge=0, le=1)
     tilted: float = Field(_USUAL.tilted, ge=0, le=1)
     glossy: float = Field(_USUAL.glossy, ge=0, le=1)
@@ -164,7 +161,7 @@ class RacksScenario(_Section):
         )
 
 
-class FloorScenario(_Section):
+class FloorScenario(Section):
     appearance: Literal["default", "clean", "harsh", "dim", "glossy", "worn"] = "default"
 
     pad_off_m: tuple[_Shift, _Shift] = (0.0, 0.0)
@@ -179,7 +176,7 @@ class FloorScenario(_Section):
         return preset(self.appearance)
 
 
-class WindScenario(_Section):
+class WindScenario(Section):
     mean_x_mps: float = Field(0.0, ge=-10, le=10)
     mean_y_mps: float = Field(0.0, ge=-10, le=10)
     gust_mps: float = Field(Draught().gust_rms_mps, ge=0, le=10)
@@ -188,7 +185,7 @@ class WindScenario(_Section):
         return Draught(self.mean_x_mps, self.mean_y_mps, self.gust_mps)
 
 
-class VehicleScenario(_Section):
+class VehicleScenario(Section):
     battery: float = Field(1.0, ge=0, le=1)
     battery_ah: float = Field(5.0, gt=0.05, le=100)
     swap_s: float = Field(30.0, ge=0, le=3600)
@@ -203,7 +200,7 @@ class VehicleScenario(_Section):
         return RadioParams(self.radio_loss, self.radio_delay_ms / 1000, self.radio_jitter_ms / 1000)
 
 
-class Expectation(_Section):
+class Expectation(Section):
     """How a flight of this scenario should go: which hazard is found, how soon, and how it ends."""
 
     hazard: str = Field(min_length=1, max_length=40)
@@ -211,7 +208,7 @@ class Expectation(_Section):
     ends: Literal["completed", "home", "landed", "handed over"]
 
 
-class Scenario(_Section):
+class Scenario(Section):
     """One simulated world's conditions."""
 
     camera: CameraScenario = CameraScenario()

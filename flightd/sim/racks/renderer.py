@@ -17,6 +17,7 @@ from flightd.grid.site import Site
 from flightd.sim.appearance import Appearance
 from flightd.sim.effects import Sensor, blur_kernel
 from flightd.sim.kinematics import Kinematics
+from flightd.sim.optics import picture_for
 from flightd.sim.racks.camera import FrontCamera
 from flightd.sim.racks.layout import faces
 from flightd.sim.racks.look import RackLook
@@ -62,12 +63,7 @@ class FrontRenderer:
         """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise.
 
         With `out` (same shape, uint8, contiguous) the picture is written there and `out` returned."""
-        lens = self._camera.lens
-        picture = np.empty((lens.height_px, lens.width_px, 3), np.uint8) if out is None else out
-        if picture.shape != (lens.height_px, lens.width_px, 3) or picture.dtype != np.uint8:
-            raise ValueError(
-                f"out is {picture.shape} {picture.dtype}, the camera makes {lens.width_px}x{lens.height_px}"
-            )
+        picture = picture_for(self._camera.lens, out)
         view = self._camera.view(kinematics).viewpoint
         seen = self._racks.sights(CameraView(self._ideal, view))
         coarse = self._background(view)
