@@ -20,7 +20,7 @@ from typing import TypeAlias
 
 from flightd.adapters.metrics.book import MetricsBook
 from flightd.adapters.recorder.recorder import Recorder
-from flightd.app import pilot_of
+from flightd.app.assembly import pilot_of
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.topics import Topic

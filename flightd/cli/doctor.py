@@ -89,7 +89,7 @@ def doctor(
 async def _examine(config: Config, site: Site, path: Path) -> Diagnosis:
     from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
     from flightd.adapters.vehicle.connect import connect_vehicle
-    from flightd.app import detector_of
+    from flightd.app.assembly import detector_of
     from flightd.cli.checks import camera, machine, vehicle
     from flightd.cli.checks.calibration import check_calibration
     from flightd.runtime.clock import LoopClock
@@ -125,7 +125,7 @@ async def _examine(config: Config, site: Site, path: Path) -> Diagnosis:
 
 async def _examine_machine(config: Config, site: Site, path: Path) -> Diagnosis:
     """What can be known without waiting for anything."""
-    from flightd.app import detector_of, pilot_of
+    from flightd.app.assembly import detector_of, pilot_of
     from flightd.cli.checks import machine
     from flightd.runtime.clock import LoopClock
 
@@ -143,7 +143,7 @@ async def _examine_machine(config: Config, site: Site, path: Path) -> Diagnosis:
 
 def _check_plan(config: Config, site: Site, path: Path) -> Check:
     """Configuration and site are sound, or InputError would have been raised: say what they mean."""
-    from flightd.app import plan_of
+    from flightd.app.assembly import plan_of
     from flightd.cli.checks.verdict import ok
 
     nodes = len(config.mission.nodes) or len(site.nodes)
@@ -153,7 +153,7 @@ def _check_plan(config: Config, site: Site, path: Path) -> Check:
 
 def _check_ground(config: Config, site: Site, clock: Clock) -> list[Check]:
     """Keys and allow-list are read (InputError if they are wrong), the ports are listened on for a moment."""
-    from flightd.app import ground_link
+    from flightd.app.assembly import ground_link
     from flightd.cli.checks.verdict import error, ok
 
     ground = config.ground

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.app import scanner_of
+from flightd.app.assembly import scanner_of
 from flightd.config.schema import Config
 from flightd.core.errors import InputError
 from flightd.core.inventory import PlannedLocation

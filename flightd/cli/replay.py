@@ -46,7 +46,7 @@ def replay(
     flightd replay out/flight.mcap
     flightd replay out/flight.mcap --tolerance 1e-6 --json
     """
-    from flightd.app import detector_of, pilot_of
+    from flightd.app.assembly import detector_of, pilot_of
     from flightd.config.site_file import parse_site
     from flightd.core.topics import Topic
     from flightd.replay.decisions import replay_decisions

@@ -19,7 +19,7 @@ from flightd.core.errors import InputError, RunError, TransientError
 if TYPE_CHECKING:
     from flightd.adapters.recorder.archive import FlightArchive
     from flightd.adapters.recorder.recorder import Recorder
-    from flightd.app import FlightResult
+    from flightd.app.daemon import FlightResult
     from flightd.config.schema import Config
     from flightd.core.types import Status
     from flightd.grid.site import Site
@@ -103,7 +103,8 @@ async def _fly(
     config: Config, site: Site, observer: Callable[[Status], None], *, journal: bool
 ) -> FlightResult:
     from flightd.adapters.store.progress import ProgressFile
-    from flightd.app import Daemon, detector_pool, ground_link
+    from flightd.app.assembly import detector_pool, ground_link
+    from flightd.app.daemon import Daemon
     from flightd.cli.flight_count import FlightCount
     from flightd.cli.service import monitors
     from flightd.runtime.clock import LoopClock

@@ -247,7 +247,7 @@ def _make_folder(out: Path, *, going_on: bool) -> None:
 
 
 def _summary(simulation: Any, result: Any, wall_s: float) -> dict[str, Any]:
-    from flightd.app import plan_of
+    from flightd.app.assembly import plan_of
     from flightd.core.topics import Topic
     from flightd.core.types import Event, Status
     from flightd.replay.log import read_log

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.app import plan_of
+from flightd.app.assembly import plan_of
 from flightd.cli.inventory_formats import utc_text
 from flightd.cli.simulate import Simulation, truth_of
 from flightd.core.inventory import LocationRecord

@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from flightd.adapters.recorder.recorder import Recorder
-from flightd.app import Daemon, FlightResult, detector_pool, ground_link, plan_of, start_of
+from flightd.app.assembly import detector_pool, ground_link, plan_of, start_of
+from flightd.app.daemon import Daemon, FlightResult
 from flightd.cli.flight_count import FlightCount
 from flightd.cli.sim_faults import LauncherFaults, attended
 from flightd.cli.sim_peers import Ports, connected, free_ports, has_front_camera

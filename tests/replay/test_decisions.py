@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from flightd.adapters.recorder.recorder import Recorder
-from flightd.app import pilot_of
+from flightd.app.assembly import pilot_of
 from flightd.config.schema import Config, load_config
 from flightd.config.site_file import load_site, site_toml
 from flightd.core.errors import InputError

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from flightd.app import detector_pool
+from flightd.app.assembly import detector_pool
 from flightd.cli import simulate
 from flightd.config.schema import Config, load_config
 from flightd.config.site_file import load_site

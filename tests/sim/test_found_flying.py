@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from flightd.adapters.metrics.book import MetricsBook
-from flightd.app import Daemon, FlightResult
+from flightd.app.daemon import Daemon, FlightResult
 from flightd.config.schema import Config, load_config
 from flightd.config.site_file import load_site
 from flightd.core.errors import UnavailableError

@@ -17,7 +17,7 @@ import zxingcpp
 from typer.testing import CliRunner
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.app import flown_between_m
+from flightd.app.assembly import flown_between_m
 from flightd.cli.flight_count import going_on
 from flightd.cli.inventory_formats import as_csv, as_epcis, as_xlsx
 from flightd.cli.main import app

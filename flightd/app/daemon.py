@@ -8,42 +8,30 @@ vehicle, ground -> tick; tick -> recorder, ground, observers
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 from flightd.adapters.camera.connect import connect_camera
-from flightd.adapters.ground.link import ZmqGround
 from flightd.adapters.store.progress import LeftOver, ProgressFile
 from flightd.adapters.vehicle.connect import connect_vehicle
-from flightd.config.schema import HEIGHT_ROOM_M, Config
-from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
+from flightd.app.assembly import pilot_of
+from flightd.app.audience import Audience
+from flightd.app.sight import Sight
+from flightd.config.schema import Config
+from flightd.core.errors import FlightdError, TransientError, UnavailableError
 from flightd.core.topics import Topic
-from flightd.core.types import AttitudeSetpoint, Command, Event, EventLevel, Health, Phase, Status
+from flightd.core.types import AttitudeSetpoint, Command, Health, Phase, Status
 from flightd.grid.site import Site
-from flightd.mission.assign import FrontSight
-from flightd.mission.guidance import CEILING_MARGIN_M
-from flightd.mission.legs import Pace
-from flightd.mission.plan import FlightPlan, VisitOrder, make_plan
-from flightd.mission.route import ordered_best
-from flightd.mission.scanner import Scanner
-from flightd.mission.sorties import check_battery
-from flightd.mission.views import view_height_m
-from flightd.pilot import Pilot, TickInput, TickOutput
+from flightd.pilot import TickInput, TickOutput
 from flightd.ports import Camera, Clock, CountsDrops, Ground, Monitor, PoseTaker, Recorder, Vehicle, Vitals
 from flightd.runtime.counting import Counting
 from flightd.runtime.latency import LatencyBook
-from flightd.runtime.latest import Latest
-from flightd.runtime.pool import Detection, DetectorPool, Detectors
+from flightd.runtime.pool import Detectors
 from flightd.runtime.pump import SetpointPump
-from flightd.runtime.ring import FrameTicket
 from flightd.runtime.supervise import restarted
-from flightd.vision.detector import Detector
 
 TICK_S = 0.02
 _FIRST_HEARD_S = 2.0
-_STATUS_NS = 100_000_000
 _OVER = {Phase.DONE, Phase.ABORTED, Phase.PILOT}
 _SILENT_NS = 30_000_000_000
 """A vehicle that nobody heard for so long after the mission's end is not waited for."""
@@ -63,109 +51,6 @@ class FlightResult:
     frames_dropped: int
     latency_ms: dict[str, float]
     setpoint_interval_ms: dict[str, float] = field(default_factory=dict)
-
-
-def plan_of(config: Config, site: Site) -> FlightPlan:
-    """The flight plan that the configuration asks for, from the home pad and back."""
-    return _plan_on(config, site.between(*flown_between_m(config, site)))
-
-
-def _plan_on(config: Config, site: Site) -> FlightPlan:
-    """The plan on a site that has only the keep-outs of the heights flown."""
-    mission = config.mission
-    visits: Sequence[str] = mission.nodes or site.serpentine_route()
-    start, policy, yaw_rad = (
-        start_of(config, site),
-        config.heading_policy(),
-        math.radians(mission.start_yaw_deg),
-    )
-    if mission.order is VisitOrder.BEST:
-        visits = ordered_best(
-            site, visits, (start, site.home.node), policy, Pace.of(mission.params()), yaw_rad
-        )
-    return make_plan(site, visits, start, site.home.node, policy, yaw_rad)
-
-
-def start_of(config: Config, site: Site) -> str:
-    """The node of the pad on which the drone stands at first.  InputError when the site lacks that pad."""
-    wanted = config.mission.pad
-    pad = site.home if wanted is None else next((pad for pad in site.pads if pad.id == wanted), None)
-    if pad is None:
-        names = ", ".join(pad.id for pad in site.pads)
-        raise InputError(f"mission.pad {wanted!r}: site {site.name} has the pads {names}")
-    return pad.node
-
-
-def pilot_of(config: Config, site: Site) -> Pilot:
-    """A fresh pilot for one flight.  Raises InputError where map and configuration contradict each other."""
-    if config.mission.height_m > site.ceiling_m - CEILING_MARGIN_M:
-        raise InputError(
-            f"mission.height_m {config.mission.height_m} is not {CEILING_MARGIN_M} m below the ceiling of"
-            f" {site.name} ({site.ceiling_m} m)"
-        )
-    flown = site.between(*flown_between_m(config, site))
-    plan, policy = _plan_on(config, flown), config.heading_policy()
-    params = config.pilot_params(site)
-    scanner = scanner_of(config, site)
-    check_battery(flown, plan, policy, params.mission, scanner)
-    return Pilot(flown, plan, policy, params, scanner)
-
-
-def scanner_of(config: Config, site: Site) -> Scanner | None:
-    """What counts the shelves; None without a front camera or locations."""
-    front = config.front_camera
-    if not front.is_fitted or not site.locations:
-        return None
-    highest_m = site.ceiling_m - CEILING_MARGIN_M
-    if config.scan.min_height_m > highest_m:
-        raise InputError(
-            f"scan.min_height_m {config.scan.min_height_m} is not {CEILING_MARGIN_M} m below the ceiling of"
-            f" {site.name} ({site.ceiling_m} m)"
-        )
-    return Scanner(site, FrontSight(front.lens(), front.mount()), config.scan_params(highest_m))
-
-
-def flown_between_m(config: Config, site: Site) -> tuple[float, float]:
-    """The heights that are flown between: with a scan, those of its views too."""
-    low_m, high_m = config.mission.flown_between_m()
-    if not config.front_camera.is_fitted or not site.locations:
-        return low_m, high_m
-    scan, mount = config.scan_params(site.ceiling_m - CEILING_MARGIN_M), config.front_camera.mount()
-    views_m = [
-        view_height_m(place.height_m, abs(place.y_m - site.nodes[place.node].y_m), mount, scan)
-        for place in site.locations.values()
-    ]
-    return min(low_m, min(views_m) - HEIGHT_ROOM_M), max(high_m, max(views_m) + HEIGHT_ROOM_M)
-
-
-def profile_of(config: Config, site: Site) -> str:
-    """The colour profile that is configured, or else that of the site's lines."""
-    return config.vision.profile or site.line_colour.value
-
-
-def detector_pool(config: Config, site: Site, clock: Clock) -> DetectorPool:
-    """Detector processes after the configuration; the colour profile is read here, so that a wrong one
-    is found before anything flies."""
-    make = detector_of(config, site)
-    make()
-    return DetectorPool(make, config.vision.workers, config.vision.timeout_s, clock)
-
-
-def detector_of(config: Config, site: Site) -> Callable[[], Detector]:
-    """What makes the detector that configuration and map ask for (in its own process, where it flies)."""
-    camera, vision = config.camera, config.vision
-    lens = camera.lens() if camera.lens().is_distorted else None
-    profile = profile_of(config, site)
-    return partial(Detector, vision.method, profile, lens, markers=site.marker_set)
-
-
-def ground_link(
-    config: Config, site: Site, clock: Clock, counting: Counting | None = None
-) -> ZmqGround | None:
-    """The link to ground stations, if the configuration wants one."""
-    if not config.ground.listen:
-        return None
-    return ZmqGround(config.ground, site, clock, counting.places if counting is not None else None)
 
 
 class Daemon:
@@ -188,19 +73,20 @@ class Daemon:
         self._clock = clock
         self._detectors = detectors
         self._recorder = recorder
-        self._observers = observers
         self._ground = ground
-        self._monitors = monitors
         self._progress = progress
         self._pilot = pilot_of(config, site)
-        self._frames: Latest[FrameTicket] = Latest()
+        self._sight = Sight(detectors, recorder, ground, config.recorder.picture_fps)
         self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock, config.control.limits())
+        self._audience = Audience(self._vehicle, recorder, ground, monitors, observers)
         self._pose_taker: PoseTaker | None = None
         if config.vehicle.shares_pose and isinstance(self._vehicle, PoseTaker):
             self._pose_taker = self._vehicle
         pad = site.nodes[site.home.node]
         self._pad_m = (pad.x_m, pad.y_m) if config.vehicle.landing_target else None
-        self._camera = connect_camera(config.camera, clock, self._frames.put, self._trouble, self._vehicle)
+        self._camera = connect_camera(
+            config.camera, clock, self._sight.frames.put, self._trouble, self._vehicle
+        )
         self._counting = counting if self._pilot.scans else None
         self._front: Camera | None = None
         if self._counting is not None:
@@ -209,14 +95,7 @@ class Daemon:
             )
         self._pump = SetpointPump(self._vehicle, clock, self._sent, TICK_S)
         self._latency = LatencyBook()
-        self._detections: list[Detection] = []
         self._commands: list[Command] = []
-        self._lost = 0
-        self._newest_ns = -1
-        self._picture_ns = 0
-        self._status_ns = 0
-        self._last_phase: Phase | None = None
-        self._rate: list[int] = []
         self._late_s: list[float] = []
         self._flew = False
 
@@ -230,7 +109,7 @@ class Daemon:
             "vehicle": self._vehicle.run(),
             "camera": restarted(self._look, self.failed),
             "pump": self._pump.run(),
-            **{f"detect-{i}": self._detect() for i in range(self._config.vision.workers)},
+            **{f"detect-{i}": self._sight.run() for i in range(self._config.vision.workers)},
         }
         if self._recorder is not None:
             parts["recorder"] = restarted(self._recorder.run, self.failed)
@@ -271,41 +150,7 @@ class Daemon:
 
     def _trouble(self, text: str) -> None:
         """Something that people should know."""
-        event = Event(self._clock.now_ns(), EventLevel.ERROR, "failure", text)
-        self._vehicle.notify(event)
-        if self._recorder is not None:
-            self._recorder.record(Topic.EVENT, event.stamp_ns, event)
-        self._announce(event)
-
-    def _announce(self, event: Event) -> None:
-        """Tell everybody but the vehicle and the log of an event."""
-        if self._ground is not None:
-            self._ground.event(event)
-        for monitor in self._monitors:
-            monitor.event(event)
-
-    async def _detect(self) -> None:
-        """One frame after the other, as many of these loops as there are detector processes."""
-        period_ns = round(1e9 / fps) if (fps := self._config.recorder.picture_fps) else 0
-        while True:
-            ticket = await self._frames.get()
-            keep = (
-                bool(period_ns)
-                and self._recorder is not None
-                and ticket.stamp_ns - self._picture_ns >= period_ns
-            )
-            if keep:
-                self._picture_ns = ticket.stamp_ns
-            show = self._ground is not None and self._ground.picture_due(ticket.stamp_ns)
-            detection = await self._detectors.detect(ticket, keep or show)
-            if detection is None:
-                self._lost += 1
-                continue
-            if detection.jpeg is not None and keep and self._recorder is not None:
-                self._recorder.image(Topic.FRAME, ticket.stamp_ns, ticket.seq, detection.jpeg)
-            if detection.jpeg is not None and show and self._ground is not None:
-                self._ground.picture(ticket.seq, ticket.stamp_ns, detection.jpeg)
-            self._detections.append(detection)
+        self._audience.trouble(text, self._clock.now_ns())
 
     async def _tick_until_over(self) -> TickOutput:
         """The control tick, at a fixed rate."""
@@ -329,7 +174,7 @@ class Daemon:
                 return output
 
     def _tick(self, now_ns: int) -> TickOutput:
-        detections = self._fresh()
+        detections = self._sight.fresh(now_ns)
         commands, self._commands = self._commands, []
         if self._ground is not None:
             commands += self._ground.take_commands()
@@ -357,10 +202,9 @@ class Daemon:
             self._latency.forget()
         if self._progress is not None:
             self._progress.put(LeftOver(self._pilot.mission.remaining, *self._pilot.mission.stand))
-        for event in output.events:
-            self._vehicle.notify(event)
-            self._announce(event)
-        self._tell(tick, output)
+        self._audience.flown(tick, output)
+        if self._audience.status_due(now_ns, output.phase):
+            self._audience.status(self._vitals(tick, output), tick, output)
         return output
 
     def _health(self, now_ns: int) -> Health:
@@ -372,44 +216,14 @@ class Daemon:
             recorder.error if recorder is not None else "",
         )
 
-    def _fresh(self) -> list[Detection]:
-        """Detections since the last tick in the order of their frames; one overtaken is dropped."""
-        arrived, self._detections = sorted(self._detections, key=lambda d: d.ticket.stamp_ns), []
-        fresh = [d for d in arrived if d.ticket.stamp_ns > self._newest_ns]
-        self._lost += len(arrived) - len(fresh)
-        if fresh:
-            self._newest_ns = fresh[-1].ticket.stamp_ns
-        return fresh
-
     def _sent(self, setpoint: AttitudeSetpoint, now_ns: int) -> None:
         self._latency.sent(now_ns)
         if self._recorder is not None:
             self._recorder.record(Topic.SETPOINT, setpoint.stamp_ns, setpoint)
 
-    def _tell(self, tick: TickInput, output: TickOutput) -> None:
-        """Record what came in and went out; status ten times a second and at each change of phase."""
-        now_ns, recorder = tick.now_ns, self._recorder
-        if recorder is not None:
-            _record(recorder, tick, output)
-        self._rate = [stamp for stamp in self._rate if now_ns - stamp < 10**9]
-        self._rate.extend([now_ns] * len(tick.lines))
-        if now_ns - self._status_ns < _STATUS_NS and output.phase is self._last_phase:
-            return
-        self._status_ns, self._last_phase = now_ns, output.phase
-        status = self._status(tick, output)
-        if recorder is not None:
-            recorder.record(Topic.STATUS, now_ns, status)
-        if self._ground is not None:
-            self._ground.tell(status, tick, output)
-        vitals = self._vitals(status, tick)
-        for monitor in self._monitors:
-            monitor.tell(vitals)
-        for observer in self._observers:
-            observer(status)
-
-    def _vitals(self, status: Status, tick: TickInput) -> Vitals:
+    def _vitals(self, tick: TickInput, output: TickOutput) -> Vitals:
         late_s, self._late_s = tuple(self._late_s), []
-        dropped = {"camera": self._frames.dropped, "detection": self._lost}
+        dropped = {"camera": self._sight.frames.dropped, "detection": self._sight.lost}
         restarts = {"detector": self._detectors.replaced}
         if isinstance(self._vehicle, CountsDrops):
             dropped["vehicle"] = self._vehicle.dropped
@@ -417,7 +231,7 @@ class Daemon:
             dropped["recorder"] = self._recorder.dropped
             restarts["recorder"] = self._recorder.restarts
         return Vitals(
-            status=status,
+            status=self._status(tick, output),
             vehicle=tick.vehicle,
             ground_silent_s=tick.ground_silent_s,
             tick_late_s=late_s,
@@ -440,8 +254,8 @@ class Daemon:
             battery_frac=vehicle.battery_frac if vehicle else 0.0,
             height_m=output.pose.height_m if output.pose else 0.0,
             frames=self._camera.frames,
-            frames_dropped=self._frames.dropped + self._lost,
-            fps=float(len(self._rate)),
+            frames_dropped=self._sight.dropped,
+            fps=self._sight.fps,
             latency_ms=dict(self._latency.newest),
         )
 
@@ -457,31 +271,10 @@ class Daemon:
             visited=tuple(self._pilot.mission.visited),
             planned=output.planned,
             frames=self._camera.frames,
-            frames_dropped=self._frames.dropped + self._lost,
+            frames_dropped=self._sight.dropped,
             latency_ms=self._latency.quantiles_ms(),
             setpoint_interval_ms=quantile,
         )
-
-
-def _record(recorder: Recorder, tick: TickInput, output: TickOutput) -> None:
-    """All that the pilot was given and answered, for the replay, and its parts for people."""
-    now_ns = tick.now_ns
-    recorder.record(Topic.TICK, now_ns, tick)
-    recorder.record(Topic.DECISION, now_ns, output)
-    for lines in tick.lines:
-        recorder.record(Topic.LINES, lines.stamp_ns, lines)
-    for codes in tick.codes:
-        recorder.record(Topic.CODES, codes.stamp_ns, codes)
-    for finding in output.findings:
-        recorder.record(Topic.FINDING, finding.stamp_ns, finding)
-    if tick.vehicle is not None:
-        recorder.record(Topic.VEHICLE, now_ns, tick.vehicle)
-    if output.pose is not None:
-        recorder.record(Topic.POSE, now_ns, output.pose)
-    for command in tick.commands:
-        recorder.record(Topic.COMMAND, now_ns, command)
-    for event in output.events:
-        recorder.record(Topic.EVENT, event.stamp_ns, event)
 
 
 def _first(group: ExceptionGroup[Exception]) -> Exception:
