@@ -165,6 +165,19 @@ class Senses:
     way_out: tuple[float, float] | None = None
     warnings: Warnings = ALL_WELL
 
+    @property
+    def speed_mps(self) -> float:
+        """Speed over the floor; infinite where there is no pose."""
+        return math.inf if self.pose is None else math.hypot(self.pose.vx_mps, self.pose.vy_mps)
+
+    def distance_m(self, to: tuple[float, float]) -> float:
+        """How far away a place on the map is; infinite where there is no pose."""
+        return math.inf if self.pose is None else math.hypot(self.pose.x_m - to[0], self.pose.y_m - to[1])
+
+    def is_sure(self, params: MissionParams) -> bool:
+        """The drone is over the node that it is believed to be over."""
+        return self.pose is not None and self.pose.integrity >= params.integrity_min
+
 
 @dataclass(frozen=True, slots=True)
 class Guidance:
