@@ -128,6 +128,11 @@ class Pilot:
         """Whether this flight counts shelves."""
         return self._scanner is not None
 
+    @property
+    def exposure(self) -> float:
+        """What the front camera's pictures are wanted with, as a part of its usual exposure."""
+        return self._scanner.exposure if self._scanner is not None else 1.0
+
     def places(self, stamp_ns: int) -> tuple[Place, ...]:
         """Which locations the front camera's picture exposed at `stamp_ns` is wanted for, and where it
         shows them; none while nothing is scanned.  Changes nothing."""

@@ -76,12 +76,18 @@ class CountsDrops(Protocol):
 
 
 class Camera(Protocol):
-    """The down camera.  `run` delivers tickets of pictures in shared memory until cancelled; it raises
-    TransientError when the source failed and another `run` may succeed."""
+    """The down camera or the front camera.  `run` delivers tickets of pictures in shared memory until
+    cancelled; it raises TransientError when the source failed and another `run` may succeed."""
 
     @property
     def frames(self) -> int:
         """Pictures delivered so far."""
+        ...
+
+    def expose(self, part: float) -> None:
+        """From now on, take pictures of this part of the usual exposure (1.0: the usual one again).  Never
+        blocks.  Each ticket tells the exposure that its picture was taken with: a camera that cannot go by
+        this leaves it at 1.0."""
         ...
 
     async def run(self) -> None: ...

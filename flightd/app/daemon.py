@@ -198,6 +198,8 @@ class Daemon:
             self._pose_taker.share_pose(output.pose, self._pad_m)
         if self._counting is not None:
             self._counting.keep(output)
+        if self._front is not None:
+            self._front.expose(self._pilot.exposure)
         if output.setpoint is None:
             self._latency.forget()
         if self._progress is not None:

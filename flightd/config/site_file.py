@@ -38,6 +38,7 @@
     sides = ["left", "right"]
     bay_width_m = 1.35           # as many bays as fit stand in the middle of each front
     levels_m = [0.3, 1.5]        # heights of the labels, from the floor up
+    deck_below_label_m = 0.4     # from the labels down to what goods stand on; left out: 2/5 of the spacing
     positions = 2                # places in each bay on each level
     pattern = "{aisle}{side}-{bay:02}-{level}-{position}"  # location codes: AL-01-2-1
 
@@ -135,6 +136,7 @@ class _RackTable(Section):
     )
     positions: int = Field(1, ge=1, le=100)
     pattern: str = Field("{aisle}{side}-{bay:02}-{level}-{position}", min_length=1, max_length=100)
+    deck_below_label_m: float | None = Field(None, ge=0, le=10)
 
 
 class _PadTable(Section):
@@ -214,7 +216,15 @@ def _rack(table: _RackTable, aisles: tuple[_AisleTable, ...]) -> Rack:
     told = table.aisles
     if told is None:
         told = tuple(aisle.id for aisle in aisles if set(table.sides) <= set(aisle.shelves))
-    return Rack(told, table.bay_width_m, table.levels_m, table.positions, table.sides, table.pattern)
+    return Rack(
+        told,
+        table.bay_width_m,
+        table.levels_m,
+        table.positions,
+        table.sides,
+        table.pattern,
+        table.deck_below_label_m,
+    )
 
 
 def site_toml(site: Site) -> str:
@@ -249,6 +259,8 @@ def site_toml(site: Site) -> str:
         parts += [f"sides = [{', '.join(map(_quoted, rack.sides))}]", f"bay_width_m = {rack.bay_width_m!r}"]
         parts += [f"levels_m = [{', '.join(map(repr, rack.levels_m))}]", f"positions = {rack.positions}"]
         parts += [f"pattern = {_quoted(rack.pattern)}"]
+        if rack.deck_below_label_m is not None:
+            parts += [f"deck_below_label_m = {rack.deck_below_label_m!r}"]
     for pad in site.pads:
         parts += ["", "[[pad]]", f"id = {_quoted(pad.id)}", f"node = {_quoted(pad.node)}"]
         parts += [f"size_m = {pad.size_m!r}"]

@@ -20,7 +20,8 @@ Quad: TypeAlias = tuple[tuple[float, float], ...]
 class Occupancy(enum.StrEnum):
     """What a picture tells of one place without reading any code.
 
-    `EMPTY` is said only of an opening that is seen through to its back; whatever is in doubt is `UNSURE`.
+    `EMPTY` is said only of an opening whose deck is seen, lit, behind the front; whatever is in doubt is
+    `UNSURE`.
     """
 
     EMPTY = "empty"
@@ -29,15 +30,26 @@ class Occupancy(enum.StrEnum):
     UNSURE = "unsure"
 
 
+class Light(enum.StrEnum):
+    """How a place comes out in a picture: `BURNT` where parts of it are as white as can be, `DIM` where the
+    whole picture is too dark to know white."""
+
+    FAIR = "fair"
+    BURNT = "burnt"
+    DIM = "dim"
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A location as the picture is expected to show it: its cell and how much of that is inside, and the
-    core of the cell, which goods cover if there are any."""
+    """A location as the picture is expected to show it: its cell and how much of that is inside; the core of
+    the cell, which goods cover if there are any; and the front part of the deck below the core, which an
+    empty place shows (its far end above its near one; empty where it cannot be in the picture)."""
 
     location: str
     quad_px: Quad
     share: float
     core_px: Quad
+    deck_px: Quad = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +61,13 @@ class PlaceLook:
     share: float
     occupancy: Occupancy
     evidence: str = ""
+    light: Light = Light.FAIR
 
 
 @dataclass(frozen=True, slots=True)
 class CodeSet:
-    """What the code reader saw in one picture of the front camera.  `timings_ms` by stage."""
+    """What the code reader saw in one picture of the front camera, taken with `exposure` as a part of the
+    camera's usual one.  `timings_ms` by stage."""
 
     frame_seq: int
     stamp_ns: int
@@ -62,6 +76,7 @@ class CodeSet:
     reads: tuple[CodeRead, ...]
     places: tuple[PlaceLook, ...]
     timings_ms: dict[str, float] = field(default_factory=dict)
+    exposure: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)

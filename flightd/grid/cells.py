@@ -8,13 +8,19 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from flightd.grid.site import Location, Side, Site
+from flightd.grid.site import Location, Rack, Side, Site
 
 _CORE = (0.22, 0.18, 0.20)
 """The core of a cell: parts of its width to each side of its middle, and parts of the spacing of the levels
 below and above its label.  Whatever stands in the place stands there."""
 _USUAL_SPACING_M, _MOST_SPACING_M = 0.7, 1.4
 """Spacing of levels where there is only one; more than the most tells nothing of the goods."""
+_DECK_BELOW = 0.4
+_LEAST_SPACING_M = 0.4
+"""Goods stand this part of the level spacing (no less than that) below their labels, where the site does not
+say it."""
+_DECK_SEEN_M = 0.3
+"""How deep the deck of an empty place is looked at."""
 _NEXT_M = 0.5
 """Height above the topmost labels that still belongs to their level where the shelf does not end before."""
 
@@ -33,6 +39,17 @@ class Cell:
     high_m: float
     label_m: float
     spacing_m: float
+    deck_m: float
+
+    @property
+    def deck_corners_m(self) -> tuple[tuple[float, float, float], ...]:
+        """(x, y, height) of the deck behind the front, as wide as the core: two corners that are
+        `_DECK_SEEN_M` deep, then two at the front, in the order of `core_m`."""
+        inwards = _DECK_SEEN_M if self.side is Side.RIGHT else -_DECK_SEEN_M
+        left, right, *_ = self.core_m
+        (x0, y, _), (x1, _, _) = left, right
+        far, h = y + inwards, self.deck_m
+        return (x0, far, h), (x1, far, h), (x1, y, h), (x0, y, h)
 
     @property
     def core_m(self) -> tuple[tuple[float, float, float], ...]:
@@ -79,6 +96,7 @@ def cells_of(site: Site) -> dict[str, Cell]:
         rack = shares[location.aisle, location.side]
         half_m = rack.bay_width_m / rack.positions / 2
         levels = rack.levels_m
+        decks = decks_m(rack, tops[location.aisle, location.side])
         i = location.level - 1
         low = 0.0 if i == 0 else (levels[i - 1] + levels[i]) / 2
         top = tops[location.aisle, location.side]
@@ -94,8 +112,23 @@ def cells_of(site: Site) -> dict[str, Cell]:
             high,
             location.height_m,
             _spacing_m(levels),
+            decks[i],
         )
     return cells
+
+
+def decks_m(rack: Rack, height_m: float) -> tuple[float, ...]:
+    """The height on which goods stand in each level of a rack, on fronts of `height_m`."""
+    below_m = rack.deck_below_label_m
+    if below_m is None:
+        below_m = _DECK_BELOW * deck_spacing_m(rack.levels_m, height_m)
+    return tuple(max(label_m - below_m, 0.0) for label_m in rack.levels_m)
+
+
+def deck_spacing_m(labels_m: Sequence[float], height_m: float) -> float:
+    """From deck to deck, by the labels of the levels on a front of `height_m`, within what racks have."""
+    gaps = [b - a for a, b in itertools.pairwise(labels_m)] or [(height_m - labels_m[0]) * 1.6]
+    return min(max(min(gaps), _LEAST_SPACING_M), _MOST_SPACING_M)
 
 
 def _spacing_m(levels_m: Sequence[float]) -> float:

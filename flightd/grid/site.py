@@ -137,7 +137,8 @@ class Shelf:
 class Rack:
     """How the shelf fronts on `sides` of `aisles` are divided.  Bays of `bay_width_m` stand in the middle
     of each front; `levels_m` are the heights at which the labels hang; each level of a bay has `positions`
-    places.  `pattern` makes the location code of {aisle} {side} (L, R) {bay} {level} {position}."""
+    places.  `pattern` makes the location code of {aisle} {side} (L, R) {bay} {level} {position}.  Goods stand
+    `deck_below_label_m` below their labels; None: two fifths of the level spacing."""
 
     aisles: tuple[str, ...]
     bay_width_m: float
@@ -145,6 +146,7 @@ class Rack:
     positions: int = 1
     sides: tuple[Side, ...] = (Side.LEFT, Side.RIGHT)
     pattern: str = "{aisle}{side}-{bay:02}-{level}-{position}"
+    deck_below_label_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

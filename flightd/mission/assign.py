@@ -76,7 +76,8 @@ class Sighting:
 
 @dataclass(frozen=True, slots=True)
 class ShelfLook:
-    """One picture, sorted by location; `strangers` are location codes that the map lacks."""
+    """One picture, sorted by location; `strangers` are location codes that the map lacks, `exposure` is as in
+    `CodeSet`."""
 
     frame_seq: int
     pose: BodyPose
@@ -84,6 +85,7 @@ class ShelfLook:
     places: tuple[PlaceLook, ...]
     sightings: tuple[Sighting, ...]
     strangers: tuple[str, ...] = ()
+    exposure: float = 1.0
 
 
 class Assigner:
@@ -111,13 +113,14 @@ class Assigner:
         found = []
         for code in locations:
             cell = self.cells[code]
-            pixels = view.project(np.array([*cell.corners_m, *cell.core_m]))
-            if not np.isfinite(pixels).all():
+            pixels = view.project(np.array([*cell.corners_m, *cell.core_m, *cell.deck_corners_m]))
+            if not np.isfinite(pixels[:8]).all():
                 continue
             share = _inside_share(pixels[:4], lens)
             if share >= _LEAST_SHARE:
-                quad, core = _quad(pixels[:4], lens), _quad(pixels[4:], lens)
-                found.append(Place(code, quad, round(share, 3), core))
+                quad, core = _quad(pixels[:4], lens), _quad(pixels[4:8], lens)
+                deck = _quad(pixels[8:], lens) if np.isfinite(pixels[8:]).all() else ()
+                found.append(Place(code, quad, round(share, 3), core, deck))
         return tuple(found)
 
     def look(self, codes: CodeSet, pose: BodyPose, front: tuple[str, Side]) -> ShelfLook:
@@ -137,7 +140,13 @@ class Assigner:
             else:
                 stock.append(self._placed(read, pose, where, front))
         return ShelfLook(
-            codes.frame_seq, pose, tuple(stock), codes.places, tuple(sightings), tuple(strangers)
+            codes.frame_seq,
+            pose,
+            tuple(stock),
+            codes.places,
+            tuple(sightings),
+            tuple(strangers),
+            codes.exposure,
         )
 
     def _on_front(

@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from flightd.core.scanning import BodyPose, Finding, Occupancy
+from flightd.core.scanning import BodyPose, Finding, Light, Occupancy
 from flightd.mission.assign import PlacedRead, ShelfLook
 from flightd.mission.tally import Tally, Verdict
 from flightd.mission.views import ScanParams, View, ViewPlanner
 
+_SAME_EXPOSURE = 0.01
+
 
 class ScanTask:
     """Pure state machine.  Fly to `view`, `begin` there, `take` what the pictures show, `step` until the
-    view is over; then `view` is the next one, None when nothing is left.  `drain` gives new findings."""
+    view is over; then `view` is the next one, None when nothing is left.  `drain` gives new findings.
 
-    def __init__(self, node: str, views: Sequence[View], planner: ViewPlanner, params: ScanParams) -> None:
+    With `relights` other exposures are tried; it turns false where the camera does not follow."""
+
+    def __init__(
+        self,
+        node: str,
+        views: Sequence[View],
+        planner: ViewPlanner,
+        params: ScanParams,
+        relights: bool = True,
+    ) -> None:
         self.node = node
+        self.relights = relights
         self._views = list(views)
         self._planner = planner
         self._params = params
@@ -24,7 +37,8 @@ class ScanTask:
             code: Tally(params.pictures) for view in views for code in view.locations
         }
         self._begun_ns: int | None = None
-        self._now_ns = 0
+        self._relit = False
+        self._followed = self._unfollowed = 0
         self._findings: list[Finding] = []
 
     @property
@@ -48,12 +62,17 @@ class ScanTask:
     def begin(self, now_ns: int) -> None:
         """The view is reached and the drone at rest."""
         self._begun_ns = now_ns
+        self._followed = self._unfollowed = 0
 
     def take(self, look: ShelfLook) -> None:
         """One picture; those exposed on the way to the view tell nothing."""
         view = self.view
         if view is None or self._begun_ns is None or look.pose.stamp_ns < self._begun_ns:
             return
+        if not math.isclose(look.exposure, view.exposure, rel_tol=_SAME_EXPOSURE):
+            self._unfollowed += 1
+            return
+        self._followed += 1
         places = {place.location: place for place in look.places}
         reads: dict[str, list[PlacedRead]] = {}
         for placed in look.reads:
@@ -62,7 +81,7 @@ class ScanTask:
         for code in self._left(view):
             place, own = places.get(code), reads.get(code, [])
             if place is not None and code in doubtful:  # somebody's code: not an empty place
-                place = replace(place, occupancy=Occupancy.UNSURE)
+                place = replace(place, occupancy=Occupancy.GOODS)
             self._open[code].add(look.frame_seq, look.pose, place, own)
             self._settle(code, final=False)
 
@@ -78,15 +97,30 @@ class ScanTask:
         if waiting and (now_ns - self._begun_ns) * 1e-9 < self._params.view_s:
             return False
         self._begun_ns = None
-        again = self._planner.retake(view, left)
+        again = self._again(view, left)
         if again is not None:
             self._views[0] = again
             return True
+        self._relit = False
         for code in left:
             self._settle(code, final=True)
             self._open.pop(code, None)
         self._views.pop(0)
         return True
+
+    def _again(self, view: View, left: Sequence[str]) -> View | None:
+        """Another look at what is left of a view: once with another exposure, then from other places."""
+        lights = {code: self._open[code].light for code in left}
+        if view.exposure != 1.0 and self._unfollowed and not self._followed:
+            self.relights = False
+        if self.relights and not self._relit:
+            relit = self._planner.relit(view, lights)
+            self._relit = relit is not None
+            if relit is not None:
+                return relit
+        if not (self.relights and Light.FAIR in lights.values()):
+            view = replace(view, exposure=1.0)
+        return self._planner.retake(view, left)
 
     def drain(self) -> tuple[Finding, ...]:
         """The locations decided since the last call."""

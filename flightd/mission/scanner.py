@@ -57,6 +57,7 @@ class Scanner:
         self._begun = self._begun_blind = 0
         self._due: list[str] = []
         self._again: Counter[str] = Counter()
+        self._relights = True
         self.doubted = False
 
     # What the mission asks
@@ -70,6 +71,11 @@ class Scanner:
     def view(self) -> View | None:
         """Where to look from now, None when the present node has nothing left."""
         return self._task.view if self._task else None
+
+    @property
+    def exposure(self) -> float:
+        """What the front camera's pictures are wanted with, as a part of its usual exposure."""
+        return self.view.exposure if self.view is not None else 1.0
 
     @property
     def blind(self) -> str:
@@ -98,7 +104,7 @@ class Scanner:
         """Begin or continue the scan of a node that is reached."""
         self.leave()
         views = self._planner.views(node, self._left(node), height_m, yaw_rad)
-        self._task = ScanTask(node, views, self._planner, self._params)
+        self._task = ScanTask(node, views, self._planner, self._params, self._relights)
         self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
         if not self._pending or self._pending[-1].node != node:
             self._pending.append(_Pending(node))
@@ -111,6 +117,10 @@ class Scanner:
     def step(self, now_ns: int) -> bool:
         """True when the view is over; `view` is then the next one."""
         over = self._task is None or self._task.step(now_ns)
+        if self._task is not None and self._relights and not self._task.relights:
+            self._relights = False
+            told = "the front camera does not follow a wanted exposure: what is lit wrongly stays unreadable"
+            self._events.append(Event(now_ns, EventLevel.WARNING, "exposure_fixed", told))
         self._gather()
         return over
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flightd.core.inventory import LocationState
-from flightd.core.scanning import BodyPose, Occupancy, PlaceLook
+from flightd.core.scanning import BodyPose, Light, Occupancy, PlaceLook
 from flightd.core.types import CodeRead
 from flightd.mission.assign import PlacedRead
 from flightd.vision.votes import CodeVotes
@@ -20,7 +20,8 @@ hold a second label."""
 _SAME_LABEL = 0.5
 """Two codes nearer to each other than this part of their size are one label."""
 _LEAST_EMPTY = 2
-"""Looks that must agree before a place is said to be empty, however little time there was."""
+"""Looks in a row that must agree before a place is said to be empty, however little time there was."""
+_OCCUPIED = (Occupancy.GOODS, Occupancy.COVERED)
 _SURE_TEXT = 0.999
 _AGREED_TEXT = 0.99
 _SEEN_EMPTY = 0.995
@@ -49,18 +50,21 @@ class _Spot:
 
 
 class Tally:
-    """The looks at one location.  `verdict` gives its state as soon as `pictures` looks agree on it."""
+    """The looks at one location.  `verdict` gives its state as soon as `pictures` looks agree on it; `light`
+    is how it came out in the last."""
 
     def __init__(self, pictures: int) -> None:
         self._least = pictures
         self._votes = CodeVotes()
         self._spots: dict[tuple[str, str], _Spot] = {}
         self._seen: Counter[Occupancy] = Counter()
+        self._empty_in_a_row = 0
         self._quiet = 0
         self._largest = 0.0
         self._best: tuple[bool, float] = (False, -1.0)
         self._evidence = ""
         self._pose: BodyPose | None = None
+        self.light = Light.FAIR
 
     @property
     def looks(self) -> int:
@@ -86,9 +90,11 @@ class Tally:
         self._votes.add(frame_seq, (placed.read for placed in reads))
         if place is not None and (place.share >= _LEAST_SHARE or reads):
             self._seen[place.occupancy] += 1
+            self._empty_in_a_row = self._empty_in_a_row + 1 if place.occupancy is Occupancy.EMPTY else 0
         if place is not None or reads:
             self._quiet = 0 if new else self._quiet + 1
             self._pose = pose
+        self.light = place.light if place is not None else self.light
         self._largest = max(self._largest, place.share if place is not None else 0.0)
         if place is not None and place.evidence:
             worth = bool(reads), place.share
@@ -104,9 +110,7 @@ class Tally:
         if believed and not torn:
             settled = self._enough and self._quiet >= 2 and self._agreed(believed)
             return self._with_codes(believed, self._pose) if settled or final else None
-        empty = self._seen[Occupancy.EMPTY]
-        seen_enough = self._enough or (final and self.looks >= _LEAST_EMPTY)
-        if seen_enough and empty == self.looks and not self._spots:
+        if self._is_empty(final):
             return Verdict(LocationState.EMPTY, _SEEN_EMPTY, (), self._evidence, self._pose)
         if not final or not self.looks:
             return None
@@ -114,6 +118,13 @@ class Tally:
         hidden = covered > self.looks / 2 and not self._spots
         state = LocationState.OCCLUDED if hidden else LocationState.UNREADABLE
         return Verdict(state, _NO_CODE, (), self._evidence, self._pose)
+
+    def _is_empty(self, final: bool) -> bool:
+        """Whether the last looks show an empty place, and none ever showed that there is something."""
+        enough = self._enough and self._empty_in_a_row >= self._least
+        if final and self._empty_in_a_row == self.looks:
+            enough = enough or self.looks >= _LEAST_EMPTY
+        return enough and not self._spots and not any(self._seen[kind] for kind in _OCCUPIED)
 
     @property
     def _enough(self) -> bool:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flightd.core.geometry import wrap_pi
-from flightd.core.scanning import BodyPose
+from flightd.core.scanning import BodyPose, Light
 from flightd.core.view import ForwardMount
 from flightd.grid.cells import by_node
 from flightd.grid.site import Location, Side, Site
@@ -23,8 +23,10 @@ class ScanParams:
 
     A view ends when every location in it is decided, at the latest after `view_s`; what is undecided then
     is looked at again from `retakes` other places, up to `step_m` nearer and `aside_m` along the aisle
-    (`aside_per_height` of the height: the node's own lines must stay in the down camera's picture).  A node
-    whose findings had to be withdrawn is flown to again, at most `revisits` times.
+    (`aside_per_height` of the height: the node's own lines must stay in the down camera's picture).  Before
+    that, where the light is the trouble, it is looked at again from the same place with the exposure times
+    `darker` or `brighter`.  A node whose findings had to be withdrawn is flown to again, at most `revisits`
+    times.
     """
 
     min_height_m: float = 0.7
@@ -35,6 +37,8 @@ class ScanParams:
     step_m: float = 0.25
     aside_m: float = 0.4
     aside_per_height: float = 0.35
+    darker: float = 0.4
+    brighter: float = 2.5
     clearance_m: float = 0.6
     label_reach_m: float = 0.3
     least_probability: float = 0.99
@@ -45,7 +49,8 @@ class ScanParams:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A place to look from.  `yaw_rad` is the drone's heading; `retake` counts the looks before."""
+    """A place to look from.  `yaw_rad` is the drone's heading; `retake` counts the places before, `exposure`
+    is a part of the front camera's usual one."""
 
     node: str
     aisle: str
@@ -56,6 +61,7 @@ class View:
     yaw_rad: float
     locations: tuple[str, ...]
     retake: int = 0
+    exposure: float = 1.0
 
 
 class ViewPlanner:
@@ -87,6 +93,15 @@ class ViewPlanner:
             ordered += column
             height_m = column[-1].height_m if column else height_m
         return ordered
+
+    def relit(self, view: View, left: Mapping[str, Light]) -> View | None:
+        """The same place with another exposure, if something of what is `left` comes out so dark or so light
+        that its code may be lost; None if nothing does, or this is such a view already."""
+        p = self._params
+        for light, part in ((Light.DIM, p.brighter), (Light.BURNT, p.darker)):
+            if view.exposure == 1.0 and light in left.values():
+                return replace(view, locations=tuple(left), exposure=part)
+        return None
 
     def retake(self, view: View, left: Sequence[str]) -> View | None:
         """Another place to look at what is `left` of a view, None after the last: nearer and squarely in

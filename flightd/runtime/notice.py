@@ -1,6 +1,8 @@
-"""The datagram by which a camera process tells that a picture lies in shared memory."""
+"""Datagrams of a camera process and the daemon: a picture lies in shared memory; an exposure is wanted."""
 
 from __future__ import annotations
+
+import math
 
 import msgspec
 
@@ -10,7 +12,8 @@ VERSION = 1
 
 
 class FrameNotice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """`device_ns` is mid-exposure in the camera's own clock; the rest says where the picture is."""
+    """`device_ns` is mid-exposure in the camera's own clock, `exposure` the part of the camera's usual one
+    that the picture was taken with; the rest says where the picture is."""
 
     ring: str
     slots: int
@@ -19,11 +22,20 @@ class FrameNotice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     device_ns: int
     width_px: int
     height_px: int
+    exposure: float = 1.0
+    version: int = VERSION
+
+
+class ExposureRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The daemon's answer to notices of another exposure than it wants: this part of the usual one."""
+
+    exposure: float
     version: int = VERSION
 
 
 _ENCODER = msgspec.json.Encoder()
 _DECODER = msgspec.json.Decoder(FrameNotice)
+_REQUESTS = msgspec.json.Decoder(ExposureRequest)
 
 
 def encode_notice(notice: FrameNotice) -> bytes:
@@ -38,4 +50,25 @@ def decode_notice(datagram: bytes) -> FrameNotice:
         raise InputError(f"not a picture notice: {err}") from err
     if notice.version != VERSION:
         raise InputError(f"picture notice of version {notice.version}, this is version {VERSION}")
+    if not _is_part(notice.exposure):
+        raise InputError(f"not a picture notice: exposure {notice.exposure}")
     return notice
+
+
+def encode_request(request: ExposureRequest) -> bytes:
+    return _ENCODER.encode(request)
+
+
+def decode_request(datagram: bytes) -> ExposureRequest:
+    """Raises InputError for anything that is not a request of this version."""
+    try:
+        request = _REQUESTS.decode(datagram)
+    except (msgspec.DecodeError, msgspec.ValidationError, UnicodeDecodeError) as err:
+        raise InputError(f"not an exposure request: {err}") from err
+    if request.version != VERSION or not _is_part(request.exposure):
+        raise InputError(f"not an exposure request: version {request.version}, {request.exposure}")
+    return request
+
+
+def _is_part(exposure: float) -> bool:
+    return math.isfinite(exposure) and exposure > 0.0

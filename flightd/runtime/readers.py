@@ -28,7 +28,7 @@ class Readers(Protocol):
 
 
 def _read(bgr: Image, ticket: FrameTicket, places: tuple[Place, ...]) -> Reading:
-    return read_shelf(bgr, ticket.seq, ticket.stamp_ns, places)
+    return read_shelf(bgr, ticket.seq, ticket.stamp_ns, places, ticket.exposure)
 
 
 def _shelf_reader() -> Work[tuple[Place, ...], Reading]:

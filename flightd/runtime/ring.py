@@ -30,7 +30,7 @@ class FrameTicket:
     """Where a picture lies and when it was taken: all that the daemon's own process handles of it.
 
     `stamp_ns` is mid-exposure, `arrival_ns` the time at which it could first be read, both in the
-    daemon's clock.
+    daemon's clock; `exposure` the part of the camera's usual one that the picture was taken with.
     """
 
     ring: str
@@ -41,6 +41,7 @@ class FrameTicket:
     arrival_ns: int
     width_px: int
     height_px: int
+    exposure: float = 1.0
 
 
 class FrameRing:

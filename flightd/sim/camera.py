@@ -7,6 +7,7 @@ jitter, as a real camera and its driver do.  Its clock is not the daemon's.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import math
 import random
 from collections.abc import Callable
@@ -16,16 +17,18 @@ from typing import Any, Protocol
 
 import cv2
 
-from flightd.core.errors import TransientError
+from flightd.core.errors import InputError, TransientError
 from flightd.core.geometry import Lens
 from flightd.core.types import Image
 from flightd.ports import Clock
 from flightd.runtime.child import Child
-from flightd.runtime.notice import FrameNotice, encode_notice
+from flightd.runtime.notice import FrameNotice, decode_request, encode_notice
 from flightd.runtime.ring import FrameRing
 from flightd.sim.kinematics import Kinematics
 
 _SPARE_SLOTS = 8
+_EXPOSURES = (0.05, 8.0)
+"""Parts of its usual exposure that a camera is able to."""
 _CLOCK_OFFSET_NS = 7_300_000_000_000
 
 
@@ -46,21 +49,23 @@ class Optics(Protocol):
 
 
 class PictureMaker(Protocol):
-    """Renders one camera's pictures."""
+    """Renders one camera's pictures, each with a part of the camera's usual exposure."""
 
-    def render(self, kinematics: Kinematics, seq: int, out: Image | None = None) -> Image: ...
+    def render(
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+    ) -> Image: ...
 
 
 class _RenderWorker:
-    """Inside the process: answers (kinematics, seq, slot) by rendering into the ring."""
+    """Inside the process: answers (kinematics, seq, slot, exposure) by rendering into the ring."""
 
     def __init__(self, make: Callable[[], PictureMaker], camera: Optics, ring: str) -> None:
         self._renderer = make()
         self._ring = FrameRing.attach(ring, _slots(camera), camera.lens.width_px, camera.lens.height_px)
 
-    def __call__(self, request: tuple[Kinematics, int, int]) -> int:
-        kinematics, seq, slot = request
-        self._renderer.render(kinematics, seq, out=self._ring.pixels(slot))
+    def __call__(self, request: tuple[Kinematics, int, int, float]) -> int:
+        kinematics, seq, slot, exposure = request
+        self._renderer.render(kinematics, seq, self._ring.pixels(slot), exposure)
         return seq
 
 
@@ -75,6 +80,17 @@ class CameraTrouble:
     """Every pixel is of this grey level."""
     turn_deg: float = 0.0
     """The picture turned clockwise about its middle."""
+
+
+class _Requests(asyncio.DatagramProtocol):
+    """What the daemon asks of a camera; anything else is dropped."""
+
+    def __init__(self, expose: Callable[[float], None]) -> None:
+        self._expose = expose
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:  # noqa: ARG002 - asyncio names it
+        with contextlib.suppress(InputError):
+            self._expose(min(max(decode_request(data).exposure, _EXPOSURES[0]), _EXPOSURES[1]))
 
 
 class CameraPeer:
@@ -106,6 +122,7 @@ class CameraPeer:
         self._ready = asyncio.Event()
         self._turn = asyncio.Lock()
         self.late = 0
+        self._exposure = 1.0
         self.trouble = CameraTrouble()
         self._kept: Image | None = None
         self._newest = 0
@@ -113,7 +130,7 @@ class CameraPeer:
     async def run(self) -> None:
         loop, lens = asyncio.get_running_loop(), self._camera.lens
         transport, _ = await loop.create_datagram_endpoint(
-            asyncio.DatagramProtocol, remote_addr=self._address
+            lambda: _Requests(self._expose_with), remote_addr=self._address
         )
         self._ring = FrameRing.create(_slots(self._camera), lens.width_px, lens.height_px)
         make = partial(self._make, self._ring.name)
@@ -128,6 +145,9 @@ class CameraPeer:
             child.join(1.0)
             transport.close()
             self._ring.close()
+
+    def _expose_with(self, part: float) -> None:
+        self._exposure = part
 
     async def _expose(self, child: Child, transport: Any, pictures: asyncio.TaskGroup) -> None:
         """Take a picture each period; each is rendered and delivered by a task of its own."""
@@ -148,14 +168,16 @@ class CameraPeer:
                 due_ns = exposure_ns + round((self._camera.capture_delay_s + jitter_s) * 1e9)
                 truth = self._truth_at(exposure_ns)
                 due_ns += round(self.trouble.late_s * 1e9)
-                pictures.create_task(self._deliver(child, transport, truth, seq, due_ns))
+                pictures.create_task(self._deliver(child, transport, truth, seq, due_ns, self._exposure))
             seq += 1
 
-    async def _deliver(self, child: Child, transport: Any, truth: Kinematics, seq: int, due_ns: int) -> None:
+    async def _deliver(
+        self, child: Child, transport: Any, truth: Kinematics, seq: int, due_ns: int, exposure: float
+    ) -> None:
         early_s = self._camera.capture_delay_s + self._camera.jitter_s
         # a late picture is drawn late: the ring holds no more than the usual delay's
         await asyncio.sleep(max((due_ns - self._clock.now_ns()) * 1e-9 - early_s, 0.0))
-        rendering = asyncio.ensure_future(self._render(child, truth, seq))
+        rendering = asyncio.ensure_future(self._render(child, truth, seq, exposure))
         try:
             await asyncio.sleep((due_ns - self._clock.now_ns()) * 1e-9)
             with self._clock.hold():
@@ -177,13 +199,14 @@ class CameraPeer:
             truth.stamp_ns + _CLOCK_OFFSET_NS,
             lens.width_px,
             lens.height_px,
+            exposure,
         )
         transport.sendto(encode_notice(notice))
 
-    async def _render(self, child: Child, truth: Kinematics, seq: int) -> int:
+    async def _render(self, child: Child, truth: Kinematics, seq: int, exposure: float) -> int:
         async with self._turn:
             slot = self._ring.begin(seq)
-            await child.ask((truth, seq, slot))
+            await child.ask((truth, seq, slot, exposure))
             self._spoil(self._ring.pixels(slot))
             self._newest = slot
             self._ring.publish(slot, seq, truth.stamp_ns)

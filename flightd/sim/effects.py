@@ -54,11 +54,11 @@ class Sensor:
                 np.clip(-steps, 0, 255).astype(np.uint8),
             )
 
-    def expose(self, picture: Image, stamp_ns: int, seq: int) -> None:
-        """Turn an ideal picture into a taken one, in place."""
+    def expose(self, picture: Image, stamp_ns: int, seq: int, part: float = 1.0) -> None:
+        """Turn an ideal picture into one taken with a part of the usual exposure, in place."""
         draw = np.random.default_rng([self._seed, seq]) if self._bank is not None else None
         beat = math.sin(math.tau * ((stamp_ns * 1e-9 * _MAINS_HZ) % 1.0))
-        exposure = self._look.exposure * (1.0 + self._look.flicker * beat)
+        exposure = part * self._look.exposure * (1.0 + self._look.flicker * beat)
         if self._gains:
             table = self._gains[int(draw.integers(len(self._gains))) if draw is not None else 0]
             cv2.multiply(picture, table, dst=picture, scale=exposure / _MIDDLE)

@@ -58,8 +58,11 @@ class Renderer:
         self._tiles = TiledFloor(Floor(site, appearance, self._lighting, seed, bare))
         self._sensor = Sensor(camera.lens, appearance, seed)
 
-    def render(self, kinematics: Kinematics, seq: int, out: Image | None = None) -> Image:
-        """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise.
+    def render(
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+    ) -> Image:
+        """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise,
+        `exposure` is its part of the camera's usual one.
 
         With `out` (same shape, uint8, contiguous) the picture is written there and `out` returned."""
         picture = picture_for(self._camera.lens, out)
@@ -71,16 +74,16 @@ class Renderer:
         # whole texels and 32nds: a quarter faster than the look-up by floats, equal to one grey level
         texels, parts = cv2.convertMaps(floor_map, None, cv2.CV_16SC2)  # type: ignore[call-overload]
         cv2.remap(canvas, texels, parts, cv2.INTER_LINEAR, dst=picture, borderMode=cv2.BORDER_REPLICATE)
-        self._smear(picture, kinematics)
+        self._smear(picture, kinematics, exposure)
         self._shine(picture, view, x_m, y_m)
         self._shade(picture, kinematics, view, x_m, y_m)
-        self._sensor.expose(picture, kinematics.stamp_ns, seq)
+        self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure)
         self._tiles.prepare(x_m, y_m, foot, footprint_m, _ahead(kinematics, view))
         return picture
 
-    def _smear(self, picture: Image, kinematics: Kinematics) -> None:
-        smear = smear_px(self._camera, kinematics) if self._look.motion_blur else (0.0, 0.0)
-        kernel = blur_kernel(smear, self._look.soft_px)
+    def _smear(self, picture: Image, kinematics: Kinematics, exposure: float) -> None:
+        across, down = smear_px(self._camera, kinematics) if self._look.motion_blur else (0.0, 0.0)
+        kernel = blur_kernel((across * exposure, down * exposure), self._look.soft_px)
         if kernel is not None:
             cv2.filter2D(picture, -1, kernel, dst=picture, borderType=cv2.BORDER_REPLICATE)
 

@@ -138,6 +138,7 @@ class RacksScenario(Section):
     too_small: float = Field(_USUAL.too_small, ge=0, le=1)
     missing: float = Field(_USUAL.missing, ge=0, le=1)
     occluded: float = Field(_USUAL.occluded, ge=0, le=1)
+    dark: float = Field(_USUAL.dark, ge=0, le=1)
     location_labels: bool = True
     seed: int | None = Field(None, ge=0)
     noise: float = Field(2.0, ge=0, le=20)

@@ -1,9 +1,12 @@
-"""Is a place on the shelf empty, are there goods, or is it covered?  From the core of its cell in a picture.
+"""Is a place on the shelf empty, are there goods, or is it covered?  From its cell in a picture.
 
 Goods that stand in a place fill the core of its cell, so an empty one shows there what lies behind: the dark
-of the rack.  Goods have faces that catch the light, with edges; a cover (a sheet, foil) catches the light
-and is smooth.  Dark means dark against the white of paper in the same picture, so exposure does not matter.
-What fits no case is `UNSURE`: an empty place is never guessed.
+of the rack.  But goods may be as dark as that.  So a place is empty only where, besides, there is something
+to see in that dark (mesh, other goods' backs: a dark face shows nothing) and the deck is seen from the front
+on to deep behind it (`deck`), which goods hide.
+Goods have faces that catch the light, with edges; a cover (a sheet, foil) catches the light and is smooth.
+Dark means dark against the white of paper in the same picture, so exposure does not matter.  What fits no
+case is `UNSURE`: an empty place is never guessed.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from flightd.core.scanning import Occupancy
+from flightd.core.scanning import Light, Occupancy
 from flightd.core.types import Image
 
 _SAMPLES = 96
@@ -22,6 +25,8 @@ _SMALLEST_PX = 12
 _WHITE_SHARE = 99.5
 _LEAST_WHITE = 110.0
 """A picture without anything lighter has no paper in it, and white is not known."""
+_BURNT, _BURNT_PART = 250, 0.001
+"""A place is burnt out where more than this part of its pixels is at least so light."""
 _DARK = 0.23
 """Part of white below which a pixel is dark."""
 _STEP = 0.035
@@ -29,14 +34,19 @@ _STEP = 0.035
 _EMPTY_DARK, _EMPTY_EDGES = 0.38, 0.10
 _GOODS_DARK = 0.30
 _COVER_EDGES = 0.01
+_LEAST_GRAIN = 0.0115
+_GRAIN_SAMPLES = 9
+"""Samples over which what is even is taken out of the grain."""
 
 
 @dataclass(frozen=True, slots=True)
 class CoreMeasures:
-    """Shares of a core, 0..1: of `dark` pixels, and of pixels on `edges`."""
+    """Shares of a core, 0..1: of `dark` pixels, and of pixels on `edges`; `grain` is the standard deviation
+    of its finer structure as a part of white."""
 
     dark: float
     edges: float
+    grain: float
 
 
 def white_level(picture: Image) -> float:
@@ -44,6 +54,14 @@ def white_level(picture: Image) -> float:
     grey = cv2.cvtColor(np.ascontiguousarray(picture[::4, ::4]), cv2.COLOR_BGR2GRAY)
     white = float(np.percentile(grey, _WHITE_SHARE))
     return white if white >= _LEAST_WHITE else float("nan")
+
+
+def light_on(cell: Image, white: float) -> Light:
+    """How a cell, (H, W, 3) BGR, comes out in a picture of that white level."""
+    if not white >= _LEAST_WHITE:
+        return Light.DIM
+    burnt = cell.size > 0 and float((cell.min(axis=2) >= _BURNT).mean()) > _BURNT_PART
+    return Light.BURNT if burnt else Light.FAIR
 
 
 def measure(core: Image, white: float) -> CoreMeasures:
@@ -54,16 +72,18 @@ def measure(core: Image, white: float) -> CoreMeasures:
     level = cv2.resize(grey, size, interpolation=cv2.INTER_AREA).astype(np.float32)
     gx, gy = cv2.Sobel(level, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(level, cv2.CV_32F, 0, 1, scale=1 / 8)
     steep = cv2.magnitude(gx, gy) > _STEP * white
-    return CoreMeasures(float((level < _DARK * white).mean()), float(steep.mean()))
+    fine = level - cv2.blur(level, (_GRAIN_SAMPLES, _GRAIN_SAMPLES))
+    dark = float((level < _DARK * white).mean())
+    return CoreMeasures(dark, float(steep.mean()), float(fine.std()) / white)
 
 
-def judge(core: Image, white: float) -> Occupancy:
-    """What the core of one cell shows."""
+def judge(core: Image, white: float, sees_deck: bool) -> Occupancy:
+    """What the core of one cell shows; `sees_deck`: the deck before it is seen (`deck.is_seen`)."""
     if min(core.shape[:2]) < _SMALLEST_PX or not white >= _LEAST_WHITE:
         return Occupancy.UNSURE
     seen = measure(core, white)
     if seen.dark > _EMPTY_DARK and seen.edges < _EMPTY_EDGES:
-        return Occupancy.EMPTY
+        return Occupancy.EMPTY if sees_deck and seen.grain > _LEAST_GRAIN else Occupancy.UNSURE
     if seen.dark < _GOODS_DARK and seen.edges < _COVER_EDGES:
         return Occupancy.COVERED
     return Occupancy.GOODS if seen.dark < _GOODS_DARK or seen.edges > 2 * _EMPTY_EDGES else Occupancy.UNSURE

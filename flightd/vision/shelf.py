@@ -11,8 +11,9 @@ import numpy as np
 
 from flightd.core.scanning import CodeSet, Occupancy, Place, PlaceLook, Quad
 from flightd.core.types import CodeRead, Image
+from flightd.vision import deck
 from flightd.vision.codes import read_codes
-from flightd.vision.occupancy import judge, white_level
+from flightd.vision.occupancy import judge, light_on, white_level
 from flightd.vision.small_jpeg import evidence_jpeg, picture_name
 
 Box: TypeAlias = tuple[int, int, int, int]
@@ -23,7 +24,7 @@ _MARGIN = 0.1
 
 
 def read_shelf(
-    bgr: Image, seq: int, stamp_ns: int, places: Sequence[Place]
+    bgr: Image, seq: int, stamp_ns: int, places: Sequence[Place], exposure: float = 1.0
 ) -> tuple[CodeSet, dict[str, bytes]]:
     """The codes and the places of one picture, (H, W, 3) BGR; the evidence of each place by its name.
 
@@ -43,7 +44,7 @@ def read_shelf(
             kept[look.evidence] = jpeg
     per_ms = cv2.getTickFrequency() * 1e-3
     timings = {"codes": (read - started) / per_ms, "places": (cv2.getTickCount() - read) / per_ms}
-    return CodeSet(seq, stamp_ns, width, height, reads, tuple(looks), timings), kept
+    return CodeSet(seq, stamp_ns, width, height, reads, tuple(looks), timings, exposure), kept
 
 
 def _around(places: Sequence[Place], width: int, height: int) -> Box:
@@ -85,11 +86,13 @@ def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> 
         occupancy = Occupancy.GOODS
     elif _is_inside(place.core_px, width, height):
         x0, y0, x1, y1 = _box(place.core_px, width, height)
-        occupancy = judge(bgr[y0:y1, x0:x1], white)
+        core = bgr[y0:y1, x0:x1]
+        occupancy = judge(core, white, deck.is_seen(bgr, place.deck_px, core, white))
     x0, y0, x1, y1 = _box(place.quad_px, width, height)
     jpeg = evidence_jpeg(np.ascontiguousarray(bgr[y0:y1, x0:x1])) if x1 > x0 and y1 > y0 else b""
     name = picture_name(jpeg) if jpeg else ""
-    return PlaceLook(place.location, place.quad_px, place.share, occupancy, name), jpeg
+    light = light_on(bgr[y0:y1, x0:x1], white)
+    return PlaceLook(place.location, place.quad_px, place.share, occupancy, name, light), jpeg
 
 
 def _is_inside(quad: Quad, width: int, height: int) -> bool:

@@ -2,6 +2,7 @@
 
 import asyncio
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -32,25 +33,31 @@ def hovering(stamp_ns: int) -> Kinematics:
     return Kinematics(stamp_ns, 1.3, 0.0, 1.6, 0.0, 0.0, 0.0, 0.0, 0.0, -1.5708, 0.0, 0.0, 0.0)
 
 
-def test_pictures_arrive_at_their_rate_after_their_delay_as_they_were_rendered() -> None:
-    camera = FrontCamera(lens=front_lens(320, 200, 250.0), fps=5.0, capture_delay_s=0.08, jitter_s=0.0)
-    make = partial(FrontRenderer, load_site(SMALL), camera, RackLook(), 1)
-    taken: list[tuple[FrameTicket, int, Image]] = []
+CAMERA = FrontCamera(lens=front_lens(320, 200, 250.0), fps=5.0, capture_delay_s=0.08, jitter_s=0.0)
+MAKE = partial(FrontRenderer, load_site(SMALL), CAMERA, RackLook(), 1)
+
+
+def taken(for_s: float, expose: tuple[float, ...] = ()) -> list[tuple[FrameTicket, int, Image]]:
+    """What a daemon's camera hears of the simulated one: each picture's ticket, arrival and pixels.  Each of
+    the exposures is asked for in turn, for an equal part of the time."""
+    found: list[tuple[FrameTicket, int, Image]] = []
 
     async def main() -> None:
         clock, port = LoopClock(), free_port()
 
         def take(ticket: FrameTicket) -> None:
             ring = FrameRing.attach(ticket.ring, ticket.slots, ticket.width_px, ticket.height_px)
-            taken.append((ticket, clock.now_ns(), ring.pixels(ticket.slot).copy()))
+            found.append((ticket, clock.now_ns(), ring.pixels(ticket.slot).copy()))
 
         address = f"udp://127.0.0.1:{port}"
         listener = SharedCamera(address, (320, 200), 0.08, clock, take, pytest.fail)
-        peer = CameraPeer(camera, make, "front camera 1", ("127.0.0.1", port), hovering, clock)
+        peer = CameraPeer(CAMERA, MAKE, "front camera 1", ("127.0.0.1", port), hovering, clock)
         listening = asyncio.ensure_future(listener.run())
         await asyncio.sleep(0)
         running = asyncio.ensure_future(peer.run())
-        await asyncio.sleep(1.5)
+        for part in expose or (1.0,):
+            listener.expose(part)
+            await asyncio.sleep(for_s / max(len(expose), 1))
         for task in (running, listening):
             task.cancel()
         await asyncio.wait([running, listening])
@@ -58,13 +65,28 @@ def test_pictures_arrive_at_their_rate_after_their_delay_as_they_were_rendered()
 
     with asyncio.Runner(loop_factory=VirtualLoop) as runner:
         runner.run(main())
-    assert 5 <= len(taken) <= 8
-    for ticket, arrival_ns, _ in taken:
+    return found
+
+
+def test_pictures_arrive_at_their_rate_after_their_delay_as_they_were_rendered() -> None:
+    pictures = taken(1.5)
+    assert 5 <= len(pictures) <= 8
+    for ticket, arrival_ns, _ in pictures:
         assert arrival_ns - ticket.stamp_ns == pytest.approx(80e6, abs=5e6)
-    ticket, _, picture = taken[-1]
+    ticket, _, picture = pictures[-1]
     # the exposure's time only enters by the lamps' flicker
-    expected = make().render(hovering(0), ticket.seq)
+    expected = MAKE().render(hovering(0), ticket.seq)
     assert np.abs(picture.astype(int) - expected).mean() < 3.0
+
+
+def test_the_camera_takes_the_exposure_it_is_asked_for_and_says_so_with_each_picture() -> None:
+    pictures = taken(6.0, (1.0, 0.4, 1.0))
+    told = [ticket.exposure for ticket, *_ in pictures]
+    assert [part for part, _ in groupby(told)] == [1.0, 0.4, 1.0]
+    assert told.count(0.4) >= 6
+    usual = np.mean([picture.mean() for ticket, _, picture in pictures if ticket.exposure == 1.0])
+    dark = np.mean([picture.mean() for ticket, _, picture in pictures if ticket.exposure == 0.4])
+    assert dark / usual == pytest.approx(0.4, abs=0.08)
 
 
 def configured(site: Path, *settings: str, scenario: Scenario = Scenario()) -> Config:  # noqa: B008

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -11,22 +10,20 @@ from pathlib import Path
 import pytest
 
 from flightd.config.site_file import load_site
-from flightd.core.scanning import BodyPose, CodeSet, Occupancy
+from flightd.core.scanning import CodeSet, Occupancy
 from flightd.mission.assign import Assigner, FrontSight, ShelfLook
-from flightd.mission.views import ScanParams, ViewPlanner
-from flightd.sim.kinematics import Kinematics
 from flightd.sim.racks.camera import FrontCamera
 from flightd.sim.racks.look import RackLook
-from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.racks.stock import Situation, StockShares
 from flightd.sim.racks.truth import LocationTruth, stock_truth
 from flightd.vision.shelf import read_shelf
 from flightd.vision.small_jpeg import MOST_BYTES, picture_name
+from tests.sim.shelf_pictures import shelf_pictures
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
 CAMERA = FrontCamera()
 SIGHT = FrontSight(CAMERA.lens, CAMERA.mount)
-LOOK = replace(RackLook(), shares=StockShares(empty=0.35, occluded=0.1, missing=0.1))
+LOOK = replace(RackLook(), shares=StockShares(empty=0.35, occluded=0.1, missing=0.1, dark=0.0))
 SEED = 4
 
 
@@ -34,32 +31,12 @@ SEED = 4
 def looks() -> list[tuple[CodeSet, ShelfLook, dict[str, bytes]]]:
     """One picture of each view of three nodes, its pose known as well as in flight."""
     assigner = Assigner(SITE, SIGHT)
-    planner = ViewPlanner(SITE, SIGHT, assigner, ScanParams(max_height_m=4.0))
-    renderer = FrontRenderer(SITE, CAMERA, LOOK, SEED)
-    rng = random.Random(SEED)
-    taken = []
-    for node in ("A1", "A3", "B2"):
-        for seq, view in enumerate(planner.views(node, frozenset(SITE.locations), 1.0, 0.0)):
-            roll, pitch = rng.gauss(0, 0.01), rng.gauss(0, 0.01)
-            at = (view.x_m + rng.gauss(0, 0.03), view.y_m + rng.gauss(0, 0.03), view.height_m)
-            k = Kinematics(seq + 1, *at, 0.0, 0.0, 0.0, roll, pitch, view.yaw_rad, 0.0, 0.0, 0.0)
-            pose = BodyPose(
-                seq + 1,
-                at[0] + rng.gauss(0, 0.01),
-                at[1] + rng.gauss(0, 0.01),
-                at[2] + rng.gauss(0, 0.01),
-                roll,
-                pitch,
-                view.yaw_rad + rng.gauss(0, 0.003),
-                0.01,
-                0.01,
-                0.004,
-                True,
-            )
-            places = assigner.places(pose, view.locations)
-            codes, evidence = read_shelf(renderer.render(k, seq), seq, k.stamp_ns, places)
-            taken.append((codes, assigner.look(codes, pose, (view.aisle, view.side)), evidence))
-    return taken
+    found = []
+    for seen in shelf_pictures(SITE, CAMERA, LOOK, SEED, ("A1", "A3", "B2")):
+        places = assigner.places(seen.pose, seen.view.locations)
+        codes, evidence = read_shelf(seen.picture, seen.pose.stamp_ns, seen.pose.stamp_ns, places)
+        found.append((codes, assigner.look(codes, seen.pose, (seen.view.aisle, seen.view.side)), evidence))
+    return found
 
 
 @pytest.fixture(scope="module")

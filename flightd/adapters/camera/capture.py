@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import enum
 import multiprocessing
 import signal
@@ -15,6 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from flightd.adapters.camera.exposure import DeviceExposure
 from flightd.core.errors import InputError, TransientError
 from flightd.core.types import Image
 from flightd.ports import Clock
@@ -70,7 +72,15 @@ class CaptureCamera:
         self._latency_ns = round(latency_s * 1e9)
         self._clock = clock
         self._on_frame = on_frame
+        self._exposure = 1.0
+        self._process: Connection | None = None
         self.frames = 0
+
+    def expose(self, part: float) -> None:
+        """Ask the device for pictures of this part of its usual exposure; recordings are as they are."""
+        if part != self._exposure:
+            self._exposure = part
+            self._ask()
 
     async def run(self) -> None:
         source, loop = self._source, asyncio.get_running_loop()
@@ -96,20 +106,39 @@ class CaptureCamera:
             process.start()
             theirs.close()
             loop.add_reader(ours.fileno(), readable)
+            self._process = ours
+            if self._exposure != 1.0:
+                self._ask()
             raise TransientError(f"camera {source.kind}:{source.path}: {await over}")
         finally:
+            self._process = None
             loop.remove_reader(ours.fileno())
             ours.close()
             process.kill()
             process.join(1.0)
             ring.close()
 
-    def _deliver(self, ring: FrameRing, slot: int, seq: int, age_ns: int) -> None:
+    def _ask(self) -> None:
+        if self._process is not None and self._source.kind is SourceKind.DEVICE:
+            with contextlib.suppress(OSError):  # the process has died: `run` tells
+                self._process.send(self._exposure)
+
+    def _deliver(self, ring: FrameRing, slot: int, seq: int, age_ns: int, exposure: float) -> None:
         arrival_ns = self._clock.now_ns()
         self.frames += 1
         stamp_ns = arrival_ns - age_ns - self._latency_ns
         self._on_frame(
-            FrameTicket(ring.name, slot, _SLOTS, seq, stamp_ns, arrival_ns, ring.width_px, ring.height_px)
+            FrameTicket(
+                ring.name,
+                slot,
+                _SLOTS,
+                seq,
+                stamp_ns,
+                arrival_ns,
+                ring.width_px,
+                ring.height_px,
+                exposure,
+            )
         )
 
 
@@ -119,7 +148,7 @@ def _capture(source: Source, ring_name: str, conn: Connection) -> None:
     ring = FrameRing.attach(ring_name, _SLOTS, source.width_px, source.height_px)
     over = "cannot be opened, or gives no picture"
     try:
-        for seq, picture in enumerate(_pictures(source)):
+        for seq, (picture, exposure) in enumerate(_pictures(source, conn)):
             over = "no more pictures"
             grabbed_ns = time.monotonic_ns()
             if picture.shape != (source.height_px, source.width_px, 3) or picture.dtype != np.uint8:
@@ -129,25 +158,31 @@ def _capture(source: Source, ring_name: str, conn: Connection) -> None:
             slot = ring.begin(seq)
             np.copyto(ring.pixels(slot), picture)
             ring.publish(slot, seq, grabbed_ns)
-            conn.send((slot, seq, time.monotonic_ns() - grabbed_ns))
+            conn.send((slot, seq, time.monotonic_ns() - grabbed_ns, exposure))
         conn.send(over)
-    except BrokenPipeError:
+    except (BrokenPipeError, EOFError):
         return
 
 
-def _pictures(source: Source) -> Iterator[Image]:
+def _pictures(source: Source, conn: Connection) -> Iterator[tuple[Image, float]]:
+    """Pictures and the part of the usual exposure that each was taken with, as `conn` asks for."""
     if source.kind is SourceKind.FOLDER:
         paths = sorted(path for path in source.path.iterdir() if path.suffix.lower() in _PICTURES)
-        yield from _paced(map(_read, paths), source.fps)
+        yield from ((picture, 1.0) for picture in _paced(map(_read, paths), source.fps))
     elif source.kind is SourceKind.FILE:
-        yield from _paced(_video(cv2.VideoCapture(str(source.path))), source.fps)
+        video = _video(cv2.VideoCapture(str(source.path)))
+        yield from ((picture, 1.0) for picture in _paced(video, source.fps))
     else:
         capture = cv2.VideoCapture(str(source.path), cv2.CAP_V4L2)
         capture.set(cv2.CAP_PROP_FRAME_WIDTH, source.width_px)
         capture.set(cv2.CAP_PROP_FRAME_HEIGHT, source.height_px)
         capture.set(cv2.CAP_PROP_FPS, source.fps)
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
-        yield from _video(capture)
+        exposure = DeviceExposure(capture)
+        for picture in _video(capture):
+            yield picture, exposure.of_next_picture()
+            while conn.poll():
+                exposure.ask(conn.recv())
 
 
 def _read(path: Path) -> Image | None:

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ports import Clock
-from flightd.runtime.notice import decode_notice
+from flightd.runtime.notice import ExposureRequest, decode_notice, encode_request
 from flightd.runtime.ring import FrameTicket
 from flightd.tracking.clocks import DeviceClock
 
@@ -30,7 +30,8 @@ def parse_address(url: str) -> tuple[str, int]:
 
 class SharedCamera(asyncio.DatagramProtocol):
     """Listens for notices and hands each picture's ticket to `on_frame`; what is no usable notice is
-    counted and told to `on_trouble`, at most once in five seconds."""
+    counted and told to `on_trouble`, at most once in five seconds.  A notice of a picture that was taken
+    with another exposure than is wanted is answered by a request."""
 
     def __init__(
         self,
@@ -50,6 +51,8 @@ class SharedCamera(asyncio.DatagramProtocol):
         self.frames = 0
         self._on_trouble = on_trouble
         self._told_ns: int | None = None
+        self._exposure = 1.0
+        self._transport: asyncio.DatagramTransport | None = None
         self.rejected = 0
 
     async def run(self) -> None:
@@ -62,11 +65,17 @@ class SharedCamera(asyncio.DatagramProtocol):
                 f"camera.url {self._url}: {err.strerror}; is another flightd running?"
             ) from err
         try:
+            self._transport = transport
             await asyncio.get_running_loop().create_future()
         finally:
+            self._transport = None
             transport.close()
 
-    def datagram_received(self, data: bytes, addr: Any) -> None:  # noqa: ARG002 - asyncio names it
+    def expose(self, part: float) -> None:
+        """Ask for pictures of this part of the usual exposure from now on."""
+        self._exposure = part
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:
         arrival_ns = self._clock.now_ns()
         try:
             notice = decode_notice(data)
@@ -79,6 +88,8 @@ class SharedCamera(asyncio.DatagramProtocol):
                 f"pictures are {notice.width_px}x{notice.height_px}, the configuration says {wanted}"
             )
             return
+        if notice.exposure != self._exposure and self._transport is not None:
+            self._transport.sendto(encode_request(ExposureRequest(self._exposure)), addr)
         self.frames += 1
         stamp_ns = self._device.to_ours(notice.device_ns, arrival_ns)
         self._on_frame(
@@ -91,6 +102,7 @@ class SharedCamera(asyncio.DatagramProtocol):
                 arrival_ns,
                 notice.width_px,
                 notice.height_px,
+                notice.exposure,
             )
         )
 

@@ -20,6 +20,7 @@ _UNIT = 128
 _CARDBOARD = ((78.0, 122.0, 164.0), (92.0, 138.0, 178.0), (110.0, 150.0, 186.0), (70.0, 108.0, 146.0))
 _PLAIN = ((205.0, 208.0, 210.0), (60.0, 60.0, 62.0))
 _CRATES = ((150.0, 80.0, 30.0), (40.0, 40.0, 150.0), (70.0, 110.0, 40.0), (120.0, 120.0, 118.0))
+_DARK_TONE = (20.0, 20.0, 21.0)
 _WOOD = (96.0, 140.0, 172.0)
 
 
@@ -43,9 +44,11 @@ class GoodsPainter:
         assert goods is not None
         rng = np.random.default_rng([goods.looks, 0x676F6F64])
         height, width = round(goods.height_m * TEXELS_PER_M), round(goods.width_m * TEXELS_PER_M)
-        pallet = round(_PALLET_M * TEXELS_PER_M) if goods.height_m > 0.35 else 0
+        stands_bare = goods.height_m <= 0.35 or (goods.dark and rng.random() < 0.5)
+        pallet = 0 if stands_bare else round(_PALLET_M * TEXELS_PER_M)
         front = np.empty((height, width, 3), np.uint8)
-        (_boxes, _boxes, _wrapped, _crates)[int(rng.integers(4))](front[: height - pallet], rng)
+        load = _dark if goods.dark else (_boxes, _boxes, _wrapped, _crates)[int(rng.integers(4))]
+        load(front[: height - pallet], rng)
         if pallet:
             _pallet(front[height - pallet :], rng)
         self._grained(front, rng)
@@ -58,7 +61,7 @@ class GoodsPainter:
 
     def tone(self, goods: Goods) -> tuple[float, float, float]:
         """About what a front looks like from afar."""
-        return _CARDBOARD[goods.looks % len(_CARDBOARD)]
+        return _DARK_TONE if goods.dark else _CARDBOARD[goods.looks % len(_CARDBOARD)]
 
     def sheet(self, goods: Goods, height_m: float, width_m: float) -> Image:
         """(H, W, 3) BGR tarpaulin that hangs before covered goods, half as many texels to the metre."""
@@ -158,6 +161,20 @@ def _crates(load: Image, rng: np.random.Generator) -> None:
             _relight(load[top + 12 : below - 6, max(rib - 4, 0) : rib + 4], 1.14)
         grip = slice(top + round(0.2 * (below - top)), top + round(0.38 * (below - top)))
         _relight(load[grip, round(width * 0.38) : round(width * 0.62)], 0.3)
+
+
+def _dark(load: Image, rng: np.random.Generator) -> None:
+    """Black film or black boxes: hardly any light comes back, seams and edges show barely or not at all."""
+    height = load.shape[0]
+    load[:] = np.round(rng.uniform(9.0, 38.0) * rng.uniform(0.92, 1.08, 3)).astype(np.uint8)
+    for part in np.linspace(0.0, 1.0, int(rng.choice((1, 2, 3))), endpoint=False)[1:]:
+        seam = round(part * height)
+        _relight(load[seam - 3 : seam + 3], float(rng.uniform(0.4, 1.7)))
+    if rng.random() < 0.5:
+        _relight(load[:, : round(0.01 * TEXELS_PER_M)], float(rng.uniform(0.6, 1.6)))
+    if rng.random() < 0.25:  # a lighter foot, as of a tray that the load stands in
+        foot = round(float(rng.uniform(0.01, 0.05)) * TEXELS_PER_M)
+        load[height - foot :] = np.round(np.full(3, rng.uniform(60.0, 120.0))).astype(np.uint8)
 
 
 def _pallet(area: Image, rng: np.random.Generator) -> None:

@@ -1,7 +1,7 @@
 """The steel of the racks, in metres: faces with bays and levels, and the opening of every location.
 
-A site says where labels hang; where beams lie follows: the deck of a level is two fifths of the level
-spacing below its labels, on a beam that carries the location's own small label.
+A site says where labels hang and how far below them goods stand, on a beam that carries the location's own
+small label.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from flightd.grid.cells import deck_spacing_m, decks_m
 from flightd.grid.site import Location, Rack, Shelf, Side, Site
 
 BEAM_M = 0.10
@@ -18,8 +19,6 @@ UPRIGHT_M = 0.08
 """Width of an upright, which stands on the line between two bays."""
 DEPTH_M = 0.9
 """From the face to the mesh at the back."""
-_DECK_BELOW_LABEL = 0.4
-_LEAST_SPACING_M, _MOST_SPACING_M = 0.4, 1.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +104,7 @@ def _face(shelf: Shelf, rack: Rack, here: list[Location]) -> Face:
     place_m = rack.bay_width_m / rack.positions
     starts = {location.bay: location.x_m - (location.position - 0.5) * place_m for location in here}
     ordered = [starts[bay] for bay in sorted(starts)]
-    levels = rack_levels(rack.levels_m, shelf.height_m)
+    levels = rack_levels(rack, shelf.height_m)
     return Face(
         shelf,
         (*ordered, ordered[-1] + rack.bay_width_m),
@@ -114,11 +113,10 @@ def _face(shelf: Shelf, rack: Rack, here: list[Location]) -> Face:
     )
 
 
-def rack_levels(labels_m: tuple[float, ...], height_m: float) -> tuple[Level, ...]:
-    """Decks and tops for labels at these rising heights on a rack of `height_m`."""
-    gaps = [b - a for a, b in itertools.pairwise(labels_m)] or [(height_m - labels_m[0]) * 1.6]
-    spacing_m = min(max(min(gaps), _LEAST_SPACING_M), _MOST_SPACING_M)
-    decks = [max(label_m - _DECK_BELOW_LABEL * spacing_m, BEAM_M) for label_m in labels_m]
+def rack_levels(rack: Rack, height_m: float) -> tuple[Level, ...]:
+    """Decks and tops of a rack of `height_m`."""
+    spacing_m = deck_spacing_m(rack.levels_m, height_m)
+    decks = [max(deck_m, BEAM_M) for deck_m in decks_m(rack, height_m)]
     tops = [deck_m - BEAM_M for deck_m in decks[1:]]
-    tops.append(max(min(decks[-1] + spacing_m - BEAM_M, height_m), labels_m[-1] + 0.05))
+    tops.append(max(min(decks[-1] + spacing_m - BEAM_M, height_m), rack.levels_m[-1] + 0.05))
     return tuple(Level(deck_m, top_m) for deck_m, top_m in zip(decks, tops, strict=True))

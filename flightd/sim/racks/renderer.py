@@ -59,8 +59,11 @@ class FrontRenderer:
             self._ideal.width_px // _COARSE, self._ideal.height_px // _COARSE
         )
 
-    def render(self, kinematics: Kinematics, seq: int, out: Image | None = None) -> Image:
-        """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise.
+    def render(
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+    ) -> Image:
+        """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise,
+        `exposure` is its part of the camera's usual one.
 
         With `out` (same shape, uint8, contiguous) the picture is written there and `out` returned."""
         picture = picture_for(self._camera.lens, out)
@@ -74,8 +77,8 @@ class FrontRenderer:
         if self._bend is not None:
             drawn = np.asarray(cv2.remap(drawn, *self._bend, cv2.INTER_LINEAR), np.uint8)
         cv2.cvtColor(drawn, cv2.COLOR_BGRA2BGR, dst=picture)
-        self._blur(picture, kinematics, _distance_m(view, seen))
-        self._sensor.expose(picture, kinematics.stamp_ns, seq)
+        self._blur(picture, kinematics, _distance_m(view, seen), exposure)
+        self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure)
         return picture
 
     def _background(self, view: Viewpoint) -> Image:
@@ -92,8 +95,9 @@ class FrontRenderer:
         whole = cv2.resize(tone.astype(np.uint8), size, interpolation=cv2.INTER_LINEAR)
         return np.ascontiguousarray(whole[: lens.height_px, : lens.width_px], np.uint8)
 
-    def _blur(self, picture: Image, kinematics: Kinematics, distance_m: float) -> None:
-        smear = self._camera.smear_px(kinematics, distance_m) if self._look.motion_blur else (0.0, 0.0)
+    def _blur(self, picture: Image, kinematics: Kinematics, distance_m: float, exposure: float) -> None:
+        across, down = self._camera.smear_px(kinematics, distance_m) if self._look.motion_blur else (0.0, 0.0)
+        smear = across * exposure, down * exposure
         soft_px = float(np.hypot(self._look.soft_px, self._camera.defocus_px(distance_m)))
         kernel = blur_kernel(smear, soft_px)
         if kernel is not None:

@@ -42,6 +42,8 @@ _LEAST_TURN_PART = 0.4
 _BARS_CROSSED = 0.5
 """A linear code is tilted so far that a level line still crosses all its bars within half their height."""
 
+_DARK_PART = 0.08
+"""Part of all other goods that are dark and matte, too."""
 
 _KINDS: tuple[tuple[Symbology, Callable[[int], str], float], ...] = (
     (Symbology.QR, pallet_name, 0.20),
@@ -71,7 +73,9 @@ class Condition(enum.StrEnum):
 
 
 class Situation(enum.StrEnum):
-    """How a place is; each has a share in `StockShares`, what is left over is `clean`."""
+    """How a place is; each has a share in `StockShares`, what is left over is `clean`.
+
+    `missing` has goods without a label, and so has `dark`, whose goods are dark and matte besides."""
 
     EMPTY = "empty"
     CLEAN = "clean"
@@ -82,6 +86,7 @@ class Situation(enum.StrEnum):
     TOO_SMALL = "too_small"
     MISSING = "missing"
     OCCLUDED = "occluded"
+    DARK = "dark"
 
     @property
     def state(self) -> LocationState:
@@ -96,7 +101,9 @@ _STATES = {
     Situation.TOO_SMALL: LocationState.UNREADABLE,
     Situation.MISSING: LocationState.UNREADABLE,
     Situation.OCCLUDED: LocationState.OCCLUDED,
+    Situation.DARK: LocationState.UNREADABLE,
 }
+_UNLABELLED = {Situation.MISSING, Situation.DARK}
 _CONDITIONS = {
     Situation.TILTED: Condition.TILTED,
     Situation.GLOSSY: Condition.GLOSSY,
@@ -118,6 +125,7 @@ class StockShares:
     too_small: float = 0.02
     missing: float = 0.03
     occluded: float = 0.03
+    dark: float = 0.03
 
     def __post_init__(self) -> None:
         each = [getattr(self, name) for name in self.names()]
@@ -166,7 +174,8 @@ class Label:
 @dataclass(frozen=True, slots=True)
 class Goods:
     """What stands in a place: a front of this size whose middle is `right_m` of the opening's, `recess_m`
-    behind the rack's face.  `covered` hangs a sheet before it; `looks` seeds everything else."""
+    behind the rack's face.  `covered` hangs a sheet before it, `dark` is dark and matte all over; `looks`
+    seeds everything else."""
 
     width_m: float
     height_m: float
@@ -174,6 +183,7 @@ class Goods:
     recess_m: float
     covered: bool
     looks: int
+    dark: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,15 +227,13 @@ def _place(
         return Place(opening, situation, None, ())
     several = situation is Situation.SEVERAL
     width_m = opening.width_m * float(rng.uniform(0.86, 0.95))
-    goods = Goods(
-        width_m,
-        opening.level.height_m * float(rng.uniform(0.78, 0.93)),
-        float(rng.uniform(-0.4, 0.4)) * (opening.width_m - width_m),
-        float(rng.uniform(0.0, 0.05)),
-        situation is Situation.OCCLUDED,
-        int(rng.integers(2**31)),
-    )
-    if situation is Situation.MISSING:
+    height_m = opening.level.height_m * float(rng.uniform(0.78, 0.93))
+    right_m = float(rng.uniform(-0.4, 0.4)) * (opening.width_m - width_m)
+    recess_m = float(rng.uniform(0.0, 0.05))
+    looks = int(rng.integers(2**31))
+    covered, dark = situation is Situation.OCCLUDED, situation is Situation.DARK or _is_dark(looks)
+    goods = Goods(width_m, height_m, right_m, recess_m, covered, looks, dark)
+    if situation in _UNLABELLED:
         return Place(opening, situation, goods, ())
     condition = _CONDITIONS.get(situation, Condition.CLEAN)
     if several:
@@ -240,6 +248,10 @@ def _place(
         for symbol, side in zip(symbols, (-1, 1) if several else (0,), strict=True)
     )
     return Place(opening, situation, goods, labels)
+
+
+def _is_dark(looks: int) -> bool:
+    return bool(np.random.default_rng([looks, 0x6461726B]).random() < _DARK_PART)
 
 
 def _symbol(serial: int, room_m: float, px_per_m: float, rng: np.random.Generator) -> Symbol:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.site_file import parse_site
-from flightd.core.scanning import BodyPose, CodeSet, Occupancy, PlaceLook
+from flightd.core.scanning import BodyPose, CodeSet, Light, Occupancy, PlaceLook
 from flightd.core.types import CodeRead
 from flightd.mission.assign import FrontSight
 
@@ -58,10 +58,13 @@ def picture(
     reads: tuple[CodeRead, ...] = (),
     places: dict[str, Occupancy] | None = None,
     stamp_ns: int | None = None,
+    exposure: float = 1.0,
+    light: Light = Light.FAIR,
 ) -> CodeSet:
     """What one picture showed; every place in full, with evidence named after picture and place."""
+    quad = ((-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0))
     looks = tuple(
-        PlaceLook(code, ((-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0)), 1.0, seen, f"{seq}:{code}")
-        for code, seen in (places or {}).items()
+        PlaceLook(code, quad, 1.0, seen, f"{seq}:{code}", light) for code, seen in (places or {}).items()
     )
-    return CodeSet(seq, seq * 250_000_000 if stamp_ns is None else stamp_ns, 1280, 800, reads, looks)
+    at_ns = seq * 250_000_000 if stamp_ns is None else stamp_ns
+    return CodeSet(seq, at_ns, 1280, 800, reads, looks, exposure=exposure)

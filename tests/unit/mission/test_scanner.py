@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 from flightd.core.inventory import LocationState
-from flightd.core.scanning import BodyPose, Finding, Occupancy
+from flightd.core.scanning import BodyPose, Finding, Light, Occupancy
 from flightd.core.types import CodeRead
 from flightd.grid.racks import code_form
 from flightd.mission.scanner import Scanner, nodes_to_count
@@ -50,6 +51,28 @@ class Hover:
         over = self.scanner.step(self.now_ns)
         self.gather()
         return over
+
+    def lit(self, camera: Callable[[float], tuple[float, Light]], reads: dict[str, tuple[str, ...]]) -> None:
+        """To the end: `camera` says what it makes of a wanted exposure and how places come out then; codes
+        are read in fair light only."""
+        while (view := self.scanner.view) is not None:
+            self.at_view()
+            over = False
+            while not over:
+                exposure, light = camera(self.scanner.exposure)
+                self.now_ns += STEP_NS
+                self.seq += 1
+                at = {"x_m": view.x_m, "y_m": view.y_m, "height_m": view.height_m, "yaw_rad": view.yaw_rad}
+                here = pose(self.now_ns, **at)
+                seen = reads if light is Light.FAIR else {}
+                codes = [
+                    self._code(here, c, t) for c, texts in seen.items() if c in view.locations for t in texts
+                ]
+                places = dict.fromkeys(view.locations, Occupancy.UNSURE)
+                shown = picture(self.seq, tuple(codes), places, self.now_ns, exposure, light)
+                self.scanner.take(shown, here)
+                over = self.scanner.step(self.now_ns)
+                self.gather()
 
     def _code(self, here: BodyPose, code: str, text: str) -> CodeRead:
         (place,) = self.scanner._assigner.places(here, [code])
@@ -337,3 +360,62 @@ def test_codes_of_goods_do_not_look_like_locations() -> None:
     assert not any(form.fullmatch(text) for text in ("4006381333931", "PALLET AL-01-1-1", "AL-01-1", "LOT-7"))
     numbers = [replace(rack, pattern="{bay:02}{level}{position}") for rack in SITE.racks]
     assert not code_form(numbers).fullmatch("0711"), "any number would look like it"
+
+
+def too_bright(wanted: float) -> tuple[float, Light]:
+    """A camera that burns out all labels unless it is asked for less light."""
+    return wanted, Light.BURNT if wanted > 0.6 else Light.FAIR
+
+
+def too_dark(wanted: float) -> tuple[float, Light]:
+    return wanted, Light.FAIR if wanted > 1.6 else Light.DIM
+
+
+@pytest.mark.parametrize(("camera", "part"), [(too_bright, PARAMS.darker), (too_dark, PARAMS.brighter)])
+def test_what_is_lit_wrongly_is_looked_at_from_the_same_place_with_another_exposure(
+    camera: Callable[[float], tuple[float, Light]], part: float
+) -> None:
+    hover = Hover()
+    codes = hover.scanner._planner.locations("A2")
+    hover.lit(camera, {code: (f"P-{code}",) for code in codes})
+    assert {hover.found[code].state for code in codes} == {LocationState.READ}
+    relit = [view for view in hover.views if view.exposure != 1.0]
+    assert {view.exposure for view in relit} == {part}
+    usual = {(view.x_m, view.y_m, view.height_m) for view in hover.views if view.exposure == 1.0}
+    assert {(view.x_m, view.y_m, view.height_m) for view in relit} == usual
+    assert hover.scanner.exposure == 1.0
+    assert not hover.scanner.drain_events()
+
+
+def test_pictures_of_another_exposure_than_the_wanted_one_tell_nothing() -> None:
+    hover = Hover()
+    view = hover.at_view()
+    code = view.locations[0]
+    here = pose(hover.now_ns + 1, x_m=view.x_m, y_m=view.y_m, height_m=view.height_m)
+    for seq in range(1, 6):
+        empty = dict.fromkeys(view.locations, Occupancy.EMPTY)
+        hover.scanner.take(picture(seq, (), empty, hover.now_ns + seq, exposure=0.4), here)
+    hover.gather()
+    assert code not in hover.found
+
+
+def test_a_camera_that_does_not_follow_is_told_once_and_not_asked_again() -> None:
+    hover = Hover()
+    hover.lit(lambda _: (1.0, Light.BURNT), {})
+    assert [event.name for event in hover.scanner.drain_events()] == ["exposure_fixed"]
+    assert sum(view.exposure != 1.0 for view in hover.views) == 1
+    assert {finding.state for finding in hover.found.values()} == {LocationState.UNREADABLE}
+
+
+def test_a_place_is_empty_after_looks_in_a_row_unless_goods_were_ever_seen() -> None:
+    for before, state in (
+        (Occupancy.UNSURE, LocationState.EMPTY),
+        (Occupancy.GOODS, LocationState.UNREADABLE),
+    ):
+        hover = Hover()
+        hover.at_view()
+        codes = hover.scanner._planner.locations("A2")
+        hover.look(dict.fromkeys(codes, before))
+        hover.run(dict.fromkeys(codes, Occupancy.EMPTY), {})
+        first = hover.views[0].locations
+        assert {hover.found[code].state for code in first} == {state}

@@ -11,6 +11,7 @@ import pytest
 from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
+from flightd.grid.site import Rack
 from flightd.sim.racks.layout import BEAM_M, faces, rack_levels
 from flightd.sim.racks.look import RackLook
 from flightd.sim.racks.stock import Condition, Place, Situation, StockShares, stock
@@ -62,7 +63,7 @@ def test_every_location_has_its_opening_and_it_fits_between_deck_and_beam() -> N
 
 @pytest.mark.parametrize("levels_m", [(0.3,), (0.0, 1.2), (0.5, 1.2, 1.9, 2.6), (0.2, 0.35, 3.0)])
 def test_decks_rise_and_leave_room_for_a_beam(levels_m: tuple[float, ...]) -> None:
-    levels = rack_levels(levels_m, 3.3)
+    levels = rack_levels(Rack(("A",), 1.2, levels_m), 3.3)
     assert all(level.deck_m >= BEAM_M - 1e-9 for level in levels)
     assert levels[-1].top_m > levels[-1].deck_m
 
@@ -115,7 +116,7 @@ def test_a_gs1_symbol_tells_its_elements_with_separators() -> None:
 def test_shares_beyond_one_are_one_clear_line(tmp_path: Path) -> None:
     file = tmp_path / "full.toml"
     file.write_text("[racks]\nempty = 0.7\ntorn = 0.7\n")
-    with pytest.raises(InputError, match=r"full\.toml: racks: .*shares of places are 1\.6"):
+    with pytest.raises(InputError, match=r"full\.toml: racks: .*shares of places are 1\.7"):
         load_scenario(file)
 
 

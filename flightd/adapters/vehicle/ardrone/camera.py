@@ -42,6 +42,9 @@ class ArDroneCamera:
         """Pictures delivered so far."""
         return self._seq
 
+    def expose(self, part: float) -> None:
+        """The drone exposes by itself: its pictures stay as they are."""
+
     async def run(self) -> None:
         """Receive until cancelled; the shared memory lives as long.  Raises `UnavailableError` when
         PyAV is missing."""

@@ -1,0 +1,59 @@
+"""A device's exposure: a part of its usual one when asked for, and what pictures are said to have."""
+
+from __future__ import annotations
+
+import cv2
+import pytest
+
+from flightd.adapters.camera.exposure import DeviceExposure
+
+AUTOMATIC = 3.0
+
+
+class Device:
+    """A V4L2 device with exposures in whole steps; a `stubborn` one takes no exposure by hand."""
+
+    def __init__(self, usual: float, stubborn: bool = False) -> None:
+        self.values = {cv2.CAP_PROP_AUTO_EXPOSURE: AUTOMATIC, cv2.CAP_PROP_EXPOSURE: usual}
+        self._stubborn = stubborn
+
+    def get(self, prop: int, /) -> float:
+        return self.values[prop]
+
+    def set(self, prop: int, value: float, /) -> bool:
+        if self._stubborn:
+            return False
+        self.values[prop] = round(value)
+        return True
+
+
+def told(exposure: DeviceExposure, count: int) -> list[float]:
+    return [exposure.of_next_picture() for _ in range(count)]
+
+
+def test_a_part_is_set_by_hand_and_told_only_when_it_has_come_through() -> None:
+    device = Device(200.0)
+    exposure = DeviceExposure(device)
+    assert told(exposure, 2) == [1.0, 1.0]
+    exposure.ask(0.4)
+    assert device.values == {cv2.CAP_PROP_AUTO_EXPOSURE: 1.0, cv2.CAP_PROP_EXPOSURE: 80.0}
+    assert told(exposure, 6) == [1.0, 1.0, 1.0, 0.4, 0.4, 0.4]
+
+
+def test_the_usual_exposure_comes_back_with_its_automatic() -> None:
+    device = Device(200.0)
+    exposure = DeviceExposure(device)
+    before = dict(device.values)
+    exposure.ask(2.5)
+    exposure.ask(1.0)
+    assert device.values == before
+    assert told(exposure, 9)[-1] == 1.0
+
+
+@pytest.mark.parametrize("device", [Device(200.0, stubborn=True), Device(0.0), Device(-1.0), Device(1.0)])
+def test_pictures_of_a_device_that_cannot_are_said_to_have_the_usual_exposure(device: Device) -> None:
+    exposure = DeviceExposure(device)
+    before = dict(device.values)
+    exposure.ask(0.4)
+    assert set(told(exposure, 9)) == {1.0}
+    assert device.values == before
