@@ -13,6 +13,7 @@ from flightd.adapters.store.sqlite import SqliteStore
 from flightd.cli.pictures import list_files, read_image
 from flightd.cli.progress import track
 from flightd.config.schema import load_table, parse_config
+from flightd.core.cells import exact
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
 from flightd.core.types import Image
@@ -61,7 +62,7 @@ def read_stock(path: Path) -> dict[str, list[str]]:
                     raise InputError(f"{path}: no column {column!r}; the first line must name location,code")
             stock: dict[str, list[str]] = {}
             for row in reader:
-                location, code = (row["location"] or "").strip(), (row["code"] or "").strip()
+                location, code = (exact((row[name] or "").strip()) for name in ("location", "code"))
                 if not location:
                     raise InputError(f"{path}: line {reader.line_num}: no location")
                 stock.setdefault(location, []).extend([code] if code else [])

@@ -11,6 +11,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any, Final
 from urllib.parse import quote
 
+from flightd.core.cells import inert
 from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationRecord, Observation, StoredRead
 
@@ -50,16 +51,19 @@ def _rows(records: Sequence[LocationRecord]) -> list[list[str | float]]:
 
 
 def as_csv(records: Sequence[LocationRecord]) -> bytes:
-    """RFC 4180 with a heading line, UTF-8."""
+    """RFC 4180 with a heading line, UTF-8; texts are inert cells (`core.cells`)."""
     out = io.StringIO()
     writer = csv.writer(out)
     writer.writerow(_COLUMNS)
-    writer.writerows(_rows(records))
+    writer.writerows(
+        [inert(value) if isinstance(value, str) else value for value in row] for row in _rows(records)
+    )
     return out.getvalue().encode()
 
 
 def as_xlsx(records: Sequence[LocationRecord]) -> bytes:
-    """One sheet with a filter; what labels say is text, never a formula.  Needs the extra `xlsx`."""
+    """One sheet with a filter; what labels say is exact text, never a formula, nor when the cell is edited.
+    Needs the extra `xlsx`."""
     try:
         import xlsxwriter
     except ImportError:
@@ -69,6 +73,7 @@ def as_xlsx(records: Sequence[LocationRecord]) -> bytes:
     sheet = book.add_worksheet("inventory")
     rows = _rows(records)
     bold = book.add_format({"bold": True})
+    text = book.add_format({"num_format": "@", "quote_prefix": True})
     for column, name in enumerate(_COLUMNS):
         sheet.write_string(0, column, name, bold)
         width = max([len(name), *(len(str(row[column])) for row in rows)])
@@ -76,7 +81,7 @@ def as_xlsx(records: Sequence[LocationRecord]) -> bytes:
     for number, row in enumerate(rows, start=1):
         for column, value in enumerate(row):
             if isinstance(value, str):
-                sheet.write_string(number, column, value)
+                sheet.write_string(number, column, value, text if inert(value) != value else None)
             else:
                 sheet.write_number(number, column, value)
     sheet.freeze_panes(1, 1)

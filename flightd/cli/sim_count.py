@@ -11,6 +11,7 @@ from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.assembly import plan_of
 from flightd.cli.inventory_formats import utc_text
 from flightd.cli.simulate import Simulation, truth_of
+from flightd.core.cells import inert
 from flightd.core.inventory import LocationRecord
 from flightd.sim.racks.truth import score_stock
 
@@ -22,14 +23,16 @@ _COLUMNS = (
 
 def inventory_csv(folder: Path) -> bytes | None:
     """One line for each location of the inventory in `folder`, several texts behind one another with
-    " | " between; None where there is no inventory."""
+    " | " between, all of it inert (`core.cells`); None where there is no inventory."""
     records = _records(folder)
     if records is None:
         return None
     out = io.StringIO()
     writer = csv.writer(out)
     writer.writerow(_COLUMNS)
-    writer.writerows(map(_row, records))
+    writer.writerows(
+        [inert(value) if isinstance(value, str) else value for value in _row(record)] for record in records
+    )
     return out.getvalue().encode()
 
 

@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 import msgspec
 
+from flightd.core.cells import inert
 from flightd.core.errors import UnavailableError
 from flightd.core.topics import Document, Picture, Topic
 from flightd.core.types import LineSet
@@ -24,7 +25,7 @@ def export_csv(log: FlightLog, folder: Path) -> list[Path]:
 
     Columns are the fields by name, those inside others joined by a dot; `t_s` counts from the first
     message.  A line set has a row for each line and one with empty columns where nothing was seen.
-    Pictures are left out.
+    Pictures are left out.  Texts are inert cells (`core.cells`).
     """
     start_ns = min((entry.stamp_ns for entry in log.entries if not _is_document(entry)), default=0)
     by_topic: dict[str, list[Entry]] = {}
@@ -89,4 +90,4 @@ def _flat(fields: Mapping[str, object], prefix: str = "") -> Iterable[tuple[str,
         elif isinstance(value, float) and math.isnan(value):
             yield prefix + name, ""
         else:
-            yield prefix + name, value
+            yield prefix + name, inert(value) if isinstance(value, str) else value

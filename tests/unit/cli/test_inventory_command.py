@@ -113,7 +113,7 @@ def counted(tmp_path: Path) -> Path:
 def test_csv_has_a_row_for_each_code_and_each_location_without(counted: Path) -> None:
     rows = list(csv.DictReader(io.StringIO(run("export", counted))))
     assert [(row["location"], row["state"], row["text"]) for row in rows] == [
-        ("A-01", "read", "=HYPERLINK(1)"),
+        ("A-01", "read", "'=HYPERLINK(1)"),
         ("A-02", "read", "0109501101530003"),
         ("A-03", "read", "x"),
         ("A-04", "several", "y"),
@@ -132,9 +132,28 @@ def test_xlsx_holds_the_same_as_text_never_as_a_formula(counted: Path, tmp_path:
     with zipfile.ZipFile(out) as book:
         sheet = book.read("xl/worksheets/sheet1.xml").decode()
         strings = book.read("xl/sharedStrings.xml").decode()
-    assert "=HYPERLINK(1)" in strings
+        styles = book.read("xl/styles.xml").decode()
+    assert "<t>=HYPERLINK(1)</t>" in strings
+    assert 'quotePrefix="1"' in styles
     assert "<f>" not in sheet
     assert sheet.count("<row ") == 10
+
+
+def test_what_is_exported_as_expected_stock_matches_itself(counted: Path, tmp_path: Path) -> None:
+    stock = tmp_path / "stock.csv"
+    rows = csv.DictReader(io.StringIO(run("export", counted, "--format", "csv")))
+    with stock.open("w", newline="") as file:
+        books = csv.writer(file)
+        books.writerow(["location", "code"])
+        books.writerows([row["location"], row["text"]] for row in rows if row["text"])
+    result = json.loads(run("compare", counted, stock, "--json"))
+    assert {name: n for name, n in result["outcomes"].items() if n} == {"match": 5}
+    texts = [
+        t
+        for place in json.loads(run("export", counted, "--format", "json"))["locations"]
+        for t in place["texts"]
+    ]
+    assert "=HYPERLINK(1)" in texts
 
 
 def test_epcis_counts_with_gs1_uris(counted: Path, tmp_path: Path) -> None:
