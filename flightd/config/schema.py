@@ -25,6 +25,7 @@ from flightd.core.errors import InputError
 from flightd.core.geometry import Mount
 from flightd.grid.localise import LocaliserParams
 from flightd.grid.site import Site
+from flightd.grid.ways import KEEP_OUT_CLEARANCE_M
 from flightd.mission.battery import BatteryParams
 from flightd.mission.guidance import CEILING_MARGIN_M, MissionParams
 from flightd.mission.plan import Heading, HeadingPolicy, VisitOrder
@@ -311,6 +312,7 @@ class Config(Section):
                 ground_lost_s=self.ground.lost_s,
                 ground_lost=self.ground.lost_action,
                 ceiling_m=site.ceiling_m - CEILING_MARGIN_M,
+                overhead_m=tuple(area.from_m - KEEP_OUT_CLEARANCE_M for area in site.keep_outs),
                 battery=self.battery.params(),
                 hazards=self.hazards.params(),
             ),

@@ -15,7 +15,7 @@ from functools import cached_property
 
 from flightd.core.errors import InputError
 from flightd.core.markers import MarkerDictionary, MarkerSet
-from flightd.grid.ways import KeepOut, NoWayError, OneWay, Ways
+from flightd.grid.ways import KEEP_OUT_CLEARANCE_M, KeepOut, NoWayError, OneWay, Ways
 
 
 class LineColour(enum.StrEnum):
@@ -218,6 +218,12 @@ class Site:
         out = self._ways.reach(self.home.node)
         backward = Ways(self.nodes, [(b, a, m) for a, b, m in self._arcs(against_one_way=False)])
         return frozenset(self.nodes) - (out.keys() & backward.reach(self.home.node).keys())
+
+    def is_clear(self, a_m: tuple[float, float, float], b_m: tuple[float, float, float]) -> bool:
+        """Whether the box between two points (x, y, height) comes near no keep-out."""
+        (ax, ay, ah), (bx, by, bh) = a_m, b_m
+        low_m, high_m = min(ah, bh) - KEEP_OUT_CLEARANCE_M, max(ah, bh) + KEEP_OUT_CLEARANCE_M
+        return not any(area.touches(ax, ay, bx, by) for area in self.between(low_m, high_m).keep_outs)
 
     def between(self, low_m: float, high_m: float) -> Site:
         """The site as it is for a drone that stays between two heights: without the keep-outs that lie

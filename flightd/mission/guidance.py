@@ -96,6 +96,7 @@ class MissionParams:
     relocate_s: float = 30.0
     relocate_climb_m: float = 1.0
     ceiling_m: float = math.inf
+    overhead_m: tuple[float, ...] = ()
     ground_lost_s: float = 5.0
     ground_lost: LossAction = LossAction.CONTINUE
     battery: BatteryParams = field(default_factory=BatteryParams)

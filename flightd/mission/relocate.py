@@ -78,9 +78,11 @@ class Relocator:
         self._look = Lasting()
 
     def height_m(self, flown_m: float) -> float:
-        """The height to look from: above what is flown now, more of the floor is in view."""
+        """The height to look from: above what is flown now, more of the floor is in view.  Wherever it is, it
+        stays below the ceiling and below the keep-outs that begin above what is flown now."""
         p = self._params
-        return max(flown_m, min(flown_m + p.relocate_climb_m, p.ceiling_m))
+        above = (height_m for height_m in p.overhead_m if height_m >= flown_m)
+        return max(flown_m, min(flown_m + p.relocate_climb_m, p.ceiling_m, *above))
 
     def _watch_jumps(self, s: Senses) -> None:
         self.jump_m = (0.0, 0.0)

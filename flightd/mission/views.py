@@ -106,33 +106,36 @@ class ViewPlanner:
     def retake(self, view: View, left: Sequence[str]) -> View | None:
         """Another place to look at what is `left` of a view, None after the last: nearer and squarely in
         front of what is left on one hand, then of the other; where there is only one, from a little
-        farther and aside, where reflections fall otherwise."""
+        farther and aside, where reflections fall otherwise.  Where a keep-out is near, only as far as that
+        leaves room."""
+        places = (self._aside(view, left, number) for number in range(view.retake, self._params.retakes))
+        return next((again for again in places if again is not None), None) if left else None
+
+    def _aside(self, view: View, left: Sequence[str], number: int) -> View | None:
+        """The re-take of that number, None where there is no room for it."""
         p = self._params
-        if view.retake >= p.retakes or not left:
-            return None
         node = self._site.nodes[view.node]
         hands = _hands([self._site.locations[code] for code in left], node.x_m)
-        places = hands[view.retake % len(hands)]
+        places = hands[number % len(hands)]
         middle_m = math.fsum(place.x_m for place in places) / len(places)
         label_m = math.fsum(place.height_m for place in places) / len(places)
         shelf_m = places[0].y_m
         towards = math.copysign(1.0, shelf_m - node.y_m)
         room_m = max(0.0, abs(shelf_m - node.y_m) - p.clearance_m)
-        near = view.retake < len(hands)
+        near = number < len(hands)
         step_m = min(p.step_m, room_m) if near else -p.step_m / 2
         height_m = self._height(label_m, abs(shelf_m - node.y_m) - step_m)
         most_m = min(p.aside_m, p.aside_per_height * height_m)
         aside_m = _clamp(middle_m - node.x_m + (0.0 if near else p.step_m), most_m)
         first, *_, last = self._site.aisle_nodes(view.aisle)
         x_m = min(max(node.x_m + aside_m, first.x_m), last.x_m)  # the aisle's line ends behind its end nodes
-        return replace(
-            view,
-            x_m=x_m,
-            y_m=node.y_m + towards * step_m,
-            height_m=height_m,
-            locations=tuple(left),
-            retake=view.retake + 1,
-        )
+        y_m = node.y_m + towards * step_m
+        ways = (view.x_m, view.y_m, view.height_m), (node.x_m, node.y_m, view.height_m)
+        for x, y in ((x_m, y_m), (x_m, node.y_m), (node.x_m, y_m)):
+            if all(self._site.is_clear(way, (x, y, height_m)) for way in ways):
+                codes = tuple(left)
+                return replace(view, x_m=x, y_m=y, height_m=height_m, locations=codes, retake=number + 1)
+        return None
 
     def _column(self, node: str, places: Sequence[Location]) -> list[View]:
         """One side's views from the lowest level up; levels whose labels fit one picture share a view."""

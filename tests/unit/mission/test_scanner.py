@@ -12,6 +12,7 @@ from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, Finding, Light, Occupancy
 from flightd.core.types import CodeRead
 from flightd.grid.racks import code_form
+from flightd.grid.ways import KeepOut
 from flightd.mission.scanner import Scanner, nodes_to_count
 from flightd.mission.views import ScanParams, View
 from tests.unit.mission.shelves import SIGHT, SITE, picture, pose, read
@@ -290,6 +291,34 @@ def test_a_re_take_at_the_end_of_an_aisle_stays_over_its_line(offset_m: float) -
     shifted = scanner._planner.retake(replace(view, x_m=view.x_m + offset_m), view.locations)
     assert shifted is not None
     assert shifted.x_m >= SITE.nodes["A1"].x_m
+
+
+def test_re_takes_stay_clear_of_keep_outs() -> None:
+    node = SITE.nodes["A2"]
+
+    def retakes(*areas: KeepOut) -> list[View]:
+        scanner = Scanner(replace(SITE, keep_outs=areas), SIGHT, PARAMS)
+        scanner.arrive("A2", 1.0, -math.pi / 2)
+        found, view = [], scanner.view
+        while view is not None and (view := scanner._planner.retake(view, view.locations)) is not None:
+            found.append(view)
+        return found
+
+    free = retakes()
+    (nearer, *_) = free
+    assert abs(nearer.x_m - node.x_m) > 0.1
+    assert abs(nearer.y_m - node.y_m) > 0.1
+    beside = KeepOut(nearer.x_m + 0.1, -9.0, nearer.x_m + 0.2, 9.0, 0.0, 3.0)
+    before = KeepOut(-9.0, -0.5, 9.0, -0.4, 0.0, 3.0)
+    for area in (beside, before):
+        assert (
+            not replace(SITE, keep_outs=(area,)).between(0.0, 9.0).is_closed(SITE.edges[0]) or area is beside
+        )
+        views = retakes(area)
+        assert views
+        assert all(not area.touches(v.x_m, v.y_m, node.x_m, node.y_m) for v in views)
+    assert retakes(beside, before, replace(beside, x0_m=node.x_m - 0.5, x1_m=node.x_m - 0.4)) != free
+    assert retakes(replace(beside, from_m=5.0, to_m=6.0)) == free, "far above, it is in nobody's way"
 
 
 def test_a_location_label_is_told_to_the_localiser_with_its_way_from_the_drone() -> None:
