@@ -99,24 +99,6 @@ class Sorties:
             if min(self._fresh_frac(pad, node) for pad in pads) > 1.0 - self._params.reserve_frac
         )
 
-    def cut(self, start: str, visits: Sequence[str]) -> tuple[tuple[str, ...], ...]:
-        """The visits in the sorties that full batteries allow: each flies on while the next visit and the
-        way back leave the reserve."""
-        usable_s = (1.0 - self._params.reserve_frac) / self.rate_per_s
-        cuts: list[tuple[str, ...]] = []
-        sortie: list[str] = []
-        here, flown_s = start, self._legs.pace.take_off_s
-        for there in visits:
-            on_s = self._legs.way_s(here, there)
-            if sortie and flown_s + self._out_s(on_s, there) > usable_s:
-                cuts.append(tuple(sortie))
-                pad = self.way_back(here).pad
-                sortie, flown_s, on_s = [], self._legs.pace.take_off_s, self._legs.way_s(pad, there)
-            flown_s += on_s + self._stop_s(there)
-            sortie.append(there)
-            here = there
-        return (*cuts, tuple(sortie)) if sortie else tuple(cuts)
-
     def _out_s(self, on_s: float, there: str) -> float:
         return on_s + self._stop_s(there) + self.way_back(there).seconds
 

@@ -52,7 +52,7 @@ class Leg:
     goal: str
 
 
-def legs(site: Site) -> Iterator[Leg]:
+def legs(site: Site, scans: bool = False) -> Iterator[Leg]:
     """Up, node by node over the serpentine, home, down."""
     way = site.expand(site.serpentine_route())
     home = site.nodes[way[0]]
@@ -69,7 +69,11 @@ def legs(site: Site) -> Iterator[Leg]:
         seconds = math.dist(here, there) / CRUISE_MPS + 0.8
         yield Leg(Phase.TURN if across else Phase.FOLLOW, seconds, here, there, a, b)
         if b not in done or b == way[-1]:
-            yield Leg(Phase.HOVER, DWELL_S, there, there, b, b)
+            yield Leg(Phase.HOVER, 0.1 if scans else DWELL_S, there, there, b, b)
+            if scans:
+                aside = (there[0] + 0.3, there[1], there[2])
+                yield Leg(Phase.CLIMB, 0.4, there, aside, b, b)
+                yield Leg(Phase.SCAN, DWELL_S - 0.5, aside, aside, b, b)
         done.add(b)
         here = there
     yield Leg(Phase.LAND, 5.0, here, ground, home.id, home.id)
@@ -101,7 +105,9 @@ def picture(lines: LineSet, rng: np.random.Generator) -> bytes:
     return jpeg.tobytes()
 
 
-def write_flight(folder: Path, *, truth: bool = True, summary: bool = True, seed: int = 1) -> Path:
+def write_flight(
+    folder: Path, *, truth: bool = True, summary: bool = True, seed: int = 1, scans: bool = False
+) -> Path:
     """Write `flight.mcap` (and `truth.mcap`, `summary.json`) to `folder`; returns the log's path."""
     rng = np.random.default_rng(seed)
     site = parse_site(SITE_TOML, "demo")
@@ -111,7 +117,7 @@ def write_flight(folder: Path, *, truth: bool = True, summary: bool = True, seed
         recorder.record(Topic.MAP, 0, Document(SITE_TOML))  # stamps before the flight
         recorder.record(Topic.CONFIG, START_NS, Document('[vehicle]\nkind = "ardupilot"\n'))
         t_s, frames, done, sway = 0.0, 0, 0, np.zeros(2)
-        plan = list(legs(site))
+        plan = list(legs(site, scans))
         for leg in plan:
             stamp_ns = START_NS + round(t_s * NS)
             recorder.record(

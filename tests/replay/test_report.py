@@ -112,6 +112,14 @@ def test_every_stop_is_in_the_list_in_order(log: Path) -> None:
     assert all(visit.true_error_m < 0.15 for visit in flight.visits)
 
 
+def test_a_stop_with_a_scan_is_one_visit_measured_while_it_hovers_over_the_node(tmp_path: Path) -> None:
+    flight = load_flight(write_flight(tmp_path, summary=False, scans=True))
+    planned = [leg.node for leg in legs(parse_site(SITE_TOML, "demo")) if leg.phase == Phase.HOVER]
+    assert [visit.node for visit in flight.visits] == planned
+    assert all(2.3 < visit.dwell_s < 2.7 for visit in flight.visits)
+    assert all(visit.true_error_m < 0.15 for visit in flight.visits), "the view itself is 0.3 m aside"
+
+
 def test_time_starts_with_the_flight_not_with_its_papers(log: Path) -> None:
     flight = load_flight(log)
     assert flight.phases[0].start_s == 0.0

@@ -46,7 +46,8 @@ class PhaseSpan:
 
 @dataclass(frozen=True, slots=True)
 class Visit:
-    """A stop at a node; errors are horizontal distances from the node, NaN where unknown."""
+    """A stop at a node, the scan there included; errors are horizontal distances from the node while it
+    hovered over it (views of a scan are beside it), NaN where unknown."""
 
     number: int
     node: str

@@ -33,6 +33,7 @@ from flightd.replay.report.flight import (
 
 _SHORTEST_STOP_S = 0.2
 """A hover that the mission leaves at once is no stop."""
+_AT_STOP = {Phase.HOVER, Phase.CLIMB, Phase.SCAN}
 
 
 def load_flight(path: Path) -> Flight:
@@ -184,31 +185,29 @@ def _phase_spans(statuses: Sequence[Status], start_ns: int) -> Iterator[PhaseSpa
 def _visits(
     statuses: Sequence[Status], start_ns: int, site: Site | None, estimate: Track, truth: Track | None
 ) -> Iterator[Visit]:
+    """The stops: a hover, and the scan of the shelves there with all its views."""
     numbers = itertools.count(1)
-    for phase, grouped in itertools.groupby(statuses, key=lambda status: status.phase):
-        if phase != Phase.HOVER:
-            continue
+    for stops, grouped in itertools.groupby(statuses, key=lambda status: status.phase in _AT_STOP):
         run = list(grouped)
-        node = Counter(status.node for status in run).most_common(1)[0][0]
-        start_s, end_s = ((status.stamp_ns - start_ns) / NS_PER_S for status in (run[0], run[-1]))
-        if end_s - start_s < _SHORTEST_STOP_S:
+        seconds = [(status.stamp_ns - start_ns) / NS_PER_S for status in run]
+        if not stops or seconds[-1] - seconds[0] < _SHORTEST_STOP_S:
             continue
+        node = Counter(status.node for status in run).most_common(1)[0][0]
+        hovers = [t_s for t_s, status in zip(seconds, run, strict=True) if status.phase == Phase.HOVER]
         yield Visit(
             next(numbers),
             node,
-            start_s,
-            end_s,
-            _error_p95_m(estimate, site, node, start_s, end_s),
-            _error_p95_m(truth, site, node, start_s, end_s),
+            seconds[0],
+            seconds[-1],
+            _error_p95_m(estimate, site, node, hovers),
+            _error_p95_m(truth, site, node, hovers),
         )
 
 
-def _error_p95_m(track: Track | None, site: Site | None, node: str, start_s: float, end_s: float) -> float:
-    if track is None or site is None or node not in site.nodes:
-        return math.nan
-    inside = (track.t_s >= start_s) & (track.t_s <= end_s)
-    if not inside.any():
+def _error_p95_m(track: Track | None, site: Site | None, node: str, hovers_s: Sequence[float]) -> float:
+    """How far from the node the drone was at these times, while it hovered over it; NaN where not known."""
+    if track is None or site is None or node not in site.nodes or not hovers_s or not len(track.t_s):
         return math.nan
     place = site.nodes[node]
-    distances = np.hypot(track.x_m[inside] - place.x_m, track.y_m[inside] - place.y_m)
-    return float(np.percentile(distances, 95))
+    x_m, y_m = (np.interp(hovers_s, track.t_s, values) for values in (track.x_m, track.y_m))
+    return float(np.percentile(np.hypot(x_m - place.x_m, y_m - place.y_m), 95))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -74,20 +73,6 @@ def test_the_nearest_charge_pad_is_chosen() -> None:
     watch = Sorties(two, Legs(two, POLICY, LEGS.pace), BatteryParams())
     assert watch.way_back("I9").pad == "J10"
     assert watch.way_back("B2").pad == "A1"
-
-
-@settings(max_examples=10, deadline=None)
-@given(st.floats(260, 1500))
-def test_sorties_hold_every_visit_once_in_order_and_each_comes_back(flight_s: float) -> None:
-    visits = [node for node in LARGE.serpentine_route() if node != "A1"]
-    watch = sorties(flight_s)
-    cut = watch.cut("A1", visits)
-    assert list(itertools.chain(*cut)) == visits
-    for sortie in cut:
-        flown_s = LEGS.pace.take_off_s + sum(
-            LEGS.way_s(a, b) + LEGS.pace.dwell_s for a, b in itertools.pairwise(("A1", *sortie))
-        )
-        assert flown_s + watch.way_back(sortie[-1]).seconds <= 0.9 * flight_s + 1e-6
 
 
 def test_what_no_full_battery_reaches_is_refused_before_the_flight() -> None:
