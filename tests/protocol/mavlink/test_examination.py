@@ -70,6 +70,17 @@ def test_px4s_whole_numbers_are_read_and_written_as_bytes() -> None:
     run_virtual(test)
 
 
+def test_sticks_that_px4_ignores_are_named_and_left_to_a_person() -> None:
+    async def test() -> None:
+        async with examined(Px4Peer, COM_RC_IN_MODE=4) as (peer, examination):
+            (finding,) = [f for f in (await examination.report()).findings if f.name == "COM_RC_IN_MODE"]
+            assert "no pilot could take over" in str(finding)
+            assert await examination.fix([finding]) == [finding]
+            assert peer.parameters["COM_RC_IN_MODE"] == 4
+
+    run_virtual(test)
+
+
 def test_the_rate_of_heartbeats_is_measured_and_a_slow_one_is_named() -> None:
     async def test() -> None:
         async with examined(ArduCopterPeer) as (_, examination):

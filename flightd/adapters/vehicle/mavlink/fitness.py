@@ -174,6 +174,12 @@ _PX4: tuple[Rule, ...] = (
         "a pilot who moves the sticks must get the vehicle out of OFFBOARD",
         3,
     ),
+    Rule(
+        ("COM_RC_IN_MODE",),
+        _one_of(0, 1, 2, 3, 5, 6, 7, 8),
+        "any of 0 to 8 but 4 (stick input disabled)",
+        "the sticks are ignored: no pilot could take over",
+    ),
     Rule(("COM_DISARM_LAND",), _within(0.1, 20), "above 0 s", "a landed vehicle must disarm itself", 2),
     Rule(
         ("COM_DISARM_PRFLT",),
