@@ -6,6 +6,7 @@ import contextlib
 import os
 import secrets
 import tempfile
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,8 @@ _NS_PER_UNIT = 10_000
 _RESERVE = 30 * 100_000
 """Half a minute of time stamps is claimed on disk in advance, so a crash cannot bring one back.  No more: an
 autopilot that is a minute behind us is not believed, and each restart begins at what was claimed."""
+_RENEW = _RESERVE // 2
+"""So much ahead of the claim's end a new one is written, aside: a disk may take its time."""
 
 
 def read_key(path: Path) -> bytes:
@@ -87,6 +90,7 @@ class Signing:
         self._start_ns = clock.now_ns()
         self._start = max(signing_time(unix_time_s), _kept(state))
         self._claimed = 0
+        self._writer: threading.Thread | None = None
         self.refused = 0
 
     def attach(self, mav: Any) -> None:
@@ -101,9 +105,20 @@ class Signing:
         """Let the time stamp follow the clock; pymavlink itself only counts the frames."""
         elapsed = (self._clock.now_ns() - self._start_ns) // _NS_PER_UNIT
         mav.signing.timestamp = max(mav.signing.timestamp, self._start + elapsed)
-        if mav.signing.timestamp + 1 > self._claimed:
-            self._claimed = mav.signing.timestamp + _RESERVE
+        self._claim(mav.signing.timestamp)
+
+    def _claim(self, timestamp: int) -> None:
+        """Have time stamps beyond this one on the disk before they are used."""
+        ahead = self._claimed - timestamp
+        if ahead > _RENEW or (self._writer is not None and self._writer.is_alive()):
+            return
+        self._claimed = timestamp + _RESERVE
+        if ahead < 1:
             _keep(self._state, self._claimed)
+            return
+        place = (self._state, self._claimed)
+        self._writer = threading.Thread(target=_keep, args=place, name="signing time stamp", daemon=True)
+        self._writer.start()
 
     def decode(self, mav: Any, frame: bytearray) -> Any | None:
         """The message, or None when signature or checksum is wrong.
@@ -144,7 +159,7 @@ def _kept(state: Path | None) -> int:
 
 
 def _keep(state: Path | None, timestamp: int) -> None:
-    """Replace the file as a whole; a full disk does not stop the flight."""
+    """Replace the file as a whole, on the disk before this returns; a full disk does not stop the flight."""
     if state is None:
         return
     with contextlib.suppress(OSError):
@@ -152,7 +167,19 @@ def _keep(state: Path | None, timestamp: int) -> None:
         try:
             with os.fdopen(fd, "w", encoding="ascii") as out:
                 out.write(str(timestamp))
+                out.flush()
+                os.fsync(out.fileno())
             Path(name).replace(state)
+            _sync_folder(state.parent)
         except OSError:
             Path(name).unlink()  # else a full disk gathers one each half minute
             raise
+
+
+def _sync_folder(folder: Path) -> None:
+    """A new name in a folder is on the disk only once the folder is."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
