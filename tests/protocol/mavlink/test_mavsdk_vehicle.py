@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import math
 import random
 import sys
@@ -12,6 +13,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from mavsdk.plugins.telemetry import LandedState as SdkLanded
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -25,6 +28,7 @@ from flightd.cli.sim_peers import free_port
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import Attitude, Demand, LandedState
+from flightd.ports import CountsDrops
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.loops import ScaledLoop
 from flightd.sim.airframe import Airframe
@@ -75,6 +79,24 @@ def test_the_gate_passes_set_points_only_while_they_are_fresh_and_all_else_alway
     assert gate.passes(command, 2_000_000_001)
     assert gate.passes(b"", 2_000_000_001)
     assert gate.held_back == 3
+
+
+@given(frame=st.binary(max_size=60), marker=st.sampled_from([b"", b"\xfd", b"\xfe"]))
+def test_the_gate_takes_any_bytes_and_holds_back_only_whole_frames(frame: bytes, marker: bytes) -> None:
+    gate = SetpointGate()
+    if not gate.passes(marker + frame, 5):
+        assert message_id(marker + frame) in {11, 75, 76, 82}
+
+
+def test_frames_that_no_line_takes_are_counted_and_those_held_back_are_not() -> None:
+    async def test() -> None:
+        vehicle = MavsdkVehicle("tcp:127.0.0.1:9", LoopClock())  # not open
+        assert isinstance(vehicle, CountsDrops)
+        vehicle._line.send(_packed(_COMMAND))
+        vehicle._line.send(_packed(_TARGET))
+        assert (vehicle.dropped, vehicle.gate.held_back) == (1, 1)
+
+    asyncio.run(test())
 
 
 _SET_MODE = dialect.MAVLink_command_long_message(1, 1, 176, 1, 1, 6, 0, 0, 0, 0, 0)
@@ -161,6 +183,12 @@ def test_whatever_the_library_hands_over_nothing_raises_and_nothing_absurd_is_be
             assert state.attitude.stamp_ns <= now_ns
     stamps = [sample.stamp_ns for sample in readings.attitudes()]
     assert stamps == sorted(stamps)
+
+
+@given(document=st.text() | st.recursive(st.none() | st.floats() | st.text(), st.lists).map(json.dumps))
+def test_fields_of_any_text_are_whole_numbers_or_none(document: str) -> None:
+    fields = whole_fields(document, "tc1")
+    assert fields is None or all(isinstance(field, int) for field in fields)
 
 
 @pytest.mark.parametrize("document", ["", "{", "[]", "null", '{"tc1": 1}', '{"tc1": null, "ts1": {}}', "7"])

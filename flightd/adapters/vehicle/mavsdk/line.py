@@ -21,17 +21,18 @@ _PEER_SILENT_NS = 3_000_000_000
 
 
 class Line:
-    """Keeps the transport open for ever and carries bytes both ways; all calls on the event loop."""
+    """Keeps the transport open for ever and carries bytes both ways; all calls on the event loop.
+    `received(data)` is set before `run`."""
 
-    def __init__(
-        self, transport: Transport, gate: SetpointGate, clock: Clock, received: Callable[[bytes], None]
-    ) -> None:
+    def __init__(self, transport: Transport, gate: SetpointGate, clock: Clock) -> None:
         self._transport = transport
         self._gate = gate
         self._clock = clock
-        self._received = received
+        self.received: Callable[[bytes], None] = lambda _data: None
         self._lost = asyncio.Event()
         self._heard_ns = -2 * _PEER_SILENT_NS
+        self.dropped = 0
+        """Frames that the gate let pass and no line could take."""
         transport.received = self._take
         transport.lost = self._lost.set
 
@@ -61,7 +62,7 @@ class Line:
     def send(self, frame: bytes) -> None:
         """One frame of the library's, if the gate lets it pass."""
         if self._gate.passes(frame, self._clock.now_ns()):
-            self._transport.send(frame)
+            self.dropped += not self._transport.send(frame)
 
     def _take(self, data: bytes, source: Source) -> None:
         """A listening socket answers whoever spoke first, until he falls silent."""
@@ -70,4 +71,4 @@ class Line:
             self._transport.peer = source
         if source == self._transport.peer:
             self._heard_ns = now_ns
-            self._received(data)
+            self.received(data)

@@ -94,7 +94,7 @@ class MavsdkVehicle:
         self._sync = ClockSync()
         self._readings = Readings(self._sync)
         self.gate = SetpointGate()
-        self._transport = make_transport(parse_endpoint(url))
+        self._line = Line(make_transport(parse_endpoint(url)), self.gate, clock)
         self._commander = SdkCommander()
         self._pursuit = Pursuit(self, self._commander, self._readings, clock)
         self._steering = Steering(self._pursuit, self._readings)
@@ -112,11 +112,11 @@ class MavsdkVehicle:
         UnavailableError when the link can never be opened (port in use, not a serial device).
         """
         library = Library(self._system_id)
-        line = Line(self._transport, self.gate, self._clock, library.feed)
-        library.connect(line.send)
+        self._line.received = library.feed
+        library.connect(self._line.send)
         try:
             async with asyncio.TaskGroup() as carrying:
-                carrier = carrying.create_task(line.run(), name="mavsdk line")
+                carrier = carrying.create_task(self._line.run(), name="mavsdk line")
                 try:
                     await self._live(library)
                 finally:
@@ -166,6 +166,11 @@ class MavsdkVehicle:
         text = f"{event.name}: {event.text}".encode("ascii", "replace").decode("ascii")
         self._texts.append((_TEXT_TYPES[event.level], text[:_TEXT_MAX]))
         self._text_waits.set()
+
+    @property
+    def dropped(self) -> int:
+        """Frames of the library's that the link could not take."""
+        return self._line.dropped
 
     # The firmware
 
