@@ -22,6 +22,8 @@ _SAMPLES = 120
 _MIN_SPAN_PX = 30.0
 _BORDER_PX = 5.0
 _ARM_M = 0.1
+_GRAZING = 0.05
+_MARGIN_M = 0.01
 _KINDS = {1: JunctionKind.END, 2: JunctionKind.CORNER, 3: JunctionKind.TEE, 4: JunctionKind.CROSS}
 
 
@@ -47,6 +49,7 @@ class IdealEye:
         self._errors = errors or EyeErrors()
         self._random = random.Random(f"eye {seed}")
         paint = PaintMap.of(site)
+        self._floors = [_samples(painted) for painted in site.lines]
         self._features = [
             (float(x), float(y), int(arms))
             for features in (paint.crossings, paint.ends)
@@ -58,12 +61,18 @@ class IdealEye:
         map_from_body = heading_rotation(pose.yaw_rad) @ level_from_body(pose.roll_rad, pose.pitch_rad)
         image_from_map = (map_from_body @ self._mount.body_from_image()).T
         eye = np.array([pose.x_m, pose.y_m, -pose.height_m]) + map_from_body @ np.array(self._mount.offset_m)
-        seen = (self._line(painted, image_from_map, eye) for painted in self._site.lines)
+        reach_m = self._reach_m(image_from_map, eye)
+        near = (
+            (painted, floor)
+            for painted, floor in zip(self._site.lines, self._floors, strict=True)
+            if _distance_m(painted, float(eye[0]), float(eye[1])) <= reach_m
+        )
+        seen = (self._line(painted, floor, image_from_map, eye) for painted, floor in near)
         lines = tuple(
             line for line in seen if line is not None and self._random.random() >= self._errors.missed
         )
         lens = self._lens
-        junctions = self._junctions(image_from_map, eye)
+        junctions = self._junctions(image_from_map, eye, reach_m)
         pads = tuple(pad for pad in (self._pad(pad, image_from_map, eye) for pad in self._site.pads) if pad)
         markers = tuple(
             MarkerSight(marker.id, *square)
@@ -108,10 +117,22 @@ class IdealEye:
             float(sides.mean()),
         )
 
-    def _junctions(self, image_from_map: np.ndarray, eye: np.ndarray) -> tuple[Junction, ...]:
+    def _reach_m(self, image_from_map: np.ndarray, eye: np.ndarray) -> float:
+        """How far from the point below the camera the picture reaches at most; infinite if to the horizon."""
+        lens = self._lens
+        u = (np.array([0.0, 0.0, 1.0, 1.0]) * (lens.width_px - 1) - lens.cx_px) / lens.fx_px
+        v = (np.array([0.0, 1.0, 0.0, 1.0]) * (lens.height_px - 1) - lens.cy_px) / lens.fy_px
+        corners = image_from_map.T @ np.stack([u, v, np.ones(4)])
+        if (corners[2] <= _GRAZING).any():
+            return math.inf
+        return float((-eye[2] * np.hypot(corners[0], corners[1]) / corners[2]).max()) + _MARGIN_M
+
+    def _junctions(self, image_from_map: np.ndarray, eye: np.ndarray, reach_m: float) -> tuple[Junction, ...]:
         """The crossings and ends in the picture, a little away from its border."""
         found = []
         for x, y, arms in self._features:
+            if math.hypot(x - eye[0], y - eye[1]) > reach_m:
+                continue
             here = self._pixel(x, y, image_from_map, eye)
             if here is None:
                 continue
@@ -137,16 +158,10 @@ class IdealEye:
         u, v = lens.fx_px * a / c + lens.cx_px - cu, lens.fy_px * b / c + lens.cy_px - cv
         return (u, v) if abs(u) < cu - _BORDER_PX and abs(v) < cv - _BORDER_PX else None
 
-    def _line(self, painted: PaintedLine, image_from_map: np.ndarray, eye: np.ndarray) -> Line | None:
+    def _line(
+        self, painted: PaintedLine, floor: np.ndarray, image_from_map: np.ndarray, eye: np.ndarray
+    ) -> Line | None:
         lens = self._lens
-        share = np.linspace(0.0, 1.0, _SAMPLES)
-        floor = np.stack(
-            [
-                painted.x0_m + share * (painted.x1_m - painted.x0_m),
-                painted.y0_m + share * (painted.y1_m - painted.y0_m),
-                np.zeros(_SAMPLES),
-            ]
-        )
         rays = image_from_map @ (floor - eye[:, None])
         with np.errstate(divide="ignore", invalid="ignore"):
             u = lens.fx_px * rays[0] / rays[2] + lens.cx_px
@@ -168,3 +183,24 @@ class IdealEye:
         along = sorted(-math.sin(theta) * x + math.cos(theta) * y for x, y in ((u0, v0), (u1, v1)))
         width = painted.width_m * lens.fx_px / float(rays[2][(a + b) // 2])
         return Line(rho, theta, width, along[0], along[1], 1.0, errors.rho_px, errors.theta_rad)
+
+
+def _samples(painted: PaintedLine) -> np.ndarray:
+    """Points along a line's middle, (3, N) metres on the map."""
+    share = np.linspace(0.0, 1.0, _SAMPLES)
+    return np.stack(
+        [
+            painted.x0_m + share * (painted.x1_m - painted.x0_m),
+            painted.y0_m + share * (painted.y1_m - painted.y0_m),
+            np.zeros(_SAMPLES),
+        ]
+    )
+
+
+def _distance_m(painted: PaintedLine, x_m: float, y_m: float) -> float:
+    """From a point to the nearest of a line's middle."""
+    dx, dy = painted.x1_m - painted.x0_m, painted.y1_m - painted.y0_m
+    length2 = dx * dx + dy * dy
+    share = ((x_m - painted.x0_m) * dx + (y_m - painted.y0_m) * dy) / length2 if length2 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return math.hypot(x_m - painted.x0_m - share * dx, y_m - painted.y0_m - share * dy)
