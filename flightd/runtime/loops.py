@@ -76,6 +76,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     which nothing happened time goes on until the holds end, so that time-outs do their work.
     """
 
+    counts_datagrams = True
+    """Each one has to come and go by `create_datagram_endpoint`."""
+
     def __init__(self, start_s: float = 1000.0, patience_s: float = HOLD_PATIENCE_S) -> None:
         self._now_s = start_s
         self._patience_s = patience_s

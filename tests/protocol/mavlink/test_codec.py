@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import random
+import threading
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -203,6 +204,22 @@ def test_the_signing_stamp_follows_the_clock_and_outlives_a_restart(tmp_path: Pa
     state.write_text("rubbish")
     with pytest.raises(InputError, match="stamp"):
         Signing(KEY, clock, 0.0, state)
+
+
+def test_time_stamps_are_claimed_on_the_disk_before_they_are_used(tmp_path: Path) -> None:
+    clock, state = StoppedClock(), tmp_path / "stamp"
+    beat = build(GOLDEN[0]["fields"])
+    codec = Codec(1, 191, Signing(KEY, clock, GOLDEN_UNIX_S, state))
+    for _ in range(90):
+        frame = codec.pack(beat)
+        assert int.from_bytes(frame[-12:-6], "little") < int(state.read_text())
+        clock.ns += 10**9
+        for thread in threading.enumerate():
+            if thread.name == "signing time stamp":
+                thread.join()
+    claimed = int(state.read_text()) - GOLDEN_STAMP
+    assert 90 * 10**5 <= claimed <= 121 * 10**5, "a restart begins there: not far ahead of the clock"
+    assert [path.name for path in tmp_path.iterdir()] == ["stamp"]
 
 
 def test_the_key_file_must_be_private_and_whole(tmp_path: Path) -> None:

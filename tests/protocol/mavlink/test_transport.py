@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import fcntl
 import os
 import socket
 from collections.abc import AsyncIterator
@@ -17,10 +18,11 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser
 from flightd.adapters.vehicle.mavlink.endpoint import Endpoint, EndpointKind, parse_endpoint
-from flightd.adapters.vehicle.mavlink.transport import TcpTransport, UdpTransport
+from flightd.adapters.vehicle.mavlink.transport import SerialTransport, TcpTransport, UdpTransport
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.datagrams import PacedDatagrams
 from flightd.sim.airframe import Airframe
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.peer import PeerConfig
@@ -28,14 +30,12 @@ from tests.protocol.rig import Rig, run_virtual
 
 
 class StandingSocket:
-    """In the place of a transport's socket: it takes nothing until it `runs`."""
+    """In the place of a socket: it takes nothing until it `runs`."""
 
-    def __init__(self, transport: Any) -> None:
-        transport = getattr(transport, "_inner", transport)
-        self._socket = transport._sock
+    def __init__(self, real: socket.socket) -> None:
+        self._socket = real
         self.runs = False
         self.sent: list[bytes] = []
-        transport._sock = self
 
     def send(self, data: bytes) -> None:
         if not self.runs:
@@ -248,16 +248,18 @@ def test_a_stalled_network_drops_datagrams_instead_of_piling_them_up() -> None:
     async def test() -> None:
         line = UdpTransport(parse_endpoint("udpout://127.0.0.1:9"))
         await line.open()
-        standing = StandingSocket(line._transport)
-        assert [line.send(b"old")] + [line.send(b"new") for _ in range(20)] == [True] + [False] * 20
-        await asyncio.sleep(0.05)
+        assert isinstance(line._open, PacedDatagrams)
+        standing: Any = StandingSocket(line._open.socket)
+        line._open.socket = standing
+        assert [line.send(b"old") for _ in range(20)] == [False] * 20
+        await asyncio.sleep(0.02)
         standing.runs = True
-        await asyncio.sleep(0.05)
+        await asyncio.sleep(0.02)
         assert line.send(b"newest")
-        assert standing.sent == [b"old", b"newest"]
+        assert standing.sent == [b"newest"]
         line.close()
 
-    asyncio.run(test())  # virtual time would wait for what is never delivered
+    asyncio.run(test())
 
 
 def test_a_called_socket_of_another_network_is_opened_anew() -> None:
@@ -273,7 +275,7 @@ def test_a_called_socket_of_another_network_is_opened_anew() -> None:
             losses: list[int] = []
             line.lost = lambda losses=losses: losses.append(1)  # type: ignore[misc]
             await line.open()
-            line.error_received(OSError(number, "no way out"))
+            line._failed(OSError(number, "no way out"))
             assert bool(losses) is opened_anew, (url, number)
             line.close()
 
@@ -336,6 +338,28 @@ def test_a_serial_line_is_opened_raw_heard_and_found_again_after_a_loss(tmp_path
             await asyncio.sleep(1.0)
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
+
+    run_virtual(test)
+
+
+def test_a_serial_line_that_another_program_has_is_waited_for_and_then_had_alone() -> None:
+    async def test() -> None:
+        master, slave = os.openpty()
+        name = os.ttyname(slave)
+        other = os.open(name, os.O_RDWR | os.O_NOCTTY)
+        fcntl.flock(other, fcntl.LOCK_EX)
+        line = SerialTransport(Endpoint(EndpointKind.SERIAL, device=name, baud=57600))
+        with pytest.raises(OSError, match="another program"):
+            await line.open()
+        os.close(other)
+        await line.open()
+        late = os.open(name, os.O_RDWR | os.O_NOCTTY)
+        with pytest.raises(BlockingIOError):
+            fcntl.flock(late, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        line.close()
+        fcntl.flock(late, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        for fd in (late, slave, master):
+            os.close(fd)
 
     run_virtual(test)
 

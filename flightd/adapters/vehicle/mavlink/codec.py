@@ -14,6 +14,7 @@ from typing import Any, TypeAlias
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.signing import Signing
+from flightd.adapters.vehicle.mavlink.wire import layout
 from flightd.core.errors import InputError
 
 Message: TypeAlias = Any
@@ -46,16 +47,25 @@ class Codec:
 
     def pack(self, message: Message) -> bytes:
         """One MAVLink 2 frame; the sequence number counts modulo 256 (pymavlink's `pack` does not)."""
+        mav = self._mav
+        form = layout(message.get_msgId()) if self._signing is None else None
         if self._signing is not None:
-            self._signing.before_pack(self._mav)
-        frame: bytes = message.pack(self._mav)
-        self._mav.seq = (self._mav.seq + 1) % 256
+            self._signing.before_pack(mav)
+        if form is not None:
+            frame = form.pack(message, mav.srcSystem, mav.srcComponent, mav.seq)
+        else:
+            frame = message.pack(mav)
+        mav.seq = (mav.seq + 1) % 256
         return frame
 
     def decode(self, frame: bytearray) -> Message | None:
         """The message in one whole frame of a known id, or None when its checksum or signature is wrong."""
         if self._signing is not None:
             return self._signing.decode(self._mav, frame)
+        if frame[0] == _MARKER_V2 and not frame[2]:
+            form = layout(frame[7] | frame[8] << 8 | frame[9] << 16)
+            if form is not None:
+                return form.read(frame)
         try:
             return self._mav.decode(frame)
         except dialect.MAVError:

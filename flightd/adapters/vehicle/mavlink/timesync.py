@@ -26,13 +26,12 @@ class ClockSync:
     def __init__(self) -> None:
         self._samples: deque[_Sample] = deque(maxlen=_WINDOW)
         self._asked: deque[int] = deque(maxlen=_WINDOW)
+        self._offset_ns: int | None = None
 
     @property
     def offset_ns(self) -> int | None:
         """None until a first answer came."""
-        if not self._samples:
-            return None
-        return min(self._samples, key=lambda sample: sample.round_trip_ns).offset_ns
+        return self._offset_ns
 
     @property
     def is_settled(self) -> bool:
@@ -42,6 +41,7 @@ class ClockSync:
         """The other clock started anew."""
         self._samples.clear()
         self._asked.clear()
+        self._offset_ns = None
 
     def ask(self, now_ns: int) -> int:
         """The time stamp of a new question."""
@@ -55,13 +55,13 @@ class ClockSync:
             return False
         self._asked.remove(ts1_ns)
         sample = _Sample(tc1_ns - ts1_ns - round_trip_ns // 2, round_trip_ns)
-        known = self.offset_ns
+        known = self._offset_ns
         if known is not None and abs(sample.offset_ns - known) > _JUMP_NS:
             self._samples.clear()
         self._samples.append(sample)
+        self._offset_ns = min(self._samples, key=lambda kept: kept.round_trip_ns).offset_ns
         return True
 
     def to_ours(self, theirs_ns: int) -> int | None:
         """Our time of a stamp of theirs; None while the offset is unknown."""
-        offset_ns = self.offset_ns
-        return None if offset_ns is None else theirs_ns - offset_ns
+        return None if self._offset_ns is None else theirs_ns - self._offset_ns

@@ -6,6 +6,7 @@ import abc
 import asyncio
 import contextlib
 import errno
+import fcntl
 import os
 import socket
 import termios
@@ -14,7 +15,8 @@ from typing import Any, TypeAlias
 
 from flightd.adapters.vehicle.mavlink.endpoint import Endpoint, EndpointKind
 from flightd.core.errors import InputError, UnavailableError
-from flightd.runtime.datagrams import is_stalled
+from flightd.runtime.datagrams import Datagrams, open_datagrams
+from flightd.runtime.paced import PacedReader
 
 Source: TypeAlias = tuple[str, int] | None
 """Address a datagram came from; None on a stream."""
@@ -57,66 +59,56 @@ class Transport(abc.ABC):
     def close(self) -> None: ...
 
 
-class UdpTransport(Transport, asyncio.DatagramProtocol):
+class UdpTransport(Transport):
     """udpin: bound, answers to `peer`.  udpout: speaks first, to one address."""
 
     datagrams = True
 
     def __init__(self, endpoint: Endpoint) -> None:
         super().__init__(endpoint)
-        self._transport: asyncio.DatagramTransport | None = None
+        self._open: Datagrams | None = None
 
     async def open(self) -> None:
         address = (self.endpoint.host, self.endpoint.port)
         listening = self.endpoint.kind is EndpointKind.UDP_IN
         place: dict[str, Any] = {"local_addr": address} if listening else {"remote_addr": address}
-        loop = asyncio.get_running_loop()
         try:
-            self._transport, _ = await loop.create_datagram_endpoint(lambda: self, **place)
+            self._open = await open_datagrams(self._take, self._failed, **place)
         except OSError as err:
             if err.errno == errno.EADDRINUSE:
                 text = f"{self.endpoint}: the port is in use: stop the other program or choose another port"
                 raise UnavailableError(text) from err
             raise
-        sock = self._transport.get_extra_info("socket")
+        sock = self._open.socket
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
 
     @property
     def address(self) -> tuple[str, int]:
         """The local address once open."""
-        assert self._transport is not None
-        name: tuple[str, int] = self._transport.get_extra_info("sockname")[:2]
+        assert self._open is not None
+        name: tuple[str, int] = self._open.socket.getsockname()[:2]
         return name
 
     def send(self, data: bytes) -> bool:
-        if self._transport is None or is_stalled(self._transport):
+        if self._open is None:
             return False
         if self.endpoint.kind is EndpointKind.UDP_OUT:
-            self._transport.sendto(data)
-        elif self.peer is not None:
-            self._transport.sendto(data, self.peer)
-        else:
-            return False
-        return True
+            return self._open.send(data)
+        return self.peer is not None and self._open.send(data, self.peer)
 
     def close(self) -> None:
-        if self._transport is not None:
-            self._transport.close()
-            self._transport = None
+        if self._open is not None:
+            self._open.close()
+            self._open = None
 
-    def datagram_received(self, data: bytes, addr: Any) -> None:
-        self.received(data, (addr[0], addr[1]))
+    def _take(self, data: bytes, address: Any) -> None:
+        self.received(data, (address[0], address[1]))
 
-    def error_received(self, exc: Exception) -> None:
+    def _failed(self, err: OSError) -> None:
         """Nobody listens there yet (ICMP): the vehicle may boot later.  A socket of another network is
         opened anew."""
-        calls = self.endpoint.kind is EndpointKind.UDP_OUT
-        if calls and isinstance(exc, OSError) and exc.errno in _MOVED:
-            self.lost()
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        if exc is not None:
+        if self.endpoint.kind is EndpointKind.UDP_OUT and err.errno in _MOVED:
             self.lost()
 
 
@@ -173,17 +165,23 @@ class SerialTransport(Transport):
         if self._speed is None:
             raise InputError(f"vehicle.url {endpoint}: {endpoint.baud} is not a baud rate of this machine")
         self._fd = -1
+        self._reader: PacedReader | None = None
 
     async def open(self) -> None:
         fd = os.open(self.endpoint.device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
-            self._make_raw(fd)
+            control = termios.tcgetattr(fd)[6]
+            self._claim(fd)  # before anything is changed under another's hands
+            self._make_raw(fd, control)
         except termios.error as err:
             os.close(fd)
             text = f"{self.endpoint}: {self.endpoint.device} is not a serial device: check the path"
             raise UnavailableError(text) from err
+        except OSError:
+            os.close(fd)
+            raise
         self._fd = fd
-        asyncio.get_running_loop().add_reader(fd, self._read)
+        self._reader = PacedReader(fd, self._read)
 
     def send(self, data: bytes) -> bool:
         if self._fd < 0:
@@ -198,31 +196,43 @@ class SerialTransport(Transport):
 
     def close(self) -> None:
         if self._fd >= 0:
-            asyncio.get_running_loop().remove_reader(self._fd)
+            if self._reader is not None:
+                self._reader.close()
             with contextlib.suppress(OSError):
                 os.close(self._fd)
             self._fd = -1
 
-    def _make_raw(self, fd: int) -> None:
+    def _make_raw(self, fd: int, control: list[bytes | int]) -> None:
         """8 data bits, no parity, one stop bit, no flow control, nothing interpreted."""
         iflag = termios.IGNBRK
         cflag = termios.CS8 | termios.CREAD | termios.CLOCAL
-        control = termios.tcgetattr(fd)[6]
         assert self._speed is not None
         termios.tcsetattr(fd, termios.TCSANOW, [iflag, 0, cflag, 0, self._speed, self._speed, control])
         termios.tcflush(fd, termios.TCIOFLUSH)
 
-    def _read(self) -> None:
+    @staticmethod
+    def _claim(fd: int) -> None:
+        """Two programs on one line tear each other's frames.  OSError while another has it: one that only
+        looks what was plugged in lets go of it soon."""
+        try:
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.ioctl(fd, termios.TIOCEXCL)
+        except BlockingIOError as err:
+            raise OSError(errno.EBUSY, "another program has this serial line: stop it") from err
+
+    def _read(self) -> int:
+        """Bytes that came."""
         try:
             data = os.read(self._fd, 4096)
         except BlockingIOError:
-            return
+            return 0
         except OSError:
             data = b""
         if data:
             self.received(data, None)
         else:
             self._fail()
+        return len(data)
 
     def _fail(self) -> None:
         self.close()
