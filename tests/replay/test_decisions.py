@@ -20,6 +20,7 @@ from flightd.grid.site import Site
 from flightd.pilot import TickInput, TickOutput
 from flightd.replay.decisions import replay_decisions
 from flightd.replay.log import read_log
+from tests.command import Command
 from tests.sim.ideal_flight import IdealFlight
 
 ROOT = Path(__file__).parents[2]
@@ -126,7 +127,9 @@ def test_the_command_finds_no_drift_in_a_new_process(log: Path) -> None:
     assert told["drift"] == []
 
 
-def test_the_command_tells_the_drift_of_another_configuration(log: Path, tmp_path: Path) -> None:
+def test_the_command_tells_the_drift_of_another_configuration(
+    flightd: Command, log: Path, tmp_path: Path
+) -> None:
     config, _ = _setting()
     slower = config.control.model_copy(update={"max_tilt_deg": 2.0})
     path = tmp_path / "flight.mcap"
@@ -136,18 +139,18 @@ def test_the_command_tells_the_drift_of_another_configuration(log: Path, tmp_pat
         )
         for entry in read_log(log, {Topic.MAP, Topic.TICK, Topic.DECISION}).entries:
             recorder.record(entry.topic, entry.stamp_ns, entry.message)
-    result = _run(path)
+    result = flightd("replay", path)
     assert result.returncode == 1
     assert "setpoint.pitch_rad" in result.stdout
     assert len(result.stderr.splitlines()) == 1
     assert "decisions drift" in result.stderr
 
 
-def test_a_log_without_its_map_is_one_line_and_exit_2(tmp_path: Path, log: Path) -> None:
+def test_a_log_without_its_map_is_one_line_and_exit_2(flightd: Command, tmp_path: Path, log: Path) -> None:
     path = tmp_path / "flight.mcap"
     with Recorder(path, lossless=True) as recorder:
         for entry in read_log(log, {Topic.CONFIG, Topic.TICK}).entries:
             recorder.record(entry.topic, entry.stamp_ns, entry.message)
-    result = _run(path)
+    result = flightd("replay", path)
     assert (result.returncode, result.stdout) == (2, "")
     assert "holds no map" in result.stderr

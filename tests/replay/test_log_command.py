@@ -2,8 +2,6 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import cv2
@@ -12,6 +10,7 @@ import pytest
 from flightd.adapters.recorder.recorder import Recorder
 from flightd.core.topics import Topic
 from flightd.core.types import AttitudeSetpoint
+from tests.command import Command
 from tests.replay.synthetic_flight import write_flight
 
 ROOT = Path(__file__).parents[2]
@@ -22,13 +21,8 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_flight(tmp_path_factory.mktemp("flight"), truth=False, summary=False)
 
 
-def _run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "flightd", "log", *map(str, arguments)]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-
-
-def test_info_tells_what_is_in_the_log(log: Path) -> None:
-    result = _run("info", log, "--json")
+def test_info_tells_what_is_in_the_log(flightd: Command, log: Path) -> None:
+    result = flightd("log", "info", log, "--json")
     assert (result.returncode, result.stderr) == (0, "")
     told = json.loads(result.stdout)
     assert told["damage"] == ""
@@ -38,8 +32,10 @@ def test_info_tells_what_is_in_the_log(log: Path) -> None:
     assert 60 < told["duration_s"] < 120
 
 
-def test_export_writes_tables_and_a_video(log: Path, tmp_path: Path) -> None:
-    result = _run("export", log, "--csv", tmp_path / "tables", "--video", tmp_path / "flight.mp4", "--json")
+def test_export_writes_tables_and_a_video(flightd: Command, log: Path, tmp_path: Path) -> None:
+    result = flightd(
+        "log", "export", log, "--csv", tmp_path / "tables", "--video", tmp_path / "flight.mp4", "--json"
+    )
     assert (result.returncode, result.stderr) == (0, "")
     written = {Path(path).name for path in json.loads(result.stdout)["written"]}
     assert written >= {
@@ -66,12 +62,12 @@ def test_export_writes_tables_and_a_video(log: Path, tmp_path: Path) -> None:
     assert (video.get(cv2.CAP_PROP_FRAME_WIDTH), video.get(cv2.CAP_PROP_FRAME_HEIGHT)) == (640, 360)
 
 
-def test_a_log_that_was_cut_off_is_repaired(log: Path, tmp_path: Path) -> None:
+def test_a_log_that_was_cut_off_is_repaired(flightd: Command, log: Path, tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
     path.write_bytes(log.read_bytes()[:-50_000])
-    assert json.loads(_run("info", path, "--json").stdout)["damage"] != ""
-    assert _run("repair", path).returncode == 0
-    assert json.loads(_run("info", path, "--json").stdout)["damage"] == ""
+    assert json.loads(flightd("log", "info", path, "--json").stdout)["damage"] != ""
+    assert flightd("log", "repair", path).returncode == 0
+    assert json.loads(flightd("log", "info", path, "--json").stdout)["damage"] == ""
 
 
 @pytest.mark.parametrize(
@@ -85,15 +81,13 @@ def test_a_log_that_was_cut_off_is_repaired(log: Path, tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_done_is_one_line_and_exit_2(
-    tmp_path: Path, arguments: tuple[str, ...], told: str
+    flightd: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, arguments: tuple[str, ...], told: str
 ) -> None:
     with Recorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
     (tmp_path / "note.txt").write_text("hello")
-    command = [sys.executable, "-m", "flightd", "log", *arguments]
-    result = subprocess.run(
-        command, cwd=tmp_path, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False
-    )
+    monkeypatch.chdir(tmp_path)
+    result = flightd("log", *arguments)
     assert (result.returncode, result.stdout) == (2, "")
     assert len(result.stderr.splitlines()) == 1
     assert told in result.stderr

@@ -4,8 +4,6 @@ import base64
 import itertools
 import json
 import re
-import subprocess
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -22,6 +20,7 @@ from flightd.replay.report.figures import key_figures, outcome
 from flightd.replay.report.load import load_flight
 from flightd.replay.report.markup import clock, number, path_data, thin, ticks
 from flightd.replay.report.page import render, write_report
+from tests.command import Command
 from tests.replay.synthetic_flight import SITE_TOML, SUMMARY, legs, write_flight
 
 ROOT = Path(__file__).parents[2]
@@ -294,25 +293,20 @@ def test_a_page_that_cannot_be_written_is_told(tmp_path: Path) -> None:
         write_report(tmp_path / "flight.mcap", tmp_path / "file" / "report.html")
 
 
-def _run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "flightd", "report", *map(str, arguments)]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-
-
-def test_the_command_writes_the_page_and_tells_where(tmp_path: Path) -> None:
+def test_the_command_writes_the_page_and_tells_where(flightd: Command, tmp_path: Path) -> None:
     Recorder(tmp_path / "flight.mcap").close()
-    result = _run(tmp_path / "flight.mcap", "--json")
+    result = flightd("report", tmp_path / "flight.mcap", "--json")
     assert (result.returncode, result.stderr) == (0, "")
     assert json.loads(result.stdout) == {"report": str(tmp_path / "report.html")}
     assert (tmp_path / "report.html").read_text().startswith("<!doctype html>")
 
 
 @pytest.mark.parametrize("content", [None, b"", b"\x00" * 100, b"PK\x03\x04 not a log"])
-def test_a_bad_file_is_one_line_and_exit_2(tmp_path: Path, content: bytes | None) -> None:
+def test_a_bad_file_is_one_line_and_exit_2(flightd: Command, tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "flight.mcap"
     if content is not None:
         path.write_bytes(content)
-    result = _run(path)
+    result = flightd("report", path)
     if content == b"":
         assert result.returncode == 0  # a log that was killed before its first byte
         return

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-import subprocess
-import sys
 from typing import Any
 
 import pytest
@@ -17,6 +15,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.runtime.clock import LoopClock
 from flightd.sim.external import ExternalVehicle, Placement, TruthReader
 from flightd.sim.kinematics import Kinematics
+from tests.command import Command
 from tests.protocol.rig import run_virtual
 
 LAT0, LON0, ALT0 = -35.363262, 149.165237, 584.0
@@ -317,9 +316,10 @@ def test_a_wrong_address_names_the_right_form(url: str) -> None:
         (["--truth-url", "nowhere", "--vehicle-url", "tcp:127.0.0.1:5760"], "tcp:HOST:PORT"),
     ],
 )
-def test_the_command_names_what_is_wrong_with_its_addresses(arguments: list[str], told: str) -> None:
-    command = [sys.executable, "-m", "flightd", "sim", *arguments]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+def test_the_command_names_what_is_wrong_with_its_addresses(
+    flightd: Command, arguments: list[str], told: str
+) -> None:
+    run = flightd("sim", *arguments)
     assert run.returncode == 2
     assert told in run.stderr
     assert "Traceback" not in run.stderr

@@ -1,42 +1,20 @@
 """`flightd map`: what it prints, writes and refuses."""
 
 import json
-import sys
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
 
-from flightd.cli.main import main
 from flightd.config.site_file import load_site, site_toml
 from flightd.sim.sites import random_site
+from tests.command import Command
 
 DEMO = Path(__file__).parents[3] / "configs" / "site-demo.toml"
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-@pytest.fixture
-def flightd(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> "Run":
-    return Run(monkeypatch, capsys)
-
-
-class Run:
-    """Runs the command in this process; gives exit code, stdout and stderr."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-        self._monkeypatch = monkeypatch
-        self._capsys = capsys
-
-    def __call__(self, *arguments: object) -> tuple[int, str, str]:
-        self._monkeypatch.setattr(sys, "argv", ["flightd", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        printed = self._capsys.readouterr()
-        code = ended.value.code
-        return int(code or 0), printed.out, printed.err
-
-
-def test_check_tells_what_a_sound_file_holds(flightd: Run) -> None:
+def test_check_tells_what_a_sound_file_holds(flightd: Command) -> None:
     code, out, _ = flightd("map", "check", DEMO, "--json")
     facts = json.loads(out)
     assert code == 0
@@ -44,7 +22,7 @@ def test_check_tells_what_a_sound_file_holds(flightd: Run) -> None:
     assert "sound" in flightd("map", "check", DEMO)[1]
 
 
-def test_check_names_the_mistake_in_one_line_and_exits_2(flightd: Run, tmp_path: Path) -> None:
+def test_check_names_the_mistake_in_one_line_and_exits_2(flightd: Command, tmp_path: Path) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text(DEMO.read_text().replace('node = "A1"', 'node = "A9"'))
     code, out, err = flightd("map", "check", bad, "--json")
@@ -53,7 +31,9 @@ def test_check_names_the_mistake_in_one_line_and_exits_2(flightd: Run, tmp_path:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_the_drawing_is_svg_with_every_node_line_and_shelf(flightd: Run, tmp_path: Path, seed: int) -> None:
+def test_the_drawing_is_svg_with_every_node_line_and_shelf(
+    flightd: Command, tmp_path: Path, seed: int
+) -> None:
     site = random_site(seed)
     file = tmp_path / "site.toml"
     file.write_text(site_toml(site))
@@ -70,7 +50,7 @@ def test_the_drawing_is_svg_with_every_node_line_and_shelf(flightd: Run, tmp_pat
         assert 0 < float(circle.attrib["cy"]) < height
 
 
-def test_new_makes_a_site_that_loads(flightd: Run, tmp_path: Path) -> None:
+def test_new_makes_a_site_that_loads(flightd: Command, tmp_path: Path) -> None:
     file = tmp_path / "hall.toml"
     numbers = ("--aisles", 4, "--nodes", 5, "--spacing-m", "1.4,1.7", "--pitch-m", 3.2)
     assert flightd("map", "new", file, *numbers)[0] == 0
@@ -80,7 +60,7 @@ def test_new_makes_a_site_that_loads(flightd: Run, tmp_path: Path) -> None:
     assert len(site.crosses) == 6
 
 
-def test_new_keeps_a_file_that_is_there(flightd: Run, tmp_path: Path) -> None:
+def test_new_keeps_a_file_that_is_there(flightd: Command, tmp_path: Path) -> None:
     file = tmp_path / "hall.toml"
     file.write_text("mine")
     code, _, err = flightd("map", "new", file)
@@ -102,7 +82,7 @@ def test_new_keeps_a_file_that_is_there(flightd: Run, tmp_path: Path) -> None:
     ],
 )
 def test_new_refuses_numbers_that_make_no_floor(
-    flightd: Run, tmp_path: Path, option: str, value: str, words: str
+    flightd: Command, tmp_path: Path, option: str, value: str, words: str
 ) -> None:
     code, _, err = flightd("map", "new", tmp_path / "hall.toml", option, value)
     assert code == 2
@@ -111,7 +91,7 @@ def test_new_refuses_numbers_that_make_no_floor(
     assert not (tmp_path / "hall.toml").exists()
 
 
-def test_check_holds_the_front_camera_against_the_shelves(flightd: Run, tmp_path: Path) -> None:
+def test_check_holds_the_front_camera_against_the_shelves(flightd: Command, tmp_path: Path) -> None:
     file = tmp_path / "hall.toml"
     assert flightd("map", "new", file, "--levels-m", "0.4,1.4", "--positions", 2)[0] == 0
     sees = ("--fov-deg", 70, "--module-mm", 3)
@@ -125,7 +105,7 @@ def test_check_holds_the_front_camera_against_the_shelves(flightd: Run, tmp_path
     assert "problem: 0.3 m/s blurs" in flightd("map", "check", file, *sees, "--exposure-ms", 20)[1]
 
 
-def test_restrictions_are_told_and_drawn(flightd: Run, tmp_path: Path) -> None:
+def test_restrictions_are_told_and_drawn(flightd: Command, tmp_path: Path) -> None:
     text = DEMO.read_text() + (
         '\n[[blocked]]\nnodes = ["A2", "A3"]\n'
         "\n[[keep_out]]\nx0_m = 3.0\ny0_m = 2.5\nx1_m = 3.5\ny1_m = 3.5\nto_m = 2.0\n"
