@@ -60,10 +60,15 @@ class _Bridge(asyncio.Protocol, asyncio.DatagramProtocol):
                 self._datagrams.sendto(bytes(message.get_msgbuf()))
 
     def datagram_received(self, data: bytes, addr: Any) -> None:
-        self._stream.write(data)
+        if not self._stream.is_closing():
+            self._stream.write(data)
 
     def error_received(self, exc: Exception) -> None:
         """The autopilot ends."""
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if self._datagrams is not None:
+            self._datagrams.close()
 
 
 class _TruthPort(asyncio.Protocol):
