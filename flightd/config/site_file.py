@@ -49,6 +49,7 @@
     start = true                 # missions may start here
     charge = true                # batteries are changed or charged here
     offset_m = [0.0, 0.0]        # of its centre from the node, where it does not lie on it
+    sign = "mat"                 # or "line_end": no mat; it lies from the painted end near it as on this map
 
     [[marker]]                   # a printed floor marker by which the place is known; may be left out
     id = 7
@@ -75,7 +76,7 @@ from flightd.config.section import Section
 from flightd.core.errors import InputError
 from flightd.core.markers import MarkerDictionary
 from flightd.grid.layout import LayoutError, lay_out
-from flightd.grid.site import Aisle, LineColour, Marker, Pad, Rack, Side, Site
+from flightd.grid.site import Aisle, LineColour, Marker, Pad, PadSign, Rack, Side, Site
 from flightd.grid.ways import KeepOut, OneWay
 
 _Metres = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
@@ -146,6 +147,7 @@ class _PadTable(Section):
     start: bool = True
     charge: bool = True
     offset_m: tuple[_PadOffset, _PadOffset] = (0.0, 0.0)
+    sign: PadSign = PadSign.MAT
 
 
 class _MarkerTable(Section):
@@ -265,6 +267,7 @@ def site_toml(site: Site) -> str:
         parts += ["", "[[pad]]", f"id = {_quoted(pad.id)}", f"node = {_quoted(pad.node)}"]
         parts += [f"size_m = {pad.size_m!r}"]
         parts += [f"offset_m = [{pad.offset_m[0]!r}, {pad.offset_m[1]!r}]"] if any(pad.offset_m) else []
+        parts += [f'sign = "{pad.sign}"'] if pad.sign is not PadSign.MAT else []
         parts += [f"{key} = false" for key, on in (("start", pad.start), ("charge", pad.charge)) if not on]
     for marker in site.markers:
         parts += ["", "[[marker]]", f"id = {marker.id}", f"dictionary = {_quoted(marker.dictionary)}"]

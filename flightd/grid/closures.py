@@ -6,7 +6,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from flightd.grid.site import Marker, PaintedLine, Site
+from flightd.grid.pads import REACH_M
+from flightd.grid.paint import nearest_end
+from flightd.grid.site import Marker, PadSign, PaintedLine, Site
 
 
 def mistakes(site: Site) -> Iterator[tuple[str, str]]:
@@ -26,6 +28,12 @@ def mistakes(site: Site) -> Iterator[tuple[str, str]]:
             yield (
                 key,
                 f"{pad.node} is cut off from {site.home.node} by [[blocked]] or [[keep_out]]; open a way",
+            )
+        end = nearest_end(site, *site.pad_centre(pad), REACH_M)
+        if pad.sign is PadSign.LINE_END and end is None:
+            yield (
+                f"pad[{i}] ({pad.id}).sign",
+                f'no painted line ends within {REACH_M} m of the pad; set offset_m, or sign = "mat"',
             )
 
 

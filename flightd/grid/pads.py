@@ -1,7 +1,8 @@
 """Where the charge pads really lie: what the down camera sees of them, held against the map.
 
-A mat may have been pushed off the node that the map puts it on.  Pads are seen whole only from some height
-upwards; what was found there is kept for the rest of the descent, which the lines guide.
+A mat may have been pushed off the node that the map puts it on, and a pad at the end of a line is where that
+end really is.  Both are seen only from some height upwards; what was found there is kept for the rest of the
+descent, which the lines guide.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ import math
 from dataclasses import dataclass, replace
 
 from flightd.core.types import GridPose
-from flightd.grid.site import Pad, Site
+from flightd.grid.paint import nearest_end
+from flightd.grid.site import Pad, PadSign, Site
 from flightd.tracking.lines import TrackSet
 
 REACH_M = 0.5
@@ -42,18 +44,31 @@ class _Found:
     y_m: float = 0.0
     count: int = 0
 
+    def add(self, x_m: float, y_m: float) -> None:
+        self.count += 1
+        gain = max(1.0 / self.count, _GAIN)
+        self.x_m += gain * (x_m - self.x_m)
+        self.y_m += gain * (y_m - self.y_m)
+
 
 class PadFinder:
     """Call `step` at each tick; `centre` says where a pad is."""
 
     def __init__(self, site: Site) -> None:
         self._site = site
+        by_end = [pad for pad in site.pads if pad.sign is PadSign.LINE_END]
+        ends = ((pad, nearest_end(site, *site.pad_centre(pad), REACH_M)) for pad in by_end)
+        self._ends = [(pad, end) for pad, end in ends if end is not None]
+        self._ends_ns = 0
         self._found: dict[str, _Found] = {}
         self._taken_ns = 0
         self._anchor: _Anchor | None = None
 
     def step(self, tracks: TrackSet, pose: GridPose) -> None:
-        """Take the pads of the newest frame, once."""
+        """Take the pads and line ends of the newest frame, once."""
+        if tracks.junctions_ns != self._ends_ns:
+            self._ends_ns = tracks.junctions_ns
+            self._take_ends(tracks, pose)
         if tracks.pads_ns == self._taken_ns:
             return
         self._taken_ns = tracks.pads_ns
@@ -63,11 +78,16 @@ class PadFinder:
             if pad is not None:
                 at = self._site.pad_centre(pad)
                 self._hold(at[0] - sight.x_m, at[1] - sight.y_m, tracks.pads_ns)
-                found = self._found.setdefault(pad.node, _Found())
-                found.count += 1
-                gain = max(1.0 / found.count, _GAIN)
-                found.x_m += gain * (x_m - found.x_m)
-                found.y_m += gain * (y_m - found.y_m)
+                self._found.setdefault(pad.node, _Found()).add(x_m, y_m)
+
+    def _take_ends(self, tracks: TrackSet, pose: GridPose) -> None:
+        """The places of pads by the line ends that are seen where the map has theirs."""
+        for pad, (end_x, end_y, arms) in self._ends:
+            centre_x, centre_y = self._site.pad_centre(pad)
+            for seen in tracks.junctions:
+                off_x, off_y = pose.x_m + seen.dx_m - end_x, pose.y_m + seen.dy_m - end_y
+                if seen.arms == arms and math.hypot(off_x, off_y) < REACH_M:
+                    self._found.setdefault(pad.node, _Found()).add(centre_x + off_x, centre_y + off_y)
 
     def centre(self, node: str) -> tuple[float, float] | None:
         """Centre of the pad on `node`: as seen, else as on the map; None without a pad there."""
@@ -104,6 +124,8 @@ class PadFinder:
 
     def _pad_at(self, x_m: float, y_m: float, side_m: float) -> Pad | None:
         for pad in self._site.pads:
+            if pad.sign is not PadSign.MAT:
+                continue
             at = self._site.pad_centre(pad)
             near = math.hypot(x_m - at[0], y_m - at[1]) < REACH_M
             if near and abs(side_m - pad.size_m) < _SIZE_SHARE * pad.size_m:

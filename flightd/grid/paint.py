@@ -60,6 +60,17 @@ class PaintMap:
         return cls((x, y), crossings, ends)
 
 
+def nearest_end(site: Site, x_m: float, y_m: float, reach_m: float) -> tuple[float, float, int] | None:
+    """The painted end nearest to a point, (x, y, its arm), None where none is within `reach_m`."""
+    ends = PaintMap.of(site).ends
+    found = [
+        (math.hypot(x - x_m, y - y_m), float(x), float(y), int(arms))
+        for (x, y), arms in zip(ends.at_m, ends.arms, strict=True)
+    ]
+    near = min(found, default=(math.inf, 0.0, 0.0, 0))
+    return near[1:] if near[0] <= reach_m else None
+
+
 def _axis(lines: list[tuple[float, float, float]]) -> AxisLines:
     at = np.array([line[0] for line in lines], dtype=float)
     span = np.array([sorted(line[1:]) for line in lines], dtype=float).reshape(-1, 2)

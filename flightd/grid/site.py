@@ -94,9 +94,16 @@ class PaintedLine:
     width_m: float
 
 
+class PadSign(enum.StrEnum):
+    """By what a pad is found: its own mat, or the end of a painted line, from which it lies as on the map."""
+
+    MAT = "mat"
+    LINE_END = "line_end"
+
+
 @dataclass(frozen=True, slots=True)
 class Pad:
-    """A square mat on a node, its centre `offset_m` (x, y) from it; missions may `start` on it, batteries
+    """A square of floor on a node, its centre `offset_m` (x, y) off; missions may `start` on it, batteries
     change where `charge`."""
 
     id: str
@@ -105,6 +112,7 @@ class Pad:
     start: bool = True
     charge: bool = True
     offset_m: tuple[float, float] = (0.0, 0.0)
+    sign: PadSign = PadSign.MAT
 
 
 @dataclass(frozen=True, slots=True)

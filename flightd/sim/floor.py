@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.grid.site import LineColour, PaintedLine, Side, Site
+from flightd.grid.site import LineColour, PadSign, PaintedLine, Side, Site
 from flightd.sim.appearance import Appearance
 from flightd.sim.lighting import Lighting
 from flightd.sim.marks import FloorMarks
@@ -69,6 +69,7 @@ class Floor:
         self._mats = [
             (x_m - half, y_m - half, x_m + half, y_m + half)
             for pad in site.pads
+            if pad.sign is PadSign.MAT
             for (x_m, y_m), half in ((site.pad_centre(pad), pad.size_m / 2),)
         ]
         self._uprights, self._pallets = _shelf_feet(site) if look.concrete > 0.0 else ([], [])

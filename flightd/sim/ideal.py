@@ -15,7 +15,7 @@ import numpy as np
 from flightd.core.geometry import Lens, Mount, heading_rotation, level_from_body, normalise_line
 from flightd.core.types import Junction, JunctionKind, Line, LineSet, MarkerSight, PadSight
 from flightd.grid.paint import ARM_DIRECTIONS, PaintMap
-from flightd.grid.site import Pad, PaintedLine, Site
+from flightd.grid.site import Pad, PadSign, PaintedLine, Site
 from flightd.sim.kinematics import Kinematics
 
 _SAMPLES = 120
@@ -73,7 +73,8 @@ class IdealEye:
         )
         lens = self._lens
         junctions = self._junctions(image_from_map, eye, reach_m)
-        pads = tuple(pad for pad in (self._pad(pad, image_from_map, eye) for pad in self._site.pads) if pad)
+        mats = [pad for pad in self._site.pads if pad.sign is PadSign.MAT]
+        pads = tuple(pad for pad in (self._pad(pad, image_from_map, eye) for pad in mats) if pad)
         markers = tuple(
             MarkerSight(marker.id, *square)
             for marker in self._site.markers

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
+from flightd.config.site_file import load_site, parse_site, site_toml
+from flightd.core.errors import InputError
 from flightd.core.types import Phase
 from flightd.grid.site import Site
 from flightd.sim.ideal import EyeErrors
@@ -58,3 +59,30 @@ def test_a_line_that_is_out_of_sight_at_the_start_is_found_while_climbing() -> N
     assert not (low[0].tracks.across_x and low[0].tracks.across_y), "not both lines are in sight low down"
     assert [o for o in flown.outputs if o.phase is Phase.ACQUIRE]
     assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
+
+
+def ending(overrun_m: float) -> Site:
+    """The demo site without a mat, aisle A running on that far behind its end nodes, the pad on its end."""
+    text = (CONFIGS / "site-demo.toml").read_text()
+    aisle_a, rest = text.split("overrun_m = 0.4", 1)
+    pad = f'size_m = 0.5\nsign = "line_end"\noffset_m = [{-overrun_m}, 0.0]'
+    return parse_site(f"{aisle_a}overrun_m = {overrun_m}{rest.replace('size_m = 0.5', pad)}", "ending")
+
+
+@pytest.mark.parametrize(("seed", "overrun_m"), [(2, 0.25), (3, 0.35), (4, 0.5)])
+def test_a_pad_without_a_mat_is_found_by_the_end_of_its_line(seed: int, overrun_m: float) -> None:
+    """Wherever the line really ends, up to 0.15 m from the map."""
+    world, site = ending(overrun_m), ending(0.35)
+    params = CONFIG.pilot_params(site)
+    params = replace(params, mission=replace(params.mission, dwell_s=0.2))
+    flown = IdealFlight(site, params, visits=("A2",), seed=seed, world=world).fly(120)
+    last, (x_m, y_m) = flown.truth[-1][1], world.pad_centre(world.home)
+    assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
+    assert math.hypot(last.x_m - x_m, last.y_m - y_m) <= 0.10
+
+
+def test_a_pad_by_a_line_end_needs_one_near_and_survives_its_file() -> None:
+    site = ending(0.35)
+    assert parse_site(site_toml(site), "again") == site
+    with pytest.raises(InputError, match=r"pad\[0\] \(home\)\.sign: no painted line ends within 0\.5 m"):
+        parse_site(site_toml(site).replace("offset_m = [-0.35, 0.0]", "offset_m = [0.5, 0.0]"), "far")
