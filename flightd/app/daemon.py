@@ -68,7 +68,10 @@ class Daemon:
         monitors: Sequence[Monitor] = (),
         progress: ProgressFile | None = None,
         counting: Counting | None = None,
+        ailing: FlightdError | None = None,
     ) -> None:
+        """`ailing` is what the daemon should not fly with: on the ground it ends with that; a vehicle that it
+        finds flying is looked after all the same."""
         self._config = config
         self._clock = clock
         self._detectors = detectors
@@ -98,6 +101,7 @@ class Daemon:
         self._commands: list[Command] = []
         self._late_s: list[float] = []
         self._flew = False
+        self._ailing = ailing
 
     def command(self, command: Command) -> None:
         """Hand an operator's order to the next tick."""
@@ -120,6 +124,8 @@ class Daemon:
         if self._counting is not None and self._front is not None:
             parts["front-camera"] = restarted(self._front.run, self.failed)
             parts |= self._counting.begin(self._pilot.places, self._trouble)
+        if self._ailing is not None:
+            parts["ailing"] = self._fly_only(self._ailing)
         try:
             async with asyncio.TaskGroup() as tasks:
                 services = [tasks.create_task(part, name=name) for name, part in parts.items()]
@@ -131,18 +137,26 @@ class Daemon:
         return self._result(output)
 
     async def _look(self) -> None:
-        """The camera's run.  One that cannot be had ends the daemon, but not in the air: a vehicle that flies
-        needs the daemon more than the daemon its camera."""
+        """The camera's run.  One that cannot be had ends the daemon, but not in the air."""
         try:
             await self._camera.run()
         except UnavailableError as err:
-            give_up_ns = self._clock.now_ns() + round(_FIRST_HEARD_S * 1e9)
-            while (state := self._vehicle.state()) is None and self._clock.now_ns() < give_up_ns:  # noqa: ASYNC110
-                await asyncio.sleep(TICK_S)
-            self._flew |= state is not None and state.armed
-            if not self._flew:
-                raise
+            await self._in_air_or(err)
             raise TransientError(str(err)) from err
+
+    async def _fly_only(self, err: FlightdError) -> None:
+        await self._in_air_or(err)
+        self._trouble(str(err))
+
+    async def _in_air_or(self, err: FlightdError) -> None:
+        """Raise an error that the daemon ends with, unless its vehicle flies: that needs the daemon more than
+        the daemon what it lacks."""
+        give_up_ns = self._clock.now_ns() + round(_FIRST_HEARD_S * 1e9)
+        while (state := self._vehicle.state()) is None and self._clock.now_ns() < give_up_ns:  # noqa: ASYNC110
+            await asyncio.sleep(TICK_S)
+        self._flew |= state is not None and state.armed
+        if not self._flew:
+            raise err
 
     def failed(self, err: TransientError) -> None:
         """A part that restarts has failed: tell people."""

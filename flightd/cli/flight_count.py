@@ -12,7 +12,7 @@ from pathlib import Path
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.assembly import scanner_of
 from flightd.config.schema import Config
-from flightd.core.errors import InputError
+from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import PlannedLocation
 from flightd.grid.site import Site
 from flightd.mission.scanner import nodes_to_count
@@ -24,13 +24,18 @@ from flightd.runtime.store_writer import StoreWriter
 
 def going_on(config: Config, site: Site, folder: Path | None, *, in_air: bool = False) -> Config:
     """The configuration of a flight that goes on with a count (`inventory.run`) in `folder`: it visits only
-    nodes with locations that are not booked yet.  InputError when there are none left, unless the flight
-    may be `in_air` already (the daemon was started anew)."""
+    nodes with locations that are not booked yet.  InputError when there are none left, and what the store
+    raises; neither where the flight may be `in_air` already (the daemon was started anew)."""
     run = config.inventory.run
     if not run or folder is None or not (folder / "inventory.db").exists():
         return config
-    with SqliteStore(folder, create=False) as store:
-        counted = store.counted(run)
+    try:
+        with SqliteStore(folder, create=False) as store:
+            counted = store.counted(run)
+    except (InputError, UnavailableError):
+        if not in_air:
+            raise
+        return config
     if not counted:
         return config
     nodes = nodes_to_count(site, config.mission.nodes or site.serpentine_route(), counted)
@@ -44,25 +49,44 @@ def going_on(config: Config, site: Site, folder: Path | None, *, in_air: bool = 
 
 
 class FlightCount:
-    """The inventory of one flight, kept in `folder` if one is given.  Raises what the store raises."""
+    """The inventory of one flight, kept in `folder` if one is given.  Raises what the store raises; where
+    the vehicle may be `in_air` already, that is its `error` instead, and nothing is kept."""
 
     def __init__(
-        self, config: Config, site: Site, folder: Path | None, stack: ExitStack | AsyncExitStack
+        self,
+        config: Config,
+        site: Site,
+        folder: Path | None,
+        stack: ExitStack | AsyncExitStack,
+        *,
+        in_air: bool = False,
     ) -> None:
         self._scan = config.scan
         self._stack = stack
         self._store: SqliteStore | None = None
         self._run = config.inventory.run or f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         self._counted: frozenset[str] = frozenset()
+        self.error: FlightdError | None = None
         self.scans = scanner_of(config, site) is not None
         if not self.scans or folder is None:
             return
-        self._store = stack.enter_context(SqliteStore(folder))
-        self._store.plan(
-            PlannedLocation(location.code, location.node) for location in site.locations.values()
-        )
-        self._store.withdraw_pending(self._run)
-        self._counted = self._store.counted(self._run)
+        try:
+            self._store, self._counted = self._opened(folder, site)
+        except (InputError, UnavailableError) as err:
+            if not in_air:
+                raise
+            self.error = err
+
+    def _opened(self, folder: Path, site: Site) -> tuple[SqliteStore, frozenset[str]]:
+        """The store, ready for this flight, and what is counted already."""
+        with ExitStack() as opened:
+            store = opened.enter_context(SqliteStore(folder))
+            places = site.locations.values()
+            store.plan(PlannedLocation(location.code, location.node) for location in places)
+            store.withdraw_pending(self._run)
+            counted = store.counted(self._run)
+            self._stack.callback(opened.pop_all().close)
+        return store, counted
 
     async def begun(
         self, clock: Clock, timed: Callable[[Readers], Readers] = lambda readers: readers

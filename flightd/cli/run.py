@@ -72,7 +72,7 @@ def run(
         chosen = chosen.model_copy(update={"mission": chosen.mission.model_copy(update={"autostart": False})})
     service.note_start(os.environ)
     with FlightProgress(shown=not journal) as progress:
-        result = asyncio.run(_until_signal(chosen, site, progress, journal=journal))
+        result = asyncio.run(_until_signal(chosen, site, progress, journal=journal, again=again))
     if isinstance(result, signal.Signals):
         print(f"flightd: stopped by {result.name}; the vehicle was handed back", file=sys.stderr)
         raise typer.Exit(128 + result)
@@ -82,10 +82,10 @@ def run(
 
 
 async def _until_signal(
-    config: Config, site: Site, observer: Callable[[Status], None], *, journal: bool
+    config: Config, site: Site, observer: Callable[[Status], None], *, journal: bool, again: bool
 ) -> FlightResult | signal.Signals:
     """The flight's result, or the signal that ended it."""
-    flight = asyncio.ensure_future(_fly(config, site, observer, journal=journal))
+    flight = asyncio.ensure_future(_fly(config, site, observer, journal=journal, again=again))
     loop = asyncio.get_running_loop()
     came: list[signal.Signals] = []
 
@@ -100,8 +100,9 @@ async def _until_signal(
 
 
 async def _fly(
-    config: Config, site: Site, observer: Callable[[Status], None], *, journal: bool
+    config: Config, site: Site, observer: Callable[[Status], None], *, journal: bool, again: bool
 ) -> FlightResult:
+    """`again`: the daemon was started before, and its vehicle may be in the air."""
     from flightd.adapters.store.progress import ProgressFile
     from flightd.app.assembly import detector_pool, ground_link
     from flightd.app.daemon import Daemon
@@ -111,7 +112,7 @@ async def _fly(
 
     clock = LoopClock()
     async with monitors(config.metrics, os.environ, journal=journal) as watchers, AsyncExitStack() as stack:
-        count = FlightCount(config, site, config.inventory.folder, stack)
+        count = FlightCount(config, site, config.inventory.folder, stack, in_air=again)
         pool = stack.enter_context(detector_pool(config, site, clock))
         recorder, archive = _black_box(config, site, clock.now_ns()) or (None, None)
         if recorder is not None:
@@ -121,7 +122,9 @@ async def _fly(
         await pool.ready()
         kept = config.mission.progress
         progress = None if kept is None else ProgressFile(kept, site.name)
-        daemon = Daemon(config, site, clock, pool, recorder, [observer], ground, watchers, progress, counting)
+        daemon = Daemon(
+            config, site, clock, pool, recorder, [observer], ground, watchers, progress, counting, count.error
+        )
         async with kept_room(archive, daemon.failed):
             return await daemon.fly()
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from flightd.adapters.metrics.book import MetricsBook
 from flightd.app.daemon import Daemon, FlightResult
+from flightd.cli.flight_count import FlightCount
+from flightd.cli.sim_peers import free_port
 from flightd.config.schema import Config, load_config
 from flightd.config.site_file import load_site
-from flightd.core.errors import UnavailableError
+from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.types import Phase, Status
 from flightd.ports import Monitor
 from flightd.runtime.clock import LoopClock
@@ -35,12 +38,13 @@ class NoDetectors:
         raise AssertionError("there is no camera")
 
 
-async def config_of(rig: Rig) -> Config:
-    """A camera that cannot be had (its port is taken), and a flight that would start by itself."""
+async def config_of(rig: Rig, *, camera_gone: bool) -> Config:
+    """A flight that would start by itself, and if wanted a camera that cannot be had: its port is taken."""
     config = load_config(ROOT / "configs" / "sim.toml")
     host, port = await rig.peer.open()
     vehicle = config.vehicle.model_copy(update={"url": f"udpout://{host}:{port}"})
-    camera = config.camera.model_copy(update={"url": f"udp://{host}:{port}"})
+    url = f"udp://{host}:{port}" if camera_gone else f"udp://127.0.0.1:{free_port()}"
+    camera = config.camera.model_copy(update={"url": url})
     return config.model_copy(update={"vehicle": vehicle, "camera": camera})
 
 
@@ -54,14 +58,22 @@ async def died(rig: Rig) -> None:
     rig.cut(False)
 
 
-async def restarted(rig: Rig, *monitors: Monitor) -> tuple[FlightResult, list[Phase]]:
+async def restarted(
+    rig: Rig, *monitors: Monitor, ailing: FlightdError | None = None, camera_gone: bool = True
+) -> tuple[FlightResult, list[Phase]]:
     phases: list[Phase] = []
 
     def note(status: Status) -> None:
         phases.extend([status.phase] if status.phase not in phases[-1:] else [])
 
     daemon = Daemon(
-        await config_of(rig), SITE, LoopClock(), NoDetectors(), observers=[note], monitors=monitors
+        await config_of(rig, camera_gone=camera_gone),
+        SITE,
+        LoopClock(),
+        NoDetectors(),
+        observers=[note],
+        monitors=monitors,
+        ailing=ailing,
     )
     async with asyncio.timeout(120):
         return await daemon.fly(), phases
@@ -128,5 +140,46 @@ def test_on_the_floor_a_camera_that_is_gone_is_an_error() -> None:
             with pytest.raises(UnavailableError):
                 await restarted(rig)
             assert not rig.peer.armed
+
+    run_virtual(test)
+
+
+def unopened(folder: Path) -> FlightdError:
+    """What is wrong with an inventory in a folder that is a file, found by a daemon that was started anew."""
+    folder.write_text("no folder")
+    config = load_config(ROOT / "configs" / "sim.toml")
+    front = config.front_camera.model_copy(update={"url": "udp://127.0.0.1:1"})
+    site = load_site(ROOT / "configs" / "site-racks-small.toml")
+    with ExitStack() as stack:
+        counting = config.model_copy(update={"front_camera": front})
+        with pytest.raises((InputError, UnavailableError)):
+            FlightCount(counting, site, folder, stack)
+        error = FlightCount(counting, site, folder, stack, in_air=True).error
+    assert error is not None
+    return error
+
+
+def test_an_inventory_that_cannot_be_opened_lands_a_vehicle_found_flying(tmp_path: Path) -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await rig.take_off(1.5)
+            await died(rig)
+            book = MetricsBook()
+            result, phases = await restarted(rig, book, ailing=unopened(tmp_path / "inventory"))
+            assert phases[-3:] == [Phase.RECOVER, Phase.LAND, Phase.ABORTED]
+            assert result.phase is Phase.ABORTED
+            assert rig.peer.truth().height_m < 0.15
+
+    run_virtual(test)
+
+
+def test_on_the_floor_an_inventory_that_cannot_be_opened_is_an_error(tmp_path: Path) -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await died(rig)
+            error = unopened(tmp_path / "inventory")
+            with pytest.raises(type(error)) as raised:
+                await restarted(rig, ailing=error, camera_gone=False)
+            assert raised.value is error
 
     run_virtual(test)
