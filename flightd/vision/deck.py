@@ -81,6 +81,6 @@ def _rows(
 
 
 def _runs(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """First and last but one index of each run of true."""
+    """First index of each run of true, and the first behind it."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     yield from ((int(start), int(stop)) for start, stop in edges.reshape(-1, 2))
