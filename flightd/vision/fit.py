@@ -113,7 +113,7 @@ class RobustLines:
 
 _MIN_SCATTER_PX = 0.02
 _STRETCHES = 8
-_SHARED_PER_PX = 2.5
+_SHARED_PER_PX = 3.0
 """Rough edges (wear, blur, compression) also err together over longer stretches than a line shows; found by
 normalised errors on generated frames of all levels: 1.1 for smooth edges, 2 at 0.35 px of scatter."""
 

@@ -28,10 +28,14 @@ _USUAL_SCATTER_PX, _FRAYED_SHARE, _SHARP_SHARE = 0.7, 0.5, 0.2
 window, on no edge at all, have 1.4."""
 _MAX_BOW = 0.006
 _MIN_BOW_PX = 1.2
+_BOW_OF_WIDTH = 0.06
+"""A short wide band whose middle is off by so small a part of its width is as straight as one can tell."""
 _PLAIN_ASPECT, _PLAIN_LENGTH, _PLAIN_SUPPORT = 8.0, 0.45, 0.85
 _PLAIN_CLEAR, _PARTLY_CLEAR, _PLAIN_SHARE = 0.8, 0.5, 0.3
 """A band is believed for its paint alone where it is so clear, or less where a part of its edges shows."""
 _LENS_BOW = 0.004
+_BOW_RMS = math.sqrt(4 / 45)
+"""Root mean square of a parabola of sagitta one about its straight line."""
 
 
 def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> list[Strip | None]:
@@ -54,9 +58,12 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
             for e in (2 * k, 2 * k + 1)
         ]
         share = sum(float(lines.points[e] / visible[e]) for e in edges if e is not None) / 2
-        if _is_line(strip, lines, share, edges):
-            low, high = (None if e is None else lines.fit(e) for e in edges)
-            refined.append(_assemble(strip, low, high))
+        low, high = (None if e is None else lines.fit(e) for e in edges)
+        band = _assemble(strip, low, high)
+        # Guessed or located: the wider is what it must not be, a blob.
+        widest = 0.0 if band is None else max(strip.width_px, band.width_px)
+        if band is not None and _is_line(strip, widest, lines, share, edges):
+            refined.append(band if band.width_px >= _MIN_WIDTH_PX else None)
         else:
             refined.append(None if _is_curve(strip, lines, edges) else _unrefined(strip, share, plane))
     return refined
@@ -83,28 +90,34 @@ def _is_curve(strip: Strip, lines: RobustLines, edges: list[int | None]) -> bool
     return len({bow > 0 for bow in bows}) == 1 and abs(least) > max(_MIN_BOW_PX, _LENS_BOW * strip.length_px)
 
 
-def _is_line(strip: Strip, lines: RobustLines, share: float, edges: list[int | None]) -> bool:
+def _is_line(
+    strip: Strip, width_px: float, lines: RobustLines, share: float, edges: list[int | None]
+) -> bool:
     """Two straight edges, or one that is seen all along; `share` is the part of both that was found."""
     seen = [e for e in edges if e is not None]
-    if not seen:
-        return False
-    aspect = strip.length_px / max(strip.width_px, 1.0)
-    rough = max(float(lines.scatter[e]) for e in seen) - _USUAL_SCATTER_PX
+    aspect = strip.length_px / max(width_px, 1.0)
+    bows = [float(lines.bow[e]) for e in seen]
+    # A lens bends both edges the same way, which frays neither.
+    bent = _BOW_RMS * min(map(abs, bows)) if len({b > 0 for b in bows}) == 1 else 0.0
+    scatter = max(float(lines.scatter[e]) for e in seen)
+    rough = math.sqrt(max(0.0, scatter * scatter - bent * bent)) - _USUAL_SCATTER_PX
     compact = max(0.0, _COMPACT_ASPECT - aspect)
-    need = _MIN_SHARE + _COMPACT_SHARE * compact
-    need += rough * (_FRAYED_SHARE + _COMPACT_FRAYED * compact if rough > 0 else _SHARP_SHARE)
+    need = _MIN_SHARE + _COMPACT_SHARE * compact + _SHARP_SHARE * min(rough, 0.0)
     # Edges where there is no paint are something else's: then gaps are no excuse.
     if share <= strip.support:
         need *= max(_WORST_CLEAR + _COMPACT_CLEAR * compact, strip.clear)
+    # Nor are they one for what is frayed where it is seen.
+    need += (_FRAYED_SHARE + _COMPACT_FRAYED * compact) * max(rough, 0.0)
     if share < need:
         return False
     # A curve bends both edges the same way.
-    bow = sum(float(lines.bow[e]) for e in seen) / len(seen)
-    return abs(bow) <= max(_MIN_BOW_PX, _MAX_BOW * strip.length_px)
+    bow = sum(bows) / len(bows)
+    return abs(bow) <= max(_MIN_BOW_PX, _MAX_BOW * strip.length_px, _BOW_OF_WIDTH * width_px)
 
 
 def _assemble(strip: Strip, low: LinearFit | None, high: LinearFit | None) -> Strip | None:
-    """The band between its located edges; with one edge only, the guessed width stands in for the other."""
+    """The band between its located edges; with one edge only, the guessed width stands in for the other;
+    None with neither."""
     if low is not None and high is not None:
         centre = bisector(low, high)
     else:
@@ -116,5 +129,4 @@ def _assemble(strip: Strip, low: LinearFit | None, high: LinearFit | None) -> St
             low, centre = high.shifted(-width, spread), high.shifted(-width / 2, spread / 4)
         else:
             return None
-    refined = replace(strip, centre=centre, low=low, high=high)
-    return refined if refined.width_px >= _MIN_WIDTH_PX else None
+    return replace(strip, centre=centre, low=low, high=high)

@@ -166,6 +166,14 @@ def test_a_lens_nobody_calibrated_costs_accuracy_but_no_line() -> None:
     assert abs(math.degrees(theta)) < 1
 
 
+def test_a_short_wide_line_bent_by_such_a_lens_is_no_curve() -> None:
+    lens = Lens(640, 480, 420.0, 420.0, 319.5, 239.5, (-0.3, 0.0, 0.0, 0.0, 0.0))
+    band = Band(180.0, 0.9, 50.0, -80.0, 80.0)
+    _, rho, theta = nearest(Detector().detect(draw([band], 640, 480, lens=lens)), band)
+    assert abs(rho) < 15
+    assert abs(math.degrees(theta)) < 1
+
+
 @pytest.mark.parametrize("method", ["centroid", "skeleton", "combined"])
 @pytest.mark.parametrize("radius", [110.0, 220.0])
 def test_a_curve_is_not_a_straight_line(method: str, radius: float) -> None:
