@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -19,7 +20,7 @@ from flightd.core.types import Image
 from flightd.vision.fit import fit_rows, is_bent
 from flightd.vision.plane import Plane, shortest_length
 from flightd.vision.sampling import Grid
-from flightd.vision.strip import Array, Strip, bisector
+from flightd.vision.strip import Array, LinearFit, Strip, bisector
 
 TRIALS = 80
 MAX_SLOPE = 1.25
@@ -39,54 +40,15 @@ _NEAR, _FAR = _DRAWS.integers(3, 6, TRIALS, endpoint=True), _DRAWS.integers(14, 
 """Slabs from a centroid to those that give its local slope and its partner."""
 
 
-@dataclass(frozen=True, slots=True)
-class Cuts:
-    """Where slabs cut bands: slab number, its position `u`, edges `low` < `high`, centred frame pixels.
-
-    `whole` is False where the picture's border cuts the band off.
-    """
-
-    slab: NDArray[np.intp]
-    u: Array
-    low: Array
-    high: Array
-    whole: NDArray[np.bool_]
-    spacing_px: float
-
-
 def slab_spacing(coverage: float) -> int:
     """Samples between slabs: little paint (thin or far lines) needs many slabs, much paint few."""
     return 2 if coverage < 0.06 else 3 if coverage < 0.2 else 4
 
 
-def cut(mask: Image, grid: Grid, *, steep: bool, spacing: int) -> Cuts:
-    """Cut the 0/255 mask by every `spacing`-th row (for steep bands) or column (for shallow ones)."""
-    first = spacing // 2
-    slabs = mask[first::spacing] if steep else cv2.transpose(mask)[first::spacing]
-    rows, length = slabs.shape
-    padded = np.zeros((rows, length + 2), np.uint8)
-    padded[:, 1:-1] = slabs
-    flat = padded.ravel()
-    changes = np.flatnonzero(flat[1:] != flat[:-1])
-    row, place = np.divmod(changes, length + 2)
-    slab, start, end = row[0::2], place[0::2], place[1::2]
-    along, across = (grid.y, grid.x) if steep else (grid.x, grid.y)
-    return Cuts(
-        slab=slab,
-        u=along(slab * spacing + first),
-        low=across(start - 0.5),
-        high=across(end - 0.5),
-        whole=(start > 0) & (end < length),
-        spacing_px=float(spacing * grid.step),
-    )
-
-
 def find(mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
-    """Straight bands in the mask, each described along its own axis."""
+    """Straight bands in the 0/255 mask, each described along its own axis."""
     spacing = slab_spacing(cv2.countNonZero(mask) / mask.size)
-    rows = _straightened(cut(mask, grid, steep=True, spacing=spacing), plane, steep=True)
-    columns = _straightened(cut(mask, grid, steep=False, spacing=spacing), plane, steep=False)
-    cuts = _Both.of(rows, columns, grid.step)
+    cuts = _cut(mask, grid, plane, spacing)
     strips: list[Strip] = []
     # A diagonal band crosses fewest slabs for its length.
     crossed = shortest_length(plane) * math.sqrt(0.5) / cuts.spacing_px
@@ -99,25 +61,52 @@ def find(mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
     return strips
 
 
-def _straightened(cuts: Cuts, plane: Plane, *, steep: bool) -> Cuts:
-    if plane.is_identity:
-        return cuts
-    if steep:
-        low, u_low = plane.ideal(cuts.low, cuts.u)
-        high, u_high = plane.ideal(cuts.high, cuts.u)
-    else:
-        u_low, low = plane.ideal(cuts.u, cuts.low)
-        u_high, high = plane.ideal(cuts.u, cuts.high)
-    return Cuts(cuts.slab, (u_low + u_high) / 2, low, high, cuts.whole, cuts.spacing_px)
+@dataclass(frozen=True, slots=True)
+class _Slabs:
+    """Every `spacing`-th row (for steep bands), then every `spacing`-th column of a mask, one after another
+    in one flat buffer of `size` samples with an unpainted one between any two.
+
+    One entry for each slab: where its `first` sample begins and its `last` one ends in the buffer, its
+    `number`, its position `u`, and what to take off step times a place in the buffer to get an edge's v.
+    """
+
+    rows: int
+    columns_at: int
+    size: int
+    first: NDArray[np.intp]
+    last: NDArray[np.intp]
+    number: NDArray[np.intp]
+    u: Array
+    shift: Array
+
+
+@lru_cache(maxsize=16)
+def _slabs(grid: Grid, height: int, width: int, spacing: int) -> _Slabs:
+    y, x = (np.arange(spacing // 2, side, spacing) for side in (height, width))
+    length = np.repeat((width, height), (len(y), len(x)))
+    ends = np.cumsum(length + 1)
+    first = ends - length - 1
+    origin = np.repeat((float(grid.x(0)), float(grid.y(0))), (len(y), len(x)))
+    return _Slabs(
+        rows=len(y),
+        columns_at=len(y) * (width + 1) + 1,
+        size=int(ends[-1]) + 1,
+        first=first,
+        last=ends - 1,
+        number=np.concatenate((np.arange(len(y)), np.arange(len(x)) + _SLABS_APART)),
+        u=np.concatenate((grid.y(y), grid.x(x))),
+        shift=grid.step * (first + 0.5) - origin,
+    )
 
 
 @dataclass(frozen=True, slots=True)
-class _Both:
-    """The cuts by rows (steep bands, the first `split`) and by columns (shallow ones) in one list.
+class _Cuts:
+    """Where slabs cut bands: by rows (steep bands, the first `split`) and by columns (shallow ones).
 
-    The columns' slabs are numbered far beyond the rows', and their centroids lie `apart` pixels beyond:
+    `points` is (4, N): one, the slab's position u, and the band's edges, low and high, in centred frame
+    pixels.  The columns' slabs are numbered far beyond the rows', and their `middle`s lie far beyond, too:
     so no hypothesis in one direction finds a cut of the other near.  `ahead` is the way, along u, on
-    which more slabs lie.
+    which more slabs lie.  A cut is no other band's once it is not `free`.
     """
 
     slab: NDArray[np.intp]
@@ -129,43 +118,65 @@ class _Both:
     spacing_px: float
     step: int
 
-    @staticmethod
-    def of(rows: Cuts, columns: Cuts, step: int) -> _Both:
-        parts = []
-        for number, cuts in enumerate((rows, columns)):
-            w = cuts.whole
-            slab = cuts.slab[w]
-            points = np.stack((cuts.u, cuts.low, cuts.high)).compress(w, axis=1)
-            centre = (slab[0] + slab[-1]) / 2 if len(slab) else 0.0
-            parts.append((slab + number * _SLABS_APART, np.where(slab < centre, 1, -1), points))
-        slab, ahead = (np.concatenate((parts[0][k], parts[1][k])) for k in (0, 1))
-        split, n = len(parts[0][0]), len(slab)
-        points = np.empty((4, n))
-        points[0] = 1.0
-        points[1:, :split], points[1:, split:] = parts[0][2], parts[1][2]
-        middle = (points[2] + points[3]) / 2
-        middle[split:] += _APART_PX
-        return _Both(slab, ahead, middle, points, np.ones(n, np.bool_), split, rows.spacing_px, step)
-
     def side(self, *, steep: bool) -> slice:
         return slice(0, self.split) if steep else slice(self.split, None)
 
     def take(self, strip: Strip) -> None:
         """The cuts of a band that was found are no other's, in neither direction."""
-        b, step, width = strip.centre.b, self.step, strip.width_px / strip.cosine
-        for steep in (True, False):
+        a, b = strip.centre.a, strip.centre.b
+        reach = 0.15 * strip.width_px / strip.cosine
+        # v - (a + b u) of the cuts' middles; in the other direction u and v change their parts.
+        along, across = (-a, -b, 0.5, 0.5), (-a, 1.0, -0.5 * b, -0.5 * b)
+        for steep, law, limit in (
+            (strip.steep, along, self.step + reach),
+            (not strip.steep, across, max(self.step, reach)),
+        ):
             side = self.side(steep=steep)
-            u, middle = self.points[1, side], self.middle[side]
-            if not steep:
-                middle = middle - _APART_PX
-            if steep == strip.steep:
-                away, reach = middle - strip.centre.a - b * u, step + 0.15 * width
-            else:
-                away, reach = u - strip.centre.a - b * middle, max(step, 0.15 * width)
-            self.free[side] &= np.abs(away) > reach
+            self.free[side] &= np.abs(np.array(law) @ self.points[:, side]) > limit
 
 
-def _ransac(cuts: _Both, chosen: NDArray[np.intp], fewest: int) -> list[Strip]:
+def _cut(mask: Image, grid: Grid, plane: Plane, spacing: int) -> _Cuts:
+    """Cut the mask's bands, but for those that the picture's border cuts off."""
+    height, width = mask.shape
+    slabs = _slabs(grid, height, width, spacing)
+    flat = np.zeros(slabs.size, np.uint8)
+    at, first = slabs.columns_at, spacing // 2
+    flat[1:at].reshape(-1, width + 1)[:, :-1] = mask[first::spacing]
+    flat[at:].reshape(-1, height + 1)[:, :-1] = cv2.transpose(mask)[first::spacing]
+    changes = np.flatnonzero(flat[1:] != flat[:-1]).reshape(-1, 2)
+    slab = slabs.first.searchsorted(changes[:, 0], "right") - 1
+    whole = (changes[:, 0] > slabs.first.take(slab)) & (changes[:, 1] < slabs.last.take(slab))
+    slab, edges = slab[whole], changes[whole]
+    split = int(slab.searchsorted(slabs.rows))
+    points = np.empty((4, len(slab)))
+    points[0] = 1.0
+    points[1] = slabs.u.take(slab)
+    points[2:] = edges.T * grid.step - slabs.shift.take(slab)
+    if not plane.is_identity:
+        _straighten(points, split, plane)
+    middle = 0.5 * (points[2] + points[3])
+    middle[split:] += _APART_PX
+    ahead = np.ones(len(slab), np.intp)
+    for side in (slice(0, split), slice(split, None)):
+        there = slab[side]
+        if len(there):
+            ahead[side][2 * there >= there[0] + there[-1]] = -1
+    free = np.ones(len(slab), np.bool_)
+    return _Cuts(
+        slabs.number.take(slab), ahead, middle, points, free, split, float(spacing * grid.step), grid.step
+    )
+
+
+def _straighten(points: Array, split: int, plane: Plane) -> None:
+    """Take the lens's distortion out of the (4, N) points in place."""
+    steep = np.arange(points.shape[1]) < split
+    u, edges = points[1], points[2:]
+    x, y = plane.ideal(np.where(steep, edges, u), np.where(steep, u, edges))
+    points[1] = np.where(steep, y, x).mean(axis=0)
+    points[2:] = np.where(steep, x, y)
+
+
+def _ransac(cuts: _Cuts, chosen: NDArray[np.intp], fewest: int) -> list[Strip]:
     """Sequential RANSAC: one matrix of hypotheses against centroids serves all bands of both directions,
     down to those with the `fewest` votes.
 
@@ -173,34 +184,33 @@ def _ransac(cuts: _Both, chosen: NDArray[np.intp], fewest: int) -> list[Strip]:
     """
     strips: list[Strip] = []
     step = cuts.step
-    u, low, high = cuts.points[1:].take(chosen, axis=1)
-    middle, width = cuts.middle[chosen], (high - low).astype(np.float32)
+    _, u, low, high = cuts.points.take(chosen, axis=1)
+    middle, width = cuts.middle[chosen], high - low
     i, j = _pairs(cuts.slab[chosen], cuts.ahead[chosen], middle)
-    du = u[j] - u[i]
-    b, width_b = (middle[j] - middle[i]) / du, (width[j] - width[i]) / du
-    good = (np.abs(b) <= MAX_SLOPE) & (np.abs(width[j] - width[i]) <= 0.25 * (width[j] + width[i]) + 2 * step)
+    du, change = u[j] - u[i], width[j] - width[i]
+    b, width_b = (middle[j] - middle[i]) / du, change / du
+    good = (np.abs(b) <= MAX_SLOPE) & (np.abs(change) <= 0.25 * (width[j] + width[i]) + 2 * step)
     i, b, width_b = i[good], b[good], width_b[good]
     if not len(i):
         return strips
-    # off = v - (v_i + b (u - u_i)) for all hypotheses and cuts in one product each; likewise the widths.
-    ones = np.ones_like(u)
-    known = np.stack((u, ones))
-    expected = (np.stack((width_b, width[i] - width_b * u[i]), axis=1) @ known).astype(np.float32)
-    off = (middle - np.stack((b, middle[i] - b * u[i]), axis=1) @ known).astype(np.float32)
-    inlier = np.abs(off) <= step + 0.08 * expected
-    inlier &= np.abs(width - expected) <= 2 * step + 0.25 * expected
-    votes = inlier.astype(np.float32)
-    free = np.ones(len(u), np.bool_)
-    scores = votes.sum(axis=1)
+    # How far each cut is off each hypothesis, v - (v_i + b (u - u_i)), in one product; likewise the width.
+    known = np.stack((np.ones_like(u), u, middle)).astype(np.float32)
+    laws = np.empty((2, len(i), 3), np.float32)
+    laws[0, :, 0], laws[0, :, 1], laws[0, :, 2] = b * u[i] - middle[i], -b, 1.0
+    laws[1, :, 0], laws[1, :, 1], laws[1, :, 2] = width[i] - width_b * u[i], width_b, 0.0
+    off, expected = laws @ known
+    votes = np.abs(off, out=off) <= step + 0.08 * expected
+    votes &= np.abs(expected - width.astype(np.float32)) <= 2 * step + 0.25 * expected
+    inlier = votes.astype(np.float32)
+    scores = inlier @ np.ones(len(u), np.float32)
     while scores[best := int(scores.argmax())] >= fewest:
-        taken = inlier[best] & free
-        strip = _fit_band(cuts, chosen[taken], steep=bool(chosen[i[best]] < cuts.split))
+        taken = chosen[votes[best] & cuts.free[chosen]]
+        strip = _fit_band(cuts, taken, steep=bool(chosen[i[best]] < cuts.split))
         if strip is not None:
             strips.append(strip)
             cuts.take(strip)
-        cuts.free[chosen[taken]] = False
-        free = cuts.free[chosen]
-        scores = votes @ free.astype(np.float32)
+        cuts.free[taken] = False
+        scores = inlier @ cuts.free[chosen].astype(np.float32)
     return strips
 
 
@@ -236,12 +246,11 @@ def _nearest(
     return np.where(use_after, after, before), after_ok | before_ok
 
 
-def _fit_band(cuts: _Both, members: NDArray[np.intp], *, steep: bool) -> Strip | None:
+def _fit_band(cuts: _Cuts, members: NDArray[np.intp], *, steep: bool) -> Strip | None:
     """Straight edges through the members' ends; None when they are too few, too short, or bent."""
     step, spacing_px = cuts.step, cuts.spacing_px
     noise = step / math.sqrt(12)
     side = cuts.points[:, cuts.side(steep=steep)]
-    _, u, low, high = side
     inside = cuts.points.take(members, axis=1)
     for _ in range(2):
         if inside.shape[1] < _MIN_CUTS:
@@ -249,21 +258,29 @@ def _fit_band(cuts: _Both, members: NDArray[np.intp], *, steep: bool) -> Strip |
         low_fit, high_fit = fit_rows(inside, noise)
         # Once more through all cuts that agree with both edges.
         limit = 1.2 * step + 0.05 * abs(high_fit.at(0.0) - low_fit.at(0.0))
-        agree = np.abs(low - low_fit.a - low_fit.b * u) <= limit
-        agree &= np.abs(high - high_fit.a - high_fit.b * u) <= limit
-        inside = side.compress(agree, axis=1)
+        away = _off(low_fit, high_fit) @ side
+        off = np.abs(away)
+        inside = side.compress((off[0] <= limit) & (off[1] <= limit), axis=1)
     count = inside.shape[1]
     centre = bisector(low_fit, high_fit)
     if count < _MIN_CUTS or abs(centre.b) > MAX_SLOPE:
         return None
     u0, u1 = float(inside[1, 0]), float(inside[1, -1])
     reach = 0.3 * (u1 - u0)
-    middle = (low + high) / 2
-    around = np.abs(middle - centre.a - centre.b * u) <= limit + 2 * step
+    u = side[1]
+    around = np.abs(away[0] + away[1]) <= 2 * (limit + 2 * step)
     around &= (u >= u0 - reach) & (u <= u1 + reach)
-    core = inside[1], (inside[2] + inside[3]) / 2
-    if is_bent(core, (u[around], middle[around]), noise):
+    if is_bent(_middles(inside), _middles(side.compress(around, axis=1)), noise):
         return None
     slabs = max(1.0, (u1 - u0) / spacing_px + 1)
     strip = Strip(steep, centre, low_fit, high_fit, u0 - spacing_px / 2, u1 + spacing_px / 2, count / slabs)
     return strip if strip.width_px > 0 else None
+
+
+def _off(low: LinearFit, high: LinearFit) -> Array:
+    """(2, 4): what makes of a cut's points how far its edges are off these."""
+    return np.array(((-low.a, -low.b, 1.0, 0.0), (-high.a, -high.b, 0.0, 1.0)))
+
+
+def _middles(points: Array) -> tuple[Array, Array]:
+    return points[1], 0.5 * (points[2] + points[3])

@@ -229,14 +229,13 @@ def grow(levels: Levels) -> NDArray[np.uint8]:
     Where next to no paint is strong (a worn white on a light floor) the weak pixels are seeds themselves:
     what is no band among them does not pass the tests of shape and edge that follow.
     """
-    strong = levels >= STRONG
-    seeds = int(np.count_nonzero(strong))
-    if seeds * _FEWEST_SEEDS < cv2.countNonZero(levels):
+    strong = np.flatnonzero(levels == STRONG)
+    if len(strong) * _FEWEST_SEEDS < cv2.countNonZero(levels):
         return np.where(levels, np.uint8(255), np.uint8(0))
     few = levels.size < TABLE_SIZE * 2  # too few pixels for more separate parts than 16 bits can number
     count, parts = cv2.connectedComponents(levels, connectivity=8, ltype=cv2.CV_16U if few else cv2.CV_32S)
     kept = np.zeros(TABLE_SIZE if few else count, np.uint8)
-    kept[parts[strong]] = 255
+    kept[parts.ravel().take(strong)] = 255
     mask = _look_up(kept, np.asarray(parts, np.uint16)) if few else kept.take(np.asarray(parts))
     if cv2.countNonZero(levels) - cv2.countNonZero(mask) > _WEAK_BAND * levels.size:
         mask |= _long_parts(np.where(mask, np.uint8(0), levels))

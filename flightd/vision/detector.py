@@ -18,7 +18,7 @@ from flightd.vision.markers import MarkerFinder
 from flightd.vision.picture import check_picture
 from flightd.vision.plane import Plane, shortest_length
 from flightd.vision.refine import refine
-from flightd.vision.sampling import Grid, grid_for, sample
+from flightd.vision.sampling import Grid, coarsened, grid_for, sample
 from flightd.vision.strip import Strip
 
 METHODS = ("centroid", "skeleton", "combined", "naive")
@@ -80,14 +80,15 @@ class Detector:
         lines = tuple(strip.to_line() for strip in strips)
         found = junctions.find(lines, mask, grid, plane)
         mark("junctions")
-        mats = pads.find(small, lines, grid, plane)
+        coarse, coarse_grid = coarsened(small, grid)
+        mats = pads.find(coarse, lines, coarse_grid, plane)
         mark("pads")
         signs: tuple[MarkerSight, ...] = ()
         if self._markers is not None:
             signs = self._markers.find(small, grid, plane)
             mark("markers")
         timings = {name: (end - begin) / 1e6 for (_, begin), (name, end) in pairwise(marks)}
-        picture = check_picture(bgr)
+        picture = check_picture(coarse)
         return LineSet(seq, stamp_ns, width, height, lines, found, self.method, timings, mats, picture, signs)
 
     def _plane(self, width: int, height: int) -> Plane:
@@ -103,7 +104,14 @@ class Detector:
             return []
         if self.method == "naive":
             return naive.find(mask, grid, plane)
-        guesses = self._guess(mask, grid, plane)
+        bands = centroid.find(mask, grid, plane) if self.method != "skeleton" else []
+        # Where centroids account for all the paint, the ridge could only say the same once more.
+        thinned = self.method == "skeleton" or (
+            self.method == "combined" and evidence.is_paint_left(mask, bands, grid, plane)
+        )
+        if thinned:
+            bands += self._ridges(mask, grid, plane, bands)
+        guesses = _weighed(bands, mask, grid, plane)
         mark("guess")
         shortest = shortest_length(plane)
         if self.method != "combined":
@@ -113,26 +121,27 @@ class Detector:
         while strips := evidence.select(guesses, shortest, found):
             refined = refine(frame, strips, plane, reach_px=_REACH_PX)
             found += [strip for strip in refined if strip is not None]
+            if None not in refined:
+                break
             # What hid behind a guess that turned out to be no line gets its own chance.
             tried = {id(strip) for strip in strips}
             guesses = [g for g in guesses if id(g.strip) not in tried]
-            if None not in refined:
-                break
+            if not thinned:
+                thinned = True
+                guesses += _weighed(bands + self._ridges(mask, grid, plane, bands), mask, grid, plane)
         mark("refine")
         return combine.without_repeats(found)
 
-    def _guess(self, mask: Image, grid: Grid, plane: Plane) -> list[evidence.Evidence]:
-        """Everything that may be a band, with its evidence."""
-        guesses: list[Strip] = []
-        if self.method in ("centroid", "combined"):
-            guesses += centroid.find(mask, grid, plane)
-        if self.method in ("skeleton", "combined"):
-            solid = _closed(mask, _HOLES)
-            worn = cv2.countNonZero(solid) > _WORN * cv2.countNonZero(mask)
-            ridged = solid if worn else mask
-            guesses += skeleton.find(ridged, grid, plane, guesses, zhang_suen=self._zhang_suen)
-        fused = combine.fuse(guesses, tolerance_px=1.5 * grid.step)
-        return evidence.weigh(fused, mask, grid, plane)
+    def _ridges(self, mask: Image, grid: Grid, plane: Plane, bands: list[Strip]) -> list[Strip]:
+        """What the skeleton shows, along the `bands` that are known and elsewhere."""
+        solid = _closed(mask, _HOLES)
+        worn = cv2.countNonZero(solid) > _WORN * cv2.countNonZero(mask)
+        return skeleton.find(solid if worn else mask, grid, plane, bands, zhang_suen=self._zhang_suen)
+
+
+def _weighed(bands: list[Strip], mask: Image, grid: Grid, plane: Plane) -> list[evidence.Evidence]:
+    """Everything that may be a band, with its evidence."""
+    return evidence.weigh(combine.fuse(bands, tolerance_px=1.5 * grid.step), mask, grid, plane)
 
 
 def _closed(mask: Image, kernel: Image) -> Image:

@@ -22,7 +22,7 @@ from flightd.vision.strip import Array, Strip
 Floats: TypeAlias = NDArray[np.float32]
 Indices: TypeAlias = NDArray[np.intp]
 
-STATIONS = 320
+STATIONS = 256
 """Shared among all edges of a frame."""
 _MIN_CONTRAST, _CONTRAST_PART, _DARK_CONTRAST = 4.0, 0.04, 1.2
 """Grey levels between floor and paint below which there is no edge: less in a dark picture, whose paint

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.plane import Plane
+from flightd.vision.plane import Plane, shortest_length
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, Strip
 
@@ -99,15 +100,22 @@ def _look_up(
     mask: Image, grid: Grid, plane: Plane, steep: NDArray[np.bool_], u: Array, v: Array
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """1 where there is paint, and 1 where the point is in the picture; 0 elsewhere."""
+    height, width = mask.shape
     if plane.is_identity:
-        x, y = np.where(steep, v, u), np.where(steep, u, v)
+        # Along and across the bands: u is one for all points of a station.
+        start_u, start_v = (np.where(steep, *pair) for pair in (grid.corner[::-1], grid.corner))
+        place_u = np.floor((u - start_u) * (1 / grid.step)).astype(np.int32)
+        place_v = np.floor((v - start_v) * (1 / grid.step)).astype(np.int32)
+        seen = (place_v >= 0) & (place_v < np.where(steep, width, height))
+        seen &= (place_u >= 0) & (place_u < np.where(steep, height, width))
+        index = place_u * np.where(steep, width, 1) + place_v * np.where(steep, 1, width)
     else:
         x, y = plane.raw(np.where(steep, v, u), np.where(steep, u, v))
-    i, j = grid.column(x), grid.row(y)
-    height, width = mask.shape
-    seen = (i >= 0) & (i < width) & (j >= 0) & (j < height)
+        i, j = grid.column(x), grid.row(y)
+        seen = (i >= 0) & (i < width) & (j >= 0) & (j < height)
+        index = j * width + i
     there = seen.astype(np.float32)
-    return (mask.ravel().take(np.where(seen, j * width + i, 0)) != 0) * there, there
+    return (mask.ravel().take(index * seen) != 0) * there, there
 
 
 def _span(filled: NDArray[np.bool_], band: Array) -> tuple[int, int] | None:
@@ -138,6 +146,24 @@ def select(found: list[Evidence], shortest_px: float, known: list[Strip]) -> lis
         if _explained(strip, known + kept) <= 0.5:
             kept.append(strip)
     return kept
+
+
+def is_paint_left(mask: Image, strips: list[Strip], grid: Grid, plane: Plane) -> bool:
+    """Whether beside the strips there is as much paint as in the shortest band, one sample wide."""
+    left = mask.copy()
+    for strip in strips:
+        margin = 1.5 * grid.step / strip.cosine
+        # Where the border cuts a slanted band, twice its width says nothing of it.
+        reach = margin + 2 * strip.width_px
+        first, last = strip.u0 - reach, strip.u1 + reach
+        u = np.array((first, last, last, first))
+        edges = (strip.low, strip.low, strip.high, strip.high)
+        v = np.array([fit.at(at) for fit, at in zip(edges, u.tolist(), strict=True)])
+        v += (-margin, -margin, margin, margin)
+        x, y = plane.raw(*((v, u) if strip.steep else (u, v)))
+        corners = np.stack((grid.column(x), grid.row(y)), axis=-1)
+        cv2.fillConvexPoly(left, corners, 0)
+    return cv2.countNonZero(left) * grid.step >= shortest_length(plane)
 
 
 def _explained(strip: Strip, others: list[Strip]) -> float:

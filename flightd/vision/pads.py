@@ -25,24 +25,24 @@ _LEAST_DARK = 0.5
 _CLOSED = 1.3
 """Closing in widths of the lines seen."""
 _THINNEST = 5
-_THIN, _ENOUGH = 2, 240
-"""Every second sample will do where there are so many: a pad is large."""
+_DARKEST_SPOT = 0.25
+"""A mat darkens some part of the picture as large as the least one at least so much."""
 
 
-def find(small: Image, lines: Sequence[Line], grid: Grid, plane: Plane) -> tuple[PadSight, ...]:
+def find(coarse: Image, lines: Sequence[Line], grid: Grid, plane: Plane) -> tuple[PadSight, ...]:
     """The pads in the (grid.height, grid.width, 3) samples of a frame in which `lines` were seen."""
-    thin = _THIN if grid.width >= _ENOUGH else 1
-    grid = Grid(grid.frame_width, grid.frame_height, grid.step * thin)
-    rows, columns = slice(0, grid.height * thin, thin), slice(0, grid.width * thin, thin)
-    grey = cv2.cvtColor(np.ascontiguousarray(small[rows, columns]), cv2.COLOR_BGR2GRAY)
-    floor = float(np.median(grey[::4, ::4]))
+    grey = cv2.cvtColor(coarse, cv2.COLOR_BGR2GRAY)
+    some = grey[::4, ::4].ravel()
+    floor = float(np.partition(some, len(some) // 2)[len(some) // 2])
     dark = np.asarray(cv2.threshold(grey, _DARK * floor, 255, cv2.THRESH_BINARY_INV)[1], np.uint8)
     widest = max((line.width_px for line in lines), default=0.0) / grid.step
     size = max(_THINNEST, 2 * round(0.5 * _CLOSED * widest) + 1)
     if size > min(dark.shape) // 2 or cv2.countNonZero(dark) < _LEAST_DARK * _LEAST_SIDE**2:
         return ()
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-    blots = cv2.morphologyEx(dark, cv2.MORPH_CLOSE, disc)
+    spots = cv2.boxFilter(dark, -1, (_LEAST_SIDE, _LEAST_SIDE))
+    if cv2.minMaxLoc(spots)[1] < 255 * _DARKEST_SPOT:
+        return ()
+    blots = cv2.morphologyEx(dark, cv2.MORPH_CLOSE, np.ones((size, size), np.uint8))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(blots, connectivity=4)
     found = (
         _pad(labels == i, stats[i], dark, grid, plane) for i in range(1, count) if _whole(stats[i], grid)

@@ -19,6 +19,9 @@ TARGET_WIDTH_PX = 320
 MAX_STEP = 6
 """A 6 px line must still leave a connected trace."""
 
+_MANY = 240
+"""Samples across from which every second one will do for what is larger than a line."""
+
 
 @dataclass(frozen=True, slots=True)
 class Grid:
@@ -27,10 +30,12 @@ class Grid:
     frame_width: int
     frame_height: int
     step: int
+    shift: int = 0
+    """How far before the middle of its cell a sample was taken, in pixels."""
 
     @property
     def offset(self) -> int:
-        return self.step // 2
+        return self.step // 2 - self.shift
 
     @property
     def width(self) -> int:
@@ -39,6 +44,12 @@ class Grid:
     @property
     def height(self) -> int:
         return max(1, (self.frame_height - self.offset) // self.step)
+
+    @property
+    def corner(self) -> tuple[float, float]:
+        """Centred frame coordinates of the first cell's outer corner."""
+        before = self.offset - self.step / 2
+        return before - (self.frame_width - 1) / 2, before - (self.frame_height - 1) / 2
 
     def x(self, i: Array | NDArray[np.intp] | float) -> Array:
         """Centred frame coordinate of (fractional) sample column `i`."""
@@ -49,12 +60,10 @@ class Grid:
 
     def column(self, x: Array) -> NDArray[np.int32]:
         """Sample column that stands for centred frame coordinate `x`; may lie outside the grid."""
-        left = self.offset - self.step / 2 - (self.frame_width - 1) / 2
-        return np.floor((x - left) * (1 / self.step)).astype(np.int32)
+        return np.floor((x - self.corner[0]) * (1 / self.step)).astype(np.int32)
 
     def row(self, y: Array) -> NDArray[np.int32]:
-        top = self.offset - self.step / 2 - (self.frame_height - 1) / 2
-        return np.floor((y - top) * (1 / self.step)).astype(np.int32)
+        return np.floor((y - self.corner[1]) * (1 / self.step)).astype(np.int32)
 
 
 def grid_for(width: int, height: int) -> Grid:
@@ -71,5 +80,20 @@ def sample(bgr: Image, grid: Grid) -> Image:
     inside = bgr[o : o + h * k, o : o + w * k]
     if inside.shape[:2] != (h * k, w * k):
         return np.ascontiguousarray(bgr[o::k, o::k][:h, :w])
-    small = cv2.resize(inside, (w, h), interpolation=cv2.INTER_NEAREST)
-    return np.asarray(small, np.uint8)
+    return _every(inside, k)
+
+
+def coarsened(small: Image, grid: Grid) -> tuple[Image, Grid]:
+    """Every second of the samples, and how they lie in the frame; all of them where there are few."""
+    if grid.width < _MANY:
+        return small, grid
+    coarse = Grid(grid.frame_width, grid.frame_height, 2 * grid.step, grid.step - grid.offset)
+    return _every(small[: 2 * coarse.height, : 2 * coarse.width], 2), coarse
+
+
+def _every(picture: Image, k: int) -> Image:
+    """Every k-th pixel of a picture whose sides are multiples of k, from the first."""
+    height, width = picture.shape[:2]
+    return np.asarray(
+        cv2.resize(picture, (width // k, height // k), interpolation=cv2.INTER_NEAREST), np.uint8
+    )

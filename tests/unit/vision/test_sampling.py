@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from flightd.core.geometry import Lens
 from flightd.vision.plane import Plane
-from flightd.vision.sampling import Grid, grid_for, sample
+from flightd.vision.sampling import Grid, coarsened, grid_for, sample
 
 FISHY = Lens(640, 360, 420.0, 415.0, 322.0, 178.0, (-0.25, 0.08, 0.002, -0.001, -0.01))
 
@@ -24,6 +24,19 @@ def test_sample_i_is_pixel_k_i_and_a_half_step(width: int, height: int, step: in
     if step > 1:
         expected = image[grid.offset :: step, grid.offset :: step][: grid.height, : grid.width]
         assert np.array_equal(small, expected)
+
+
+@pytest.mark.parametrize("size", [(1920, 1080), (1918, 1077), (640, 360), (300, 200)])
+def test_a_coarse_sample_is_the_pixel_its_grid_tells(size: tuple[int, int]) -> None:
+    width, height = size
+    y, x = np.mgrid[0:height, 0:width]
+    image = np.stack([x & 255, y & 255, (x >> 8) + 16 * (y >> 8)], axis=-1).astype(np.uint8)
+    grid = grid_for(width, height)
+    coarse, where = coarsened(sample(image, grid), grid)
+    assert coarse.shape == (where.height, where.width, 3)
+    columns = where.x(np.arange(where.width)) + (width - 1) / 2
+    rows = where.y(np.arange(where.height)) + (height - 1) / 2
+    assert np.array_equal(coarse, image[np.ix_(rows.astype(int), columns.astype(int))])
 
 
 @given(width=st.integers(16, 4000), height=st.integers(16, 4000), i=st.integers(0, 50))
