@@ -42,6 +42,8 @@ class SensorModel:
     end_found: float = 0.8
     """An end of a line that was in view was told."""
     end_false: float = 0.02
+    end_strange: float = 0.3
+    """A line that is none of the map ends just there: it may end anywhere."""
     feature_gate_m: float = 0.25
     fix_tail: float = 1e-4
     """A marker or label hangs somewhere else."""
@@ -76,13 +78,14 @@ def crossing_likelihood(model: SensorModel, crossings: Features, at_m: Matrix, a
     return result
 
 
-def end_likelihood(model: SensorModel, ends: Features, at_m: Matrix, arms: int) -> Matrix:
-    """p(a line ends so) at (N, 2) points."""
+def end_likelihood(model: SensorModel, ends: Features, at_m: Matrix, arms: int, strange: Flags) -> Matrix:
+    """p(a line ends so) at (N, 2) points; (N) `strange` where the line is none of the map."""
     same = np.flatnonzero(ends.arms == arms)
     nearest, distance = _nearest(_pick(ends, same), at_m)
     if nearest is None:
-        return np.full(len(at_m), model.end_false)
-    result: Matrix = np.where(distance < model.feature_gate_m, model.end_found, model.end_false)
+        distance = np.full(len(at_m), math.inf)
+    unexpected = np.where(strange, model.end_strange, model.end_false)
+    result: Matrix = np.where(~strange & (distance < model.feature_gate_m), model.end_found, unexpected)
     return result
 
 

@@ -38,6 +38,8 @@ from flightd.tracking.lines import TrackSet
 from flightd.tracking.motion import TrackedLine
 
 _MIN_HITS = 3
+_ENDS_ALONG_X = (1, 4)
+"""Arms of the ends of a line that runs along x."""
 _CELL_M = 0.3
 """Places that differ by less are the same node."""
 _JUDGE_NS = 100_000_000
@@ -196,7 +198,7 @@ class GridLocaliser:
                 places.match(axis, track, reach_m, judge)
                 index = places.matched(axis, track.id)
             else:
-                if due and (index[1:] < 0).any():
+                if due and places.unmatched(axis, track.id):
                     places.match(axis, track, reach_m, judge=False)
             if index[places.best] >= 0:
                 self._ever_matched[axis] = True
@@ -210,15 +212,18 @@ class GridLocaliser:
         for mark in self._marks.frame(
             tracks.junctions, float(here[0]), float(here[1]), sure_m, self._leave_m(height_m)
         ):
-            self._weigh_mark(mark)
+            self._weigh_mark(mark, tracks)
         for known, seen in self._fixes.markers(tracks.markers, float(here[0]), float(here[1])):
             self.marker((known.x_m, known.y_m), seen.x_m, seen.y_m)
 
-    def _weigh_mark(self, mark: Landmark) -> None:
+    def _weigh_mark(self, mark: Landmark, tracks: TrackSet) -> None:
         places = self._places
-        at_m = places.at_m + (np.array([mark.x_m, mark.y_m]) - places.at_m[places.best])
+        off_m = np.array([mark.x_m, mark.y_m]) - places.at_m[places.best]
+        at_m = places.at_m + off_m
         if mark.arms.bit_count() == 1:
-            factors = end_likelihood(self._model, self._paint.ends, at_m, mark.arms)
+            axis, lines = (1, tracks.across_y) if mark.arms in _ENDS_ALONG_X else (0, tracks.across_x)
+            strange = places.strange(axis, lines, float(off_m[axis]))
+            factors = end_likelihood(self._model, self._paint.ends, at_m, mark.arms, strange)
         else:
             factors = crossing_likelihood(self._model, self._paint.crossings, at_m, mark.arms)
         places.weigh(factors)

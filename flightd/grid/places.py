@@ -30,6 +30,8 @@ _FRESH_S = 0.3
 _SAME_M = 0.2
 """Places closer than this in both axes are one."""
 _NEGLIGIBLE = 1e-7
+_UNMATCHED, _FALSE = -1, -2
+"""Instead of a map line: none fits yet, or this place holds the track to be no line of the map."""
 
 
 class Places:
@@ -53,8 +55,20 @@ class Places:
         return len(self.weights)
 
     def matched(self, axis: int, track_id: int) -> Indices:
-        """(N) indices of the map lines that the track is, -1 where it is none."""
+        """(N) indices of the map lines that the track is, negative where it is none."""
         return self._matches[axis][track_id]
+
+    def unmatched(self, axis: int, track_id: int) -> bool:
+        """Whether at some place the track may still turn out to be a map line."""
+        return bool((self._matches[axis][track_id][1:] == _UNMATCHED).any())
+
+    def strange(self, axis: int, tracks: Sequence[TrackedLine], offset_m: float) -> Flags:
+        """(N) where what is tracked `offset_m` from the drone is no line of the map."""
+        flags: Flags = np.zeros(len(self), dtype=bool)
+        for track in tracks:
+            if track.id in self._matches[axis] and abs(track.offset_m - offset_m) < _SAME_M:
+                flags |= self._matches[axis][track.id] < 0
+        return flags
 
     # Motion
 
@@ -93,10 +107,13 @@ class Places:
         self.weights /= self.weights.sum()
 
     def match(self, axis: int, track: TrackedLine, reach_m: float, judge: bool) -> None:
-        """Say at each place which painted line the track is; `judge` also weighs the places by it."""
+        """Say at each place which painted line the track is; `judge` also weighs the places by it.
+
+        A match that moves a place by more than `_SAME_M` is in doubt: the line may be a false one.  Both are
+        kept, the place that is moved by it and one that stays and takes the line for none of the map."""
         lines = self._paint.axes[axis]
         matches = self._matches[axis]
-        index = matches.setdefault(track.id, np.full(len(self), -1, dtype=np.int64))
+        index = matches.setdefault(track.id, np.full(len(self), _UNMATCHED, dtype=np.int64))
         if not len(lines.at_m):
             return
         residual = lines.at_m[None, :] - (self.at_m[:, axis, None] + track.offset_m)
@@ -106,8 +123,9 @@ class Places:
         apart = np.where(covered, np.abs(residual), np.inf)
         best = apart.argmin(axis=1)
         found = apart[rows, best]
+        told = line_likelihood(self._model, lines, residual, sigma, covered)
         if judge:
-            factors = line_likelihood(self._model, lines, residual, sigma, covered)
+            factors = told
             again = self._missed[axis][rows, best] & (found < _SAME_M)
             factors = np.where(again, factors / (1.0 - self._model.line_seen), factors)
             factors[0] = self._model.elsewhere_line_per_m
@@ -119,9 +137,22 @@ class Places:
         for id_, already in matches.items():
             if id_ != track.id:
                 taken |= (already >= 0) & (lines.at_m[already] == lines.at_m[best])
-        new = (index < 0) & (found <= gate) & ~taken
+        new = (index == _UNMATCHED) & (found <= gate) & ~taken
+        doubtful = np.flatnonzero(new & (found > _SAME_M))
+        doubtful = doubtful[self.weights[doubtful] > _NEGLIGIBLE]
         index[new] = best[new]
         self._known[axis][new] |= other[new] <= 1e-6  # every piece of that line
+        if len(doubtful):
+            self._branch(axis, track.id, doubtful, self._model.false_line_per_m / told[doubtful], other)
+
+    def _branch(self, axis: int, track_id: int, rows: Indices, false_share: Matrix, other_m: Matrix) -> None:
+        """Beside each of these places put its like to which the line just matched is none of the map."""
+        twins = np.arange(len(self), len(self) + len(rows))
+        self._take(np.concatenate([np.arange(len(self)), rows]))
+        self.weights[twins] *= false_share
+        self.weights[rows] *= 1.0 - false_share
+        self._matches[axis][track_id][twins] = _FALSE
+        self._known[axis][twins] &= other_m[rows] > 1e-6
 
     def _covered(self, axis: int, lines: AxisLines, track: TrackedLine, reach_m: float) -> Flags:
         """(N, L): the map line has paint where the track was seen; by the drone's own place and `reach_m`
@@ -205,7 +236,7 @@ class Places:
         self.weights = np.concatenate([self.weights, weights])
         for matches in self._matches:
             for id_, index in matches.items():
-                matches[id_] = np.concatenate([index, np.full(count, -1, dtype=np.int64)])
+                matches[id_] = np.concatenate([index, np.full(count, _UNMATCHED, dtype=np.int64)])
         for axis in (0, 1):
             width = self._known[axis].shape[1]
             # what is in view now was not watched from here: neither seen nor missed yet
