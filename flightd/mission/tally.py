@@ -58,7 +58,7 @@ class Tally:
         self._votes = CodeVotes()
         self._spots: dict[tuple[str, str], _Spot] = {}
         self._seen: Counter[Occupancy] = Counter()
-        self._empty_in_a_row = 0
+        self._empty_in_a_row = self._most_empty = 0
         self._quiet = 0
         self._largest = 0.0
         self._best: tuple[bool, float] = (False, -1.0)
@@ -91,6 +91,7 @@ class Tally:
         if place is not None and (place.share >= _LEAST_SHARE or reads):
             self._seen[place.occupancy] += 1
             self._empty_in_a_row = self._empty_in_a_row + 1 if place.occupancy is Occupancy.EMPTY else 0
+            self._most_empty = max(self._most_empty, self._empty_in_a_row)
         if place is not None or reads:
             self._quiet = 0 if new else self._quiet + 1
             self._pose = pose
@@ -120,10 +121,11 @@ class Tally:
         return Verdict(state, _NO_CODE, (), self._evidence, self._pose)
 
     def _is_empty(self, final: bool) -> bool:
-        """Whether the last looks show an empty place, and none ever showed that there is something."""
+        """Whether looks in a row show an empty place, and none ever showed that there is something."""
         enough = self._enough and self._empty_in_a_row >= self._least
-        if final and self._empty_in_a_row == self.looks:
-            enough = enough or self.looks >= _LEAST_EMPTY
+        if final:
+            all_empty = self._empty_in_a_row == self.looks >= _LEAST_EMPTY
+            enough = enough or all_empty or self._most_empty >= self._least
         return enough and not self._spots and not any(self._seen[kind] for kind in _OCCUPIED)
 
     @property

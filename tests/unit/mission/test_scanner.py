@@ -39,8 +39,13 @@ class Hover:
         self.views.append(view)
         return view
 
-    def look(self, show: dict[str, Occupancy], reads: dict[str, tuple[str, ...]] | None = None) -> bool:
-        """One picture at the view; True when the view is over."""
+    def look(
+        self,
+        show: dict[str, Occupancy],
+        reads: dict[str, tuple[str, ...]] | None = None,
+        share: float = 1.0,
+    ) -> bool:
+        """One picture at the view, which shows that share of each place; True when the view is over."""
         view = self.scanner.view
         assert view is not None
         self.now_ns += STEP_NS
@@ -48,7 +53,9 @@ class Hover:
         here = pose(self.now_ns, x_m=view.x_m, y_m=view.y_m, height_m=view.height_m, yaw_rad=view.yaw_rad)
         codes = [self._code(here, code, text) for code, texts in (reads or {}).items() for text in texts]
         places = {code: seen for code, seen in show.items() if code in view.locations}
-        self.scanner.take(picture(self.seq, tuple(codes), places, self.now_ns), here)
+        shown = picture(self.seq, tuple(codes), places, self.now_ns)
+        cut = tuple(replace(place, share=share) for place in shown.places)
+        self.scanner.take(replace(shown, places=cut), here)
         over = self.scanner.step(self.now_ns)
         self.gather()
         return over
@@ -448,3 +455,15 @@ def test_a_place_is_empty_after_looks_in_a_row_unless_goods_were_ever_seen() -> 
         hover.run(dict.fromkeys(codes, Occupancy.EMPTY), {})
         first = hover.views[0].locations
         assert {hover.found[code].state for code in first} == {state}
+
+
+def test_a_single_doubtful_look_leaves_a_place_empty_that_no_picture_shows_whole() -> None:
+    hover = Hover(replace(PARAMS, retakes=0))
+    codes = hover.scanner._planner.locations("A2")
+    while hover.scanner.view is not None:
+        hover.at_view()
+        over = False
+        while not over:
+            seen = Occupancy.UNSURE if hover.seq % 5 == 4 else Occupancy.EMPTY
+            over = hover.look(dict.fromkeys(codes, seen), share=0.7)
+    assert {hover.found[code].state for code in codes} == {LocationState.EMPTY}
