@@ -81,7 +81,7 @@ class ScanTask:
         for code in self._left(view):
             place, own = places.get(code), reads.get(code, [])
             if place is not None and code in doubtful:  # somebody's code: not an empty place
-                place = replace(place, occupancy=Occupancy.GOODS)
+                place = replace(place, occupancy=Occupancy.GOODS, light=Light.FAIR)
             self._open[code].add(look.frame_seq, look.pose, place, own)
             self._settle(code, final=False)
 

@@ -467,3 +467,22 @@ def test_a_single_doubtful_look_leaves_a_place_empty_that_no_picture_shows_whole
             seen = Occupancy.UNSURE if hover.seq % 5 == 4 else Occupancy.EMPTY
             over = hover.look(dict.fromkeys(codes, seen), share=0.7)
     assert {hover.found[code].state for code in codes} == {LocationState.EMPTY}
+
+
+def test_an_empty_place_that_is_burnt_out_is_empty_by_the_exposure_that_shows_it() -> None:
+    hover = Hover()
+    while (view := hover.scanner.view) is not None:
+        hover.at_view()
+        over = False
+        while not over:
+            hover.now_ns, hover.seq = hover.now_ns + STEP_NS, hover.seq + 1
+            burnt = hover.scanner.exposure == 1.0
+            seen = Occupancy.GOODS if burnt else Occupancy.EMPTY
+            light = Light.BURNT if burnt else Light.FAIR
+            places = dict.fromkeys(view.locations, seen)
+            shown = picture(hover.seq, (), places, hover.now_ns, hover.scanner.exposure, light)
+            here = pose(hover.now_ns, x_m=view.x_m, y_m=view.y_m, height_m=view.height_m)
+            hover.scanner.take(shown, here)
+            over = hover.scanner.step(hover.now_ns)
+            hover.gather()
+    assert {finding.state for finding in hover.found.values()} == {LocationState.EMPTY}
