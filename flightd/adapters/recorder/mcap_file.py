@@ -10,7 +10,7 @@ from __future__ import annotations
 import fcntl
 import os
 import zlib
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -49,6 +49,9 @@ from flightd.runtime.mcap_scan import (
 CHUNK_BYTES = 1 << 20
 """A chunk is closed when it holds this much, or sooner by `flush`."""
 
+KEPT_BYTES = 8 << 20
+"""What waits at most, in closed chunks, for a disk that refuses; beyond that the oldest is given up."""
+
 _LIBRARY = "flightd"
 
 
@@ -56,7 +59,7 @@ class McapFile:
     """One log file open for writing; `create` a new one or `resume` one that was cut off.
 
     Every method that writes raises OSError when the disk refuses; the file then still ends with the
-    last chunk that was written whole, and `flush` has given up the messages of the failed one.
+    last chunk that was written whole, and the next `flush` tries the failed ones again, oldest first.
     """
 
     def __init__(self, stream: BinaryIO) -> None:
@@ -69,6 +72,7 @@ class McapFile:
         self._counts: Counter[int] = Counter()
         self._undeclared: list[McapRecord] = []
         self._open_chunk = OpenChunk()
+        self._closed: deque[OpenChunk] = deque()
         self._compressor = zstandard.ZstdCompressor(level=1)
 
     @classmethod
@@ -109,7 +113,7 @@ class McapFile:
     @property
     def pending(self) -> int:
         """Messages taken but not yet on disk."""
-        return self._open_chunk.messages
+        return self._open_chunk.messages + sum(chunk.messages for chunk in self._closed)
 
     def add_channel(self, channel_id: int, topic: str, schema_name: str, schema: str) -> None:
         """Introduce a channel (id > 0) of JSON messages; nothing happens if the file has it already.
@@ -140,13 +144,34 @@ class McapFile:
             self.flush()
 
     def flush(self) -> None:
-        """Close the open chunk and write it."""
-        taken, self._open_chunk = self._open_chunk, OpenChunk()
+        """Close the open chunk and write all that waits."""
+        if self._open_chunk.messages:
+            self._closed.append(self._open_chunk)
+            self._open_chunk = OpenChunk()
+        while len(self._closed) > 1 and sum(chunk.size for chunk in self._closed) > KEPT_BYTES:
+            self._closed.popleft()
         if self._undeclared:
             self._append(pack(*self._undeclared))
             self._undeclared.clear()
-        if not taken.messages:
-            return
+        while self._closed:
+            self._write(self._closed[0])
+            self._closed.popleft()
+
+    def sync(self) -> None:
+        """Make what was flushed survive a loss of power."""
+        os.fdatasync(self._stream.fileno())
+
+    def close(self) -> None:
+        """Flush, write the index that makes the file quick to search, close; what the disk still refuses
+        is given up."""
+        try:
+            self.flush()
+            self._append(self._summary())
+        finally:
+            self._closed.clear()
+            self._stream.close()
+
+    def _write(self, taken: OpenChunk) -> None:
         content = taken.content()
         chunk = Chunk(
             compression="zstd",
@@ -161,18 +186,6 @@ class McapFile:
         self._append(packed + indexes)
         self._chunks.append(index)
         self._counts.update({channel: len(entries) for channel, entries in taken.index.items()})
-
-    def sync(self) -> None:
-        """Make what was flushed survive a loss of power."""
-        os.fdatasync(self._stream.fileno())
-
-    def close(self) -> None:
-        """Flush, write the index that makes the file quick to search, close."""
-        try:
-            self.flush()
-            self._append(self._summary())
-        finally:
-            self._stream.close()
 
     def _begin(self) -> None:
         self._append(MAGIC + pack(Header(profile="", library=_LIBRARY)))

@@ -1,7 +1,8 @@
 """The process that writes the log: takes frames from a socket until it ends, so it outlives the daemon.
 
 It ignores SIGINT and SIGTERM: when the daemon goes, however it goes, the socket closes and the log
-is finished.  A disk that refuses costs messages, never the process.
+is finished.  What a disk refuses waits for it, within bounds; beyond them it costs messages, never the
+process.
 """
 
 from __future__ import annotations
@@ -57,6 +58,8 @@ class LogWriter:
             self._file.sync()
         except OSError as err:
             self._error = err.strerror or str(err)
+        else:
+            self._error = ""
 
     def close(self) -> None:
         self.flush()

@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+import resource
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -8,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
+from flightd.adapters.recorder import mcap_file
 from flightd.adapters.recorder.mcap_file import McapFile, repair
 from flightd.core.errors import InputError
 from flightd.replay.log import read_log
@@ -115,3 +119,52 @@ def test_a_log_of_another_program_is_refused_and_left_alone(tmp_path: Path) -> N
     with pytest.raises(InputError, match="another program"):
         repair(path)
     assert path.read_bytes() == content
+
+
+@contextmanager
+def _full_disk(path: Path) -> Iterator[None]:
+    """No file of this process grows beyond the present size of `path`, as on a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_disk_that_is_full_for_a_while_costs_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+    file = McapFile.create(path)
+    file.add_channel(1, "/a", "A", '{"type":"object"}')
+    file.add_message(1, 0, b'{"i":0}')
+    file.flush()
+    with _full_disk(path):
+        for number in (1, 2):
+            file.add_message(1, number, b'{"i":%d}' % number)
+            with pytest.raises(OSError, match="too large"):
+                file.flush()
+    assert (file.messages, file.pending) == (1, 2)
+    file.add_message(1, 3, b'{"i":3}')
+    file.flush()
+    assert (file.messages, file.pending) == (4, 0)
+    file.close()
+    assert _numbers(path) == [0, 1, 2, 3]
+
+
+def test_a_disk_that_stays_full_costs_the_oldest_of_what_waits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mcap_file, "KEPT_BYTES", 100_000)
+    path = tmp_path / "flight.mcap"
+    file = McapFile.create(path)
+    file.add_channel(1, "/a", "A", '{"type":"object"}')
+    file.flush()
+    with _full_disk(path):
+        for number in range(30):
+            file.add_message(1, number, b'{"i":%d,"text":"%s"}' % (number, b"x" * 10_000))
+            with pytest.raises(OSError, match="too large"):
+                file.flush()
+            assert file.pending <= 10
+    kept = file.pending
+    file.close()
+    assert _numbers(path) == list(range(30 - kept, 30))
