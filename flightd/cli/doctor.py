@@ -120,6 +120,7 @@ async def _examine(config: Config, site: Site, path: Path) -> Diagnosis:
     checks += _check_ground(config, site, clock)
     checks += camera.judge_camera(config, pictures)
     checks += camera.check_vision(config, detector, pictures.picture)
+    checks += camera.check_latency(config, detector, pictures)
     return Diagnosis([*checks, *autopilot.checks], autopilot.report)
 
 

@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass, field
 
 from flightd.adapters.camera.connect import connect_camera
+from flightd.app.daemon import TICK_S
 from flightd.cli.checks.verdict import Check, error, ok, warning
 from flightd.config.schema import Config
 from flightd.core.errors import TransientError, UnavailableError
@@ -22,15 +23,19 @@ _SLOW = 0.85
 _DARK, _BRIGHT = 12.0, 243.0
 _BUSY = 0.8
 _TRIES = 3
+_NEAR = 0.8
+"""Of the latency that is allowed: what is measured here is not the slowest picture of a flight."""
 
 
 @dataclass(slots=True)
 class Pictures:
-    """What came: arrival times, the newest picture of a second ago or later, and what was refused."""
+    """What came: arrival times, the newest picture of a second ago or later, what was refused, and the delays
+    since mid-exposure."""
 
     arrivals_ns: list[int] = field(default_factory=list)
     picture: Image | None = None
     trouble: str = ""
+    delays_s: list[float] = field(default_factory=list)
 
     @property
     def rate_hz(self) -> float:
@@ -47,6 +52,7 @@ async def watch(config: Config, clock: Clock, vehicle: Vehicle | None) -> Pictur
 
     def take(ticket: FrameTicket) -> None:
         pictures.arrivals_ns.append(ticket.arrival_ns)
+        pictures.delays_s.append((ticket.arrival_ns - ticket.stamp_ns) * 1e-9)
         first.set()
         if pictures.picture is None and len(pictures.arrivals_ns) >= _LEAST_PICTURES:
             pictures.picture = _copy(ticket)  # the first ones are exposed badly
@@ -101,12 +107,8 @@ def check_vision(config: Config, detector: Detector, picture: Image | None) -> l
     name = f"{config.vision.method}, profile {detector.profile.name}"
     if picture is None:
         return [warning("vision", f"{name}: loads, had no picture to look at", "see the camera's line")]
-    best_s = float("inf")
-    for _ in range(_TRIES):
-        start_s = time.perf_counter()
-        lines = detector.detect(picture).lines
-        best_s = min(best_s, time.perf_counter() - start_s)
-    text = f"{name}: {best_s * 1000:.0f} ms a picture, {len(lines)} lines seen"
+    best_s, lines = _look(detector, picture)
+    text = f"{name}: {best_s * 1000:.0f} ms a picture, {lines} lines seen"
     busy = best_s * config.camera.fps / config.vision.workers
     checks = []
     if busy > _BUSY:
@@ -116,6 +118,38 @@ def check_vision(config: Config, detector: Detector, picture: Image | None) -> l
         remedy = "none may be in view here; else train the colour: flightd train-colour"
         checks.append(warning("vision", text, remedy))
     return checks or [ok("vision", text)]
+
+
+def check_latency(config: Config, detector: Detector, found: Pictures) -> list[Check]:
+    """Whether set points are made soon enough after the exposure of what they are made from."""
+    if found.picture is None or not found.delays_s:
+        return []
+    most_s = config.hazards.latency_s
+    camera_s, (detector_s, _) = max(found.delays_s), _look(detector, found.picture)
+    whole_s = camera_s + detector_s + TICK_S
+    text = (
+        f"{whole_s * 1000:.0f} ms from exposure to set point: camera {camera_s * 1000:.0f},"
+        f" detector {detector_s * 1000:.0f}, up to {TICK_S * 1000:.0f} until the next tick"
+    )
+    remedy = (
+        f"hazards.latency_s allows {most_s * 1000:.0f} ms: a camera with less delay (camera.latency_s is its"
+        " measured share), smaller pictures, a faster computer"
+    )
+    if whole_s > most_s:
+        return [error("latency", text, remedy)]
+    if whole_s > _NEAR * most_s:
+        return [warning("latency", text, remedy)]
+    return [ok("latency", text)]
+
+
+def _look(detector: Detector, picture: Image) -> tuple[float, int]:
+    """The shortest time of some looks at a picture, s, and the lines in it."""
+    best_s, lines = float("inf"), 0
+    for _ in range(_TRIES):
+        start_s = time.perf_counter()
+        lines = len(detector.detect(picture).lines)
+        best_s = min(best_s, time.perf_counter() - start_s)
+    return best_s, lines
 
 
 def _copy(ticket: FrameTicket) -> Image | None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flightd.cli.checks.calibration import check_calibration
-from flightd.cli.checks.camera import Pictures, check_vision, judge_camera
+from flightd.cli.checks.camera import Pictures, check_latency, check_vision, judge_camera
 from flightd.cli.checks.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
 from flightd.cli.checks.verdict import Check, Level
 from flightd.config.schema import CameraConfig, Config, RecorderConfig, load_config
@@ -129,6 +129,23 @@ def test_a_floor_without_lines_is_a_warning_only() -> None:
     checks = check_vision(config(), Detector("combined", "yellow"), pictures(30.0).picture)
     assert set(levels(checks)) == {Level.WARNING}
     assert levels(check_vision(config(), Detector("combined", "yellow"), None)) == [Level.WARNING]
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "expected"), [(0.02, Level.OK), (4.9, Level.WARNING), (5.1, Level.ERROR)]
+)
+def test_pictures_that_come_too_late_to_fly_by_are_told_before_the_flight(
+    delay_s: float, expected: Level
+) -> None:
+    allowed = config().hazards.model_copy(update={"latency_s": 5.0})
+    found = pictures(30.0)
+    assert check_latency(config(), Detector("combined", "yellow"), found) == [], "nothing was measured"
+    found.delays_s += [0.01, delay_s]
+    checks = check_latency(
+        config().model_copy(update={"hazards": allowed}), Detector("combined", "yellow"), found
+    )
+    assert levels(checks) == [expected]
+    assert "hazards.latency_s" in checks[0].remedy or expected is Level.OK
 
 
 def config() -> Config:
