@@ -110,6 +110,11 @@ install_files() {
     systemd-sysusers ${root:+--root="$root"} "$root$users"
     keep 640 "$source/configs/ardupilot.toml" /etc/flightd/flightd.toml
     keep 640 "$source/configs/site-demo.toml" /etc/flightd/site-demo.toml
+    keep 640 "$source/configs/sim.toml" /etc/flightd/sim.toml
+    local scenario
+    for scenario in "$source"/configs/scenarios/*.toml; do
+        keep 640 "$scenario" "/etc/flightd/scenarios/${scenario##*/}"
+    done
     install -d -m 750 "$root/etc/flightd" "$root/var/lib/flightd"
     local owner
     owner=$(sed -n 's/^flightd:[^:]*:\([0-9]*\):\([0-9]*\):.*/\1:\2/p' "$root/etc/passwd")
