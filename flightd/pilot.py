@@ -208,10 +208,10 @@ class Pilot:
         """Telemetry first: a frame needs the attitude and height of its exposure.
 
         What was seen before arming says nothing: until then the drone may have been carried about.  The
-        flight starts on the pad, in the plan's heading.
+        flight starts on the pad, in the plan's heading.  Nor is anything reckoned on once it is disarmed.
         """
         armed = tick.vehicle is not None and tick.vehicle.armed
-        if armed and not self._armed:
+        if armed is not self._armed:
             self._begin()
         self._armed = armed
         for sample in tick.attitudes:

@@ -86,7 +86,8 @@ class Relocator:
 
     def _watch_jumps(self, s: Senses) -> None:
         self.jump_m = (0.0, 0.0)
-        if s.pose is None:
+        if s.pose is None:  # a new flight begins on its pad, wherever the last one was believed to end
+            self._last = None
             return
         at = s.pose.x_m, s.pose.y_m
         if self._last is not None:

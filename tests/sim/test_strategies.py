@@ -143,7 +143,7 @@ def test_a_small_battery_flies_the_plan_in_sorties_with_its_reserve() -> None:
         DEMO,
         params(battery=SWAPS, battery_home_frac=0.02, battery_land_frac=0.01),
         airframe=SMALL,
-        swap_s=5.0,
+        swap_s=30.0,
     )
     lowest = [1.0]
     step = flight.pilot.step
@@ -160,6 +160,7 @@ def test_a_small_battery_flies_the_plan_in_sorties_with_its_reserve() -> None:
     assert sorties >= 2
     assert phases(flown).count(Phase.SWAP) == sorties - 1
     assert all("in reserve" in text for text in told(flown, "home"))
+    assert not told(flown, "position"), "where it is reckoned to be while it waits is not carried on"
     assert 0.7 * SWAPS.reserve_frac < lowest[0] < 0.35, "neither stranded nor home with half a battery"
 
 
