@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flightd.config.hazards import HazardConfig
 from flightd.config.schema import Config, load_config, parse_config
 from flightd.core.errors import InputError
+from flightd.mission.guidance import HazardParams
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 FLIGHTS = sorted(path for path in CONFIGS.glob("*.toml") if "[mission]" in path.read_text())
@@ -77,3 +79,7 @@ def test_no_table_escapes_as_another_error(table: dict[str, object]) -> None:
     with pytest.raises(InputError) as caught:
         parse_config(table, Path("fuzz.toml"))
     assert "\n" not in str(caught.value)
+
+
+def test_the_hazards_defaults_stand_in_one_place() -> None:
+    assert HazardConfig().params() == HazardParams()
