@@ -30,6 +30,7 @@ _DEMANDS = {
     Phase.PILOT: Demand.HANDS_OFF,
 }
 _ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.DONE, Phase.ABORTED, Phase.PILOT}
+_OVER = (Phase.DONE, Phase.ABORTED, Phase.PILOT)
 _WAITING = (Phase.PREFLIGHT, Phase.SWAP)
 _STOPPED = (Phase.HOLD, Phase.RELOCATE, Phase.ACQUIRE)
 """Where a leg that was interrupted goes on from."""
@@ -155,14 +156,17 @@ class Mission:
 
     def _lost(self, action: LossAction, trigger: Trigger, now_ns: int) -> set[Trigger]:
         """What the configured action makes of something lost."""
-        self._events.hazard(now_ns, trigger, action.value)
+        if self.airborne or (self.phase not in _OVER and action is not LossAction.CONTINUE):
+            self._events.hazard(now_ns, trigger, action.value)
         if action is LossAction.HOME and self.airborne and not self._route.returning:
             self._go_home(now_ns, trigger.value, in_need=True)
         return {LossAction.HOLD: {Trigger.HOLD}, LossAction.LAND: {trigger}}.get(action, set())
 
     def _tell_hazards(self, triggers: set[Trigger], now_ns: int) -> None:
         asked = triggers & ACTIONS.keys()
-        if self.phase in {Phase.TAKE_OFF, Phase.LAND}:  # near the floor lines come and go
+        if not self.airborne:  # on the ground only what decides something there is worth telling
+            asked &= TABLE[self.phase].keys()
+        elif self.phase in {Phase.TAKE_OFF, Phase.LAND}:  # near the floor lines come and go
             asked &= TABLE[self.phase].keys() | triggers_of(Action.REPORT, Action.HOME)
         for trigger in sorted(asked, key=list(Trigger).index):
             self._events.hazard(now_ns, trigger, ACTIONS[trigger].value)

@@ -22,6 +22,7 @@ from flightd.grid.site import Site
 from flightd.mission.guidance import Guidance, Guide, MissionParams, Senses
 from flightd.mission.mission import Mission
 from flightd.mission.plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.relocate import Relocator
 from flightd.mission.scanner import Scanner
 from flightd.mission.views import ScanParams
 from flightd.sim.sites import random_site
@@ -122,6 +123,36 @@ def test_a_flight_where_all_is_well_visits_everything() -> None:
     flight.run(0.1)
     assert flight.phase is Phase.DONE
     assert flight.mission.visited == list(SITE.serpentine_route())
+
+
+def test_on_the_ground_only_a_hazard_that_decides_something_is_told() -> None:
+    flight = Flight(MissionParams(autostart=False))
+    flight.set(localised=False, x_age_s=60.0, y_age_s=60.0)
+    flight.run(2.0)
+    assert not [event for event in flight.mission.drain_events() if event.name == "hazard"]
+    flight.set(localised=True, x_age_s=0.0, y_age_s=0.0)
+    flight.order(CommandKind.START)
+    flight.to(Phase.FOLLOW)
+    flight.order(CommandKind.LAND)
+    flight.to(Phase.LAND)
+    flight.set(landed=LandedState.ON_GROUND, armed=False)
+    flight.run(0.1)
+    assert flight.phase is Phase.ABORTED
+    flight.mission.drain_events()
+    flight.set(localised=False, x_age_s=60.0, y_age_s=60.0, ground_silent_s=60.0)
+    flight.run(2.0)
+    assert not [event for event in flight.mission.drain_events() if event.name == "hazard"]
+
+
+def test_a_position_lost_between_two_flights_does_not_shift_the_second_one() -> None:
+    relocator = Relocator(MissionParams())
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    sure = flight.senses
+    assert sure.pose is not None
+    for tick, pose in enumerate((sure.pose, None, replace(sure.pose, x_m=sure.pose.x_m + 7.0))):
+        relocator.step(replace(sure, now_ns=tick * TICK_NS, pose=pose), Phase.TAKE_OFF, 1.0)
+        assert not relocator.jumped
 
 
 def test_a_lost_link_is_no_pilot_and_ends_in_a_landing() -> None:
