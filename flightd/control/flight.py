@@ -9,8 +9,8 @@ from flightd.control.pid import Pid, PidGains
 from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.core.types import AttitudeSetpoint
 
-_TRIM_MPS2 = 0.35
-"""The most that is leaned against a push which is no longer measured: two degrees."""
+_TRIM_MPS2 = 0.8
+"""The most that is leaned against a push when not even the velocity is reckoned any more: five degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,12 +97,13 @@ class FlightController:
     ) -> AttitudeSetpoint:
         """Come to rest by the velocity alone (`reckoned`: it is known), then lean only against the steady
         push as it was last known (grid axes), at most `_TRIM_MPS2`; straight, height held."""
-        ax, ay = (-min(max(push, -_TRIM_MPS2), _TRIM_MPS2) for push in push_mps2)
+        gains = self._gains.horizontal
+        trim = gains.output_limit if reckoned else _TRIM_MPS2
+        ax, ay = (-min(max(push, -trim), trim) for push in push_mps2)
         moving = (motion.vx_mps, motion.vy_mps, motion.yaw_rad)
         if not all(map(math.isfinite, moving)):
             return self.level(now_ns, motion, reference, dt_s)
         if reckoned:
-            gains = self._gains.horizontal
             most = gains.output_limit
             ax = min(max(ax - gains.kd * motion.vx_mps, -most), most)
             ay = min(max(ay - gains.kd * motion.vy_mps, -most), most)

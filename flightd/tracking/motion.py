@@ -20,6 +20,8 @@ from flightd.tracking.kalman import KalmanFilter
 _GATE_SIGMAS = 4.0
 _UNSEEN_S = 0.1
 """An axis without a line for so long is reckoned: the gust that was last felt on it fades."""
+_BIAS_GAIN, _BIASED = 0.25, 0.6
+"""Innovations whose running mean is beyond this, in sigmas, all err to one side: the wind has changed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,15 +29,17 @@ class MotionNoise:
     """What the model does not know, as densities (per square root of a second) and starting sigmas.
 
     A disturbance is a steady part (trim, draught: its mean over `steady_s`) and a gust that fades within
-    `gust_s`."""
+    `gust_s`.  Its density is `changed_mps2` while what is seen all errs to one side (process noise adapted
+    to the innovations: Jazwinski, Automatica 5, 1969)."""
 
     accel_mps2: float = 0.2
     disturbance_mps2: float = 0.15
+    changed_mps2: float = 1.0
     drag_per_s: float = 0.25
     start_velocity_mps: float = 0.3
     start_disturbance_mps2: float = 0.2
-    max_disturbance_mps2: float = 1.0
-    gust_s: float = 2.5
+    max_disturbance_mps2: float = 1.2
+    gust_s: float = 1.2
     steady_s: float = 10.0
 
 
@@ -88,6 +92,7 @@ class AxisTracker:
         self._p = np.diag([noise.start_velocity_mps**2, noise.start_disturbance_mps2**2])
         self._steady_mps2 = 0.0
         self._unseen_s = 0.0
+        self._bias = 0.0
 
     @property
     def velocity_mps(self) -> float:
@@ -143,7 +148,8 @@ class AxisTracker:
         kf.F, kf.B = transition, control
         # white acceleration noise reaches velocity and offsets through the same column as the control
         kf.Q = control @ control.T * (noise.accel_mps2**2 / dt_s)
-        kf.Q[1, 1] += noise.disturbance_mps2**2 * dt_s
+        changed = abs(self._bias) > _BIASED
+        kf.Q[1, 1] += (noise.changed_mps2 if changed else noise.disturbance_mps2) ** 2 * dt_s
         kf.predict(u=np.array([[accel_mps2]]))
         self._keep(kf)
         if self._unseen_s > _UNSEEN_S:
@@ -178,6 +184,8 @@ class AxisTracker:
             track.seen_ns, track.hits = stamp_ns, track.hits + 1
             track.width_m += 0.2 * (line.width_m - track.width_m)
             track.from_m, track.to_m = line.from_m, line.to_m
+        if innovations:
+            self._bias += _BIAS_GAIN * (sum(innovations) / len(innovations) - self._bias)
         for line in fresh:
             self._add(line, stamp_ns)
         self._forget(stamp_ns)
@@ -187,6 +195,7 @@ class AxisTracker:
         """Know nothing any more: no lines, and a velocity as uncertain as at the start."""
         noise = self._noise
         self._tracks = []
+        self._bias = 0.0
         self._x = np.zeros(2)
         self._p = np.diag([noise.start_velocity_mps**2, noise.start_disturbance_mps2**2])
 

@@ -128,6 +128,24 @@ def test_tracked_sigmas_are_honest() -> None:
     assert 0.8 < spread < 1.25
 
 
+def test_wind_that_sets_in_is_soon_known_and_calm_air_stays_calm() -> None:
+    rng = random.Random(1)
+    axis = AxisTracker(MotionNoise(drag_per_s=0.0), gate_m=0.35, forget_ns=10**10)
+    dt = 1 / 30
+    x = v = 0.0
+    felt = []
+    for step in range(120):
+        push = 0.9 if step >= 90 else 0.0
+        x += v * dt + 0.5 * push * dt * dt
+        v += push * dt
+        axis.predict(dt, 0.0)
+        axis.update([SeenLine(0.5 - x + rng.gauss(0, 0.004), 0.005, 0.075)], step * FRAME_NS)
+        felt.append(axis.disturbance_mps2)
+    assert max(map(abs, felt[30:90])) < 0.2
+    assert max(felt[:107]) > 0.6, "half a second after it began"
+    assert 0.7 < felt[-1] < 1.1
+
+
 def test_a_false_line_nearby_starts_a_track_of_its_own() -> None:
     axis = AxisTracker(MotionNoise(), gate_m=0.35, forget_ns=10**9)
     for step in range(20):
