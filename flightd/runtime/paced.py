@@ -45,13 +45,14 @@ class PacedReader:
 
     def _due(self) -> None:
         self._timer = None
-        busy = self._read() > 1
-        if self._closed:
-            return
-        if busy:
-            self._wait()
-        else:
-            self._loop.add_reader(self._fd, self._ready)
+        busy = True  # also when the reading fails: what comes behind it is still to be read
+        try:
+            busy = self._read() > 1
+        finally:
+            if not self._closed and busy:
+                self._wait()
+            elif not self._closed:
+                self._loop.add_reader(self._fd, self._ready)
 
     def _wait(self) -> None:
         self._timer = self._loop.call_later(_BATCH_S, self._due)

@@ -151,6 +151,32 @@ def test_a_busy_line_is_read_in_batches_and_a_quiet_one_at_once() -> None:
     run(VirtualLoop, test)
 
 
+def test_a_busy_line_is_read_on_after_a_message_whose_taking_failed() -> None:
+    async def test() -> None:
+        told: list[Any] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(context["exception"]))
+        heard: list[bytes] = []
+
+        def take(data: bytes, _address: Any) -> None:
+            heard.append(data)
+            if len(heard) in {1, 7, 8}:
+                raise ValueError
+
+        here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+        line = PacedDatagrams(here, take, lambda _error: None)
+        sent = [str(number).encode() for number in range(40)]
+        for data in sent:
+            there.send(data)
+            await asyncio.sleep(0.001)
+        await asyncio.sleep(0.05)
+        assert heard == sent
+        assert [type(error) for error in told] == [ValueError] * 3
+        line.close()
+        there.close()
+
+    run(VirtualLoop, test)
+
+
 def test_what_does_not_block_is_never_waited_for() -> None:
     async def test() -> None:
         here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
