@@ -7,6 +7,7 @@ import errno
 import fcntl
 import os
 import socket
+import termios
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -27,6 +28,9 @@ from flightd.sim.airframe import Airframe
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.peer import PeerConfig
 from tests.protocol.rig import Rig, run_virtual
+
+_TIOCGEXCL = 0x80045440
+"""Whether a terminal refuses to be opened once more; `termios` leaves it out."""
 
 
 class StandingSocket:
@@ -342,6 +346,35 @@ def test_a_serial_line_is_opened_raw_heard_and_found_again_after_a_loss(tmp_path
     run_virtual(test)
 
 
+@pytest.mark.parametrize(
+    ("number", "ends"),
+    [(errno.EIO, False), (errno.ENODEV, False), (errno.ENOTTY, True), (errno.EINVAL, True)],
+)
+def test_a_serial_line_that_goes_away_while_it_is_opened_is_tried_again(
+    monkeypatch: pytest.MonkeyPatch, number: int, ends: bool
+) -> None:
+    def gone(*_: Any) -> None:
+        raise termios.error(number, os.strerror(number))
+
+    async def test() -> None:
+        master, slave = os.openpty()
+        line = SerialTransport(Endpoint(EndpointKind.SERIAL, device=os.ttyname(slave), baud=57600))
+        monkeypatch.setattr(termios, "tcsetattr", gone)
+        with pytest.raises(UnavailableError if ends else OSError):
+            await line.open()
+        monkeypatch.undo()
+        await line.open()
+        line.close()
+        os.close(slave)
+        os.close(master)
+
+    run_virtual(test)
+
+
+def is_exclusive(fd: int) -> bool:
+    return bool(fcntl.ioctl(fd, _TIOCGEXCL, bytes(4)) != bytes(4))
+
+
 def test_a_serial_line_that_another_program_has_is_waited_for_and_then_had_alone() -> None:
     async def test() -> None:
         master, slave = os.openpty()
@@ -356,8 +389,10 @@ def test_a_serial_line_that_another_program_has_is_waited_for_and_then_had_alone
         late = os.open(name, os.O_RDWR | os.O_NOCTTY)
         with pytest.raises(BlockingIOError):
             fcntl.flock(late, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        assert is_exclusive(late)
         line.close()
         fcntl.flock(late, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        assert not is_exclusive(late), "who had it open all the time must not lock us out"
         for fd in (late, slave, master):
             os.close(fd)
 

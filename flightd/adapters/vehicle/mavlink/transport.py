@@ -32,6 +32,9 @@ _UNHEARD_MS = 5_000
 _MOVED = frozenset({errno.EINVAL, errno.EADDRNOTAVAIL, errno.ENETUNREACH, errno.ENETDOWN})
 """What a called UDP socket says once this computer has left its network or has another address there."""
 
+_UNPLUGGED = frozenset({errno.EIO, errno.ENXIO, errno.ENODEV})
+"""What a serial device says that goes away just as it is opened."""
+
 
 class Transport(abc.ABC):
     """One line to the vehicle.  `received(data, source)` and `lost()` are set before `open`."""
@@ -175,6 +178,8 @@ class SerialTransport(Transport):
             self._make_raw(fd, control)
         except termios.error as err:
             os.close(fd)
+            if err.args[0] in _UNPLUGGED:
+                raise OSError(*err.args) from err
             text = f"{self.endpoint}: {self.endpoint.device} is not a serial device: check the path"
             raise UnavailableError(text) from err
         except OSError:
@@ -198,6 +203,8 @@ class SerialTransport(Transport):
         if self._fd >= 0:
             if self._reader is not None:
                 self._reader.close()
+            with contextlib.suppress(OSError):  # else who had it open before us would lock us out
+                fcntl.ioctl(self._fd, termios.TIOCNXCL)
             with contextlib.suppress(OSError):
                 os.close(self._fd)
             self._fd = -1
