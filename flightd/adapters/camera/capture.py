@@ -8,7 +8,7 @@ import enum
 import multiprocessing
 import signal
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -23,6 +23,8 @@ from flightd.ports import Clock
 from flightd.runtime.ring import FrameRing, FrameTicket
 
 _SLOTS = 8
+_GIVING_BACK_S = 1.0
+"""So long a capture process may take to end by itself."""
 _PICTURES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"}
 
 
@@ -74,6 +76,7 @@ class CaptureCamera:
         self._on_frame = on_frame
         self._exposure = 1.0
         self._process: Connection | None = None
+        self._asked = False
         self.frames = 0
 
     def expose(self, part: float) -> None:
@@ -103,6 +106,7 @@ class CaptureCamera:
             self._deliver(ring, *message)
 
         try:
+            self._asked = False
             process.start()
             theirs.close()
             loop.add_reader(ours.fileno(), readable)
@@ -114,12 +118,17 @@ class CaptureCamera:
             self._process = None
             loop.remove_reader(ours.fileno())
             ours.close()
-            process.kill()
-            process.join(1.0)
-            ring.close()
+            try:
+                if self._asked:  # the process gives the device's own exposure back
+                    await asyncio.to_thread(process.join, _GIVING_BACK_S)
+            finally:
+                process.kill()
+                process.join(1.0)
+                ring.close()
 
     def _ask(self) -> None:
         if self._process is not None and self._source.kind is SourceKind.DEVICE:
+            self._asked = True
             with contextlib.suppress(OSError):  # the process has died: `run` tells
                 self._process.send(self._exposure)
 
@@ -148,23 +157,25 @@ def _capture(source: Source, ring_name: str, conn: Connection) -> None:
     ring = FrameRing.attach(ring_name, _SLOTS, source.width_px, source.height_px)
     over = "cannot be opened, or gives no picture"
     try:
-        for seq, (picture, exposure) in enumerate(_pictures(source, conn)):
-            over = "no more pictures"
-            grabbed_ns = time.monotonic_ns()
-            if picture.shape != (source.height_px, source.width_px, 3) or picture.dtype != np.uint8:
-                size = f"{picture.shape[1]}x{picture.shape[0]}"
-                conn.send(f"pictures are {size}, the configuration says {source.width_px}x{source.height_px}")
-                return
-            slot = ring.begin(seq)
-            np.copyto(ring.pixels(slot), picture)
-            ring.publish(slot, seq, grabbed_ns)
-            conn.send((slot, seq, time.monotonic_ns() - grabbed_ns, exposure))
+        with contextlib.closing(_pictures(source, conn)) as pictures:
+            for seq, (picture, exposure) in enumerate(pictures):
+                over = "no more pictures"
+                grabbed_ns = time.monotonic_ns()
+                if picture.shape != (source.height_px, source.width_px, 3) or picture.dtype != np.uint8:
+                    size = f"{picture.shape[1]}x{picture.shape[0]}"
+                    wanted = f"{source.width_px}x{source.height_px}"
+                    conn.send(f"pictures are {size}, the configuration says {wanted}")
+                    return
+                slot = ring.begin(seq)
+                np.copyto(ring.pixels(slot), picture)
+                ring.publish(slot, seq, grabbed_ns)
+                conn.send((slot, seq, time.monotonic_ns() - grabbed_ns, exposure))
         conn.send(over)
-    except (BrokenPipeError, EOFError):
+    except (ConnectionError, EOFError):
         return
 
 
-def _pictures(source: Source, conn: Connection) -> Iterator[tuple[Image, float]]:
+def _pictures(source: Source, conn: Connection) -> Generator[tuple[Image, float], None, None]:
     """Pictures and the part of the usual exposure that each was taken with, as `conn` asks for."""
     if source.kind is SourceKind.FOLDER:
         paths = sorted(path for path in source.path.iterdir() if path.suffix.lower() in _PICTURES)
@@ -179,10 +190,13 @@ def _pictures(source: Source, conn: Connection) -> Iterator[tuple[Image, float]]
         capture.set(cv2.CAP_PROP_FPS, source.fps)
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
         exposure = DeviceExposure(capture)
-        for picture in _video(capture):
-            yield picture, exposure.of_next_picture()
-            while conn.poll():
-                exposure.ask(conn.recv())
+        try:
+            for picture in _video(capture):
+                yield picture, exposure.of_next_picture()
+                while conn.poll():
+                    exposure.ask(conn.recv())
+        finally:
+            exposure.give_back()
 
 
 def _read(path: Path) -> Image | None:

@@ -50,6 +50,11 @@ class DeviceExposure:
         else:
             self.ask(1.0)
 
+    def give_back(self) -> None:
+        """Leave the device as it was found: it keeps its settings for whoever opens it next."""
+        if self._coming != 1.0:
+            self.ask(1.0)
+
     def of_next_picture(self) -> float:
         """The part of the usual exposure that the picture read next has."""
         if self._late:

@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ports import Clock
+from flightd.runtime.datagrams import is_stalled
 from flightd.runtime.notice import ExposureRequest, decode_notice, encode_request
 from flightd.runtime.ring import FrameTicket
 from flightd.tracking.clocks import DeviceClock
@@ -88,8 +89,9 @@ class SharedCamera(asyncio.DatagramProtocol):
                 f"pictures are {notice.width_px}x{notice.height_px}, the configuration says {wanted}"
             )
             return
-        if notice.exposure != self._exposure and self._transport is not None:
-            self._transport.sendto(encode_request(ExposureRequest(self._exposure)), addr)
+        line = self._transport
+        if notice.exposure != self._exposure and line is not None and not is_stalled(line):
+            line.sendto(encode_request(ExposureRequest(self._exposure)), addr)
         self.frames += 1
         stamp_ns = self._device.to_ours(notice.device_ns, arrival_ns)
         self._on_frame(

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import multiprocessing
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
 import cv2
+import numpy as np
 import pytest
 
+from flightd.adapters.camera.capture import Source, SourceKind, _pictures
 from flightd.adapters.camera.exposure import DeviceExposure
 
 AUTOMATIC = 3.0
@@ -25,6 +32,9 @@ class Device:
             return False
         self.values[prop] = round(value)
         return True
+
+    def read(self) -> tuple[bool, np.ndarray]:
+        return True, np.zeros((36, 64, 3), np.uint8)
 
 
 def told(exposure: DeviceExposure, count: int) -> list[float]:
@@ -56,4 +66,25 @@ def test_pictures_of_a_device_that_cannot_are_said_to_have_the_usual_exposure(de
     before = dict(device.values)
     exposure.ask(0.4)
     assert set(told(exposure, 9)) == {1.0}
+    assert device.values == before
+
+
+@pytest.mark.parametrize(
+    "end", [lambda ours, pictures: pictures.close(), lambda ours, pictures: ours.close()]
+)
+def test_a_device_is_left_with_the_exposure_that_it_was_found_with(
+    monkeypatch: pytest.MonkeyPatch, end: Callable[..., None]
+) -> None:
+    device = Device(200.0)
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
+    ours, theirs = multiprocessing.Pipe()
+    with closing(_pictures(Source(SourceKind.DEVICE, Path("/dev/video0"), 64, 36, 30.0), theirs)) as pictures:
+        next(pictures)
+        before = dict(device.values)
+        ours.send(0.4)
+        assert [next(pictures)[1] for _ in range(9)][-1] == 0.4
+        assert device.values != before
+        end(ours, pictures)
+        with pytest.raises((StopIteration, EOFError)):
+            next(pictures)
     assert device.values == before
