@@ -20,7 +20,7 @@ from flightd.app.sight import Sight
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, TransientError, UnavailableError
 from flightd.core.topics import Topic
-from flightd.core.types import AttitudeSetpoint, Command, Health, Phase, Status
+from flightd.core.types import AttitudeSetpoint, Command, CommandKind, Health, Phase, Status
 from flightd.grid.site import Site
 from flightd.pilot import TickInput, TickOutput
 from flightd.ports import Camera, Clock, CountsDrops, Ground, Monitor, PoseTaker, Recorder, Vehicle, Vitals
@@ -145,8 +145,14 @@ class Daemon:
             raise TransientError(str(err)) from err
 
     async def _fly_only(self, err: FlightdError) -> None:
+        """Look after a vehicle that flies; once one that only stands there is disarmed, the daemon ends."""
         await self._in_air_or(err)
         self._trouble(str(err))
+        while self._pilot.mission.phase is Phase.PREFLIGHT:
+            state = self._vehicle.state()
+            if state is not None and not state.armed:
+                raise err
+            await asyncio.sleep(TICK_S)
 
     async def _in_air_or(self, err: FlightdError) -> None:
         """Raise an error that the daemon ends with, unless its vehicle flies: that needs the daemon more than
@@ -192,6 +198,8 @@ class Daemon:
         commands, self._commands = self._commands, []
         if self._ground is not None:
             commands += self._ground.take_commands()
+        if self._ailing is not None:
+            commands = [command for command in commands if command.kind is not CommandKind.START]
         tick = TickInput(
             now_ns,
             tuple(d.lines for d in detections),

@@ -17,7 +17,7 @@ from flightd.cli.sim_peers import free_port
 from flightd.config.schema import Config, load_config
 from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError, InputError, UnavailableError
-from flightd.core.types import Phase, Status
+from flightd.core.types import Command, CommandKind, Demand, Phase, Status
 from flightd.ports import Monitor
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.pool import Detection
@@ -181,5 +181,31 @@ def test_on_the_floor_an_inventory_that_cannot_be_opened_is_an_error(tmp_path: P
             with pytest.raises(type(error)) as raised:
                 await restarted(rig, ailing=error, camera_gone=False)
             assert raised.value is error
+
+    run_virtual(test)
+
+
+def test_a_vehicle_that_stands_armed_never_takes_off_without_its_inventory(tmp_path: Path) -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            rig.vehicle.demand(Demand.FLY)
+            await rig.until(lambda: rig.known().armed)
+            await died(rig)
+            error = unopened(tmp_path / "inventory")
+            daemon = Daemon(
+                await config_of(rig, camera_gone=False), SITE, LoopClock(), NoDetectors(), ailing=error
+            )
+            flying = asyncio.create_task(daemon.fly())
+            await asyncio.sleep(1.0)
+            assert rig.peer.armed
+            assert not flying.done()
+            daemon.command(Command("order", CommandKind.START))
+            with pytest.raises(type(error)) as raised:
+                async with asyncio.timeout(60):
+                    await flying
+            assert raised.value is error
+            assert not rig.peer.armed
+            assert rig.peer.truth().height_m < 0.15
 
     run_virtual(test)
