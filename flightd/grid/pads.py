@@ -81,13 +81,18 @@ class PadFinder:
                 self._found.setdefault(pad.node, _Found()).add(x_m, y_m)
 
     def _take_ends(self, tracks: TrackSet, pose: GridPose) -> None:
-        """The places of pads by the line ends that are seen where the map has theirs."""
+        """The places of pads by the line ends that are seen where the map has theirs.  Of several in a frame
+        the nearest to the map's counts: worn paint has ends, too."""
         for pad, (end_x, end_y, arms) in self._ends:
-            centre_x, centre_y = self._site.pad_centre(pad)
-            for seen in tracks.junctions:
-                off_x, off_y = pose.x_m + seen.dx_m - end_x, pose.y_m + seen.dy_m - end_y
-                if seen.arms == arms and math.hypot(off_x, off_y) < REACH_M:
-                    self._found.setdefault(pad.node, _Found()).add(centre_x + off_x, centre_y + off_y)
+            offs = [
+                (pose.x_m + seen.dx_m - end_x, pose.y_m + seen.dy_m - end_y)
+                for seen in tracks.junctions
+                if seen.arms == arms
+            ]
+            off = min(offs, key=lambda off: math.hypot(*off), default=(math.inf, math.inf))
+            if math.hypot(*off) < REACH_M:
+                centre_x, centre_y = self._site.pad_centre(pad)
+                self._found.setdefault(pad.node, _Found()).add(centre_x + off[0], centre_y + off[1])
 
     def centre(self, node: str) -> tuple[float, float] | None:
         """Centre of the pad on `node`: as seen, else as on the map; None without a pad there."""

@@ -249,12 +249,13 @@ class Places:
 
     def thin(self, most: int) -> None:
         """Join places that have become one, drop the negligible and all but the `most` likeliest."""
-        close = np.abs(self.at_m[:, None, :] - self.at_m[None, :, :]).max(axis=2) < _SAME_M
         keep: Flags = self.weights >= _NEGLIGIBLE
         if np.count_nonzero(keep) > most:
             keep &= self.weights >= np.partition(self.weights, -most)[-most]
-        keep[[0, self.best]] = True
+        self._keep(keep)
+        close = np.abs(self.at_m[:, None, :] - self.at_m[None, :, :]).max(axis=2) < _SAME_M
         if np.count_nonzero(close) > len(self):
+            keep = np.ones(len(self), dtype=bool)
             for row in np.argsort(-self.weights):
                 if keep[row] and row:
                     twins = close[row] & keep
@@ -263,10 +264,15 @@ class Places:
                     if twins[self.best]:
                         self.best = int(row)
                     keep &= ~twins
+            self._keep(keep)
+        self.weights /= self.weights.sum()
+
+    def _keep(self, keep: Flags) -> None:
+        """Drop the other places, but neither elsewhere nor the best one."""
+        keep[[0, self.best]] = True
         if not keep.all():
             self.best = int(np.count_nonzero(keep[: self.best]))
             self._take(np.flatnonzero(keep))
-        self.weights /= self.weights.sum()
 
     def _take(self, rows: Indices) -> None:
         self.at_m, self.sigma_m, self.weights = self.at_m[rows], self.sigma_m[rows], self.weights[rows]
