@@ -89,10 +89,9 @@ class Tally:
             self._spots[key] = _Spot(placed.x_m, placed.height_m, placed.size_m, best)
         self._votes.add(frame_seq, (placed.read for placed in reads))
         if place is not None and (place.share >= _LEAST_SHARE or reads):
-            lit_well = place.light is Light.FAIR or place.occupancy is Occupancy.EMPTY
-            occupancy = (
-                place.occupancy if lit_well else Occupancy.UNSURE
-            )  # what is burnt out looks like goods
+            # what is burnt out looks like goods
+            told = place.light is Light.FAIR or place.occupancy is Occupancy.EMPTY
+            occupancy = place.occupancy if told else Occupancy.UNSURE
             self._seen[occupancy] += 1
             self._empty_in_a_row = self._empty_in_a_row + 1 if occupancy is Occupancy.EMPTY else 0
             self._most_empty = max(self._most_empty, self._empty_in_a_row)
