@@ -312,6 +312,11 @@ class Mission:
             self.reason = f"{self._cause}: {s.vehicle.refusal}" if refused and s.vehicle else self._cause
         return guidance
 
+    def _crossing_over(self) -> bool:
+        """The leg leads to another aisle: seen from a shelf's lowest level both aisles would be out of view."""
+        goal, (x_m, y_m) = self.goal, self._steering.anchor
+        return abs(goal.y_m - y_m) > abs(goal.x_m - x_m)
+
     def _task(self, now_ns: int) -> Task:
         route = self._route
         return Task(
@@ -319,7 +324,7 @@ class Mission:
             phase_s=self._progress.phase_s(now_ns),
             goal=route.goal,
             view=self._scan.view(self.phase),
-            cruise=route.returning or not route.goal.visit,
+            cruise=route.returning or not route.goal.visit or self._crossing_over(),
             on_pad=self._on_pad_leg,
             stopped=self._stopped,
             unknown=self._found_flying,

@@ -189,9 +189,12 @@ class Steering:
         return True
 
     def _height_goal_m(self, task: Task) -> float:
-        """The view's height while scanning; the legs between scanned nodes are flown at the last one's."""
+        """The view's height while scanning; the legs between an aisle's scanned nodes are flown at the last
+        one's, unless a doubt on the way asks for a wider view."""
         if task.view is not None:
             self._cruise_m = task.view.height_m
+        elif task.phase is Phase.RELOCATE:
+            self._cruise_m = max(self._cruise_m, self._params.height_m)
         elif task.cruise:
             self._cruise_m = self._params.height_m
         return self._cruise_m

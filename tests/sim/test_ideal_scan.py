@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from flightd.config.schema import load_config
+from flightd.config.site_file import load_site
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import Finding
 from flightd.core.types import Command, CommandKind, EventLevel, Phase
@@ -120,6 +121,20 @@ def test_with_the_nose_to_the_shelf_no_leg_begins_with_half_a_turn() -> None:
     assert set(findings(flown)) == set(PLACES)
     sides = [phase for phase, k in flown.truth if phase is Phase.TURN]
     assert len(sides) * 0.02 < 0.5 * len(NODES) * math.pi / params.mission.turn_rate_radps
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_from_aisle_to_aisle_it_flies_where_it_sees_both(seed: int) -> None:
+    """The last view of a node is a low one, from which a line 3.4 m off is long out of sight."""
+    site = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
+    scanner = Scanner(site, SIGHT, CONFIG.scan_params(4.0))
+    front, params = IdealFront(site, SIGHT, Stock()), CONFIG.pilot_params(site)
+    visits = ("A4", "B4")
+    flown = IdealFlight(site, params, visits=visits, seed=seed, scanner=scanner, front=front).fly()
+    assert (flown.phase, flown.visited) == (Phase.DONE, list(visits))
+    between = [k.height_m for phase, k in flown.truth if phase is Phase.FOLLOW and 1.2 < k.y_m < 2.2]
+    assert min(between) > params.mission.height_m - 0.3
+    assert Phase.RELOCATE not in {output.phase for output in flown.outputs}
 
 
 @pytest.mark.parametrize("phase", [Phase.CLIMB, Phase.SCAN])
