@@ -313,7 +313,7 @@ class Mission:
         return guidance
 
     def _crossing_over(self) -> bool:
-        """The leg leads to another aisle: seen from a shelf's lowest level both aisles would be out of view."""
+        """The leg leads to another aisle: from a shelf's lowest level neither aisle's line would be seen."""
         goal, (x_m, y_m) = self.goal, self._steering.anchor
         return abs(goal.y_m - y_m) > abs(goal.x_m - x_m)
 
