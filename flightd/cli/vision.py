@@ -106,6 +106,8 @@ def evaluate(
     A detection matches a labelled line when it passes within the gate of the middle of its visible span;
     the errors are those of rho (about the image centre) and theta.  `minor` lines are neither missed nor
     false; false lines are counted on pictures labelled `complete`, as a part of the detections there.
+    Two labels of which one continues the other's band are one line: a detection within 2 % of the width
+    and 3 degrees of both finds both.
 
     \b
     labels.json: {"images": [{"file": "a.jpg", "width": 1920, "height": 1080, "line_colour": "yellow",

@@ -19,6 +19,8 @@ The format is meant for hand-labelled photographs and generated frames alike:
 
 Coordinates are pixels with the origin at the centre of the top-left pixel, x right, y down.  A line is
 the bisector of its two visible edges, from where it enters the picture to where it leaves it or ends.
+One that something hides in the middle may be labelled as two stretches, each with its thickness; one
+detection finds both.
 Only `file` is required; other keys are ignored, so a labeller may keep notes beside these.
 """
 

@@ -5,6 +5,10 @@ A detection matches a labelled line when the middle of the label's visible span 
 pair first, each at most once.  The errors are those of the paper's Table II: |rho| in pixels, about the
 image centre, and |theta|.
 
+A line of which something hides the middle is labelled as two stretches.  Where one label continues the
+other's band, a detection that is `found` within FOUND_ACROSS and FOUND_ANGLE_RAD of both finds both: it is
+one line.  Labels that lie side by side are two lines, and each needs a detection of its own.
+
 What is left of the `main` labels is missed.  What is left of the detections is false, unless it lies on
 a `minor` label, or the picture is not `complete`.  Nodes match within the same distance; `bend`s are
 ignored.
@@ -117,7 +121,8 @@ def score_picture(score: Score, label: LabelledImage, found: LineSet, gate: Gate
     """Add one picture to `score`, and say which labels were missed and which detections are false."""
     width, height = found.width_px, found.height_px
     main = [line for line in label.lines if line.grade == "main"]
-    pairs = _match(main, found.lines, width, height, gate)
+    matched = _match(main, found.lines, width, height, gate)
+    pairs = matched + _stretches(main, found.lines, matched, width, height)
     errors = tuple(_error(main[i], found.lines[j], width, height) for i, j in pairs)
     missed = tuple(sorted(set(range(len(main))) - {i for i, _ in pairs}))
     spare = sorted(set(range(len(found.lines))) - {j for _, j in pairs})
@@ -147,6 +152,43 @@ def _match(
         for j, line in enumerate(lines)
     )
     return _nearest_first(costs)
+
+
+def _stretches(
+    labels: Sequence[LabelledLine],
+    lines: Sequence[Line],
+    pairs: Sequence[tuple[int, int]],
+    width: int,
+    height: int,
+) -> list[tuple[int, int]]:
+    """Labels that no detection of their own matched, with the one that found the line they continue."""
+    more: list[tuple[int, int]] = []
+    for i in sorted(set(range(len(labels))) - {i for i, _ in pairs}):
+        for k, j in pairs:
+            both = (_error(labels[other], lines[j], width, height).found for other in (i, k))
+            if all(both) and _continues(labels[i], labels[k], width, height):
+                more.append((i, j))
+                break
+    return more
+
+
+def _continues(one: LabelledLine, other: LabelledLine, width: int, height: int) -> bool:
+    """Whether two labels are stretches of one straight band: each prolonged meets the other's paint."""
+    turn = wrap_half_pi(one.hessian(width, height)[1] - other.hessian(width, height)[1])
+    reach_px = max(one.thickness, other.thickness) / 2
+    return abs(turn) <= FOUND_ANGLE_RAD and _meets(one, other, reach_px) and _meets(other, one, reach_px)
+
+
+def _meets(line: LabelledLine, stretch: LabelledLine, reach_px: float) -> bool:
+    """Whether `stretch` lies wholly before or beyond `line`, and begins within reach of `line` prolonged."""
+    length = max(line.length_px, 1e-9)
+    dx, dy = (line.x2 - line.x1) / length, (line.y2 - line.y1) / length
+    ends = ((stretch.x1 - line.x1, stretch.y1 - line.y1), (stretch.x2 - line.x1, stretch.y2 - line.y1))
+    (near, off), (far, _) = sorted(
+        ((x * dx + y * dy, abs(x * dy - y * dx)) for x, y in ends), key=lambda end: abs(end[0] - length / 2)
+    )
+    beyond = min(near, far) >= length or max(near, far) <= 0.0
+    return beyond and off <= reach_px
 
 
 def _nearest_first(costs: Iterable[tuple[float, int, int]]) -> list[tuple[int, int]]:

@@ -81,6 +81,41 @@ def test_parallel_lines_closer_than_the_gate_are_each_matched_by_their_own() -> 
     assert score.missed == score.false == 0
 
 
+def stretch(first: float, last: float, across: float = 0.0, turn: float = 0.0) -> LabelledLine:
+    """A piece of a level line, from and to so far from the picture's middle."""
+    (x1, x2), y = (at + (WIDTH - 1) / 2 for at in (first, last)), across + (HEIGHT - 1) / 2
+    return LabelledLine(x1=x1, y1=y, x2=x2, y2=y + (last - first) * math.tan(turn), thickness=20.0)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_one_detection_finds_both_stretches_of_a_line_that_something_hides(reverse: bool) -> None:
+    stretches = [stretch(-300, -60), stretch(40, 250, across=4)]
+    score = scored(shown(*stretches[:: -1 if reverse else 1]), seen(line(2, math.pi / 2)))
+    assert (score.labelled, score.missed, score.found_part, score.false) == (2, 0, 1.0, 0)
+    assert sorted(error.rho_px for error in score.errors) == [pytest.approx(2.0)] * 2
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        stretch(40, 250, across=11),  # beside the first one's paint
+        stretch(-70, 250, across=4),  # side by side with it for a while
+        stretch(40, 250, turn=math.radians(3.5)),
+    ],
+)
+def test_two_lines_need_two_detections(other: LabelledLine) -> None:
+    score = scored(shown(stretch(-300, -60), other), seen(line(2, math.pi / 2)))
+    assert (score.labelled, score.missed, score.false) == (2, 1, 0)
+
+
+def test_stretches_of_a_line_excuse_no_repeated_and_no_distant_detection() -> None:
+    picture = shown(stretch(-300, -60), stretch(40, 250))
+    thrice = scored(picture, seen(*(line(across, math.pi / 2) for across in (0, 1, 2))))
+    assert (thrice.missed, thrice.detected, thrice.false) == (0, 3, 1)
+    distant = scored(picture, seen(line(14, math.pi / 2)))
+    assert (distant.missed, distant.found_part, distant.false) == (1, 0.0, 0)
+
+
 def test_minor_lines_are_neither_missed_nor_false() -> None:
     picture = shown(label(0, 0.5, grade="minor"))
     for found in (seen(), seen(line(0, 0.5))):
