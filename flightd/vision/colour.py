@@ -223,15 +223,20 @@ def _look_up(table: NDArray[np.uint8], index: NDArray[np.uint16]) -> NDArray[np.
     return table.take(index)
 
 
+def has_seeds(levels: Levels) -> bool:
+    """Whether so much paint is strong that the weak is judged by it."""
+    return cv2.countNonZero(levels & STRONG) * _FEWEST_SEEDS >= cv2.countNonZero(levels)
+
+
 def grow(levels: Levels) -> NDArray[np.uint8]:
     """(h, w) mask, 255 where a pixel is strong, or weak and joined (8-neighbours) to a strong one.
 
     Where next to no paint is strong (a worn white on a light floor) the weak pixels are seeds themselves:
     what is no band among them does not pass the tests of shape and edge that follow.
     """
-    strong = np.flatnonzero(levels == STRONG)
-    if len(strong) * _FEWEST_SEEDS < cv2.countNonZero(levels):
+    if not has_seeds(levels):
         return np.where(levels, np.uint8(255), np.uint8(0))
+    strong = np.flatnonzero(levels == STRONG)
     few = levels.size < TABLE_SIZE * 2  # too few pixels for more separate parts than 16 bits can number
     count, parts = cv2.connectedComponents(levels, connectivity=8, ltype=cv2.CV_16U if few else cv2.CV_32S)
     kept = np.zeros(TABLE_SIZE if few else count, np.uint8)

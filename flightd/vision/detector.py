@@ -74,9 +74,12 @@ class Detector:
         plane = self._plane(width, height)
         grid = grid_for(width, height)
         small = sample(bgr, grid)
-        mask = _closed(grow(classify(small, self.profile)), _SPECKS)
+        levels = classify(small, self.profile)
+        mask = _closed(grow(levels), _SPECKS)
         mark("colour")
         strips = self._find(bgr, mask, grid, plane, mark)
+        if self.method != "naive":
+            strips = evidence.without_faint(strips, levels, grid, plane)
         lines = tuple(strip.to_line() for strip in strips)
         found = junctions.find(lines, mask, grid, plane)
         mark("junctions")
@@ -145,7 +148,12 @@ def _weighed(bands: list[Strip], mask: Image, grid: Grid, plane: Plane) -> list[
 
 
 def _closed(mask: Image, kernel: Image) -> Image:
-    return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel), np.uint8)
+    """The mask with its small gaps filled.  What lies outside the picture is unknown: the floor between a
+    band and the border it runs along is no gap, and does not make of the band one that the border cuts."""
+    closed = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel), np.uint8)
+    for rim in (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1]):
+        closed[rim] &= mask[rim]
+    return closed
 
 
 def _check(bgr: Image) -> None:

@@ -6,6 +6,7 @@ that a guess made from part of a band gets the band's true span, gaps included.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import cv2
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
+from flightd.vision.colour import STRONG, Levels, has_seeds
 from flightd.vision.plane import Plane, shortest_length
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, Strip
@@ -25,6 +27,9 @@ _PARTS[:6, 0] = _PARTS[6:8, 1] = _PARTS[8:, 2] = 1.0
 """Which of the points across a band lie inside it, and which on its one and other side."""
 _BOTH_SIDES = np.ones(2, np.float32)
 _PLACES = (np.arange(STATIONS) + 0.5) / STATIONS
+_FAINT_STRONG, _FAINT_FILLED, _FAINT_LENGTH = 0.12, 0.8, 0.3
+"""Less than the first part of a band is strong and less than the second weak or strong: it is faint.  One
+that is shorter than this part of the picture's diagonal is then something of a similar colour."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +169,28 @@ def is_paint_left(mask: Image, strips: list[Strip], grid: Grid, plane: Plane) ->
         corners = np.stack((grid.column(x), grid.row(y)), axis=-1)
         cv2.fillConvexPoly(left, corners, 0)
     return cv2.countNonZero(left) * grid.step >= shortest_length(plane)
+
+
+def without_faint(strips: list[Strip], levels: Levels, grid: Grid, plane: Plane) -> list[Strip]:
+    """The strips without short ones of a colour that is only like the paint's: lettering, dirt, goods.
+
+    Worn paint is strong between its holes, and what bad light leaves of a line is long.  Where next to no
+    paint is strong, that says nothing.
+    """
+    enough = _FAINT_LENGTH * math.hypot(plane.width_px, plane.height_px)
+    faint = [s for s in strips if s.length_px < enough and _is_faint(s, levels, grid, plane)]
+    return [s for s in strips if s not in faint] if faint and has_seeds(levels) else strips
+
+
+def _is_faint(strip: Strip, levels: Levels, grid: Grid, plane: Plane) -> bool:
+    u = strip.u0 + (strip.u1 - strip.u0) * _PLACES
+    width = strip.high.a - strip.low.a + (strip.high.b - strip.low.b) * u
+    v = (strip.centre.a + strip.centre.b * u)[:, None] + width[:, None] * _INSIDE
+    steep = np.full((1, 1), strip.steep)
+    marked, seen = _look_up(levels, grid, plane, steep, u[:, None], v)
+    strong, _ = _look_up((levels == STRONG).view(np.uint8), grid, plane, steep, u[:, None], v)
+    count = max(float(seen.sum()), 1.0)
+    return bool(strong.sum() < _FAINT_STRONG * count and marked.sum() < _FAINT_FILLED * count)
 
 
 def _explained(strip: Strip, others: list[Strip]) -> float:

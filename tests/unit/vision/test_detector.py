@@ -90,6 +90,12 @@ def test_parallel_lines_are_told_apart(method: str) -> None:
     assert_found(Detector(method).detect(draw(bands)), bands, RHO_PX[method], THETA_DEG[method])
 
 
+@pytest.mark.parametrize("gap_px", [3, 5])
+def test_a_line_along_the_border_is_found_with_both_its_edges(gap_px: int) -> None:
+    band = Band(180.0 - gap_px - 13.0, math.pi / 2, 26.0, -200.0, 150.0)
+    assert_found(Detector().detect(draw([band])), [band])
+
+
 @pytest.mark.parametrize("theta_deg", [0.0, 30.0, 45.0])
 def test_crossing_lines_are_both_found_with_their_crossing(theta_deg: float) -> None:
     theta = math.radians(theta_deg)

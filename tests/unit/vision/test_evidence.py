@@ -9,6 +9,7 @@ import pytest
 
 from flightd.core.types import Image
 from flightd.vision import centroid, evidence
+from flightd.vision.colour import STRONG, WEAK, Levels
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
 from tests.unit.vision.drawing import Band, coverage, grid
@@ -35,3 +36,37 @@ def test_specks_are_no_paint_left() -> None:
     mask = mask_of([])
     mask[50:54, 60:64] = 255
     assert not evidence.is_paint_left(mask, [], GRID, PLANE)
+
+
+def levels_of(short: Band, level: int, filled: float, long: int = STRONG) -> Levels:
+    """A band of level `long` across the picture, and a short one beside it of which a part is `level`."""
+    painted = np.random.default_rng(5).random((240, 320)) < filled
+    levels: Levels = np.where(mask_of([short]) > 0, painted * level, 0).astype(np.uint8)
+    levels[mask_of([Band(-90.0, 0.2, 12.0)]) > 0] = long
+    return levels
+
+
+@pytest.mark.parametrize(
+    ("level", "filled", "half_px", "kept"),
+    [
+        (WEAK, 0.6, 45.0, False),  # lettering
+        (STRONG, 0.6, 45.0, True),  # worn
+        (WEAK, 1.0, 45.0, True),  # in shadow
+        (WEAK, 0.6, 90.0, True),  # as long as a line
+    ],
+)
+def test_a_short_patchy_band_of_a_similar_colour_is_no_line(
+    level: int, filled: float, half_px: float, kept: bool
+) -> None:
+    short = Band(40.0, 0.2, 16.0, -half_px, half_px)
+    strips = centroid.find(mask_of([Band(-90.0, 0.2, 12.0), short]), GRID, PLANE)
+    left = evidence.without_faint(strips, levels_of(short, level, filled), GRID, PLANE)
+    assert (len(strips), len(left)) == (2, 1 + kept)
+
+
+def test_where_nothing_is_strong_weak_bands_are_lines() -> None:
+    short = Band(40.0, 0.2, 16.0, -45.0, 45.0)
+    strips = centroid.find(mask_of([short]), GRID, PLANE)
+    levels = levels_of(short, WEAK, 0.6, long=WEAK)
+    assert len(strips) == 1
+    assert evidence.without_faint(strips, levels, GRID, PLANE) == strips
