@@ -278,10 +278,10 @@ class Config(Section):
 
     def scan_params(self, highest_m: float) -> ScanParams:
         """How shelves are scanned, never above `highest_m`.  Facing the shelf, the picture's side that lies
-        across the nose sees along the aisle: three quarters of what it sees are kept to."""
+        across the nose sees along the aisle: half of that is kept to, the rest is for drift and tilt."""
         camera = self.camera
         half = min(camera.width_px / camera.fx_px, camera.height_px / camera.fy_px) / 2
-        return self.scan.params(highest_m, 0.75 * half)
+        return self.scan.params(highest_m, 0.5 * half)
 
     def _localiser(self) -> LocaliserParams:
         """What the down camera surely sees of the floor, at full tilt too."""

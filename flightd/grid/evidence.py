@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.geometry import Matrix
-from flightd.grid.paint import AxisLines, Features
+from flightd.grid.paint import Features
 
 Indices: TypeAlias = NDArray[np.int64]
 Flags: TypeAlias = NDArray[np.bool_]
@@ -49,20 +49,24 @@ class SensorModel:
     """A marker or label hangs somewhere else."""
 
 
-def line_likelihood(
-    model: SensorModel, lines: AxisLines, residual_m: Matrix, sigma_m: Matrix, covered: Flags
-) -> Matrix:
-    """p(a line is seen there) for (N, L) residuals to each map line, where `covered` says that the line
-    has paint in that part: a mixture of the exact, the rough and the false observation."""
-    if not len(lines.at_m):
-        return np.full(len(residual_m), model.false_line_per_m)
+def line_density(model: SensorModel, residual_m: Matrix, sigma_m: Matrix) -> Matrix:
+    """p(a painted line is seen there) for (N, L) residuals to each map line, (N) sigmas: a mixture of the
+    exact and the rough observation."""
     spread = np.hypot(sigma_m, model.survey_m)[:, None]
     exact = np.exp(-0.5 * (residual_m / spread) ** 2) / (spread * math.sqrt(math.tau))
     wide = np.hypot(spread, model.rough_m)
     rough = np.exp(-0.5 * (residual_m / wide) ** 2) / (wide * math.sqrt(math.tau))
-    density = (1.0 - model.rough_share) * exact + model.rough_share * rough
+    density: Matrix = model.line_seen * ((1.0 - model.rough_share) * exact + model.rough_share * rough)
+    return density
+
+
+def line_likelihood(model: SensorModel, density: Matrix, covered: Flags) -> Matrix:
+    """p(a line is seen there) of (N, L) densities for each map line, where `covered` says that the line has
+    paint in that part: the likeliest of them, or a false line."""
+    if not density.shape[1]:
+        return np.full(len(density), model.false_line_per_m)
     seen: Matrix = np.where(covered, density, 0.0).max(axis=1)
-    result: Matrix = model.line_seen * seen + model.false_line_per_m
+    result: Matrix = seen + model.false_line_per_m
     return result
 
 

@@ -13,15 +13,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from flightd.core.geometry import Matrix
-from flightd.grid.evidence import Flags, Indices, SensorModel, line_likelihood
+from flightd.grid.evidence import Flags, Indices, SensorModel, line_density, line_likelihood
 from flightd.grid.paint import AxisLines, PaintMap
 from flightd.tracking.motion import TrackedLine
 
 _FAR_M = 1e7
 _DRIFT_MPS = 0.15
 """Growth of a position's sigma while no line is seen."""
-_MATCH_SHARE = 0.4
-"""A track is matched within this share of the distance to the next map line (0.5 would be ambiguous)."""
+_RIVAL = 0.01
+"""Another map line is considered too where it explains the track so well, against the nearest one."""
 _MATCH_SIGMAS = 4.0
 _MATCH_SLACK_M = 0.06
 _SURVEY_SIGMA_M = 0.01
@@ -109,8 +109,8 @@ class Places:
     def match(self, axis: int, track: TrackedLine, reach_m: float, judge: bool) -> None:
         """Say at each place which painted line the track is; `judge` also weighs the places by it.
 
-        A match that moves a place by more than `_SAME_M` is in doubt: the line may be a false one.  Both are
-        kept, the place that is moved by it and one that stays and takes the line for none of the map."""
+        A match that moves a place by more than `_SAME_M` is in doubt: the line may be a false one, or the
+        next of the map.  Beside the place that is moved to the nearest line one is kept for either."""
         lines = self._paint.axes[axis]
         matches = self._matches[axis]
         index = matches.setdefault(track.id, np.full(len(self), _UNMATCHED, dtype=np.int64))
@@ -123,36 +123,51 @@ class Places:
         apart = np.where(covered, np.abs(residual), np.inf)
         best = apart.argmin(axis=1)
         found = apart[rows, best]
-        told = line_likelihood(self._model, lines, residual, sigma, covered)
+        density = np.where(covered, line_density(self._model, residual, sigma), 0.0)
+        told = line_likelihood(self._model, density, covered)
         if judge:
-            factors = told
             again = self._missed[axis][rows, best] & (found < _SAME_M)
-            factors = np.where(again, factors / (1.0 - self._model.line_seen), factors)
+            factors = np.where(again, told / (1.0 - self._model.line_seen), told)
             factors[0] = self._model.elsewhere_line_per_m
             self.weigh(factors)
         other = np.abs(lines.at_m[None, :] - lines.at_m[best][:, None])
-        gap = np.where(covered & (other > 1e-6), other, np.inf).min(axis=1)
-        gate = np.minimum(_MATCH_SHARE * gap, _MATCH_SIGMAS * sigma + _MATCH_SLACK_M)
-        taken = np.zeros(len(self), dtype=bool)
+        gate = _MATCH_SIGMAS * sigma + _MATCH_SLACK_M
+        taken = np.zeros((len(self), len(lines.at_m)), dtype=bool)
         for id_, already in matches.items():
             if id_ != track.id:
-                taken |= (already >= 0) & (lines.at_m[already] == lines.at_m[best])
-        new = (index == _UNMATCHED) & (found <= gate) & ~taken
-        doubtful = np.flatnonzero(new & (found > _SAME_M))
-        doubtful = doubtful[self.weights[doubtful] > _NEGLIGIBLE]
+                taken |= (already >= 0)[:, None] & (lines.at_m[already][:, None] == lines.at_m[None, :])
+        new = (index == _UNMATCHED) & (found <= gate) & ~taken[rows, best]
+        moved = np.flatnonzero(new & (found > _SAME_M) & (self.weights > _NEGLIGIBLE))
         index[new] = best[new]
         self._known[axis][new] |= other[new] <= 1e-6  # every piece of that line
-        if len(doubtful):
-            self._branch(axis, track.id, doubtful, self._model.false_line_per_m / told[doubtful], other)
+        if not len(moved):
+            return
+        rival = np.where(other > 1e-6, density, 0.0)[moved]
+        second = rival.argmax(axis=1)
+        share = rival[np.arange(len(moved)), second] / told[moved]
+        share[taken[moved, second] | (share < _RIVAL)] = 0.0
+        self._branch(axis, track.id, moved, self._model.false_line_per_m / told[moved], second, share)
 
-    def _branch(self, axis: int, track_id: int, rows: Indices, false_share: Matrix, other_m: Matrix) -> None:
-        """Beside each of these places put its like to which the line just matched is none of the map."""
-        twins = np.arange(len(self), len(self) + len(rows))
-        self._take(np.concatenate([np.arange(len(self)), rows]))
-        self.weights[twins] *= false_share
-        self.weights[rows] *= 1.0 - false_share
-        self._matches[axis][track_id][twins] = _FALSE
-        self._known[axis][twins] &= other_m[rows] > 1e-6
+    def _branch(
+        self, axis: int, track_id: int, rows: Indices, false: Matrix, second: Indices, rival: Matrix
+    ) -> None:
+        """Beside each of these places put its like to which the line just matched is none of the map, with
+        the share `false` of its weight, and where `rival` is not 0 one to which it is the line `second`."""
+        at_m = self._paint.axes[axis].at_m
+        also = np.flatnonzero(rival)
+        size, parents = len(self), np.concatenate([rows, rows[also]])
+        shares = np.concatenate([false, rival[also]])
+        lines = np.concatenate([np.full(len(rows), _FALSE), second[also]])
+        first = self._matches[axis][track_id][parents]
+        known = self._known[axis][parents] & (at_m[None, :] != at_m[first][:, None])
+        known |= (lines >= 0)[:, None] & (at_m[None, :] == at_m[lines][:, None])
+        weights = self.weights[parents] * shares
+        self.weights[rows] *= 1.0 - false
+        self._take(np.concatenate([np.arange(size), parents]))
+        self.weights[size:] = weights
+        self._matches[axis][track_id][size:] = lines
+        self._known[axis][size:] = known
+        self.weights /= self.weights.sum()
 
     def _covered(self, axis: int, lines: AxisLines, track: TrackedLine, reach_m: float) -> Flags:
         """(N, L): the map line has paint where the track was seen; by the drone's own place and `reach_m`

@@ -76,6 +76,17 @@ def test_without_lines_the_doubt_grows() -> None:
     assert later.covariance[0] > 1.0
 
 
+def test_after_a_long_gap_a_line_between_two_is_held_for_either_until_the_next_one_tells() -> None:
+    localiser, gap = GridLocaliser(SITE, "A1"), A2.x_m - A1.x_m
+    localiser.step(tracks(1, [line(0, 0.0)], [line(0, 0.0)]), 1.6)
+    localiser.step(tracks(401, [], [line(0, 0.0)]), 1.6)
+    shift = 0.45 * gap  # it drifted back, unseen, by nearly half a cell
+    pose = localiser.step(tracks(402, [line(1, shift)], [line(0, 0.0)]), 1.6)
+    assert pose.integrity < 0.95
+    pose = localiser.step(tracks(403, [line(1, shift), line(2, shift + gap)], [line(0, 0.0)]), 1.6)
+    assert abs(pose.x_m - A1.x_m + shift) < 0.05
+
+
 def test_what_the_lines_ahead_look_like_makes_it_sure() -> None:
     localiser, gap = GridLocaliser(SITE, "A1"), A2.x_m - A1.x_m
     for tick in range(1, 150):
