@@ -98,13 +98,13 @@ class FlightController:
         """Come to rest by the velocity alone (`reckoned`: it is known), then lean only against the steady
         push as it was last known (grid axes), at most `_TRIM_MPS2`; straight, height held."""
         gains = self._gains.horizontal
-        trim = gains.output_limit if reckoned else _TRIM_MPS2
+        most = gains.output_limit
+        trim = most if reckoned else _TRIM_MPS2
         ax, ay = (-min(max(push, -trim), trim) for push in push_mps2)
         moving = (motion.vx_mps, motion.vy_mps, motion.yaw_rad)
         if not all(map(math.isfinite, moving)):
             return self.level(now_ns, motion, reference, dt_s)
         if reckoned:
-            most = gains.output_limit
             ax = min(max(ax - gains.kd * motion.vx_mps, -most), most)
             ay = min(max(ay - gains.kd * motion.vy_mps, -most), most)
         cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)

@@ -44,29 +44,24 @@ class SensorModel:
     end_false: float = 0.02
     end_strange: float = 0.3
     """A line that is none of the map ends just there: it may end anywhere."""
+    mat_found: float = 0.95
+    mat_strange: float = 0.05
+    """A mat lies where the map has none: it was pushed away, or is none."""
+    mat_gate_m: float = 0.5
     feature_gate_m: float = 0.25
     fix_tail: float = 1e-4
     """A marker or label hangs somewhere else."""
 
 
-def line_density(model: SensorModel, residual_m: Matrix, sigma_m: Matrix) -> Matrix:
+def line_density(model: SensorModel, residual_m: Matrix, sigma_m: Matrix, covered: Flags) -> Matrix:
     """p(a painted line is seen there) for (N, L) residuals to each map line, (N) sigmas: a mixture of the
-    exact and the rough observation."""
+    exact and the rough observation, 0 where the line is not `covered` with paint in that part."""
     spread = np.hypot(sigma_m, model.survey_m)[:, None]
     exact = np.exp(-0.5 * (residual_m / spread) ** 2) / (spread * math.sqrt(math.tau))
     wide = np.hypot(spread, model.rough_m)
     rough = np.exp(-0.5 * (residual_m / wide) ** 2) / (wide * math.sqrt(math.tau))
-    density: Matrix = model.line_seen * ((1.0 - model.rough_share) * exact + model.rough_share * rough)
-    return density
-
-
-def line_likelihood(model: SensorModel, density: Matrix, covered: Flags) -> Matrix:
-    """p(a line is seen there) of (N, L) densities for each map line, where `covered` says that the line has
-    paint in that part: the likeliest of them, or a false line."""
-    if not density.shape[1]:
-        return np.full(len(density), model.false_line_per_m)
-    seen: Matrix = np.where(covered, density, 0.0).max(axis=1)
-    result: Matrix = seen + model.false_line_per_m
+    density = model.line_seen * ((1.0 - model.rough_share) * exact + model.rough_share * rough)
+    result: Matrix = np.where(covered, density, 0.0)
     return result
 
 
@@ -90,6 +85,14 @@ def end_likelihood(model: SensorModel, ends: Features, at_m: Matrix, arms: int, 
         distance = np.full(len(at_m), math.inf)
     unexpected = np.where(strange, model.end_strange, model.end_false)
     result: Matrix = np.where(~strange & (distance < model.feature_gate_m), model.end_found, unexpected)
+    return result
+
+
+def mat_likelihood(model: SensorModel, mats_m: Matrix, at_m: Matrix) -> Matrix:
+    """p(a pad's mat lies there) at (N, 2) points, for (M, 2) mats of the map."""
+    apart = np.hypot(mats_m[None, :, 0] - at_m[:, None, 0], mats_m[None, :, 1] - at_m[:, None, 1])
+    near = (apart < model.mat_gate_m).any(axis=1)
+    result: Matrix = np.where(near, model.mat_found, model.mat_strange)
     return result
 
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from flightd.core.geometry import Matrix
-from flightd.grid.evidence import Flags, Indices, SensorModel, line_density, line_likelihood
+from flightd.grid.evidence import Flags, Indices, SensorModel, line_density
 from flightd.grid.paint import AxisLines, PaintMap
 from flightd.tracking.motion import TrackedLine
 
@@ -123,13 +123,6 @@ class Places:
         apart = np.where(covered, np.abs(residual), np.inf)
         best = apart.argmin(axis=1)
         found = apart[rows, best]
-        density = np.where(covered, line_density(self._model, residual, sigma), 0.0)
-        told = line_likelihood(self._model, density, covered)
-        if judge:
-            again = self._missed[axis][rows, best] & (found < _SAME_M)
-            factors = np.where(again, told / (1.0 - self._model.line_seen), told)
-            factors[0] = self._model.elsewhere_line_per_m
-            self.weigh(factors)
         other = np.abs(lines.at_m[None, :] - lines.at_m[best][:, None])
         gate = _MATCH_SIGMAS * sigma + _MATCH_SLACK_M
         taken = np.zeros((len(self), len(lines.at_m)), dtype=bool)
@@ -137,6 +130,15 @@ class Places:
             if id_ != track.id:
                 taken |= (already >= 0)[:, None] & (lines.at_m[already][:, None] == lines.at_m[None, :])
         new = (index == _UNMATCHED) & (found <= gate) & ~taken[rows, best]
+        if not (judge or new.any()):
+            return
+        density = line_density(self._model, residual, sigma, covered)
+        told = density.max(axis=1) + self._model.false_line_per_m
+        if judge:
+            again = self._missed[axis][rows, best] & (found < _SAME_M)
+            factors = np.where(again, told / (1.0 - self._model.line_seen), told)
+            factors[0] = self._model.elsewhere_line_per_m
+            self.weigh(factors)
         moved = np.flatnonzero(new & (found > _SAME_M) & (self.weights > _NEGLIGIBLE))
         index[new] = best[new]
         self._known[axis][new] |= other[new] <= 1e-6  # every piece of that line

@@ -173,8 +173,7 @@ class Mission:
 
     def _situation(self, paused: bool) -> Situation:
         if self.phase is Phase.FOLLOW:
-            dx, dy = self.goal.x_m - self._steering.anchor[0], self.goal.y_m - self._steering.anchor[1]
-            self._leg_along_x = abs(dx) >= abs(dy)
+            self._leg_along_x = self._leads_along_x()
         elif self.phase not in _STOPPED:
             self._leg_along_x = None
         return Situation(self.airborne, paused, self._leg_along_x, self.phase is Phase.HOLD)
@@ -312,19 +311,21 @@ class Mission:
             self.reason = f"{self._cause}: {s.vehicle.refusal}" if refused and s.vehicle else self._cause
         return guidance
 
-    def _crossing_over(self) -> bool:
-        """The leg leads to another aisle: from a shelf's lowest level neither aisle's line would be seen."""
+    def _leads_along_x(self) -> bool:
+        """The way to the goal is along its aisle, not from one aisle to another."""
         goal, (x_m, y_m) = self.goal, self._steering.anchor
-        return abs(goal.y_m - y_m) > abs(goal.x_m - x_m)
+        return abs(goal.x_m - x_m) >= abs(goal.y_m - y_m)
 
     def _task(self, now_ns: int) -> Task:
         route = self._route
+        # from a shelf's lowest level neither aisle's line would be seen on the way to another aisle
+        cruise = route.returning or not route.goal.visit or not self._leads_along_x()
         return Task(
             phase=self.phase,
             phase_s=self._progress.phase_s(now_ns),
             goal=route.goal,
             view=self._scan.view(self.phase),
-            cruise=route.returning or not route.goal.visit or self._crossing_over(),
+            cruise=cruise,
             on_pad=self._on_pad_leg,
             stopped=self._stopped,
             unknown=self._found_flying,

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 import msgspec
 
 from flightd.core.errors import InputError
 
 VERSION = 1
+
+_T = TypeVar("_T")
 
 
 class FrameNotice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -44,10 +47,7 @@ def encode_notice(notice: FrameNotice) -> bytes:
 
 def decode_notice(datagram: bytes) -> FrameNotice:
     """Raises InputError for anything that is not a notice of this version."""
-    try:
-        notice = _DECODER.decode(datagram)
-    except (msgspec.DecodeError, msgspec.ValidationError, UnicodeDecodeError) as err:
-        raise InputError(f"not a picture notice: {err}") from err
+    notice = _decoded(_DECODER, datagram, "a picture notice")
     if notice.version != VERSION:
         raise InputError(f"picture notice of version {notice.version}, this is version {VERSION}")
     if not _is_part(notice.exposure):
@@ -61,13 +61,17 @@ def encode_request(request: ExposureRequest) -> bytes:
 
 def decode_request(datagram: bytes) -> ExposureRequest:
     """Raises InputError for anything that is not a request of this version."""
-    try:
-        request = _REQUESTS.decode(datagram)
-    except (msgspec.DecodeError, msgspec.ValidationError, UnicodeDecodeError) as err:
-        raise InputError(f"not an exposure request: {err}") from err
+    request = _decoded(_REQUESTS, datagram, "an exposure request")
     if request.version != VERSION or not _is_part(request.exposure):
         raise InputError(f"not an exposure request: version {request.version}, {request.exposure}")
     return request
+
+
+def _decoded(decoder: msgspec.json.Decoder[_T], datagram: bytes, what: str) -> _T:
+    try:
+        return decoder.decode(datagram)
+    except (msgspec.DecodeError, msgspec.ValidationError, UnicodeDecodeError) as err:
+        raise InputError(f"not {what}: {err}") from err
 
 
 def _is_part(exposure: float) -> bool:

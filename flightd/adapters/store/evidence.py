@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from flightd.core.errors import UnavailableError
+from flightd.runtime.durable import replace_file, sync_folder
 from flightd.vision.small_jpeg import MOST_BYTES, picture_name
 
 
@@ -32,13 +33,8 @@ class EvidenceFolder:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             part = target.with_name(f"{name}.{os.getpid()}.part")
-            with part.open("wb") as file:
-                file.write(jpeg)
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(target)
-            for folder in (target.parent, self._folder):
-                _sync(folder)
+            replace_file(target, part, jpeg)
+            sync_folder(self._folder)
         except OSError as err:
             raise UnavailableError(f"{target}: cannot keep the picture: {err.strerror or err}") from err
         return name
@@ -47,12 +43,3 @@ class EvidenceFolder:
         """Take away what a power cut left half written."""
         for part in self._folder.glob("*/*.part"):
             part.unlink(missing_ok=True)
-
-
-def _sync(folder: Path) -> None:
-    # a new name is safe only once its folder is
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

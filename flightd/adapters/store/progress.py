@@ -9,13 +9,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import os
 import threading
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from flightd.core.errors import InputError, TransientError
 from flightd.grid.site import Site
+from flightd.runtime.durable import replace_file
 from flightd.runtime.latest import Latest
 
 
@@ -90,15 +90,6 @@ class ProgressFile:
         beside = self._path.with_suffix(self._path.suffix + ".new")
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            with beside.open("w", encoding="utf-8") as file:
-                file.write(text + "\n")
-                file.flush()
-                os.fsync(file.fileno())
-            beside.replace(self._path)
-            folder = os.open(self._path.parent, os.O_RDONLY)
-            try:
-                os.fsync(folder)
-            finally:
-                os.close(folder)
+            replace_file(self._path, beside, f"{text}\n".encode())
         except OSError as err:
             raise TransientError(f"progress {self._path}: {err.strerror or err}") from err

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.core.errors import InputError
 from flightd.ports import Clock
+from flightd.runtime.durable import replace_file
 
 KEY_BYTES = 32
 
@@ -165,21 +166,8 @@ def _keep(state: Path | None, timestamp: int) -> None:
     with contextlib.suppress(OSError):
         fd, name = tempfile.mkstemp(dir=state.parent, prefix=state.name)
         try:
-            with os.fdopen(fd, "w", encoding="ascii") as out:
-                out.write(str(timestamp))
-                out.flush()
-                os.fsync(out.fileno())
-            Path(name).replace(state)
-            _sync_folder(state.parent)
+            os.close(fd)
+            replace_file(state, Path(name), str(timestamp).encode("ascii"))
         except OSError:
             Path(name).unlink()  # else a full disk gathers one each half minute
             raise
-
-
-def _sync_folder(folder: Path) -> None:
-    """A new name in a folder is on the disk only once the folder is."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
