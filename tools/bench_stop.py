@@ -17,6 +17,7 @@ import random
 import socket
 import statistics
 import struct
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,9 @@ class ShiftedClock:
 
     def set(self, now_ns: int) -> None:
         self._shift_ns = now_ns - self._clock.now_ns()
+
+    def hold(self) -> AbstractContextManager[None]:
+        return self._clock.hold()
 
 
 class UdpVehicle:
@@ -98,7 +102,8 @@ def _flying() -> tuple[Pilot, int, VehicleState]:
     """A pilot amid a leg, its time and what it last heard from the vehicle."""
     site = load_site(CONFIGS / "site-demo.toml")
     flight = IdealFlight(site, load_config(CONFIGS / "sim.toml").pilot_params(site), visits=("A4",))
-    step, last = flight.pilot.step, []
+    step = flight.pilot.step
+    last: list[TickInput] = []
 
     def watch(tick: TickInput) -> Any:
         last[:] = [tick]
@@ -107,7 +112,7 @@ def _flying() -> tuple[Pilot, int, VehicleState]:
     flight.pilot.step = watch  # type: ignore[method-assign]
     while flight.pilot.mission.phase is not Phase.FOLLOW or flight.airframe.x_m < 1.0:
         flight.fly(1.0)
-    del flight.pilot.step  # type: ignore[attr-defined]
+    del flight.pilot.step
     vehicle = last[0].vehicle
     assert vehicle is not None
     return flight.pilot, last[0].now_ns, vehicle

@@ -38,6 +38,7 @@ def main() -> None:
     parser.add_argument("--layout", choices=LAYOUTS, help="arrangement (default: drawn by seed)")
     parser.add_argument("--masks", action="store_true", help="write each frame's paint mask (for training)")
     wanted = parser.parse_args()
+    width_px, height_px = wanted.size
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal) as progress:
         task = progress.add_task(f"{wanted.level} frames", total=wanted.count)
@@ -46,7 +47,8 @@ def main() -> None:
             wanted.level,
             wanted.count,
             wanted.seed,
-            *wanted.size,
+            width_px,
+            height_px,
             colour=wanted.colour,
             layout=wanted.layout,
             masks=wanted.masks,

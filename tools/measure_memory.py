@@ -86,7 +86,7 @@ def main() -> None:
             missions += 1
             flight = IdealFlight(site, config.pilot_params(site), seed=missions)
             flight.pilot = pilot_of(config, site)
-            flight.pilot.step = watched.around(flight.pilot.step)  # type: ignore[method-assign]
+            flight.pilot.step = watched.around(flight.pilot.step)  # type: ignore[method-assign, assignment]
             flight.fly()
             flown_s = watched.ticks * 0.02
             del flight
