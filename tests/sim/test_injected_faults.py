@@ -112,6 +112,18 @@ def test_battery_and_clock_jump_as_told(in_flight: Any) -> None:
     in_flight(test)
 
 
+def test_the_range_finder_measures_on_when_the_clock_jumps_back(in_flight: Any) -> None:
+    async def test(rig: Rig, turn: Any) -> None:
+        turn(True, kind="clock_jump", jump_s=100.0)
+        await rig.stream(2.0)
+        turn(False, kind="clock_jump", jump_s=100.0)
+        await rig.stream(3.0, climb_mps=0.3)
+        assert rig.peer.truth().height_m > 2.0
+        assert rig.known().height_m == pytest.approx(rig.peer.truth().height_m, abs=0.2)
+
+    in_flight(test)
+
+
 def test_a_pilot_takes_it_and_lands_it(in_flight: Any) -> None:
     async def test(rig: Rig, turn: Any) -> None:
         turn(True, kind="pilot")

@@ -178,11 +178,12 @@ class AutopilotPeer(abc.ABC):
     def jump_clock(self, jump_ns: int) -> None:
         """The boot clock goes on from elsewhere; streams keep their rates."""
         self._boot_ns -= jump_ns
+        self.instruments.clock_changed()
 
     def reboot(self) -> None:
         """Power cycle: the boot clock starts again, streams are forgotten, motors stop."""
         self._boot_ns = self._now_ns
-        self.instruments.reboot()
+        self.instruments.clock_changed()
         for channel in self.link.channels.values():
             channel.intervals_ns.clear()
             channel.due_ns.clear()

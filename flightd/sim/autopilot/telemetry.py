@@ -43,7 +43,7 @@ class Instruments:
         self.healthy = False
         self.landed_state = LANDED_GROUND
         self._range_m = 0.0
-        self._ranged_ms = -_RANGE_PERIOD_MS
+        self._ranged_ms = -math.inf
         self._builders: dict[int, Callable[[], Message]] = {
             dialect.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
             dialect.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
@@ -67,8 +67,9 @@ class Instruments:
         """The message with the present readings; KeyError for one it does not know."""
         return self._builders[message_id]()
 
-    def reboot(self) -> None:
-        self._ranged_ms = -_RANGE_PERIOD_MS
+    def clock_changed(self) -> None:
+        """The boot clock goes on from elsewhere: the range finder measures anew whatever it says."""
+        self._ranged_ms = -math.inf
 
     def _attitude(self) -> Message:
         sensors, airframe = self._sensors, self._airframe
