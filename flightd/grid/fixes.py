@@ -1,4 +1,4 @@
-"""Things of known place that the drone sees, each told once: floor markers and shelf labels.
+"""Things of known place that the drone sees, each told once: floor markers, pads' mats and shelf labels.
 
 A marker that lies wrong lies wrong in every frame, so that only its first sight says anything; it may speak
 again when the drone has been away.
@@ -10,8 +10,11 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
-from flightd.grid.site import Marker, Site
-from flightd.tracking.lines import MarkerOffset
+import numpy as np
+
+from flightd.core.geometry import Matrix
+from flightd.grid.site import Marker, PadSign, Site
+from flightd.tracking.lines import MarkerOffset, PadOffset
 
 _AWAY_M = 2.0
 _FRAMES = 3
@@ -24,7 +27,9 @@ class FixBook:
 
     def __init__(self, site: Site) -> None:
         self._markers = {marker.id: marker for marker in site.markers}
+        self._mats = [(*site.pad_centre(pad), pad.size_m) for pad in site.pads if pad.sign is PadSign.MAT]
         self._frames: Counter[int] = Counter()
+        self._mat_frames = 0
         self._told: dict[str, tuple[float, float]] = {}
 
     def shift(self, dx_m: float, dy_m: float) -> None:
@@ -55,3 +60,17 @@ class FixBook:
                 self._frames[sight.id] = 0
                 sure.append((marker, sight))
         return sure
+
+    def mat(self, seen: Sequence[PadOffset], x_m: float, y_m: float) -> tuple[PadOffset, Matrix] | None:
+        """Take one frame's mats; the one that has become sure with it, and where the map has those (M, 2) of
+        its size.  They look alike: it tells that the drone is at one of them, not at which."""
+        alike = [(sight, self._mats_like(sight)) for sight in seen]
+        known = next(((sight, mats_m) for sight, mats_m in alike if len(mats_m)), None)
+        self._mat_frames = self._mat_frames + 1 if known else 0
+        if self._mat_frames < _FRAMES or not self.is_new("mat", x_m, y_m):
+            return None
+        return known
+
+    def _mats_like(self, sight: PadOffset) -> Matrix:
+        fits = [(x, y) for x, y, side_m in self._mats if abs(sight.side_m - side_m) <= _SIZE_SHARE * side_m]
+        return np.array(fits, dtype=np.float64).reshape(-1, 2)

@@ -11,7 +11,8 @@ at each new node, much more after a gap without lines, so that no belief is ever
 
 Likelihoods (`flightd.grid.evidence`).  Each observation counts once: a line seen where the map has one,
 or none; a painted line that passed below and was not seen; the arms of a crossing (cross, tee, corner);
-the end of a line, seen or not where it should be; a floor marker or a shelf label of known place.
+the end of a line, seen or not where it should be; a pad's mat; a floor marker or a shelf label of known
+place.
 
 `GridPose.integrity` is the posterior probability that the node told is the right one.  The recursion is
 the discrete Bayes filter of Thrun, Burgard, Fox: Probabilistic Robotics, 2005, table 4.1.
@@ -26,7 +27,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.core.types import GridPose
-from flightd.grid.evidence import SensorModel, crossing_likelihood, end_likelihood, fix_likelihood
+from flightd.grid.evidence import (
+    SensorModel,
+    crossing_likelihood,
+    end_likelihood,
+    fix_likelihood,
+    mat_likelihood,
+)
 from flightd.grid.fixes import FixBook
 from flightd.grid.landmarks import Landmark, LandmarkBook
 from flightd.grid.nodes import NodeIndex
@@ -215,6 +222,9 @@ class GridLocaliser:
             self._weigh_mark(mark, tracks)
         for known, seen in self._fixes.markers(tracks.markers, float(here[0]), float(here[1])):
             self.marker((known.x_m, known.y_m), seen.x_m, seen.y_m)
+        if sure := self._fixes.mat(tracks.pads, float(here[0]), float(here[1])):
+            mat, mats_m = sure
+            places.weigh(mat_likelihood(self._model, mats_m, places.at_m + np.array([mat.x_m, mat.y_m])))
 
     def _weigh_mark(self, mark: Landmark, tracks: TrackSet) -> None:
         places = self._places

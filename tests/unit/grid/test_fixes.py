@@ -8,7 +8,7 @@ from flightd.core.types import GridPose
 from flightd.grid.layout import lay_out
 from flightd.grid.localise import GridLocaliser, LocaliserParams
 from flightd.grid.site import Aisle, Marker, Pad, Site
-from flightd.tracking.lines import MarkerOffset, TrackSet
+from flightd.tracking.lines import MarkerOffset, PadOffset, TrackSet
 from flightd.tracking.motion import TrackedLine
 
 TICK_NS = 20_000_000
@@ -46,9 +46,16 @@ MARKED = lay_out(
 class Hover:
     """A drone that hangs over a crossing for as long as it is asked to."""
 
-    def __init__(self, site: Site, markers: tuple[MarkerOffset, ...] = ()) -> None:
-        self.localiser = GridLocaliser(site, "A3", SURE)
+    def __init__(
+        self,
+        site: Site,
+        markers: tuple[MarkerOffset, ...] = (),
+        pads: tuple[PadOffset, ...] = (),
+        params: LocaliserParams = SURE,
+    ) -> None:
+        self.localiser = GridLocaliser(site, "A3", params)
         self.markers = markers
+        self.pads = pads
         self.tick = 0
 
     def look(self, ticks: int) -> GridPose:
@@ -58,7 +65,7 @@ class Hover:
             line = TrackedLine(0, 0.0, 0.01, 0.075, stamp, 10)
             seen = TrackSet(
                 stamp, stamp, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0, (line,), (line,),
-                junctions_ns=stamp, markers=self.markers,
+                junctions_ns=stamp, markers=self.markers, pads=self.pads,
             )  # fmt: skip
             pose = self.localiser.step(seen, HEIGHT_M)
         return pose
@@ -110,3 +117,20 @@ def test_a_marker_of_another_node_makes_doubt_and_one_in_its_place_none() -> Non
 def test_what_is_no_marker_of_the_map_says_nothing() -> None:
     strange = Hover(MARKED, (MarkerOffset(9, 0.3, 0.3, 0.2), MarkerOffset(5, 0.3, 0.3, 0.5)))
     assert strange.look(30).integrity > 0.99
+
+
+def test_among_nodes_that_look_alike_the_pads_mat_tells_where_a_flight_starts() -> None:
+    doubts = LocaliserParams()
+    assert Hover(RACKS, params=doubts).look(50).integrity < 0.95
+    on_it = Hover(RACKS, pads=(PadOffset(0.1, -0.05, 0.5),), params=doubts).look(50)
+    assert (on_it.node, on_it.integrity > 0.98) == ("A3", True)
+
+
+def test_no_mat_of_the_map_says_nothing_and_one_at_another_node_makes_doubt() -> None:
+    doubts = LocaliserParams()
+    without = Hover(RACKS, params=doubts).look(50).integrity
+    larger = Hover(RACKS, pads=(PadOffset(0.1, 0.0, 0.9),), params=doubts).look(50)
+    assert larger.integrity == without
+    aside = Hover(RACKS, pads=(PadOffset(1.3, 0.0, 0.5),), params=doubts)
+    assert aside.look(50).integrity < without
+    assert aside.localiser.rivals()[0][0] in ("A2", "A3")
