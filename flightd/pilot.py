@@ -38,6 +38,7 @@ from flightd.mission.scanner import Scanner
 from flightd.tracking.height import HeightHistory
 from flightd.tracking.lines import LineTracker, TrackerParams, TrackSet
 from flightd.tracking.pictures import PictureWatch
+from flightd.tracking.unheard import UnheardAttitude
 
 _FRAMES_ARRIVE_S = 0.5
 _TOUCHDOWN_S = 2.0
@@ -118,6 +119,8 @@ class Pilot:
         self._yaw_rate = 0.0
         self._pictures = PictureWatch()
         self._caution = Caution(site, params.mission)
+        self._unheard = UnheardAttitude()
+        self._asked: AttitudeSetpoint | None = None
 
     @property
     def mission(self) -> Mission:
@@ -163,7 +166,7 @@ class Pilot:
         senses = replace(senses, by_pad=by_pad is not None)
         guidance = self._mission.step(senses)
         push_mps2 = (tracks.push_x_mps2, tracks.push_y_mps2) if tracks is not None else (0.0, 0.0)
-        setpoint = self._setpoint(senses, guidance, push_mps2)
+        setpoint = self._asked = self._setpoint(senses, guidance, push_mps2)
         self._caution.steered(guidance, pose)
         mission = self._mission
         findings, settled = self._scanner.drain() if self._scanner is not None else ((), ())
@@ -217,6 +220,10 @@ class Pilot:
         for sample in tick.attitudes:
             self._tracker.attitude(sample)
             self._past.add_attitude(sample)
+        heard = tick.vehicle.attitude if tick.vehicle is not None else None
+        assumed = self._unheard.step(tick.now_ns, heard, self._asked)
+        if assumed is not None:
+            self._tracker.attitude(assumed, assumed=True)
         if tick.vehicle is not None:
             v = tick.vehicle
             self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
@@ -267,7 +274,7 @@ class Pilot:
             wanted, age_s = control.level(now_ns, motion, reference, dt_s), 0.0
         elif guidance.guide is Guide.BRAKE:
             wanted = control.rest(now_ns, motion, reference, dt_s, push, reckoned=guidance.reckoned)
-            age_s = senses.telemetry_age_s
+            age_s = min(senses.telemetry_age_s, sight_s)
         else:
             wanted = control.step(now_ns, motion, reference, dt_s)
             # above the pad the mission steers on without lines: by the mat, or the motion last known

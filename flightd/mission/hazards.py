@@ -84,7 +84,8 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.TELEMETRY_STALE,
         "newest attitude older than `mission.telemetry_hold_s`",
         Action.HOLD,
-        "level, no climb; never taken for a pilot",
+        "brake by the pictures, with the attitude that was asked for; level without them; no climb; never"
+        " taken for a pilot",
         _FAST,
     ),
     Hazard(
@@ -92,7 +93,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.TELEMETRY_LOST,
         "newest attitude older than `mission.telemetry_land_s`",
         Action.LAND,
-        "level, the autopilot's own landing is asked for; given up 60 s later",
+        "braked or level as before, the autopilot's own landing is asked for; given up 60 s later",
         _FAST,
     ),
     Hazard(

@@ -126,9 +126,12 @@ class Steering:
         return self._height.velocity
 
     def _may_brake(self, s: Senses, task: Task) -> bool:
-        """Without a view of the floor, but with an attitude by which to reckon on from the last one."""
-        heard = s.telemetry_age_s <= self._params.telemetry_hold_s
-        known = heard and s.pose is not None and not task.unknown
+        """Without a view of the floor, but with an attitude by which to reckon on from the last one; or, the
+        other way round, with a view to brake by while the vehicle is not heard."""
+        p = self._params
+        heard = s.telemetry_age_s <= p.telemetry_hold_s
+        seen = min(s.x_age_s, s.y_age_s) <= p.lines_hold_s
+        known = (heard or seen) and s.pose is not None and not task.unknown
         return known and not task.stopped and task.phase is not Phase.TAKE_OFF
 
     def _wanted_height_m(self, task: Task) -> float:

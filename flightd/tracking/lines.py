@@ -21,6 +21,7 @@ from flightd.tracking.motion import AxisTracker, HeadingTracker, MotionNoise, Se
 from flightd.tracking.tilt import FloorView, GroundLine, TiltCompensation, ground_lines, ground_point
 
 _STEP_NS = 20_000_000
+_ASSUMED_TILT_RAD = math.radians(2.0)
 _PARALLEL_RAD = math.radians(20.0)
 _WIDTH_GAIN = 0.15
 _AGREEING, _DOUBTED = 0.15, 0.2
@@ -103,6 +104,7 @@ class LineTracker:
         self._params = params
         self._start_yaw_rad = start_yaw_rad
         self._history = AttitudeHistory()
+        self._assumed = False
         self._heading: HeadingTracker | None = None
         forget_ns = round(params.forget_s * 1e9)
         self._x = AxisTracker(params.noise, params.gate_m, forget_ns)
@@ -124,8 +126,10 @@ class LineTracker:
         """What all lines lately said against the vehicle's heading; 0 while any of them agrees."""
         return self._dispute.error_rad
 
-    def attitude(self, sample: Attitude) -> None:
+    def attitude(self, sample: Attitude, *, assumed: bool = False) -> None:
+        """Take an attitude that the vehicle told, or one that is only `assumed` while it is silent."""
         self._history.add(sample)
+        self._assumed = assumed
         if self._heading is None:
             offset = wrap_pi(self._start_yaw_rad - sample.yaw_rad)
             self._heading = HeadingTracker(offset, self._params.start_yaw_sigma_rad)
@@ -140,9 +144,8 @@ class LineTracker:
             return False
         self._advance(lines.stamp_ns)
         params = self._params
-        view = FloorView(
-            params.lens, params.mount, attitude, height_m, params.compensation, params.sigma_tilt_rad
-        )
+        sigma_tilt_rad = _ASSUMED_TILT_RAD if self._assumed else params.sigma_tilt_rad
+        view = FloorView(params.lens, params.mount, attitude, height_m, params.compensation, sigma_tilt_rad)
         low, high = (share * params.width_m for share in params.width_share)
         seen = ground_lines(lines.lines, view)
         on_floor = [line for line in seen if low <= line.width_m <= high]
