@@ -242,8 +242,8 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "overload",
         Trigger.OVERLOAD,
-        "p99 from exposure to the wire above `hazards.latency_s`, or ticks late on average by more than"
-        " 40 ms, for `hazards.overload_s`",
+        "p99 from exposure to the wire, dropped frames included, above `hazards.latency_s`, or ticks late on"
+        " average by more than 40 ms, for `hazards.overload_s`",
         Action.HOLD,
         _HOLD,
         _FAST,

@@ -6,6 +6,7 @@ from collections import deque
 from itertools import pairwise
 
 from flightd.runtime.pool import Detection
+from flightd.runtime.ring import FrameTicket
 from flightd.runtime.series import Series
 
 _SAME_TICK_NS = 40_000_000
@@ -20,6 +21,7 @@ class LatencyBook:
         self._totals_ms = Series()
         self._since: list[dict[str, float]] = []
         self._recent: deque[tuple[int, float]] = deque()
+        self._before: FrameTicket | None = None
         self.newest: dict[str, float] = {}
 
     def taken(self, detection: Detection, now_ns: int) -> None:
@@ -52,7 +54,8 @@ class LatencyBook:
             }
             self._since.append(self.newest)
             self._totals_ms.add(total)
-            self._recent.append((now_ns, total))
+            self._recent.append((now_ns, (now_ns - self._oldest_ns(ticket)) * 1e-6))
+            self._before = ticket
         self._waiting.clear()
 
     def drain(self) -> tuple[dict[str, float], ...]:
@@ -65,11 +68,19 @@ class LatencyBook:
         self._waiting.clear()
 
     def recent_p99_s(self, now_ns: int) -> float:
-        """p99 of the whole way over the last second, seconds; 0 when no frame was flown by."""
+        """p99 of the whole way over the last second, seconds, from the oldest frame that the one flown by
+        overtook: where most are dropped, those that are not may well be fast.  0 when none was flown by."""
         while self._recent and now_ns - self._recent[0][0] > _RECENT_NS:
             self._recent.popleft()
         totals = sorted(total for _, total in self._recent)
         return totals[min(int(0.99 * len(totals)), len(totals) - 1)] * 1e-3 if totals else 0.0
+
+    def _oldest_ns(self, ticket: FrameTicket) -> int:
+        """Exposure of the first frame after the one flown by before."""
+        last = self._before
+        if last is None or ticket.seq <= last.seq:
+            return ticket.stamp_ns
+        return last.stamp_ns + (ticket.stamp_ns - last.stamp_ns) // (ticket.seq - last.seq)
 
     def quantiles_ms(self) -> dict[str, float]:
         """p50 and p99 of the whole way, rounded to a hundredth; zeros before any frame was flown by."""
