@@ -23,8 +23,11 @@ _COLUMNS = 48
 """Samples across the deck."""
 _LEAST_PX = 20.0
 """Expected height of the strip below which it is not looked for: the deck is seen too flat."""
-_LEAST_PART = 0.8
-"""Part of the expected height that must be seen as one strip."""
+_LEAST_PART = 0.95
+"""Part of the expected height that must be seen as one strip: an empty deck is seen deeper than expected."""
+_FOOT_PART = 0.175
+"""Part of the core's height up to which a strip may be the front of something low: a tray, a pallet's board,
+and what of the deck lies before it."""
 _MISPLACED_PART = 0.2
 """How far the strip's near end may be from where it is expected, as a part of the core's height: the place is
 known to a few centimetres."""
@@ -51,15 +54,15 @@ def is_seen(picture: Image, deck: Quad, core: Image, white: float) -> bool:
     span = float(corners[[0, 3], 0].max()), float(corners[[1, 2], 0].min())
     misplaced_px = _MISPLACED_PART * core.shape[0]
     colours, spread, top = _rows(picture, span, (far - height_px - misplaced_px, near + misplaced_px))
-    if len(colours) < _LEAST_PART * height_px:
+    least_px = max(_LEAST_PART * height_px, _FOOT_PART * core.shape[0])
+    if len(colours) < least_px:
         return False
     dark = np.median(core.reshape(-1, 3), axis=0)
     lit = (colours - dark).mean(axis=1) > _LIT * white
     even = lit & (spread < _UNEVEN * white)
     even[1:-1] &= np.abs(colours[2:] - colours[:-2]).max(axis=1) < _STEP * white
     return any(
-        stop - start + 2 >= _LEAST_PART * height_px and abs(top + stop - near) <= misplaced_px
-        for start, stop in _runs(even)
+        stop - start + 2 >= least_px and abs(top + stop - near) <= misplaced_px for start, stop in _runs(even)
     )
 
 
