@@ -19,6 +19,7 @@ TARGET_WIDTH_PX = 320
 MAX_STEP = 6
 """A 6 px line must still leave a connected trace."""
 
+_FAR = 1e6
 _MANY = 240
 """Samples across from which every second one will do for what is larger than a line."""
 
@@ -60,10 +61,15 @@ class Grid:
 
     def column(self, x: Array) -> NDArray[np.int32]:
         """Sample column that stands for centred frame coordinate `x`; may lie outside the grid."""
-        return np.floor((x - self.corner[0]) * (1 / self.step)).astype(np.int32)
+        return _whole((x - self.corner[0]) * (1 / self.step))
 
     def row(self, y: Array) -> NDArray[np.int32]:
-        return np.floor((y - self.corner[1]) * (1 / self.step)).astype(np.int32)
+        return _whole((y - self.corner[1]) * (1 / self.step))
+
+
+def _whole(places: Array) -> NDArray[np.int32]:
+    """Rounded down; far outside the picture a lens model may put points anywhere, even beyond an int32."""
+    return np.clip(np.floor(places), -_FAR, _FAR).astype(np.int32)
 
 
 def grid_for(width: int, height: int) -> Grid:
