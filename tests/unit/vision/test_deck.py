@@ -1,4 +1,4 @@
-"""The lit strip that tells an empty place: as high as the deck is seen deep, higher than what goods stand on."""
+"""The lit strip that tells an empty place: as high as the deck is deep, higher than what goods stand on."""
 
 from __future__ import annotations
 
