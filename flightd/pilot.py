@@ -223,7 +223,7 @@ class Pilot:
         heard = tick.vehicle.attitude if tick.vehicle is not None else None
         assumed = self._unheard.step(tick.now_ns, heard, self._asked)
         if assumed is not None:
-            self._tracker.attitude(assumed, assumed=True)
+            self._tracker.assume(assumed)
         if tick.vehicle is not None:
             v = tick.vehicle
             self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
@@ -282,7 +282,7 @@ class Pilot:
             age_s = senses.telemetry_age_s if by_mat else max(sight_s, senses.telemetry_age_s)
         around = Surroundings(
             headroom_m=senses.warnings.headroom_m,
-            back=self._caution.back(pose) if senses.localised else None,
+            back=self._caution.back(pose, senses.warnings.line_m) if senses.localised else None,
             data_age_s=age_s,
             at_once=guidance.at_once,
         )

@@ -20,6 +20,8 @@ _AWAY_M = 2.0
 _FRAMES = 3
 """A marker is believed after so many frames."""
 _SIZE_SHARE = 0.3
+_SAME_MAT_M = 0.3
+"""A mat that seems to have moved further from frame to frame is another one."""
 
 
 class FixBook:
@@ -30,11 +32,13 @@ class FixBook:
         self._mats = [(*site.pad_centre(pad), pad.size_m) for pad in site.pads if pad.sign is PadSign.MAT]
         self._frames: Counter[int] = Counter()
         self._mat_frames = 0
+        self._mat_at = (math.inf, math.inf)
         self._told: dict[str, tuple[float, float]] = {}
 
     def shift(self, dx_m: float, dy_m: float) -> None:
         """The place believed in is another now."""
         self._told = {key: (x + dx_m, y + dy_m) for key, (x, y) in self._told.items()}
+        self._mat_at = self._mat_at[0] + dx_m, self._mat_at[1] + dy_m
 
     def is_new(self, key: str, x_m: float, y_m: float) -> bool:
         """Whether this thing, seen by a drone at (`x_m`, `y_m`), has not spoken here yet; it has now."""
@@ -64,12 +68,20 @@ class FixBook:
     def mat(self, seen: Sequence[PadOffset], x_m: float, y_m: float) -> tuple[PadOffset, Matrix] | None:
         """Take one frame's mats; the one that has become sure with it, and where the map has those (M, 2) of
         its size.  They look alike: it tells that the drone is at one of them, not at which."""
-        alike = [(sight, self._mats_like(sight)) for sight in seen]
-        known = next(((sight, mats_m) for sight, mats_m in alike if len(mats_m)), None)
-        self._mat_frames = self._mat_frames + 1 if known else 0
+        known = [(sight, mats_m) for sight in seen if len(mats_m := self._mats_like(sight))]
+        if not known:
+            self._mat_frames = 0
+            return None
+        last_x, last_y = self._mat_at
+        apart_m = [math.hypot(x_m + sight.x_m - last_x, y_m + sight.y_m - last_y) for sight, _ in known]
+        nearest = min(range(len(known)), key=apart_m.__getitem__)
+        sight, _ = known[nearest]
+        self._mat_at = x_m + sight.x_m, y_m + sight.y_m
+        self._mat_frames = self._mat_frames + 1 if apart_m[nearest] < _SAME_MAT_M else 1
         if self._mat_frames < _FRAMES or not self.is_new("mat", x_m, y_m):
             return None
-        return known
+        self._mat_frames = 0
+        return known[nearest]
 
     def _mats_like(self, sight: PadOffset) -> Matrix:
         fits = [(x, y) for x, y, side_m in self._mats if abs(sight.side_m - side_m) <= _SIZE_SHARE * side_m]

@@ -34,7 +34,7 @@ class Blind:
         ages_s = s.x_age_s, s.y_age_s
         self.unseen_s = min(ages_s) if leg_along_x is None else ages_s[leg_along_x]
         self.shows = max(w.picture_age_s, w.frozen_s, w.blank_s) <= hold_s
-        # without attitudes no picture can be used: that is the telemetry's hazard, with its own times
+        # what is lost from view while it is not heard is the telemetry's hazard, with its own times
         heard = s.telemetry_age_s <= self._params.telemetry_hold_s
         if self.unseen_s <= hold_s or not heard:
             self._since_ns = None

@@ -54,7 +54,7 @@ class Caution:
         if pose is not None:
             near = self._corridor.nearest(pose.x_m, pose.y_m)
             line_m = (near.x_m, near.y_m)
-            if self._tells_side(pose):
+            if _tells_side(pose, line_m):
                 outside_m = max(near.distance_m - self._corridor.half_width_m, 0.0)
         return Warnings(
             picture_age_s=pictures.age_s(now_ns),
@@ -82,10 +82,10 @@ class Caution:
         """The height by which to climb: NaN while the lines contradict it."""
         return math.nan if self._doubt else told_m
 
-    def back(self, pose: GridPose | None) -> tuple[float, float] | None:
+    def back(self, pose: GridPose | None, line_m: tuple[float, float]) -> tuple[float, float] | None:
         """The way back into the corridor, (forward, right) of the body; None inside it, and where the
-        position is too uncertain to tell on which side of the line the drone is."""
-        if pose is None or not self._tells_side(pose):
+        position is too uncertain to tell the side of the line, whose nearest point is `line_m`."""
+        if pose is None or not _tells_side(pose, line_m):
             return None
         back = self._corridor.back(pose.x_m, pose.y_m, pose.vx_mps, pose.vy_mps)
         if back is None:
@@ -93,9 +93,9 @@ class Caution:
         cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
         return cos * back[0] + sin * back[1], -sin * back[0] + cos * back[1]
 
-    def _tells_side(self, pose: GridPose) -> bool:
-        near = self._corridor.nearest(pose.x_m, pose.y_m)
-        return _across_sigma_m(pose, (near.x_m, near.y_m)) < _KNOWN_M
+
+def _tells_side(pose: GridPose, line_m: tuple[float, float]) -> bool:
+    return _across_sigma_m(pose, line_m) < _KNOWN_M
 
 
 def _across_sigma_m(pose: GridPose, line_m: tuple[float, float]) -> float:

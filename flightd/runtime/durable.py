@@ -8,7 +8,8 @@ from pathlib import Path
 
 def replace_file(path: Path, beside: Path, data: bytes) -> None:
     """Put `data` in the place of `path`, by way of a file `beside` it in the same folder; on the disk before
-    this returns.  Raises OSError when the disk refuses; `path` is as it was then, `beside` may be left."""
+    this returns.  Raises OSError when the disk refuses: `path` is as it was then and `beside` may be left,
+    unless only their folder could not be brought to the disk: then `path` is new already."""
     with beside.open("wb") as file:
         file.write(data)
         file.flush()

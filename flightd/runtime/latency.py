@@ -11,6 +11,8 @@ from flightd.runtime.series import Series
 
 _SAME_TICK_NS = 40_000_000
 _RECENT_NS = 1_000_000_000
+_RECENT_MAX = 256
+"""More frames than that no camera gives in a second."""
 
 
 class LatencyBook:
@@ -20,7 +22,7 @@ class LatencyBook:
         self._waiting: list[tuple[Detection, int]] = []
         self._totals_ms = Series()
         self._since: list[dict[str, float]] = []
-        self._recent: deque[tuple[int, float]] = deque()
+        self._recent: deque[tuple[int, float]] = deque(maxlen=_RECENT_MAX)
         self._before: FrameTicket | None = None
         self.newest: dict[str, float] = {}
 
@@ -57,7 +59,6 @@ class LatencyBook:
             self._recent.append((now_ns, (now_ns - self._oldest_ns(ticket)) * 1e-6))
             self._before = ticket
         self._waiting.clear()
-        self._forget_before(now_ns - _RECENT_NS)
 
     def drain(self) -> tuple[dict[str, float], ...]:
         """The stages' times in ms of each picture since the last call, oldest first."""
@@ -67,17 +68,15 @@ class LatencyBook:
     def forget(self) -> None:
         """No set point goes out (not flying): the frames in waiting count for nothing."""
         self._waiting.clear()
+        self._before = None
 
     def recent_p99_s(self, now_ns: int) -> float:
         """p99 of the whole way over the last second, seconds, from the oldest frame that the one flown by
         overtook: where most are dropped, those that are not may well be fast.  0 when none was flown by."""
-        self._forget_before(now_ns - _RECENT_NS)
+        while self._recent and now_ns - self._recent[0][0] > _RECENT_NS:
+            self._recent.popleft()
         totals = sorted(total for _, total in self._recent)
         return totals[min(int(0.99 * len(totals)), len(totals) - 1)] * 1e-3 if totals else 0.0
-
-    def _forget_before(self, stamp_ns: int) -> None:
-        while self._recent and self._recent[0][0] < stamp_ns:
-            self._recent.popleft()
 
     def _oldest_ns(self, ticket: FrameTicket) -> int:
         """Exposure of the first frame after the one flown by before."""

@@ -10,23 +10,47 @@ from flightd.core.types import Attitude
 
 
 class AttitudeHistory:
-    """Samples of the last seconds; `at` interpolates, and holds the newest for at most `hold_ns`."""
+    """Samples of the last seconds; `at` interpolates, and holds the newest for at most `hold_ns`.
+
+    What is only assumed stands behind the measured samples, and gives way to the next of them however late
+    that comes.
+    """
 
     def __init__(self, keep_ns: int = 3_000_000_000, hold_ns: int = 150_000_000) -> None:
         self._keep_ns = keep_ns
         self._hold_ns = hold_ns
         self._samples: deque[Attitude] = deque()
         self._stamps: deque[int] = deque()
+        self._assumed = 0
+        """So many of the last samples are assumed."""
 
     def add(self, sample: Attitude) -> None:
-        """Append a sample; one that is not newer than the last is ignored (reordered datagrams)."""
+        """Append a measured sample; one that is not newer than the last is ignored (reordered datagrams)."""
+        for _ in range(self._assumed):
+            self._samples.pop()
+            self._stamps.pop()
+        self._assumed = 0
+        self._append(sample)
+
+    def assume(self, sample: Attitude) -> None:
+        """Append what is assumed while nothing is measured."""
+        if self._append(sample):
+            self._assumed = min(self._assumed + 1, len(self._samples))
+
+    def is_assumed(self, stamp_ns: int) -> bool:
+        """Whether the attitude at that time rests on what is only assumed."""
+        measured = len(self._stamps) - self._assumed
+        return self._assumed > 0 and (measured == 0 or stamp_ns > self._stamps[measured - 1])
+
+    def _append(self, sample: Attitude) -> bool:
         if self._stamps and sample.stamp_ns <= self._stamps[-1]:
-            return
+            return False
         self._samples.append(sample)
         self._stamps.append(sample.stamp_ns)
         while self._stamps[0] < sample.stamp_ns - self._keep_ns:
             self._samples.popleft()
             self._stamps.popleft()
+        return True
 
     @property
     def newest(self) -> Attitude | None:

@@ -104,7 +104,6 @@ class LineTracker:
         self._params = params
         self._start_yaw_rad = start_yaw_rad
         self._history = AttitudeHistory()
-        self._assumed = False
         self._heading: HeadingTracker | None = None
         forget_ns = round(params.forget_s * 1e9)
         self._x = AxisTracker(params.noise, params.gate_m, forget_ns)
@@ -126,10 +125,12 @@ class LineTracker:
         """What all lines lately said against the vehicle's heading; 0 while any of them agrees."""
         return self._dispute.error_rad
 
-    def attitude(self, sample: Attitude, *, assumed: bool = False) -> None:
-        """Take an attitude that the vehicle told, or one that is only `assumed` while it is silent."""
+    def assume(self, sample: Attitude) -> None:
+        """Take an attitude that is only assumed, while the vehicle is silent."""
+        self._history.assume(sample)
+
+    def attitude(self, sample: Attitude) -> None:
         self._history.add(sample)
-        self._assumed = assumed
         if self._heading is None:
             offset = wrap_pi(self._start_yaw_rad - sample.yaw_rad)
             self._heading = HeadingTracker(offset, self._params.start_yaw_sigma_rad)
@@ -144,7 +145,8 @@ class LineTracker:
             return False
         self._advance(lines.stamp_ns)
         params = self._params
-        sigma_tilt_rad = _ASSUMED_TILT_RAD if self._assumed else params.sigma_tilt_rad
+        assumed = self._history.is_assumed(lines.stamp_ns)
+        sigma_tilt_rad = _ASSUMED_TILT_RAD if assumed else params.sigma_tilt_rad
         view = FloorView(params.lens, params.mount, attitude, height_m, params.compensation, sigma_tilt_rad)
         low, high = (share * params.width_m for share in params.width_share)
         seen = ground_lines(lines.lines, view)

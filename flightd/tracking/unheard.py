@@ -12,7 +12,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.core.types import Attitude, AttitudeSetpoint
 
 SILENT_NS = 150_000_000
-"""Telemetry comes at 10 Hz or more; after this time it is not late but gone."""
+"""Telemetry comes at 10 Hz or more: without any for so long, something is assumed until it goes on."""
 _LAG_S = 0.15
 """An attitude loop's time constant, roughly."""
 
@@ -22,6 +22,7 @@ class UnheardAttitude:
 
     def __init__(self) -> None:
         self._attitude: Attitude | None = None
+        self._heard_ns = 0
 
     def step(self, now_ns: int, heard: Attitude | None, asked: AttitudeSetpoint | None) -> Attitude | None:
         """What is to be assumed at `now_ns`, given the newest attitude `heard` and the set point last sent;
@@ -30,8 +31,8 @@ class UnheardAttitude:
         if heard is None or asked is None or now_ns - heard.stamp_ns <= SILENT_NS:
             self._attitude = None
             return None
-        if last is None or last.stamp_ns < heard.stamp_ns:
-            last = heard
+        if last is None or self._heard_ns != heard.stamp_ns:  # late as it is, it is what was measured
+            last, self._heard_ns = heard, heard.stamp_ns
         dt_s = (now_ns - last.stamp_ns) * 1e-9
         part = 1.0 - math.exp(-dt_s / _LAG_S)
         self._attitude = Attitude(

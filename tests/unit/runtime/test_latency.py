@@ -39,6 +39,14 @@ def test_frames_that_were_dropped_count_until_the_one_that_overtook_them() -> No
     assert book.quantiles_ms()["p99"] == pytest.approx(WAY_NS * 1e-6), "that of the frames themselves"
 
 
+def test_a_time_without_set_points_is_no_delay() -> None:
+    book = LatencyBook()
+    fly(book, 0)
+    book.forget()
+    now_ns = fly(book, 2000)
+    assert book.recent_p99_s(now_ns) == pytest.approx(WAY_NS * 1e-9)
+
+
 def test_it_forgets_after_a_second() -> None:
     book = LatencyBook()
     now_ns = fly(book, 0)

@@ -41,6 +41,32 @@ def test_a_sample_from_the_past_is_ignored() -> None:
     assert history.newest == Attitude(100, 0.1, 0.0, 0.0)
 
 
+def test_what_is_assumed_gives_way_to_the_next_measured_sample_however_late() -> None:
+    history = AttitudeHistory()
+    history.add(Attitude(100, 0.1, 0.0, 0.0))
+    for stamp_ns in (300, 320, 340):
+        history.assume(Attitude(stamp_ns, 0.5, 0.0, 0.0))
+    assert history.is_assumed(310)
+    assert not history.is_assumed(100)
+    history.add(Attitude(200, 0.2, 0.0, 0.0))
+    assert history.newest == Attitude(200, 0.2, 0.0, 0.0)
+    assert not history.is_assumed(200)
+    history.assume(Attitude(360, 0.5, 0.0, 0.0))
+    assert history.is_assumed(250)
+    assert not history.is_assumed(150)
+
+
+def test_a_silence_longer_than_the_memory_leaves_only_what_is_assumed() -> None:
+    history = AttitudeHistory(keep_ns=100)
+    history.add(Attitude(100, 0.1, 0.0, 0.0))
+    for stamp_ns in range(120, 500, 20):
+        history.assume(Attitude(stamp_ns, 0.5, 0.0, 0.0))
+    assert history.is_assumed(490)
+    history.add(Attitude(500, 0.2, 0.0, 0.0))
+    assert history.newest == Attitude(500, 0.2, 0.0, 0.0)
+    assert history.at(450) is None
+
+
 def test_height_follows_the_climb_past_the_newest_sample_but_not_for_long() -> None:
     history = HeightHistory()
     history.add(0, 1.0, 0.5)

@@ -36,6 +36,17 @@ def test_silent_it_leans_and_turns_as_asked() -> None:
     assert turned == pytest.approx(0.5 * (now_ns - HEARD.stamp_ns) * 1e-9)
 
 
+def test_what_comes_late_all_the_time_is_where_each_guess_begins() -> None:
+    unheard = UnheardAttitude()
+    asked = AttitudeSetpoint(0, -0.3)
+    for tick in range(100):
+        now_ns = 2_000_000_000 + tick * TICK_NS
+        late = Attitude(now_ns - SILENT_NS - 10_000_000, 0.1, 0.0, 0.0)
+        guess = unheard.step(now_ns, late, asked)
+        assert guess is not None
+        assert guess.roll_rad > -0.2, "it never runs on by what is asked alone"
+
+
 def test_heard_again_it_starts_anew_from_what_it_then_says() -> None:
     unheard = UnheardAttitude()
     asked = AttitudeSetpoint(0)
