@@ -133,9 +133,9 @@ def test_a_busy_line_is_read_in_batches_and_a_quiet_one_at_once() -> None:
             await asyncio.sleep(0.001)
         await asyncio.sleep(0.02)
         assert sum(count for _, count in readings) == 500
-        assert len(readings) < 120
+        assert len(readings) < 60
         gaps_s = [b - a for (a, _), (b, _) in itertools.pairwise(readings)]
-        assert max(gaps_s) < 0.0051
+        assert max(gaps_s) < 0.0101
         readings.clear()
         os.write(into, b"x")  # quiet again
         await asyncio.sleep(0)
