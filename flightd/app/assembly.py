@@ -116,7 +116,7 @@ def detector_of(config: Config, site: Site) -> Callable[[], Detector]:
     camera, vision = config.camera, config.vision
     lens = camera.lens() if camera.lens().is_distorted else None
     profile = profile_of(config, site)
-    return partial(Detector, vision.method, profile, lens, markers=site.marker_set)
+    return partial(Detector, vision.method, profile, lens, markers=site.marker_set, in_flight=True)
 
 
 def ground_link(

@@ -90,7 +90,8 @@ def bench(seconds: float, sizes: Sequence[tuple[int, int]] = SIZES, all_cores: b
 
 
 def _one_core(size: tuple[int, int], seconds: float) -> list[Timing]:
-    """Rounds over the frames, every method in turn, so that a busy moment strikes all alike.
+    """Rounds in which every method in turn takes all frames, one after another as in a flight, so that a busy
+    moment strikes all alike.
 
     Processor time of the one thread at work, which other programs on the machine hardly touch.
     """
@@ -105,17 +106,17 @@ def _one_core(size: tuple[int, int], seconds: float) -> list[Timing]:
         except UnavailableError as err:
             timing.missing = str(err)
     spent = dict.fromkeys(finders, 0.0)
-    rounds = max(round(seconds * 100), 2)
-    for number in track(range(rounds), f"one core, {size[0]}x{size[1]}"):
-        bgr = frames[number % len(frames)]
+    rounds = max(round(seconds * 100 / FRAMES), 2)
+    for _ in track(range(rounds), f"one core, {size[0]}x{size[1]}"):
         for timing in timings:
             if timing.missing or (spent[timing.method] > seconds and len(timing.ms) >= 2 * FRAMES):
                 continue
-            start = thread_time()
-            finders[timing.method](bgr)
-            elapsed = thread_time() - start
-            timing.ms.append(elapsed * 1e3)
-            spent[timing.method] += elapsed
+            for bgr in frames:
+                start = thread_time()
+                finders[timing.method](bgr)
+                elapsed = thread_time() - start
+                timing.ms.append(elapsed * 1e3)
+                spent[timing.method] += elapsed
     return timings
 
 

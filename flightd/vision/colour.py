@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
@@ -59,7 +60,7 @@ hang together over this part of the picture's diagonal, and as many samples."""
 
 _BRIGHT_FLOOR = 135.0
 _MAX_STRETCH = 3.0
-_LUMA_BGR = np.array([0.114, 0.587, 0.299])
+_LUMA_BGR = (0.114, 0.587, 0.299)
 _LUT_TAKES_16_BITS = int(cv2.__version__.split(".")[0]) >= 5
 
 
@@ -148,10 +149,13 @@ def floor_field(small_bgr: Image, colour: str) -> Image:
     grey = np.asarray(cv2.cvtColor(cells, cv2.COLOR_BGR2GRAY), np.uint8)
     frame = _middle(grey.ravel())
     darkest, brightest = _LOCAL_RANGE.get(colour, _OTHER_LOCAL_RANGE)
-    floor = np.asarray(cv2.medianBlur(grey, _NEIGHBOURHOOD), np.float32)
-    floor = np.minimum(np.maximum(floor, frame * darkest), frame * brightest)
-    tinted = floor[..., None] * _floor_tint(cells[::2, ::2], colour)
-    return np.minimum(np.maximum(tinted, 1.0), 255.0).astype(np.uint8)
+    floor = np.asarray(cv2.medianBlur(grey, _NEIGHBOURHOOD))
+    floor = np.minimum(np.maximum(floor, int(frame * darkest)), min(int(frame * brightest), 255))
+    tint = _floor_tint(cells[::2, ::2], colour)
+    field = np.asarray(
+        cv2.merge([cv2.convertScaleAbs(floor, alpha=part, beta=-0.5) for part in tint]), np.uint8
+    )
+    return np.maximum(field, 1)
 
 
 def _middle(values: NDArray[np.uint8]) -> float:
@@ -160,8 +164,8 @@ def _middle(values: NDArray[np.uint8]) -> float:
     return float(np.partition(values, middle)[middle])
 
 
-def _floor_tint(cells: Image, colour: str) -> NDArray[np.float64]:
-    """(3,) colour of the floor in units of its brightness, as far as the light makes it.
+def _floor_tint(cells: Image, colour: str) -> list[float]:
+    """Colour (BGR) of the floor in units of its brightness, as far as the light makes it.
 
     The light tints even the least colourful cells; the floor's own tint is the median of the less
     colourful half, within limits about the light's.  White lines are themselves among the least colourful,
@@ -172,19 +176,25 @@ def _floor_tint(cells: Image, colour: str) -> NDArray[np.float64]:
     most = np.maximum(np.maximum(blue, green), red)
     saturation = (most - np.minimum(np.minimum(blue, green), red)) / (most + 8.0)
     order = saturation.argsort()
-    light = _tint(pixels[order[: max(len(order) // 10, 1)]], 1.0)
-    floor = _tint(pixels[order[: len(order) // 2 + 1]], light)
-    return np.sqrt(light * floor) if colour == "white" else floor
+    light = _tint(pixels.take(order[: max(len(order) // 10, 1)], axis=0), (1.0, 1.0, 1.0))
+    floor = _tint(pixels.take(order[: len(order) // 2 + 1], axis=0), light)
+    return (
+        [math.sqrt(one * other) for one, other in zip(light, floor, strict=True)]
+        if colour == "white"
+        else floor
+    )
 
 
-def _tint(pixels: Image, about: NDArray[np.float64] | float) -> NDArray[np.float64]:
-    """(3,) median colour in units of its brightness, within `_TINT_RANGE` about another."""
+def _tint(pixels: Image, about: Sequence[float]) -> list[float]:
+    """Median colour in units of its brightness, within `_TINT_RANGE` about another."""
     pixels.sort(axis=0)
-    colour = pixels[len(pixels) // 2] + 1.0
+    colour = [value + 1.0 for value in pixels[len(pixels) // 2].tolist()]
+    brightness = sum(part * value for part, value in zip(_LUMA_BGR, colour, strict=True))
     darkest, brightest = _TINT_RANGE
-    tint = colour / float(colour @ _LUMA_BGR)
-    limited: NDArray[np.float64] = np.minimum(np.maximum(tint, about * darkest), about * brightest)
-    return limited
+    return [
+        min(max(value / brightness, other * darkest), other * brightest)
+        for value, other in zip(colour, about, strict=True)
+    ]
 
 
 def level(small_bgr: Image, colour: str) -> Image:
@@ -197,11 +207,13 @@ def level(small_bgr: Image, colour: str) -> Image:
     field = floor_field(small_bgr, colour)
     floor = cv2.resize(field, (width, height), interpolation=cv2.INTER_LINEAR)
     levelled = cv2.divide(small_bgr, floor, scale=FLOOR_GREY)
-    brightness = float(field.mean())
+    brightness = sum(cv2.mean(field)) / 3
     if brightness > _BRIGHT_FLOOR:
         stretch = min((255.0 - FLOOR_GREY) / max(255.0 - brightness, 1.0), _MAX_STRETCH)
-        above = cv2.subtract(small_bgr, floor)
-        levelled = cv2.add(levelled, cv2.convertScaleAbs(above, alpha=stretch - FLOOR_GREY / brightness))
+        # In place: every new picture of this size would be new memory to the system, too.
+        above = cv2.subtract(small_bgr, floor, dst=floor)
+        cv2.convertScaleAbs(above, dst=above, alpha=stretch - FLOOR_GREY / brightness)
+        cv2.add(levelled, above, dst=levelled)
     return np.asarray(levelled, np.uint8)
 
 
@@ -216,9 +228,9 @@ def classify(small_bgr: Image, profile: ColourProfile) -> Levels:
     return _look_up(profile.lut, table_index(level(small_bgr, profile.colour)))
 
 
-def _look_up(table: NDArray[np.uint8], index: NDArray[np.uint16]) -> NDArray[np.uint8]:
-    """`table[index]` for a table of 65,536; OpenCV 5 does it in less than half of numpy's time."""
-    if _LUT_TAKES_16_BITS:
+def _look_up(table: NDArray[np.uint8], index: NDArray[np.uint16] | NDArray[np.int32]) -> NDArray[np.uint8]:
+    """`table[index]`; for 16 bits, a table of 65,536, OpenCV 5 takes less than half of numpy's time."""
+    if _LUT_TAKES_16_BITS and index.dtype == np.uint16:
         return np.asarray(cv2.LUT(index, table), np.uint8)
     return table.take(index)
 
@@ -236,12 +248,12 @@ def grow(levels: Levels) -> NDArray[np.uint8]:
     """
     if not has_seeds(levels):
         return np.where(levels, np.uint8(255), np.uint8(0))
-    strong = np.flatnonzero(levels == STRONG)
     few = levels.size < TABLE_SIZE * 2  # too few pixels for more separate parts than 16 bits can number
-    count, parts = cv2.connectedComponents(levels, connectivity=8, ltype=cv2.CV_16U if few else cv2.CV_32S)
+    count, found = cv2.connectedComponents(levels, connectivity=8, ltype=cv2.CV_16U if few else cv2.CV_32S)
+    parts = np.asarray(found, np.uint16) if few else np.asarray(found, np.int32)
     kept = np.zeros(TABLE_SIZE if few else count, np.uint8)
-    kept[parts.ravel().take(strong)] = 255
-    mask = _look_up(kept, np.asarray(parts, np.uint16)) if few else kept.take(np.asarray(parts))
+    kept[parts[levels == STRONG]] = 255
+    mask = _look_up(kept, parts)
     if cv2.countNonZero(levels) - cv2.countNonZero(mask) > _WEAK_BAND * levels.size:
         mask |= _long_parts(np.where(mask, np.uint8(0), levels))
     return mask

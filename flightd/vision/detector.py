@@ -11,7 +11,7 @@ import numpy as np
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
 from flightd.core.markers import MarkerSet
-from flightd.core.types import Image, LineSet, MarkerSight
+from flightd.core.types import UNCHECKED, Image, LineSet, MarkerSight, PadSight
 from flightd.vision import centroid, combine, evidence, junctions, naive, pads, skeleton
 from flightd.vision.colour import ColourProfile, classify, grow, load_profile
 from flightd.vision.markers import MarkerFinder
@@ -26,6 +26,7 @@ METHODS = ("centroid", "skeleton", "combined", "naive")
 _MIN_SIDE_PX = 16
 _REACH_PX = 10
 """How far the guessed edge may be off: a sample and a half, or what blur hides."""
+_KEPT_BYTES = 1 << 24
 _SPECKS = np.ones((5, 5), np.uint8)
 _HOLES = np.ones((9, 9), np.uint8)
 _WORN = 1.02
@@ -37,7 +38,8 @@ class Detector:
 
     `method` is one of METHODS; `profile` a colour profile or the name of one.  With a `lens` the lines
     are those of a distortion-free camera.  Floor markers are looked for when `markers` says
-    which.  `now_ns`, when given, times the stages.  Not thread-safe: one detector for each worker.
+    which.  `in_flight`, charge pads are looked for, too, and the picture's fingerprint and exposure are
+    taken.  `now_ns`, when given, times the stages.  Not thread-safe: one detector for each worker.
     """
 
     def __init__(
@@ -48,6 +50,7 @@ class Detector:
         *,
         zhang_suen: bool = False,
         markers: MarkerSet | None = None,
+        in_flight: bool = False,
         now_ns: Callable[[], int] | None = None,
     ) -> None:
         if method not in METHODS:
@@ -57,7 +60,9 @@ class Detector:
         self._lens = lens
         self._zhang_suen = zhang_suen
         self._markers = MarkerFinder(markers) if markers is not None else None
+        self._in_flight = in_flight
         self._now_ns = now_ns or _no_clock
+        _keep_freed_memory()
 
     def detect(self, bgr: Image, seq: int = 0, stamp_ns: int = 0) -> LineSet:
         """Lines and junctions of a (H, W, 3) uint8 BGR picture.
@@ -83,15 +88,17 @@ class Detector:
         lines = tuple(strip.to_line() for strip in strips)
         found = junctions.find(lines, mask, grid, plane)
         mark("junctions")
-        coarse, coarse_grid = coarsened(small, grid)
-        mats = pads.find(coarse, lines, coarse_grid, plane)
-        mark("pads")
+        mats: tuple[PadSight, ...] = ()
+        picture = UNCHECKED
+        if self._in_flight:
+            coarse, coarse_grid = coarsened(small, grid)
+            mats, picture = pads.find(coarse, lines, coarse_grid, plane), check_picture(coarse)
+            mark("pads")
         signs: tuple[MarkerSight, ...] = ()
         if self._markers is not None:
             signs = self._markers.find(small, grid, plane)
             mark("markers")
         timings = {name: (end - begin) / 1e6 for (_, begin), (name, end) in pairwise(marks)}
-        picture = check_picture(coarse)
         return LineSet(seq, stamp_ns, width, height, lines, found, self.method, timings, mats, picture, signs)
 
     def _plane(self, width: int, height: int) -> Plane:
@@ -164,6 +171,15 @@ def _check(bgr: Image) -> None:
         raise InputError(
             f"picture of {shape[1]}x{shape[0]} px is too small; at least {_MIN_SIDE_PX} px a side"
         )
+
+
+def _keep_freed_memory() -> None:
+    """Let this process keep what a frame's small pictures leave for those of the next one.
+
+    The GNU C library returns freed blocks of more than 128 KB to the system, until a larger one was freed;
+    new pages, a hundred or more for each frame, cost as much time as reading the frame.
+    """
+    np.empty(_KEPT_BYTES, np.uint8)
 
 
 def _no_clock() -> int:

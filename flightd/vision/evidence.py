@@ -7,29 +7,49 @@ that a guess made from part of a band gets the band's true span, gaps included.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.colour import STRONG, Levels, has_seeds
+from flightd.vision.colour import STRONG, WEAK, Levels, has_seeds
 from flightd.vision.plane import Plane, shortest_length
-from flightd.vision.sampling import Grid
+from flightd.vision.sampling import OUTSIDE, PAINT, Grid, look_up
 from flightd.vision.strip import Array, Strip
 
 STATIONS = 48
 _INSIDE = np.array([-0.42, -0.25, -0.08, 0.08, 0.25, 0.42])
 """Where the paint is looked for, in widths from the centre line."""
+_TAPS = np.zeros((4, 10))
+_TAPS[0] = 1.0
+_TAPS[1, :6] = _INSIDE
+_TAPS[2, 6:] = -1.0, 0.0, 0.0, 1.0
+_TAPS[3, 6:] = 0.0, -1.0, 1.0, 0.0
+"""The points across a band, from its centre line, the width inside which paint is looked for, and the farther
+and the nearer distance at which floor is: six points inside, two on its one side, two on its other."""
 _PARTS = np.zeros((10, 3), np.float32)
 _PARTS[:6, 0] = _PARTS[6:8, 1] = _PARTS[8:, 2] = 1.0
 """Which of the points across a band lie inside it, and which on its one and other side."""
 _BOTH_SIDES = np.ones(2, np.float32)
-_PLACES = (np.arange(STATIONS) + 0.5) / STATIONS
+_PLACES = ((np.arange(STATIONS) + 0.5) / STATIONS).astype(np.float32)
+_FAR = 1e4
+"""Samples from the first beyond which a lens model may put anything."""
+_LOOKS = 16
+"""Stations at which a guess is asked whether it is another's."""
+_GAP = bytes(STATIONS // 4)
+"""So many stations without paint end a band where there is more of it on one side."""
 _FAINT_STRONG, _FAINT_FILLED, _FAINT_LENGTH = 0.12, 0.8, 0.3
 """Less than the first part of a band is strong and less than the second weak or strong: it is faint.  One
 that is shorter than this part of the picture's diagonal is then something of a similar colour."""
+
+
+_Run: TypeAlias = tuple[float, float]
+"""From where to where along u a band is looked at."""
+_Law: TypeAlias = tuple[float, float]
+_Laws: TypeAlias = tuple[_Law, _Law, _Law, _Law]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,88 +69,103 @@ def weigh(strips: list[Strip], mask: Image, grid: Grid, plane: Plane) -> list[Ev
     """The evidence for each guess that shows any paint."""
     if not strips:
         return []
-    steep = np.array([s.steep for s in strips])[:, None]
-    fits = np.array([(s.centre.a, s.centre.b, s.low.a, s.low.b, s.high.a, s.high.b) for s in strips])
-    a, b, low_a, low_b, high_a, high_b = (fits[:, k, None] for k in range(6))
-    norm = np.hypot(1.0, b)
-    u0, u1 = _run(steep, a, b, plane)
-    pitch = (u1 - u0) / STATIONS
-    u = u0 + (u1 - u0) * _PLACES
-    width = np.maximum(high_a - low_a + (high_b - low_b) * u, 0.5 * grid.step)
-    margin = 1.5 * grid.step * norm
-    beside = margin + np.minimum(0.35 * width, 6.0 * grid.step * norm)
-    v = np.empty((len(strips), STATIONS, len(_INSIDE) + 4))
-    # Samples on the very edge may be either: look half a sample inside it.
-    v[..., :6] = _INSIDE * np.maximum(width - grid.step * norm, 0.25 * width)[..., None]
-    v[..., 6], v[..., 7] = -width / 2 - beside, -width / 2 - margin
-    v[..., 8], v[..., 9] = width / 2 + margin, width / 2 + beside
-    v += (a + b * u)[..., None]
-    painted, seen = _look_up(mask, grid, plane, steep[..., None], u[..., None], v)
-    counts = painted @ _PARTS
-    filled = counts[..., 0] >= 0.55 * np.maximum(seen @ _PARTS[:, 0], 3)
+    runs = [_run(strip, plane) for strip in strips]
+    laws = [_across(strip, grid.step, run) for strip, run in zip(strips, runs, strict=True)]
+    found = _looks(mask, strips, runs, laws, grid, plane)
+    looks = np.empty((2, *found.shape), np.float32)
+    looks[0], looks[1] = found == PAINT, found != OUTSIDE
+    painted = looks[0]
+    counts, points = looks @ _PARTS
+    filled = counts[..., 0] >= 0.55 * np.maximum(points[..., 0], 3)
     band = filled * (1.0 - 0.5 * np.minimum(counts[..., 1:], 1.0) @ _BOTH_SIDES)
-    found = []
+    evidence = []
     for k, strip in enumerate(strips):
         span = _span(filled[k], band[k])
         if span is None:
             continue
         stretch = slice(*span)
         places = filled[k, stretch].astype(np.float32)
-        count = int(places.sum())
-        if (places @ painted[k, stretch, :6]).min() < 0.3 * count:
+        each = (places @ painted[k, stretch, :6]).tolist()
+        count = int(np.add.reduce(places))
+        if min(each) < 0.3 * count:
             continue
-        first, pace = float(u0[k, 0]), float(pitch[k, 0])
-        stations = span[1] - span[0]
+        first, last = runs[k]
+        pace, stations = (last - first) / STATIONS, span[1] - span[0]
         clear = float(np.add.reduce(band[k, stretch])) / stations
-        length = clear * stations * pace * float(norm[k, 0])
-        new = replace(
-            strip, u0=first + pace * span[0], u1=first + pace * span[1], support=count / stations, clear=clear
-        )
-        found.append(Evidence(new, length, length * min(new.width_px, length)))
-    return found
+        u0, u1 = first + pace * span[0], first + pace * span[1]
+        new = Strip(strip.steep, strip.centre, strip.low, strip.high, u0, u1, count / stations, clear)
+        length = clear * stations * pace / strip.cosine
+        evidence.append(Evidence(new, length, length * min(new.width_px, length)))
+    return evidence
 
 
-def _run(steep: NDArray[np.bool_], a: Array, b: Array, plane: Plane) -> tuple[Array, Array]:
-    """From where to where each centre line runs inside the picture."""
-    half_u = np.where(steep, plane.height_px / 2, plane.width_px / 2)
-    half_v = np.where(steep, plane.width_px / 2, plane.height_px / 2)
-    slope = np.where(np.abs(b) < 1e-9, 1e-9, b)
+def _run(strip: Strip, plane: Plane) -> _Run:
+    """From where to where the centre line runs inside the picture."""
+    half_u, half_v = plane.width_px / 2, plane.height_px / 2
+    if strip.steep:
+        half_u, half_v = half_v, half_u
+    a, b = strip.centre.a, strip.centre.b
+    slope = b if abs(b) > 1e-9 else 1e-9
     one, other = (-half_v - a) / slope, (half_v - a) / slope
-    u0 = np.maximum(-half_u, np.minimum(one, other))
-    u1 = np.minimum(half_u, np.maximum(one, other))
-    return u0, np.maximum(u0 + 1.0, u1)
+    u0, u1 = max(-half_u, min(one, other)), min(half_u, max(one, other))
+    return u0, max(u0 + 1.0, u1)
 
 
-def _look_up(
-    mask: Image, grid: Grid, plane: Plane, steep: NDArray[np.bool_], u: Array, v: Array
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """1 where there is paint, and 1 where the point is in the picture; 0 elsewhere."""
-    height, width = mask.shape
+def _across(strip: Strip, step: int, run: _Run) -> _Laws:
+    """What `_TAPS` are taken of, each as (a, b) of v = a + b u: the centre line, the width inside which paint
+    is looked for, and the farther and the nearer distance at which floor is."""
+    a, b = strip.high.a - strip.low.a, strip.high.b - strip.low.b
+    middle = max(a + b * (strip.u0 + strip.u1) / 2, 0.5 * step)
+    if min(a + b * run[0], a + b * run[1]) < 0.5 * step:
+        a, b = middle, 0.0  # the edges would cross
+    sample = step / strip.cosine
+    margin = 1.5 * sample
+    # Samples on the very edge may be either: look half a sample inside it.
+    inner = (a - sample, b) if middle - sample > 0.25 * middle else (0.25 * a, 0.25 * b)
+    beside = (0.35 * a, 0.35 * b) if 0.35 * middle < 6.0 * sample else (6.0 * sample, 0.0)
+    near = (a / 2 + margin, b / 2)
+    return (strip.centre.a, strip.centre.b), inner, (near[0] + beside[0], near[1] + beside[1]), near
+
+
+def _looks(
+    table: Image, strips: list[Strip], runs: list[_Run], laws: list[_Laws], grid: Grid, plane: Plane
+) -> Image:
+    """(N, STATIONS, 10) values of a mask or of levels at the stations of each run, at all taps."""
+    parts = [_parts(*each) for each in zip(strips, runs, laws, strict=True)]
+    taps = _TAPS.T @ np.array(parts).reshape(-1, 2, 4, 2)
     if plane.is_identity:
-        # Along and across the bands: u is one for all points of a station.
-        start_u, start_v = (np.where(steep, *pair) for pair in (grid.corner[::-1], grid.corner))
-        place_u = np.floor((u - start_u) * (1 / grid.step)).astype(np.int32)
-        place_v = np.floor((v - start_v) * (1 / grid.step)).astype(np.int32)
-        seen = (place_v >= 0) & (place_v < np.where(steep, width, height))
-        seen &= (place_u >= 0) & (place_u < np.where(steep, height, width))
-        index = place_u * np.where(steep, width, 1) + place_v * np.where(steep, 1, width)
-    else:
-        x, y = plane.raw(np.where(steep, v, u), np.where(steep, u, v))
-        i, j = grid.column(x), grid.row(y)
-        seen = (i >= 0) & (i < width) & (j >= 0) & (j < height)
-        index = j * width + i
-    there = seen.astype(np.float32)
-    return (mask.ravel().take(index * seen) != 0) * there, there
+        taps[:, 0] -= grid.first
+        taps *= 1 / grid.step
+    begin, way = taps.astype(np.float32).swapaxes(0, 1)[:, :, None]
+    places = begin + _PLACES[:, None, None] * way
+    if not plane.is_identity:
+        places = grid.places(*plane.raw(places[..., 0], places[..., 1]))
+    count = len(strips)
+    return look_up(table, places.reshape(count * STATIONS, 10, 2)).reshape(count, STATIONS, 10)
+
+
+def _parts(strip: Strip, run: _Run, laws: _Laws) -> tuple[float, ...]:
+    """(2, 4, 2), flat: x and y of the four laws at the beginning of the run, and how far they go to its
+    end."""
+    u, length = run[0], run[1] - run[0]
+    (a0, b0), (a1, b1), (a2, b2), (a3, b3) = laws
+    v0, v1, v2, v3 = a0 + b0 * u, a1 + b1 * u, a2 + b2 * u, a3 + b3 * u
+    d0, d1, d2, d3 = b0 * length, b1 * length, b2 * length, b3 * length
+    if strip.steep:
+        return v0, u, v1, 0.0, v2, 0.0, v3, 0.0, d0, length, d1, 0.0, d2, 0.0, d3, 0.0
+    return u, v0, 0.0, v1, 0.0, v2, 0.0, v3, length, d0, 0.0, d1, 0.0, d2, 0.0, d3
 
 
 def _span(filled: NDArray[np.bool_], band: Array) -> tuple[int, int] | None:
     """First and one past the last station of the band: its stations, and gaps no longer than its parts."""
-    places = np.flatnonzero(filled)
-    if len(places) == 0:
+    marks = filled.tobytes()
+    first, last = marks.find(1), marks.rfind(1) + 1
+    if last == 0:
         return None
-    breaks = np.flatnonzero(places[1:] - places[:-1] > STATIONS // 4)
-    if len(breaks) == 0:
-        return int(places[0]), int(places[-1]) + 1
+    if marks.find(_GAP, first, last) < 0:
+        return first, last
+    places = np.flatnonzero(filled)
+    breaks = np.flatnonzero(places[1:] - places[:-1] > len(_GAP))
     starts, ends = [0, *(breaks + 1)], [*breaks, len(places) - 1]
     parts = [(int(places[s]), int(places[e]) + 1) for s, e in zip(starts, ends, strict=True)]
     return max(parts, key=lambda part: float(band[part[0] : part[1]].sum()))
@@ -166,7 +201,7 @@ def is_paint_left(mask: Image, strips: list[Strip], grid: Grid, plane: Plane) ->
         v = np.array([fit.at(at) for fit, at in zip(edges, u.tolist(), strict=True)])
         v += (-margin, -margin, margin, margin)
         x, y = plane.raw(*((v, u) if strip.steep else (u, v)))
-        corners = np.stack((grid.column(x), grid.row(y)), axis=-1)
+        corners = np.rint(np.clip(grid.places(x, y), -_FAR, _FAR)).astype(np.int32)
         cv2.fillConvexPoly(left, corners, 0)
     return cv2.countNonZero(left) * grid.step >= shortest_length(plane)
 
@@ -183,27 +218,27 @@ def without_faint(strips: list[Strip], levels: Levels, grid: Grid, plane: Plane)
 
 
 def _is_faint(strip: Strip, levels: Levels, grid: Grid, plane: Plane) -> bool:
-    u = strip.u0 + (strip.u1 - strip.u0) * _PLACES
-    width = strip.high.a - strip.low.a + (strip.high.b - strip.low.b) * u
-    v = (strip.centre.a + strip.centre.b * u)[:, None] + width[:, None] * _INSIDE
-    steep = np.full((1, 1), strip.steep)
-    marked, seen = _look_up(levels, grid, plane, steep, u[:, None], v)
-    strong, _ = _look_up((levels == STRONG).view(np.uint8), grid, plane, steep, u[:, None], v)
-    count = max(float(seen.sum()), 1.0)
-    return bool(strong.sum() < _FAINT_STRONG * count and marked.sum() < _FAINT_FILLED * count)
+    low, high, centre = strip.low, strip.high, strip.centre
+    laws = ((centre.a, centre.b), (high.a - low.a, high.b - low.b), (0.0, 0.0), (0.0, 0.0))
+    found = _looks(levels, [strip], [(strip.u0, strip.u1)], [laws], grid, plane)[..., : len(_INSIDE)]
+    count = max(int(np.count_nonzero(found != OUTSIDE)), 1)
+    strong, weak = np.count_nonzero(found == STRONG), np.count_nonzero(found == WEAK)
+    return bool(strong < _FAINT_STRONG * count and strong + weak < _FAINT_FILLED * count)
 
 
 def _explained(strip: Strip, others: list[Strip]) -> float:
     """The part of the strip's centre line that lies in the others' bands."""
-    u = strip.u0 + (strip.u1 - strip.u0) * ((np.arange(16) + 0.5) / 16)
-    v = strip.centre.a + strip.centre.b * u
-    covered = np.zeros(16, np.bool_)
+    if not others:
+        return 0.0
+    a, b, pace = strip.centre.a, strip.centre.b, (strip.u1 - strip.u0) / _LOOKS
+    covered = set()
     for other in others:
-        s, t = (u, v) if strip.steep == other.steep else (v, u)
         reach = 0.6 * other.width_px / other.cosine + 4.0
-        covered |= (
-            (np.abs(t - other.centre.a - other.centre.b * s) <= reach)
-            & (s >= other.u0 - reach)
-            & (s <= other.u1 + reach)
-        )
-    return float(covered.mean())
+        first, last = other.u0 - reach, other.u1 + reach
+        middle, slope = other.centre.a, other.centre.b
+        for k in range(_LOOKS):
+            u = strip.u0 + pace * (k + 0.5)
+            s, t = (u, a + b * u) if strip.steep == other.steep else (a + b * u, u)
+            if abs(t - middle - slope * s) <= reach and first <= s <= last:
+                covered.add(k)
+    return len(covered) / _LOOKS

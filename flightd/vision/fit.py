@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,74 +16,89 @@ MAX_BOW = 0.02
 """Sagitta over chord beyond which a band is a curve: an arc of radius 6 chords.  What cheap lenses bend
 stays below it."""
 
+BEYOND = 0.3
+"""A curve shows in how it goes on by this part of what looks straight."""
 
-def fit_line(u: Array, v: Array, sigma: float) -> LinearFit:
-    """Least squares v = a + b u, each v good to at least `sigma`; the covariance follows the scatter."""
-    return fit_rows(np.stack((np.ones_like(u), u, v)), sigma)[0]
+Moments: TypeAlias = list[list[float]]
+"""(3 + K, 3 + K) sums of products of the rows one, u, u squared, and K times v at u."""
 
 
-def fit_rows(points: Array, sigma: float) -> list[LinearFit]:
-    """`fit_line` of each of the rows from the third on of the (K, N) `points`, whose first is ones and
-    whose second is u.  One product of the points with themselves holds all the sums."""
-    sums = (points @ points.T).tolist()
-    n, su, suu = sums[0][0], sums[0][1], sums[1][1]
+def rows_of(u: Array, *values: Array) -> Array:
+    """(3 + K, N) rows whose moments are asked for: one, u, u squared, and K values at u."""
+    return np.stack((np.ones_like(u), u, u * u, *values))
+
+
+def moments(rows: Array) -> Moments:
+    """All that lines and parabolas through the points of `rows_of` follow from."""
+    sums: Moments = (rows @ rows.T).tolist()
+    return sums
+
+
+def law(sums: Moments, column: int) -> tuple[float, float]:
+    """Least squares (a, b) of v = a + b u for the values in a row of the moments."""
+    n, su, sv = sums[0][0], sums[0][1], sums[0][column]
     mean_u = su / n
-    suu -= su * mean_u
-    fits = []
-    for k in range(2, len(sums)):
-        sv, suv, svv = sums[0][k], sums[1][k], sums[k][k]
-        suv -= mean_u * sv
-        b = suv / suu if suu > 0 else 0.0
-        variance = max(sigma * sigma, (svv - sv * sv / n - b * suv) / max(1.0, n - 2))
-        var_b = variance / suu if suu > 0 else variance
-        fits.append(
-            LinearFit(sv / n - b * mean_u, b, variance / n + mean_u * mean_u * var_b, var_b, -mean_u * var_b)
-        )
-    return fits
+    suu = sums[1][1] - su * mean_u
+    b = (sums[1][column] - mean_u * sv) / suu if suu > 0 else 0.0
+    return sv / n - b * mean_u, b
 
 
-def is_bent(core: tuple[Array, Array], around: tuple[Array, Array], sigma: float) -> bool:
-    """Whether points (u, v), each good to `sigma`, run on a curve.
+def fit(sums: Moments, column: int, sigma: float) -> LinearFit:
+    """The same with its covariance: the values are good to at least `sigma`, and to their scatter."""
+    n, su, sv = sums[0][0], sums[0][1], sums[0][column]
+    mean_u = su / n
+    suu, suv = sums[1][1] - su * mean_u, sums[1][column] - mean_u * sv
+    b = suv / suu if suu > 0 else 0.0
+    variance = max(sigma * sigma, (sums[column][column] - sv * sv / n - b * suv) / max(1.0, n - 2))
+    var_b = variance / suu if suu > 0 else variance
+    return LinearFit(sv / n - b * mean_u, b, variance / n + mean_u * mean_u * var_b, var_b, -mean_u * var_b)
+
+
+def is_bent(
+    core: tuple[Moments, float], around: Callable[[], tuple[Moments, float]], column: int, sigma: float
+) -> bool:
+    """Whether points, each good to `sigma`, run on a curve: `core` and `around` are their moments, and how
+    far they reach along u; v is in the given row.
 
     Of a curve the points that fit a straight line look straight: what lies around them must bend by
     MAX_BOW.  But straight bands end in bends, too: so their core must bend the same way.
     """
-    wide, wide_sigma, chord = sagitta(*around, sigma)
-    if abs(wide) <= max(MAX_BOW * chord, 4 * wide_sigma):
+    narrow, narrow_sigma = sagitta(*core, column, sigma)
+    if abs(narrow) <= max(0.5 * MAX_BOW * core[1], narrow_sigma):
         return False
-    narrow, narrow_sigma, chord = sagitta(*core, sigma)
-    return narrow * wide > 0 and abs(narrow) > max(0.5 * MAX_BOW * chord, narrow_sigma)
+    sums, chord = around()
+    wide, wide_sigma = sagitta(sums, chord, column, sigma)
+    return narrow * wide > 0 and abs(wide) > max(MAX_BOW * chord, 4 * wide_sigma)
 
 
-def sagitta(u: Array, v: Array, sigma: float) -> tuple[float, float, float]:
-    """Height of the best parabola's arc over its chord, its standard deviation, and the chord."""
-    n = len(u)
-    if n < 5:
-        return 0.0, math.inf, 0.0
-    first, last = float(u.min()), float(u.max())
-    chord = last - first
-    if chord <= 0:
-        return 0.0, math.inf, 0.0
-    rows = np.empty((4, n))
-    rows[0] = 1.0
-    t = np.multiply(u, 2 / chord, out=rows[1])
-    t -= (first + last) / chord
-    np.multiply(t, t, out=rows[2])
-    np.subtract(v, v[0], out=rows[3])
-    (_, s1, s2, sv), (_, _, s3, s1v), (_, _, s4, s2v), (_, _, _, svv) = (rows @ rows.T).tolist()
-    # v = c0 + c1 t + c2 q with q the part of t^2 that no straight line explains: the sagitta is c2, to
-    # within how unevenly the points lie.
-    stt, stq, stv = s2 - s1 * s1 / n, s3 - s1 * s2 / n, s1v - s1 * sv / n
-    if stt <= 1e-9 * n:
-        return 0.0, math.inf, chord
-    sqq, sqv = s4 - s2 * s2 / n - stq * stq / stt, s2v - s2 * sv / n - stq * stv / stt
-    if sqq <= 1e-9 * n:
-        return 0.0, math.inf, chord
-    c1, c2 = stv / stt, sqv / sqq
-    residual = svv - sv * sv / n - c1 * stv - c2 * sqv
-    variance = max(sigma * sigma, residual / max(1, n - 3))
-    slope = math.hypot(1.0, c1 * 2 / chord)
-    return c2 / slope, math.sqrt(variance / sqq) / slope, chord
+def sagitta(sums: Moments, chord: float, column: int, sigma: float) -> tuple[float, float]:
+    """Height over its `chord` of the best parabola's arc through the values in a row of the moments, and its
+    standard deviation."""
+    n, s1, s2 = sums[0][:3]
+    if n < 5 or chord <= 0:
+        return 0.0, math.inf
+    s3, s4 = sums[1][2], sums[2][2]
+    sv, s1v, s2v, svv = sums[0][column], sums[1][column], sums[2][column], sums[column][column]
+    # About the points' mean, t = u - mean and w = v - mean.
+    mean_u, mean_v = s1 / n, sv / n
+    tt = s2 - mean_u * s1
+    ttt = s3 - 3 * mean_u * s2 + 2 * mean_u * mean_u * s1
+    tttt = s4 - 4 * mean_u * s3 + 6 * mean_u * mean_u * s2 - 3 * mean_u**3 * s1
+    tw = s1v - mean_u * sv
+    ttw = s2v - 2 * mean_u * s1v + mean_u * mean_u * sv - mean_v * tt
+    half = chord / 2
+    if tt <= 1e-9 * n * half**2:
+        return 0.0, math.inf
+    # v = c0 + c1 t + c2 q with q the part of t^2 that no straight line explains: the sagitta is c2 over half
+    # the chord, to within how unevenly the points lie.
+    qq, qw = tttt - tt * tt / n - ttt * ttt / tt, ttw - ttt * tw / tt
+    if qq <= 1e-9 * n * half**4:
+        return 0.0, math.inf
+    c1, c2 = tw / tt, qw / qq
+    residual = svv - mean_v * sv - c1 * tw - c2 * qw
+    variance = max(sigma * sigma, residual / max(1.0, n - 3))
+    scale = half * half / math.hypot(1.0, c1)
+    return c2 * scale, math.sqrt(variance / qq) * scale
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from flightd.core.types import Image, Junction, JunctionKind, Line
 from flightd.vision.plane import Plane
-from flightd.vision.sampling import Grid
+from flightd.vision.sampling import OUTSIDE, PAINT, Grid, look_up
 
 _MIN_ANGLE_RAD = math.radians(25.0)
 _PAINTED = 0.6
@@ -85,14 +85,12 @@ def _painted(arms: list[_Arm], mask: Image, grid: Grid, plane: Plane) -> list[bo
     """Whether each arm is there."""
     if not arms:
         return []
-    x0, y0, dx, dy, length = np.array(arms).T[:, :, None]
-    t = length * _STEPS
-    x, y = plane.raw(x0 + t * dx, y0 + t * dy)
-    i, j = grid.column(x), grid.row(y)
-    seen = (i >= 0) & (j >= 0) & (i < mask.shape[1]) & (j < mask.shape[0])
-    paint = mask[np.where(seen, j, 0), np.where(seen, i, 0)].astype(np.bool_) & seen
-    count, total = np.count_nonzero(paint, axis=1), np.count_nonzero(seen, axis=1)
-    return [bool(there) for there in (total >= _MIN_SEEN) & (count >= _PAINTED * total)]
+    x, y, dx, dy, length = np.array(arms).T[:, :, None]
+    along = length * _STEPS
+    found = look_up(mask, grid.places(*plane.raw(x + along * dx, y + along * dy)))
+    count, total = np.add.reduce((found == PAINT, found != OUTSIDE), axis=2, dtype=np.intp)
+    there: list[bool] = ((total >= _MIN_SEEN) & (count >= _PAINTED * total)).tolist()
+    return there
 
 
 def _ends(line: Line, junctions: list[Junction], half_x: float, half_y: float) -> list[Junction]:

@@ -19,7 +19,8 @@ TARGET_WIDTH_PX = 320
 MAX_STEP = 6
 """A 6 px line must still leave a connected trace."""
 
-_FAR = 1e6
+PAINT, OUTSIDE = 255, 128
+"""What a mask holds where there is paint, and what is looked up beyond its border."""
 _MANY = 240
 """Samples across from which every second one will do for what is larger than a line."""
 
@@ -47,10 +48,9 @@ class Grid:
         return max(1, (self.frame_height - self.offset) // self.step)
 
     @property
-    def corner(self) -> tuple[float, float]:
-        """Centred frame coordinates of the first cell's outer corner."""
-        before = self.offset - self.step / 2
-        return before - (self.frame_width - 1) / 2, before - (self.frame_height - 1) / 2
+    def first(self) -> tuple[float, float]:
+        """Centred frame coordinates of the first sample."""
+        return self.offset - (self.frame_width - 1) / 2, self.offset - (self.frame_height - 1) / 2
 
     def x(self, i: Array | NDArray[np.intp] | float) -> Array:
         """Centred frame coordinate of (fractional) sample column `i`."""
@@ -59,17 +59,28 @@ class Grid:
     def y(self, j: Array | NDArray[np.intp] | float) -> Array:
         return np.asarray(j, float) * self.step + (self.offset - (self.frame_height - 1) / 2)
 
-    def column(self, x: Array) -> NDArray[np.int32]:
-        """Sample column that stands for centred frame coordinate `x`; may lie outside the grid."""
-        return _whole((x - self.corner[0]) * (1 / self.step))
+    def places(self, x: Array, y: Array) -> NDArray[np.float32]:
+        """(..., 2) fractional sample columns and rows of centred frame coordinates."""
+        places = np.empty((*np.shape(x), 2), np.float32)
+        scale, (x0, y0) = 1 / self.step, self.first
+        np.multiply(x - x0, scale, out=places[..., 0], casting="same_kind")
+        np.multiply(y - y0, scale, out=places[..., 1], casting="same_kind")
+        return places
 
-    def row(self, y: Array) -> NDArray[np.int32]:
-        return _whole((y - self.corner[1]) * (1 / self.step))
 
-
-def _whole(places: Array) -> NDArray[np.int32]:
-    """Rounded down; far outside the picture a lens model may put points anywhere, even beyond an int32."""
-    return np.clip(np.floor(places), -_FAR, _FAR).astype(np.int32)
+def look_up(table: Image, places: NDArray[np.float32]) -> Image:
+    """(A, B) values of a mask or of levels at the samples nearest to (A, B, 2) `places`; OUTSIDE beyond its
+    border."""
+    # No second map: the first holds both coordinates.
+    found = cv2.remap(  # type: ignore[call-overload]
+        table,
+        places,
+        None,
+        cv2.INTER_NEAREST,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=OUTSIDE,
+    )
+    return np.asarray(found, np.uint8)
 
 
 def grid_for(width: int, height: int) -> Grid:

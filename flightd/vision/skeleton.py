@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.fit import fit_rows, is_bent
+from flightd.vision.fit import BEYOND, Moments, fit, is_bent, law, moments, rows_of
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, LinearFit, Strip
@@ -31,6 +31,8 @@ _MAX_CANDIDATES = 64
 _MAX_CLUSTERS = 10
 _WEAKEST = 0.12
 """Hough lines with less than this part of the strongest one's votes are scraps."""
+_PLACE, _RADIUS = 3, 4
+"""Rows of what is known at ridge points: their place across the band, and the band's half width there."""
 _AROUND = np.ones((5, 5), np.uint8)
 _NEIGHBOURS = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
 """Clockwise from north, P2..P9 of Zhang and Suen."""
@@ -88,7 +90,7 @@ def find(
     ys, xs = np.divmod(place, ridge.shape[1])
     radius = distance.ravel()[place].astype(float) * grid.step
     x, y = plane.ideal(grid.x(xs), grid.y(ys))
-    points = _Ridge(x, y, radius, np.ones(len(x)), np.ones(len(x), np.bool_), grid.step)
+    points = _Ridge(x, y, radius, np.ones(len(x), np.bool_), grid.step)
     strips = [_take_band(points, *_normal(seed), passes=1) for seed in seeds]
     need = max(_MIN_POINTS, round(_VOTE_SHARE * max(mask.shape)))
     if np.count_nonzero(points.free) >= need:
@@ -108,7 +110,6 @@ class _Ridge:
     x: Array
     y: Array
     radius: Array
-    ones: Array
     free: NDArray[np.bool_]
     step: int
 
@@ -175,35 +176,40 @@ def _fit_ridge(
     """A straight line through the ridge; None when too little of it is straight and of one width."""
     radius, step = ridge.radius, ridge.step
     noise = step / math.sqrt(6)
-    points = np.stack((ridge.ones, u, v, radius))
+    points = rows_of(u, v, radius)
     for _ in range(passes):
         # The band may taper; where others cross or join it, the ridge is wider than its own line says.
         near = points.take(members, axis=1)
-        _, half = fit_rows(near, noise)
-        off = np.abs(near[3] - half.a - half.b * near[1])
-        near = near.compress(off <= 1.2 * step + 0.2 * near[3], axis=1)
+        a, b = law(moments(near), _RADIUS)
+        off = np.abs(near[_RADIUS] - a - b * near[1])
+        near = near.compress(off <= 1.2 * step + 0.2 * near[_RADIUS], axis=1)
         if near.shape[1] < _MIN_POINTS:
             return None
-        fit, half = fit_rows(near, noise)
-        away = np.abs(v - fit.a - fit.b * u)
+        core = moments(near)
+        centre, half = fit(core, _PLACE, noise), fit(core, _RADIUS, noise)
+        away = np.abs(v - centre.a - centre.b * u)
         members = np.flatnonzero((away <= 1.5 * step) & ridge.free)
         if len(members) < _MIN_POINTS:
             return None
-    along, across = near[1], near[2]
+    along = near[1]
     first, last = float(along.min()), float(along.max())
-    reach = 0.3 * (last - first)
-    around = (away <= 3 * step) & (u >= first - reach) & (u <= last + reach)
-    if is_bent((along, across), (u[around], v[around]), noise):
+
+    def around() -> tuple[Moments, float]:
+        reach = BEYOND * (last - first)
+        wide = points.compress((away <= 3 * step) & (u >= first - reach) & (u <= last + reach), axis=1)
+        return moments(wide), float(np.ptp(wide[1]))
+
+    if is_bent((core, last - first), around, _PLACE, noise):
         return None
     # The distance is to the first unpainted sample's centre: half a sample beyond the edge.
-    stretch = math.hypot(1.0, fit.b)
+    stretch = math.hypot(1.0, centre.b)
     u0, u1 = first - step / 2, last + step / 2
     if min(half.at(u0), half.at(u1)) < step / 2:
         return None
     a, b = (half.a - step / 2) * stretch, half.b * stretch
     # The transform counts whole samples: its edges are known half as well as its ridge.
     variance = step * step / 4
-    low = LinearFit(fit.a - a, fit.b - b, fit.var_a + variance, fit.var_b, fit.cov_ab)
-    high = LinearFit(fit.a + a, fit.b + b, fit.var_a + variance, fit.var_b, fit.cov_ab)
+    low = LinearFit(centre.a - a, centre.b - b, centre.var_a + variance, centre.var_b, centre.cov_ab)
+    high = LinearFit(centre.a + a, centre.b + b, centre.var_a + variance, centre.var_b, centre.cov_ab)
     slabs = np.count_nonzero(np.bincount(((along - u0) / step).astype(np.intp)))
-    return Strip(steep, fit, low, high, u0, u1, slabs * step / (u1 - u0))
+    return Strip(steep, centre, low, high, u0, u1, slabs * step / (u1 - u0))

@@ -311,5 +311,6 @@ def test_an_unknown_method_is_refused_with_the_known_ones() -> None:
 
 def test_the_stages_are_timed_when_a_clock_is_given() -> None:
     ticks = iter(range(0, 10_000_000, 1_000_000))
-    seen = Detector(now_ns=lambda: next(ticks)).detect(draw([Band(0.0, 0.5, 20.0)]))
+    detector = Detector(in_flight=True, now_ns=lambda: next(ticks))
+    seen = detector.detect(draw([Band(0.0, 0.5, 20.0)]))
     assert seen.timings_ms == {"colour": 1.0, "guess": 1.0, "refine": 1.0, "junctions": 1.0, "pads": 1.0}

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightd.vision.combine import fuse
-from flightd.vision.fit import fit_line, is_bent, robust_lines, sagitta
+from flightd.vision.fit import Moments, fit, is_bent, moments, robust_lines, rows_of, sagitta
 from flightd.vision.strip import LinearFit, Strip, bisector, swapped
 
 
@@ -22,7 +22,8 @@ def strip(a: float, b: float, *, steep: bool = True, sigma: float = 1.0, half: f
 def test_the_covariance_of_a_fit_is_that_of_repeated_fits() -> None:
     rng = np.random.default_rng(3)
     u = np.linspace(40, 240, 60)
-    fits = [fit_line(u, 7 + 0.3 * u + rng.normal(0, 0.5, u.size), 0.01) for _ in range(600)]
+    values = [7 + 0.3 * u + rng.normal(0, 0.5, u.size) for _ in range(600)]
+    fits = [fit(moments(rows_of(u, v)), 3, 0.01) for v in values]
     errors = np.array([(f.a - 7, f.b - 0.3) for f in fits])
     claimed = np.array([fits[0].var_a, fits[0].cov_ab, fits[0].var_b])
     measured = np.cov(errors.T)[[0, 0, 1], [0, 1, 1]]
@@ -50,22 +51,35 @@ def test_points_without_weight_have_no_say() -> None:
     assert lines.b[0] == pytest.approx(2)
 
 
+def points(u: np.ndarray, v: np.ndarray) -> tuple[Moments, float]:
+    return moments(rows_of(u, v)), float(np.ptp(u))
+
+
+@given(a=st.floats(-900, 900), b=st.floats(-1.2, 1.2), bow=st.floats(-9, 9), middle=st.floats(-900, 900))
+def test_a_parabola_has_its_sagitta_wherever_it_lies(a: float, b: float, bow: float, middle: float) -> None:
+    u = np.linspace(middle - 60, middle + 60, 41)
+    v = a + b * u + bow * ((u - middle) / 60) ** 2
+    height, _ = sagitta(*points(u, v), 3, 0.1)
+    assert height * math.hypot(1.0, b) == pytest.approx(bow, abs=1e-4)
+
+
 @given(radius=st.floats(50, 500), noise=st.floats(0, 0.5))
 def test_an_arc_is_bent_and_a_line_is_not(radius: float, noise: float) -> None:
     u = np.linspace(-radius / 2, radius / 2, 80)
     ripple = np.random.default_rng(1).normal(0, noise, u.size)
     arc, line = np.sqrt(radius**2 - u**2) + ripple, 0.7 * u + ripple
     core = slice(20, 60)
-    assert is_bent((u[core], arc[core]), (u, arc), max(noise, 0.1))
-    assert not is_bent((u[core], line[core]), (u, line), max(noise, 0.1))
+    sigma = max(noise, 0.1)
+    assert is_bent(points(u[core], arc[core]), lambda: points(u, arc), 3, sigma)
+    assert not is_bent(points(u[core], line[core]), lambda: points(u, line), 3, sigma)
 
 
 def test_a_line_that_ends_in_bends_is_a_line() -> None:
     u = np.linspace(-100, 100, 101)
     v = np.where(np.abs(u) > 70, (np.abs(u) - 70) ** 2 / 60, 0.0)
     core = np.abs(u) <= 70
-    assert abs(sagitta(u, v, 0.1)[0]) > 0.02 * 200
-    assert not is_bent((u[core], v[core]), (u, v), 0.1)
+    assert abs(sagitta(*points(u, v), 3, 0.1)[0]) > 0.02 * 200
+    assert not is_bent(points(u[core], v[core]), lambda: points(u, v), 3, 0.1)
 
 
 @given(a=st.floats(-300, 300), b=st.floats(-1.2, 1.2), steep=st.booleans())

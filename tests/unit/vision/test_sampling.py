@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from flightd.core.geometry import Lens
 from flightd.vision.plane import Plane
-from flightd.vision.sampling import Grid, coarsened, grid_for, sample
+from flightd.vision.sampling import OUTSIDE, Grid, coarsened, grid_for, look_up, sample
 
 FISHY = Lens(640, 360, 420.0, 415.0, 322.0, 178.0, (-0.25, 0.08, 0.002, -0.001, -0.01))
 
@@ -42,8 +42,14 @@ def test_a_coarse_sample_is_the_pixel_its_grid_tells(size: tuple[int, int]) -> N
 @given(width=st.integers(16, 4000), height=st.integers(16, 4000), i=st.integers(0, 50))
 def test_a_sample_s_place_leads_back_to_it(width: int, height: int, i: int) -> None:
     grid = grid_for(width, height)
-    assert int(grid.column(grid.x(i))) == i
-    assert int(grid.row(grid.y(i))) == i
+    assert grid.places(grid.x(i), grid.y(i)) == pytest.approx([i, i], abs=1e-3)
+
+
+def test_what_is_looked_up_is_the_nearest_sample_or_outside() -> None:
+    table = np.array([[0, 255], [255, 0]], np.uint8)
+    places = np.array([[(0.4, 0.4), (0.6, 0.4), (-0.6, 0.0)], [(1.4, 1.4), (np.nan, 0.0), (1e9, -1e9)]])
+    found = look_up(table, places.astype(np.float32))
+    assert found.tolist() == [[0, 255, OUTSIDE], [0, OUTSIDE, OUTSIDE]]
 
 
 def test_the_usual_pictures_are_looked_at_320_samples_wide() -> None:
