@@ -26,6 +26,8 @@ less excuse by its clear part, and edges as sharp as a short line's are."""
 _USUAL_SCATTER_PX, _FRAYED_SHARE, _SHARP_SHARE = 0.7, 0.5, 0.2
 """A pixel of scatter more asks for so much more share, one less for so much less; points all over the
 window, on no edge at all, have 1.4."""
+_NO_EDGE, _SHARP_OF_NONE = 0.8, 0.5
+"""Points that scatter so far where the other edge's do so by that part of it less are on no edge."""
 _MAX_BOW = 0.006
 _MIN_BOW_PX = 1.2
 _BOW_OF_WIDTH = 0.06
@@ -57,6 +59,7 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
             e if taps.contrast[e] > taps.least_contrast and lines.points[e] >= _MIN_POINTS else None
             for e in (2 * k, 2 * k + 1)
         ]
+        edges = _without_none(edges, lines)
         share = sum(float(lines.points[e] / visible[e]) for e in edges if e is not None) / 2
         low, high = (None if e is None else lines.fit(e) for e in edges)
         band = _assemble(strip, low, high)
@@ -67,6 +70,15 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
         else:
             refined.append(None if _is_curve(strip, lines, edges) else _unrefined(strip, share, plane))
     return refined
+
+
+def _without_none(edges: list[int | None], lines: RobustLines) -> list[int | None]:
+    """The edges without one that is on nothing where the other is sharp: worn away, covered, or a join."""
+    scatter = [math.inf if e is None else float(lines.scatter[e]) for e in edges]
+    best, worst = min(scatter), max(scatter)
+    if worst < _NO_EDGE or best > _SHARP_OF_NONE * worst:
+        return edges
+    return [e if of == best else None for e, of in zip(edges, scatter, strict=True)]
 
 
 def _unrefined(strip: Strip, share: float, plane: Plane) -> Strip | None:
