@@ -120,15 +120,16 @@ class _Cuts:
     `points` is (6, N): one, the slab's position u, its square, the band's edges, low and high, and the
     middle between them, in centred frame pixels; `known` (4, N) is one, u, the middle and the width.  The
     columns' slabs are numbered far beyond the rows', and their known middles lie far beyond, too: so no
-    hypothesis in one direction finds a cut of the other near.  `ahead` is the way, along u, on which more
+    hypothesis in one direction finds a cut of the other near.  `key` (N + 2) orders them by slab and
+    then by place, the slabs far apart, infinity at both ends.  `ahead` is the way, along u, on which more
     slabs lie.  A cut is no other band's once it is not `free`.  `sides` are the points of all cuts by
     columns and by rows, also of those that are left out here.
     """
 
-    slab: Array
+    key: Array
     ahead: Array
     points: Array
-    known: Array
+    known: NDArray[np.float32]
     free: NDArray[np.bool_]
     sides: tuple[Array, Array]
     split: int
@@ -152,7 +153,7 @@ class _Cuts:
         """Only those that are still free."""
         free = self.free
         return _Cuts(
-            self.slab[free],
+            self.key[np.concatenate(((True,), free, (True,)))],
             self.ahead[free],
             self.points.compress(free, axis=1),
             self.known.compress(free, axis=1),
@@ -180,20 +181,24 @@ def _cut(mask: Image, grid: Grid, plane: Plane, spacing: int) -> _Cuts:
     points[0] = 1.0
     points[1] = u
     points[_LOW : _HIGH + 1] = changes * grid.step - shift
-    points, slab = points.compress(whole, axis=1), number[whole]
-    split = int(slab.searchsorted(_SLABS_APART))
+    points, number = points.compress(whole, axis=1), number[whole]
+    split = int(number.searchsorted(_SLABS_APART))
     if not plane.is_identity:
         _straighten(points, split, plane)
     _, u, square, low, high, middle = points
     np.multiply(u, u, out=square)
     np.multiply(low + high, 0.5, out=middle)
-    known = points.take(_KNOWN, axis=0)
+    known = points.take(_KNOWN, axis=0).astype(np.float32)
     known[2, split:] += _APART_PX
-    np.subtract(high, low, out=known[3])
+    known[3] = high - low
+    key = np.full(len(u) + 2, np.inf)
+    key[0] = -np.inf
+    np.multiply(number, _SLAB_KEY, out=key[1:-1])
+    key[1:-1] += known[2]
     free = np.ones(len(u), np.bool_)
     sides = points[:, split:], points[:, :split]
     spacing_px = float(spacing * grid.step)
-    return _Cuts(slab, ahead[whole], points, known, free, sides, split, spacing_px, grid.step)
+    return _Cuts(key, ahead[whole], points, known, free, sides, split, spacing_px, grid.step)
 
 
 def _straighten(points: Array, split: int, plane: Plane) -> None:
@@ -213,7 +218,7 @@ def _ransac(cuts: _Cuts, fewest: int) -> list[Strip]:
     """
     strips: list[Strip] = []
     step, free, known = cuts.step, cuts.free, cuts.known
-    i, j = _pairs(cuts.slab, cuts.ahead, known[2])
+    i, j = _pairs(cuts.key, cuts.ahead)
     one, other = known.take(i, axis=1), known.take(j, axis=1)
     _, du, rise, change = other - one
     b, width_b = rise / du, change / du
@@ -223,43 +228,41 @@ def _ransac(cuts: _Cuts, fewest: int) -> list[Strip]:
         return strips
     # How far each cut is off each hypothesis, v - (v_i + b (u - u_i)), to either side beyond what is let
     # pass, and the width expected there, in one product.
-    off = np.array((b * one[1] - one[2], -b, np.ones(len(i))))
-    expected = np.array((one[3] - width_b * one[1], width_b, np.zeros(len(i))))
+    laws = np.zeros((3, 3, len(i)), np.float32)
+    expected = laws[2]
+    expected[0], expected[1] = one[3] - width_b * one[1], width_b
     passed = _PASS_OF_WIDTH * expected
     passed[0] += step
-    laws = np.array((off - passed, -off - passed, expected), np.float32).swapaxes(1, 2)
-    above, below, expected = laws @ known[:3].astype(np.float32)
-    widths = known[3].astype(np.float32)
+    off = np.array((b * one[1] - one[2], -b, one[0]))
+    np.subtract(off, passed, out=laws[0])
+    np.subtract(-off, passed, out=laws[1])
+    above, below, expected = laws.swapaxes(1, 2) @ known[:3]
     votes = np.maximum(above, below, out=above) <= 0
-    votes &= expected >= (widths - 2 * step) / (1 + _PASS_WIDTH)
-    votes &= expected <= (widths + 2 * step) / (1 - _PASS_WIDTH)
+    votes &= expected >= (known[3] - 2 * step) / (1 + _PASS_WIDTH)
+    votes &= expected <= (known[3] + 2 * step) / (1 - _PASS_WIDTH)
     inlier = votes.astype(np.float32)
-    scores = inlier @ np.ones(len(free), np.float32)
-    while scores[best := int(scores.argmax())] >= fewest:
+    while True:
+        scores = inlier @ free.astype(np.float32)
+        best = int(scores.argmax())
+        if scores[best] < fewest:
+            return strips
         taken = np.flatnonzero(votes[best] & free)
         strip = _fit_band(cuts, taken, steep=bool(i[best] < cuts.split))
         if strip is not None:
             strips.append(strip)
             cuts.take(strip)
         free[taken] = False
-        scores = inlier @ free.astype(np.float32)
-    return strips
 
 
-def _pairs(slab: Array, ahead: Array, middle: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _pairs(key: Array, ahead: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Random centroids, each with a partner far along the band it seems to belong to.
 
     A nearby slab gives the local slope, which says where to look in a slab further on: nearly every pair
     lies on one band, where blind pairs on k bands would agree once in k.
     """
-    n = len(slab)
+    n = len(ahead)
     trials = min(n, max(TRIALS, min(n // _CUTS_PER_TRIAL, _MOST_LOOKS // n, MOST_TRIALS)))
     i = (_SPREAD[:trials] * (n / trials)).astype(np.intp) if n > trials else np.arange(n)
-    # A slab's centroids lie together in the keys, in the order of their places, far from other slabs'.
-    key = np.full(n + 2, np.inf)
-    key[0] = -np.inf
-    np.multiply(slab, _SLAB_KEY, out=key[1:-1])
-    key[1:-1] += middle
     here, way = key.take(i + 1), ahead[i]
     near, far = way * _NEAR[:trials], way * _FAR[:trials]
     j, same = _nearest(key, here + near * _SLAB_KEY)

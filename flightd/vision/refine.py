@@ -20,7 +20,7 @@ _MIN_SHARE = 0.46
 """Of the stations that show paint between floor, the part at which the edges are where they should be."""
 _WORST_CLEAR = 0.6
 """Crossings and gaps excuse missing edges down to this clear part; a chain of blobs has less."""
-_COMPACT_ASPECT, _COMPACT_SHARE, _COMPACT_CLEAR, _COMPACT_FRAYED = 5.0, 0.14, 0.03, 0.4
+_COMPACT_ASPECT, _COMPACT_SHARE, _COMPACT_CLEAR, _COMPACT_FRAYED = 5.0, 0.14, 0.015, 0.4
 """Below this length to width a blob may pass for a band: each unit less asks for that much more share,
 less excuse by its clear part, and edges as sharp as a short line's are."""
 _USUAL_SCATTER_PX, _FRAYED_SHARE, _SHARP_SHARE = 0.7, 0.5, 0.2
