@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from flightd.core.types import Image
-from flightd.vision.edges import FINE, locate, rough, take
+from flightd.vision.edges import FINE, Taps, locate, rough, take
 from flightd.vision.fit import RobustLines, robust_lines
 from flightd.vision.plane import Plane
 from flightd.vision.strip import LinearFit, Strip, bisector
@@ -28,6 +28,8 @@ _USUAL_SCATTER_PX, _FRAYED_SHARE, _SHARP_SHARE = 0.7, 0.5, 0.2
 window, on no edge at all, have 1.4."""
 _NO_EDGE, _SHARP_OF_NONE = 0.8, 0.5
 """Points that scatter so far where the other edge's do so by that part of it less are on no edge."""
+_STEP = 0.06
+"""Less than this part of the one edge's contrast on the other one: no band."""
 _MAX_BOW = 0.006
 _MIN_BOW_PX = 1.2
 _BOW_OF_WIDTH = 0.06
@@ -55,6 +57,9 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
     visible = np.maximum(np.count_nonzero(taps.seen, axis=1), stations / 2)
     refined: list[Strip | None] = []
     for k, strip in enumerate(strips):
+        if _is_step(taps, 2 * k):
+            refined.append(None)
+            continue
         edges = [
             e if taps.contrast[e] > taps.least_contrast and lines.points[e] >= _MIN_POINTS else None
             for e in (2 * k, 2 * k + 1)
@@ -70,6 +75,14 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
         else:
             refined.append(None if _is_curve(strip, lines, edges) else _unrefined(strip, share, plane))
     return refined
+
+
+def _is_step(taps: Taps, e: int) -> bool:
+    """Whether a band has floor of its own colour on one side: the border of a shadow, or of another floor."""
+    low, high = float(taps.contrast[e]), float(taps.contrast[e + 1])
+    if min(low, high) >= _STEP * max(low, high):
+        return False
+    return bool(np.count_nonzero(taps.seen[e : e + 2], axis=1).min() > taps.row.shape[1] / 2)
 
 
 def _without_none(edges: list[int | None], lines: RobustLines) -> list[int | None]:
