@@ -18,7 +18,7 @@ _MIN_POINTS = 6.0
 _MIN_WIDTH_PX = 2.5
 _MIN_SHARE = 0.46
 """Of the stations that show paint between floor, the part at which the edges are where they should be."""
-_WORST_CLEAR = 0.6
+_WORST_CLEAR = 0.62
 """Crossings and gaps excuse missing edges down to this clear part; a chain of blobs has less."""
 _COMPACT_ASPECT, _COMPACT_SHARE, _COMPACT_CLEAR, _COMPACT_FRAYED = 5.0, 0.14, 0.015, 0.4
 """Below this length to width a blob may pass for a band: each unit less asks for that much more share,
