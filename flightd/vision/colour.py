@@ -206,14 +206,15 @@ def level(small_bgr: Image, colour: str) -> Image:
     height, width = small_bgr.shape[:2]
     field = floor_field(small_bgr, colour)
     floor = cv2.resize(field, (width, height), interpolation=cv2.INTER_LINEAR)
-    levelled = cv2.divide(small_bgr, floor, scale=FLOOR_GREY)
     brightness = sum(cv2.mean(field)) / 3
-    if brightness > _BRIGHT_FLOOR:
-        stretch = min((255.0 - FLOOR_GREY) / max(255.0 - brightness, 1.0), _MAX_STRETCH)
-        # In place: every new picture of this size would be new memory to the system, too.
-        above = cv2.subtract(small_bgr, floor, dst=floor)
-        cv2.convertScaleAbs(above, dst=above, alpha=stretch - FLOOR_GREY / brightness)
-        cv2.add(levelled, above, dst=levelled)
+    # In place: every new picture of this size would push another one out of the processor's cache.
+    if brightness <= _BRIGHT_FLOOR:
+        return np.asarray(cv2.divide(small_bgr, floor, dst=floor, scale=FLOOR_GREY), np.uint8)
+    levelled = cv2.divide(small_bgr, floor, scale=FLOOR_GREY)
+    stretch = min((255.0 - FLOOR_GREY) / max(255.0 - brightness, 1.0), _MAX_STRETCH)
+    above = cv2.subtract(small_bgr, floor, dst=floor)
+    cv2.convertScaleAbs(above, dst=above, alpha=stretch - FLOOR_GREY / brightness)
+    cv2.add(levelled, above, dst=levelled)
     return np.asarray(levelled, np.uint8)
 
 
