@@ -54,7 +54,7 @@ _FAR = _DRAWS.integers(14, 30, MOST_TRIALS, endpoint=True)
 
 def slab_spacing(coverage: float) -> int:
     """Samples between slabs: little paint (thin or far lines) needs many slabs, much paint few."""
-    return 2 if coverage < 0.06 else 3 if coverage < 0.2 else 4
+    return 2 if coverage < 0.03 else 3 if coverage < 0.12 else 4
 
 
 def find(mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
@@ -292,7 +292,8 @@ def _fit_band(cuts: _Cuts, members: NDArray[np.intp], *, steep: bool) -> Strip |
     side = cuts.sides[steep]
     limit = 1.2 * step + 0.05 * abs(c - a)
     away = np.array(((-a, -b, 0.0, 1.0, 0.0, 0.0), (-c, -d, 0.0, 0.0, 1.0, 0.0))) @ side
-    inside = side.compress(np.abs(away).max(axis=0) <= limit, axis=1)
+    off = np.abs(away)
+    inside = side.compress(np.maximum(off[0], off[1]) <= limit, axis=1)
     count = inside.shape[1]
     if count < _MIN_CUTS:
         return None
