@@ -47,6 +47,7 @@ class Taps:
 
     `row` counts along u and `base` along v in raw pixels; tap t of an edge is pixel base + sign (t - half).
     `seen` (E, S) tells which guessed places are in the picture; edges need `least_contrast` grey levels.
+    `shade` (E, 3) is the paint's colour over the floor's, by channel.
     """
 
     steep: NDArray[np.bool_]
@@ -57,16 +58,19 @@ class Taps:
     seen: NDArray[np.bool_]
     profile: Floats
     contrast: Array
+    shade: Array
     least_contrast: float
 
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """Located edge points (E, S) in the distortion-free plane with their weights (0 where none)."""
+    """Located edge points (E, S) in the distortion-free plane with their weights (0 where none), and how much
+    (E,) of each edge's contrast lies within some pixels of it."""
 
     u: Array
     v: Array
     weight: Array
+    sharpness: Array
 
 
 def take(bgr: Image, strips: list[Strip], plane: Plane, half: int) -> Taps:
@@ -100,9 +104,9 @@ def take(bgr: Image, strips: list[Strip], plane: Plane, half: int) -> Taps:
     offset = sign * stride_v * np.minimum(np.arange(-half, half + 1), inner)
     index = (row * stride_u + base * stride_v)[:, :, None] + offset[:, None, :]
     pixels = bgr.reshape(-1, 3).take(index, axis=0).astype(np.float32)
-    profile, contrast = _project(pixels, seen)
+    profile, contrast, shade = _project(pixels, seen)
     least = min(max(_CONTRAST_PART * float(pixels.mean()), _DARK_CONTRAST), _MIN_CONTRAST)
-    return Taps(steep, sign, row, base, half, seen, profile, contrast, least)
+    return Taps(steep, sign, row, base, half, seen, profile, contrast, shade, least)
 
 
 def rough(taps: Taps) -> tuple[Array, Array]:
@@ -144,17 +148,22 @@ def locate(taps: Taps, rough_a: Array, rough_b: Array, plane: Plane) -> Edges:
     x = np.where(taps.steep, edge, taps.row) - (plane.width_px - 1) / 2
     y = np.where(taps.steep, taps.row, edge) - (plane.height_px - 1) / 2
     x, y = plane.ideal(x, y)
-    return Edges(np.where(taps.steep, y, x), np.where(taps.steep, x, y), usable.astype(float))
+    weight = usable.astype(float)
+    sharpness = (step * weight).sum(axis=1) / np.maximum(taps.contrast * weight.sum(axis=1), 1e-6)
+    return Edges(np.where(taps.steep, y, x), np.where(taps.steep, x, y), weight, sharpness)
 
 
-def _project(pixels: Floats, valid: NDArray[np.bool_]) -> tuple[Floats, Array]:
-    """Profiles (E, S, T) along the colour direction from floor to paint, and each edge's contrast."""
+def _project(pixels: Floats, valid: NDArray[np.bool_]) -> tuple[Floats, Array, Array]:
+    """Profiles (E, S, T) along the colour direction from floor to paint, each edge's contrast, and the paint's
+    colour over the floor's (E, 3)."""
     weight = valid / np.maximum(np.count_nonzero(valid, axis=1), 1)[:, None].astype(np.float32)
-    rise = pixels[:, :, -1] + pixels[:, :, -2] - pixels[:, :, 0] - pixels[:, :, 1]
-    direction = np.einsum("es,esc->ec", weight.astype(np.float32), rise) / 2
+    floor, paint = pixels[:, :, 0] + pixels[:, :, 1], pixels[:, :, -1] + pixels[:, :, -2]
+    floor, paint = (np.einsum("es,esc->ec", weight.astype(np.float32), side) / 2 for side in (floor, paint))
+    direction = paint - floor
+    shade = np.asarray(paint / np.maximum(floor, 1.0), np.float64)
     projection = direction @ _TRUST
     contrast = np.sqrt(np.einsum("ec,ec->e", direction, projection))
     projection /= np.maximum(contrast, 1e-6)[:, None]
     edges, stations, taps, _ = pixels.shape
     profile = np.matmul(pixels.reshape(edges, -1, 3), projection[:, :, None]).reshape(edges, stations, taps)
-    return np.asarray(profile, np.float32), contrast.astype(float)
+    return np.asarray(profile, np.float32), contrast.astype(float), shade

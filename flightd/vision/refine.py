@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from flightd.core.types import Image
-from flightd.vision.edges import FINE, Taps, locate, rough, take
+from flightd.vision.edges import FINE, Edges, Taps, locate, rough, take
 from flightd.vision.fit import RobustLines, robust_lines
 from flightd.vision.plane import Plane
 from flightd.vision.strip import LinearFit, Strip, bisector
@@ -30,6 +30,9 @@ _NO_EDGE, _SHARP_OF_NONE = 0.8, 0.5
 """Points that scatter so far where the other edge's do so by that part of it less are on no edge."""
 _STEP = 0.06
 """Less than this part of the one edge's contrast on the other one: no band."""
+_SOFT, _DARKEST_SHADOW, _GREY = 0.66, 0.4, 1.2
+"""Less than this part of the contrast close to an edge is a penumbra; shadows keep more than this part of the
+light, in all channels alike to within the last."""
 _MAX_BOW = 0.006
 _MIN_BOW_PX = 1.2
 _BOW_OF_WIDTH = 0.06
@@ -57,7 +60,7 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
     visible = np.maximum(np.count_nonzero(taps.seen, axis=1), stations / 2)
     refined: list[Strip | None] = []
     for k, strip in enumerate(strips):
-        if _is_step(taps, 2 * k):
+        if _is_step(taps, 2 * k) or _is_shadow(taps, found, 2 * k):
             refined.append(None)
             continue
         edges = [
@@ -83,6 +86,14 @@ def _is_step(taps: Taps, e: int) -> bool:
     if min(low, high) >= _STEP * max(low, high):
         return False
     return bool(np.count_nonzero(taps.seen[e : e + 2], axis=1).min() > taps.row.shape[1] / 2)
+
+
+def _is_shadow(taps: Taps, found: Edges, e: int) -> bool:
+    """Whether a band is only darker than the floor, of no other colour, and softer than paint at both edges."""
+    shade = taps.shade[e : e + 2]
+    if found.sharpness[e : e + 2].max() >= _SOFT or shade.min() <= _DARKEST_SHADOW or shade.max() >= 1.0:
+        return False
+    return bool((shade.max(axis=1) <= _GREY * shade.min(axis=1)).all())
 
 
 def _without_none(edges: list[int | None], lines: RobustLines) -> list[int | None]:
