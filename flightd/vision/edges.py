@@ -154,8 +154,8 @@ def locate(taps: Taps, rough_a: Array, rough_b: Array, plane: Plane) -> Edges:
 
 
 def _project(pixels: Floats, valid: NDArray[np.bool_]) -> tuple[Floats, Array, Array]:
-    """Profiles (E, S, T) along the colour direction from floor to paint, each edge's contrast, and the paint's
-    colour over the floor's (E, 3)."""
+    """Profiles (E, S, T) along the colour direction from floor to paint, each edge's contrast (E,), and the
+    paint's colour over the floor's (E, 3)."""
     weight = valid / np.maximum(np.count_nonzero(valid, axis=1), 1)[:, None].astype(np.float32)
     floor, paint = pixels[:, :, 0] + pixels[:, :, 1], pixels[:, :, -1] + pixels[:, :, -2]
     floor, paint = (np.einsum("es,esc->ec", weight.astype(np.float32), side) / 2 for side in (floor, paint))

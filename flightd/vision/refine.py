@@ -11,7 +11,7 @@ from flightd.core.types import Image
 from flightd.vision.edges import FINE, Edges, Taps, locate, rough, take
 from flightd.vision.fit import RobustLines, robust_lines
 from flightd.vision.plane import Plane
-from flightd.vision.strip import LinearFit, Strip, bisector
+from flightd.vision.strip import Array, LinearFit, Strip, bisector
 
 _CUTS_PX = (1.5, 0.7, 0.3)
 _MIN_POINTS = 6.0
@@ -67,17 +67,31 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
             e if taps.contrast[e] > taps.least_contrast and lines.points[e] >= _MIN_POINTS else None
             for e in (2 * k, 2 * k + 1)
         ]
-        edges = _without_none(edges, lines)
-        share = sum(float(lines.points[e] / visible[e]) for e in edges if e is not None) / 2
-        low, high = (None if e is None else lines.fit(e) for e in edges)
-        band = _assemble(strip, low, high)
-        # Guessed or located: the wider is what it must not be, a blob.
-        widest = 0.0 if band is None else max(strip.width_px, band.width_px)
-        if band is not None and _is_line(strip, widest, lines, share, edges):
+        share = _share(edges, lines, visible)
+        band = _judged(strip, lines, visible, edges)
+        if band is None and (sharp := _without_none(edges, lines)) != edges:
+            band = _judged(strip, lines, visible, sharp)
+        if band is not None:
             refined.append(band if band.width_px >= _MIN_WIDTH_PX else None)
         else:
             refined.append(None if _is_curve(strip, lines, edges) else _unrefined(strip, share, plane))
     return refined
+
+
+def _share(edges: list[int | None], lines: RobustLines, visible: Array) -> float:
+    """The part of both edges that was found where it could be seen."""
+    return sum(float(lines.points[e] / visible[e]) for e in edges if e is not None) / 2
+
+
+def _judged(strip: Strip, lines: RobustLines, visible: Array, edges: list[int | None]) -> Strip | None:
+    """The band between those edges, or None when they are no line's."""
+    low, high = (None if e is None else lines.fit(e) for e in edges)
+    band = _assemble(strip, low, high)
+    if band is None:
+        return None
+    # Guessed or located: the wider is what it must not be, a blob.
+    widest = max(strip.width_px, band.width_px)
+    return band if _is_line(strip, widest, lines, _share(edges, lines, visible), edges) else None
 
 
 def _is_step(taps: Taps, e: int) -> bool:
@@ -89,7 +103,7 @@ def _is_step(taps: Taps, e: int) -> bool:
 
 
 def _is_shadow(taps: Taps, found: Edges, e: int) -> bool:
-    """Whether a band is only darker than the floor, of no other colour, and softer than paint at both edges."""
+    """Whether a band is only darker than the floor, of no other colour, and soft at both edges."""
     shade = taps.shade[e : e + 2]
     if found.sharpness[e : e + 2].max() >= _SOFT or shade.min() <= _DARKEST_SHADOW or shade.max() >= 1.0:
         return False

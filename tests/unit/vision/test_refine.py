@@ -1,0 +1,45 @@
+"""What the full frame says against a band that the small mask shows."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from flightd.core.types import Image
+from flightd.vision.detector import Detector
+from tests.unit.vision.drawing import FLOOR, Band, coverage, grid, nearest
+
+BAND = Band(20.0, 0.3, 60.0)
+
+
+def floor_with(shade: NDArray[np.float64], width: int, height: int, seed: int = 0) -> Image:
+    """Grey floor whose brightness is multiplied by `shade` (H, W), a little blurred and noisy."""
+    lit = shade[..., None] * np.array(FLOOR)
+    grainy = cv2.GaussianBlur(lit, (0, 0), 0.7)
+    grainy += np.random.default_rng(seed).normal(0, 2.0, lit.shape)
+    drawn: Image = np.clip(grainy, 0, 255).astype(np.uint8)
+    return drawn
+
+
+@pytest.mark.parametrize("shade", [0.45, 0.6])
+def test_a_soft_shadow_is_no_black_line(shade: float) -> None:
+    painted = coverage([BAND], *grid(1920, 1080))
+    soft = 1 - (1 - shade) * np.asarray(cv2.GaussianBlur(painted, (0, 0), 9.0), np.float64)
+    assert Detector(profile="black").detect(floor_with(soft, 1920, 1080)).lines == ()
+
+
+def test_a_black_line_is_one_even_where_it_reflects_as_much_as_a_shadow() -> None:
+    painted = coverage([BAND], *grid(1920, 1080))
+    seen = Detector(profile="black").detect(floor_with(1 - 0.55 * painted, 1920, 1080))
+    _, rho, theta = nearest(seen, BAND)
+    assert abs(rho) < 0.1
+    assert abs(theta) < 1e-3
+
+
+def test_the_border_of_a_darker_floor_is_no_line() -> None:
+    x, y = grid(1920, 1080)
+    dark = 1 - 0.5 * np.clip(x * np.cos(0.3) + y * np.sin(0.3) + 0.5, 0, 1)
+    for profile in ("black", "white"):
+        assert Detector(profile=profile).detect(floor_with(dark, 1920, 1080)).lines == ()
