@@ -146,7 +146,8 @@ class MarkerSight:
 @dataclass(frozen=True, slots=True)
 class LineSet:
     """What vision saw in one frame.  Lines are in pixels of a distortion-free pinhole camera when a
-    lens was given to the detector.  `timings_ms` names each stage's time."""
+    lens was given to the detector.  `timings_ms` names each stage's time.  Pads are only looked for, and the
+    picture only checked, by a detector that is in flight."""
 
     frame_seq: int
     stamp_ns: int

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from flightd.core.types import Image
 from flightd.vision.fit import BEYOND, Moments, fit, is_bent, law, moments
-from flightd.vision.plane import Plane, shortest_length
+from flightd.vision.plane import NOWHERE_PX, Plane, shortest_length
 from flightd.vision.sampling import Grid
 from flightd.vision.strip import Array, Strip, bisector
 
-TRIALS, MOST_TRIALS = 64, 192
+TRIALS, _MOST_TRIALS = 64, 192
 _CUTS_PER_TRIAL, _MOST_LOOKS = 4, 150_000
 """Draws follow the number of cuts, for the short bands among much clutter; but no more than so many looks, of
 each draw at each cut."""
@@ -30,25 +30,23 @@ MAX_SLOPE = 1.25
 """dv/du of a band described along its own axis; a little beyond the diagonal so that none falls between."""
 
 _PASS_OF_WIDTH, _PASS_WIDTH = 0.08, 0.25
-"""A sample and this part of a band's width, a cut's middle may be off; two samples and this part of the width
-expected, its own width."""
+"""A cut votes for a band when its middle is off by no more than a sample and the first part of the width that
+is expected there, and its width by no more than two samples and the second part."""
 _MIN_CUTS = 5
-_ROUNDS = 2
-"""Draws go to long bands first; what they leave over is drawn from once more, for the short ones."""
 _WORTH_A_FIT = 0.6
 """A band is fitted when so great a part of the slabs that the shortest band crosses vote for it."""
 _SLAB_KEY, _SLABS_APART, _APART_PX = 1e6, 1 << 20, 1 << 17
 
 _LOW, _HIGH, _MIDDLE = 3, 4, 5
-_PLACE, _KNOWN = np.array((0, 1, _MIDDLE)), np.array((0, 1, _MIDDLE, _LOW))
 """Rows of a cut's points that hold the band's edges and the middle between them."""
+_PLACE = np.array((0, 1, _MIDDLE))
 
 _DRAWS = np.random.default_rng(20190909)
 """The same draws for every frame: one frame, one answer."""
-_SPREAD = np.arange(MOST_TRIALS) + _DRAWS.random(MOST_TRIALS)
+_SPREAD = np.arange(_MOST_TRIALS) + _DRAWS.random(_MOST_TRIALS)
 """Evenly over all cuts, so that a band has draws as its length demands."""
-_NEAR = _DRAWS.integers(3, 6, MOST_TRIALS, endpoint=True)
-_FAR = _DRAWS.integers(14, 30, MOST_TRIALS, endpoint=True)
+_NEAR = _DRAWS.integers(3, 6, _MOST_TRIALS, endpoint=True)
+_FAR = _DRAWS.integers(14, 30, _MOST_TRIALS, endpoint=True)
 """Slabs from a centroid to those that give its local slope and its partner."""
 
 
@@ -65,14 +63,13 @@ def find(mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
     # A diagonal band crosses fewest slabs for its length.
     crossed = shortest_length(plane) * math.sqrt(0.5) / cuts.spacing_px
     fewest = max(_MIN_CUTS, math.ceil(_WORTH_A_FIT * crossed))
-    for _ in range(_ROUNDS):
-        if max(cuts.split, len(cuts.free) - cuts.split) < fewest:
-            break
+    while max(cuts.split, len(cuts.free) - cuts.split) >= fewest:
         found = _ransac(cuts, fewest)
-        strips += found
-        if not found or len(cuts.free) <= TRIALS:
-            break  # nothing is straight, or every cut has had its draw
-        cuts = cuts.left()
+        # Draws go to long bands first; what they leave over is drawn from once more, for the short ones: but
+        # not where nothing is straight, or every second cut has had its draw.
+        if strips or not found or len(cuts.free) <= 2 * TRIALS:
+            return strips + found
+        strips, cuts = found, cuts.left()
     return strips
 
 
@@ -86,7 +83,6 @@ class _Slabs:
     its number, and the way along u, 1 or -1, on which more slabs lie.
     """
 
-    rows: int
     columns_at: int
     size: int
     first: NDArray[np.intp]
@@ -103,7 +99,6 @@ def _slabs(grid: Grid, height: int, width: int, spacing: int) -> _Slabs:
     u = np.concatenate((grid.y(y), grid.x(x)))
     number = np.concatenate((np.arange(len(y)), np.arange(len(x)) + _SLABS_APART))
     return _Slabs(
-        rows=len(y),
         columns_at=len(y) * (width + 1) + 1,
         size=int(ends[-1]) + 1,
         first=first,
@@ -181,16 +176,17 @@ def _cut(mask: Image, grid: Grid, plane: Plane, spacing: int) -> _Cuts:
     points[0] = 1.0
     points[1] = u
     points[_LOW : _HIGH + 1] = changes * grid.step - shift
+    if not plane.is_identity:
+        _straighten(points, int(number.searchsorted(_SLABS_APART)), plane)
+        whole &= (points[[1, _LOW, _HIGH]] < NOWHERE_PX).all(axis=0)
     points, number = points.compress(whole, axis=1), number[whole]
     split = int(number.searchsorted(_SLABS_APART))
-    if not plane.is_identity:
-        _straighten(points, split, plane)
     _, u, square, low, high, middle = points
     np.multiply(u, u, out=square)
     np.multiply(low + high, 0.5, out=middle)
-    known = points.take(_KNOWN, axis=0).astype(np.float32)
+    known = np.empty((4, len(u)), np.float32)
+    known[0], known[1], known[2], known[3] = 1.0, u, middle, high - low
     known[2, split:] += _APART_PX
-    known[3] = high - low
     key = np.full(len(u) + 2, np.inf)
     key[0] = -np.inf
     np.multiply(number, _SLAB_KEY, out=key[1:-1])
@@ -229,11 +225,10 @@ def _ransac(cuts: _Cuts, fewest: int) -> list[Strip]:
     # How far each cut is off each hypothesis, v - (v_i + b (u - u_i)), to either side beyond what is let
     # pass, and the width expected there, in one product.
     laws = np.zeros((3, 3, len(i)), np.float32)
-    expected = laws[2]
-    expected[0], expected[1] = one[3] - width_b * one[1], width_b
-    passed = _PASS_OF_WIDTH * expected
+    laws[2, 0], laws[2, 1] = one[3] - width_b * one[1], width_b
+    passed = _PASS_OF_WIDTH * laws[2]
     passed[0] += step
-    off = np.array((b * one[1] - one[2], -b, one[0]))
+    off = np.array((b * one[1] - one[2], -b, np.ones_like(b)))
     np.subtract(off, passed, out=laws[0])
     np.subtract(-off, passed, out=laws[1])
     above, below, expected = laws.swapaxes(1, 2) @ known[:3]
@@ -261,7 +256,7 @@ def _pairs(key: Array, ahead: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]
     lies on one band, where blind pairs on k bands would agree once in k.
     """
     n = len(ahead)
-    trials = min(n, max(TRIALS, min(n // _CUTS_PER_TRIAL, _MOST_LOOKS // n, MOST_TRIALS)))
+    trials = min(n, max(TRIALS, min(n // _CUTS_PER_TRIAL, _MOST_LOOKS // n, _MOST_TRIALS)))
     i = (_SPREAD[:trials] * (n / trials)).astype(np.intp) if n > trials else np.arange(n)
     here, way = key.take(i + 1), ahead[i]
     near, far = way * _NEAR[:trials], way * _FAR[:trials]

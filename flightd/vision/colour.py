@@ -152,10 +152,9 @@ def floor_field(small_bgr: Image, colour: str) -> Image:
     floor = np.asarray(cv2.medianBlur(grey, _NEIGHBOURHOOD))
     floor = np.minimum(np.maximum(floor, int(frame * darkest)), min(int(frame * brightest), 255))
     tint = _floor_tint(cells[::2, ::2], colour)
-    field = np.asarray(
-        cv2.merge([cv2.convertScaleAbs(floor, alpha=part, beta=-0.5) for part in tint]), np.uint8
-    )
-    return np.maximum(field, 1)
+    # Half a level off the rounding: down, as the profiles were trained with.
+    field = cv2.merge([cv2.convertScaleAbs(floor, alpha=part, beta=-0.5) for part in tint])
+    return np.maximum(np.asarray(field, np.uint8), 1)
 
 
 def _middle(values: NDArray[np.uint8]) -> float:

@@ -27,6 +27,7 @@ _MIN_SIDE_PX = 16
 _REACH_PX = 10
 """How far the guessed edge may be off: a sample and a half, or what blur hides."""
 _KEPT_BYTES = 1 << 24
+"""More than any small picture, less than the 32 MB from which the C library always goes to the system."""
 _SPECKS = np.ones((5, 5), np.uint8)
 _HOLES = np.ones((9, 9), np.uint8)
 _WORN = 1.02
@@ -38,8 +39,8 @@ class Detector:
 
     `method` is one of METHODS; `profile` a colour profile or the name of one.  With a `lens` the lines
     are those of a distortion-free camera.  Floor markers are looked for when `markers` says
-    which.  `in_flight`, charge pads are looked for, too, and the picture's fingerprint and exposure are
-    taken.  `now_ns`, when given, times the stages.  Not thread-safe: one detector for each worker.
+    which.  When `in_flight`, charge pads are looked for, too, and the picture's fingerprint and exposure
+    are taken.  `now_ns`, when given, times the stages.  Not thread-safe: one detector for each worker.
     """
 
     def __init__(
@@ -176,10 +177,11 @@ def _check(bgr: Image) -> None:
 def _keep_freed_memory() -> None:
     """Let this process keep what a frame's small pictures leave for those of the next one.
 
-    The GNU C library returns freed blocks of more than 128 KB to the system, until a larger one was freed;
-    new pages, a hundred or more for each frame, cost as much time as reading the frame.
+    The GNU C library gives freed blocks of more than 128 KB back to the system until it has seen a larger one
+    freed; new pages, fifty to three hundred for each frame, cost as much time as reading the frame.  Other
+    libraries take no notice.
     """
-    np.empty(_KEPT_BYTES, np.uint8)
+    np.empty(_KEPT_BYTES, np.uint8)  # freed at once, and never touched
 
 
 def _no_clock() -> int:

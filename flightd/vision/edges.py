@@ -96,13 +96,15 @@ def take(bgr: Image, strips: list[Strip], plane: Plane, half: int) -> Taps:
     columns: Indices = np.where(steep, np.full(1, width), height)
     half = min(half, (min(height, width) - 1) // 2)
     seen = (row >= 0) & (row < rows) & (base >= 0) & (base < columns)
-    row, base = np.clip(row, 0, rows - 1), np.clip(base, half, columns - 1 - half)
+    row, guessed = np.clip(row, 0, rows - 1), base
+    base = np.clip(base, half, columns - 1 - half)
     # Inside a thin band the taps stop at its middle: beyond it the far edge would be seen.
     middles = np.array([(s.high.at(m) - s.low.at(m)) / 2 for s in strips for m in [(s.u0 + s.u1) / 2]])
     inner = np.repeat(np.maximum(1, middles.astype(np.intp)), 2)[:, None]
     stride_u, stride_v = np.where(steep, width, 1), np.where(steep, 1, width)
-    offset = sign * stride_v * np.minimum(np.arange(-half, half + 1), inner)
-    index = (row * stride_u + base * stride_v)[:, :, None] + offset[:, None, :]
+    inner = np.maximum(1, inner - sign * (base - guessed))
+    offset = (sign * stride_v)[..., None] * np.minimum(np.arange(-half, half + 1), inner[..., None])
+    index = (row * stride_u + base * stride_v)[:, :, None] + offset
     pixels = bgr.reshape(-1, 3).take(index, axis=0).astype(np.float32)
     profile, contrast, shade = _project(pixels, seen)
     least = min(max(_CONTRAST_PART * float(pixels.mean()), _DARK_CONTRAST), _MIN_CONTRAST)

@@ -37,10 +37,10 @@ _BOTH_SIDES = np.ones(2, np.float32)
 _PLACES = ((np.arange(STATIONS) + 0.5) / STATIONS).astype(np.float32)
 _FAR = 1e4
 """Samples from the first beyond which a lens model may put anything."""
-_LOOKS = 16
+_SHARED = 16
 """Stations at which a guess is asked whether it is another's."""
 _GAP = bytes(STATIONS // 4)
-"""So many stations without paint end a band where there is more of it on one side."""
+"""So many stations without paint, or more, part a band in two, of which the larger one counts."""
 _FAINT_STRONG, _FAINT_FILLED, _FAINT_LENGTH = 0.12, 0.8, 0.3
 """Less than the first part of a band is strong and less than the second weak or strong: it is faint.  One
 that is shorter than this part of the picture's diagonal is then something of a similar colour."""
@@ -230,15 +230,15 @@ def _explained(strip: Strip, others: list[Strip]) -> float:
     """The part of the strip's centre line that lies in the others' bands."""
     if not others:
         return 0.0
-    a, b, pace = strip.centre.a, strip.centre.b, (strip.u1 - strip.u0) / _LOOKS
+    a, b, pace = strip.centre.a, strip.centre.b, (strip.u1 - strip.u0) / _SHARED
     covered = set()
     for other in others:
         reach = 0.6 * other.width_px / other.cosine + 4.0
         first, last = other.u0 - reach, other.u1 + reach
         middle, slope = other.centre.a, other.centre.b
-        for k in range(_LOOKS):
+        for k in range(_SHARED):
             u = strip.u0 + pace * (k + 0.5)
             s, t = (u, a + b * u) if strip.steep == other.steep else (a + b * u, u)
             if abs(t - middle - slope * s) <= reach and first <= s <= last:
                 covered.add(k)
-    return len(covered) / _LOOKS
+    return len(covered) / _SHARED

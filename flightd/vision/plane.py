@@ -12,6 +12,8 @@ from flightd.core.geometry import Lens
 from flightd.vision.strip import Array
 
 _ROUNDS = 4
+NOWHERE_PX = 1e5
+"""Where points lie that the lens model cannot have from anywhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +29,8 @@ class Plane:
         return self.lens is None or not self.lens.is_distorted
 
     def ideal(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Where a distortion-free camera would see the raw points; any equal shapes."""
+        """Where a distortion-free camera would see the raw points; any equal shapes.  Points that the lens
+        model cannot have from anywhere are put at NOWHERE_PX."""
         lens = self.lens
         if lens is None or not lens.is_distorted:
             return x, y
@@ -41,11 +44,14 @@ class Plane:
         ).reshape(-1, 2)
         ideal = straight.T.reshape(2, *x.shape)
         ideal_x, ideal_y = ideal[0] - centre_x, ideal[1] - centre_y
-        # OpenCV stops after five rounds, a tenth of a pixel short in the corners of a wide lens.
-        for _ in range(_ROUNDS):
-            raw_x, raw_y = self.raw(ideal_x, ideal_y)
-            ideal_x, ideal_y = ideal_x + (x - raw_x), ideal_y + (y - raw_y)
-        return ideal_x, ideal_y
+        # OpenCV stops after five rounds, a tenth of a pixel short in the corners of a wide lens.  A model
+        # that folds inside the picture leads them ever farther away.
+        with np.errstate(over="ignore", invalid="ignore"):
+            for _ in range(_ROUNDS):
+                raw_x, raw_y = self.raw(ideal_x, ideal_y)
+                ideal_x, ideal_y = ideal_x + (x - raw_x), ideal_y + (y - raw_y)
+            there = (np.abs(ideal_x) < NOWHERE_PX) & (np.abs(ideal_y) < NOWHERE_PX)
+        return np.where(there, ideal_x, NOWHERE_PX), np.where(there, ideal_y, NOWHERE_PX)
 
     def raw(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Where the real camera sees points of the distortion-free plane."""

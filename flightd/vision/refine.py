@@ -30,9 +30,10 @@ _NO_EDGE, _SHARP_OF_NONE = 0.8, 0.5
 """Points that scatter so far where the other edge's do so by that part of it less are on no edge."""
 _STEP = 0.06
 """Less than this part of the one edge's contrast on the other one: no band."""
-_SOFT, _DARKEST_SHADOW, _GREY = 0.66, 0.4, 1.2
-"""Less than this part of the contrast close to an edge is a penumbra; shadows keep more than this part of the
-light, in all channels alike to within the last."""
+_SOFT, _DARKEST_SHADOW, _GREY = 0.66, 0.55, 1.2
+"""Less than this part of the contrast close to an edge is a penumbra, or paint blurred by motion; but paint
+that is called black keeps less than this part of the floor's light, and a shadow takes all channels alike,
+to within the last."""
 _MAX_BOW = 0.006
 _MIN_BOW_PX = 1.2
 _BOW_OF_WIDTH = 0.06

@@ -21,6 +21,8 @@ MAX_STEP = 6
 
 PAINT, OUTSIDE = 255, 128
 """What a mask holds where there is paint, and what is looked up beyond its border."""
+_MOST_ROWS = 32_000
+"""OpenCV's remapping takes fewer than 2^15."""
 _MANY = 240
 """Samples across from which every second one will do for what is larger than a line."""
 
@@ -54,23 +56,26 @@ class Grid:
 
     def x(self, i: Array | NDArray[np.intp] | float) -> Array:
         """Centred frame coordinate of (fractional) sample column `i`."""
-        return np.asarray(i, float) * self.step + (self.offset - (self.frame_width - 1) / 2)
+        return np.asarray(i, float) * self.step + self.first[0]
 
     def y(self, j: Array | NDArray[np.intp] | float) -> Array:
-        return np.asarray(j, float) * self.step + (self.offset - (self.frame_height - 1) / 2)
+        return np.asarray(j, float) * self.step + self.first[1]
 
     def places(self, x: Array, y: Array) -> NDArray[np.float32]:
         """(..., 2) fractional sample columns and rows of centred frame coordinates."""
         places = np.empty((*np.shape(x), 2), np.float32)
         scale, (x0, y0) = 1 / self.step, self.first
-        np.multiply(x - x0, scale, out=places[..., 0], casting="same_kind")
-        np.multiply(y - y0, scale, out=places[..., 1], casting="same_kind")
+        np.multiply(x - x0, scale, out=places[..., 0])
+        np.multiply(y - y0, scale, out=places[..., 1])
         return places
 
 
 def look_up(table: Image, places: NDArray[np.float32]) -> Image:
     """(A, B) values of a mask or of levels at the samples nearest to (A, B, 2) `places`; OUTSIDE beyond its
     border."""
+    if len(places) > _MOST_ROWS:
+        parts = [places[k : k + _MOST_ROWS] for k in range(0, len(places), _MOST_ROWS)]
+        return np.concatenate([look_up(table, part) for part in parts])
     # No second map: the first holds both coordinates.
     found = cv2.remap(  # type: ignore[call-overload]
         table,

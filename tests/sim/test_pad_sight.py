@@ -28,7 +28,7 @@ SIZE_M = DEMO.home.size_m
 
 
 def seen(picture: Image) -> tuple[PadSight, ...]:
-    return Detector("combined", "yellow", LENS).detect(picture).pads
+    return Detector("combined", "yellow", LENS, in_flight=True).detect(picture).pads
 
 
 @pytest.mark.parametrize("look", [DEFAULT, CLEAN])
@@ -63,7 +63,7 @@ def test_no_pad_is_seen_where_none_is_or_only_a_part() -> None:
 
 
 def test_looking_for_pads_costs_little_beside_the_lines() -> None:
-    clock = Detector("combined", "yellow", LENS, now_ns=time.process_time_ns)
+    clock = Detector("combined", "yellow", LENS, in_flight=True, now_ns=time.process_time_ns)
     picture = Renderer(DEMO, CAMERA, DEFAULT, 3).render(hover(0.1, 0.1, 1.4), 1)
     timings = [clock.detect(picture).timings_ms for _ in range(15)]
     pads = float(np.median([t["pads"] for t in timings]))

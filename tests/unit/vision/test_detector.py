@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
-from flightd.core.types import JunctionKind, LineSet
+from flightd.core.types import UNCHECKED, JunctionKind, LineSet
 from flightd.vision.detector import METHODS, Detector
 from tests.unit.vision.drawing import Band, coverage, draw, errors, grid, nearest, picture
 
@@ -307,6 +307,23 @@ def test_sixteen_bit_pictures_are_refused() -> None:
 def test_an_unknown_method_is_refused_with_the_known_ones() -> None:
     with pytest.raises(InputError, match="centroid, skeleton, combined, naive"):
         Detector("hough")
+
+
+def test_pads_and_exposure_are_only_looked_at_in_flight() -> None:
+    image = draw([Band(0.0, 0.5, 20.0)])
+    seen, flown = Detector().detect(image), Detector(in_flight=True).detect(image)
+    assert seen.picture is UNCHECKED
+    assert flown.picture is not UNCHECKED
+    assert seen.lines == flown.lines
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("focal_px", [300.0, 400.0])
+def test_a_lens_model_that_folds_ends_nothing(method: str, focal_px: float) -> None:
+    lens = Lens(640, 360, focal_px, focal_px, 320.0, 180.0, (-0.44, 0.25, 0.0, 0.0, -0.09))
+    for seed in range(4):
+        bands = [Band(250.0 - 60 * seed, 0.3 * seed, 20.0), Band(-100.0, 1.4, 12.0), Band(150.0, 1.6, 9.0)]
+        Detector(method, lens=lens).detect(draw(bands, seed=seed))
 
 
 def test_the_stages_are_timed_when_a_clock_is_given() -> None:

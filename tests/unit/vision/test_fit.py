@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightd.vision.combine import fuse
-from flightd.vision.fit import Moments, fit, is_bent, moments, robust_lines, rows_of, sagitta
+from flightd.vision.fit import Moments, fit, is_bent, law, moments, robust_lines, rows_of, sagitta
 from flightd.vision.strip import LinearFit, Strip, bisector, swapped
 
 
@@ -61,6 +61,20 @@ def test_a_parabola_has_its_sagitta_wherever_it_lies(a: float, b: float, bow: fl
     v = a + b * u + bow * ((u - middle) / 60) ** 2
     height, _ = sagitta(*points(u, v), 3, 0.1)
     assert height * math.hypot(1.0, b) == pytest.approx(bow, abs=1e-4)
+
+
+@given(a=st.floats(-900, 900), b=st.floats(-1.2, 1.2), middle=st.floats(-4000, 4000), seed=st.integers(0, 99))
+def test_a_fit_is_the_least_squares_line_far_from_the_middle_too(
+    a: float, b: float, middle: float, seed: int
+) -> None:
+    u = np.linspace(middle - 40, middle + 40, 21)
+    v = a + b * (u - middle) + np.random.default_rng(seed).normal(0, 1, u.size)
+    slope, offset = np.polyfit(u - middle, v, 1)
+    sums = moments(rows_of(u, v))
+    line = fit(sums, 3, 0.1)
+    assert line.at(middle) == pytest.approx(offset, abs=1e-5)
+    assert line.b == pytest.approx(slope, abs=1e-7)
+    assert law(sums, 3) == pytest.approx((line.a, line.b))
 
 
 @given(radius=st.floats(50, 500), noise=st.floats(0, 0.5))

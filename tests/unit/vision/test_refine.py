@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightd.core.types import Image
 from flightd.vision.detector import Detector
-from tests.unit.vision.drawing import FLOOR, Band, coverage, grid, nearest
+from tests.unit.vision.drawing import FLOOR, Band, coverage, draw, grid, nearest
 
 BAND = Band(20.0, 0.3, 60.0)
 
@@ -23,7 +23,7 @@ def floor_with(shade: NDArray[np.float64], width: int, height: int, seed: int = 
     return drawn
 
 
-@pytest.mark.parametrize("shade", [0.45, 0.6])
+@pytest.mark.parametrize("shade", [0.6, 0.7])
 def test_a_soft_shadow_is_no_black_line(shade: float) -> None:
     painted = coverage([BAND], *grid(1920, 1080))
     soft = 1 - (1 - shade) * np.asarray(cv2.GaussianBlur(painted, (0, 0), 9.0), np.float64)
@@ -43,3 +43,25 @@ def test_the_border_of_a_darker_floor_is_no_line() -> None:
     dark = 1 - 0.5 * np.clip(x * np.cos(0.3) + y * np.sin(0.3) + 0.5, 0, 1)
     for profile in ("black", "white"):
         assert Detector(profile=profile).detect(floor_with(dark, 1920, 1080)).lines == ()
+
+
+@pytest.mark.parametrize("theta", [0.0, np.pi / 2])
+@pytest.mark.parametrize("floor_px", [3.0, 4.0, 5.0])
+@pytest.mark.parametrize("width", [16.0, 20.0, 26.0])
+def test_a_line_beside_a_little_floor_at_the_border_is_one(
+    width: float, floor_px: float, theta: float
+) -> None:
+    half = 320.0 if theta == 0 else 180.0
+    band = Band(half - floor_px - width / 2, theta, width)
+    _, rho, turn = nearest(Detector().detect(draw([band])), band)
+    assert abs(rho) < 1.1  # of a 4 px wide strip of floor one edge may be all that can be located
+    assert abs(turn) < 3e-3
+
+
+@pytest.mark.parametrize("blur_px", [5, 13, 25])
+def test_a_black_line_blurred_by_motion_is_no_shadow(blur_px: int) -> None:
+    band = Band(20.0, 0.0, 50.0)
+    sharp = floor_with(1 - 0.6 * coverage([band], *grid(1280, 720)), 1280, 720)
+    blurred = np.asarray(cv2.blur(sharp, (blur_px, 1)), np.uint8)
+    _, rho, _ = nearest(Detector(profile="black").detect(blurred), band)
+    assert abs(rho) < 1.0

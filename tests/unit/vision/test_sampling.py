@@ -47,9 +47,16 @@ def test_a_sample_s_place_leads_back_to_it(width: int, height: int, i: int) -> N
 
 def test_what_is_looked_up_is_the_nearest_sample_or_outside() -> None:
     table = np.array([[0, 255], [255, 0]], np.uint8)
-    places = np.array([[(0.4, 0.4), (0.6, 0.4), (-0.6, 0.0)], [(1.4, 1.4), (np.nan, 0.0), (1e9, -1e9)]])
+    places = np.array([[(0.4, 0.4), (0.6, 0.4), (-0.6, 0.0)], [(1.4, 1.4), (np.inf, 0.0), (1e9, -1e9)]])
     found = look_up(table, places.astype(np.float32))
     assert found.tolist() == [[0, 255, OUTSIDE], [0, OUTSIDE, OUTSIDE]]
+
+
+def test_as_many_places_as_one_likes_are_looked_up() -> None:
+    table = np.array([[0, 255]], np.uint8)
+    places = np.zeros((70_000, 1, 2), np.float32)
+    places[::2, 0, 0] = 1.0
+    assert np.array_equal(look_up(table, places)[:, 0], np.tile(np.array([255, 0], np.uint8), 35_000))
 
 
 def test_the_usual_pictures_are_looked_at_320_samples_wide() -> None:
