@@ -68,14 +68,15 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
             e if taps.contrast[e] > taps.least_contrast and lines.points[e] >= _MIN_POINTS else None
             for e in (2 * k, 2 * k + 1)
         ]
-        share = _share(edges, lines, visible)
         band = _judged(strip, lines, visible, edges)
         if band is None and (sharp := _without_none(edges, lines)) != edges:
             band = _judged(strip, lines, visible, sharp)
         if band is not None:
             refined.append(band if band.width_px >= _MIN_WIDTH_PX else None)
+        elif _is_curve(strip, lines, edges):
+            refined.append(None)
         else:
-            refined.append(None if _is_curve(strip, lines, edges) else _unrefined(strip, share, plane))
+            refined.append(_unrefined(strip, _share(edges, lines, visible), plane))
     return refined
 
 
