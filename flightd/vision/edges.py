@@ -102,7 +102,8 @@ def take(bgr: Image, strips: list[Strip], plane: Plane, half: int) -> Taps:
     middles = np.array([(s.high.at(m) - s.low.at(m)) / 2 for s in strips for m in [(s.u0 + s.u1) / 2]])
     inner = np.repeat(np.maximum(1, middles.astype(np.intp)), 2)[:, None]
     stride_u, stride_v = np.where(steep, width, 1), np.where(steep, 1, width)
-    inner = np.maximum(1, inner - sign * (base - guessed))
+    if (moved := sign * (base - guessed)).any():
+        inner = np.maximum(1, inner - moved)
     offset = (sign * stride_v)[..., None] * np.minimum(np.arange(-half, half + 1), inner[..., None])
     index = (row * stride_u + base * stride_v)[:, :, None] + offset
     pixels = bgr.reshape(-1, 3).take(index, axis=0).astype(np.float32)
