@@ -33,8 +33,8 @@ class Surroundings:
     """What the limits have to know.  `headroom_m` is the way up to the ceiling (NaN: unknown, inf: none
     above), `back` the unit vector (forward, right) into the corridor that was left, None inside it;
     `data_age_s` the age of the oldest thing that the lean was computed from, for a brake that of the newest:
-    pictures or attitude, either tells enough to come to rest by.  `at_once`: an emergency stop
-    is not kept waiting by the rates."""
+    pictures or attitude, either tells enough to come to rest by.  `at_once`: an emergency stop is not kept
+    waiting by the rates."""
 
     headroom_m: float = math.inf
     back: tuple[float, float] | None = None

@@ -73,15 +73,15 @@ class FixBook:
             self._mat_frames = 0
             return None
         last_x, last_y = self._mat_at
-        apart_m = [math.hypot(x_m + sight.x_m - last_x, y_m + sight.y_m - last_y) for sight, _ in known]
-        nearest = min(range(len(known)), key=apart_m.__getitem__)
-        sight, _ = known[nearest]
+        moved_m = [math.hypot(x_m + sight.x_m - last_x, y_m + sight.y_m - last_y) for sight, _ in known]
+        least_m = min(moved_m)
+        sight, mats_m = known[moved_m.index(least_m)]
         self._mat_at = x_m + sight.x_m, y_m + sight.y_m
-        self._mat_frames = self._mat_frames + 1 if apart_m[nearest] < _SAME_MAT_M else 1
+        self._mat_frames = self._mat_frames + 1 if least_m < _SAME_MAT_M else 1
         if self._mat_frames < _FRAMES or not self.is_new("mat", x_m, y_m):
             return None
         self._mat_frames = 0
-        return known[nearest]
+        return sight, mats_m
 
     def _mats_like(self, sight: PadOffset) -> Matrix:
         fits = [(x, y) for x, y, side_m in self._mats if abs(sight.side_m - side_m) <= _SIZE_SHARE * side_m]

@@ -10,7 +10,7 @@ import pytest
 from flightd.cli.bench import UNIT, Timing, bench
 
 LIMITS = {"centroid": 1.6, "skeleton": 1.6, "combined": 2.5}
-"""Ceilings against a slow change creeping in; what is reached is about two thirds of them."""
+"""Ceilings against a slow change creeping in; what is reached is about half of them."""
 
 
 @pytest.fixture(scope="module")

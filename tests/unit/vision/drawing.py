@@ -47,6 +47,11 @@ def grid(width: int, height: int) -> tuple[NDArray[np.float64], NDArray[np.float
     return x - (width - 1) / 2, y - (height - 1) / 2
 
 
+def mask_of(bands: list[Band], x: NDArray[np.float64], y: NDArray[np.float64]) -> Image:
+    """255 where more than half is painted, at ideal centred coordinates (x, y); 0 elsewhere."""
+    return np.where(coverage(bands, x, y) > 0.5, np.uint8(255), np.uint8(0))
+
+
 def picture(paint: NDArray[np.float64], seed: int = 0, noise: float = 3.0, light: float = 1.0) -> Image:
     """The photograph of a floor with that paint: a little blur and noise, brightness times `light`."""
     colour = paint[..., None] * np.array(PAINT) + (1 - paint[..., None]) * np.array(FLOOR)

@@ -12,7 +12,8 @@ from flightd.core.types import Image
 from flightd.vision import centroid
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid, grid_for
-from tests.unit.vision.drawing import Band, coverage
+from tests.unit.vision import drawing
+from tests.unit.vision.drawing import Band
 
 PLANE = Plane(1920, 1080)
 GRID = grid_for(1920, 1080)
@@ -21,7 +22,7 @@ GRID = grid_for(1920, 1080)
 def mask_of(bands: list[Band], grid: Grid = GRID) -> Image:
     x: NDArray[np.float64] = grid.x(np.arange(grid.width))[None, :] + np.zeros((grid.height, 1))
     y: NDArray[np.float64] = grid.y(np.arange(grid.height))[:, None] + np.zeros((1, grid.width))
-    return np.where(coverage(bands, x, y) > 0.5, np.uint8(255), np.uint8(0))
+    return drawing.mask_of(bands, x, y)
 
 
 @pytest.mark.parametrize("size", [(16, 16), (17, 640), (640, 17), (1919, 1079), (1920, 1080)])

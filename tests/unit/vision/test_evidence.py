@@ -12,14 +12,14 @@ from flightd.vision import centroid, evidence
 from flightd.vision.colour import STRONG, WEAK, Levels
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
-from tests.unit.vision.drawing import Band, coverage, grid
+from tests.unit.vision import drawing
+from tests.unit.vision.drawing import Band, grid
 
 GRID, PLANE = Grid(320, 240, 1), Plane(320, 240)
 
 
 def mask_of(bands: list[Band]) -> Image:
-    mask: Image = ((coverage(bands, *grid(320, 240)) > 0.5) * 255).astype(np.uint8)
-    return mask
+    return drawing.mask_of(bands, *grid(320, 240))
 
 
 @pytest.mark.parametrize("theta", [0.0, 0.7, 1.9])

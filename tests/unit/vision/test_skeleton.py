@@ -13,14 +13,14 @@ from flightd.core.types import Image
 from flightd.vision import skeleton
 from flightd.vision.plane import Plane
 from flightd.vision.sampling import Grid
-from tests.unit.vision.drawing import Band, coverage, grid
+from tests.unit.vision import drawing
+from tests.unit.vision.drawing import Band, grid
 
 CLOCKWISE = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
 
 
 def mask_of(bands: list[Band], width: int = 160, height: int = 120) -> Image:
-    mask: Image = ((coverage(bands, *grid(width, height)) > 0.5) * 255).astype(np.uint8)
-    return mask
+    return drawing.mask_of(bands, *grid(width, height))
 
 
 def test_thinning_leaves_one_connected_line_one_sample_wide() -> None:
