@@ -176,7 +176,8 @@ class Mission:
             self._leg_along_x = self._leads_along_x()
         elif self.phase not in _STOPPED:
             self._leg_along_x = None
-        return Situation(self.airborne, paused, self._leg_along_x, self.phase is Phase.HOLD)
+        at_height = self.airborne and self.phase is not Phase.TAKE_OFF
+        return Situation(self.airborne, paused, self._leg_along_x, self.phase is Phase.HOLD, at_height)
 
     def _ground(self, s: Senses) -> set[Trigger]:
         """What a lost ground link asks for, by the configured action; the link's return ends a hold."""

@@ -32,12 +32,13 @@ _Conditions: TypeAlias = dict[Trigger, tuple[bool, float]]
 @dataclass(frozen=True, slots=True)
 class Situation:
     """What the mission is at: in the air, paused, on or stopped on a leg along the map's x axis (None: on no
-    leg), holding."""
+    leg), holding, high enough that lines are to be seen."""
 
     airborne: bool
     paused: bool
     leg_along_x: bool | None
     holds: bool = False
+    at_height: bool = True
 
 
 class Lasting:
@@ -178,7 +179,9 @@ class Watch:
         borne_s = p.lines_hold_s if situation.holds else p.followed_hold_s
         lost = lost or self.blind.unseen_s > borne_s
         seen_s = self._seen.step(not lost, s.now_ns)
-        if lost and self._unseen_ns is None:
+        if not situation.at_height:  # near the floor nobody sees lines: what is borne begins above
+            self._unseen_ns = None
+        elif lost and self._unseen_ns is None:
             self._unseen_ns = s.now_ns
         elif seen_s > p.lines_found_s:
             self._unseen_ns = None

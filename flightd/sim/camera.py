@@ -122,6 +122,7 @@ class CameraPeer:
         self._ready = asyncio.Event()
         self._turn = asyncio.Lock()
         self.late = 0
+        """Pictures that the machine was too slow to take."""
         self._exposure = 1.0
         self.trouble = CameraTrouble()
         self._kept: Image | None = None
@@ -177,7 +178,7 @@ class CameraPeer:
         early_s = self._camera.capture_delay_s + self._camera.jitter_s
         # a late picture is drawn late: the ring holds no more than the usual delay's
         await asyncio.sleep(max((due_ns - self._clock.now_ns()) * 1e-9 - early_s, 0.0))
-        rendering = asyncio.ensure_future(self._render(child, truth, seq, exposure))
+        rendering = asyncio.ensure_future(self._render(child, truth, seq, exposure, due_ns))
         try:
             await asyncio.sleep((due_ns - self._clock.now_ns()) * 1e-9)
             with self._clock.hold():
@@ -203,8 +204,11 @@ class CameraPeer:
         )
         transport.sendto(encode_notice(notice))
 
-    async def _render(self, child: Child, truth: Kinematics, seq: int, exposure: float) -> int:
+    async def _render(self, child: Child, truth: Kinematics, seq: int, exposure: float, due_ns: int) -> int:
+        """The slot of the picture.  TransientError when its turn came only after it was due."""
         async with self._turn:
+            if self._clock.now_ns() > due_ns:  # a slow machine costs pictures; queued, they would come late
+                raise TransientError(f"picture {seq}: the renderer is behind")
             slot = self._ring.begin(seq)
             await child.ask((truth, seq, slot, exposure))
             self._spoil(self._ring.pixels(slot))

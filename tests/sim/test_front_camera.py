@@ -1,6 +1,8 @@
 """The simulated front camera as a peer: its pictures reach a daemon's camera, with the right calibration."""
 
 import asyncio
+import time
+from collections.abc import Callable
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -18,7 +20,7 @@ from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.loops import VirtualLoop
 from flightd.runtime.ring import FrameRing, FrameTicket
-from flightd.sim.camera import CameraPeer
+from flightd.sim.camera import CameraPeer, PictureMaker
 from flightd.sim.kinematics import Kinematics
 from flightd.sim.racks.camera import FrontCamera, front_lens
 from flightd.sim.racks.look import RackLook
@@ -37,7 +39,12 @@ CAMERA = FrontCamera(lens=front_lens(320, 200, 250.0), fps=5.0, capture_delay_s=
 MAKE = partial(FrontRenderer, load_site(SMALL), CAMERA, RackLook(), 1)
 
 
-def taken(for_s: float, expose: tuple[float, ...] = ()) -> list[tuple[FrameTicket, int, Image]]:
+def taken(
+    for_s: float,
+    expose: tuple[float, ...] = (),
+    make: Callable[[], PictureMaker] = MAKE,
+    loop: Callable[[], asyncio.AbstractEventLoop] = VirtualLoop,
+) -> list[tuple[FrameTicket, int, Image]]:
     """What a daemon's camera hears of the simulated one: each picture's ticket, arrival and pixels.  Each of
     the exposures is asked for in turn, for an equal part of the time."""
     found: list[tuple[FrameTicket, int, Image]] = []
@@ -51,7 +58,7 @@ def taken(for_s: float, expose: tuple[float, ...] = ()) -> list[tuple[FrameTicke
 
         address = f"udp://127.0.0.1:{port}"
         listener = SharedCamera(address, (320, 200), 0.08, clock, take, pytest.fail)
-        peer = CameraPeer(CAMERA, MAKE, "front camera 1", ("127.0.0.1", port), hovering, clock)
+        peer = CameraPeer(CAMERA, make, "front camera 1", ("127.0.0.1", port), hovering, clock)
         listening = asyncio.ensure_future(listener.run())
         await asyncio.sleep(0)
         running = asyncio.ensure_future(peer.run())
@@ -61,9 +68,9 @@ def taken(for_s: float, expose: tuple[float, ...] = ()) -> list[tuple[FrameTicke
         for task in (running, listening):
             task.cancel()
         await asyncio.wait([running, listening])
-        assert peer.late == 0
+        assert (peer.late > 0) is (make is not MAKE)
 
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+    with asyncio.Runner(loop_factory=loop) as runner:
         runner.run(main())
     return found
 
@@ -87,6 +94,26 @@ def test_the_camera_takes_the_exposure_it_is_asked_for_and_says_so_with_each_pic
     usual = np.mean([picture.mean() for ticket, _, picture in pictures if ticket.exposure == 1.0])
     dark = np.mean([picture.mean() for ticket, _, picture in pictures if ticket.exposure == 0.4])
     assert dark / usual == pytest.approx(0.4, abs=0.08)
+
+
+class Slow:
+    """Takes half as long again over a picture as the camera has for one."""
+
+    def render(
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+    ) -> Image:
+        time.sleep(1.5 / CAMERA.fps)
+        assert out is not None
+        return out
+
+
+@pytest.mark.realtime
+def test_a_renderer_that_cannot_keep_up_costs_pictures_and_does_not_let_them_queue() -> None:
+    """Queued, the last ones would be five renderings old."""
+    pictures = taken(5.0, make=Slow, loop=asyncio.new_event_loop)
+    ages_s = [(arrival_ns - ticket.stamp_ns) * 1e-9 for ticket, arrival_ns, _ in pictures]
+    assert 5 <= len(pictures) < 5.0 * CAMERA.fps / 1.4
+    assert max(ages_s[-3:]) < CAMERA.capture_delay_s + 3 * 1.5 / CAMERA.fps
 
 
 def configured(site: Path, *settings: str, scenario: Scenario = Scenario()) -> Config:  # noqa: B008

@@ -238,6 +238,20 @@ def test_lines_that_only_flicker_end_in_a_landing() -> None:
     assert flight.phase is Phase.LAND
 
 
+def test_a_view_lost_at_height_is_borne_as_long_as_any_however_long_the_climb_saw_no_line() -> None:
+    flight = Flight(MissionParams(climb_mps=0.2))
+    flight.set(x_age_s=60.0, y_age_s=60.0)
+    flight.to(Phase.TAKE_OFF)
+    flight.run(60.0, lambda: flight.senses.height_m > 1.35)
+    flight.set(x_age_s=0.0, y_age_s=0.0)  # but not for long enough to count as found
+    flight.to(Phase.ACQUIRE)
+    flight.set(x_age_s=0.5, y_age_s=0.5)
+    flight.run(1.0)
+    assert flight.phase is Phase.HOLD
+    flight.set(x_age_s=0.0, y_age_s=0.0)
+    flight.to(Phase.FOLLOW)
+
+
 def test_on_a_leg_other_lines_do_not_stand_in_for_the_one_followed() -> None:
     flight = Flight()
     flight.to(Phase.FOLLOW)
