@@ -35,11 +35,12 @@ is expected there, and its width by no more than two samples and the second part
 _MIN_CUTS = 5
 _WORTH_A_FIT = 0.6
 """A band is fitted when so great a part of the slabs that the shortest band crosses vote for it."""
+_SPARSEST = 4
+"""The shortest band shows in one of so many of the slabs that it crosses, at the least."""
 _SLAB_KEY, _SLABS_APART, _APART_PX = 1e6, 1 << 20, 1 << 17
 
 _LOW, _HIGH, _MIDDLE = 3, 4, 5
 """Rows of a cut's points that hold the band's edges and the middle between them."""
-_PLACE = np.array((0, 1, _MIDDLE))
 
 _DRAWS = np.random.default_rng(20190909)
 """The same draws for every frame: one frame, one answer."""
@@ -63,7 +64,7 @@ def find(mask: Image, grid: Grid, plane: Plane) -> list[Strip]:
     # A diagonal band crosses fewest slabs for its length.
     crossed = shortest_length(plane) * math.sqrt(0.5) / cuts.spacing_px
     fewest = max(_MIN_CUTS, math.ceil(_WORTH_A_FIT * crossed))
-    while max(cuts.split, len(cuts.free) - cuts.split) >= fewest:
+    while cuts.may_hold(fewest):
         found = _ransac(cuts, fewest)
         # Draws go to long bands first; what they leave over is drawn from once more, for the short ones: but
         # not where nothing is straight, or every second cut has had its draw.
@@ -138,11 +139,22 @@ class _Cuts:
         # v - (a + b u) of the cuts' middles in units of what still belongs to the band; in the other
         # direction u and v change their parts.
         along, across = 1 / (self.step + reach), 1 / max(self.step, reach)
-        laws = ((-a * along, -b * along, along), (-a * across, across, -b * across))
-        off = np.abs(np.array(laws) @ self.points.take(_PLACE, axis=0)) > 1.0
+        laws = (
+            (-a * along, -b * along, 0.0, 0.0, 0.0, along),
+            (-a * across, across, 0.0, 0.0, 0.0, -b * across),
+        )
+        off = np.abs(np.array(laws) @ self.points) > 1.0
         own, other = off if strip.steep else off[::-1]
         self.free[: self.split] &= own[: self.split]
         self.free[self.split :] &= other[self.split :]
+
+    def may_hold(self, fewest: int) -> bool:
+        """Whether so many cuts of one direction lie near enough to each other to be one band's."""
+        within = _SPARSEST * fewest * self.spacing_px
+        for u in (self.points[1, : self.split], self.points[1, self.split :]):
+            if len(u) >= fewest and (u[fewest - 1 :] - u[: len(u) - fewest + 1]).min() < within:
+                return True
+        return False
 
     def left(self) -> _Cuts:
         """Only those that are still free."""
@@ -168,7 +180,7 @@ def _cut(mask: Image, grid: Grid, plane: Plane, spacing: int) -> _Cuts:
     at, first = slabs.columns_at, spacing // 2
     flat[1:at].reshape(-1, width + 1)[:, :-1] = mask[first::spacing]
     flat[at:].reshape(-1, height + 1)[:, :-1] = cv2.transpose(mask)[first::spacing]
-    changes = np.flatnonzero(flat[1:] != flat[:-1]).reshape(-1, 2).T
+    changes = (flat[1:] != flat[:-1]).nonzero()[0].reshape(-1, 2).T
     slab = slabs.first.searchsorted(changes[0], "right") - 1
     begin, end, u, shift, number, ahead = slabs.about.take(slab, axis=1)
     whole = (changes[0] > begin) & (changes[1] < end)
@@ -187,8 +199,8 @@ def _cut(mask: Image, grid: Grid, plane: Plane, spacing: int) -> _Cuts:
     known = np.empty((4, len(u)), np.float32)
     known[0], known[1], known[2], known[3] = 1.0, u, middle, high - low
     known[2, split:] += _APART_PX
-    key = np.full(len(u) + 2, np.inf)
-    key[0] = -np.inf
+    key = np.empty(len(u) + 2)
+    key[0], key[-1] = -np.inf, np.inf
     np.multiply(number, _SLAB_KEY, out=key[1:-1])
     key[1:-1] += known[2]
     free = np.ones(len(u), np.bool_)
@@ -219,16 +231,18 @@ def _ransac(cuts: _Cuts, fewest: int) -> list[Strip]:
     _, du, rise, change = other - one
     b, width_b = rise / du, change / du
     good = (np.abs(b) <= MAX_SLOPE) & (np.abs(change) <= _PASS_WIDTH * (one[3] + other[3]) + 2 * step)
-    i, one, b, width_b = i[good], one.compress(good, axis=1), b[good], width_b[good]
-    if not len(i):
+    (kept,) = good.nonzero()
+    if not len(kept):
         return strips
+    i, one, b, width_b = i.take(kept), one.take(kept, axis=1), b.take(kept), width_b.take(kept)
     # How far each cut is off each hypothesis, v - (v_i + b (u - u_i)), to either side beyond what is let
     # pass, and the width expected there, in one product.
     laws = np.zeros((3, 3, len(i)), np.float32)
     laws[2, 0], laws[2, 1] = one[3] - width_b * one[1], width_b
     passed = _PASS_OF_WIDTH * laws[2]
     passed[0] += step
-    off = np.array((b * one[1] - one[2], -b, np.ones_like(b)))
+    off = np.empty_like(laws[0])
+    off[0], off[1], off[2] = b * one[1] - one[2], -b, 1.0
     np.subtract(off, passed, out=laws[0])
     np.subtract(-off, passed, out=laws[1])
     above, below, expected = laws.swapaxes(1, 2) @ known[:3]
@@ -241,7 +255,7 @@ def _ransac(cuts: _Cuts, fewest: int) -> list[Strip]:
         best = int(scores.argmax())
         if scores[best] < fewest:
             return strips
-        taken = np.flatnonzero(votes[best] & free)
+        (taken,) = (votes[best] & free).nonzero()
         strip = _fit_band(cuts, taken, steep=bool(i[best] < cuts.split))
         if strip is not None:
             strips.append(strip)
@@ -261,8 +275,9 @@ def _pairs(key: Array, ahead: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]
     here, way = key.take(i + 1), ahead[i]
     near, far = way * _NEAR[:trials], way * _FAR[:trials]
     j, same = _nearest(key, here + near * _SLAB_KEY)
-    i, j, far = i[same], j[same], far[same]
-    here, near = here[same], near[same]
+    (kept,) = same.nonzero()
+    i, j = i.take(kept), j.take(kept)
+    far, here, near = far.take(kept), here.take(kept), near.take(kept)
     rise = key.take(j + 1) - here - near * _SLAB_KEY
     k, same = _nearest(key, here + far * _SLAB_KEY + rise / near * far)
     return i, np.where(same, k, j)

@@ -153,14 +153,15 @@ def floor_field(small_bgr: Image, colour: str) -> Image:
     floor = np.minimum(np.maximum(floor, int(frame * darkest)), min(int(frame * brightest), 255))
     tint = _floor_tint(cells[::2, ::2], colour)
     # Half a level off the rounding: down, as the profiles were trained with.
-    field = cv2.merge([cv2.convertScaleAbs(floor, alpha=part, beta=-0.5) for part in tint])
+    field = cv2.transform(floor, np.array([(part, -0.5) for part in tint]))
     return np.maximum(np.asarray(field, np.uint8), 1)
 
 
 def _middle(values: NDArray[np.uint8]) -> float:
     """The median; of an even number, the upper of the two in the middle."""
-    middle = len(values) // 2
-    return float(np.partition(values, middle)[middle])
+    middle, ordered = len(values) // 2, values.copy()
+    ordered.partition(middle)
+    return float(ordered[middle])
 
 
 def _floor_tint(cells: Image, colour: str) -> list[float]:
@@ -174,9 +175,9 @@ def _floor_tint(cells: Image, colour: str) -> list[float]:
     blue, green, red = pixels.T
     most = np.maximum(np.maximum(blue, green), red)
     saturation = (most - np.minimum(np.minimum(blue, green), red)) / (most + 8.0)
-    order = saturation.argsort()
-    light = _tint(pixels.take(order[: max(len(order) // 10, 1)], axis=0), (1.0, 1.0, 1.0))
-    floor = _tint(pixels.take(order[: len(order) // 2 + 1], axis=0), light)
+    grey = pixels.take(saturation.argsort()[: len(pixels) // 2 + 1], axis=0)
+    light = _tint(grey[: max(len(pixels) // 10, 1)].copy(), (1.0, 1.0, 1.0))
+    floor = _tint(grey, light)
     return (
         [math.sqrt(one * other) for one, other in zip(light, floor, strict=True)]
         if colour == "white"
@@ -185,7 +186,8 @@ def _floor_tint(cells: Image, colour: str) -> list[float]:
 
 
 def _tint(pixels: Image, about: Sequence[float]) -> list[float]:
-    """Median colour in units of its brightness, within `_TINT_RANGE` about another."""
+    """Median colour of the pixels, which are put in order, in units of its brightness; within `_TINT_RANGE`
+    about another."""
     pixels.sort(axis=0)
     colour = [value + 1.0 for value in pixels[len(pixels) // 2].tolist()]
     brightness = sum(part * value for part, value in zip(_LUMA_BGR, colour, strict=True))

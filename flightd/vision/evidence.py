@@ -231,14 +231,26 @@ def _explained(strip: Strip, others: list[Strip]) -> float:
     if not others:
         return 0.0
     a, b, pace = strip.centre.a, strip.centre.b, (strip.u1 - strip.u0) / _SHARED
-    covered = set()
+    u = strip.u0 + 0.5 * pace
+    covered: set[int] = set()
     for other in others:
         reach = 0.6 * other.width_px / other.cosine + 4.0
-        first, last = other.u0 - reach, other.u1 + reach
         middle, slope = other.centre.a, other.centre.b
-        for k in range(_SHARED):
-            u = strip.u0 + pace * (k + 0.5)
-            s, t = (u, a + b * u) if strip.steep == other.steep else (a + b * u, u)
-            if abs(t - middle - slope * s) <= reach and first <= s <= last:
-                covered.add(k)
+        # The strip's stations in the other's own axes: s along it and off across it, both linear in k.
+        (s, s_pace), (t, t_pace) = (u, pace), (a + b * u, b * pace)
+        if strip.steep != other.steep:
+            (s, s_pace), (t, t_pace) = (t, t_pace), (s, s_pace)
+        along = _between(s, s_pace, other.u0 - reach, other.u1 + reach)
+        across = _between(t - middle - slope * s, t_pace - slope * s_pace, -reach, reach)
+        covered.update(range(max(along[0], across[0]), min(along[1], across[1])))
     return len(covered) / _SHARED
+
+
+def _between(first: float, pace: float, least: float, most: float) -> tuple[int, int]:
+    """The stations k, from and to before, at which first + k pace lies in [least, most]."""
+    if abs(pace) < 1e-9:
+        return (0, _SHARED) if least <= first <= most else (0, 0)
+    one, other = (least - first) / pace, (most - first) / pace
+    if pace < 0:
+        one, other = other, one
+    return max(math.ceil(one), 0), min(math.floor(other) + 1, _SHARED)

@@ -52,7 +52,8 @@ def fit(sums: Moments, column: int, sigma: float) -> LinearFit:
     """The same with its covariance: the values are good to at least `sigma`, and to their scatter."""
     n, sv = sums[0][0], sums[0][column]
     mean_u, suu, suv = _about_mean(sums, column)
-    a, b = law(sums, column)
+    b = suv / suu if suu > 0 else 0.0
+    a = sv / n - b * mean_u
     variance = max(sigma * sigma, (sums[column][column] - sv * sv / n - b * suv) / max(1.0, n - 2))
     var_b = variance / suu if suu > 0 else variance
     return LinearFit(a, b, variance / n + mean_u * mean_u * var_b, var_b, -mean_u * var_b)

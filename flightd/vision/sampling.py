@@ -7,6 +7,7 @@ floor and cost more than all the rest.  Sample i is raw pixel k i + k // 2.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import cv2
 import numpy as np
@@ -27,7 +28,7 @@ _MANY = 240
 """Samples across from which every second one will do for what is larger than a line."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Grid:
     """How samples lie in the frame."""
 
@@ -37,19 +38,19 @@ class Grid:
     shift: int = 0
     """How far before the middle of its cell a sample was taken, in pixels."""
 
-    @property
+    @cached_property
     def offset(self) -> int:
         return self.step // 2 - self.shift
 
-    @property
+    @cached_property
     def width(self) -> int:
         return max(1, (self.frame_width - self.offset) // self.step)
 
-    @property
+    @cached_property
     def height(self) -> int:
         return max(1, (self.frame_height - self.offset) // self.step)
 
-    @property
+    @cached_property
     def first(self) -> tuple[float, float]:
         """Centred frame coordinates of the first sample."""
         return self.offset - (self.frame_width - 1) / 2, self.offset - (self.frame_height - 1) / 2
@@ -88,6 +89,7 @@ def look_up(table: Image, places: NDArray[np.float32]) -> Image:
     return np.asarray(found, np.uint8)
 
 
+@lru_cache(maxsize=16)
 def grid_for(width: int, height: int) -> Grid:
     """About 320 samples across the longer side, at most every 6th pixel."""
     return Grid(width, height, max(1, min(MAX_STEP, round(max(width, height) / TARGET_WIDTH_PX))))
