@@ -30,10 +30,10 @@ _NO_EDGE, _SHARP_OF_NONE = 0.8, 0.5
 """Points that scatter so far where the other edge's do so by that part of it less are on no edge."""
 _STEP = 0.06
 """Less than this part of the one edge's contrast on the other one: no band."""
-_SOFT, _DARKEST_SHADOW, _GREY = 0.66, 0.55, 1.2
-"""Less than this part of the contrast close to an edge is a penumbra, or paint blurred by motion; but paint
-that is called black keeps less than this part of the floor's light, and a shadow takes all channels alike,
-to within the last."""
+_SOFT, _DARKEST_SHADOW, _DARKEST_MARK, _GREY = 0.66, 0.55, 0.68, 1.2
+"""Less than the first part of the contrast close to an edge is a penumbra, or paint blurred by motion; but
+paint that is called black keeps less than the second part of the floor's light.  More than the third part is
+what rubber and joints leave, however sharp.  Both take all channels alike, to within the last."""
 _MAX_BOW = 0.006
 _MIN_BOW_PX = 1.2
 _BOW_OF_WIDTH = 0.06
@@ -105,9 +105,11 @@ def _is_step(taps: Taps, e: int) -> bool:
 
 
 def _is_shadow(taps: Taps, found: Edges, e: int) -> bool:
-    """Whether a band is only darker than the floor, of no other colour, and soft at both edges."""
+    """Whether a band is only darker than the floor, of no other colour: a shadow, soft at both edges, or the
+    mark of a tyre or a joint, too pale for paint."""
     shade = taps.shade[e : e + 2]
-    if found.sharpness[e : e + 2].max() >= _SOFT or shade.min() <= _DARKEST_SHADOW or shade.max() >= 1.0:
+    darkest = _DARKEST_SHADOW if found.sharpness[e : e + 2].max() < _SOFT else _DARKEST_MARK
+    if shade.min() <= darkest or shade.max() >= 1.0:
         return False
     return bool((shade.max(axis=1) <= _GREY * shade.min(axis=1)).all())
 

@@ -38,6 +38,16 @@ def test_a_black_line_is_one_even_where_it_reflects_as_much_as_a_shadow() -> Non
     assert abs(theta) < 1e-3
 
 
+def test_a_tyre_mark_in_a_shadow_is_no_black_line() -> None:
+    """Sharp as paint, and there as dark as black paint in the light."""
+    x, y = grid(1920, 1080)
+    mark = 1 - 0.28 * coverage([BAND], x, y)
+    shadow = 1 - 0.6 * np.clip((300 - np.abs(y)) / 80, 0, 1)
+    picture = floor_with(mark * shadow, 1920, 1080)
+    assert Detector("centroid", "black").detect(picture).lines
+    assert Detector("combined", "black").detect(picture).lines == ()
+
+
 def test_the_border_of_a_darker_floor_is_no_line() -> None:
     x, y = grid(1920, 1080)
     dark = 1 - 0.5 * np.clip(x * np.cos(0.3) + y * np.sin(0.3) + 0.5, 0, 1)
