@@ -28,8 +28,9 @@ _USUAL_SCATTER_PX, _FRAYED_SHARE, _SHARP_SHARE = 0.7, 0.5, 0.2
 window, on no edge at all, have 1.4."""
 _NO_EDGE, _SHARP_OF_NONE = 0.8, 0.5
 """Points that scatter so far where the other edge's do so by that part of it less are on no edge."""
-_STEP = 0.06
-"""Less than this part of the one edge's contrast on the other one: no band."""
+_STEP, _GREY_STEP, _SAME = 0.06, 0.12, 0.03
+"""Less than this part of the one edge's contrast on the other one: no band; for grey ones the second, and
+neither are those that are lighter than the floor on one side and darker on the other by more than the third."""
 _SOFT, _DARKEST_SHADOW, _DARKEST_MARK, _GREY = 0.66, 0.55, 0.68, 1.2
 """Less than the first part of the contrast close to an edge is a penumbra, or paint blurred by motion; but
 paint that is called black keeps less than the second part of the floor's light.  More than the third part is
@@ -97,9 +98,12 @@ def _judged(strip: Strip, lines: RobustLines, visible: Array, edges: list[int | 
 
 
 def _is_step(taps: Taps, e: int) -> bool:
-    """Whether a band has floor of its own colour on one side: the border of a shadow, or of another floor."""
+    """Whether a band has floor of its own colour on one side, or a grey one is between two floors': the border
+    of a shadow, or of another floor."""
     low, high = float(taps.contrast[e]), float(taps.contrast[e + 1])
-    if min(low, high) >= _STEP * max(low, high):
+    shade, grey = taps.shade[e : e + 2].mean(axis=1), _is_grey(taps, e)
+    between = grey and shade.min() < 1.0 - _SAME and shade.max() > 1.0 + _SAME
+    if not between and min(low, high) >= (_GREY_STEP if grey else _STEP) * max(low, high):
         return False
     return bool(np.count_nonzero(taps.seen[e : e + 2], axis=1).min() > taps.row.shape[1] / 2)
 
@@ -111,6 +115,12 @@ def _is_shadow(taps: Taps, found: Edges, e: int) -> bool:
     darkest = _DARKEST_SHADOW if found.sharpness[e : e + 2].max() < _SOFT else _DARKEST_MARK
     if shade.min() <= darkest or shade.max() >= 1.0:
         return False
+    return _is_grey(taps, e)
+
+
+def _is_grey(taps: Taps, e: int) -> bool:
+    """Whether a band takes all of the floor's channels alike."""
+    shade = taps.shade[e : e + 2]
     return bool((shade.max(axis=1) <= _GREY * shade.min(axis=1)).all())
 
 

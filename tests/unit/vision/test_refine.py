@@ -55,6 +55,13 @@ def test_the_border_of_a_darker_floor_is_no_line() -> None:
         assert Detector(profile=profile).detect(floor_with(dark, 1920, 1080)).lines == ()
 
 
+def test_a_strip_between_a_dark_floor_and_a_light_one_is_no_black_line() -> None:
+    _, y = grid(1920, 1080)
+    picture = floor_with(np.where(y < 0, 0.5, np.where(y < 16, 0.6, 1.0)), 1920, 1080)
+    assert Detector("centroid", "black").detect(picture).lines
+    assert Detector("combined", "black").detect(picture).lines == ()
+
+
 @pytest.mark.parametrize("theta", [0.0, np.pi / 2])
 @pytest.mark.parametrize("floor_px", [3.0, 4.0, 5.0])
 @pytest.mark.parametrize("width", [16.0, 20.0, 26.0])
