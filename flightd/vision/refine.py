@@ -29,8 +29,9 @@ window, on no edge at all, have 1.4."""
 _NO_EDGE, _SHARP_OF_NONE = 0.8, 0.5
 """Points that scatter so far where the other edge's do so by that part of it less are on no edge."""
 _STEP, _GREY_STEP, _SAME = 0.06, 0.12, 0.03
-"""Less than this part of the one edge's contrast on the other one: no band; for grey ones the second, and
-neither are those that are lighter than the floor on one side and darker on the other by more than the third."""
+"""Less than the first part of the one edge's contrast on the other one, or of a grey band the second: no
+band.  Nor is a grey one that is lighter than the floor on one side and darker on the other by more than the
+third."""
 _SOFT, _DARKEST_SHADOW, _DARKEST_MARK, _GREY = 0.66, 0.55, 0.68, 1.2
 """Less than the first part of the contrast close to an edge is a penumbra, or paint blurred by motion; but
 paint that is called black keeps less than the second part of the floor's light.  More than the third part is
@@ -98,8 +99,8 @@ def _judged(strip: Strip, lines: RobustLines, visible: Array, edges: list[int | 
 
 
 def _is_step(taps: Taps, e: int) -> bool:
-    """Whether a band has floor of its own colour on one side, or a grey one is between two floors': the border
-    of a shadow, or of another floor."""
+    """Whether a band has floor of its own colour on one side, or is grey and between two floors' light: the
+    border of a shadow, or of another floor."""
     low, high = float(taps.contrast[e]), float(taps.contrast[e + 1])
     shade, grey = taps.shade[e : e + 2].mean(axis=1), _is_grey(taps, e)
     between = grey and shade.min() < 1.0 - _SAME and shade.max() > 1.0 + _SAME
