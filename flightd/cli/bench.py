@@ -91,8 +91,8 @@ def bench(seconds: float, sizes: Sequence[tuple[int, int]] = SIZES, all_cores: b
 
 def _one_core(size: tuple[int, int], seconds: float) -> list[Timing]:
     """Rounds in which every method in turn takes all frames, one right after another, so that a busy moment
-    strikes all alike; each turn begins with a frame that is not counted, for in flight no other method comes
-    between.  Lines and junctions only, without what a flight asks of a frame besides.
+    strikes all alike; each turn begins with a frame that is not counted, which pays for what the one before
+    left in the caches.  Lines and junctions only, without what a flight asks of a frame besides.
 
     Processor time of the one thread at work, which other programs on the machine hardly touch.
     """

@@ -179,7 +179,7 @@ class Watch:
         borne_s = p.lines_hold_s if situation.holds else p.followed_hold_s
         lost = lost or self.blind.unseen_s > borne_s
         seen_s = self._seen.step(not lost, s.now_ns)
-        if not situation.at_height:  # near the floor nobody sees lines: what is borne begins above
+        if not situation.at_height:  # near the floor lines come and go: what glimpses excuse begins above
             self._unseen_ns = None
         elif lost and self._unseen_ns is None:
             self._unseen_ns = s.now_ns

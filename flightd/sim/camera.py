@@ -176,9 +176,10 @@ class CameraPeer:
         self, child: Child, transport: Any, truth: Kinematics, seq: int, due_ns: int, exposure: float
     ) -> None:
         early_s = self._camera.capture_delay_s + self._camera.jitter_s
+        latest_ns = due_ns + round(1e9 / self._camera.fps)
         # a late picture is drawn late: the ring holds no more than the usual delay's
         await asyncio.sleep(max((due_ns - self._clock.now_ns()) * 1e-9 - early_s, 0.0))
-        rendering = asyncio.ensure_future(self._render(child, truth, seq, exposure, due_ns))
+        rendering = asyncio.ensure_future(self._render(child, truth, seq, exposure, latest_ns))
         try:
             await asyncio.sleep((due_ns - self._clock.now_ns()) * 1e-9)
             with self._clock.hold():
@@ -204,10 +205,12 @@ class CameraPeer:
         )
         transport.sendto(encode_notice(notice))
 
-    async def _render(self, child: Child, truth: Kinematics, seq: int, exposure: float, due_ns: int) -> int:
-        """The slot of the picture.  TransientError when its turn came only after it was due."""
+    async def _render(
+        self, child: Child, truth: Kinematics, seq: int, exposure: float, latest_ns: int
+    ) -> int:
+        """The slot of the picture.  TransientError when its turn did not come until `latest_ns`."""
         async with self._turn:
-            if self._clock.now_ns() > due_ns:  # a slow machine costs pictures; queued, they would come late
+            if self._clock.now_ns() > latest_ns:  # a slow machine costs pictures; queued, they would be old
                 raise TransientError(f"picture {seq}: the renderer is behind")
             slot = self._ring.begin(seq)
             await child.ask((truth, seq, slot, exposure))

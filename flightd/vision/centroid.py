@@ -36,7 +36,7 @@ _MIN_CUTS = 5
 _WORTH_A_FIT = 0.6
 """A band is fitted when so great a part of the slabs that the shortest band crosses vote for it."""
 _SPARSEST = 4
-"""The shortest band shows in one of so many of the slabs that it crosses, at the least."""
+"""What others have left is a band where it shows in one of so many slabs, over the length of the shortest."""
 _SLAB_KEY, _SLABS_APART, _APART_PX = 1e6, 1 << 20, 1 << 17
 
 _LOW, _HIGH, _MIDDLE = 3, 4, 5

@@ -130,7 +130,7 @@ class Detector:
         frame = np.ascontiguousarray(bgr)
         found: list[Strip] = []
         while strips := evidence.select(guesses, shortest, found):
-            refined = refine(frame, strips, plane, reach_px=_REACH_PX)
+            refined = refine(frame, strips, plane, self.profile.colour, reach_px=_REACH_PX)
             found += [strip for strip in refined if strip is not None]
             if None not in refined:
                 break
@@ -159,9 +159,9 @@ def _closed(mask: Image, kernel: Image) -> Image:
     """The mask with its small gaps filled.  What lies outside the picture is unknown: the floor between a
     band and the border it runs along is no gap, and does not make of the band one that the border cuts."""
     closed = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel), np.uint8)
-    height, width = mask.shape
-    closed[:: height - 1] &= mask[:: height - 1]
-    closed[:, :: width - 1] &= mask[:, :: width - 1]
+    rows, columns = (max(side - 1, 1) for side in mask.shape)
+    closed[::rows] &= mask[::rows]
+    closed[:, ::columns] &= mask[:, ::columns]
     return closed
 
 

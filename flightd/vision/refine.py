@@ -29,13 +29,14 @@ window, on no edge at all, have 1.4."""
 _NO_EDGE, _SHARP_OF_NONE = 0.8, 0.5
 """Points that scatter so far where the other edge's do so by that part of it less are on no edge."""
 _STEP, _GREY_STEP, _SAME = 0.06, 0.12, 0.03
-"""Less than the first part of the one edge's contrast on the other one, or of a grey band the second: no
-band.  Nor is a grey one that is lighter than the floor on one side and darker on the other by more than the
-third."""
+"""Less than the first part of the one edge's contrast on the other one, or of a black or white band the
+second: no band.  Nor is a black one that is lighter than the floor on one side and darker on the other by
+more than the third."""
 _SOFT, _DARKEST_SHADOW, _DARKEST_MARK, _GREY = 0.66, 0.55, 0.68, 1.2
 """Less than the first part of the contrast close to an edge is a penumbra, or paint blurred by motion; but
 paint that is called black keeps less than the second part of the floor's light.  More than the third part is
-what rubber and joints leave, however sharp.  Both take all channels alike, to within the last."""
+what rubber and joints leave, however sharp, and no black paint.  Both take all channels alike, to within the
+last."""
 _MAX_BOW = 0.006
 _MIN_BOW_PX = 1.2
 _BOW_OF_WIDTH = 0.06
@@ -48,8 +49,8 @@ _BOW_RMS = math.sqrt(4 / 45)
 """Root mean square of a parabola of sagitta one about its straight line."""
 
 
-def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> list[Strip | None]:
-    """Each band with its edges located on the frame, or None where they are not a line's.
+def refine(bgr: Image, strips: list[Strip], plane: Plane, colour: str, reach_px: float) -> list[Strip | None]:
+    """Each band of the named colour with its edges located on the frame, or None where they are not a line's.
 
     `reach_px` is how far the guess may be off, measured along v.
     """
@@ -63,7 +64,7 @@ def refine(bgr: Image, strips: list[Strip], plane: Plane, reach_px: float) -> li
     visible = np.maximum(np.count_nonzero(taps.seen, axis=1), stations / 2)
     refined: list[Strip | None] = []
     for k, strip in enumerate(strips):
-        if _is_step(taps, 2 * k) or _is_shadow(taps, found, 2 * k):
+        if _is_step(taps, 2 * k, colour) or _is_shadow(taps, found, 2 * k, colour):
             refined.append(None)
             continue
         edges = [
@@ -98,23 +99,26 @@ def _judged(strip: Strip, lines: RobustLines, visible: Array, edges: list[int | 
     return band if _is_line(strip, widest, lines, _share(edges, lines, visible), edges) else None
 
 
-def _is_step(taps: Taps, e: int) -> bool:
-    """Whether a band has floor of its own colour on one side, or is grey and between two floors' light: the
+def _is_step(taps: Taps, e: int, colour: str) -> bool:
+    """Whether a band has floor of its own colour on one side, or is black and between two floors' light: the
     border of a shadow, or of another floor."""
     low, high = float(taps.contrast[e]), float(taps.contrast[e + 1])
-    shade, grey = taps.shade[e : e + 2].mean(axis=1), _is_grey(taps, e)
-    between = grey and shade.min() < 1.0 - _SAME and shade.max() > 1.0 + _SAME
+    grey = colour in ("black", "white") and _is_grey(taps, e)
+    shade = taps.shade[e : e + 2].mean(axis=1)
+    between = grey and colour == "black" and shade.min() < 1.0 - _SAME and shade.max() > 1.0 + _SAME
     if not between and min(low, high) >= (_GREY_STEP if grey else _STEP) * max(low, high):
         return False
     return bool(np.count_nonzero(taps.seen[e : e + 2], axis=1).min() > taps.row.shape[1] / 2)
 
 
-def _is_shadow(taps: Taps, found: Edges, e: int) -> bool:
-    """Whether a band is only darker than the floor, of no other colour: a shadow, soft at both edges, or the
-    mark of a tyre or a joint, too pale for paint."""
+def _is_shadow(taps: Taps, found: Edges, e: int, colour: str) -> bool:
+    """Whether a band is only darker than the floor, of no other colour: a shadow, soft at both edges, or for
+    a black line too pale, the mark of a tyre or a joint."""
     shade = taps.shade[e : e + 2]
-    darkest = _DARKEST_SHADOW if found.sharpness[e : e + 2].max() < _SOFT else _DARKEST_MARK
-    if shade.min() <= darkest or shade.max() >= 1.0:
+    is_soft = found.sharpness[e : e + 2].max() < _SOFT
+    if not is_soft and colour != "black":
+        return False
+    if shade.min() <= (_DARKEST_SHADOW if is_soft else _DARKEST_MARK) or shade.max() >= 1.0:
         return False
     return _is_grey(taps, e)
 

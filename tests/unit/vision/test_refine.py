@@ -48,6 +48,21 @@ def test_a_tyre_mark_in_a_shadow_is_no_black_line() -> None:
     assert Detector("combined", "black").detect(picture).lines == ()
 
 
+@pytest.mark.parametrize(
+    ("colour", "paint", "left"), [("green", (70, 140, 50), 0.3), ("black", (40, 40, 40), 0.4)]
+)
+@pytest.mark.parametrize("width", [8.0, 24.0])
+def test_a_faded_line_on_a_light_floor_is_no_mark(
+    colour: str, paint: tuple[int, int, int], left: float, width: float
+) -> None:
+    """Green that is no darker than a tyre's mark, and black that is just so."""
+    band = Band(10.0, 0.3, width)
+    covered = left * coverage([band], *grid(640, 360))[..., None]
+    seen = np.array((205, 208, 210)) * (1 - covered) + np.array(paint) * covered
+    picture = np.clip(seen + np.random.default_rng(0).normal(0, 2.0, seen.shape), 0, 255).astype(np.uint8)
+    assert abs(nearest(Detector(profile=colour).detect(picture), band)[1]) < 1.0
+
+
 def test_the_border_of_a_darker_floor_is_no_line() -> None:
     x, y = grid(1920, 1080)
     dark = 1 - 0.5 * np.clip(x * np.cos(0.3) + y * np.sin(0.3) + 0.5, 0, 1)
