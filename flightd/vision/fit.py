@@ -34,26 +34,26 @@ def moments(rows: Array) -> Moments:
     return sums
 
 
-def _about_mean(sums: Moments, column: int) -> tuple[float, float, float]:
-    """The mean of u, and the sums of squares of u and of products with the values about it."""
-    n, su = sums[0][0], sums[0][1]
+def _line(sums: Moments, column: int) -> tuple[float, float, float, float, float]:
+    """Least squares a and b of v = a + b u for the values in a row of the moments, the mean of u, and the
+    sums of squares of u and of products with the values about it."""
+    n, su, sv = sums[0][0], sums[0][1], sums[0][column]
     mean_u = su / n
-    return mean_u, sums[1][1] - su * mean_u, sums[1][column] - mean_u * sums[0][column]
+    suu, suv = sums[1][1] - su * mean_u, sums[1][column] - mean_u * sv
+    b = suv / suu if suu > 0 else 0.0
+    return sv / n - b * mean_u, b, mean_u, suu, suv
 
 
 def law(sums: Moments, column: int) -> tuple[float, float]:
     """Least squares (a, b) of v = a + b u for the values in a row of the moments."""
-    mean_u, suu, suv = _about_mean(sums, column)
-    b = suv / suu if suu > 0 else 0.0
-    return sums[0][column] / sums[0][0] - b * mean_u, b
+    a, b, *_ = _line(sums, column)
+    return a, b
 
 
 def fit(sums: Moments, column: int, sigma: float) -> LinearFit:
     """The same with its covariance: the values are good to at least `sigma`, and to their scatter."""
     n, sv = sums[0][0], sums[0][column]
-    mean_u, suu, suv = _about_mean(sums, column)
-    b = suv / suu if suu > 0 else 0.0
-    a = sv / n - b * mean_u
+    a, b, mean_u, suu, suv = _line(sums, column)
     variance = max(sigma * sigma, (sums[column][column] - sv * sv / n - b * suv) / max(1.0, n - 2))
     var_b = variance / suu if suu > 0 else variance
     return LinearFit(a, b, variance / n + mean_u * mean_u * var_b, var_b, -mean_u * var_b)
