@@ -30,6 +30,8 @@ _DEMANDS = {
     Phase.PILOT: Demand.HANDS_OFF,
 }
 _ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.DONE, Phase.ABORTED, Phase.PILOT}
+_NEAR_FLOOR = {Phase.TAKE_OFF, Phase.LAND}
+"""Where lines come and go."""
 _OVER = (Phase.DONE, Phase.ABORTED, Phase.PILOT)
 _WAITING = (Phase.PREFLIGHT, Phase.SWAP)
 _STOPPED = (Phase.HOLD, Phase.RELOCATE, Phase.ACQUIRE)
@@ -166,7 +168,7 @@ class Mission:
         asked = triggers & ACTIONS.keys()
         if not self.airborne:  # on the ground only what decides something there is worth telling
             asked &= TABLE[self.phase].keys()
-        elif self.phase in {Phase.TAKE_OFF, Phase.LAND}:  # near the floor lines come and go
+        elif self.phase in _NEAR_FLOOR:
             asked &= TABLE[self.phase].keys() | triggers_of(Action.REPORT, Action.HOME)
         for trigger in sorted(asked, key=list(Trigger).index):
             self._events.hazard(now_ns, trigger, ACTIONS[trigger].value)
@@ -176,7 +178,7 @@ class Mission:
             self._leg_along_x = self._leads_along_x()
         elif self.phase not in _STOPPED:
             self._leg_along_x = None
-        at_height = self.airborne and self.phase is not Phase.TAKE_OFF
+        at_height = self.airborne and self.phase not in _NEAR_FLOOR
         return Situation(self.airborne, paused, self._leg_along_x, self.phase is Phase.HOLD, at_height)
 
     def _ground(self, s: Senses) -> set[Trigger]:

@@ -179,12 +179,10 @@ class Watch:
         borne_s = p.lines_hold_s if situation.holds else p.followed_hold_s
         lost = lost or self.blind.unseen_s > borne_s
         seen_s = self._seen.step(not lost, s.now_ns)
-        if not situation.at_height:  # near the floor lines come and go: what glimpses excuse begins above
+        if seen_s > p.lines_found_s or not situation.at_height:
             self._unseen_ns = None
         elif lost and self._unseen_ns is None:
             self._unseen_ns = s.now_ns
-        elif seen_s > p.lines_found_s:
-            self._unseen_ns = None
         self.unseen_s = 0.0 if self._unseen_ns is None else (s.now_ns - self._unseen_ns) * 1e-9
         if lost and (self.unseen_s > p.lines_land_s or self.blind.too_long):
             return {Trigger.LINES_LOST, Trigger.LINES_LOST_LONG}

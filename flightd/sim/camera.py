@@ -114,6 +114,7 @@ class CameraPeer:
         self._wanted = wanted
         self._show = show
         self._camera = camera
+        self._period_ns = round(1e9 / camera.fps)
         self._address = address
         self._truth_at = truth_at
         self._clock = clock
@@ -152,7 +153,7 @@ class CameraPeer:
 
     async def _expose(self, child: Child, transport: Any, pictures: asyncio.TaskGroup) -> None:
         """Take a picture each period; each is rendered and delivered by a task of its own."""
-        period_ns = round(1e9 / self._camera.fps)
+        period_ns = self._period_ns
         exposure_ns = self._clock.now_ns()
         seq = 0
         while True:
@@ -176,10 +177,9 @@ class CameraPeer:
         self, child: Child, transport: Any, truth: Kinematics, seq: int, due_ns: int, exposure: float
     ) -> None:
         early_s = self._camera.capture_delay_s + self._camera.jitter_s
-        latest_ns = due_ns + round(1e9 / self._camera.fps)
         # a late picture is drawn late: the ring holds no more than the usual delay's
         await asyncio.sleep(max((due_ns - self._clock.now_ns()) * 1e-9 - early_s, 0.0))
-        rendering = asyncio.ensure_future(self._render(child, truth, seq, exposure, latest_ns))
+        rendering = asyncio.ensure_future(self._render(child, truth, seq, exposure, due_ns + self._period_ns))
         try:
             await asyncio.sleep((due_ns - self._clock.now_ns()) * 1e-9)
             with self._clock.hold():

@@ -55,7 +55,12 @@ def mask_of(bands: list[Band], x: NDArray[np.float64], y: NDArray[np.float64]) -
 def picture(paint: NDArray[np.float64], seed: int = 0, noise: float = 3.0, light: float = 1.0) -> Image:
     """The photograph of a floor with that paint: a little blur and noise, brightness times `light`."""
     colour = paint[..., None] * np.array(PAINT) + (1 - paint[..., None]) * np.array(FLOOR)
-    blurred = cv2.GaussianBlur(colour * light, (0, 0), 0.7)
+    return photographed(colour * light, seed, noise)
+
+
+def photographed(colour: NDArray[np.float64], seed: int, noise: float) -> Image:
+    """(H, W, 3) colours with a little blur and noise."""
+    blurred = cv2.GaussianBlur(colour, (0, 0), 0.7)
     grainy = blurred + np.random.default_rng(seed).normal(0, noise, blurred.shape)
     drawn: Image = np.clip(grainy, 0, 255).astype(np.uint8)
     return drawn

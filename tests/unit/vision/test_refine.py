@@ -9,30 +9,26 @@ from numpy.typing import NDArray
 
 from flightd.core.types import Image
 from flightd.vision.detector import Detector
-from tests.unit.vision.drawing import FLOOR, Band, coverage, draw, grid, nearest
+from tests.unit.vision.drawing import FLOOR, Band, coverage, draw, grid, nearest, photographed
 
 BAND = Band(20.0, 0.3, 60.0)
 
 
-def floor_with(shade: NDArray[np.float64], width: int, height: int, seed: int = 0) -> Image:
+def floor_with(shade: NDArray[np.float64]) -> Image:
     """Grey floor whose brightness is multiplied by `shade` (H, W), a little blurred and noisy."""
-    lit = shade[..., None] * np.array(FLOOR)
-    grainy = cv2.GaussianBlur(lit, (0, 0), 0.7)
-    grainy += np.random.default_rng(seed).normal(0, 2.0, lit.shape)
-    drawn: Image = np.clip(grainy, 0, 255).astype(np.uint8)
-    return drawn
+    return photographed(shade[..., None] * np.array(FLOOR), 0, 2.0)
 
 
 @pytest.mark.parametrize("shade", [0.6, 0.7])
 def test_a_soft_shadow_is_no_black_line(shade: float) -> None:
     painted = coverage([BAND], *grid(1920, 1080))
     soft = 1 - (1 - shade) * np.asarray(cv2.GaussianBlur(painted, (0, 0), 9.0), np.float64)
-    assert Detector(profile="black").detect(floor_with(soft, 1920, 1080)).lines == ()
+    assert Detector(profile="black").detect(floor_with(soft)).lines == ()
 
 
 def test_a_black_line_is_one_even_where_it_reflects_as_much_as_a_shadow() -> None:
     painted = coverage([BAND], *grid(1920, 1080))
-    seen = Detector(profile="black").detect(floor_with(1 - 0.55 * painted, 1920, 1080))
+    seen = Detector(profile="black").detect(floor_with(1 - 0.55 * painted))
     _, rho, theta = nearest(seen, BAND)
     assert abs(rho) < 0.1
     assert abs(theta) < 1e-3
@@ -43,7 +39,7 @@ def test_a_tyre_mark_in_a_shadow_is_no_black_line() -> None:
     x, y = grid(1920, 1080)
     mark = 1 - 0.28 * coverage([BAND], x, y)
     shadow = 1 - 0.6 * np.clip((300 - np.abs(y)) / 80, 0, 1)
-    picture = floor_with(mark * shadow, 1920, 1080)
+    picture = floor_with(mark * shadow)
     assert Detector("centroid", "black").detect(picture).lines
     assert Detector("combined", "black").detect(picture).lines == ()
 
@@ -59,20 +55,19 @@ def test_a_faded_line_on_a_light_floor_is_no_mark(
     band = Band(10.0, 0.3, width)
     covered = left * coverage([band], *grid(640, 360))[..., None]
     seen = np.array((205, 208, 210)) * (1 - covered) + np.array(paint) * covered
-    picture = np.clip(seen + np.random.default_rng(0).normal(0, 2.0, seen.shape), 0, 255).astype(np.uint8)
-    assert abs(nearest(Detector(profile=colour).detect(picture), band)[1]) < 1.0
+    assert abs(nearest(Detector(profile=colour).detect(photographed(seen, 0, 2.0)), band)[1]) < 1.0
 
 
 def test_the_border_of_a_darker_floor_is_no_line() -> None:
     x, y = grid(1920, 1080)
     dark = 1 - 0.5 * np.clip(x * np.cos(0.3) + y * np.sin(0.3) + 0.5, 0, 1)
     for profile in ("black", "white"):
-        assert Detector(profile=profile).detect(floor_with(dark, 1920, 1080)).lines == ()
+        assert Detector(profile=profile).detect(floor_with(dark)).lines == ()
 
 
 def test_a_strip_between_a_dark_floor_and_a_light_one_is_no_black_line() -> None:
     _, y = grid(1920, 1080)
-    picture = floor_with(np.where(y < 0, 0.5, np.where(y < 16, 0.6, 1.0)), 1920, 1080)
+    picture = floor_with(np.where(y < 0, 0.5, np.where(y < 16, 0.6, 1.0)))
     assert Detector("centroid", "black").detect(picture).lines
     assert Detector("combined", "black").detect(picture).lines == ()
 
@@ -93,7 +88,7 @@ def test_a_line_beside_a_little_floor_at_the_border_is_one(
 @pytest.mark.parametrize("blur_px", [5, 13, 25])
 def test_a_black_line_blurred_by_motion_is_no_shadow(blur_px: int) -> None:
     band = Band(20.0, 0.0, 50.0)
-    sharp = floor_with(1 - 0.6 * coverage([band], *grid(1280, 720)), 1280, 720)
+    sharp = floor_with(1 - 0.6 * coverage([band], *grid(1280, 720)))
     blurred = np.asarray(cv2.blur(sharp, (blur_px, 1)), np.uint8)
     _, rho, _ = nearest(Detector(profile="black").detect(blurred), band)
     assert abs(rho) < 1.0
