@@ -2,7 +2,7 @@
 
 The same step flies, simulates and replays: it reads no clock, opens nothing and keeps all its state in
 itself.  Order: telemetry and lines into the tracks, tracks to a pose on the grid, the mission decides,
-control turns its reference into a set point, the limits have the last word.
+control turns its reference into a setpoint, the limits have the last word.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-from flightd.control.flight import FlightController, FlightGains, Motion
+from flightd.control.flight_controller import FlightController, FlightGains, Motion
 from flightd.control.limits import Limiter, Limits, Surroundings
 from flightd.core.scanning import CodeSet, Finding, Place, Settled
 from flightd.core.types import (
@@ -26,19 +26,22 @@ from flightd.core.types import (
     Phase,
     VehicleState,
 )
-from flightd.grid.localise import GridLocaliser, LocaliserParams
-from flightd.grid.pads import PadFinder
-from flightd.grid.past import PoseHistory
-from flightd.grid.site import Site
-from flightd.mission.caution import Caution
-from flightd.mission.guidance import Guidance, Guide, MissionParams, Senses
+from flightd.localisation.grid_localiser import GridLocaliser, LocaliserParams
+from flightd.localisation.pad_finder import PadFinder
+from flightd.localisation.pose_history import PoseHistory
+from flightd.mission.guidance import Guidance, Guide, MissionInputs, MissionParams
 from flightd.mission.mission import Mission
-from flightd.mission.plan import FlightPlan, HeadingPolicy
-from flightd.mission.scanner import Scanner
-from flightd.tracking.height import HeightHistory
-from flightd.tracking.lines import LineTracker, TrackerParams, TrackSet
-from flightd.tracking.pictures import PictureWatch
-from flightd.tracking.unheard import UnheardAttitude
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
+from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
+from flightd.mission.scan.scanner import Scanner
+from flightd.site.site import Site
+from flightd.tracking.attitude_extrapolation import AttitudeExtrapolation
+from flightd.tracking.frame_monitor import FrameMonitor
+from flightd.tracking.height_history import HeightHistory
+from flightd.tracking.line_tracker import LineTracker, TrackerParams, TrackSet
+
+TICK_S = 0.02
+"""Period of the control tick."""
 
 _FRAMES_ARRIVE_S = 0.5
 _TOUCHDOWN_S = 2.0
@@ -117,9 +120,9 @@ class Pilot:
         self._last_ns: int | None = None
         self._last_yaw: float | None = None
         self._yaw_rate = 0.0
-        self._pictures = PictureWatch()
-        self._caution = Caution(site, params.mission)
-        self._unheard = UnheardAttitude()
+        self._pictures = FrameMonitor()
+        self._caution = PlausibilityMonitor(site, params.mission)
+        self._unheard = AttitudeExtrapolation()
         self._asked: AttitudeSetpoint | None = None
 
     @property
@@ -147,7 +150,7 @@ class Pilot:
     def step(self, tick: TickInput) -> TickOutput:
         """Fly one tick."""
         now_ns = tick.now_ns
-        dt_s = 0.02 if self._last_ns is None else max((now_ns - self._last_ns) * 1e-9, 1e-3)
+        dt_s = TICK_S if self._last_ns is None else max((now_ns - self._last_ns) * 1e-9, 1e-3)
         self._last_ns = now_ns
         self._take(tick)
         height_m = self._heights.at(now_ns)
@@ -233,13 +236,13 @@ class Pilot:
 
     def _senses(
         self, tick: TickInput, dt_s: float, pose: GridPose | None, height_m: float, tracks: TrackSet | None
-    ) -> Senses:
+    ) -> MissionInputs:
         now_ns, v = tick.now_ns, tick.vehicle
         x_ns, y_ns = self._localiser.seen_ns
         known = pose is not None and max(pose.covariance[0], pose.covariance[4]) < self._params.max_sigma_m**2
         seeking = self._mission.phase is Phase.RELOCATE
         doubted = seeking or (pose is not None and pose.integrity < self._params.mission.integrity_min)
-        return Senses(
+        return MissionInputs(
             now_ns=now_ns,
             dt_s=dt_s,
             pose=pose,
@@ -260,7 +263,7 @@ class Pilot:
         )
 
     def _setpoint(
-        self, senses: Senses, guidance: Guidance, push: tuple[float, float]
+        self, senses: MissionInputs, guidance: Guidance, push: tuple[float, float]
     ) -> AttitudeSetpoint | None:
         """What control makes of the guidance, within the limits; None when nothing may be sent."""
         now_ns, dt_s, pose = senses.now_ns, senses.dt_s, senses.pose

@@ -153,7 +153,7 @@ class Vitals:
     `tick_late_s` and `latencies_ms` are those since the last status: how late each tick came, and for each
     picture flown by the time of its stages.  The others count since the start: `dropped` what a full queue
     or a lost worker cost, `restarts` what died and was brought back, each by the part's name;
-    `repeated_level` the set points that went out because no tick made one.
+    `repeated_level` the setpoints that went out because no tick made one.
     """
 
     status: Status

@@ -24,9 +24,9 @@ from typing import Any
 import zmq
 import zmq.asyncio
 
-from flightd.adapters.ground.client import Address, GroundClient
-from flightd.adapters.ground.keys import load_pair, load_public, make_keys
-from flightd.adapters.ground.link import ZmqGround
+from flightd.adapters.ground_link.client import Address, GroundClient
+from flightd.adapters.ground_link.keys import load_pair, load_public, make_keys
+from flightd.adapters.ground_link.link import ZmqGround
 from flightd.config.ground import GroundConfig
 from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError

@@ -25,8 +25,8 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED_NOGPS, ArduPilotVehicle
-from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser, Message
-from flightd.adapters.vehicle.mavlink.outputs import PoseForm
+from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser, Message
+from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
 from flightd.core.types import AttitudeSetpoint, Demand, GridPose

@@ -1,4 +1,4 @@
-"""How long an emergency stop takes from the client's call to the set point on the wire.
+"""How long an emergency stop takes from the client's call to the setpoint on the wire.
 
 A client on real loopback sockets, the ground link, the pilot's own tick at 50 Hz amid a leg, limits, pump
 and a UDP socket with a listener.  Each stop is taken by a fresh copy of the same flying pilot.
@@ -22,15 +22,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from flightd.adapters.ground.client import Address, GroundClient
-from flightd.adapters.ground.link import ZmqGround
+from flightd.adapters.ground_link.client import Address, GroundClient
+from flightd.adapters.ground_link.link import ZmqGround
+from flightd.app.setpoint_pump import SetpointPump
 from flightd.config.ground import GroundConfig
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.types import Attitude, AttitudeSetpoint, CommandKind, Demand, Event, Phase, VehicleState
 from flightd.pilot import Pilot, TickInput
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.pump import SetpointPump
 from tests.sim.ideal_flight import IdealFlight
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -56,7 +56,7 @@ class ShiftedClock:
 
 
 class UdpVehicle:
-    """Sends each set point as a datagram."""
+    """Sends each setpoint as a datagram."""
 
     def __init__(self, to: tuple[str, int]) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -80,7 +80,7 @@ class UdpVehicle:
 
 
 class Listener(asyncio.DatagramProtocol):
-    """The vehicle's end: when the first level and sinking set point after `listen` came."""
+    """The vehicle's end: when the first level and sinking setpoint after `listen` came."""
 
     def __init__(self) -> None:
         self.stopped: asyncio.Future[float] | None = None

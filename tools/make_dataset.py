@@ -13,9 +13,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from flightd.sim.dataset import COLOURS, write_dataset
-from flightd.sim.scenes import LAYOUTS
-from flightd.sim.severity import LEVELS
+from flightd.sim.dataset.generate import COLOURS, write_dataset
+from flightd.sim.dataset.scenes import LAYOUTS
+from flightd.sim.dataset.severity import LEVELS
 
 
 def size(text: str) -> tuple[int, int]:

@@ -18,18 +18,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
 
-from flightd.adapters.metrics.book import MetricsBook
-from flightd.adapters.recorder.recorder import Recorder
-from flightd.app.assembly import pilot_of
+from flightd.adapters.metrics.metrics import MetricsBook
+from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.app.build import pilot_of
+from flightd.app.detection.detector_pool import Detection
+from flightd.app.detection.latency import LatencyBook
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.topics import Topic
 from flightd.core.types import LineSet, Status
 from flightd.pilot import TickInput, TickOutput
 from flightd.ports import Vitals
-from flightd.runtime.latency import LatencyBook
-from flightd.runtime.pool import Detection
-from flightd.runtime.ring import FrameTicket
+from flightd.runtime.frame_ring import FrameTicket
 from tests.sim.ideal_flight import IdealFlight
 
 ROOT = Path(__file__).parents[1]
@@ -41,7 +41,7 @@ WARM_UP_S = 400.0
 class Watched:
     """A pilot's step with all that the daemon does around it."""
 
-    def __init__(self, recorder: Recorder, book: MetricsBook, latency: LatencyBook) -> None:
+    def __init__(self, recorder: McapRecorder, book: MetricsBook, latency: LatencyBook) -> None:
         self._recorder, self._book, self._latency = recorder, book, latency
         self.ticks = 0
 
@@ -79,7 +79,7 @@ def main() -> None:
     flown_s, missions, first_mb = 0.0, 0, 0.0
     with (
         tempfile.TemporaryDirectory() as folder,
-        Recorder(Path(folder) / "f.mcap", lossless=True) as recorder,
+        McapRecorder(Path(folder) / "f.mcap", lossless=True) as recorder,
     ):
         watched = Watched(recorder, MetricsBook(), LatencyBook())
         while flown_s < options.seconds:

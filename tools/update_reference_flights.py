@@ -19,8 +19,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from flightd.adapters.recorder.recorder import Recorder
-from flightd.core.topics import Document, Picture, Topic
+from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.replay.log import Entry, read_log
 
 ROOT = Path(__file__).parents[1]
@@ -93,9 +93,9 @@ def flown(reference: Reference, folder: Path) -> Path:
 def keep(reference: Reference, log: Path, to: Path) -> None:
     """The part of a log that a replay needs, in as little room as possible."""
     to.parent.mkdir(parents=True, exist_ok=True)
-    with Recorder(to, lossless=True) as recorder:
+    with McapRecorder(to, lossless=True) as recorder:
         for entry in _beginning(log, reference.seconds):
-            if isinstance(entry.message, Picture):
+            if isinstance(entry.message, RecordedFrame):
                 recorder.image(entry.topic, entry.stamp_ns, entry.message.seq, entry.message.jpeg)
             else:
                 recorder.record(entry.topic, entry.stamp_ns, entry.message)

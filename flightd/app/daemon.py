@@ -14,23 +14,22 @@ from dataclasses import dataclass, field
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.store.progress import LeftOver, ProgressFile
 from flightd.adapters.vehicle.connect import connect_vehicle
-from flightd.app.assembly import pilot_of
-from flightd.app.audience import Audience
-from flightd.app.sight import Sight
+from flightd.app.build import pilot_of
+from flightd.app.counting.count import Counting
+from flightd.app.detection.detector_pool import Detectors
+from flightd.app.detection.latency import LatencyBook
+from flightd.app.detection.pipeline import DetectionPipeline
+from flightd.app.publishers import TelemetryPublishers
+from flightd.app.setpoint_pump import SetpointPump
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, TransientError, UnavailableError
 from flightd.core.topics import Topic
 from flightd.core.types import AttitudeSetpoint, Command, CommandKind, Health, Phase, Status
-from flightd.grid.site import Site
-from flightd.pilot import TickInput, TickOutput
+from flightd.pilot import TICK_S, TickInput, TickOutput
 from flightd.ports import Camera, Clock, CountsDrops, Ground, Monitor, PoseTaker, Recorder, Vehicle, Vitals
-from flightd.runtime.counting import Counting
-from flightd.runtime.latency import LatencyBook
-from flightd.runtime.pool import Detectors
-from flightd.runtime.pump import SetpointPump
-from flightd.runtime.supervise import restarted
+from flightd.runtime.supervisor import restarted
+from flightd.site.site import Site
 
-TICK_S = 0.02
 _FIRST_HEARD_S = 2.0
 _OVER = {Phase.DONE, Phase.ABORTED, Phase.PILOT}
 _SILENT_NS = 30_000_000_000
@@ -79,9 +78,9 @@ class Daemon:
         self._ground = ground
         self._progress = progress
         self._pilot = pilot_of(config, site)
-        self._sight = Sight(detectors, recorder, ground, config.recorder.picture_fps)
+        self._sight = DetectionPipeline(detectors, recorder, ground, config.recorder.picture_fps)
         self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock, config.control.limits())
-        self._audience = Audience(self._vehicle, recorder, ground, monitors, observers)
+        self._audience = TelemetryPublishers(self._vehicle, recorder, ground, monitors, observers)
         self._pose_taker: PoseTaker | None = None
         if config.vehicle.shares_pose and isinstance(self._vehicle, PoseTaker):
             self._pose_taker = self._vehicle

@@ -12,7 +12,7 @@ import typer
 from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
-    from flightd.vision.calibration import Board
+    from flightd.vision.lens_calibration import Board
 
 EXAMPLES = """Examples:
 
@@ -35,8 +35,8 @@ def calibrate(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
 ) -> None:
     """Calibrate the down camera; prints the `[camera]` keys for the configuration."""
-    from flightd.cli.pictures import list_files, pictures
-    from flightd.vision import calibration
+    from flightd.studies.frame_files import list_files, pictures
+    from flightd.vision import lens_calibration as calibration
 
     chessboard = _board(board)
     views, sizes, looked = [], set[tuple[int, int]](), 0
@@ -74,7 +74,7 @@ def calibrate(
 
 
 def _board(text: str) -> Board:
-    from flightd.vision.calibration import Board
+    from flightd.vision.lens_calibration import Board
 
     match = re.fullmatch(r"(\d+)x(\d+)", text)
     if match is None or min(map(int, match.groups())) < 3 or max(map(int, match.groups())) > 50:

@@ -15,8 +15,8 @@ from flightd.cli.exits import run_app
 from flightd.core.errors import InputError, UnavailableError
 
 if TYPE_CHECKING:
-    from flightd.adapters.ground.client import Address, GroundClient
-    from flightd.adapters.ground.protocol import StatusReport
+    from flightd.adapters.ground_link.client import Address, GroundClient
+    from flightd.adapters.ground_link.protocol import StatusReport
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
@@ -104,7 +104,7 @@ def status_lines(report: StatusReport) -> list[str]:
             f"vehicle  {vehicle.mode}, {armed}, battery {battery}"
             + (f", refused: {vehicle.refusal}" if vehicle.refusal else "")
         )
-    lines.append(f"latency  {report.latency_ms.get('total', 0.0):.0f} ms from exposure to set point")
+    lines.append(f"latency  {report.latency_ms.get('total', 0.0):.0f} ms from exposure to setpoint")
     lines.append(
         f"link     {link.attending} attending, {link.refused} of {link.requests} requests refused, "
         f"{link.denied} connections denied"
@@ -209,8 +209,8 @@ def keygen(
     flightctl keygen drone-1 --out /etc/flightd/keys
     flightctl keygen ann --role viewer
     """
-    from flightd.adapters.ground.keys import load_public, make_keys
-    from flightd.adapters.ground.protocol import Role
+    from flightd.adapters.ground_link.keys import load_public, make_keys
+    from flightd.adapters.ground_link.protocol import Role
 
     if role not in set(Role):
         raise InputError(f"--role {role}: expected {' or '.join(Role)}")
@@ -231,7 +231,7 @@ def protocol(as_json: AsJson = False) -> None:
     \b
     flightctl protocol
     """
-    from flightd.adapters.ground.describe import markdown, schema
+    from flightd.adapters.ground_link.protocol_text import markdown, schema
 
     print(json.dumps(schema(), indent=1) if as_json else markdown())
 
@@ -261,7 +261,7 @@ def watch(
 
 
 def _with_client(context: Context, use: Callable[[GroundClient], Awaitable[_T]]) -> _T:
-    from flightd.adapters.ground.client import GroundClient
+    from flightd.adapters.ground_link.client import GroundClient
 
     address = _address(context.obj)
 
@@ -273,8 +273,8 @@ def _with_client(context: Context, use: Callable[[GroundClient], Awaitable[_T]])
 
 
 def _address(options: dict[str, Any]) -> Address:
-    from flightd.adapters.ground.client import Address
-    from flightd.adapters.ground.keys import load_pair, load_public
+    from flightd.adapters.ground_link.client import Address
+    from flightd.adapters.ground_link.keys import load_pair, load_public
 
     key, server_key = options["key"], options["server_key"]
     if (key is None) != (server_key is None):
@@ -289,7 +289,7 @@ def _address(options: dict[str, Any]) -> Address:
 
 
 def _print_message(message: Any) -> None:
-    from flightd.adapters.ground.protocol import encode
+    from flightd.adapters.ground_link.protocol import encode
 
     print(encode(message).decode())
 

@@ -14,13 +14,13 @@ import typer
 from flightd.core.errors import InputError, RunError, UnavailableError
 
 if TYPE_CHECKING:
-    from flightd.adapters.vehicle.mavlink.examination import Report
-    from flightd.adapters.vehicle.mavlink.fitness import Finding
-    from flightd.cli.checks.vehicle import Autopilot
-    from flightd.cli.checks.verdict import Check
+    from flightd.adapters.vehicle.mavlink.examination import ExaminationReport
+    from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
     from flightd.config.schema import Config
-    from flightd.grid.site import Site
+    from flightd.doctor.check import Check
+    from flightd.doctor.vehicle import Autopilot
     from flightd.ports import Clock
+    from flightd.site.site import Site
 
 _COLOURS = {"ok": typer.colors.GREEN, "warning": typer.colors.YELLOW, "error": typer.colors.RED}
 
@@ -30,7 +30,7 @@ class Diagnosis:
     """Everything that was looked at; `report` and `fixed` are those of a MAVLink autopilot."""
 
     checks: list[Check]
-    report: Report | None = None
+    report: ExaminationReport | None = None
     fixed: tuple[str, ...] = ()
 
     @property
@@ -89,9 +89,9 @@ def doctor(
 async def _examine(config: Config, site: Site, path: Path) -> Diagnosis:
     from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
     from flightd.adapters.vehicle.connect import connect_vehicle
-    from flightd.app.assembly import detector_of
-    from flightd.cli.checks import camera, machine, vehicle
-    from flightd.cli.checks.calibration import check_calibration
+    from flightd.app.build import detector_of
+    from flightd.doctor import camera, machine, vehicle
+    from flightd.doctor.calibration import check_calibration
     from flightd.runtime.clock import LoopClock
 
     clock = LoopClock()
@@ -126,8 +126,8 @@ async def _examine(config: Config, site: Site, path: Path) -> Diagnosis:
 
 async def _examine_machine(config: Config, site: Site, path: Path) -> Diagnosis:
     """What can be known without waiting for anything."""
-    from flightd.app.assembly import detector_of, pilot_of
-    from flightd.cli.checks import machine
+    from flightd.app.build import detector_of, pilot_of
+    from flightd.doctor import machine
     from flightd.runtime.clock import LoopClock
 
     detector_of(config, site)()
@@ -144,8 +144,8 @@ async def _examine_machine(config: Config, site: Site, path: Path) -> Diagnosis:
 
 def _check_plan(config: Config, site: Site, path: Path) -> Check:
     """Configuration and site are sound, or InputError would have been raised: say what they mean."""
-    from flightd.app.assembly import plan_of
-    from flightd.cli.checks.verdict import ok
+    from flightd.app.build import plan_of
+    from flightd.doctor.check import ok
 
     nodes = len(config.mission.nodes) or len(site.nodes)
     plan_of(config, site)
@@ -154,8 +154,8 @@ def _check_plan(config: Config, site: Site, path: Path) -> Check:
 
 def _check_ground(config: Config, site: Site, clock: Clock) -> list[Check]:
     """Keys and allow-list are read (InputError if they are wrong), the ports are listened on for a moment."""
-    from flightd.app.assembly import ground_link
-    from flightd.cli.checks.verdict import error, ok
+    from flightd.app.build import ground_link
+    from flightd.doctor.check import error, ok
 
     ground = config.ground
     link = ground_link(config, site, clock)
@@ -171,7 +171,7 @@ def _check_ground(config: Config, site: Site, clock: Clock) -> list[Check]:
 
 
 async def _fix(config: Config, agreed: list[str]) -> Autopilot:
-    from flightd.cli.checks.vehicle import examine
+    from flightd.doctor.vehicle import examine
     from flightd.runtime.clock import LoopClock
 
     return await examine(config.vehicle, LoopClock(), agreed)
@@ -183,7 +183,7 @@ def _with_autopilot(found: Diagnosis, autopilot: Autopilot) -> Diagnosis:
     return Diagnosis([*rest, *autopilot.checks], autopilot.report, autopilot.fixed)
 
 
-def _agreed(report: Report, *, ask: bool) -> list[str]:
+def _agreed(report: ExaminationReport, *, ask: bool) -> list[str]:
     """Names of the parameters that may be written."""
     mendable = [found for found in report.findings if found.better is not None]
     if not mendable or report.armed:
@@ -200,7 +200,7 @@ def _agreed(report: Report, *, ask: bool) -> list[str]:
     return [found.name for found in mendable]
 
 
-def _change(found: Finding) -> str:
+def _change(found: ParameterFinding) -> str:
     return f"{found.name:<16} {found.value:g} -> {found.better:g}"
 
 

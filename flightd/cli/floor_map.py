@@ -9,7 +9,7 @@ from typing import TypeAlias
 from rich.style import Style
 from rich.text import Text
 
-from flightd.adapters.ground.protocol import Floor, Position
+from flightd.adapters.ground_link.protocol import FloorStatus, Position
 
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 _BRAILLE = 0x2800
@@ -31,7 +31,7 @@ class FloorMap:
 
     Braille dots are taken to be square (a terminal's cells are about twice as high as wide)."""
 
-    def __init__(self, floor: Floor, columns: int, rows: int) -> None:
+    def __init__(self, floor: FloorStatus, columns: int, rows: int) -> None:
         self._floor = floor
         self._columns, self._rows = columns, rows
         xs = [x for line in floor.lines for x in (line.x0_m, line.x1_m)] or [0.0]

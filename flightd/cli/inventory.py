@@ -68,7 +68,7 @@ def show(
     flightd inventory show out/inventory --location A-03-2-1
     """
     from flightd.adapters.store.sqlite import SqliteStore
-    from flightd.cli.inventory_formats import location_json, observation_json, utc_text
+    from flightd.inventory.formats import location_json, observation_json, utc_text
 
     with SqliteStore(folder, create=False) as store:
         records = store.locations()
@@ -135,7 +135,7 @@ def export(
     flightd inventory export out/inventory --format epcis --out stock.jsonld
     """
     from flightd.adapters.store.sqlite import SqliteStore
-    from flightd.cli.inventory_formats import FORMATS
+    from flightd.inventory.formats import FORMATS
 
     chosen = kind or _SUFFIXES.get(out.suffix.lower(), "csv")
     if chosen not in FORMATS:
@@ -179,7 +179,7 @@ def compare(
     """
     from flightd.adapters.store.sqlite import SqliteStore
     from flightd.cli.inventory_count import read_stock, write_recount
-    from flightd.mission.stock import Outcome, compare_stock, doubtful_locations
+    from flightd.inventory.comparison import ComparisonOutcome, compare_stock, doubtful_locations
 
     if (recount is None) != (config is None):
         raise InputError("--recount and --config: give both, the mission needs a configuration")
@@ -194,7 +194,7 @@ def compare(
         unreachable = write_recount(recount, config, doubtful, records)
     if as_json:
         document = {
-            "outcomes": {outcome.value: counts[outcome] for outcome in Outcome},
+            "outcomes": {outcome.value: counts[outcome] for outcome in ComparisonOutcome},
             "lines": [
                 {
                     "outcome": line.outcome.value,
@@ -212,11 +212,11 @@ def compare(
         print(json.dumps(document, indent=1, ensure_ascii=False))
         return
     for line in lines:
-        if line.outcome is not Outcome.MATCH:
+        if line.outcome is not ComparisonOutcome.MATCH:
             more = f" at {line.found_at}" if line.found_at else ""
             more += f": {_visible(line.found)} is there" if line.found else ""
             print(f"{line.location:<16} {line.outcome.value:<18} {_visible(line.text)}{more}")
-    print(", ".join(f"{counts[outcome]} {outcome.value}" for outcome in Outcome))
+    print(", ".join(f"{counts[outcome]} {outcome.value}" for outcome in ComparisonOutcome))
     if unreachable:
         print(f"no node known, not in the mission: {', '.join(unreachable)}")
 

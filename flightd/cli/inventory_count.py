@@ -10,18 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.cli.pictures import list_files, read_image
-from flightd.cli.progress import track
 from flightd.config.schema import load_table, parse_config
-from flightd.core.cells import exact
+from flightd.core.csv_text import exact
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
 from flightd.core.types import Image
-from flightd.vision.codes import read_codes
-from flightd.vision.small_jpeg import evidence_jpeg
+from flightd.studies.frame_files import list_files, read_image
+from flightd.studies.progress_bar import track
+from flightd.vision.shelf.code_reader import read_codes
+from flightd.vision.shelf.evidence_jpeg import evidence_jpeg
 
 if TYPE_CHECKING:
-    from flightd.replay.report.count import Count
+    from flightd.replay.report.stock import Count
 
 
 def count_pictures(folder: Path, paths: Sequence[Path], run: str) -> list[LocationRecord]:
@@ -79,8 +79,8 @@ def counted_beside(log: Path, inventory: Path | None = None, expected: Path | No
     """What was counted, for the report of `log`: the inventory in `inventory`, or beside the log if there
     is one; compared with an `expected` stock.  Raises InputError when what is asked for is missing; one that
     merely lies there and cannot be read is told and left out."""
-    from flightd.mission.stock import compare_stock
-    from flightd.replay.report.count import Count
+    from flightd.inventory.comparison import compare_stock
+    from flightd.replay.report.stock import Count
 
     stock = read_stock(expected) if expected is not None else None
     folder = inventory or log.parent

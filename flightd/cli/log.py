@@ -99,7 +99,7 @@ def export(
 
         written += export_csv(read_log(log, FOR_PEOPLE), csv)
     if video is not None:
-        from flightd.cli.video import export_video
+        from flightd.studies.flight_video import export_video
 
         export_video(log, video)
         written.append(video)

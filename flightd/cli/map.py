@@ -13,8 +13,8 @@ import typer
 from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
-    from flightd.grid.coverage import Coverage
-    from flightd.grid.site import Site
+    from flightd.site.coverage import Coverage
+    from flightd.site.site import Site
 
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
@@ -62,8 +62,8 @@ def check(
     flightd map check hall-3.toml --fov-deg 75 --width-px 1920 --exposure-ms 2 --module-mm 3
     """
     from flightd.config.site_file import load_site
-    from flightd.grid.coverage import FrontView, check_coverage
-    from flightd.grid.likeness import alike
+    from flightd.site.ambiguity import alike
+    from flightd.site.coverage import FrontView, check_coverage
 
     site = load_site(site_file)
     facts = _facts(site)
@@ -127,8 +127,8 @@ def draw(
     \b
     flightd map draw configs/site-demo.toml --out demo.svg
     """
-    from flightd.cli.site_drawing import draw_site
     from flightd.config.site_file import load_site
+    from flightd.site.floor_plan_svg import draw_site
 
     target = out if out is not None else site_file.with_suffix(".svg")
     _write(target, draw_site(load_site(site_file)), force)

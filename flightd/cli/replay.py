@@ -16,7 +16,7 @@ from flightd.core.errors import InputError, RunError
 
 if TYPE_CHECKING:
     from flightd.config.schema import Config
-    from flightd.replay.decisions import Comparison
+    from flightd.replay.decision_compare import Comparison
     from flightd.replay.log import FlightLog
 
 
@@ -46,12 +46,12 @@ def replay(
     flightd replay out/flight.mcap
     flightd replay out/flight.mcap --tolerance 1e-6 --json
     """
-    from flightd.app.assembly import detector_of, pilot_of
+    from flightd.app.build import detector_of, pilot_of
     from flightd.config.site_file import parse_site
     from flightd.core.topics import Topic
-    from flightd.replay.decisions import replay_decisions
+    from flightd.replay.decision_compare import replay_decisions
     from flightd.replay.log import read_log
-    from flightd.replay.perception import replay_pictures
+    from flightd.replay.perception_compare import replay_pictures
 
     recorded = read_log(log, {Topic.TICK, Topic.DECISION, Topic.CONFIG, Topic.MAP})
     config = _config(recorded)

@@ -18,11 +18,11 @@ from flightd.core.errors import InputError, RunError, TransientError
 
 if TYPE_CHECKING:
     from flightd.adapters.recorder.archive import FlightArchive
-    from flightd.adapters.recorder.recorder import Recorder
+    from flightd.adapters.recorder.recorder import McapRecorder
     from flightd.app.daemon import FlightResult
     from flightd.config.schema import Config
     from flightd.core.types import Status
-    from flightd.grid.site import Site
+    from flightd.site.site import Site
 
 EXAMPLES = """Examples:
 
@@ -49,10 +49,10 @@ def run(
     SIGINT and SIGTERM hand the vehicle back at once (exit 130 and 143).  Started while its vehicle flies,
     it keeps it level, reports, and lands.  Started anew by systemd it never starts a flight by itself.
     """
-    from flightd.cli import service
-    from flightd.cli.flight_count import going_on
+    from flightd.app import service
+    from flightd.app.counting.flight_count import going_on
+    from flightd.app.resume import resumed
     from flightd.cli.flight_progress import FlightProgress
-    from flightd.cli.resume import resumed
     from flightd.config.schema import load_config
     from flightd.config.site_file import load_site
     from flightd.core.types import Phase
@@ -104,10 +104,10 @@ async def _fly(
 ) -> FlightResult:
     """`again`: the daemon was started before, and its vehicle may be in the air."""
     from flightd.adapters.store.progress import ProgressFile
-    from flightd.app.assembly import detector_pool, ground_link
+    from flightd.app.build import detector_pool, ground_link
+    from flightd.app.counting.flight_count import FlightCount
     from flightd.app.daemon import Daemon
-    from flightd.cli.flight_count import FlightCount
-    from flightd.cli.service import monitors
+    from flightd.app.service import monitors
     from flightd.runtime.clock import LoopClock
 
     clock = LoopClock()
@@ -135,7 +135,7 @@ async def kept_room(
 ) -> AsyncIterator[None]:
     """Keep room for the flight's log meanwhile; whatever goes wrong with that is told to `failed` at once
     and never ends the flight."""
-    from flightd.runtime.supervise import restarted
+    from flightd.runtime.supervisor import restarted
 
     if archive is None:
         yield
@@ -154,10 +154,10 @@ async def kept_room(
         await asyncio.wait([keeping])
 
 
-def _black_box(config: Config, site: Site, now_ns: int) -> tuple[Recorder, FlightArchive] | None:
+def _black_box(config: Config, site: Site, now_ns: int) -> tuple[McapRecorder, FlightArchive] | None:
     """The recorder of this flight and the archive of all, if the configuration wants them."""
     from flightd.adapters.recorder.archive import FlightArchive
-    from flightd.adapters.recorder.recorder import Recorder
+    from flightd.adapters.recorder.recorder import McapRecorder
     from flightd.config.site_file import site_toml
     from flightd.core.topics import Document, Topic
 
@@ -167,7 +167,7 @@ def _black_box(config: Config, site: Site, now_ns: int) -> tuple[Recorder, Fligh
     archive = FlightArchive(settings.folder, round(settings.quota_gb * 1e9), round(settings.reserve_gb * 1e9))
     started = datetime.now(UTC)
     metadata = {"started": f"{started:%Y-%m-%d %H:%M:%S} UTC", "vehicle": config.vehicle.kind}
-    recorder = Recorder(archive.begin(started), metadata=metadata)
+    recorder = McapRecorder(archive.begin(started), metadata=metadata)
     recorder.record(Topic.MAP, now_ns, Document(site_toml(site)))
     recorder.record(Topic.CONFIG, now_ns, Document(config.model_dump_json(indent=1)))
     return recorder, archive

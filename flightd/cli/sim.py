@@ -66,16 +66,16 @@ def sim(
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json and nothing else.")] = False,
 ) -> None:
     """Fly a whole mission in the simulator and leave its log, report and summary."""
-    from flightd.cli.flight_count import going_on
+    from flightd.app.counting.flight_count import going_on
+    from flightd.app.simulation.launch import Simulation, fly
+    from flightd.app.simulation.ports import fitted
+    from flightd.app.simulation.process_faults import check_faults
+    from flightd.app.simulation.stock_summary import stock_summary
     from flightd.cli.flight_progress import FlightProgress
-    from flightd.cli.sim_count import stock_summary
-    from flightd.cli.sim_faults import check_faults
-    from flightd.cli.sim_peers import fitted
-    from flightd.cli.sim_sweep import SHORT_ROUTE, sweep
-    from flightd.cli.simulate import Simulation, fly
-    from flightd.sim.external import truth_address
-    from flightd.sim.scenario import Scenario
-    from flightd.sim.scenario_files import load_scenarios
+    from flightd.cli.scenario_sweep import SHORT_ROUTE, sweep
+    from flightd.sim.plant.external_simulator import truth_address
+    from flightd.sim.scenario.scenario import Scenario
+    from flightd.sim.scenario.scenario_files import load_scenarios
 
     external = bool(truth_url or vehicle_url)
     if external and not (truth_url and vehicle_url):
@@ -166,7 +166,7 @@ def _configured(
     from flightd.config.paths import shipped
     from flightd.config.schema import load_table, parse_config
     from flightd.config.site_file import load_site
-    from flightd.sim.sites import random_site
+    from flightd.sim.random_sites import random_site
 
     path = path or shipped("sim.toml")
     table = load_table(path)
@@ -247,12 +247,12 @@ def _make_folder(out: Path, *, going_on: bool) -> None:
 
 
 def _summary(simulation: Any, result: Any, wall_s: float) -> dict[str, Any]:
-    from flightd.app.assembly import plan_of
+    from flightd.app.build import plan_of
     from flightd.core.topics import Topic
     from flightd.core.types import Event, Status
     from flightd.replay.log import read_log
-    from flightd.sim.kinematics import Kinematics
-    from flightd.sim.score import as_summary, score
+    from flightd.sim.judge.flight_score import as_summary, score
+    from flightd.sim.plant.kinematics import Kinematics
 
     flight = read_log(simulation.flight_log, {Topic.STATUS, Topic.EVENT})
     truth = read_log(simulation.truth_log, {Topic.TRUTH}).entries
@@ -282,8 +282,8 @@ def _summary(simulation: Any, result: Any, wall_s: float) -> dict[str, Any]:
 
 def _write_truth(simulation: Any) -> None:
     """`truth-stock.json`, where there is stock."""
-    from flightd.cli.simulate import truth_of
-    from flightd.sim.racks.truth import write_truth
+    from flightd.app.simulation.launch import truth_of
+    from flightd.sim.racks.stock_truth import write_truth
 
     if truth := truth_of(simulation):
         write_truth(simulation.folder / "truth-stock.json", truth, simulation.seed)
@@ -291,7 +291,7 @@ def _write_truth(simulation: Any) -> None:
 
 def _write_inventory(out: Path, visited: Sequence[str]) -> None:
     """What was counted, or where nothing is counted, what was visited."""
-    from flightd.cli.sim_count import inventory_csv
+    from flightd.app.simulation.stock_summary import inventory_csv
 
     path = out / "inventory.csv"
     if (data := inventory_csv(out)) is not None:
@@ -344,7 +344,7 @@ def _print_summary(summary: dict[str, Any], report: Path) -> None:
         *([("locations", _counted(summary))] if summary.get("locations_planned") else []),
         ("frames", f"{summary['frames']}, {summary['frames_dropped']} dropped"),
         (
-            "exposure to set point",
+            "exposure to setpoint",
             f"{summary['latency_ms']['p50']:.0f} ms, p99 {summary['latency_ms']['p99']:.0f} ms",
         ),
         ("report", str(report)),

@@ -69,7 +69,7 @@ def detect(
     flightd detect floor.jpg --method skeleton --json
     """
     _check_methods((method,))
-    from flightd.cli import detect as command
+    from flightd.studies import detect as command
 
     found = command.detect(paths, method, profile, overlay)
     if as_json:
@@ -122,11 +122,11 @@ def evaluate(
     """
     wanted = tuple(methods or _TABLE_ORDER)
     _check_methods(wanted)
-    from flightd.cli import evaluate as command
-    from flightd.vision.score import Gate
+    from flightd.studies import evaluate as command
+    from flightd.vision.training.line_score import Gate
 
     gate = Gate(gate_rho / 100.0, math.radians(gate_theta))
-    light = command.Light(exposure, warmth)
+    light = command.LightLevel(exposure, warmth)
     scores, failures, count = command.evaluate(dataset, wanted, profile, gate, overlay, light)
     if as_json:
         sys.stdout.write(command.as_json(dataset, gate, scores, failures, count) + "\n")
@@ -156,7 +156,7 @@ def codes(
     flightd codes shelf/ --json
     flightd codes photographs/ --labels photographs/codes.json
     """
-    from flightd.cli import codes as command
+    from flightd.studies import codes as command
 
     expected = command.read_expected(labels) if labels else None
     pages = command.read(paths)
@@ -187,7 +187,7 @@ def bench(
     flightd bench
     flightd bench --seconds 3 --json
     """
-    from flightd.cli import bench as command
+    from flightd.studies import bench as command
 
     timings = command.bench(seconds, all_cores=not one_core)
     if as_json:
@@ -220,7 +220,7 @@ def train_colour(
     flightd train-colour photographs/ --colour orange --out orange.npz
     flightd detect floor.jpg --profile orange.npz
     """
-    from flightd.cli import train as command
+    from flightd.studies import train as command
 
     trained = command.train_colour(datasets, colour, out, name or out.stem, seed)
     print(command.as_json(trained, out) if as_json else command.as_text(trained, out))

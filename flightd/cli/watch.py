@@ -14,8 +14,8 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Footer, RichLog, Static
 
-from flightd.adapters.ground.client import GroundClient
-from flightd.adapters.ground.protocol import EventReport, Role, StatusReport, Welcome
+from flightd.adapters.ground_link.client import GroundClient
+from flightd.adapters.ground_link.protocol import EventReport, Role, StatusReport, Welcome
 from flightd.cli.floor_map import FloorMap
 from flightd.core.errors import FlightdError
 from flightd.core.types import CommandKind, EventLevel, Phase

@@ -7,7 +7,7 @@ import math
 from pydantic import Field
 
 from flightd.config.section import FocalX, FocalY, Height, OpticsSection, Width
-from flightd.core.view import ForwardMount
+from flightd.core.camera_view import ForwardMount
 
 
 class FrontCameraConfig(OpticsSection):

@@ -8,7 +8,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from flightd.config.section import Section
-from flightd.mission.views import ScanParams
+from flightd.mission.scan.views import ScanParams
 
 
 class ScanConfig(Section):

@@ -18,21 +18,21 @@ from flightd.config.metrics import MetricsConfig
 from flightd.config.scan import InventoryConfig, ScanConfig
 from flightd.config.section import FocalX, FocalY, Height, OpticsSection, Section, Width
 from flightd.config.vehicle import VehicleConfig
-from flightd.control.flight import FlightGains
+from flightd.control.flight_controller import FlightGains
 from flightd.control.limits import Limits
 from flightd.control.pid import PidGains
 from flightd.core.errors import InputError
 from flightd.core.geometry import Mount
-from flightd.grid.localise import LocaliserParams
-from flightd.grid.site import Site
-from flightd.grid.ways import KEEP_OUT_CLEARANCE_M
-from flightd.mission.battery import BatteryParams
+from flightd.localisation.grid_localiser import LocaliserParams
+from flightd.mission.battery.consumption import BatteryParams
 from flightd.mission.guidance import CEILING_MARGIN_M, MissionParams
-from flightd.mission.plan import Heading, HeadingPolicy, VisitOrder
-from flightd.mission.views import ScanParams
+from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, VisitOrder
+from flightd.mission.scan.views import ScanParams
 from flightd.pilot import PilotParams
-from flightd.tracking.lines import TrackerParams
-from flightd.tracking.tilt import TiltCompensation
+from flightd.site.site import Site
+from flightd.site.ways import KEEP_OUT_CLEARANCE_M
+from flightd.tracking.line_tracker import TrackerParams
+from flightd.tracking.tilt_compensation import TiltCompensation
 
 _Positive = Annotated[float, Field(gt=0, le=1e4, allow_inf_nan=False)]
 _Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
@@ -106,7 +106,7 @@ class ControlConfig(Section):
         PidConfig(kp=1.0, ki=0.1, kd=0.0, integral_limit=0.1, output_limit=0.8), description="m/s per m"
     )
     max_tilt_deg: float = Field(10.0, gt=0, le=30, description="roll and pitch, each")
-    max_tilt_rate_degps: float = Field(60.0, gt=0, le=360, description="change of a tilt set point")
+    max_tilt_rate_degps: float = Field(60.0, gt=0, le=360, description="change of a tilt setpoint")
     max_jerk_mps3: float = Field(12.0, gt=0.5, le=100, description="change of the horizontal acceleration")
     max_yaw_rate_degps: float = Field(45.0, gt=0, le=180)
     max_yaw_accel_degps2: float = Field(180.0, gt=5, le=2000)

@@ -75,9 +75,9 @@ from pydantic import Field, ValidationError
 from flightd.config.section import Section
 from flightd.core.errors import InputError
 from flightd.core.markers import MarkerDictionary
-from flightd.grid.layout import LayoutError, lay_out
-from flightd.grid.site import Aisle, LineColour, Marker, Pad, PadSign, Rack, Side, Site
-from flightd.grid.ways import KeepOut, OneWay
+from flightd.site.layout import LayoutError, lay_out
+from flightd.site.site import Aisle, LineColour, Marker, Pad, PadSign, Rack, Side, Site
+from flightd.site.ways import KeepOut, OneWay
 
 _Metres = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 _Coordinate = Annotated[float, Field(ge=-10_000, le=10_000, allow_inf_nan=False)]

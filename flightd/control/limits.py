@@ -1,4 +1,4 @@
-"""The last word before the wire: whatever computed a set point, these limits hold."""
+"""The last word before the wire: whatever computed a setpoint, these limits hold."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from flightd.core.geometry import GRAVITY_MPS2
 from flightd.core.types import AttitudeSetpoint
 
 _GAP_S = 0.1
-"""A longer gap between two set points counts as this long."""
+"""A longer gap between two setpoints counts as this long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,14 +47,14 @@ OPEN = Surroundings()
 
 
 class Limiter:
-    """Applies `Limits` to one stream of set points, each relative to the one before it."""
+    """Applies `Limits` to one stream of setpoints, each relative to the one before it."""
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self._last = AttitudeSetpoint(0)
 
     def apply(self, wanted: AttitudeSetpoint, around: Surroundings = OPEN) -> AttitudeSetpoint:
-        """The nearest set point within the limits.
+        """The nearest setpoint within the limits.
 
         Rates bend to nothing but `at_once`, and then only towards level: a lean that became forbidden is
         taken back as fast as they allow, and never grows meanwhile.
@@ -105,7 +105,7 @@ class Limiter:
 
 
 def outward(setpoint: AttitudeSetpoint, back: tuple[float, float]) -> float:
-    """Acceleration of a set point away from where `back` points, m/s^2; negative when it leans back."""
+    """Acceleration of a setpoint away from where `back` points, m/s^2; negative when it leans back."""
     forward, right = -math.tan(setpoint.pitch_rad), math.tan(setpoint.roll_rad)
     return -GRAVITY_MPS2 * (forward * back[0] + right * back[1])
 

@@ -22,7 +22,7 @@ class PidGains:
 
 
 class Pid:
-    """One loop.  The derivative acts on the measured rate, so a jump of the set point does not kick."""
+    """One loop.  The derivative acts on the measured rate, so a jump of the setpoint does not kick."""
 
     def __init__(self, gains: PidGains) -> None:
         self._gains = gains
@@ -38,7 +38,7 @@ class Pid:
         self._integral = min(max(integral, -limit), limit)
 
     def step(self, error: float, rate: float, dt_s: float, feed_forward: float = 0.0) -> float:
-        """Output for this `error` (set point minus measurement) and measured `rate`.
+        """Output for this `error` (setpoint minus measurement) and measured `rate`.
 
         The integral stands still while the output is at its limit and the error would drive it further
         (conditional integration), and never exceeds its own limit.

@@ -46,7 +46,7 @@ class Topic(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class RecordedFrame:
     """A compressed picture of the down camera; `stamp_ns` is mid-exposure, `seq` the frame's number."""
 
     seq: int
@@ -78,7 +78,7 @@ MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(
         Topic.STATUS: Status,
         Topic.EVENT: Event,
         Topic.COMMAND: Command,
-        Topic.FRAME: Picture,
+        Topic.FRAME: RecordedFrame,
         Topic.CONFIG: Document,
         Topic.MAP: Document,
         Topic.SCENARIO: Document,

@@ -6,9 +6,9 @@ import enum
 import math
 from dataclasses import dataclass, field
 
-from flightd.control.flight import Reference
+from flightd.control.flight_controller import Reference
 from flightd.core.types import HEALTHY, Demand, GridPose, Health, Phase, VehicleState
-from flightd.mission.battery import BatteryParams
+from flightd.mission.battery.consumption import BatteryParams
 
 CEILING_MARGIN_M = 0.5
 """Nothing is flown nearer to the ceiling."""
@@ -143,7 +143,7 @@ ALL_WELL = Warnings()
 
 
 @dataclass(frozen=True, slots=True)
-class Senses:
+class MissionInputs:
     """All that the mission knows at one tick.  `pose` is None before the floor was seen; ages in
     seconds, infinite when there never was any.  `ground_silent_s` is 0 while no ground station attends.
     `pad_m` is the centre of the goal's pad on the map, as seen or else as drawn; None where there is none.

@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, Phase
-from flightd.grid.site import Site
-from flightd.mission.charging import Charging
-from flightd.mission.events import EventLog
-from flightd.mission.guidance import Guidance, LossAction, MissionParams, Senses
-from flightd.mission.hazards import ACTIONS, Action, triggers_of
-from flightd.mission.itinerary import Itinerary
-from flightd.mission.plan import FlightPlan, HeadingPolicy, Stop
-from flightd.mission.progress import Progress
-from flightd.mission.readiness import not_fresh, not_ready
-from flightd.mission.relocate import Relocator
-from flightd.mission.scan_phase import ScanPhase
-from flightd.mission.scanner import Scanner
-from flightd.mission.steering import Steering, Task
-from flightd.mission.table import TABLE, next_phase
+from flightd.mission.battery.swap import BatterySwap
+from flightd.mission.event_log import EventLog
+from flightd.mission.flight.phase_progress import PhaseProgress
+from flightd.mission.flight.reference import ReferenceGenerator, ReferenceTask
+from flightd.mission.flight.relocation import Relocator
+from flightd.mission.guidance import Guidance, LossAction, MissionInputs, MissionParams
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
+from flightd.mission.plan.itinerary import Itinerary
+from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
+from flightd.mission.safety.hazards import ACTIONS, Action, triggers_of
+from flightd.mission.safety.readiness import not_fresh, not_ready
+from flightd.mission.scan.scan_phase import ScanPhase
+from flightd.mission.scan.scanner import Scanner
+from flightd.mission.transition_table import TABLE, next_phase
 from flightd.mission.triggers import Trigger
-from flightd.mission.watch import Situation, Watch
+from flightd.site.site import Site
 
 _DEMANDS = {
     Phase.PREFLIGHT: Demand.STANDBY,
@@ -57,13 +57,13 @@ class Mission:
         self._events = EventLog()
         self._route = Itinerary(site, plan, policy, self._events)
         self._scan = ScanPhase(site, scanner, params, policy)
-        self._progress = Progress(params, self._route, self._scan)
-        self._watch = Watch(params)
+        self._progress = PhaseProgress(params, self._route, self._scan)
+        self._watch = HazardMonitor(params)
         self._relocator = Relocator(params)
-        self._steering = Steering(
+        self._steering = ReferenceGenerator(
             params, site.ceiling_m, self._watch, self._relocator, (start.x_m, start.y_m, plan.start_yaw_rad)
         )
-        self._charging = Charging(site, policy, params, scanner, self._route, self._watch)
+        self._charging = BatterySwap(site, policy, params, scanner, self._route, self._watch)
         self.phase = Phase.PREFLIGHT
         self.reason = self._cause = ""
         self._aborting = False
@@ -121,7 +121,7 @@ class Mission:
         else:
             self._ordered = Trigger.LAND_HERE if kind is CommandKind.LAND else Trigger.STOP
 
-    def step(self, senses: Senses) -> Guidance:
+    def step(self, senses: MissionInputs) -> Guidance:
         """Advance by one tick."""
         doubts = self._relocator.step(senses, self.phase, self._progress.phase_s(senses.now_ns))
         if self._relocator.jumped:
@@ -136,7 +136,7 @@ class Mission:
 
     # What has happened
 
-    def _triggers(self, s: Senses) -> set[Trigger]:
+    def _triggers(self, s: MissionInputs) -> set[Trigger]:
         may_start = self.phase in _WAITING and self._started and not self._grounded(s)
         found = self._progress.step(s, self.phase, may_start=may_start)
         if self._ordered is not None:
@@ -173,15 +173,15 @@ class Mission:
         for trigger in sorted(asked, key=list(Trigger).index):
             self._events.hazard(now_ns, trigger, ACTIONS[trigger].value)
 
-    def _situation(self, paused: bool) -> Situation:
+    def _situation(self, paused: bool) -> FlightContext:
         if self.phase is Phase.FOLLOW:
             self._leg_along_x = self._leads_along_x()
         elif self.phase not in _STOPPED:
             self._leg_along_x = None
         at_height = self.airborne and self.phase not in _NEAR_FLOOR
-        return Situation(self.airborne, paused, self._leg_along_x, self.phase is Phase.HOLD, at_height)
+        return FlightContext(self.airborne, paused, self._leg_along_x, self.phase is Phase.HOLD, at_height)
 
-    def _ground(self, s: Senses) -> set[Trigger]:
+    def _ground(self, s: MissionInputs) -> set[Trigger]:
         """What a lost ground link asks for, by the configured action; the link's return ends a hold."""
         action = self._params.ground_lost
         lost = self._watch.ground_lost(s)
@@ -191,11 +191,11 @@ class Mission:
             self._events.tell(s.now_ns, EventLevel.WARNING if lost else EventLevel.INFO, "ground_link", text)
         return self._lost(action, Trigger.GROUND_LOST, s.now_ns) if lost else set()
 
-    def _adopting(self, s: Senses) -> bool:
+    def _adopting(self, s: MissionInputs) -> bool:
         """A vehicle found flying is given a moment to show that it obeys."""
         return self.phase is Phase.RECOVER and self._progress.phase_s(s.now_ns) < self._params.adopt_s
 
-    def _grounded(self, s: Senses) -> str:
+    def _grounded(self, s: MissionInputs) -> str:
         """Why it stays on the ground, or an empty text."""
         silent = self._ground_lost and self._params.ground_lost is not LossAction.CONTINUE
         stale = not_fresh(s, self._params, len(self.remaining)) if self.phase is Phase.SWAP else ""
@@ -203,7 +203,7 @@ class Mission:
 
     # Changing phase
 
-    def _change(self, s: Senses, phase: Phase, trigger: Trigger) -> None:
+    def _change(self, s: MissionInputs, phase: Phase, trigger: Trigger) -> None:
         before, self.phase = self.phase, phase
         self._stopped |= trigger is Trigger.STOP
         planned = (trigger is Trigger.ROUTE_DONE or before is Phase.LAND) and not self._stopped
@@ -250,13 +250,13 @@ class Mission:
             text = f"found flying in mode {s.vehicle.mode} at {s.height_m:.1f} m: level, then landing"
             self._events.tell(s.now_ns, EventLevel.ERROR, "restart", text)
 
-    def _go_on(self, s: Senses) -> None:
+    def _go_on(self, s: MissionInputs) -> None:
         """To the next stop, which is the way back where the battery does not reach another one."""
         if self._charging.look_ahead(s.now_ns):
             self._turned_back()
         self._route.advance(self._scan.heading_kept(s, self.goal, self._route.next_stop))
 
-    def _relocate(self, s: Senses, trigger: Trigger) -> None:
+    def _relocate(self, s: MissionInputs, trigger: Trigger) -> None:
         """Begin to look for the position, or go on from where it was found."""
         if trigger is Trigger.POSITION_SURE:
             self._rejoin(s)
@@ -266,7 +266,7 @@ class Mission:
             if places:
                 self._events.tell(s.now_ns, EventLevel.WARNING, "position", f"doubted, it may be {places}")
 
-    def _correct(self, s: Senses) -> None:
+    def _correct(self, s: MissionInputs) -> None:
         """The drone is not where it was believed to be: what was held in metres moves along."""
         dx, dy = self._relocator.jump_m
         if s.pose is None or not self.airborne:
@@ -280,7 +280,7 @@ class Mission:
             x, y = self._steering.anchor
             self._steering.anchor = (x + dx, y + dy)
 
-    def _rejoin(self, s: Senses) -> None:
+    def _rejoin(self, s: MissionInputs) -> None:
         """Go on from where the drone turned out to be."""
         if s.pose is None:
             return
@@ -303,7 +303,7 @@ class Mission:
 
     # What to do
 
-    def _guide(self, s: Senses) -> Guidance:
+    def _guide(self, s: MissionInputs) -> Guidance:
         if self.phase in _WAITING:
             self.reason = self._grounded(s) or "waiting for the start command"
         if not self.airborne:
@@ -319,11 +319,11 @@ class Mission:
         goal, (x_m, y_m) = self.goal, self._steering.anchor
         return abs(goal.x_m - x_m) >= abs(goal.y_m - y_m)
 
-    def _task(self, now_ns: int) -> Task:
+    def _task(self, now_ns: int) -> ReferenceTask:
         route = self._route
         # from a shelf's lowest level neither aisle's line would be seen on the way to another aisle
         cruise = route.returning or not route.goal.visit or not self._leads_along_x()
-        return Task(
+        return ReferenceTask(
             phase=self.phase,
             phase_s=self._progress.phase_s(now_ns),
             goal=route.goal,

@@ -11,9 +11,9 @@ from typing import TypeAlias
 
 import msgspec
 
-from flightd.core.cells import inert
+from flightd.core.csv_text import inert
 from flightd.core.errors import UnavailableError
-from flightd.core.topics import Document, Picture, Topic
+from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.core.types import LineSet
 from flightd.replay.log import Entry, FlightLog
 
@@ -30,7 +30,7 @@ def export_csv(log: FlightLog, folder: Path) -> list[Path]:
     start_ns = min((entry.stamp_ns for entry in log.entries if not _is_document(entry)), default=0)
     by_topic: dict[str, list[Entry]] = {}
     for entry in log.entries:
-        if not isinstance(entry.message, Picture):
+        if not isinstance(entry.message, RecordedFrame):
             by_topic.setdefault(entry.topic, []).append(entry)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -17,7 +17,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Metadata
 
 from flightd.core.errors import InputError
-from flightd.core.topics import MESSAGE_TYPES, Picture
+from flightd.core.topics import MESSAGE_TYPES, RecordedFrame
 from flightd.core.types import Event, EventLevel
 from flightd.runtime.mcap_scan import (
     MAGIC,
@@ -159,7 +159,7 @@ def _opened(path: Path) -> BinaryIO:
 def _decoder(kind: type) -> Decoder:
     if kind is Event:
         return _event
-    if kind is Picture:
+    if kind is RecordedFrame:
         return _picture
     strict: msgspec.json.Decoder[object] = msgspec.json.Decoder(kind)
 
@@ -188,10 +188,10 @@ def _event(payload: bytes) -> Event:
     return Event(_stamp_ns(fields), _LEVELS[fields["level"]], fields["name"], fields["message"])
 
 
-def _picture(payload: bytes) -> Picture:
+def _picture(payload: bytes) -> RecordedFrame:
     fields: dict[str, Any] = msgspec.json.decode(payload, type=dict)
     jpeg = base64.b64decode(fields["data"], validate=True)
-    return Picture(int(fields["seq"]), _stamp_ns(fields), jpeg)
+    return RecordedFrame(int(fields["seq"]), _stamp_ns(fields), jpeg)
 
 
 def _stamp_ns(fields: dict[str, Any]) -> int:

@@ -7,7 +7,7 @@ import socket
 from collections.abc import Callable
 from typing import Any, Protocol, TypeAlias
 
-from flightd.runtime.paced import PacedReader
+from flightd.runtime.batched_reader import PacedReader
 
 Received: TypeAlias = Callable[[bytes, Any], None]
 """Gets each datagram and the address it came from."""

@@ -14,27 +14,27 @@ from typing import Literal, Protocol
 from flightd.core.errors import UnavailableError
 from flightd.core.topics import Topic
 from flightd.core.types import Image
-from flightd.grid.site import Site
 from flightd.ports import Clock, Recorder
-from flightd.sim.airframe import Airframe, AirframeParams
-from flightd.sim.appearance import DEFAULT, Appearance
+from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
-from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
-from flightd.sim.camera import CameraPeer
-from flightd.sim.crew import PadCrew
-from flightd.sim.external import ExternalVehicle, Placement
-from flightd.sim.fault_spec import Fault
-from flightd.sim.faults import Told, WorldFaults, bare_boxes
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.optics import SimCamera
-from flightd.sim.racks.camera import FrontCamera
-from flightd.sim.racks.look import RackLook
+from flightd.sim.floor.appearance import DEFAULT, Appearance
+from flightd.sim.floor.renderer import Renderer
+from flightd.sim.plant.airframe import Airframe, AirframeParams
+from flightd.sim.plant.external_simulator import ExternalVehicle, Placement
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.pad_crew import PadCrew
+from flightd.sim.plant.wind import Draught
+from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.renderer import FrontRenderer
-from flightd.sim.renderer import Renderer
-from flightd.sim.sensors import Sensors
-from flightd.sim.wind import Draught
+from flightd.sim.scenario.fault_schema import Fault
+from flightd.sim.scenario.faults import Told, WorldFaults, bare_boxes
+from flightd.sim.sensors.camera import CameraPeer
+from flightd.sim.sensors.instruments import Sensors
+from flightd.sim.sensors.optics import SimCamera
+from flightd.site.site import Site
 
 _TRUTH_PERIOD_S = 0.02
 
@@ -197,16 +197,16 @@ def _ardrone(
     without its video library."""
     try:
         from flightd.sim.ardrone.drone import Drone  # noqa: PLC0415 - its video needs an optional extra
-        from flightd.sim.ardrone.front import front_peer  # noqa: PLC0415
-        from flightd.sim.ardrone.server import ArDroneServer, Ports  # noqa: PLC0415
-        from flightd.sim.ardrone.video import Channel  # noqa: PLC0415
+        from flightd.sim.ardrone.front_camera import front_peer  # noqa: PLC0415
+        from flightd.sim.ardrone.server import ArDroneServer, DronePorts  # noqa: PLC0415
+        from flightd.sim.ardrone.video import VideoChannel  # noqa: PLC0415
     except ModuleNotFoundError as err:
         raise UnavailableError(
             f"simulating an AR.Drone needs {err.name}: pip install 'flightd[ardrone]'"
         ) from err
     drone = Drone(airframe, Sensors(seed=spec.seed))
-    ports = Ports("127.0.0.1", *spec.vehicle_ports)
+    ports = DronePorts("127.0.0.1", *spec.vehicle_ports)
     server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)
     look = spec.front.look if spec.front is not None else RackLook()
     front = front_peer(server, spec.site, look, spec.seed, clock)
-    return server, partial(server.show, camera=Channel.BOTTOM), front
+    return server, partial(server.show, camera=VideoChannel.BOTTOM), front

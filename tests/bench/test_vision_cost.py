@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from flightd.cli.bench import UNIT, Timing, bench
+from flightd.studies.bench import UNIT, Timing, bench
 
 LIMITS = {"centroid": 1.6, "skeleton": 1.6, "combined": 2.5}
 """Ceilings against a slow change creeping in; what is reached is about half of them."""

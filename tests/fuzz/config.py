@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flightd.app.assembly import pilot_of
+from flightd.app.build import pilot_of
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.errors import InputError

@@ -7,9 +7,8 @@ import contextlib
 import itertools
 from pathlib import Path
 
-from flightd.adapters.ground.audit import AuditEntry
-from flightd.adapters.ground.desk import Desk, Peer
-from flightd.adapters.ground.protocol import (
+from flightd.adapters.ground_link.audit import AuditEntry
+from flightd.adapters.ground_link.protocol import (
     DECODE_ERRORS,
     VERSION,
     Accepted,
@@ -21,6 +20,7 @@ from flightd.adapters.ground.protocol import (
     decode_status,
     encode,
 )
+from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
 from flightd.config.site_file import load_site
 from flightd.core.types import CommandKind
 from tests.fuzz.drive import Target, main
@@ -33,7 +33,7 @@ _OPERATOR, _VIEWER = Peer("ann", Role.OPERATOR, b"1"), Peer("bob", Role.VIEWER, 
 def target(folder: Path) -> Target:
     del folder  # no files here
     audit: list[AuditEntry] = []
-    desk = Desk(load_site(_CONFIGS / "site-demo.toml"), "session", audit.append)
+    desk = RequestHandler(load_site(_CONFIGS / "site-demo.toml"), "session", audit.append)
     clock = itertools.count(10**12, 200_000_000)
 
     def attempt(data: bytes) -> bool:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
-from flightd.sim import scenario
-from flightd.sim.scenario_files import load_scenario
+from flightd.sim.scenario import scenario
+from flightd.sim.scenario.scenario_files import load_scenario
 from tests.fuzz.drive import Target, in_one_line, main
 from tests.fuzz.mutate import spoil_text
 

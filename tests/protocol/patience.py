@@ -8,7 +8,7 @@ import selectors
 import time
 from typing import Any
 
-from flightd.runtime.loops import _Selector
+from flightd.runtime.event_loops import _Selector
 
 _PAUSE_S = 0.02
 

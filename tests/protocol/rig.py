@@ -16,16 +16,16 @@ from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.ports import Vehicle
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import VirtualLoop
-from flightd.sim.airframe import Airframe
+from flightd.runtime.event_loops import VirtualLoop
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer
+from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
-from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.sensors import Sensors
-from flightd.sim.wind import Draught
+from flightd.sim.plant.airframe import Airframe
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.wind import Draught
+from flightd.sim.sensors.instruments import Sensors
 from tests.protocol.ardrone.bench import ANY_PORTS, settings_for
 from tests.protocol.patience import PatientLoop
 

@@ -21,13 +21,13 @@ import cv2
 import numpy as np
 import pytest
 
-from flightd.adapters.vehicle.mavlink.signing import make_key, read_key
+from flightd.adapters.vehicle.mavlink.link.signing import make_key, read_key
 from flightd.cli.main import main
 from flightd.runtime.clock import LoopClock
-from flightd.sim.airframe import Airframe
+from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
-from flightd.sim.autopilot.peer import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.px4 import Px4Peer
+from flightd.sim.plant.airframe import Airframe
 
 pytestmark = pytest.mark.slow  # the command has its own loop: real time
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from flightd.adapters.recorder.recorder import Recorder
+from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.config.site_file import parse_site
 from flightd.core.topics import Document, Topic
 from flightd.core.types import (
@@ -28,8 +28,8 @@ from flightd.core.types import (
     Status,
     VehicleState,
 )
-from flightd.grid.site import Site
-from flightd.sim.kinematics import Kinematics
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.site.site import Site
 
 SITE_TOML = (Path(__file__).parents[2] / "configs" / "site-demo.toml").read_text()
 NS = 1_000_000_000
@@ -113,7 +113,7 @@ def write_flight(
     site = parse_site(SITE_TOML, "demo")
     path = folder / "flight.mcap"
     truths: list[Kinematics] = []
-    with Recorder(path, lossless=True, metadata={"vehicle": "ardupilot", "site": site.name}) as recorder:
+    with McapRecorder(path, lossless=True, metadata={"vehicle": "ardupilot", "site": site.name}) as recorder:
         recorder.record(Topic.MAP, 0, Document(SITE_TOML))  # stamps before the flight
         recorder.record(Topic.CONFIG, START_NS, Document('[vehicle]\nkind = "ardupilot"\n'))
         t_s, frames, done, sway = 0.0, 0, 0, np.zeros(2)
@@ -212,7 +212,7 @@ def write_flight(
                 t_s += TICK_S
             done += leg.phase == Phase.HOVER
     if truth:
-        with Recorder(folder / "truth.mcap", lossless=True) as recorder:
+        with McapRecorder(folder / "truth.mcap", lossless=True) as recorder:
             for kinematics in truths:
                 recorder.record(Topic.TRUTH, kinematics.stamp_ns, asdict(kinematics))
     if summary:

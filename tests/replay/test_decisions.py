@@ -9,17 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.recorder.recorder import Recorder
-from flightd.app.assembly import pilot_of
+from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.app.build import pilot_of
 from flightd.config.schema import Config, load_config
 from flightd.config.site_file import load_site, site_toml
 from flightd.core.errors import InputError
 from flightd.core.topics import Document, Topic
 from flightd.core.types import AttitudeSetpoint, Phase
-from flightd.grid.site import Site
 from flightd.pilot import TickInput, TickOutput
-from flightd.replay.decisions import replay_decisions
+from flightd.replay.decision_compare import replay_decisions
 from flightd.replay.log import read_log
+from flightd.site.site import Site
 from tests.command import Command
 from tests.sim.ideal_flight import IdealFlight
 
@@ -40,7 +40,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     flight = IdealFlight(site, config.pilot_params(site))
     flight.pilot = pilot_of(config, site)
     step = flight.pilot.step
-    with Recorder(path, lossless=True) as recorder:
+    with McapRecorder(path, lossless=True) as recorder:
 
         def recording(tick: TickInput) -> TickOutput:
             output = step(tick)
@@ -107,7 +107,7 @@ def test_gaps_in_the_record_are_told(log: Path) -> None:
 
 
 def test_a_log_without_ticks_is_told(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
     with pytest.raises(InputError, match="holds no ticks"):
         replay_decisions(read_log(tmp_path / "flight.mcap"), _step())
@@ -133,7 +133,7 @@ def test_the_command_tells_the_drift_of_another_configuration(
     config, _ = _setting()
     slower = config.control.model_copy(update={"max_tilt_deg": 2.0})
     path = tmp_path / "flight.mcap"
-    with Recorder(path, lossless=True) as recorder:
+    with McapRecorder(path, lossless=True) as recorder:
         recorder.record(
             Topic.CONFIG, 0, Document(config.model_copy(update={"control": slower}).model_dump_json())
         )
@@ -148,7 +148,7 @@ def test_the_command_tells_the_drift_of_another_configuration(
 
 def test_a_log_without_its_map_is_one_line_and_exit_2(flightd: Command, tmp_path: Path, log: Path) -> None:
     path = tmp_path / "flight.mcap"
-    with Recorder(path, lossless=True) as recorder:
+    with McapRecorder(path, lossless=True) as recorder:
         for entry in read_log(log, {Topic.CONFIG, Topic.TICK}).entries:
             recorder.record(entry.topic, entry.stamp_ns, entry.message)
     result = flightd("replay", path)

@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import pytest
 
-from flightd.adapters.recorder.recorder import Recorder
+from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.core.topics import Topic
 from flightd.core.types import AttitudeSetpoint
 from tests.command import Command
@@ -83,7 +83,7 @@ def test_a_log_that_was_cut_off_is_repaired(flightd: Command, log: Path, tmp_pat
 def test_what_cannot_be_done_is_one_line_and_exit_2(
     flightd: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, arguments: tuple[str, ...], told: str
 ) -> None:
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
     (tmp_path / "note.txt").write_text("hello")
     monkeypatch.chdir(tmp_path)

@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 import pytest
 
-from flightd.adapters.recorder.recorder import Recorder
-from flightd.core.topics import Picture, Topic
+from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.core.topics import RecordedFrame, Topic
 from flightd.core.types import Image, Line, LineSet
 from flightd.replay.log import LogReader
-from flightd.replay.perception import replay_pictures
-from flightd.vision.detector import Detector
+from flightd.replay.perception_compare import replay_pictures
+from flightd.vision.lines.detector import Detector
 from tests.replay.synthetic_flight import picture, seen_lines
 
 
@@ -24,7 +24,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("flight") / "flight.mcap"
     rng = np.random.default_rng(3)
     detector = Detector()
-    with Recorder(path, lossless=True) as recorder:
+    with McapRecorder(path, lossless=True) as recorder:
         for seq in range(1, 11):
             jpeg = picture(seen_lines(seq, seq, 0.0, rng), rng)
             decoded = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
@@ -72,7 +72,7 @@ def test_a_line_written_the_other_way_round_is_the_same(tmp_path: Path) -> None:
     turned = dataclasses.replace(line, rho_px=-12.5, theta_rad=math.pi - 0.001)
     before = LineSet(1, 1, 640, 360, (line,), (), "combined")
     path = tmp_path / "flight.mcap"
-    with Recorder(path) as recorder:
+    with McapRecorder(path) as recorder:
         recorder.record(Topic.LINES, 1, before)
         recorder.image(Topic.FRAME, 1, 1, picture(before, np.random.default_rng(1)))
     drift = replay_pictures(path, lambda *_: dataclasses.replace(before, lines=(turned,)))
@@ -83,9 +83,9 @@ def test_a_line_written_the_other_way_round_is_the_same(tmp_path: Path) -> None:
 
 def test_a_picture_without_recorded_lines_is_passed_over(log: Path, tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
-    with Recorder(path) as recorder:
+    with McapRecorder(path) as recorder:
         for entry in LogReader(log).entries({Topic.FRAME}):
-            assert isinstance(entry.message, Picture)
+            assert isinstance(entry.message, RecordedFrame)
             recorder.image(Topic.FRAME, entry.stamp_ns, entry.message.seq, entry.message.jpeg)
         recorder.image(Topic.FRAME, 99, 99, b"no picture")
     assert replay_pictures(path, Detector().detect).pictures == 0

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightd.adapters.recorder.recorder import Recorder
+from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.config.site_file import parse_site
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.topics import Document, Topic
 from flightd.core.types import Event, EventLevel, GridPose, Phase, Status
-from flightd.replay.report.charts import Line, Strip
+from flightd.replay.report.charts import ChartLine, ChartStrip
 from flightd.replay.report.figures import key_figures, outcome
-from flightd.replay.report.load import load_flight
+from flightd.replay.report.loader import load_flight
 from flightd.replay.report.markup import clock, number, path_data, thin, ticks
 from flightd.replay.report.page import render, write_report
 from tests.command import Command
@@ -165,7 +165,7 @@ def test_an_aborted_mission_says_so_and_why(bare_log: Path) -> None:
 
 
 def test_an_empty_log_makes_a_page_that_says_so(tmp_path: Path) -> None:
-    Recorder(tmp_path / "flight.mcap").close()
+    McapRecorder(tmp_path / "flight.mcap").close()
     page = render(load_flight(tmp_path / "flight.mcap"))
     _outline(page)
     assert "No flight in this log" in page
@@ -173,7 +173,7 @@ def test_an_empty_log_makes_a_page_that_says_so(tmp_path: Path) -> None:
 
 def test_a_log_of_one_status_makes_a_page(tmp_path: Path) -> None:
     status = Status(5, Phase.TAKE_OFF, "", "", "", 0, 3, 0.9, 0.1, 0, 0, 0.0, {})
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(Topic.STATUS, 5, status)
     flight = load_flight(tmp_path / "flight.mcap")
     _outline(render(flight))
@@ -192,7 +192,7 @@ def test_a_log_cut_off_in_flight_makes_a_page_that_says_so(log: Path, tmp_path: 
 
 def test_hostile_text_stays_text(tmp_path: Path) -> None:
     attack = '</script><script>alert(1)</script><img src="x">'
-    with Recorder(tmp_path / "flight.mcap", metadata={"vehicle": attack}) as recorder:
+    with McapRecorder(tmp_path / "flight.mcap", metadata={"vehicle": attack}) as recorder:
         recorder.record(Topic.EVENT, 1, Event(1, EventLevel.ERROR, attack, attack))
         recorder.record(Topic.CONFIG, 1, Document(attack))
     (tmp_path / "summary.json").write_text(
@@ -205,7 +205,7 @@ def test_hostile_text_stays_text(tmp_path: Path) -> None:
 
 
 def test_a_map_that_cannot_be_read_costs_the_map_alone(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(Topic.MAP, 1, Document("[site]\n"))
         recorder.record(Topic.EVENT, 1, Event(1, EventLevel.INFO, "armed", "armed"))
     page = render(load_flight(tmp_path / "flight.mcap"))
@@ -214,7 +214,7 @@ def test_a_map_that_cannot_be_read_costs_the_map_alone(tmp_path: Path) -> None:
 
 
 def test_a_picture_that_is_none_is_left_out(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.image(Topic.FRAME, 1, 1, b"this is no JPEG")
     page = render(load_flight(tmp_path / "flight.mcap"))
     assert base64.b64encode(b"this is no JPEG").decode() not in page
@@ -227,7 +227,7 @@ def test_a_picture_that_is_none_is_left_out(tmp_path: Path) -> None:
 def test_cross_track_is_measured_from_the_way_that_is_flown(
     tmp_path: Path, x_m: tuple[float, ...], y_m: tuple[float, ...], expected_m: float
 ) -> None:
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(Topic.MAP, 0, Document(SITE_TOML))
         for index, (x, y) in enumerate(zip(x_m, y_m, strict=True)):
             stamp_ns = index * 1_000_000_000
@@ -268,11 +268,11 @@ def test_numbers_are_short() -> None:
 
 
 def test_a_strip_shows_all_of_its_values() -> None:
-    line = Line("x", "plain", np.arange(3.0), np.array([-0.5, float("nan"), 3.0]))
+    line = ChartLine("x", "plain", np.arange(3.0), np.array([-0.5, float("nan"), 3.0]))
     for strip in (
-        Strip("a", "m", (line,)),
-        Strip("b", "m", (line,), symmetric=True),
-        Strip("c", "m", (line,), zero=True, least_span=10.0),
+        ChartStrip("a", "m", (line,)),
+        ChartStrip("b", "m", (line,), symmetric=True),
+        ChartStrip("c", "m", (line,), zero=True, least_span=10.0),
     ):
         low, high = strip.range()
         assert low <= -0.5
@@ -280,21 +280,21 @@ def test_a_strip_shows_all_of_its_values() -> None:
 
 
 def test_a_summary_that_is_no_json_is_told(tmp_path: Path) -> None:
-    Recorder(tmp_path / "flight.mcap").close()
+    McapRecorder(tmp_path / "flight.mcap").close()
     (tmp_path / "summary.json").write_text("{")
     with pytest.raises(InputError, match=r"summary\.json: not a readable summary"):
         load_flight(tmp_path / "flight.mcap")
 
 
 def test_a_page_that_cannot_be_written_is_told(tmp_path: Path) -> None:
-    Recorder(tmp_path / "flight.mcap").close()
+    McapRecorder(tmp_path / "flight.mcap").close()
     (tmp_path / "file").write_text("")
     with pytest.raises(UnavailableError, match="cannot write the report"):
         write_report(tmp_path / "flight.mcap", tmp_path / "file" / "report.html")
 
 
 def test_the_command_writes_the_page_and_tells_where(flightd: Command, tmp_path: Path) -> None:
-    Recorder(tmp_path / "flight.mcap").close()
+    McapRecorder(tmp_path / "flight.mcap").close()
     result = flightd("report", tmp_path / "flight.mcap", "--json")
     assert (result.returncode, result.stderr) == (0, "")
     assert json.loads(result.stdout) == {"report": str(tmp_path / "report.html")}

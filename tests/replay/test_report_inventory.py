@@ -18,13 +18,13 @@ from flightd.cli.inventory_count import counted_beside
 from flightd.cli.main import app
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, LocationState, Observation
-from flightd.grid.site import Side, Site
-from flightd.mission.stock import Outcome
-from flightd.replay.report.count import Count, count_figures, percent
-from flightd.replay.report.load import load_flight
+from flightd.inventory.comparison import ComparisonOutcome
+from flightd.replay.report.loader import load_flight
 from flightd.replay.report.page import render
 from flightd.replay.report.racks import racks_section
+from flightd.replay.report.stock import Count, count_figures, percent
 from flightd.replay.report.stocktaking import inventory_section
+from flightd.site.site import Side, Site
 from tests.replay.synthetic_count import site_with_racks, state_of, write_count, write_stock
 from tests.replay.synthetic_flight import SITE_TOML, write_flight
 
@@ -89,7 +89,9 @@ def test_every_location_is_drawn_once_in_its_state(section: str, count: Count) -
 def test_places_differing_from_the_books_are_marked_and_no_others(section: str, count: Count) -> None:
     marked = {code for code, classes, _ in Cells(section).places if "differs" in classes}
     wrong = [
-        line for line in count.differences or () if line.outcome not in {Outcome.MATCH, Outcome.UNCOUNTED}
+        line
+        for line in count.differences or ()
+        if line.outcome not in {ComparisonOutcome.MATCH, ComparisonOutcome.UNCOUNTED}
     ]
     assert marked == {line.location for line in wrong} | {line.found_at for line in wrong if line.found_at}
     assert marked

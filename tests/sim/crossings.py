@@ -16,13 +16,13 @@ import sys
 from dataclasses import dataclass, replace
 
 from flightd.core.types import GridPose
-from flightd.grid.localise import GridLocaliser, LocaliserParams
-from flightd.grid.paint import PaintMap
-from flightd.grid.site import PaintedLine, Site
-from flightd.sim.sites import random_site
-from flightd.tracking.junctions import FloorJunction
-from flightd.tracking.lines import TrackSet
-from flightd.tracking.motion import TrackedLine
+from flightd.localisation.grid_localiser import GridLocaliser, LocaliserParams
+from flightd.sim.random_sites import random_site
+from flightd.site.painted_lines import PaintMap
+from flightd.site.site import PaintedLine, Site
+from flightd.tracking.axis_filters import TrackedLine
+from flightd.tracking.ground_junctions import FloorJunction
+from flightd.tracking.line_tracker import TrackSet
 
 STEP_S = 0.06
 SURE = 0.95

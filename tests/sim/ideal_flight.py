@@ -23,18 +23,18 @@ from flightd.core.types import (
     PictureCheck,
     VehicleState,
 )
-from flightd.grid.site import Site
-from flightd.mission.plan import FlightPlan, Heading, HeadingPolicy, make_plan
-from flightd.mission.scanner import Scanner
+from flightd.mission.plan.flight_plan import FlightPlan, Heading, HeadingPolicy, make_plan
+from flightd.mission.scan.scanner import Scanner
 from flightd.pilot import Pilot, PilotParams, TickInput, TickOutput
-from flightd.sim.airframe import Airframe, AirframeCommand, AirframeParams
-from flightd.sim.climb_loop import ClimbLoop
-from flightd.sim.crew import PadCrew
-from flightd.sim.ideal import EyeErrors, IdealEye
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.sensors import Sensors
-from flightd.sim.wind import Draught
+from flightd.sim.autopilot.climb_loop import ClimbLoop
+from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.pad_crew import PadCrew
+from flightd.sim.plant.wind import Draught
+from flightd.sim.sensors.instruments import Sensors
+from flightd.site.site import Site
 from tests.sim.ideal_front import IdealFront
+from tests.sim.ideal_sight import EyeErrors, IdealEye
 
 STEP_NS = 5_000_000
 TICK_NS = 20_000_000

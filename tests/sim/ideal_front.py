@@ -9,9 +9,9 @@ import numpy as np
 
 from flightd.core.scanning import BodyPose, CodeSet, Occupancy, Place, PlaceLook
 from flightd.core.types import CodeRead
-from flightd.grid.site import Side, Site
-from flightd.mission.assign import FrontSight
-from flightd.sim.kinematics import Kinematics
+from flightd.mission.scan.code_assignment import FrontSight
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.site.site import Side, Site
 
 
 @dataclass(frozen=True)

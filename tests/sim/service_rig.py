@@ -18,15 +18,15 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from flightd.adapters.ground.client import Address, GroundClient
-from flightd.adapters.ground.protocol import StatusReport
-from flightd.cli.sim_peers import free_port
-from flightd.cli.sim_world import run_world
+from flightd.adapters.ground_link.client import Address, GroundClient
+from flightd.adapters.ground_link.protocol import StatusReport
+from flightd.app.simulation.ports import free_port
+from flightd.app.simulation.world_process import run_world
 from flightd.config.site_file import load_site
 from flightd.core.topics import Topic
 from flightd.replay.log import read_log
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.optics import SimCamera, wide_lens
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.sensors.optics import SimCamera, wide_lens
 from flightd.sim.world import WorldSpec
 
 ROOT = Path(__file__).parents[2]

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 from flightd.core.scanning import BodyPose
 from flightd.core.types import Image
-from flightd.grid.site import Site
-from flightd.mission.assign import Assigner, FrontSight
-from flightd.mission.views import ScanParams, View, ViewPlanner
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.racks.camera import FrontCamera
-from flightd.sim.racks.look import RackLook
+from flightd.mission.scan.code_assignment import Assigner, FrontSight
+from flightd.mission.scan.views import ScanParams, View, ViewPlanner
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.renderer import FrontRenderer
+from flightd.site.site import Site
 
 
 @dataclass(frozen=True, slots=True)

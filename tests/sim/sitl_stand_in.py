@@ -13,13 +13,13 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import ScaledLoop
-from flightd.sim.airframe import Airframe
+from flightd.runtime.event_loops import ScaledLoop
+from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.link import Address, Message
-from flightd.sim.autopilot.peer import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.px4 import Px4Peer
-from flightd.sim.kinematics import Kinematics
+from flightd.sim.plant.airframe import Airframe
+from flightd.sim.plant.kinematics import Kinematics
 
 LAT, LON, ALT_M = -35.363262, 149.165237, 584.0
 YAW_RAD = math.radians(203.0)

@@ -8,12 +8,12 @@ from collections.abc import Callable
 
 import pytest
 
-from flightd.sim.airframe import Airframe, AirframeCommand, AirframeParams
-from flightd.sim.climb_loop import ClimbLoop
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.sensors import SensorParams, Sensors
-from flightd.sim.truth import TruthHistory
-from flightd.sim.wind import Draught, Wind
+from flightd.sim.autopilot.climb_loop import ClimbLoop
+from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.truth_history import TruthHistory
+from flightd.sim.plant.wind import Draught, Wind
+from flightd.sim.sensors.instruments import SensorParams, Sensors
 
 DT_S = 0.0025
 CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)

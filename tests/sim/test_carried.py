@@ -10,9 +10,9 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.types import Phase
-from flightd.grid.layout import lay_out
-from flightd.grid.site import Aisle, Pad, Site
-from flightd.sim.sites import random_site
+from flightd.sim.random_sites import random_site
+from flightd.site.layout import lay_out
+from flightd.site.site import Aisle, Pad, Site
 from tests.sim.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[2] / "configs"

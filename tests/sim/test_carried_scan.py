@@ -11,9 +11,9 @@ from flightd.config.schema import load_config
 from flightd.config.site_file import parse_site
 from flightd.core.inventory import LocationState
 from flightd.core.types import Phase
-from flightd.grid.localise import LocaliserParams
-from flightd.grid.site import Site
-from flightd.mission.scanner import Scanner
+from flightd.localisation.grid_localiser import LocaliserParams
+from flightd.mission.scan.scanner import Scanner
+from flightd.site.site import Site
 from tests.sim.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal_front import IdealFront, Label, Stock
 from tests.sim.test_carried import wrong_visits

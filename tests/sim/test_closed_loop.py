@@ -1,4 +1,4 @@
-"""Camera to set point and back: short missions through pictures, processes and sockets."""
+"""Camera to setpoint and back: short missions through pictures, processes and sockets."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
-from flightd.app.assembly import detector_pool
-from flightd.cli import simulate
+from flightd.app.build import detector_pool
+from flightd.app.detection.detector_pool import DetectorPool
+from flightd.app.simulation import launch as simulate
 from flightd.config.schema import Config, load_config
 from flightd.config.site_file import load_site
 from flightd.core.types import Phase, Status
-from flightd.runtime.pool import DetectorPool
-from flightd.sim.scenario import Scenario
+from flightd.sim.scenario.scenario import Scenario
 from tests.command import Command
 
 ROOT = Path(__file__).parents[2]
@@ -146,7 +146,7 @@ def test_detectors_killed_in_flight_are_replaced_and_the_mission_completes(
             for pid in pools[0].pids:
                 os.kill(pid, signal.SIGKILL)
 
-    monkeypatch.setattr("flightd.cli.simulate.detector_pool", watched)
+    monkeypatch.setattr("flightd.app.simulation.launch.detector_pool", watched)
     result = simulate.fly(short_flight(tmp_path, 1.0, kill_once))
     assert pools[0].replaced >= 2
     assert result.phase is Phase.DONE

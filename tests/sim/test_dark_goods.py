@@ -10,11 +10,11 @@ import pytest
 
 from flightd.config.site_file import load_site
 from flightd.core.scanning import Light, Occupancy
-from flightd.mission.assign import Assigner, FrontSight
-from flightd.sim.racks.camera import FrontCamera
-from flightd.sim.racks.look import RackLook
-from flightd.sim.racks.stock import Situation, StockShares, stock
-from flightd.vision.shelf import read_shelf
+from flightd.mission.scan.code_assignment import Assigner, FrontSight
+from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.front_camera import FrontCamera
+from flightd.sim.racks.stock import StockShares, StockSituation, stock
+from flightd.vision.shelf.shelf_look import read_shelf
 from tests.sim.shelf_pictures import shelf_pictures
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
@@ -27,7 +27,7 @@ def judged(seed: int, exposure: float) -> Counter[tuple[bool, Occupancy]]:
     """How often places that are (not) empty were taken for what, from all places that are looked from."""
     assigner = Assigner(SITE, FrontSight(CAMERA.lens, CAMERA.mount))
     empty = {
-        code: place.situation is Situation.EMPTY
+        code: place.situation is StockSituation.EMPTY
         for code, place in stock(SITE, LOOK.shares, CAMERA.lens.fx_px, seed).items()
     }
     told: Counter[tuple[bool, Occupancy]] = Counter()

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.cli.sim_peers import free_port
+from flightd.app.simulation.ports import free_port
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.geometry import wrap_pi
 from flightd.runtime.clock import LoopClock
-from flightd.sim.external import ExternalVehicle, Placement, TruthReader
-from flightd.sim.kinematics import Kinematics
+from flightd.sim.plant.external_simulator import ExternalVehicle, Placement, TruthReader
+from flightd.sim.plant.kinematics import Kinematics
 from tests.command import Command
 from tests.protocol.rig import run_virtual
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.ground.link import ZmqGround
+from flightd.adapters.ground_link.link import ZmqGround
 from flightd.core.types import CommandKind, Phase
 from tests.sim.ground_rig import Keyring, address_of, in_loop, local, serving, tell_once, until
 

@@ -13,12 +13,12 @@ from flightd.config.site_file import load_site
 from flightd.core.distortion import undistorted
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
-from flightd.sim.appearance import DEFAULT, HARSH, Appearance, preset
-from flightd.sim.effects import blur_kernel
-from flightd.sim.floor import Floor
-from flightd.sim.lighting import Lighting
-from flightd.sim.optics import wide_lens
-from flightd.sim.texture import Patch
+from flightd.sim.floor.appearance import DEFAULT, HARSH, Appearance, preset
+from flightd.sim.floor.floor import Floor
+from flightd.sim.floor.lighting import Lighting
+from flightd.sim.floor.texture import Patch
+from flightd.sim.sensors.camera_effects import blur_kernel
+from flightd.sim.sensors.optics import wide_lens
 
 DEMO = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")
 

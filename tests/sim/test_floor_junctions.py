@@ -9,14 +9,14 @@ from pathlib import Path
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.types import Attitude
-from flightd.grid.paint import Features, PaintMap
-from flightd.sim.appearance import DEFAULT
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.optics import SimCamera
-from flightd.sim.renderer import Renderer
-from flightd.tracking.junctions import FloorJunction, floor_junctions
-from flightd.tracking.tilt import FloorView, TiltCompensation
-from flightd.vision.detector import Detector
+from flightd.sim.floor.appearance import DEFAULT
+from flightd.sim.floor.renderer import Renderer
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.sensors.optics import SimCamera
+from flightd.site.painted_lines import Features, PaintMap
+from flightd.tracking.ground_junctions import FloorJunction, floor_junctions
+from flightd.tracking.tilt_compensation import FloorView, TiltCompensation
+from flightd.vision.lines.detector import Detector
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CONFIG = load_config(CONFIGS / "sim.toml")

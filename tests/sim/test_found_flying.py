@@ -10,18 +10,18 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.metrics.book import MetricsBook
+from flightd.adapters.metrics.metrics import MetricsBook
+from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
-from flightd.cli.flight_count import FlightCount
-from flightd.cli.sim_peers import free_port
+from flightd.app.detection.detector_pool import Detection
+from flightd.app.simulation.ports import free_port
 from flightd.config.schema import Config, load_config
 from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.types import Command, CommandKind, Demand, Phase, Status
 from flightd.ports import Monitor
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.pool import Detection
-from flightd.runtime.ring import FrameTicket
+from flightd.runtime.frame_ring import FrameTicket
 from flightd.sim.autopilot.copter import CopterMode
 from tests.protocol.rig import Rig, ardupilot_rig, run_virtual
 

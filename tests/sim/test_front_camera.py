@@ -11,22 +11,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightd.adapters.camera.shared import SharedCamera
+from flightd.adapters.camera.shared_memory import SharedCamera
+from flightd.app.simulation.launch import Simulation, truth_of
+from flightd.app.simulation.ports import free_port, has_front_camera
 from flightd.cli.sim import _camera_keys, _configured
-from flightd.cli.sim_peers import free_port, has_front_camera
-from flightd.cli.simulate import Simulation, truth_of
 from flightd.config.schema import Config
 from flightd.config.site_file import load_site
 from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import VirtualLoop
-from flightd.runtime.ring import FrameRing, FrameTicket
-from flightd.sim.camera import CameraPeer, PictureMaker
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.racks.camera import FrontCamera, front_lens
-from flightd.sim.racks.look import RackLook
+from flightd.runtime.event_loops import VirtualLoop
+from flightd.runtime.frame_ring import FrameRing, FrameTicket
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.front_camera import FrontCamera, front_lens
 from flightd.sim.racks.renderer import FrontRenderer
-from flightd.sim.scenario import FrontCameraScenario, Scenario
+from flightd.sim.scenario.scenario import FrontCameraScenario, Scenario
+from flightd.sim.sensors.camera import CameraPeer, PictureMaker
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SMALL = CONFIGS / "site-racks-small.toml"

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from flightd.config.site_file import load_site
+from flightd.core.camera_view import ForwardMount
 from flightd.core.geometry import Lens
 from flightd.core.types import CodeRead
-from flightd.core.view import ForwardMount
-from flightd.grid.site import Side
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.racks.camera import FrontCamera
-from flightd.sim.racks.layout import faces
-from flightd.sim.racks.look import RackLook
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.front_camera import FrontCamera
+from flightd.sim.racks.rack_layout import faces
 from flightd.sim.racks.renderer import FrontRenderer
-from flightd.sim.racks.stock import Condition, Label, Place, Situation, StockShares, stock
-from flightd.vision.codes import read_codes
+from flightd.sim.racks.stock import Condition, Label, StockPlace, StockShares, StockSituation, stock
+from flightd.site.site import Side
+from flightd.vision.shelf.code_reader import read_codes
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
 LOOK = RackLook(shares=StockShares(empty=0.15, tilted=0.15, torn=0.1, too_small=0.1, missing=0.05))
@@ -37,11 +37,11 @@ def renderer() -> FrontRenderer:
 
 
 @cache
-def places() -> dict[str, Place]:
+def places() -> dict[str, StockPlace]:
     return dict(stock(SITE, LOOK.shares, CAMERA.lens.fx_px, SEED))
 
 
-def facing(place: Place, seq: int = 0, **changes: Any) -> Kinematics:
+def facing(place: StockPlace, seq: int = 0, **changes: Any) -> Kinematics:
     """Hovering before the place's node at the height of its label, nose to the shelf, not quite still."""
     location = place.opening.location
     node = SITE.nodes[location.node]
@@ -66,7 +66,7 @@ def facing(place: Place, seq: int = 0, **changes: Any) -> Kinematics:
     return replace(pose, **changes)
 
 
-def code_corners(place: Place, label: Label) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def code_corners(place: StockPlace, label: Label) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     """(4, 3) map points of the printed code's corners (without its quiet zone), top left first."""
     face = next(f for f in faces(SITE) if place.opening in f.openings)
     assert place.goods is not None
@@ -131,9 +131,9 @@ def test_matrix_codes_are_found_where_the_geometry_puts_them(camera: FrontCamera
     raise AssertionError(f"only {found} codes were found")
 
 
-def pictures() -> Iterator[tuple[list[Place], dict[str, CodeRead]]]:
+def pictures() -> Iterator[tuple[list[StockPlace], dict[str, CodeRead]]]:
     """Every place of the site, two to a picture, and what is believed of each picture."""
-    stops: dict[tuple[object, ...], list[Place]] = {}
+    stops: dict[tuple[object, ...], list[StockPlace]] = {}
     for place in places().values():
         location = place.opening.location
         stops.setdefault((location.node, location.side, location.level), []).append(place)
@@ -175,10 +175,10 @@ def test_a_picture_does_not_depend_on_what_was_rendered_before() -> None:
 
 
 def test_an_empty_place_is_dark_and_not_flat() -> None:
-    empty = next(p for p in places().values() if p.situation is Situation.EMPTY)
-    full = next(p for p in places().values() if p.situation is Situation.MISSING)
+    empty = next(p for p in places().values() if p.situation is StockSituation.EMPTY)
+    full = next(p for p in places().values() if p.situation is StockSituation.MISSING)
 
-    def inside(place: Place) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    def inside(place: StockPlace) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
         location, pose = place.opening.location, facing(place, 0)
         pixels = CAMERA.view(pose).project(np.array([(location.x_m, location.y_m, location.height_m)]))
         u, v = (round(float(pixel)) for pixel in pixels[0])

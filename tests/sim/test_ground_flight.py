@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.ground.client import Address, GroundClient
-from flightd.adapters.ground.protocol import StatusReport
+from flightd.adapters.ground_link.client import Address, GroundClient
+from flightd.adapters.ground_link.protocol import StatusReport
 from flightd.core.types import CommandKind, Phase
 from tests.sim.ground_rig import in_loop
 

@@ -16,13 +16,13 @@ import pytest
 import zmq
 import zmq.asyncio
 
-from flightd.adapters.ground.client import GroundClient
-from flightd.adapters.ground.link import ZmqGround
-from flightd.adapters.ground.protocol import EventReport, Role, StatusReport
+from flightd.adapters.ground_link.client import GroundClient
+from flightd.adapters.ground_link.link import ZmqGround
+from flightd.adapters.ground_link.protocol import EventReport, Role, StatusReport
 from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.types import CommandKind, Phase
-from flightd.grid.site import Aisle, Edge, Node
 from flightd.runtime.clock import LoopClock
+from flightd.site.site import Aisle, Edge, Node
 from tests.sim.ground_rig import (
     SITE,
     Keyring,

@@ -16,10 +16,10 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.types import Command, CommandKind, Health, Phase
-from flightd.grid.corridor import Corridor
-from flightd.mission.hazards import HAZARDS, PHASE_OF, Action, Hazard
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.wind import Draught, Wind
+from flightd.mission.safety.hazards import HAZARDS, PHASE_OF, Action, Hazard
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.wind import Draught, Wind
+from flightd.site.corridor import Corridor
 from tests.sim.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[2] / "configs"

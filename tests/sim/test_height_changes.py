@@ -11,8 +11,8 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.config.site_file import parse_site
 from flightd.core.types import Phase
-from flightd.mission.scanner import Scanner
-from flightd.tracking.lines import TrackSet
+from flightd.mission.scan.scanner import Scanner
+from flightd.tracking.line_tracker import TrackSet
 from tests.sim.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import SIGHT

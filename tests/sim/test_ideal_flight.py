@@ -10,9 +10,9 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.types import Phase
-from flightd.mission.plan import Heading, HeadingPolicy
-from flightd.sim.sites import random_site
-from flightd.sim.wind import Draught
+from flightd.mission.plan.flight_plan import Heading, HeadingPolicy
+from flightd.sim.plant.wind import Draught
+from flightd.sim.random_sites import random_site
 from tests.sim.ideal_flight import Flown, IdealFlight, rms_off_line
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -15,8 +15,8 @@ from flightd.config.site_file import load_site
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import Finding
 from flightd.core.types import Command, CommandKind, EventLevel, Phase
-from flightd.mission.plan import Heading, HeadingPolicy
-from flightd.mission.scanner import Scanner
+from flightd.mission.plan.flight_plan import Heading, HeadingPolicy
+from flightd.mission.scan.scanner import Scanner
 from tests.sim.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import SIGHT, SITE

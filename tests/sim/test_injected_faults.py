@@ -13,8 +13,8 @@ from pydantic import TypeAdapter
 
 from flightd.config.site_file import load_site
 from flightd.core.types import Demand
-from flightd.sim.fault_spec import Fault
-from flightd.sim.faults import WorldFaults
+from flightd.sim.scenario.fault_schema import Fault
+from flightd.sim.scenario.faults import WorldFaults
 from tests.protocol.rig import Rig, ardupilot_rig, px4_rig, run_virtual
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")

@@ -15,13 +15,13 @@ from flightd.config.site_file import load_site
 from flightd.core.geometry import Mount
 from flightd.core.markers import MarkerDictionary, MarkerSet
 from flightd.core.types import Attitude, LineSet, Phase
-from flightd.grid.layout import lay_out
-from flightd.grid.site import Aisle, Marker, Pad
-from flightd.sim.appearance import DEFAULT, HARSH, Appearance
-from flightd.sim.optics import SimCamera
-from flightd.sim.renderer import Renderer
-from flightd.tracking.tilt import FloorView, TiltCompensation, ground_point
-from flightd.vision.detector import Detector
+from flightd.sim.floor.appearance import DEFAULT, HARSH, Appearance
+from flightd.sim.floor.renderer import Renderer
+from flightd.sim.sensors.optics import SimCamera
+from flightd.site.layout import lay_out
+from flightd.site.site import Aisle, Marker, Pad
+from flightd.tracking.tilt_compensation import FloorView, TiltCompensation, ground_point
+from flightd.vision.lines.detector import Detector
 from tests.sim.ideal_flight import IdealFlight
 from tests.sim.test_carried import wrong_visits
 from tests.sim.test_renderer import hover

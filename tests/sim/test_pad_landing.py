@@ -12,10 +12,10 @@ from flightd.config.schema import load_config
 from flightd.config.site_file import load_site, parse_site, site_toml
 from flightd.core.errors import InputError
 from flightd.core.types import Phase
-from flightd.grid.site import Site
-from flightd.sim.ideal import EyeErrors
-from flightd.sim.scenario import FloorScenario
+from flightd.sim.scenario.scenario import FloorScenario
+from flightd.site.site import Site
 from tests.sim.ideal_flight import Flown, IdealFlight
+from tests.sim.ideal_sight import EyeErrors
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CONFIG = load_config(CONFIGS / "sim.toml")

@@ -13,12 +13,12 @@ import pytest
 from flightd.config.site_file import load_site
 from flightd.core.geometry import Mount
 from flightd.core.types import Attitude, Image, PadSight
-from flightd.sim.appearance import CLEAN, DEFAULT, HARSH, Appearance
-from flightd.sim.optics import SimCamera
-from flightd.sim.renderer import Renderer
-from flightd.sim.scenario import FloorScenario
-from flightd.tracking.tilt import FloorView, TiltCompensation, ground_point
-from flightd.vision.detector import Detector
+from flightd.sim.floor.appearance import CLEAN, DEFAULT, HARSH, Appearance
+from flightd.sim.floor.renderer import Renderer
+from flightd.sim.scenario.scenario import FloorScenario
+from flightd.sim.sensors.optics import SimCamera
+from flightd.tracking.tilt_compensation import FloorView, TiltCompensation, ground_point
+from flightd.vision.lines.detector import Detector
 from tests.sim.test_renderer import hover
 
 DEMO = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")

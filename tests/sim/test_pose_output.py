@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from flightd.cli import simulate
+from flightd.app.simulation import launch as simulate
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.types import Phase
-from flightd.sim.autopilot.peer import AutopilotPeer
-from flightd.sim.scenario import Scenario
+from flightd.sim.autopilot.autopilot import AutopilotPeer
+from flightd.sim.scenario.scenario import Scenario
 
 CONFIG = Path(__file__).parents[2] / "configs" / "sim.toml"
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from flightd.config.site_file import load_site
 from flightd.core.geometry import Lens, Mount, ground_homography, heading_rotation, level_from_body
-from flightd.grid.layout import lay_out
-from flightd.grid.site import Aisle, LineColour, Pad, Site
-from flightd.sim.appearance import CLEAN, DEFAULT, HARSH, Appearance
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.optics import SimCamera, wide_lens
-from flightd.sim.renderer import Renderer
+from flightd.sim.floor.appearance import CLEAN, DEFAULT, HARSH, Appearance
+from flightd.sim.floor.renderer import Renderer
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.sensors.optics import SimCamera, wide_lens
+from flightd.site.layout import lay_out
+from flightd.site.site import Aisle, LineColour, Pad, Site
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 DEMO = load_site(CONFIGS / "site-demo.toml")

@@ -11,13 +11,13 @@ import pytest
 
 from flightd.config.site_file import load_site
 from flightd.core.scanning import CodeSet, Occupancy
-from flightd.mission.assign import Assigner, FrontSight, ShelfLook
-from flightd.sim.racks.camera import FrontCamera
-from flightd.sim.racks.look import RackLook
-from flightd.sim.racks.stock import Situation, StockShares
-from flightd.sim.racks.truth import LocationTruth, stock_truth
-from flightd.vision.shelf import read_shelf
-from flightd.vision.small_jpeg import MOST_BYTES, picture_name
+from flightd.mission.scan.code_assignment import Assigner, FrontSight, ShelfLook
+from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.front_camera import FrontCamera
+from flightd.sim.racks.stock import StockShares, StockSituation
+from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
+from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, picture_name
+from flightd.vision.shelf.shelf_look import read_shelf
 from tests.sim.shelf_pictures import shelf_pictures
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
@@ -50,7 +50,7 @@ Truth = dict[str, LocationTruth]
 
 def test_empty_places_are_told_and_no_other_is_ever_called_empty(looks: Looks, truth: Truth) -> None:
     told = Counter(
-        (truth[place.location].situation == Situation.EMPTY, place.occupancy)
+        (truth[place.location].situation == StockSituation.EMPTY, place.occupancy)
         for codes, _, _ in looks
         for place in codes.places
     )

@@ -11,10 +11,10 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site, parse_site, site_toml
 from flightd.core.types import Command, CommandKind, Phase
-from flightd.mission.battery import BatteryParams
+from flightd.mission.battery.consumption import BatteryParams
 from flightd.pilot import PilotParams, TickOutput
-from flightd.sim.airframe import AirframeParams
-from flightd.sim.crew import PadCrew
+from flightd.sim.plant.airframe import AirframeParams
+from flightd.sim.plant.pad_crew import PadCrew
 from tests.sim.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[2] / "configs"

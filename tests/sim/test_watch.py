@@ -8,9 +8,9 @@ import math
 import pytest
 from textual.widgets import RichLog, Static
 
-from flightd.adapters.ground.client import GroundClient
-from flightd.adapters.ground.desk import Desk, Peer
-from flightd.adapters.ground.protocol import Floor, Position, Role, Welcome
+from flightd.adapters.ground_link.client import GroundClient
+from flightd.adapters.ground_link.protocol import FloorStatus, Position, Role, Welcome
+from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
 from flightd.cli.floor_map import FloorMap, arrow
 from flightd.cli.watch import WatchApp
 from flightd.core.types import CommandKind, Phase
@@ -18,8 +18,8 @@ from flightd.runtime.clock import LoopClock
 from tests.sim.ground_rig import SITE, address_of, event, in_loop, local, serving, telling, until
 
 
-def floor() -> Floor:
-    desk = Desk(SITE, "s", lambda _: None)
+def floor() -> FloorStatus:
+    desk = RequestHandler(SITE, "s", lambda _: None)
     welcome = desk.answer(b'{"version":1,"id":"12345678","op":"hello"}', Peer("x", Role.VIEWER), 0)
     assert isinstance(welcome, Welcome)
     return welcome.floor

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from flightd.cli.sim_world import run_world, watch_world
+from flightd.app.simulation.world_process import run_world, watch_world
 from flightd.config.paths import shipped
 from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError, RunError, UnavailableError

@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import ScaledLoop, VirtualLoop
+from flightd.runtime.event_loops import ScaledLoop, VirtualLoop
 
 
 def run_virtual(main: Any) -> Any:

@@ -20,7 +20,7 @@ from flightd.adapters.camera.exposure import DeviceExposure
 from flightd.core.errors import InputError, TransientError
 from flightd.core.types import Image
 from flightd.ports import Clock
-from flightd.runtime.ring import FrameRing, FrameTicket
+from flightd.runtime.frame_ring import FrameRing, FrameTicket
 
 _SLOTS = 8
 _GIVING_BACK_S = 1.0

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from flightd.adapters.camera.capture import CaptureCamera, parse_source
-from flightd.adapters.camera.shared import SharedCamera
+from flightd.adapters.camera.shared_memory import SharedCamera
 from flightd.adapters.vehicle.ardrone.camera import ArDroneCamera
-from flightd.adapters.vehicle.ardrone.settings import Camera as ArDroneView
+from flightd.adapters.vehicle.ardrone.settings import DroneCamera
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.schema import CameraConfig
 from flightd.core.errors import InputError
 from flightd.ports import Camera, Clock, Vehicle
-from flightd.runtime.ring import FrameTicket
+from flightd.runtime.frame_ring import FrameTicket
 
 ARDRONE_URL = "ardrone:"
 """The camera of the AR.Drone that is the vehicle."""
@@ -34,7 +34,7 @@ def connect_camera(
             raise InputError(f"front_camera.url {ARDRONE_URL!r}: the AR.Drone sends one camera at a time")
         if not isinstance(vehicle, ArDroneVehicle):
             raise InputError(f'camera.url {ARDRONE_URL!r} needs vehicle.kind = "ardrone"')
-        return ArDroneCamera(vehicle, config.latency_s, clock, {ArDroneView.DOWN: on_frame})
+        return ArDroneCamera(vehicle, config.latency_s, clock, {DroneCamera.DOWN: on_frame})
     if config.url.startswith("udp:"):
         size_px = config.width_px, config.height_px
         return SharedCamera(config.url, size_px, config.latency_s, clock, on_frame, on_trouble)

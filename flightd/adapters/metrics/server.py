@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 from collections.abc import Callable
 
-from flightd.adapters.metrics.book import CONTENT_TYPE
+from flightd.adapters.metrics.metrics import CONTENT_TYPE
 from flightd.core.errors import UnavailableError
 
 _CLIENTS = 8

@@ -19,7 +19,7 @@ import msgspec
 
 import flightd
 from flightd.adapters.recorder.schemas import encode, picture_schema, schema_of
-from flightd.adapters.recorder.wire import HEADER, PICTURE_SEQ, Definition, Kind, Tally
+from flightd.adapters.recorder.writer_protocol import HEADER, PICTURE_SEQ, Definition, Kind, WriterTally
 from flightd.core.errors import UnavailableError
 from flightd.core.topics import RETAINED, Topic
 from flightd.core.types import Event, EventLevel
@@ -39,7 +39,7 @@ CLOSE_S = 10.0
 _PUSH_BYTES = 16 << 10
 
 
-class Recorder:
+class McapRecorder:
     """Writes a flight log (MCAP) through a process of its own.
 
     `record` and `image` are synchronous and take microseconds: they encode into a bounded queue that
@@ -68,7 +68,7 @@ class Recorder:
         self._definitions: list[bytes] = []
         self._retained: dict[str, bytes] = {}
         self._answers = bytearray()
-        self._tally = Tally(found=0, written=0, lost=0, error="")
+        self._tally = WriterTally(found=0, written=0, lost=0, error="")
         self._newest_ns = 0
         self._accepted = 0
         self._accepted_before = 0
@@ -227,7 +227,7 @@ class Recorder:
         self._answers = bytearray(rest)
         if lines:
             with suppress(msgspec.DecodeError):  # a line that did not fit the socket came in part
-                self._tally = msgspec.json.decode(lines[-1], type=Tally)
+                self._tally = msgspec.json.decode(lines[-1], type=WriterTally)
 
     def _restart(self) -> None:
         """Go on in the same file; what waited is given up, for its front may be half of a frame."""
@@ -235,7 +235,7 @@ class Recorder:
         code = self._child.wait()
         self._restarts += 1
         self._accepted_before = self._accepted
-        self._tally = Tally(found=self._tally.written, written=self._tally.written, lost=0, error="")
+        self._tally = WriterTally(found=self._tally.written, written=self._tally.written, lost=0, error="")
         self._answers.clear()
         self._queue.clear()
         self._start("resume")
@@ -255,7 +255,7 @@ class Recorder:
                 [
                     sys.executable,
                     "-m",
-                    "flightd.adapters.recorder.writer",
+                    "flightd.adapters.recorder.writer_process",
                     str(theirs.fileno()),
                     how,
                     self._path,

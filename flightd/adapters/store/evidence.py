@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 from flightd.core.errors import UnavailableError
-from flightd.runtime.durable import replace_file, sync_folder
-from flightd.vision.small_jpeg import MOST_BYTES, picture_name
+from flightd.runtime.durable_files import replace_file, sync_folder
+from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, picture_name
 
 
 class EvidenceFolder:

@@ -14,9 +14,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from flightd.core.errors import InputError, TransientError
-from flightd.grid.site import Site
-from flightd.runtime.durable import replace_file
-from flightd.runtime.latest import Latest
+from flightd.runtime.durable_files import replace_file
+from flightd.runtime.latest_slot import Latest
+from flightd.site.site import Site
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,9 @@ import time
 from flightd.adapters.vehicle.ardrone.settings import settings_of
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, GUIDED_NOGPS, ArduPilotVehicle
-from flightd.adapters.vehicle.mavlink.outputs import PoseForm
+from flightd.adapters.vehicle.mavlink.link.signing import Signing, read_key
+from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
-from flightd.adapters.vehicle.mavlink.signing import Signing, read_key
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
 from flightd.config.vehicle import VehicleConfig
 from flightd.control.limits import Limits
@@ -21,7 +21,7 @@ def connect_vehicle(config: VehicleConfig, clock: Clock, limits: Limits | None =
     """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address or a
     signing key that cannot be used.
 
-    `limits` are those of the set points: an AR.Drone's own are set to them, for it takes shares of its own.
+    `limits` are those of the setpoints: an AR.Drone's own are set to them, for it takes shares of its own.
     """
     match config.kind:
         case "ardupilot":

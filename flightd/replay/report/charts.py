@@ -42,7 +42,7 @@ _FULL = 100.0
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class ChartLine:
     """One curve; `role` is its colour on the page: estimate, truth, setpoint or plain."""
 
     name: str
@@ -52,13 +52,13 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Strip:
+class ChartStrip:
     """One chart.  `least_span` keeps a quiet curve from filling the strip with noise; `zero` puts zero
     on the axis; `symmetric` puts it in the middle."""
 
     title: str
     unit: str
-    lines: tuple[Line, ...]
+    lines: tuple[ChartLine, ...]
     digits: int = 1
     least_span: float = 0.0
     zero: bool = False
@@ -82,20 +82,20 @@ class Strip:
         return floor, high + missing / 2 + margin
 
 
-def strips(flight: Flight) -> tuple[Strip, ...]:
+def strips(flight: Flight) -> tuple[ChartStrip, ...]:
     """The charts of a flight, top to bottom; those without data are left out."""
     estimate, truth, vehicle, setpoints = flight.estimate, flight.truth, flight.telemetry, flight.setpoints
-    cross = [Line("estimated", "estimate", estimate.t_s, flight.cross_track_m(estimate) * 100)]
-    height = [Line("measured", "estimate", vehicle.t_s, vehicle.height_m)]
-    heading = [Line("estimated", "estimate", estimate.t_s, np.degrees(np.unwrap(estimate.yaw_rad)))]
+    cross = [ChartLine("estimated", "estimate", estimate.t_s, flight.cross_track_m(estimate) * 100)]
+    height = [ChartLine("measured", "estimate", vehicle.t_s, vehicle.height_m)]
+    heading = [ChartLine("estimated", "estimate", estimate.t_s, np.degrees(np.unwrap(estimate.yaw_rad)))]
     if truth is not None:
-        cross.append(Line("true", "truth", truth.t_s, flight.cross_track_m(truth) * 100))
-        height.append(Line("true", "truth", truth.t_s, truth.height_m))
-        heading.append(Line("true", "truth", truth.t_s, np.degrees(np.unwrap(truth.yaw_rad))))
+        cross.append(ChartLine("true", "truth", truth.t_s, flight.cross_track_m(truth) * 100))
+        height.append(ChartLine("true", "truth", truth.t_s, truth.height_m))
+        heading.append(ChartLine("true", "truth", truth.t_s, np.degrees(np.unwrap(truth.yaw_rad))))
     tilt = [
         (
-            Line("setpoint", "setpoint", setpoints.t_s, np.degrees(wanted)),
-            Line("measured", "estimate", vehicle.t_s, np.degrees(measured)),
+            ChartLine("setpoint", "setpoint", setpoints.t_s, np.degrees(wanted)),
+            ChartLine("measured", "estimate", vehicle.t_s, np.degrees(measured)),
         )
         for measured, wanted in (
             (vehicle.roll_rad, setpoints.roll_rad),
@@ -106,20 +106,26 @@ def strips(flight: Flight) -> tuple[Strip, ...]:
     total = latency.stage("total") if "total" in latency.stages else np.array([])
     times = latency.t_s if len(total) else np.array([])
     made = (
-        Strip("Cross-track", "cm", tuple(cross), 1, 12.0, symmetric=True),
-        Strip("Height", "m", tuple(height), 2, 1.0, zero=True),
-        Strip("Roll", "°", tilt[0], 1, 6.0, symmetric=True),
-        Strip("Pitch", "°", tilt[1], 1, 6.0, symmetric=True),
-        Strip("Heading", "°", tuple(heading), 1, 10.0),
-        Strip("Picture to setpoint", "ms", (Line("latency", "estimate", times, total),), 1, 20.0, zero=True),
-        Strip(
-            "Battery", "%", (Line("charge", "estimate", vehicle.t_s, vehicle.battery_frac * 100),), 0, 10.0
+        ChartStrip("Cross-track", "cm", tuple(cross), 1, 12.0, symmetric=True),
+        ChartStrip("Height", "m", tuple(height), 2, 1.0, zero=True),
+        ChartStrip("Roll", "°", tilt[0], 1, 6.0, symmetric=True),
+        ChartStrip("Pitch", "°", tilt[1], 1, 6.0, symmetric=True),
+        ChartStrip("Heading", "°", tuple(heading), 1, 10.0),
+        ChartStrip(
+            "Picture to setpoint", "ms", (ChartLine("latency", "estimate", times, total),), 1, 20.0, zero=True
+        ),
+        ChartStrip(
+            "Battery",
+            "%",
+            (ChartLine("charge", "estimate", vehicle.t_s, vehicle.battery_frac * 100),),
+            0,
+            10.0,
         ),
     )
     return tuple(strip for strip in made if strip.has_data())
 
 
-def timeline(flight: Flight, shown: Sequence[Strip]) -> str:
+def timeline(flight: Flight, shown: Sequence[ChartStrip]) -> str:
     """The phase ribbon and all strips, one below the other on one time axis."""
     if not shown:
         return element("p", "The log holds no telemetry to draw.", class_="empty")
@@ -191,7 +197,7 @@ def _words(phase: Phase) -> str:
     return phase.replace("_", " ")
 
 
-def _strip(strip: Strip, duration_s: float, bands: str) -> str:
+def _strip(strip: ChartStrip, duration_s: float, bands: str) -> str:
     low, high = strip.range()
 
     def down(values: Array) -> Array:

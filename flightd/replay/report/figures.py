@@ -18,7 +18,7 @@ from flightd.replay.report.markup import clock, number
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class FlightOutcome:
     """`tone` is good, bad or open (the log ends in flight)."""
 
     headline: str
@@ -37,17 +37,19 @@ class Figure:
     tone: str = ""
 
 
-def outcome(flight: Flight) -> Outcome:
+def outcome(flight: Flight) -> FlightOutcome:
     """How the mission ended, by the summary or else by the last status."""
     mission, reason = flight.summary.get("mission"), str(flight.summary.get("reason") or "")
     last = flight.last_status
     if mission == "completed" or (mission is None and last is not None and last.phase == Phase.DONE):
-        return Outcome("Mission completed", reason, "good")
+        return FlightOutcome("Mission completed", reason, "good")
     if mission == "aborted" or (last is not None and last.phase == Phase.ABORTED):
-        return Outcome("Mission aborted", reason or (last.reason if last else ""), "bad")
+        return FlightOutcome("Mission aborted", reason or (last.reason if last else ""), "bad")
     if last is None:
-        return Outcome("No flight in this log", flight.log.damage, "open")
-    return Outcome("Mission not finished", f"the log ends in phase {last.phase.replace('_', ' ')}", "open")
+        return FlightOutcome("No flight in this log", flight.log.damage, "open")
+    return FlightOutcome(
+        "Mission not finished", f"the log ends in phase {last.phase.replace('_', ' ')}", "open"
+    )
 
 
 def key_figures(flight: Flight) -> tuple[Figure, ...]:

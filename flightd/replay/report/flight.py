@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Event, LineSet, Phase, Status
-from flightd.grid.site import Site
 from flightd.replay.log import FlightLog
+from flightd.site.site import Site
 
 Array: TypeAlias = NDArray[np.float64]
 Summary: TypeAlias = dict[str, object]
@@ -80,7 +80,7 @@ class Track:
 
 
 @dataclass(frozen=True, slots=True)
-class Telemetry:
+class TelemetrySeries:
     """The vehicle's own word over time; angles in rad, NaN where it did not know."""
 
     t_s: Array
@@ -124,7 +124,7 @@ class Flight:
     visits: tuple[Visit, ...]
     estimate: Track
     truth: Track | None
-    telemetry: Telemetry
+    telemetry: TelemetrySeries
     setpoints: Setpoints
     latency: Latency
     events: tuple[Event, ...]

@@ -11,14 +11,14 @@ from string import Template
 from flightd import __version__
 from flightd.core.errors import UnavailableError
 from flightd.replay.report.charts import strips, timeline
-from flightd.replay.report.count import Count, count_figures
 from flightd.replay.report.figures import Figure, flight_time_s, key_figures, outcome
 from flightd.replay.report.flight import Flight
-from flightd.replay.report.frames import frames_section
+from flightd.replay.report.floor_plan import floor_plan
 from flightd.replay.report.latency import latency_section
-from flightd.replay.report.load import load_flight
+from flightd.replay.report.loader import load_flight
 from flightd.replay.report.markup import NOTHING, clock, element, number, table, text
-from flightd.replay.report.plan import floor_plan
+from flightd.replay.report.pictures import frames_section
+from flightd.replay.report.stock import Count, count_figures
 from flightd.replay.report.stocktaking import inventory_section
 
 _EVENTS_SHOWN = 400

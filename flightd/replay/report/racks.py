@@ -6,9 +6,9 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
 from flightd.core.inventory import LocationRecord, LocationState
-from flightd.grid.site import Location, Side, Site
-from flightd.replay.report.count import Count
 from flightd.replay.report.markup import element, text
+from flightd.replay.report.stock import Count
+from flightd.site.site import Location, Side, Site
 
 _HALF_COLUMNS = 30
 """More places beside each other than this take the page's whole width."""

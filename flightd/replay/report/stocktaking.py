@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 
 from flightd.core.inventory import LocationRecord, LocationState
-from flightd.grid.site import Site
-from flightd.mission.stock import Outcome
-from flightd.replay.report.count import SETTLED, Count
+from flightd.inventory.comparison import ComparisonOutcome
 from flightd.replay.report.markup import NOTHING, element, table, text
 from flightd.replay.report.racks import STATE_NAMES, racks_section
+from flightd.replay.report.stock import SETTLED, Count
+from flightd.site.site import Site
 
 _PICTURES_BYTES = 12_000_000
 """All pictures in the page together, before base64; those of exceptions come first."""
@@ -76,7 +76,7 @@ def _exception(record: LocationRecord) -> str:
 
 def _differences(count: Count) -> str:
     wrong = [line for line in count.differences or () if line.outcome not in SETTLED]
-    unknown = sum(line.outcome is Outcome.UNCOUNTED for line in count.differences or ())
+    unknown = sum(line.outcome is ComparisonOutcome.UNCOUNTED for line in count.differences or ())
     note = (
         f"{unknown:,} expected codes lie where nobody could see: nothing is said of them." if unknown else ""
     )
@@ -88,8 +88,11 @@ def _differences(count: Count) -> str:
             "tr",
             element("td", element("b", text(line.location))),
             element("td", element("i", line.outcome.replace("_", " "), class_="level error")),
-            element("td", text(line.text if line.outcome is not Outcome.UNEXPECTED else NOTHING)),
-            element("td", text(line.text if line.outcome is Outcome.UNEXPECTED else line.found or NOTHING)),
+            element("td", text(line.text if line.outcome is not ComparisonOutcome.UNEXPECTED else NOTHING)),
+            element(
+                "td",
+                text(line.text if line.outcome is ComparisonOutcome.UNEXPECTED else line.found or NOTHING),
+            ),
             element("td", text(line.found_at or NOTHING)),
             element("td", f"{line.confidence:.0%}"),
             data_code=line.location,

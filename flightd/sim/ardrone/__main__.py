@@ -17,19 +17,19 @@ from pathlib import Path
 from flightd.config.paths import shipped
 from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
-from flightd.grid.site import Site
 from flightd.runtime.clock import LoopClock
-from flightd.sim.airframe import Airframe
-from flightd.sim.appearance import DEFAULT
 from flightd.sim.ardrone.drone import Drone
-from flightd.sim.ardrone.front import front_peer
-from flightd.sim.ardrone.server import ArDroneServer, Ports
-from flightd.sim.ardrone.video import Channel
-from flightd.sim.camera import CameraPeer
-from flightd.sim.optics import SimCamera
-from flightd.sim.racks.look import RackLook
-from flightd.sim.renderer import Renderer
-from flightd.sim.sensors import Sensors
+from flightd.sim.ardrone.front_camera import front_peer
+from flightd.sim.ardrone.server import ArDroneServer, DronePorts
+from flightd.sim.ardrone.video import VideoChannel
+from flightd.sim.floor.appearance import DEFAULT
+from flightd.sim.floor.renderer import Renderer
+from flightd.sim.plant.airframe import Airframe
+from flightd.sim.racks.appearance import RackLook
+from flightd.sim.sensors.camera import CameraPeer
+from flightd.sim.sensors.instruments import Sensors
+from flightd.sim.sensors.optics import SimCamera
+from flightd.site.site import Site
 
 _NOBODY = ("127.0.0.1", 9)
 
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     try:
         site = load_site(chosen.site or shipped("site-demo.toml"))
-        ports = Ports(chosen.host, *chosen.ports)
+        ports = DronePorts(chosen.host, *chosen.ports)
         asyncio.run(_serve(site, ports, chosen.seed, chosen.battery))
     except KeyboardInterrupt:
         return 0
@@ -58,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-async def _serve(site: Site, ports: Ports, seed: int, battery_frac: float) -> None:
+async def _serve(site: Site, ports: DronePorts, seed: int, battery_frac: float) -> None:
     clock = LoopClock()
     pad = site.nodes[site.home.node]
     airframe = Airframe(seed=seed, x_m=pad.x_m, y_m=pad.y_m, battery_frac=battery_frac)
@@ -67,7 +67,7 @@ async def _serve(site: Site, ports: Ports, seed: int, battery_frac: float) -> No
     print(f"AR.Drone 2.0 on {server.ports}", flush=True)
     optics = SimCamera()
     make = partial(Renderer, site, optics, DEFAULT, seed)
-    show = partial(server.show, camera=Channel.BOTTOM)
+    show = partial(server.show, camera=VideoChannel.BOTTOM)
     camera = CameraPeer(optics, make, f"camera {seed}", _NOBODY, server.truth_at, clock, show)
     front = front_peer(server, site, RackLook(), seed, clock)
     async with asyncio.TaskGroup() as tasks:

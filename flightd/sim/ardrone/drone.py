@@ -10,12 +10,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from flightd.sim.airframe import Airframe
-from flightd.sim.ardrone.commands import Command, SequenceRule, parse
+from flightd.sim.ardrone.at_commands import DroneCommand, SequenceRule, parse
 from flightd.sim.ardrone.configuration import Configuration, Ids
 from flightd.sim.ardrone.flight import FlightLoops, Wish
-from flightd.sim.ardrone.telemetry import ALL_OPTIONS, OPTION_BYTES, Report, bootstrap, packet
-from flightd.sim.sensors import Sensors
+from flightd.sim.ardrone.navdata_writer import ALL_OPTIONS, OPTION_BYTES, NavdataReport, bootstrap, packet
+from flightd.sim.plant.airframe import Airframe
+from flightd.sim.sensors.instruments import Sensors
 
 REF_FLY = 1 << 9
 REF_EMERGENCY = 1 << 8
@@ -40,7 +40,7 @@ COM_WATCHDOG_NS = 50_000_000
 COM_LOST_NS = 2_000_000_000
 
 
-class Major(enum.IntEnum):
+class MajorState(enum.IntEnum):
     DEFAULT = 0
     INIT = 1
     LANDED = 2
@@ -51,7 +51,9 @@ class Major(enum.IntEnum):
     LANDING = 8
 
 
-AIRBORNE = frozenset({Major.FLYING, Major.HOVERING, Major.TAKE_OFF, Major.GO_TO_FIX, Major.LANDING})
+AIRBORNE = frozenset(
+    {MajorState.FLYING, MajorState.HOVERING, MajorState.TAKE_OFF, MajorState.GO_TO_FIX, MajorState.LANDING}
+)
 
 _FLYING_ALT_OUT_ZONE = 3
 _HOVERING_LOST_COM = 8
@@ -99,7 +101,7 @@ class Drone:
         self._boot()
 
     def _boot(self) -> None:
-        self.major = Major.LANDED
+        self.major = MajorState.LANDED
         self.minor = 0
         self.emergency = False
         self.streaming = False
@@ -144,13 +146,13 @@ class Drone:
             named, self._named = self._named, None
             self._obey(command, named, now_ns)
 
-    def _obey(self, command: Command, named: Ids | None, now_ns: int) -> None:
+    def _obey(self, command: DroneCommand, named: Ids | None, now_ns: int) -> None:
         match command.name:
             case "REF":
                 self._ref(command.integer(0), now_ns)
             case "PCMD" | "PCMD_MAG":
                 self._pcmd(command)
-            case "FTRIM" if self.major == Major.LANDED:
+            case "FTRIM" if self.major == MajorState.LANDED:
                 self.loops.trim()
             case "CTRL":
                 self._ctrl(command.integer(0))
@@ -172,10 +174,10 @@ class Drone:
                 self._cut_motors(now_ns)
             elif not self.faults:
                 self.emergency = False
-                self._enter(Major.LANDED, now_ns)
+                self._enter(MajorState.LANDED, now_ns)
         self._emergency_bit = pressed
 
-    def _pcmd(self, command: Command) -> None:
+    def _pcmd(self, command: DroneCommand) -> None:
         flag = command.integer(0)
         roll, pitch, gaz, yaw = (command.fraction(n) for n in range(1, 5))
         if flag is None or roll is None or pitch is None or gaz is None or yaw is None:
@@ -189,7 +191,7 @@ class Drone:
             self._ack = True
             self.send_configuration(self.configuration.dump() if mode == 4 else self.configuration.dump_ids())
 
-    def _config(self, command: Command, named: Ids | None, now_ns: int) -> None:
+    def _config(self, command: DroneCommand, named: Ids | None, now_ns: int) -> None:
         key, value = command.text(0), command.text(1)
         if key is None or value is None or (self._ack and self.options.config_needs_clear_ack):
             return
@@ -232,33 +234,33 @@ class Drone:
     def _advance(self, now_ns: int) -> None:
         since_s = (now_ns - self._entered_ns) / 1e9
         options = self.options
-        if self.major == Major.LANDED:
+        if self.major == MajorState.LANDED:
             charged = self.airframe.battery_frac >= options.low_battery_frac
             if self._fly and charged and not self.emergency:
-                self._enter(Major.TAKE_OFF, now_ns)
-        elif self.major == Major.LANDING:
+                self._enter(MajorState.TAKE_OFF, now_ns)
+        elif self.major == MajorState.LANDING:
             if self.airframe.on_floor:
-                self._enter(Major.LANDED, now_ns)
+                self._enter(MajorState.LANDED, now_ns)
         elif self.airborne and not self._fly:
-            self._enter(Major.LANDING, now_ns)
-        elif self.major == Major.TAKE_OFF:
+            self._enter(MajorState.LANDING, now_ns)
+        elif self.major == MajorState.TAKE_OFF:
             self.minor = int(since_s >= options.spin_up_s)
             if self.loops.height_m >= options.take_off_height_m:
-                self._enter(Major.HOVERING, now_ns)
+                self._enter(MajorState.HOVERING, now_ns)
         elif self.airborne:
             self._follow_stick(now_ns, since_s)
 
     def _follow_stick(self, now_ns: int, since_s: float) -> None:
         obeyed = self._stick.flag & PCMD_PROGRESSIVE and not self.configuration.number("control:flying_mode")
-        if obeyed and self.major != Major.FLYING:
-            self._enter(Major.FLYING, now_ns)
-        elif not obeyed and self.major == Major.FLYING:
-            self._enter(Major.GO_TO_FIX, now_ns)
-        elif self.major == Major.GO_TO_FIX and (self.loops.still or since_s > 3.0):
-            self._enter(Major.HOVERING, now_ns)
-        if self.major == Major.FLYING:
+        if obeyed and self.major != MajorState.FLYING:
+            self._enter(MajorState.FLYING, now_ns)
+        elif not obeyed and self.major == MajorState.FLYING:
+            self._enter(MajorState.GO_TO_FIX, now_ns)
+        elif self.major == MajorState.GO_TO_FIX and (self.loops.still or since_s > 3.0):
+            self._enter(MajorState.HOVERING, now_ns)
+        if self.major == MajorState.FLYING:
             self.minor = _FLYING_ALT_OUT_ZONE if self._too_high else 0
-        elif self.major == Major.HOVERING:
+        elif self.major == MajorState.HOVERING:
             self.minor = _HOVERING_LOST_COM if self._com_lost else 0
 
     @property
@@ -268,11 +270,11 @@ class Drone:
     def _wish(self) -> Wish:
         if not self.airborne or self.emergency:
             return Wish()
-        if self.major == Major.TAKE_OFF:
+        if self.major == MajorState.TAKE_OFF:
             return Wish(motors=True, idle=not self.minor, climb_mps=self.options.take_off_climb_mps)
-        if self.major == Major.LANDING:
+        if self.major == MajorState.LANDING:
             return Wish(motors=True, climb_mps=-self.options.land_sink_mps)
-        if self.major != Major.FLYING:
+        if self.major != MajorState.FLYING:
             return Wish(motors=True)
         tilt_rad = self.configuration.number("control:euler_angle_max")
         climb_mps = self._stick.gaz * self.configuration.number("control:control_vz_max") / 1000.0
@@ -285,13 +287,13 @@ class Drone:
             climb_mps=min(climb_mps, 0.0) if self._too_high else climb_mps,
         )
 
-    def _enter(self, major: Major, now_ns: int) -> None:
+    def _enter(self, major: MajorState, now_ns: int) -> None:
         self.major, self.minor, self._entered_ns = major, 0, now_ns
 
     def _cut_motors(self, now_ns: int) -> None:
         self.emergency = True
         self._fly = False
-        self._enter(Major.DEFAULT, now_ns)
+        self._enter(MajorState.DEFAULT, now_ns)
 
     # telemetry
 
@@ -330,10 +332,10 @@ class Drone:
         standing = BIT_ALTITUDE | BIT_CAMERA | BITS_THREADS
         return standing | self.faults | sum(bit for bit, raised in flags.items() if raised)
 
-    def _report(self, now_ns: int, state: int) -> Report:
+    def _report(self, now_ns: int, state: int) -> NavdataReport:
         loops = self.loops
         height_m = loops.height_m if self.airborne else 0.0
-        return Report(
+        return NavdataReport(
             state=state,
             sequence=self._navdata_sequence,
             major=self.major,

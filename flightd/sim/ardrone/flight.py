@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 from flightd.core.geometry import wrap_pi
-from flightd.sim.airframe import Airframe, AirframeCommand
-from flightd.sim.climb_loop import ClimbLoop
-from flightd.sim.sensors import Sensors
+from flightd.sim.autopilot.climb_loop import ClimbLoop
+from flightd.sim.plant.airframe import Airframe, AirframeCommand
+from flightd.sim.sensors.instruments import Sensors
 
 SONAR_PERIOD_S = 0.04
 _SONAR_GAIN = 0.3

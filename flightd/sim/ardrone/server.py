@@ -11,12 +11,12 @@ from typing import Any, Self, TypeAlias
 
 from flightd.core.types import Image
 from flightd.ports import Clock
-from flightd.sim.airframe import Airframe
 from flightd.sim.ardrone.drone import Drone
-from flightd.sim.ardrone.video import Channel, Encoder, Packer, is_idr
+from flightd.sim.ardrone.video import Encoder, Packer, VideoChannel, is_idr
 from flightd.sim.autopilot.radio import PERFECT, Radio, RadioParams
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.truth import TruthHistory
+from flightd.sim.plant.airframe import Airframe
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.truth_history import TruthHistory
 
 STEP_NS = 5_000_000
 _Serve: TypeAlias = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Coroutine[Any, Any, None]]
@@ -27,7 +27,7 @@ _CATCH_UP_NS = 2_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Ports:
+class DronePorts:
     """Where the drone listens; 0 takes any free port."""
 
     host: str = "127.0.0.1"
@@ -50,14 +50,14 @@ class ArDroneServer:
         self,
         drone: Drone,
         clock: Clock,
-        ports: Ports | None = None,
+        ports: DronePorts | None = None,
         *,
         video_header_bytes: int = 64,
         air: RadioParams = PERFECT,
         seed: int = 0,
     ) -> None:
         self.drone = drone
-        self.ports = ports or Ports()
+        self.ports = ports or DronePorts()
         self.radio = True
         self._up, self._down = Radio(air, seed), Radio(air, seed + 1)
         self._clock = clock
@@ -80,10 +80,10 @@ class ArDroneServer:
         return self.drone.airframe
 
     @property
-    def channel(self) -> Channel:
+    def channel(self) -> VideoChannel:
         """The camera whose pictures the client asked for."""
         bottom = int(self.drone.configuration.number("video:video_channel")) in (1, 3)
-        return Channel.BOTTOM if bottom else Channel.FRONT
+        return VideoChannel.BOTTOM if bottom else VideoChannel.FRONT
 
     @property
     def watched(self) -> bool:
@@ -176,7 +176,7 @@ class ArDroneServer:
         for writer in [*self._watchers, *self._readers]:
             writer.transport.abort()
 
-    def show(self, bgr: Image, stamp_ns: int | None = None, camera: Channel | None = None) -> None:
+    def show(self, bgr: Image, stamp_ns: int | None = None, camera: VideoChannel | None = None) -> None:
         """Stream one picture of `camera` (the one in use when left out) to whoever watches; (H, W, 3) of any
         size, exposed at `stamp_ns` (now when left out).  Pictures of the other camera are dropped."""
         if not self.radio or (camera is not None and camera is not self.channel):

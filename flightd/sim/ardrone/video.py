@@ -25,7 +25,7 @@ _NAL_SPS, _NAL_PPS, _NAL_IDR, _NAL_SLICE = 7, 8, 5, 1
 _START_CODE = b"\0\0\0\1"
 
 
-class Channel(enum.IntEnum):
+class VideoChannel(enum.IntEnum):
     FRONT = 0
     BOTTOM = 1
 

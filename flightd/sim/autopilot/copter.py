@@ -12,12 +12,12 @@ import enum
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.ports import Clock
-from flightd.sim.airframe import Airframe, AirframeCommand
+from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.guided import AngleTarget
 from flightd.sim.autopilot.link import Message
 from flightd.sim.autopilot.parameters import COPTER_PARAMETERS, ParameterServer
-from flightd.sim.autopilot.peer import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.telemetry import LANDED_AIR, LANDED_GROUND, LANDED_LANDING
+from flightd.sim.plant.airframe import Airframe, AirframeCommand
 
 _THRUST_IS_COLLECTIVE = 8
 _IDLE_COLLECTIVE = 0.05

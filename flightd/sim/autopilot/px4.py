@@ -11,12 +11,12 @@ import math
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.ports import Clock
-from flightd.sim.airframe import Airframe, AirframeCommand
+from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.guided import euler
 from flightd.sim.autopilot.link import Message
 from flightd.sim.autopilot.parameters import PX4_PARAMETERS, ParameterServer
-from flightd.sim.autopilot.peer import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.telemetry import LANDED_AIR, LANDED_GROUND, LANDED_LANDING
+from flightd.sim.plant.airframe import Airframe, AirframeCommand
 
 _STREAM_S = 1.0
 _STREAM_GAP_S = 0.5

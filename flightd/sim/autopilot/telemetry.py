@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.sim.airframe import Airframe
 from flightd.sim.autopilot.link import Message
-from flightd.sim.sensors import Sensors
+from flightd.sim.plant.airframe import Airframe
+from flightd.sim.sensors.instruments import Sensors
 
 LANDED_GROUND = dialect.MAV_LANDED_STATE_ON_GROUND
 LANDED_AIR = dialect.MAV_LANDED_STATE_IN_AIR

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.sim.racks.paper import stick
-from flightd.sim.racks.stock import Goods, Place
+from flightd.sim.racks.label_paper import stick
+from flightd.sim.racks.stock import Goods, StockPlace
 
 TEXELS_PER_M = 1250.0
 _PALLET_M = 0.10
@@ -37,7 +37,7 @@ class GoodsPainter:
         # twice as large, so that every crop is one piece
         self._grain: Image = np.repeat(np.tile(gain, (2, 2))[..., None], 3, axis=2)
 
-    def front(self, place: Place) -> Image:
+    def front(self, place: StockPlace) -> Image:
         """(H, W, 3) BGR front of a place that is not empty, the top row highest, `TEXELS_PER_M` to the
         metre, as seen from the aisle."""
         goods = place.goods

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from flightd.core.camera_view import CameraView
 from flightd.core.geometry import Matrix
 from flightd.core.types import Image
-from flightd.core.view import CameraView
 
 _NEAREST_M = 0.05
 """What reaches nearer to the camera's plane than this is left out."""

@@ -9,21 +9,21 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from flightd.core.camera_view import CameraView, Viewpoint
 from flightd.core.distortion import undistorted
 from flightd.core.geometry import Lens
 from flightd.core.types import Image
-from flightd.core.view import CameraView, Viewpoint
-from flightd.grid.site import Site
-from flightd.sim.appearance import Appearance
-from flightd.sim.effects import Sensor, blur_kernel
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.optics import picture_for
-from flightd.sim.racks.camera import FrontCamera
-from flightd.sim.racks.layout import faces
-from flightd.sim.racks.look import RackLook
+from flightd.sim.floor.appearance import Appearance
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.panels import Pane
-from flightd.sim.racks.scene import Racks, Sight
+from flightd.sim.racks.rack_layout import faces
+from flightd.sim.racks.scene import Racks, Sightline
 from flightd.sim.racks.stock import stock
+from flightd.sim.sensors.camera_effects import Sensor, blur_kernel
+from flightd.sim.sensors.optics import picture_for
+from flightd.site.site import Site
 
 _COARSE = 2
 """The depths of the racks are drawn at a fraction of the resolution."""
@@ -104,7 +104,7 @@ class FrontRenderer:
             cv2.filter2D(picture, -1, kernel, dst=picture, borderType=cv2.BORDER_REPLICATE)
 
 
-def _distance_m(view: Viewpoint, seen: tuple[Sight, ...]) -> float:
+def _distance_m(view: Viewpoint, seen: tuple[Sightline, ...]) -> float:
     """How far ahead along the optical axis the first face is."""
     across = float(view.map_from_image[1, 2])
     reaches = [

@@ -10,14 +10,14 @@ from functools import partial
 
 import numpy as np
 
+from flightd.core.camera_view import CameraView, Viewpoint
 from flightd.core.geometry import Matrix
 from flightd.core.types import Image
-from flightd.core.view import CameraView, Viewpoint
 from flightd.sim.racks.goods import GoodsPainter
-from flightd.sim.racks.layout import BEAM_M, DEPTH_M, UPRIGHT_M, Face, Level, Opening
 from flightd.sim.racks.panels import Pane, Panel, Texture
+from flightd.sim.racks.rack_layout import BEAM_M, DEPTH_M, UPRIGHT_M, Face, Opening, RackLevel
 from flightd.sim.racks.steel import BLUE, ORANGE, back, beam, upright
-from flightd.sim.racks.stock import Goods, Place
+from flightd.sim.racks.stock import Goods, StockPlace
 
 _REACH_M = 7.0
 """Along the aisle, what is farther is not drawn."""
@@ -36,7 +36,7 @@ _SIDE_TONES = ((40.0, 62.0, 84.0), (46.0, 68.0, 88.0), (36.0, 54.0, 72.0))
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
+class Sightline:
     """A face before a camera at `at`, of which what lies between two x may be in the picture."""
 
     face: Face
@@ -70,7 +70,7 @@ class Racks:
     def __init__(
         self,
         faces: tuple[Face, ...],
-        places: Mapping[str, Place],
+        places: Mapping[str, StockPlace],
         density: Callable[[str], float | None],
         seed: int,
     ) -> None:
@@ -85,9 +85,9 @@ class Racks:
             height_m: Texture.of(upright(height_m, seed)) for height_m in {f.shelf.height_m for f in faces}
         }
 
-    def sights(self, view: CameraView) -> tuple[Sight, ...]:
+    def sights(self, view: CameraView) -> tuple[Sightline, ...]:
         """The faces that look at the camera from both sides of its aisle, and what of them is in view."""
-        found: list[Sight] = []
+        found: list[Sightline] = []
         at = view.viewpoint
         for inward in (-1.0, 1.0):
             ahead = [
@@ -98,16 +98,16 @@ class Racks:
                 if (face.y_m - at.y_m) * inward < nearest + _SAME_PLANE_M:
                     x0_m, x1_m = _reach(face, view)
                     if x0_m < face.x1_m and face.x0_m < x1_m:
-                        found.append(Sight(face, at, x0_m, x1_m))
+                        found.append(Sightline(face, at, x0_m, x1_m))
         return tuple(found)
 
-    def draw_depths(self, pane: Pane, sights: tuple[Sight, ...]) -> None:
+    def draw_depths(self, pane: Pane, sights: tuple[Sightline, ...]) -> None:
         """What lies in the shade between face and back: decks, backs, the goods' sides.  `pane` may be
         coarse: all this is dim and out of focus."""
         for sight in sights:
             places = [self._places[opening.location.code] for opening in sight.openings()]
             below_m = max(sight.face.levels[0].deck_m - BEAM_M, 0.01)
-            levels = (Level(0.0, below_m), *sight.face.levels)
+            levels = (RackLevel(0.0, below_m), *sight.face.levels)
             # what is nearer to the camera's height hides what is farther from it
             above = [level for level in levels if level.deck_m > sight.at.height_m]
             for level in (*levels[: len(levels) - len(above)], *reversed(above)):
@@ -122,7 +122,7 @@ class Racks:
                             _flat(x0_m, x1_m, *sight.depth_m(1.0), level.deck_m - BEAM_M), _ROOF_TONE
                         )
 
-    def draw_fronts(self, pane: Pane, sights: tuple[Sight, ...]) -> None:
+    def draw_fronts(self, pane: Pane, sights: tuple[Sightline, ...]) -> None:
         """Goods, then the steel before them, then the sheets that hang before all."""
         for sight in sights:
             stocked = [
@@ -140,7 +140,7 @@ class Racks:
                 if goods is not None and goods.covered:
                     self._draw_sheet(pane, sight.face, place, goods)
 
-    def _draw_hollow(self, pane: Pane, sight: Sight, x0_m: float, x1_m: float, level: Level) -> None:
+    def _draw_hollow(self, pane: Pane, sight: Sightline, x0_m: float, x1_m: float, level: RackLevel) -> None:
         face = sight.face
         deep_m = sight.depth_m(1.0)[1]
         choice = (round(x0_m * 10) * 31 + round(level.deck_m * 10) * 7 + self._seed) % _BACKS
@@ -151,7 +151,7 @@ class Racks:
             pane.polygon(_flat(x0_m, x1_m, near_m, middle_m, level.deck_m), _DECK_TONE)
             pane.polygon(_flat(x0_m, x1_m, middle_m, deep_m, level.deck_m), _DECK_FAR_TONE)
 
-    def _draw_sheet(self, pane: Pane, face: Face, place: Place, goods: Goods) -> None:
+    def _draw_sheet(self, pane: Pane, face: Face, place: StockPlace, goods: Goods) -> None:
         level, x_m, half_m = place.opening.level, place.opening.x_m, place.opening.width_m / 2
         low_m, high_m = level.deck_m + _SHEET_LOW_M, level.top_m + BEAM_M
         y_m = face.y_m - face.inward * _SHEET_BEFORE_M
@@ -159,7 +159,7 @@ class Racks:
         make = partial(self._painter.sheet, goods, high_m - low_m, 2 * half_m)
         pane.panel(panel, partial(self._picture, (place.code, "sheet"), make), _SIDE_TONES[0])
 
-    def _draw_steel(self, pane: Pane, sight: Sight) -> None:
+    def _draw_steel(self, pane: Pane, sight: Sightline) -> None:
         face = sight.face
         for x0_m, x1_m in sight.bays():
             for number, level in enumerate(face.levels):
@@ -204,7 +204,7 @@ def _panel(face: Face, y_m: float, x0_m: float, x1_m: float, low_m: float, high_
     return Panel(y_m, left_m, right_m, low_m, high_m)
 
 
-def _goods_panel(face: Face, place: Place, goods: Goods) -> Panel:
+def _goods_panel(face: Face, place: StockPlace, goods: Goods) -> Panel:
     x_m = place.opening.x_m + face.right * goods.right_m
     half_m, deck_m = goods.width_m / 2, place.opening.level.deck_m
     y_m = face.y_m + face.inward * goods.recess_m
@@ -218,7 +218,7 @@ def _flat(x0_m: float, x1_m: float, y0_m: float, y1_m: float, height_m: float) -
     )
 
 
-def _draw_sides(pane: Pane, sight: Sight, place: Place, goods: Goods) -> None:
+def _draw_sides(pane: Pane, sight: Sightline, place: StockPlace, goods: Goods) -> None:
     """The side of the goods that is turned to the camera."""
     panel = _goods_panel(sight.face, place, goods)
     x0_m, x1_m = sorted((panel.left_m, panel.right_m))

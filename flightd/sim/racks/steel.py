@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
+from flightd.sim.racks.code_symbols import Symbol, Symbology, modules
 from flightd.sim.racks.goods import TEXELS_PER_M
-from flightd.sim.racks.layout import BEAM_M, UPRIGHT_M, Opening
-from flightd.sim.racks.symbols import Symbol, Symbology, modules
+from flightd.sim.racks.rack_layout import BEAM_M, UPRIGHT_M, Opening
 
 Floats: TypeAlias = NDArray[np.float32]
 

@@ -15,10 +15,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from flightd.core.inventory import LocationState
-from flightd.grid.site import Site
-from flightd.sim.racks.layout import Opening, openings
-from flightd.sim.racks.symbols import Symbol, Symbology, modules
-from flightd.sim.racks.texts import (
+from flightd.sim.racks.code_symbols import Symbol, Symbology, modules
+from flightd.sim.racks.label_texts import (
     Numbers,
     gtin_13,
     gtin_with_serial,
@@ -27,6 +25,8 @@ from flightd.sim.racks.texts import (
     pallet_name,
     sscc,
 )
+from flightd.sim.racks.rack_layout import Opening, openings
+from flightd.site.site import Site
 
 _LINEAR_PX = (2.75, 3.3)
 _MATRIX_PX = (3.0, 4.2)
@@ -72,7 +72,7 @@ class Condition(enum.StrEnum):
         return self in {Condition.CLEAN, Condition.TILTED, Condition.GLOSSY}
 
 
-class Situation(enum.StrEnum):
+class StockSituation(enum.StrEnum):
     """How a place is; each has a share in `StockShares`, what is left over is `clean`.
 
     `missing` has goods without a label, and so has `dark`, whose goods are dark and matte besides."""
@@ -95,21 +95,21 @@ class Situation(enum.StrEnum):
 
 
 _STATES = {
-    Situation.EMPTY: LocationState.EMPTY,
-    Situation.SEVERAL: LocationState.SEVERAL,
-    Situation.TORN: LocationState.UNREADABLE,
-    Situation.TOO_SMALL: LocationState.UNREADABLE,
-    Situation.MISSING: LocationState.UNREADABLE,
-    Situation.OCCLUDED: LocationState.OCCLUDED,
-    Situation.DARK: LocationState.UNREADABLE,
+    StockSituation.EMPTY: LocationState.EMPTY,
+    StockSituation.SEVERAL: LocationState.SEVERAL,
+    StockSituation.TORN: LocationState.UNREADABLE,
+    StockSituation.TOO_SMALL: LocationState.UNREADABLE,
+    StockSituation.MISSING: LocationState.UNREADABLE,
+    StockSituation.OCCLUDED: LocationState.OCCLUDED,
+    StockSituation.DARK: LocationState.UNREADABLE,
 }
-_UNLABELLED = {Situation.MISSING, Situation.DARK}
+_UNLABELLED = {StockSituation.MISSING, StockSituation.DARK}
 _CONDITIONS = {
-    Situation.TILTED: Condition.TILTED,
-    Situation.GLOSSY: Condition.GLOSSY,
-    Situation.TORN: Condition.TORN,
-    Situation.TOO_SMALL: Condition.TOO_SMALL,
-    Situation.OCCLUDED: Condition.COVERED,
+    StockSituation.TILTED: Condition.TILTED,
+    StockSituation.GLOSSY: Condition.GLOSSY,
+    StockSituation.TORN: Condition.TORN,
+    StockSituation.TOO_SMALL: Condition.TOO_SMALL,
+    StockSituation.OCCLUDED: Condition.COVERED,
 }
 
 
@@ -137,13 +137,13 @@ class StockShares:
         """The situations that have a share."""
         return tuple(field.name for field in fields(cls))
 
-    def situation(self, draw: float) -> Situation:
+    def situation(self, draw: float) -> StockSituation:
         """The situation for a number drawn from 0..1."""
         for name in self.names():
             draw -= getattr(self, name)
             if draw < 0.0:
-                return Situation(name)
-        return Situation.CLEAN
+                return StockSituation(name)
+        return StockSituation.CLEAN
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,11 +187,11 @@ class Goods:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class StockPlace:
     """One location with what is there; `goods` None is an empty place."""
 
     opening: Opening
-    situation: Situation
+    situation: StockSituation
     goods: Goods | None
     labels: tuple[Label, ...]
 
@@ -205,7 +205,7 @@ class Place:
         return tuple(label.symbol.text for label in self.labels if label.condition.is_readable)
 
 
-def stock(site: Site, shares: StockShares, focal_px: float, seed: int) -> Mapping[str, Place]:
+def stock(site: Site, shares: StockShares, focal_px: float, seed: int) -> Mapping[str, StockPlace]:
     """What is at every location of the site, by its code, in the order of the map."""
     found = {}
     order = {code: number for number, code in enumerate(site.locations)}
@@ -221,20 +221,20 @@ def stock(site: Site, shares: StockShares, focal_px: float, seed: int) -> Mappin
 
 def _place(
     opening: Opening, shares: StockShares, px_per_m: float, serial: tuple[int, int], rng: np.random.Generator
-) -> Place:
+) -> StockPlace:
     situation = shares.situation(float(rng.random()))
-    if situation is Situation.EMPTY:
-        return Place(opening, situation, None, ())
-    several = situation is Situation.SEVERAL
+    if situation is StockSituation.EMPTY:
+        return StockPlace(opening, situation, None, ())
+    several = situation is StockSituation.SEVERAL
     width_m = opening.width_m * float(rng.uniform(0.86, 0.95))
     height_m = opening.level.height_m * float(rng.uniform(0.78, 0.93))
     right_m = float(rng.uniform(-0.4, 0.4)) * (opening.width_m - width_m)
     recess_m = float(rng.uniform(0.0, 0.05))
     looks = int(rng.integers(2**31))
-    covered, dark = situation is Situation.OCCLUDED, situation is Situation.DARK or _is_dark(looks)
+    covered, dark = situation is StockSituation.OCCLUDED, situation is StockSituation.DARK or _is_dark(looks)
     goods = Goods(width_m, height_m, right_m, recess_m, covered, looks, dark)
     if situation in _UNLABELLED:
-        return Place(opening, situation, goods, ())
+        return StockPlace(opening, situation, goods, ())
     condition = _CONDITIONS.get(situation, Condition.CLEAN)
     if several:
         symbols = [
@@ -247,7 +247,7 @@ def _place(
         _label(symbol, condition, goods, opening, px_per_m, side, rng)
         for symbol, side in zip(symbols, (-1, 1) if several else (0,), strict=True)
     )
-    return Place(opening, situation, goods, labels)
+    return StockPlace(opening, situation, goods, labels)
 
 
 def _is_dark(looks: int) -> bool:

@@ -11,17 +11,17 @@ from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import VirtualLoop
-from flightd.sim.airframe import Airframe
-from flightd.sim.ardrone.commands import Command, parse
+from flightd.runtime.event_loops import VirtualLoop
+from flightd.sim.ardrone.at_commands import DroneCommand, parse
 from flightd.sim.ardrone.drone import Drone, DroneOptions
-from flightd.sim.ardrone.server import ArDroneServer, Ports
+from flightd.sim.ardrone.server import ArDroneServer, DronePorts
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
-from flightd.sim.sensors import SensorParams, Sensors
+from flightd.sim.plant.airframe import Airframe
+from flightd.sim.sensors.instruments import SensorParams, Sensors
 
 T = TypeVar("T")
 
-ANY_PORTS = Ports(at=0, navdata=0, video=0, control=0)
+ANY_PORTS = DronePorts(at=0, navdata=0, video=0, control=0)
 
 
 def virtually(main: Callable[[], Coroutine[Any, Any, T]]) -> T:
@@ -46,8 +46,8 @@ def make_drone(
 class Ear:
     """Writes down every command that reaches the drone, and may swallow some."""
 
-    def __init__(self, drone: Drone, lose: Callable[[Command], bool] = lambda _command: False) -> None:
-        self.commands: list[tuple[int, Command]] = []
+    def __init__(self, drone: Drone, lose: Callable[[DroneCommand], bool] = lambda _command: False) -> None:
+        self.commands: list[tuple[int, DroneCommand]] = []
         obey = drone.command
 
         def hear(datagram: bytes, now_ns: int) -> None:
@@ -57,7 +57,7 @@ class Ear:
 
         drone.command = hear  # type: ignore[method-assign]
 
-    def named(self, *names: str) -> list[Command]:
+    def named(self, *names: str) -> list[DroneCommand]:
         return [command for _, command in self.commands if command.name in names]
 
 

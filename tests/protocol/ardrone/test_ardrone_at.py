@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from flightd.adapters.vehicle.ardrone import at
 from flightd.adapters.vehicle.ardrone.at import AtCommand, AtEncoder
-from flightd.sim.ardrone import commands
+from flightd.sim.ardrone import at_commands as commands
 
 
 def test_the_first_command_is_number_one_and_the_counter_only_grows() -> None:

@@ -8,12 +8,12 @@ import math
 
 import pytest
 
-from flightd.adapters.vehicle.ardrone.config import parse_text, same_value, wanted_values
-from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, Camera, profile_id, settings_of
+from flightd.adapters.vehicle.ardrone.configurator import parse_text, same_value, wanted_values
+from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, DroneCamera, profile_id, settings_of
 from flightd.control.limits import Limits
 from flightd.core.types import Demand
 from flightd.sim.ardrone import configuration
-from flightd.sim.ardrone.commands import Command
+from flightd.sim.ardrone.at_commands import DroneCommand
 from flightd.sim.ardrone.configuration import Configuration, Ids
 from flightd.sim.ardrone.drone import DroneOptions
 from tests.protocol.ardrone.bench import Bench, Ear, bench, make_drone, virtually
@@ -57,7 +57,7 @@ def test_the_next_config_waits_until_the_acknowledge_bit_is_cleared() -> None:
         configs: list[tuple[str | None, bool]] = []
         obey = drone._config
 
-        def config(command: Command, named: Ids | None, now_ns: int) -> None:
+        def config(command: DroneCommand, named: Ids | None, now_ns: int) -> None:
             configs.append((command.text(0), drone._ack))
             obey(command, named, now_ns)
 
@@ -92,7 +92,7 @@ def test_lost_config_and_control_datagrams_are_repeated() -> None:
         drone = make_drone()
         counts = {"CONFIG": 0, "CTRL": 0}
 
-        def lose(command: Command) -> bool:
+        def lose(command: DroneCommand) -> bool:
             if command.name not in counts:
                 return False
             counts[command.name] += 1
@@ -191,10 +191,10 @@ def test_the_camera_is_switched_and_known_to_be_switched_only_after_settling() -
     async def main() -> None:
         async with bench(camera_settle_s=0.3) as b:
             await b.configured()
-            b.vehicle.select_camera(Camera.FRONT)
+            b.vehicle.select_camera(DroneCamera.FRONT)
             assert b.vehicle.camera_since_ns is None
             await b.until(lambda: b.vehicle.camera_since_ns is not None, limit_s=2.0)
-            assert b.drone.configuration.number("video:video_channel") == Camera.FRONT
+            assert b.drone.configuration.number("video:video_channel") == DroneCamera.FRONT
             ahead_ns = (b.vehicle.camera_since_ns or 0) - b.clock.now_ns()
             assert 290_000_000 <= ahead_ns <= 300_000_000
 

@@ -21,7 +21,7 @@ from flightd.sim.ardrone.drone import (
     BIT_FLY,
     BIT_VBAT_LOW,
     DroneOptions,
-    Major,
+    MajorState,
 )
 from tests.protocol.ardrone import golden
 from tests.protocol.ardrone.bench import make_drone, virtually
@@ -40,7 +40,7 @@ async def up(client: RawClient) -> None:
     """Configure demo navdata, take off, wait until the drone hovers."""
     client.wake()
     await client.configure("general:navdata_demo", "TRUE")
-    while client.server.drone.major != Major.HOVERING:
+    while client.server.drone.major != MajorState.HOVERING:
         await client.keep_saying(0.1, FLY, HOVER)
 
 
@@ -96,7 +96,7 @@ def test_only_larger_numbers_are_obeyed_and_one_starts_afresh() -> None:
                 client.raw(datagram)
                 await asyncio.sleep(0.01)
                 assert drone.last_sequence == last
-            assert drone.major == Major.LANDED
+            assert drone.major == MajorState.LANDED
 
     virtually(main)
 
@@ -139,7 +139,7 @@ def test_unknown_commands_count_as_traffic_and_do_nothing() -> None:
                 0.3, "LED,0,1084227584,2", "ANIM,18,1000", "PMODE,2", "MISC,2,20,2000,3000"
             )
             assert not client.state & BIT_COM_WATCHDOG
-            assert client.server.drone.major == Major.LANDED
+            assert client.server.drone.major == MajorState.LANDED
 
     virtually(main)
 
@@ -159,7 +159,13 @@ def test_take_off_and_landing_pass_through_their_states(fly: str) -> None:
                     major = demo_fields(client.newest)[0] >> 16
                     if len(client.newest) > 24 and major not in seen[-1:]:
                         seen.append(major)
-            assert seen == [Major.LANDED, Major.TAKE_OFF, Major.HOVERING, Major.LANDING, Major.LANDED]
+            assert seen == [
+                MajorState.LANDED,
+                MajorState.TAKE_OFF,
+                MajorState.HOVERING,
+                MajorState.LANDING,
+                MajorState.LANDED,
+            ]
             assert drone.airframe.touchdown_mps < 0.6
             assert not client.state & BIT_FLY
 
@@ -171,7 +177,7 @@ def test_a_weak_battery_refuses_without_a_word() -> None:
         async with raw_drone(make_drone(battery_frac=0.19)) as client:
             client.wake()
             await client.keep_saying(3.0, FLY, HOVER)
-            assert client.server.drone.major == Major.LANDED
+            assert client.server.drone.major == MajorState.LANDED
             assert client.state & BIT_VBAT_LOW
             assert not client.state & BIT_EMERGENCY
 
@@ -249,7 +255,7 @@ def test_without_commands_it_keeps_the_last_tilt_and_then_lands() -> None:
             await asyncio.sleep(1.5)
             assert drone.airframe.vx_mps > speed + 0.3
             await asyncio.sleep(6.0)
-            assert drone.major == Major.LANDED
+            assert drone.major == MajorState.LANDED
             assert drone.airframe.on_floor
 
     virtually(main)
@@ -394,7 +400,7 @@ def test_the_recorded_sessions_of_the_npm_client_are_obeyed(kind: str) -> None:
             assert drone.last_sequence == sent[-1]
             assert drone.ignored_commands == 1, "its counter starts at 0: that one is stale"
             assert drone.configuration.flag("general:navdata_demo")
-            assert drone.major in (Major.TAKE_OFF, Major.LANDING)
+            assert drone.major in (MajorState.TAKE_OFF, MajorState.LANDING)
             # Without its CTRL 5 the acknowledge bit still stands, and the second CONFIG is lost.
             assert client.server.channel == (1 if kind == "ack" else 0)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from flightd.sim.ardrone.telemetry import Report, bootstrap, packet
+from flightd.sim.ardrone.navdata_writer import NavdataReport, bootstrap, packet
 from tests.protocol.ardrone import golden
 
 GOLDEN = golden.recorded()
@@ -16,7 +16,7 @@ DEMO_PACKETS = [p for p in GOLDEN["navdata"] if p["name"].startswith("demo_")]
 @pytest.mark.parametrize("recorded", DEMO_PACKETS, ids=lambda p: p["name"])
 def test_demo_packets_are_written_byte_for_byte(recorded: dict[str, Any]) -> None:
     raw, demo = recorded["raw"], recorded["raw"]["demo"]
-    report = Report(
+    report = NavdataReport(
         state=raw["state"],
         sequence=raw["sequence"],
         major=demo["major"],

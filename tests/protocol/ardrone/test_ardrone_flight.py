@@ -11,14 +11,14 @@ import pytest
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.runtime.clock import LoopClock
-from flightd.sim.ardrone.commands import Command
-from flightd.sim.ardrone.drone import BIT_CUTOUT, DroneOptions, Major
+from flightd.sim.ardrone.at_commands import DroneCommand
+from flightd.sim.ardrone.drone import BIT_CUTOUT, DroneOptions, MajorState
 from flightd.sim.ardrone.server import ArDroneServer
-from flightd.sim.sensors import SensorParams
+from flightd.sim.sensors.instruments import SensorParams
 from tests.protocol.ardrone.bench import ANY_PORTS, Ear, bench, ended, make_drone, settings_for, virtually
 
 
-def ref_bits(commands: list[Command]) -> list[int]:
+def ref_bits(commands: list[DroneCommand]) -> list[int]:
     return [bits & 0x300 for command in commands if (bits := command.integer(0)) is not None]
 
 
@@ -109,8 +109,8 @@ def test_late_setpoints_turn_into_hover_and_the_drone_brakes() -> None:
         async with bench(setpoint_timeout_s=0.15) as b:
             await b.hovering()
             await b.steer(1.5, pitch_rad=-0.1)
-            assert b.drone.major == Major.FLYING
-            took_s = await b.until(lambda: b.drone.major != Major.FLYING)
+            assert b.drone.major == MajorState.FLYING
+            took_s = await b.until(lambda: b.drone.major != MajorState.FLYING)
             assert 0.1 < took_s < 0.2
             await b.until(lambda: b.state.mode == "hovering")
             assert math.hypot(b.drone.airframe.vx_mps, b.drone.airframe.vy_mps) < 0.25
@@ -123,7 +123,7 @@ def test_a_setpoint_without_any_motion_holds_the_place() -> None:
         async with bench() as b:
             await b.hovering()
             await b.steer(1.0)
-            assert b.drone.major == Major.HOVERING
+            assert b.drone.major == MajorState.HOVERING
 
     virtually(main)
 
@@ -144,13 +144,13 @@ def test_sinking_low_becomes_the_drones_own_landing() -> None:
     async def main() -> None:
         async with bench(land_below_m=0.35) as b:
             await b.hovering()
-            await b.steer(8.0, climb_mps=-0.3, while_=lambda: b.drone.major != Major.LANDING)
+            await b.steer(8.0, climb_mps=-0.3, while_=lambda: b.drone.major != MajorState.LANDING)
             assert 0.2 < b.drone.airframe.height_m < 0.4
             assert b.state.in_control
             await b.steer(5.0, climb_mps=-0.2, while_=lambda: b.state.armed)
             assert (b.state.landed, b.state.mode) == (LandedState.ON_GROUND, "landed")
             await b.steer(3.0, climb_mps=0.5)
-            assert b.drone.major == Major.LANDED, "a finished landing does not start again by itself"
+            assert b.drone.major == MajorState.LANDED, "a finished landing does not start again by itself"
 
     virtually(main)
 
@@ -164,7 +164,7 @@ def test_with_a_deaf_sonar_the_height_is_unknown_and_a_descent_becomes_a_landing
             await b.steer(0.3)
             assert math.isnan(b.state.height_m)
             await b.steer(0.3, climb_mps=-0.3)
-            assert b.drone.major == Major.LANDING
+            assert b.drone.major == MajorState.LANDING
 
     virtually(main)
 
@@ -205,7 +205,7 @@ def test_standby_leaves_a_flying_drone_in_the_air() -> None:
             await b.hovering()
             b.vehicle.demand(Demand.STANDBY)
             await asyncio.sleep(3.0)
-            assert drone.major == Major.HOVERING
+            assert drone.major == MajorState.HOVERING
 
     virtually(main)
 
@@ -219,7 +219,7 @@ def test_an_adapter_that_starts_beside_a_flying_drone_does_not_land_it() -> None
         async with bench(drone) as b:
             b.vehicle.demand(Demand.STANDBY)
             await asyncio.sleep(6.0)
-            assert drone.major == Major.HOVERING
+            assert drone.major == MajorState.HOVERING
 
     async def nothing() -> None:
         """The first daemon was killed: it says nothing more."""
@@ -252,7 +252,7 @@ def test_a_drone_that_lands_by_itself_is_not_sent_up_again() -> None:
             await b.until(lambda: not b.state.armed)
             b.drone.airframe.battery_frac = 0.9
             await asyncio.sleep(3.0)
-            assert b.drone.major == Major.LANDED
+            assert b.drone.major == MajorState.LANDED
             b.vehicle.demand(Demand.STANDBY)
             b.vehicle.demand(Demand.FLY)
             await b.until(lambda: b.state.mode == "hovering")
@@ -279,7 +279,7 @@ def test_an_emergency_from_before_is_cleared_when_flight_is_demanded() -> None:
     async def main() -> None:
         drone = make_drone()
         drone.emergency = True
-        drone.major = Major.DEFAULT
+        drone.major = MajorState.DEFAULT
         ear = Ear(drone)
         async with bench(drone) as b:
             await b.configured()
@@ -329,7 +329,7 @@ def test_hands_off_in_the_air_hovers_once_and_falls_silent() -> None:
             assert ear.commands[-1][1].sequence == 1, "whoever takes over is obeyed at once"
             assert ear.named("PCMD")[0].integer(0) == 0
             await asyncio.sleep(1.5)
-            assert drone.major == Major.LANDING, "nobody took over: it lands itself"
+            assert drone.major == MajorState.LANDING, "nobody took over: it lands itself"
 
     virtually(main)
 
@@ -356,7 +356,7 @@ def test_a_drone_found_flying_that_nobody_asks_for_is_held_then_landed() -> None
             assert "nothing demanded" in state.refusal
             await asyncio.sleep(8.0)
             seen.append(drone.major)
-            assert seen == [Major.HOVERING, Major.HOVERING, Major.LANDING, Major.LANDED]
+            assert seen == [MajorState.HOVERING, MajorState.HOVERING, MajorState.LANDING, MajorState.LANDED]
             await ended(running)
             await ended(serving)
 
@@ -376,7 +376,7 @@ def test_what_another_pilot_starts_in_hands_off_is_not_interfered_with() -> None
             for number in range(5000, 5400):
                 obey(b"AT*REF=%d,290718208\r" % number, b.clock.now_ns())
                 await asyncio.sleep(0.03)
-            assert drone.major == Major.HOVERING
+            assert drone.major == MajorState.HOVERING
             assert ear.named("REF", "PCMD") == []
 
     virtually(main)
@@ -395,7 +395,7 @@ def test_another_pilot_takes_over_unhindered() -> None:
                     b.clock.now_ns(),
                 )
                 await asyncio.sleep(0.03)
-            assert drone.major == Major.HOVERING
+            assert drone.major == MajorState.HOVERING
             assert drone.last_sequence == 398
 
     virtually(main)
@@ -409,7 +409,7 @@ def test_cancelled_in_flight_the_adapter_orders_a_landing() -> None:
             await b.hovering()
             ear.commands.clear()
         assert ref_bits(ear.named("REF"))[-3:] == [0, 0, 0]
-        assert drone.major == Major.LANDING
+        assert drone.major == MajorState.LANDING
 
     virtually(main)
 

@@ -14,14 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightd.adapters.vehicle.ardrone import at, navdata
-from flightd.adapters.vehicle.ardrone.config import parse_text
+from flightd.adapters.vehicle.ardrone.configurator import parse_text
 from flightd.adapters.vehicle.ardrone.navdata import NavdataError, NavdataOrder
 from flightd.adapters.vehicle.ardrone.pave import PaveFrame, PaveParser
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
-from flightd.adapters.vehicle.ardrone.telemetry import Telemetry
-from flightd.sim.ardrone.commands import parse
+from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
+from flightd.sim.ardrone.at_commands import parse
 from flightd.sim.ardrone.drone import DroneOptions
-from flightd.sim.ardrone.telemetry import ALL_OPTIONS, OPTION_BYTES, Report, packet
+from flightd.sim.ardrone.navdata_writer import ALL_OPTIONS, OPTION_BYTES, NavdataReport, packet
 from tests.protocol.ardrone import golden
 from tests.protocol.ardrone.bench import make_drone
 
@@ -60,7 +60,7 @@ def good_packets() -> Iterator[bytes]:
     sequence = 1
     while True:
         sequence += 1
-        report = Report(
+        report = NavdataReport(
             state=0x0F800490,
             sequence=sequence,
             major=4,
@@ -75,8 +75,10 @@ def good_packets() -> Iterator[bytes]:
 def test_navdata_survives_anything_and_loses_nothing() -> None:
     rng = random.Random(20)
     corpus = [bytes.fromhex(p["hex"]) for p in golden.recorded()["navdata"]]
-    corpus.append(packet(Report(state=0x0F800490, sequence=9, major=4, battery_percent=70), ALL_OPTIONS))
-    order, telemetry = NavdataOrder(), Telemetry(0)
+    corpus.append(
+        packet(NavdataReport(state=0x0F800490, sequence=9, major=4, battery_percent=70), ALL_OPTIONS)
+    )
+    order, telemetry = NavdataOrder(), NavdataTelemetry(0)
     good = good_packets()
     refused = taken = sent = now_ns = 0
     for case in range(CASES):
@@ -89,7 +91,7 @@ def test_navdata_survives_anything_and_loses_nothing() -> None:
             refused += 1
         else:
             assert data[:4] in (b"\x88\x77\x66\x55", b"\x89\x77\x66\x55")
-            Telemetry(0).observe(read, now_ns)
+            NavdataTelemetry(0).observe(read, now_ns)
         if case % 10 == 0:
             sent += 1
             read = navdata.parse(next(good))
@@ -124,7 +126,7 @@ def test_any_chain_of_options_under_a_right_checksum_is_read_or_refused(
     assert read.sequence == sequence
     assert read.state == state
     assert dict(read.options) == dict(options)
-    telemetry = Telemetry(0)
+    telemetry = NavdataTelemetry(0)
     telemetry.observe(read, 0)
     assert telemetry.battery_percent <= 100
 
@@ -231,7 +233,7 @@ def test_every_known_option_may_hold_anything(tag: int, payload: bytes) -> None:
     except NavdataError:
         assert tag == 0
         return
-    telemetry = Telemetry(0)
+    telemetry = NavdataTelemetry(0)
     telemetry.observe(read, 0)
 
 

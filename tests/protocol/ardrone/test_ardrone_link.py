@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from flightd.adapters.vehicle.ardrone.settings import Camera
+from flightd.adapters.vehicle.ardrone.settings import DroneCamera
 from flightd.core.types import Demand
-from flightd.sim.ardrone.drone import Major
-from flightd.sim.ardrone.telemetry import Report, packet
+from flightd.sim.ardrone.drone import MajorState
+from flightd.sim.ardrone.navdata_writer import NavdataReport, packet
 from flightd.sim.autopilot.radio import RadioParams
 from tests.protocol.ardrone.bench import Ear, bench, make_drone, virtually
 
@@ -108,8 +108,8 @@ def test_setpoints_stop_at_the_drone_before_a_lost_link_ends() -> None:
             drone.wake = lambda: None  # type: ignore[method-assign]
             await b.steer(1.0, pitch_rad=-0.05)
             assert ear.named("PCMD")[-1].integer(0) == 0, "hover: flying blind"
-            assert drone.major in (Major.GO_TO_FIX, Major.HOVERING)
-            await b.until(lambda: drone.major == Major.LANDING, limit_s=2.0)
+            assert drone.major in (MajorState.GO_TO_FIX, MajorState.HOVERING)
+            await b.until(lambda: drone.major == MajorState.LANDING, limit_s=2.0)
             assert "no navdata for 2 s" in b.state.refusal
 
     virtually(main)
@@ -121,11 +121,11 @@ def test_after_a_long_gap_the_drone_stays_down_until_flight_is_demanded_anew() -
         async with bench(drone) as b:
             await b.hovering()
             b.server.radio = False
-            await b.until(lambda: drone.major == Major.LANDED, limit_s=15.0)
+            await b.until(lambda: drone.major == MajorState.LANDED, limit_s=15.0)
             b.server.radio = True
             await b.until(lambda: b.state.mode == "landed")
             await asyncio.sleep(8.0)
-            assert drone.major == Major.LANDED
+            assert drone.major == MajorState.LANDED
             assert not b.state.in_control
             b.vehicle.demand(Demand.STANDBY)
             await b.until(lambda: b.vehicle._flight.configured)
@@ -143,10 +143,10 @@ def test_what_was_only_being_watched_is_not_sent_up_again_after_a_long_gap(deman
             await b.hovering()
             b.vehicle.demand(demand)
             b.server.radio = False
-            await b.until(lambda: drone.major == Major.LANDED, limit_s=15.0)
+            await b.until(lambda: drone.major == MajorState.LANDED, limit_s=15.0)
             b.server.radio = True
             await asyncio.sleep(5.0)
-            assert drone.major == Major.LANDED
+            assert drone.major == MajorState.LANDED
 
     virtually(main)
 
@@ -233,7 +233,7 @@ def test_a_bad_radio_delays_and_does_not_stop_a_flight() -> None:
             assert sum(b.sent) > 0.95 * len(b.sent)
             assert b.drone.airframe.vx_mps > 0.3
             await b.steer(10.0, climb_mps=-0.3, while_=lambda: b.state.armed)
-            assert (b.drone.major, b.drone.emergency) == (Major.LANDED, False)
+            assert (b.drone.major, b.drone.emergency) == (MajorState.LANDED, False)
 
     virtually(main)
 
@@ -255,7 +255,7 @@ def test_damaged_and_foreign_navdata_costs_nothing() -> None:
         async with bench() as b:
             await b.configured()
             rng = random.Random(3)
-            good = packet(Report(state=0x0F800490, sequence=10, major=2, battery_percent=50), (0,))
+            good = packet(NavdataReport(state=0x0F800490, sequence=10, major=2, battery_percent=50), (0,))
             navdata, client = b.server._navdata, b.server._client
             assert navdata is not None
             b.vehicle.attitudes()
@@ -278,7 +278,7 @@ def test_navdata_that_was_overtaken_is_not_taken() -> None:
             await b.configured()
             navdata, client = b.server._navdata, b.server._client
             assert navdata is not None
-            old = packet(Report(state=0x0F800490, sequence=3, major=3, battery_percent=5), (0,))
+            old = packet(NavdataReport(state=0x0F800490, sequence=3, major=3, battery_percent=5), (0,))
             for _ in range(20):
                 navdata.sendto(old, client)
                 await asyncio.sleep(0.01)
@@ -315,11 +315,11 @@ def test_a_camera_asked_for_during_a_gap_is_switched_when_the_drone_is_back() ->
             await b.configured()
             b.server.radio = False
             await asyncio.sleep(0.1)
-            b.vehicle.select_camera(Camera.FRONT)
+            b.vehicle.select_camera(DroneCamera.FRONT)
             await asyncio.sleep(1.6)
             assert b.vehicle.camera_since_ns is None
             b.server.radio = True
             await b.until(lambda: b.vehicle.camera_since_ns is not None)
-            assert int(b.server.channel) == Camera.FRONT
+            assert int(b.server.channel) == DroneCamera.FRONT
 
     virtually(main)

@@ -14,9 +14,11 @@ from flightd.adapters.vehicle.ardrone.navdata import (
     NavdataOrder,
     parse,
 )
-from flightd.sim.ardrone.telemetry import ALL_OPTIONS, OPTION_BYTES, Report, bootstrap, packet
+from flightd.sim.ardrone.navdata_writer import ALL_OPTIONS, OPTION_BYTES, NavdataReport, bootstrap, packet
 
-REPORT = Report(state=0x0F800490, sequence=7, major=4, battery_percent=80, theta_mdeg=1500.0, altitude_mm=990)
+REPORT = NavdataReport(
+    state=0x0F800490, sequence=7, major=4, battery_percent=80, theta_mdeg=1500.0, altitude_mm=990
+)
 MS = 1_000_000
 
 

@@ -13,20 +13,20 @@ import numpy as np
 import pytest
 
 from flightd.adapters.vehicle.ardrone.camera import SLOTS, ArDroneCamera
+from flightd.adapters.vehicle.ardrone.clock_counters import WrappingCounter
 from flightd.adapters.vehicle.ardrone.pave import FrameType, PaveFrame, PaveParser
-from flightd.adapters.vehicle.ardrone.settings import Camera
-from flightd.adapters.vehicle.ardrone.stamps import WrappingCounter
-from flightd.adapters.vehicle.ardrone.video import MAX_BACKLOG, Backlog, Decoder, Picture, VideoStream
+from flightd.adapters.vehicle.ardrone.settings import DroneCamera
+from flightd.adapters.vehicle.ardrone.video import MAX_BACKLOG, Backlog, DecodedFrame, Decoder, VideoStream
 from flightd.config.paths import shipped
 from flightd.config.site_file import load_site
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.ring import FrameRing, FrameTicket
-from flightd.sim.ardrone.front import front_peer
+from flightd.runtime.frame_ring import FrameRing, FrameTicket
+from flightd.sim.ardrone.front_camera import front_peer
 from flightd.sim.ardrone.server import ArDroneServer
-from flightd.sim.ardrone.video import Channel, Encoder, Packer, is_idr
-from flightd.sim.racks.look import RackLook
+from flightd.sim.ardrone.video import Encoder, Packer, VideoChannel, is_idr
+from flightd.sim.racks.appearance import RackLook
 from tests.protocol.ardrone import golden
 from tests.protocol.ardrone.bench import ANY_PORTS, bench, ended, make_drone, virtually
 
@@ -49,7 +49,9 @@ def number_of(picture: Image) -> int:
 class Watching:
     """A drone that shows numbered pictures, and a stream that receives them."""
 
-    def __init__(self, server: ArDroneServer, stream: VideoStream, pictures: list[Picture], clock: LoopClock):
+    def __init__(
+        self, server: ArDroneServer, stream: VideoStream, pictures: list[DecodedFrame], clock: LoopClock
+    ):
         self.server = server
         self.stream = stream
         self.pictures = pictures
@@ -68,7 +70,7 @@ class Watching:
 async def watching(header_bytes: int = 64, latency_s: float = 0.0) -> AsyncIterator[Watching]:
     clock = LoopClock()
     async with ArDroneServer(make_drone(), clock, ANY_PORTS, video_header_bytes=header_bytes) as server:
-        pictures: list[Picture] = []
+        pictures: list[DecodedFrame] = []
         stream = VideoStream((server.ports.host, server.ports.video), latency_s, clock, pictures.append)
         task = asyncio.create_task(stream.run())
         try:
@@ -147,7 +149,7 @@ def test_a_silent_stream_is_opened_anew_and_waits_for_a_whole_picture() -> None:
 def test_video_that_is_not_there_yet_is_asked_for_again() -> None:
     async def main() -> None:
         clock = LoopClock()
-        pictures: list[Picture] = []
+        pictures: list[DecodedFrame] = []
         async with ArDroneServer(make_drone(), clock, ANY_PORTS) as server:
             ports = server.ports
         stream = VideoStream((ports.host, ports.video), 0.0, clock, pictures.append)
@@ -275,7 +277,7 @@ def test_the_emulated_stream_is_what_the_drone_sends() -> None:
 def test_each_picture_goes_to_the_camera_it_shows_and_none_during_the_switch() -> None:
     async def main() -> None:
         async with bench() as b:
-            tickets: dict[Camera, list[FrameTicket]] = {Camera.DOWN: [], Camera.FRONT: []}
+            tickets: dict[DroneCamera, list[FrameTicket]] = {DroneCamera.DOWN: [], DroneCamera.FRONT: []}
             camera = ArDroneCamera(
                 b.vehicle,
                 0.0,
@@ -285,7 +287,10 @@ def test_each_picture_goes_to_the_camera_it_shows_and_none_during_the_switch() -
             task = asyncio.create_task(camera.run())
             await b.configured()
             colours = {0: (60, 60, 220), 1: (60, 220, 60)}
-            seen: dict[Camera, list[np.ndarray[Any, Any]]] = {Camera.DOWN: [], Camera.FRONT: []}
+            seen: dict[DroneCamera, list[np.ndarray[Any, Any]]] = {
+                DroneCamera.DOWN: [],
+                DroneCamera.FRONT: [],
+            }
 
             async def film(count: int) -> None:
                 for n in range(count):
@@ -302,14 +307,14 @@ def test_each_picture_goes_to_the_camera_it_shows_and_none_during_the_switch() -
                         taken.clear()
 
             await film(60)
-            b.vehicle.select_camera(Camera.FRONT)
+            b.vehicle.select_camera(DroneCamera.FRONT)
             await film(60)
             assert camera.unassigned > 0
-            assert len(seen[Camera.DOWN]) > 20
-            assert len(seen[Camera.FRONT]) > 20
-            for top in seen[Camera.DOWN][1:]:
+            assert len(seen[DroneCamera.DOWN]) > 20
+            assert len(seen[DroneCamera.FRONT]) > 20
+            for top in seen[DroneCamera.DOWN][1:]:
                 assert top[1] > top[2] + 60
-            for top in seen[Camera.FRONT]:
+            for top in seen[DroneCamera.FRONT]:
                 assert top[2] > top[1] + 60
             await ended(task)
 
@@ -322,7 +327,7 @@ def test_the_front_channel_shows_the_racks_and_the_bottom_one_the_floor() -> Non
     async def main() -> None:
         async with bench() as b:
             taken: list[FrameTicket] = []
-            camera = ArDroneCamera(b.vehicle, 0.0, b.clock, dict.fromkeys(Camera, taken.append))
+            camera = ArDroneCamera(b.vehicle, 0.0, b.clock, dict.fromkeys(DroneCamera, taken.append))
             front = front_peer(b.server, site, RackLook(), 1, b.clock)
             tasks = [asyncio.create_task(part.run()) for part in (camera, front)]
             await b.configured()
@@ -332,7 +337,7 @@ def test_the_front_channel_shows_the_racks_and_the_bottom_one_the_floor() -> Non
                 taken.clear()
                 for _ in range(60):
                     await asyncio.sleep(PERIOD_S)
-                    b.server.show(floor, camera=Channel.BOTTOM)
+                    b.server.show(floor, camera=VideoChannel.BOTTOM)
                     await asyncio.sleep(0.001)
                 ticket = taken[-1]
                 ring = FrameRing.attach(ticket.ring, SLOTS, ticket.width_px, ticket.height_px)
@@ -344,11 +349,11 @@ def test_the_front_channel_shows_the_racks_and_the_bottom_one_the_floor() -> Non
                 return float(np.abs(picture.astype(float) - other).mean())
 
             assert differs(await newest(), floor) < 10.0
-            b.vehicle.select_camera(Camera.FRONT)
+            b.vehicle.select_camera(DroneCamera.FRONT)
             racks = await newest()
             assert differs(racks, floor) > 30.0
             assert racks.std() > 10.0
-            b.vehicle.select_camera(Camera.DOWN)
+            b.vehicle.select_camera(DroneCamera.DOWN)
             assert differs(await newest(), floor) < 10.0
             for task in tasks:
                 await ended(task)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser
+from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
 
 GOLDEN = json.loads((Path(__file__).parent.parent / "mavlink_golden.json").read_text())["vectors"]
 """Frames packed by pymavlink, with their fields."""

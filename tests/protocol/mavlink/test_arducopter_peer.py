@@ -12,11 +12,11 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import VirtualLoop
-from flightd.sim.airframe import Airframe
+from flightd.runtime.event_loops import VirtualLoop
+from flightd.sim.autopilot.autopilot import PeerConfig, Sticks
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
-from flightd.sim.autopilot.peer import PeerConfig, Sticks
-from flightd.sim.wind import Draught
+from flightd.sim.plant.airframe import Airframe
+from flightd.sim.plant.wind import Draught
 from tests.protocol.mavlink.raw_client import RawClient
 
 CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)

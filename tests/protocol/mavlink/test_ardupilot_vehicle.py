@@ -12,9 +12,9 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, ArduPilotVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.runtime.clock import LoopClock
-from flightd.sim.airframe import Airframe
+from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
-from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.plant.airframe import Airframe
 from tests.protocol.mavlink.scripted import (
     ALT_HOLD,
     ARM,

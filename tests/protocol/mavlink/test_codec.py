@@ -14,10 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser
-from flightd.adapters.vehicle.mavlink.signing import Signing, read_key
-from flightd.adapters.vehicle.mavlink.telemetry import Telemetry
-from flightd.adapters.vehicle.mavlink.timesync import ClockSync
+from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
+from flightd.adapters.vehicle.mavlink.link.signing import Signing, read_key
+from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.mavlink.telemetry import MavlinkTelemetry
 from flightd.core.errors import InputError
 from tests.protocol.mavlink.damage import GOLDEN, frames, hammer
 
@@ -246,7 +246,7 @@ def test_twenty_thousand_damaged_datagrams_lose_no_good_one() -> None:
 def test_nothing_in_a_damaged_stream_escapes_the_vehicle() -> None:
     """Sound frames with absurd values reach the telemetry: none may raise, none may be believed."""
     rng = random.Random(3)
-    telemetry = Telemetry(ClockSync())
+    telemetry = MavlinkTelemetry(ClockSync())
     kinds = [dialect.mavlink_map[i] for i in (0, 1, 30, 33, 132, 147, 245)]
     for i in range(20_000):
         kind = rng.choice(kinds)

@@ -8,8 +8,8 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.core.types import Demand
+from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import CopterMode
-from flightd.sim.autopilot.peer import PeerConfig
 from tests.protocol.mavlink.scripted import (
     ARM,
     LAND,

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.vehicle.mavlink.beats import too_slow
 from flightd.adapters.vehicle.mavlink.examination import Examination
-from flightd.adapters.vehicle.mavlink.fitness import RULES, judge
-from flightd.adapters.vehicle.mavlink.link import Firmware
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.required_parameters import RULES, judge
+from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import too_slow
 from flightd.core.errors import UnavailableError
 from flightd.runtime.clock import LoopClock
-from flightd.sim.airframe import Airframe
+from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
-from flightd.sim.autopilot.peer import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.px4 import Px4Peer
+from flightd.sim.plant.airframe import Airframe
 from tests.protocol.rig import run_virtual
 
 

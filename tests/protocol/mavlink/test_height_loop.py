@@ -7,7 +7,7 @@ import math
 import pytest
 
 from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
-from flightd.sim.airframe import Airframe, AirframeCommand
+from flightd.sim.plant.airframe import Airframe, AirframeCommand
 from tests.protocol.rig import CALM
 
 

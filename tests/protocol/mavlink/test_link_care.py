@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser
-from flightd.adapters.vehicle.mavlink.outputs import PoseForm
-from flightd.adapters.vehicle.mavlink.statustext import TextAssembler, make_texts
+from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
+from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
+from flightd.adapters.vehicle.mavlink.services.statustext import TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Demand, Event, EventLevel, GridPose
-from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.radio import RadioParams
 from tests.protocol.mavlink.scripted import (
     ALT_HOLD,

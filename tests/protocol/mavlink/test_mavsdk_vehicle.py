@@ -1,4 +1,4 @@
-"""MAVSDK's own set point repeater never keeps a dead loop flying; what the adapter refuses, and why."""
+"""MAVSDK's own setpoint repeater never keeps a dead loop flying; what the adapter refuses, and why."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from mavsdk.plugins.telemetry import LandedState as SdkLanded
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.connect import connect_vehicle
-from flightd.adapters.vehicle.mavlink.timesync import ClockSync
+from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavsdk.gate import FRESH_NS, SetpointGate, message_id
 from flightd.adapters.vehicle.mavsdk.library import whole_fields
-from flightd.adapters.vehicle.mavsdk.readings import Readings
+from flightd.adapters.vehicle.mavsdk.telemetry import Readings
 from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
-from flightd.cli.sim_peers import free_port
+from flightd.app.simulation.ports import free_port
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import Attitude, Demand, LandedState
 from flightd.ports import CountsDrops
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import ScaledLoop
-from flightd.sim.airframe import Airframe
+from flightd.runtime.event_loops import ScaledLoop
+from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.link import Message
-from flightd.sim.autopilot.peer import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
+from flightd.sim.plant.airframe import Airframe
 from tests.protocol.rig import Rig, mavlink_rig, mavsdk_rig, run_real
 
 
 class _CountingPx4(Px4Peer):
-    """Counts the set points that reach it."""
+    """Counts the setpoints that reach it."""
 
     def __init__(self, clock: LoopClock, airframe: Airframe, config: PeerConfig | None = None) -> None:
         super().__init__(clock, airframe, config)

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser
-from flightd.adapters.vehicle.mavlink.link import Firmware
-from flightd.adapters.vehicle.mavlink.outputs import (
+from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.pose_output import (
     PoseForm,
     PoseOutput,
     landing_target,

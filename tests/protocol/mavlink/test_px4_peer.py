@@ -13,9 +13,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.runtime.clock import LoopClock
-from flightd.sim.airframe import Airframe
-from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
+from flightd.sim.plant.airframe import Airframe
 from tests.protocol.mavlink.raw_client import RawClient
 from tests.protocol.rig import CALM, run_virtual
 

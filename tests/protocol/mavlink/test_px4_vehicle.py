@@ -9,9 +9,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.core.types import AttitudeSetpoint, Demand, LandedState
-from flightd.sim.airframe import AirframeParams
-from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Mode
+from flightd.sim.plant.airframe import AirframeParams
 from tests.protocol.rig import px4_rig, run_virtual
 
 

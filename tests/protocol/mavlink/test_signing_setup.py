@@ -12,18 +12,18 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from typer.testing import CliRunner
 
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
-from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser
 from flightd.adapters.vehicle.mavlink.examination import Examination
-from flightd.adapters.vehicle.mavlink.key_transfer import give_key, refuse_overheard
-from flightd.adapters.vehicle.mavlink.signing import Signing
+from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
+from flightd.adapters.vehicle.mavlink.link.key_transfer import give_key, refuse_overheard
+from flightd.adapters.vehicle.mavlink.link.signing import Signing
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
 from flightd.cli.main import app
 from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.runtime.clock import LoopClock
-from flightd.sim.airframe import Airframe
+from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
-from flightd.sim.autopilot.peer import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.px4 import Px4Peer
+from flightd.sim.plant.airframe import Airframe
 from tests.protocol.mavlink.test_codec import StoppedClock
 from tests.protocol.rig import Rig, run_virtual
 

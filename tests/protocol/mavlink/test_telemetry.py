@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.telemetry import Telemetry
-from flightd.adapters.vehicle.mavlink.timesync import ClockSync
+from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.mavlink.telemetry import MavlinkTelemetry
 from flightd.core.types import LandedState, VehicleState
 
 NOW_NS = 1_000_000_000_000
@@ -20,8 +20,8 @@ def attitude(boot_ms: int = 0, roll: float = 0.0, pitch: float = 0.0, yaw: float
     return dialect.MAVLink_attitude_message(boot_ms, roll, pitch, yaw, 0.0, 0.0, 0.0)
 
 
-def told(*messages: Any, telemetry: Telemetry | None = None, now_ns: int = NOW_NS) -> VehicleState:
-    telemetry = telemetry or Telemetry(ClockSync())
+def told(*messages: Any, telemetry: MavlinkTelemetry | None = None, now_ns: int = NOW_NS) -> VehicleState:
+    telemetry = telemetry or MavlinkTelemetry(ClockSync())
     for message in (dialect.MAVLink_heartbeat_message(2, 3, 1, 20, 4, 3), attitude(), *messages):
         telemetry.take(message, now_ns)
     state = telemetry.state(now_ns, "", in_control=False, refusal="")
@@ -34,7 +34,7 @@ def distance(centimetres: int, orientation: int = 25, least: int = 20, most: int
 
 
 def test_nothing_is_known_before_heartbeat_and_attitude() -> None:
-    telemetry = Telemetry(ClockSync())
+    telemetry = MavlinkTelemetry(ClockSync())
     telemetry.take(attitude(), NOW_NS)
     assert telemetry.state(NOW_NS, "", in_control=False, refusal="") is None
     state = told()
@@ -56,7 +56,7 @@ def test_what_the_range_finder_did_not_see_is_no_height(message: Any) -> None:
 
 
 def test_a_silent_range_finder_is_no_height() -> None:
-    telemetry = Telemetry(ClockSync())
+    telemetry = MavlinkTelemetry(ClockSync())
     told(distance(155), telemetry=telemetry)
     assert telemetry.height_m(NOW_NS + 400 * MS) == pytest.approx(1.55)
     assert math.isnan(telemetry.height_m(NOW_NS + 600 * MS))
@@ -99,7 +99,7 @@ def test_the_battery_is_read_from_either_message_and_unknown_stays_unknown() -> 
 
 
 def test_a_landed_state_is_believed_for_a_second() -> None:
-    telemetry = Telemetry(ClockSync())
+    telemetry = MavlinkTelemetry(ClockSync())
     told(dialect.MAVLink_extended_sys_state_message(0, 1), telemetry=telemetry)
     assert told(telemetry=telemetry, now_ns=NOW_NS + 1000 * MS).landed is LandedState.ON_GROUND
     assert told(telemetry=telemetry, now_ns=NOW_NS + 1001 * MS).landed is LandedState.UNKNOWN
@@ -107,14 +107,14 @@ def test_a_landed_state_is_believed_for_a_second() -> None:
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e30])
 def test_an_attitude_that_makes_no_sense_is_not_taken(value: float) -> None:
-    telemetry = Telemetry(ClockSync())
+    telemetry = MavlinkTelemetry(ClockSync())
     told(attitude(10, roll=value), telemetry=telemetry)
     assert len(telemetry.attitudes()) == 1
 
 
 def test_stamps_are_in_our_clock_once_the_clocks_are_compared() -> None:
     sync = ClockSync()
-    telemetry = Telemetry(sync)
+    telemetry = MavlinkTelemetry(sync)
     telemetry.take(attitude(5000), NOW_NS)
     asked = sync.ask(NOW_NS)
     assert sync.answered(asked, 5_010 * MS, NOW_NS + 20 * MS)  # their 5010 ms is our NOW + 10 ms
@@ -126,7 +126,7 @@ def test_stamps_are_in_our_clock_once_the_clocks_are_compared() -> None:
 
 def test_an_impossible_stamp_is_replaced_by_the_arrival() -> None:
     sync = ClockSync()
-    telemetry = Telemetry(sync)
+    telemetry = MavlinkTelemetry(sync)
     sync.answered(sync.ask(NOW_NS), 5_000 * MS, NOW_NS)
     telemetry.take(attitude(9_000), NOW_NS + 10 * MS)  # four seconds in our future
     assert telemetry.attitudes()[0].stamp_ns == NOW_NS + 10 * MS
@@ -134,7 +134,7 @@ def test_an_impossible_stamp_is_replaced_by_the_arrival() -> None:
 
 def test_a_boot_clock_that_jumps_back_is_a_reboot() -> None:
     sync = ClockSync()
-    telemetry = Telemetry(sync)
+    telemetry = MavlinkTelemetry(sync)
     sync.answered(sync.ask(NOW_NS), 60_000 * MS, NOW_NS)
     assert not telemetry.take(attitude(60_000), NOW_NS)
     assert not telemetry.take(attitude(59_900), NOW_NS)  # late, not rebooted

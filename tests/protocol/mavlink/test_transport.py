@@ -17,16 +17,16 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
-from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser
-from flightd.adapters.vehicle.mavlink.endpoint import Endpoint, EndpointKind, parse_endpoint
-from flightd.adapters.vehicle.mavlink.transport import SerialTransport, TcpTransport, UdpTransport
+from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
+from flightd.adapters.vehicle.mavlink.link.endpoint import Endpoint, EndpointKind, parse_endpoint
+from flightd.adapters.vehicle.mavlink.link.transport import SerialTransport, TcpTransport, UdpTransport
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.datagrams import PacedDatagrams
-from flightd.sim.airframe import Airframe
+from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
-from flightd.sim.autopilot.peer import PeerConfig
+from flightd.sim.plant.airframe import Airframe
 from tests.protocol.rig import Rig, run_virtual
 
 _TIOCGEXCL = 0x80045440

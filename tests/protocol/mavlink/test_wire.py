@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.codec import Codec, FrameParser
+from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
+from flightd.adapters.vehicle.mavlink.link.wire import layout
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
-from flightd.adapters.vehicle.mavlink.wire import layout
 from flightd.core.types import AttitudeSetpoint
 
 PLAIN = [kind for kind in dialect.mavlink_map.values() if layout(kind.id) is not None]

@@ -12,13 +12,13 @@ import pytest
 
 from flightd.adapters.camera.capture import CaptureCamera, parse_source
 from flightd.adapters.camera.connect import connect_camera
-from flightd.adapters.camera.shared import SharedCamera
+from flightd.adapters.camera.shared_memory import SharedCamera
 from flightd.config.schema import CameraConfig
 from flightd.core.errors import InputError, TransientError, UnavailableError
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import VirtualLoop
-from flightd.runtime.notice import FrameNotice, encode_notice
-from flightd.runtime.ring import FrameTicket
+from flightd.runtime.event_loops import VirtualLoop
+from flightd.runtime.frame_notice import FrameNotice, encode_notice
+from flightd.runtime.frame_ring import FrameTicket
 
 
 def free_port() -> int:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from flightd.cli.baselines import BASELINES
-from flightd.sim.dataset import generate
+from flightd.sim.dataset.generate import generate
+from flightd.studies.baselines import BASELINES
 
 
 @pytest.mark.parametrize("name", BASELINES)

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flightd.cli.checks.calibration import check_calibration
-from flightd.cli.checks.camera import Pictures, check_latency, check_vision, judge_camera
-from flightd.cli.checks.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
-from flightd.cli.checks.verdict import Check, Level
 from flightd.config.schema import CameraConfig, Config, RecorderConfig, load_config
 from flightd.config.site_file import load_site
-from flightd.vision.detector import Detector
+from flightd.doctor.calibration import check_calibration
+from flightd.doctor.camera import Pictures, check_latency, check_vision, judge_camera
+from flightd.doctor.check import Check, CheckLevel
+from flightd.doctor.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
+from flightd.vision.lines.detector import Detector
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
@@ -23,26 +23,26 @@ FIT = Load(cores=4, load=0.5, hottest_c=55.0, governor="schedutil", memory_bytes
 ROOM = 50_000_000_000
 
 
-def levels(checks: list[Check]) -> list[Level]:
+def levels(checks: list[Check]) -> list[CheckLevel]:
     for check in checks:
         assert "\n" not in check.text + check.remedy
-        assert bool(check.remedy) is (check.level is not Level.OK)
+        assert bool(check.remedy) is (check.level is not CheckLevel.OK)
     return [check.level for check in checks]
 
 
 @pytest.mark.parametrize(
     ("change", "word", "level"),
     [
-        ({}, "4 cores", Level.OK),
-        ({"cores": 2}, "detectors and the control loop", Level.WARNING),
-        ({"load": 3.5}, "busy before the flight", Level.WARNING),
-        ({"hottest_c": 85.0}, "85 degrees", Level.WARNING),
-        ({"hottest_c": None}, "4 cores", Level.OK),
-        ({"governor": "powersave"}, "powersave", Level.WARNING),
-        ({"memory_bytes": 100_000_000}, "100 MB", Level.ERROR),
+        ({}, "4 cores", CheckLevel.OK),
+        ({"cores": 2}, "detectors and the control loop", CheckLevel.WARNING),
+        ({"load": 3.5}, "busy before the flight", CheckLevel.WARNING),
+        ({"hottest_c": 85.0}, "85 degrees", CheckLevel.WARNING),
+        ({"hottest_c": None}, "4 cores", CheckLevel.OK),
+        ({"governor": "powersave"}, "powersave", CheckLevel.WARNING),
+        ({"memory_bytes": 100_000_000}, "100 MB", CheckLevel.ERROR),
     ],
 )
-def test_the_processor(change: dict[str, Any], word: str, level: Level) -> None:
+def test_the_processor(change: dict[str, Any], word: str, level: CheckLevel) -> None:
     checks = judge_processor(replace(FIT, **change), workers=2)
     assert levels(checks) == [level]
     assert word in checks[0].text
@@ -51,32 +51,32 @@ def test_the_processor(change: dict[str, Any], word: str, level: Level) -> None:
 @pytest.mark.parametrize(
     ("resolution_s", "year", "synchronised", "level"),
     [
-        (1e-9, 2026, True, Level.OK),
-        (1e-9, 2026, False, Level.WARNING),
-        (1e-9, 1970, True, Level.WARNING),
-        (0.015, 2026, True, Level.ERROR),
+        (1e-9, 2026, True, CheckLevel.OK),
+        (1e-9, 2026, False, CheckLevel.WARNING),
+        (1e-9, 1970, True, CheckLevel.WARNING),
+        (0.015, 2026, True, CheckLevel.ERROR),
     ],
 )
-def test_the_clock(resolution_s: float, year: int, synchronised: bool, level: Level) -> None:
+def test_the_clock(resolution_s: float, year: int, synchronised: bool, level: CheckLevel) -> None:
     assert levels([judge_clock(resolution_s, year, synchronised=synchronised)]) == [level]
 
 
 @pytest.mark.parametrize(
     ("free_bytes", "level"),
-    [(ROOM, Level.OK), (2_500_000_000, Level.WARNING), (900_000_000, Level.ERROR)],
+    [(ROOM, CheckLevel.OK), (2_500_000_000, CheckLevel.WARNING), (900_000_000, CheckLevel.ERROR)],
 )
-def test_room_on_the_disk(free_bytes: int, level: Level) -> None:
+def test_room_on_the_disk(free_bytes: int, level: CheckLevel) -> None:
     assert levels([judge_disk(Path("flights"), free_bytes, 1_000_000_000)]) == [level]
 
 
 def test_the_recorders_folder(tmp_path: Path) -> None:
-    assert levels([check_disk(RecorderConfig())]) == [Level.WARNING]  # not recorded at all
+    assert levels([check_disk(RecorderConfig())]) == [CheckLevel.WARNING]  # not recorded at all
     folder = tmp_path / "not" / "there" / "yet"
-    assert check_disk(RecorderConfig(folder=folder, reserve_gb=0)).level is not Level.ERROR
+    assert check_disk(RecorderConfig(folder=folder, reserve_gb=0)).level is not CheckLevel.ERROR
     assert not folder.exists()  # it only looked
     file = tmp_path / "file"
     file.touch()
-    assert levels([check_disk(RecorderConfig(folder=file))]) == [Level.ERROR]
+    assert levels([check_disk(RecorderConfig(folder=file))]) == [CheckLevel.ERROR]
 
 
 @pytest.mark.parametrize(
@@ -92,14 +92,14 @@ def test_the_recorders_folder(tmp_path: Path) -> None:
 )
 def test_a_lens_that_cannot_be_is_named(keys: dict[str, Any], word: str) -> None:
     checks = check_calibration(CameraConfig(**keys), SITE, 1.6)
-    assert Level.OK not in levels(checks)
+    assert CheckLevel.OK not in levels(checks)
     assert any(word in check.text for check in checks)
 
 
 def test_a_calibrated_lens_is_fit_where_its_lines_are_wide_enough() -> None:
     camera = CameraConfig(fx_px=381.0, fy_px=382.0, distortion=(-0.1, 0.02, 0.0, 0.0, 0.0))
-    assert levels(check_calibration(camera, SITE, 1.6)) == [Level.OK]
-    assert Level.ERROR in levels(check_calibration(camera, SITE, 12.0))
+    assert levels(check_calibration(camera, SITE, 1.6)) == [CheckLevel.OK]
+    assert CheckLevel.ERROR in levels(check_calibration(camera, SITE, 12.0))
 
 
 def pictures(rate_hz: float, grey: int = 120) -> Pictures:
@@ -110,16 +110,16 @@ def pictures(rate_hz: float, grey: int = 120) -> Pictures:
 @pytest.mark.parametrize(
     ("found", "expected"),
     [
-        (pictures(30.0), [Level.OK]),
-        (pictures(20.0), [Level.WARNING]),
-        (pictures(4.0), [Level.ERROR]),
-        (pictures(30.0, grey=3), [Level.OK, Level.ERROR]),
-        (pictures(30.0, grey=254), [Level.OK, Level.ERROR]),
-        (Pictures(), [Level.ERROR]),
-        (Pictures(trouble="pictures are 800x600, the configuration says 640x360"), [Level.ERROR]),
+        (pictures(30.0), [CheckLevel.OK]),
+        (pictures(20.0), [CheckLevel.WARNING]),
+        (pictures(4.0), [CheckLevel.ERROR]),
+        (pictures(30.0, grey=3), [CheckLevel.OK, CheckLevel.ERROR]),
+        (pictures(30.0, grey=254), [CheckLevel.OK, CheckLevel.ERROR]),
+        (Pictures(), [CheckLevel.ERROR]),
+        (Pictures(trouble="pictures are 800x600, the configuration says 640x360"), [CheckLevel.ERROR]),
     ],
 )
-def test_the_cameras_pictures(found: Pictures, expected: list[Level]) -> None:
+def test_the_cameras_pictures(found: Pictures, expected: list[CheckLevel]) -> None:
     checks = judge_camera(config(), found)
     assert levels(checks) == expected
     assert found.trouble in checks[0].text
@@ -127,15 +127,15 @@ def test_the_cameras_pictures(found: Pictures, expected: list[Level]) -> None:
 
 def test_a_floor_without_lines_is_a_warning_only() -> None:
     checks = check_vision(config(), Detector("combined", "yellow"), pictures(30.0).picture)
-    assert set(levels(checks)) == {Level.WARNING}
-    assert levels(check_vision(config(), Detector("combined", "yellow"), None)) == [Level.WARNING]
+    assert set(levels(checks)) == {CheckLevel.WARNING}
+    assert levels(check_vision(config(), Detector("combined", "yellow"), None)) == [CheckLevel.WARNING]
 
 
 @pytest.mark.parametrize(
-    ("delay_s", "expected"), [(0.02, Level.OK), (4.9, Level.WARNING), (5.1, Level.ERROR)]
+    ("delay_s", "expected"), [(0.02, CheckLevel.OK), (4.9, CheckLevel.WARNING), (5.1, CheckLevel.ERROR)]
 )
 def test_pictures_that_come_too_late_to_fly_by_are_told_before_the_flight(
-    delay_s: float, expected: Level
+    delay_s: float, expected: CheckLevel
 ) -> None:
     allowed = config().hazards.model_copy(update={"latency_s": 5.0})
     found = pictures(30.0)
@@ -145,7 +145,7 @@ def test_pictures_that_come_too_late_to_fly_by_are_told_before_the_flight(
         config().model_copy(update={"hazards": allowed}), Detector("combined", "yellow"), found
     )
     assert levels(checks) == [expected]
-    assert "hazards.latency_s" in checks[0].remedy or expected is Level.OK
+    assert "hazards.latency_s" in checks[0].remedy or expected is CheckLevel.OK
 
 
 def config() -> Config:

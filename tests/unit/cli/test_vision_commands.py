@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from flightd.cli.main import app
 from flightd.core.errors import InputError, UnavailableError
-from flightd.sim.dataset import generate, write_dataset
+from flightd.sim.dataset.generate import generate, write_dataset
 
 RUNNER = CliRunner()
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from flightd.config.site_file import load_site, parse_site, site_toml
 from flightd.core.errors import InputError
-from flightd.grid.site import LineColour, Side, Site
-from flightd.sim.sites import random_site
+from flightd.sim.random_sites import random_site
+from flightd.site.site import LineColour, Side, Site
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 

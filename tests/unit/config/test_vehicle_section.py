@@ -10,7 +10,7 @@ import pytest
 
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, ArduPilotVehicle
-from flightd.adapters.vehicle.mavlink.signing import make_key, read_key
+from flightd.adapters.vehicle.mavlink.link.signing import make_key, read_key
 from flightd.config.schema import Config, parse_config
 from flightd.core.errors import InputError
 from flightd.ports import PoseTaker

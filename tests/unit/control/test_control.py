@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flightd.control.motion_profile import Profile
 from flightd.control.pid import Pid, PidGains
-from flightd.control.profile import Profile
 
 GAINS = PidGains(kp=2.0, ki=1.0, kd=1.0, integral_limit=0.5, output_limit=1.0)
 finite = st.floats(-1e3, 1e3)

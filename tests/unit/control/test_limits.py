@@ -1,4 +1,4 @@
-"""The limits before the wire, for any stream of set points whatsoever."""
+"""The limits before the wire, for any stream of setpoints whatsoever."""
 
 from __future__ import annotations
 

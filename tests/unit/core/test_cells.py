@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.core.cells import exact, inert
+from flightd.core.csv_text import exact, inert
 
 TEXTS = st.text(st.sampled_from("'=+-@\t\r\nA1 ;\"") | st.characters(), max_size=12)
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightd.config.front_camera import FrontCameraConfig
+from flightd.core.camera_view import CameraView, ForwardMount, Viewpoint
 from flightd.core.geometry import Lens, Mount
-from flightd.core.view import CameraView, ForwardMount, Viewpoint
 
 LENS = FrontCameraConfig().lens()
 BENT = Lens(1280, 800, 1000.0, 1000.0, 630.0, 405.0, (-0.12, 0.03, 0.001, -0.0005, -0.002))

@@ -8,9 +8,8 @@ from typing import Any
 
 import msgspec
 
-from flightd.adapters.ground.audit import AuditEntry
-from flightd.adapters.ground.desk import Desk, Peer
-from flightd.adapters.ground.protocol import (
+from flightd.adapters.ground_link.audit import AuditEntry
+from flightd.adapters.ground_link.protocol import (
     VERSION,
     Answer,
     AskPicture,
@@ -18,6 +17,7 @@ from flightd.adapters.ground.protocol import (
     Role,
     StatusReport,
 )
+from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
 from flightd.config.site_file import load_site
 from flightd.core.types import Phase
 
@@ -65,7 +65,7 @@ class DeskRig:
 
     def __init__(self, phase: Phase = Phase.FOLLOW, **more: Any) -> None:
         self.audit: list[AuditEntry] = []
-        self.desk = Desk(SITE, SESSION, self.audit.append, **more)
+        self.desk = RequestHandler(SITE, SESSION, self.audit.append, **more)
         self.desk.status = report(phase)
         self.now_ns = 100 * S
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.ground.audit import AuditEntry, AuditLog
+from flightd.adapters.ground_link.audit import AuditEntry, AuditLog
 from flightd.core.errors import UnavailableError
 
 

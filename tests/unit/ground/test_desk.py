@@ -8,8 +8,7 @@ import random
 import msgspec
 import pytest
 
-from flightd.adapters.ground.desk import POSSIBLE, Peer
-from flightd.adapters.ground.protocol import (
+from flightd.adapters.ground_link.protocol import (
     Accepted,
     AskPicture,
     Code,
@@ -21,6 +20,7 @@ from flightd.adapters.ground.protocol import (
     decode_answer,
     encode,
 )
+from flightd.adapters.ground_link.request_handler import POSSIBLE, Peer
 from flightd.core.types import CommandKind, Phase
 from tests.unit.ground.desk_rig import OPERATOR, SESSION, SITE, VIEWER, DeskRig, S, body
 

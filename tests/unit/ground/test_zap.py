@@ -9,18 +9,18 @@ import zmq
 import zmq.asyncio
 from zmq.utils import z85
 
-from flightd.adapters.ground.keys import Client
-from flightd.adapters.ground.protocol import Role
-from flightd.adapters.ground.zap import Doorkeeper
+from flightd.adapters.ground_link.authenticator import Authenticator
+from flightd.adapters.ground_link.keys import Client
+from flightd.adapters.ground_link.protocol import Role
 
 PUBLIC = zmq.curve_keypair()[0]
 KEY = z85.decode(PUBLIC)
 RIGHT = [b"1.0", b"7", b"flightd", b"10.0.0.2", b"", b"CURVE", KEY]
 
 
-def door() -> tuple[zmq.asyncio.Context, Doorkeeper]:
+def door() -> tuple[zmq.asyncio.Context, Authenticator]:
     context = zmq.asyncio.Context()
-    return context, Doorkeeper(context, {PUBLIC.decode(): Client("ann", Role.OPERATOR)})
+    return context, Authenticator(context, {PUBLIC.decode(): Client("ann", Role.OPERATOR)})
 
 
 def test_a_listed_key_comes_in_under_its_own_name_and_no_other_does() -> None:

@@ -6,7 +6,7 @@ from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.site_file import parse_site
 from flightd.core.scanning import BodyPose, CodeSet, Light, Occupancy, PlaceLook
 from flightd.core.types import CodeRead
-from flightd.mission.assign import FrontSight
+from flightd.mission.scan.code_assignment import FrontSight
 
 SITE = parse_site(
     """

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
-from flightd.mission.battery import BatteryGauge, BatteryParams
+from flightd.mission.battery.consumption import BatteryGauge, BatteryParams
+from flightd.mission.battery.sorties import Sorties, check_battery
 from flightd.mission.guidance import MissionParams
-from flightd.mission.legs import Legs, Pace
-from flightd.mission.plan import Heading, HeadingPolicy, make_plan
-from flightd.mission.scanner import Scanner
-from flightd.mission.sorties import Sorties, check_battery
-from flightd.mission.views import ScanParams
+from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.plan.leg_times import Legs, Pace
+from flightd.mission.scan.scanner import Scanner
+from flightd.mission.scan.views import ScanParams
 from tests.unit.mission import shelves
 
 LARGE = load_site(Path(__file__).parents[3] / "configs" / "site-large.toml")

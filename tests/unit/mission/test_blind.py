@@ -8,14 +8,14 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.mission.blind import Blind
-from flightd.mission.guidance import ALL_WELL, MissionParams, Senses
+from flightd.mission.guidance import ALL_WELL, MissionInputs, MissionParams
+from flightd.mission.safety.view_monitor import FloorViewMonitor
 
 PARAMS = MissionParams()
 
 
-def senses(x_age_s: float, y_age_s: float, picture_age_s: float = 0.0) -> Senses:
-    return Senses(
+def senses(x_age_s: float, y_age_s: float, picture_age_s: float = 0.0) -> MissionInputs:
+    return MissionInputs(
         now_ns=10**9,
         dt_s=0.02,
         pose=None,
@@ -31,7 +31,7 @@ def senses(x_age_s: float, y_age_s: float, picture_age_s: float = 0.0) -> Senses
 
 
 def test_a_camera_that_shows_nothing_makes_it_sink_and_pictures_without_lines_do_not() -> None:
-    blind = Blind(PARAMS)
+    blind = FloorViewMonitor(PARAMS)
     blind.step(senses(0.5, 0.5, picture_age_s=0.5), leg_along_x=True)
     assert blind.is_blind
     assert blind.sink_mps(1.6) > 0.0
@@ -40,7 +40,7 @@ def test_a_camera_that_shows_nothing_makes_it_sink_and_pictures_without_lines_do
     assert not blind.is_blind
 
 
-def over(blind: Blind, seconds: float, leg_along_x: bool, telemetry_age_s: float = 0.0) -> bool:
+def over(blind: FloorViewMonitor, seconds: float, leg_along_x: bool, telemetry_age_s: float = 0.0) -> bool:
     """Whether it has to land after seeing only lines that cross the x axis for so long."""
     for tick in range(round(seconds / 0.02)):
         at = replace(senses(0.0, tick * 0.02), now_ns=tick * 20_000_000, telemetry_age_s=telemetry_age_s)
@@ -50,17 +50,17 @@ def over(blind: Blind, seconds: float, leg_along_x: bool, telemetry_age_s: float
 
 def test_on_a_leg_only_the_line_that_is_followed_keeps_it_in_the_air() -> None:
     seconds = PARAMS.hazards.search_land_s + 0.2
-    assert over(Blind(PARAMS), seconds, leg_along_x=True)
-    assert not over(Blind(PARAMS), seconds, leg_along_x=False)
+    assert over(FloorViewMonitor(PARAMS), seconds, leg_along_x=True)
+    assert not over(FloorViewMonitor(PARAMS), seconds, leg_along_x=False)
 
 
 def test_lost_telemetry_is_not_taken_for_a_lost_view() -> None:
-    assert not over(Blind(PARAMS), 2.5, leg_along_x=True, telemetry_age_s=1.0)
+    assert not over(FloorViewMonitor(PARAMS), 2.5, leg_along_x=True, telemetry_age_s=1.0)
 
 
 @given(st.floats(0.0, 20.0), st.floats(0.0, 20.0))
 def test_a_blind_descent_never_stops_and_is_gentle_at_the_floor(a_m: float, b_m: float) -> None:
-    blind = Blind(PARAMS)
+    blind = FloorViewMonitor(PARAMS)
     low, high = sorted((a_m, b_m))
     assert PARAMS.touch_blind_mps <= blind.rate_mps(low) <= blind.rate_mps(high) <= PARAMS.blind_mps
     assert blind.rate_mps(0.1) == PARAMS.touch_blind_mps

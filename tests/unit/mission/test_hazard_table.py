@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from flightd.config.schema import Config
-from flightd.mission.hazards import HAZARDS, Action, Hazard, markdown
+from flightd.mission.safety.hazards import HAZARDS, Action, Hazard, markdown
 from flightd.mission.triggers import Trigger
 
 ROOT = Path(__file__).parents[3]
@@ -33,7 +33,7 @@ def test_a_row_names_only_keys_that_exist(row: Hazard) -> None:
 
 
 def test_the_mission_answers_every_hazard_that_asks_for_something() -> None:
-    from flightd.mission.table import TABLE
+    from flightd.mission.transition_table import TABLE
 
     answered = {trigger for row in TABLE.values() for trigger in row}
     below = {Action.REPORT, Action.HOME}

@@ -18,14 +18,14 @@ from flightd.core.types import (
     Phase,
     VehicleState,
 )
-from flightd.grid.site import Site
-from flightd.mission.guidance import Guidance, Guide, MissionParams, Senses
+from flightd.mission.flight.relocation import Relocator
+from flightd.mission.guidance import Guidance, Guide, MissionInputs, MissionParams
 from flightd.mission.mission import Mission
-from flightd.mission.plan import Heading, HeadingPolicy, make_plan
-from flightd.mission.relocate import Relocator
-from flightd.mission.scanner import Scanner
-from flightd.mission.views import ScanParams
-from flightd.sim.sites import random_site
+from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.scan.scanner import Scanner
+from flightd.mission.scan.views import ScanParams
+from flightd.sim.random_sites import random_site
+from flightd.site.site import Site
 from tests.unit.mission import shelves
 
 SITE = random_site(3)
@@ -59,7 +59,7 @@ class Flight:
             12.0,
             0,
         )
-        self.senses = Senses(0, 0.02, None, True, 0.1, True, 0.0, 0.0, 0.0, state)
+        self.senses = MissionInputs(0, 0.02, None, True, 0.1, True, 0.0, 0.0, 0.0, state)
 
     @property
     def phase(self) -> Phase:

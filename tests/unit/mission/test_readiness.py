@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flightd.core.types import Attitude, LandedState, VehicleState
-from flightd.mission.guidance import ALL_WELL, MissionParams, Senses
-from flightd.mission.readiness import not_ready
+from flightd.mission.guidance import ALL_WELL, MissionInputs, MissionParams
+from flightd.mission.safety.readiness import not_ready
 
 PARAMS = MissionParams()
 VEHICLE = VehicleState(
@@ -22,7 +22,7 @@ VEHICLE = VehicleState(
     battery_v=12.6,
     heartbeat_ns=10**9,
 )
-READY = Senses(
+READY = MissionInputs(
     now_ns=10**9,
     dt_s=0.02,
     pose=None,

@@ -8,8 +8,8 @@ import pytest
 
 from flightd.config.schema import load_config
 from flightd.config.site_file import parse_site
+from flightd.mission.flight.relocation import Relocator
 from flightd.mission.guidance import MissionParams
-from flightd.mission.relocate import Relocator
 
 SITE = """
 [site]

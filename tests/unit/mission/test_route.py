@@ -10,14 +10,14 @@ import time
 import numpy as np
 import pytest
 
-from flightd.grid.layout import lay_out
-from flightd.grid.site import Aisle, Pad, Site
-from flightd.grid.ways import NoWayError, OneWay
 from flightd.mission.guidance import MissionParams
-from flightd.mission.legs import Legs, Pace
-from flightd.mission.plan import Heading, HeadingPolicy, make_plan
-from flightd.mission.route import best_order
-from flightd.sim.sites import random_site
+from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.plan.leg_times import Legs, Pace
+from flightd.mission.plan.route_optimiser import best_order
+from flightd.sim.random_sites import random_site
+from flightd.site.layout import lay_out
+from flightd.site.site import Aisle, Pad, Site
+from flightd.site.ways import NoWayError, OneWay
 
 PACE = Pace.of(MissionParams())
 

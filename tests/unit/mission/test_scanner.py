@@ -11,10 +11,10 @@ import pytest
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, Finding, Light, Occupancy
 from flightd.core.types import CodeRead
-from flightd.grid.racks import code_form
-from flightd.grid.ways import KeepOut
-from flightd.mission.scanner import Scanner, nodes_to_count
-from flightd.mission.views import ScanParams, View
+from flightd.mission.scan.scanner import Scanner, nodes_to_count
+from flightd.mission.scan.views import ScanParams, View
+from flightd.site.racks import code_form
+from flightd.site.ways import KeepOut
 from tests.unit.mission.shelves import SIGHT, SITE, picture, pose, read
 
 PARAMS = ScanParams(max_height_m=4.0, aside_per_height=0.4)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
-from flightd.mission.stock import Difference, Outcome, compare_stock, doubtful_locations
+from flightd.inventory.comparison import ComparisonOutcome, Difference, compare_stock, doubtful_locations
 
 
 def record(code: str, state: str, *texts: str, confidence: float = 0.9) -> LocationRecord:
@@ -92,17 +92,17 @@ def test_every_code_expected_or_found_is_accounted_for_once(
     states = ("empty", "read", "several", "several")
     records = [record(code, states[len(texts)], *texts) for code, texts in found.items()]
     lines = compare_stock(records, expected)
-    about_expected = [line for line in lines if line.outcome is not Outcome.UNEXPECTED]
+    about_expected = [line for line in lines if line.outcome is not ComparisonOutcome.UNEXPECTED]
     wanted = Counter((code, text) for code, texts in expected.items() for text in texts)
     assert Counter((line.location, line.text) for line in about_expected) == wanted
     explaining: Counter[tuple[str, str]] = Counter()
     for line in lines:
         match line.outcome:
-            case Outcome.MATCH | Outcome.UNEXPECTED:
+            case ComparisonOutcome.MATCH | ComparisonOutcome.UNEXPECTED:
                 explaining[line.location, line.text] += 1
-            case Outcome.MOVED:
+            case ComparisonOutcome.MOVED:
                 explaining[line.found_at, line.text] += 1
-            case Outcome.WRONG:
+            case ComparisonOutcome.WRONG:
                 explaining[line.location, line.found] += 1
             case _:
                 pass

@@ -9,11 +9,11 @@ import pytest
 
 from flightd.core.errors import InputError
 from flightd.core.types import Phase
-from flightd.mission.hazards import Action, triggers_of
-from flightd.mission.plan import Heading, HeadingPolicy, make_plan
-from flightd.mission.table import next_phase
+from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.safety.hazards import Action, triggers_of
+from flightd.mission.transition_table import next_phase
 from flightd.mission.triggers import Trigger
-from flightd.sim.sites import random_site
+from flightd.sim.random_sites import random_site
 
 FLYING = [
     p

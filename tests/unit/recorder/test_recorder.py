@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flightd.adapters.recorder.recorder import Recorder
+from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.adapters.recorder.schemas import schema_of
 from flightd.core.errors import UnavailableError
-from flightd.core.topics import Document, Picture, Topic
+from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -36,7 +36,7 @@ from flightd.core.types import (
     Status,
     VehicleState,
 )
-from flightd.ports import Recorder as RecorderPort
+from flightd.ports import Recorder
 from flightd.replay.log import read_log
 
 LINE = Line(12.5, 0.1, 31.0, -170.0, 180.0, 0.93, 0.12, 0.0011, 1e-5)
@@ -85,7 +85,7 @@ def test_every_message_comes_back_as_it_was(
     tmp_path: Path, topic: Topic, stamp_ns: int, message: object
 ) -> None:
     path = tmp_path / "flight.mcap"
-    with Recorder(path, metadata={"site": "demo"}) as recorder:
+    with McapRecorder(path, metadata={"site": "demo"}) as recorder:
         recorder.record(topic, stamp_ns, message)
     log = read_log(path)
     assert [(entry.topic, entry.stamp_ns, entry.message) for entry in log.entries] == [
@@ -99,17 +99,17 @@ def test_every_message_comes_back_as_it_was(
 
 def test_a_picture_comes_back_byte_for_byte(tmp_path: Path) -> None:
     jpeg = bytes(range(256)) * 100
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.image(Topic.FRAME, 1_234_567_890_123, 42, jpeg)
     (entry,) = read_log(tmp_path / "flight.mcap").entries
-    assert entry.message == Picture(42, 1_234_567_890_123, jpeg)
+    assert entry.message == RecordedFrame(42, 1_234_567_890_123, jpeg)
 
 
 def test_a_height_nobody_measured_comes_back_as_nan(tmp_path: Path) -> None:
     unknown = VehicleState(
         Attitude(11, 0.0, 0.0, 0.0), math.nan, 0, 0.0, "", False, False, LandedState.UNKNOWN, 1.0, 15.0, 9
     )
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(Topic.VEHICLE, 1, unknown)
     (vehicle,) = read_log(tmp_path / "flight.mcap").messages(VehicleState)
     assert math.isnan(vehicle.height_m)
@@ -117,20 +117,23 @@ def test_a_height_nobody_measured_comes_back_as_nan(tmp_path: Path) -> None:
 
 
 def test_numpy_numbers_are_written_as_numbers(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record("/extra", 1, {"a": np.float64(0.5), "b": np.arange(3)})
     (entry,) = read_log(tmp_path / "flight.mcap").entries
     assert entry.message == {"a": 0.5, "b": [0, 1, 2]}
 
 
 def test_what_has_no_json_form_is_refused_at_once(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "flight.mcap") as recorder, pytest.raises(TypeError, match="cannot be recorded"):
+    with (
+        McapRecorder(tmp_path / "flight.mcap") as recorder,
+        pytest.raises(TypeError, match="cannot be recorded"),
+    ):
         recorder.record("/extra", 1, {"a": object()})
 
 
 def test_the_recorder_is_the_port(tmp_path: Path) -> None:
-    with Recorder(tmp_path / "flight.mcap") as recorder:
-        port: RecorderPort = recorder
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
+        port: Recorder = recorder
         port.record(Topic.POSE, 2, POSE)
     assert len(read_log(tmp_path / "flight.mcap").messages(GridPose)) == 1
 
@@ -138,23 +141,23 @@ def test_the_recorder_is_the_port(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_written_is_told_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UnavailableError, match=r"flight\.mcap: cannot write the flight log"):
-        Recorder(tmp_path / "file" / "flight.mcap")
+        McapRecorder(tmp_path / "file" / "flight.mcap")
 
 
 def test_a_log_that_another_recorder_writes_is_not_taken_from_it(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
-    with Recorder(path) as recorder:
+    with McapRecorder(path) as recorder:
         recorder.record(Topic.POSE, 2, POSE)
         recorder._push()
         _wait_for(path, 1)
         with pytest.raises(UnavailableError, match="another process is writing"):
-            Recorder(path)
+            McapRecorder(path)
     assert len(read_log(path).entries) == 1
 
 
 def test_nothing_is_lost_in_a_clean_close_under_load(tmp_path: Path) -> None:
     count = 20_000
-    with Recorder(tmp_path / "flight.mcap", queue_bytes=1 << 16, lossless=True) as recorder:
+    with McapRecorder(tmp_path / "flight.mcap", queue_bytes=1 << 16, lossless=True) as recorder:
         for index in range(count):
             recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index, 0.01))
     assert (recorder.written, recorder.dropped) == (count, 0)
@@ -163,7 +166,7 @@ def test_nothing_is_lost_in_a_clean_close_under_load(tmp_path: Path) -> None:
 
 
 def test_a_full_queue_drops_and_counts_instead_of_waiting(tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "flight.mcap", queue_bytes=100_000)
+    recorder = McapRecorder(tmp_path / "flight.mcap", queue_bytes=100_000)
     recorder.record(Topic.SETPOINT, 0, AttitudeSetpoint(0))
     os.kill(recorder._child.pid, signal.SIGSTOP)
     for index in range(1, 20_000):
@@ -181,7 +184,7 @@ def test_a_full_queue_drops_and_counts_instead_of_waiting(tmp_path: Path) -> Non
 
 
 def test_pictures_are_lost_before_decisions(tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "flight.mcap", queue_bytes=1_000_000)
+    recorder = McapRecorder(tmp_path / "flight.mcap", queue_bytes=1_000_000)
     os.kill(recorder._child.pid, signal.SIGSTOP)
     for seq in range(50):
         recorder.image(Topic.FRAME, seq, seq, b"x" * 50_000)
@@ -191,7 +194,7 @@ def test_pictures_are_lost_before_decisions(tmp_path: Path) -> None:
     recorder.close()
     log = read_log(tmp_path / "flight.mcap")
     assert len(log.messages(AttitudeSetpoint)) == 1_000
-    assert 0 < len(log.messages(Picture)) < 50
+    assert 0 < len(log.messages(RecordedFrame)) < 50
 
 
 def _wait_for(path: Path, count: int) -> None:
@@ -202,7 +205,7 @@ def _wait_for(path: Path, count: int) -> None:
         time.sleep(0.05)
 
 
-def _wait_for_restart(recorder: Recorder) -> None:
+def _wait_for_restart(recorder: McapRecorder) -> None:
     deadline_s = time.monotonic() + 30
     while not recorder.restarts:
         assert time.monotonic() < deadline_s
@@ -212,8 +215,8 @@ def _wait_for_restart(recorder: Recorder) -> None:
 def test_the_log_is_readable_after_kill_9_and_goes_on_in_the_same_file(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
 
-    async def fly() -> Recorder:
-        recorder = Recorder(path)
+    async def fly() -> McapRecorder:
+        recorder = McapRecorder(path)
         recorder.record(Topic.MAP, 0, Document("map"))
         for index in range(100):
             recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
@@ -240,7 +243,7 @@ def test_the_log_is_readable_after_kill_9_and_goes_on_in_the_same_file(tmp_path:
 
 
 def test_what_died_with_the_writer_is_counted_as_dropped(tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "flight.mcap")
+    recorder = McapRecorder(tmp_path / "flight.mcap")
     os.kill(recorder._child.pid, signal.SIGSTOP)
     for index in range(10):
         recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
@@ -254,7 +257,7 @@ def test_what_died_with_the_writer_is_counted_as_dropped(tmp_path: Path) -> None
 
 def test_the_log_is_finished_when_the_daemon_is_killed(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
-    recorder = Recorder(path)
+    recorder = McapRecorder(path)
     recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
     recorder._push()
     recorder._link.close()  # what the kernel does to a killed process
@@ -266,7 +269,7 @@ def test_the_log_is_finished_when_the_daemon_is_killed(tmp_path: Path) -> None:
 
 def test_a_stop_of_the_service_does_not_stop_the_writer(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
-    with Recorder(path) as recorder:
+    with McapRecorder(path) as recorder:
         recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
         recorder._push()
         _wait_for(path, 1)
@@ -287,7 +290,7 @@ def test_a_full_disk_costs_messages_and_is_told(tmp_path: Path, monkeypatch: pyt
 
     monkeypatch.setattr(subprocess, "Popen", limited)
     noise = np.random.default_rng(1)
-    with Recorder(tmp_path / "flight.mcap", lossless=True) as recorder:
+    with McapRecorder(tmp_path / "flight.mcap", lossless=True) as recorder:
         for seq in range(100):
             recorder.image(Topic.FRAME, seq, seq, noise.bytes(40_000))
     assert recorder.written + recorder.dropped == 100
@@ -300,7 +303,7 @@ def test_the_foxglove_reader_of_the_format_reads_it(tmp_path: Path) -> None:
     from mcap.reader import make_reader
 
     path = tmp_path / "flight.mcap"
-    with Recorder(path) as recorder:
+    with McapRecorder(path) as recorder:
         for topic, stamp_ns, message in MESSAGES:
             recorder.record(topic, stamp_ns, message)
         recorder.image(Topic.FRAME, 10, 1, b"jpeg")
@@ -335,7 +338,7 @@ def _json(path: Path, topic: str) -> dict[str, Any]:
 
 def test_a_pose_is_shown_by_foxglove_where_it_was(tmp_path: Path) -> None:
     turned = dataclasses.replace(POSE, x_m=3.0, y_m=2.0, height_m=1.5, yaw_rad=math.pi / 2)
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(Topic.POSE, 2, turned)
     pose = _json(tmp_path / "flight.mcap", Topic.POSE)["pose"]
     assert pose["position"] == {"x": 3.0, "y": -2.0, "z": 1.5}
@@ -347,7 +350,7 @@ def test_lines_are_drawn_by_foxglove_where_they_were_seen(tmp_path: Path) -> Non
     upright = Line(20.0, 0.0, 30.0, -100.0, 50.0, 1.0, 0.1, 0.001)
     junction = Junction(JunctionKind.END, 20.0, 50.0)
     seen = dataclasses.replace(LINES, width_px=640, height_px=360, lines=(upright,), junctions=(junction,))
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(Topic.LINES, 5, seen)
     drawn = _json(tmp_path / "flight.mcap", Topic.LINES)
     band, centre = drawn["points"]
@@ -359,7 +362,7 @@ def test_lines_are_drawn_by_foxglove_where_they_were_seen(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(("topic", "message"), [(Topic.LINES, LINES), (Topic.POSE, POSE)])
 def test_the_schema_names_every_field_that_is_written(tmp_path: Path, topic: Topic, message: object) -> None:
-    with Recorder(tmp_path / "flight.mcap") as recorder:
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(topic, 5, message)
     _, schema = schema_of(message)
     assert set(_json(tmp_path / "flight.mcap", topic)) == set(schema["properties"])
@@ -369,7 +372,7 @@ def test_run_hands_over_what_waits_without_further_messages(tmp_path: Path) -> N
     path = tmp_path / "flight.mcap"
 
     async def fly() -> None:
-        with Recorder(path) as recorder:
+        with McapRecorder(path) as recorder:
             recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
             running = asyncio.create_task(recorder.run())
             await asyncio.to_thread(_wait_for, path, 1)
@@ -381,7 +384,7 @@ def test_run_hands_over_what_waits_without_further_messages(tmp_path: Path) -> N
 
 
 def test_close_can_be_called_twice(tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "flight.mcap")
+    recorder = McapRecorder(tmp_path / "flight.mcap")
     recorder.close()
     recorder.close()
     assert isinstance(recorder._link, socket.socket)

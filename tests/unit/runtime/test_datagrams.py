@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
+from flightd.runtime.batched_reader import PacedReader
 from flightd.runtime.datagrams import Datagrams, PacedDatagrams, is_stalled, open_datagrams
-from flightd.runtime.loops import VirtualLoop
-from flightd.runtime.paced import PacedReader
+from flightd.runtime.event_loops import VirtualLoop
 
 REAL: Callable[[], asyncio.AbstractEventLoop] = asyncio.new_event_loop
 LOOPS = pytest.mark.parametrize("make_loop", [REAL, VirtualLoop], ids=["real", "virtual"])

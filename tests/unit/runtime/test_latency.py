@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from flightd.app.detection.detector_pool import Detection
+from flightd.app.detection.latency import LatencyBook
 from flightd.core.types import LineSet
-from flightd.runtime.latency import LatencyBook
-from flightd.runtime.pool import Detection
-from flightd.runtime.ring import FrameTicket
+from flightd.runtime.frame_ring import FrameTicket
 
 FRAME_NS = 33_000_000
 WAY_NS = 80_000_000

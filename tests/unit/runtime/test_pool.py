@@ -11,13 +11,13 @@ from functools import partial
 import numpy as np
 import pytest
 
+from flightd.app.detection.detector_pool import Detection, DetectorPool
+from flightd.app.simulation.lockstep import LockstepDetectors
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.core.types import Image, LineSet
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import VirtualLoop
-from flightd.runtime.pool import Detection, DetectorPool
-from flightd.runtime.ring import FrameRing, FrameTicket
-from flightd.sim.lockstep import LockstepDetectors
+from flightd.runtime.event_loops import VirtualLoop
+from flightd.runtime.frame_ring import FrameRing, FrameTicket
 
 
 class MeanDetector:

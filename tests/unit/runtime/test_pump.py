@@ -1,20 +1,20 @@
-"""The set point stream: its own rate, level when its maker is dead, silent when told."""
+"""The setpoint stream: its own rate, level when its maker is dead, silent when told."""
 
 from __future__ import annotations
 
 import asyncio
 import itertools
 
+from flightd.app.setpoint_pump import SetpointPump
 from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, VehicleState
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import VirtualLoop
-from flightd.runtime.pump import SetpointPump
+from flightd.runtime.event_loops import VirtualLoop
 
 MS = 1_000_000
 
 
 class Wire:
-    """Takes set points and the time they came."""
+    """Takes setpoints and the time they came."""
 
     def __init__(self, clock: LoopClock) -> None:
         self._clock = clock

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from flightd.runtime.series import Series
+from flightd.runtime.bounded_series import Series
 
 
 def test_quantiles_are_those_of_the_newest_and_the_memory_is_bounded() -> None:

@@ -8,13 +8,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from flightd.adapters.store.sqlite import SqliteStore
+from flightd.app.counting.store_writer import StoreWriter
 from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, PlannedLocation
 from flightd.core.scanning import Finding, Settled
 from flightd.core.types import CodeRead
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import VirtualLoop
-from flightd.runtime.store_writer import StoreWriter
+from flightd.runtime.event_loops import VirtualLoop
 
 READ = CodeRead("QR Code", "PALLET", ((0.0, 0.0),) * 4, True, 2, 1.0)
 

@@ -11,7 +11,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from pydantic import ValidationError
 
-from flightd.adapters.metrics.book import MetricsBook
+from flightd.adapters.metrics.metrics import MetricsBook
 from flightd.adapters.metrics.server import MetricsServer
 from flightd.config.metrics import MetricsConfig
 from flightd.core.errors import UnavailableError

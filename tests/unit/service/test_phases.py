@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flightd.adapters.ground.desk import POSSIBLE
+from flightd.adapters.ground_link.request_handler import POSSIBLE
 from flightd.core.types import CommandKind, Phase
 from flightd.replay.report.charts import PHASE_TONE
 

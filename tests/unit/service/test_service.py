@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from flightd.cli.service import note_start, was_started_before
+from flightd.app.service import note_start, was_started_before
 
 SYSTEMD = Path(__file__).parents[3] / "systemd"
 UNIT = SYSTEMD / "flightd.service"

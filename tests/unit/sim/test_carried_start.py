@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.recorder.recorder import Recorder
-from flightd.cli.sim_peers import free_ports
-from flightd.cli.simulate import Simulation, _spec
+from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.app.simulation.launch import Simulation, _spec
+from flightd.app.simulation.ports import free_ports
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.loops import VirtualLoop
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.scenario_files import load_scenario
+from flightd.runtime.event_loops import VirtualLoop
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.scenario.scenario_files import load_scenario
 from flightd.sim.world import World
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -29,7 +29,7 @@ def test_the_drone_stands_where_the_scenario_carried_it(tmp_path: Path) -> None:
     simulation = Simulation(config, site, load_scenario(file), 1, None, tmp_path)
 
     async def start() -> Kinematics:
-        with Recorder(tmp_path / "truth.mcap", lossless=True) as recorder:
+        with McapRecorder(tmp_path / "truth.mcap", lossless=True) as recorder:
             spec = _spec(simulation, free_ports(config, site))
             return World(spec, LoopClock(), recorder).vehicle.truth()
 

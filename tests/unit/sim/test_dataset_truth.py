@@ -7,11 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from flightd.sim.dataset import COLOURS, generate
-from flightd.sim.paint import Bend, coverage
-from flightd.sim.scenes import LAYOUTS, Band, Scene, random_scene, truth_lines, truth_nodes, visible_span
-from flightd.sim.severity import LEVELS
-from flightd.vision.labels import LabelledLine
+from flightd.sim.dataset.generate import COLOURS, generate
+from flightd.sim.dataset.scenes import (
+    LAYOUTS,
+    Scene,
+    SceneBand,
+    random_scene,
+    truth_lines,
+    truth_nodes,
+    visible_span,
+)
+from flightd.sim.dataset.severity import LEVELS
+from flightd.sim.floor.paint import Bend, coverage
+from flightd.vision.training.labelled_frames import LabelledLine
 
 
 def measured_line(paint: np.ndarray, line: LabelledLine) -> tuple[float, float]:
@@ -23,7 +31,7 @@ def measured_line(paint: np.ndarray, line: LabelledLine) -> tuple[float, float]:
     x, y = x - (width - 1) / 2, y - (height - 1) / 2
     across, along = x * c + y * s - rho, y * c - x * s
     reach = line.thickness / 2 + 3
-    band = Band(rho, theta, line.thickness)
+    band = SceneBand(rho, theta, line.thickness)
     spans = [visible_span(band, width, height, side * reach) for side in (-1, 1)]
     start, end = max(span[0] for span in spans if span), min(span[1] for span in spans if span)
     ends = sorted(
@@ -64,7 +72,7 @@ def test_the_picture_itself_is_centred_on_the_label() -> None:
 
 
 def test_the_edge_of_a_vertical_band_is_where_it_was_asked_for() -> None:
-    scene = Scene(64, 48, "single", (Band(rho=3.3, theta=0.0, thickness=10.0),))
+    scene = Scene(64, 48, "single", (SceneBand(rho=3.3, theta=0.0, thickness=10.0),))
     row = coverage(scene, Bend())[20]
     x = np.arange(64) - 31.5
     assert row.sum() == pytest.approx(10.0, abs=1e-4)
@@ -128,7 +136,7 @@ def test_each_layout_has_its_nodes(layout: str, kinds: list[str]) -> None:
 
 
 def test_a_line_of_which_only_one_edge_is_in_the_picture_is_minor() -> None:
-    scene = Scene(640, 360, "single", (Band(rho=318.0, theta=0.0, thickness=40.0),))
+    scene = Scene(640, 360, "single", (SceneBand(rho=318.0, theta=0.0, thickness=40.0),))
     assert [line.grade for line in truth_lines(scene)] == ["minor"]
 
 
@@ -136,7 +144,9 @@ def test_a_label_gives_back_the_hessian_form_it_was_made_of() -> None:
     rng = np.random.default_rng(5)
     for _ in range(200):
         theta = rng.uniform(0, math.pi)
-        scene = Scene(640, 360, "single", (Band(rho=rng.uniform(-150, 150), theta=theta, thickness=12.0),))
+        scene = Scene(
+            640, 360, "single", (SceneBand(rho=rng.uniform(-150, 150), theta=theta, thickness=12.0),)
+        )
         (line,) = truth_lines(scene)
         rho, angle = line.hessian(640, 360)
         assert rho == pytest.approx(scene.bands[0].rho, abs=1e-6)

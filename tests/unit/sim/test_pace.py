@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from flightd.sim.pace import PaceWatch
+from flightd.sim.plant.external_pace import PaceWatch
 
 
 def _paces(factor: float, seconds: float, watch: PaceWatch, start_ms: int = 1000) -> list[float]:

@@ -11,20 +11,20 @@ import pytest
 from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
-from flightd.grid.site import Rack
-from flightd.sim.racks.layout import BEAM_M, faces, rack_levels
-from flightd.sim.racks.look import RackLook
-from flightd.sim.racks.stock import Condition, Place, Situation, StockShares, stock
-from flightd.sim.racks.symbols import Symbol, Symbology
-from flightd.sim.racks.truth import LocationTruth, score_stock, stock_truth, write_truth
-from flightd.sim.scenario_files import load_scenario
+from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.code_symbols import Symbol, Symbology
+from flightd.sim.racks.rack_layout import BEAM_M, faces, rack_levels
+from flightd.sim.racks.stock import Condition, StockPlace, StockShares, StockSituation, stock
+from flightd.sim.racks.stock_truth import LocationTruth, score_stock, stock_truth, write_truth
+from flightd.sim.scenario.scenario_files import load_scenario
+from flightd.site.site import Rack
 
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-racks.toml")
 FOCAL_PX = 1000.0
 
 
 @cache
-def places() -> dict[str, Place]:
+def places() -> dict[str, StockPlace]:
     return dict(stock(SITE, StockShares(), FOCAL_PX, 1))
 
 
@@ -44,7 +44,7 @@ def perfect_count() -> dict[str, LocationRecord]:
     }
 
 
-def of_situation(situation: Situation) -> LocationTruth:
+def of_situation(situation: StockSituation) -> LocationTruth:
     return next(place for place in truth().values() if place.situation == situation)
 
 
@@ -83,7 +83,7 @@ def test_every_symbology_and_situation_occurs_about_as_often_as_asked() -> None:
     counts = Counter(place.situation for place in places().values())
     for name in StockShares.names():
         share = getattr(StockShares(), name)
-        assert counts[Situation(name)] / len(places()) == pytest.approx(share, abs=0.03)
+        assert counts[StockSituation(name)] / len(places()) == pytest.approx(share, abs=0.03)
     kinds = Counter(label.symbol.symbology for place in places().values() for label in place.labels)
     assert all(kinds[symbology] > 50 for symbology in Symbology)
 
@@ -149,45 +149,45 @@ def test_nothing_counted_is_nothing_wrong() -> None:
 
 
 def test_a_misread_text_is_wrong() -> None:
-    place = of_situation(Situation.CLEAN)
+    place = of_situation(StockSituation.CLEAN)
     score = score_stock(truth(), [record(place.code, LocationState.READ, "nobody's")])
     assert (score.codes_read, score.codes_wrong) == (0, 1)
 
 
 def test_the_right_text_at_the_neighbours_place_is_wrong() -> None:
-    here, there = of_situation(Situation.CLEAN), of_situation(Situation.TILTED)
+    here, there = of_situation(StockSituation.CLEAN), of_situation(StockSituation.TILTED)
     (text,) = there.readable
     score = score_stock(truth(), [record(here.code, LocationState.READ, text)])
     assert (score.codes_read, score.codes_wrong) == (0, 1)
 
 
 def test_a_locations_own_label_told_as_goods_is_wrong() -> None:
-    place = of_situation(Situation.EMPTY)
+    place = of_situation(StockSituation.EMPTY)
     score = score_stock(truth(), [record(place.code, LocationState.READ, place.code)])
     assert (score.codes_wrong, score.empty_right) == (1, 0)
 
 
 def test_one_of_two_labels_is_half_a_success() -> None:
-    place = of_situation(Situation.SEVERAL)
+    place = of_situation(StockSituation.SEVERAL)
     score = score_stock(truth(), [record(place.code, LocationState.READ, min(place.readable))])
     assert (score.codes_read, score.codes_wrong, score.locations_right) == (1, 0, 0)
 
 
 def test_a_torn_label_that_was_read_all_the_same_is_not_wrong() -> None:
-    place = of_situation(Situation.TORN)
+    place = of_situation(StockSituation.TORN)
     score = score_stock(truth(), [record(place.code, LocationState.READ, *place.texts)])
     assert (score.codes_wrong, score.unreadable_told) == (0, 0)
 
 
 def test_goods_called_empty_are_counted_and_occluded_for_unreadable_is_not_held_against_anyone() -> None:
-    clean, covered = of_situation(Situation.CLEAN), of_situation(Situation.OCCLUDED)
+    clean, covered = of_situation(StockSituation.CLEAN), of_situation(StockSituation.OCCLUDED)
     records = [record(clean.code, LocationState.EMPTY), record(covered.code, LocationState.UNREADABLE)]
     score = score_stock(truth(), records)
     assert (score.empty_wrong, score.unreadable_told, score.locations_right) == (1, 1, 0)
 
 
 def test_only_planned_locations_are_expected() -> None:
-    place = of_situation(Situation.CLEAN)
+    place = of_situation(StockSituation.CLEAN)
     score = score_stock(truth(), [], planned=[place.code])
     assert (score.locations_planned, score.codes_expected) == (1, 1)
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from flightd.adapters.store.progress import LeftOver, NothingLeftError, ProgressFile, load_left_over
-from flightd.app.assembly import plan_of
-from flightd.cli.resume import resumed as take_up
+from flightd.app.build import plan_of
+from flightd.app.resume import resumed as take_up
 from flightd.config.schema import load_config
 from flightd.config.site_file import load_site
 from flightd.core.errors import InputError, TransientError

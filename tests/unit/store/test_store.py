@@ -20,7 +20,7 @@ from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import LocationState, Observation, PlannedLocation, StoredRead
 from flightd.ports import Store
-from flightd.vision.small_jpeg import MOST_BYTES, evidence_jpeg
+from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, evidence_jpeg
 from tests.unit.store.kill_at_random import look
 
 ROOT = Path(__file__).parents[3]

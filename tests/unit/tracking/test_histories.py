@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightd.core.types import Attitude
-from flightd.tracking.attitude import AttitudeHistory
-from flightd.tracking.clocks import DeviceClock
-from flightd.tracking.height import HeightHistory
+from flightd.tracking.attitude_history import AttitudeHistory
+from flightd.tracking.clock_offset import DeviceClock
+from flightd.tracking.height_history import HeightHistory
 
 
 def test_attitude_is_interpolated_across_the_wrap_of_yaw() -> None:

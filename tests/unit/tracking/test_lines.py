@@ -9,11 +9,11 @@ import pytest
 
 from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount
 from flightd.core.types import Attitude, Line, LineSet
-from flightd.sim.ideal import EyeErrors, IdealEye
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.sites import random_site
-from flightd.tracking.lines import LineTracker, TrackerParams
-from flightd.tracking.motion import AxisTracker, MotionNoise, SeenLine
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.random_sites import random_site
+from flightd.tracking.axis_filters import AxisTracker, LineMeasurement, MotionNoise
+from flightd.tracking.line_tracker import LineTracker, TrackerParams
+from tests.sim.ideal_sight import EyeErrors, IdealEye
 
 LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)
 HEIGHT_M = 1.6
@@ -121,7 +121,7 @@ def test_tracked_sigmas_are_honest() -> None:
                 v += (accel + push - noise.drag_per_s * v) * dt
                 axis.predict(dt, 0.0)
             if step < 40:
-                axis.update([SeenLine(0.5 - x + rng.gauss(0, 0.01), 0.01, 0.075)], step)
+                axis.update([LineMeasurement(0.5 - x + rng.gauss(0, 0.01), 0.01, 0.075)], step)
         (line,) = axis.lines()
         errors.append((line.offset_m - (0.5 - x)) / line.sigma_m)
     spread = (sum(e * e for e in errors) / len(errors)) ** 0.5
@@ -139,7 +139,7 @@ def test_wind_that_sets_in_is_soon_known_and_calm_air_stays_calm() -> None:
         x += v * dt + 0.5 * push * dt * dt
         v += push * dt
         axis.predict(dt, 0.0)
-        axis.update([SeenLine(0.5 - x + rng.gauss(0, 0.004), 0.005, 0.075)], step * FRAME_NS)
+        axis.update([LineMeasurement(0.5 - x + rng.gauss(0, 0.004), 0.005, 0.075)], step * FRAME_NS)
         felt.append(axis.disturbance_mps2)
     assert max(map(abs, felt[30:90])) < 0.2
     assert max(felt[:107]) > 0.6, "half a second after it began"
@@ -150,9 +150,9 @@ def test_a_false_line_nearby_starts_a_track_of_its_own() -> None:
     axis = AxisTracker(MotionNoise(), gate_m=0.35, forget_ns=10**9)
     for step in range(20):
         axis.predict(1 / 30, 0.0)
-        axis.update([SeenLine(0.2, 0.005, 0.075), SeenLine(0.9, 0.005, 0.075)], step * FRAME_NS)
+        axis.update([LineMeasurement(0.2, 0.005, 0.075), LineMeasurement(0.9, 0.005, 0.075)], step * FRAME_NS)
     first = axis.lines()
-    axis.update([SeenLine(0.2, 0.005, 0.075), SeenLine(0.5, 0.005, 0.075)], 21 * FRAME_NS)
+    axis.update([LineMeasurement(0.2, 0.005, 0.075), LineMeasurement(0.5, 0.005, 0.075)], 21 * FRAME_NS)
     assert [round(line.offset_m, 2) for line in first] == [0.2, 0.9]
     assert len(axis.lines()) == 3
     axis.update([], 10**10)

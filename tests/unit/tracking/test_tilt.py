@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from flightd.core.geometry import Lens, Mount
 from flightd.core.types import Attitude
-from flightd.grid.site import PaintedLine, Site
-from flightd.sim.ideal import EyeErrors, IdealEye
-from flightd.sim.kinematics import Kinematics
-from flightd.sim.sites import random_site
-from flightd.tracking.tilt import FloorView, GroundLine, TiltCompensation, ground_lines
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.random_sites import random_site
+from flightd.site.site import PaintedLine, Site
+from flightd.tracking.tilt_compensation import FloorView, GroundLine, TiltCompensation, ground_lines
+from tests.sim.ideal_sight import EyeErrors, IdealEye
 
 LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)
 PERFECT = EyeErrors(0.0, 0.0)

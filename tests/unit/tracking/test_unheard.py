@@ -7,14 +7,14 @@ import math
 import pytest
 
 from flightd.core.types import Attitude, AttitudeSetpoint
-from flightd.tracking.unheard import SILENT_NS, UnheardAttitude
+from flightd.tracking.attitude_extrapolation import SILENT_NS, AttitudeExtrapolation
 
 TICK_NS = 20_000_000
 HEARD = Attitude(1_000_000_000, 0.1, -0.05, 3.1)
 
 
 def test_nothing_is_assumed_while_it_talks_nor_of_one_of_which_nothing_was_asked() -> None:
-    unheard = UnheardAttitude()
+    unheard = AttitudeExtrapolation()
     asked = AttitudeSetpoint(0, 0.2)
     assert unheard.step(HEARD.stamp_ns + SILENT_NS, HEARD, asked) is None
     assert unheard.step(HEARD.stamp_ns + 2 * SILENT_NS, HEARD, None) is None
@@ -22,7 +22,7 @@ def test_nothing_is_assumed_while_it_talks_nor_of_one_of_which_nothing_was_asked
 
 
 def test_silent_it_leans_and_turns_as_asked() -> None:
-    unheard = UnheardAttitude()
+    unheard = AttitudeExtrapolation()
     now_ns = HEARD.stamp_ns + SILENT_NS + TICK_NS
     first = unheard.step(now_ns, HEARD, AttitudeSetpoint(0, -0.1, 0.02, 0.5))
     assert first is not None
@@ -37,7 +37,7 @@ def test_silent_it_leans_and_turns_as_asked() -> None:
 
 
 def test_what_comes_late_all_the_time_is_where_each_guess_begins() -> None:
-    unheard = UnheardAttitude()
+    unheard = AttitudeExtrapolation()
     asked = AttitudeSetpoint(0, -0.3)
     for tick in range(100):
         now_ns = 2_000_000_000 + tick * TICK_NS
@@ -48,7 +48,7 @@ def test_what_comes_late_all_the_time_is_where_each_guess_begins() -> None:
 
 
 def test_heard_again_it_starts_anew_from_what_it_then_says() -> None:
-    unheard = UnheardAttitude()
+    unheard = AttitudeExtrapolation()
     asked = AttitudeSetpoint(0)
     unheard.step(HEARD.stamp_ns + 2 * SILENT_NS, HEARD, asked)
     later = Attitude(5_000_000_000, 0.3, 0.0, 0.0)

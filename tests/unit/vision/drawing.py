@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flightd.core.geometry import Lens
 from flightd.core.types import Image, Line, LineSet
-from flightd.vision.plane import Plane
+from flightd.vision.lines.undistortion import Plane
 
 FLOOR = (118.0, 116.0, 112.0)
 PAINT = (35.0, 190.0, 230.0)

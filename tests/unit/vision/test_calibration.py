@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from flightd.cli.main import app
 from flightd.core.errors import InputError
 from flightd.core.types import Image
-from flightd.vision.calibration import Board, calibrate, find_board
+from flightd.vision.lens_calibration import Board, calibrate, find_board
 
 BOARD = Board(9, 6)
 WIDTH, HEIGHT = 640, 360

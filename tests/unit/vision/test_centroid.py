@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision import centroid
-from flightd.vision.plane import Plane
-from flightd.vision.sampling import Grid, grid_for
+from flightd.vision.lines import centroid
+from flightd.vision.lines.sampling import Grid, grid_for
+from flightd.vision.lines.undistortion import Plane
 from tests.unit.vision import drawing
 from tests.unit.vision.drawing import Band
 

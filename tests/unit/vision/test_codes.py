@@ -12,9 +12,9 @@ import segno
 import zxingcpp
 
 from flightd.core.types import CodeRead, Image
-from flightd.vision.code_regions import code_regions
-from flightd.vision.codes import read_codes
-from flightd.vision.votes import CodeVotes
+from flightd.vision.shelf.code_reader import read_codes
+from flightd.vision.shelf.code_regions import code_regions
+from flightd.vision.shelf.read_votes import CodeVotes
 
 PHOTOGRAPHS = Path(__file__).parents[4] / "shared" / "real" / "codes"
 LINES = PHOTOGRAPHS.parent / "lines"
@@ -190,7 +190,7 @@ def test_a_checksum_is_believed_at_once_and_the_most_seen_comes_first() -> None:
 
 @pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="the photographs are not beside this repository")
 def test_the_photographs_are_read() -> None:
-    from flightd.cli import codes as command
+    from flightd.studies import codes as command
 
     expected = command.read_expected(PHOTOGRAPHS / "codes.json")
     verdict = command.compare(list(command.read([PHOTOGRAPHS])), expected)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightd.core.errors import InputError
 from flightd.core.types import Image
-from flightd.vision.colour import (
+from flightd.vision.lines.colour_profile import (
     SHIPPED,
     STRONG,
     ColourProfile,
@@ -182,7 +182,7 @@ def test_an_older_opencv_gives_the_same_levels(monkeypatch: pytest.MonkeyPatch) 
     picture, _ = band("yellow")
     profile = load_profile("yellow")
     levels = classify(picture, profile)
-    monkeypatch.setattr("flightd.vision.colour._LUT_TAKES_16_BITS", False)
+    monkeypatch.setattr("flightd.vision.lines.colour_profile._LUT_TAKES_16_BITS", False)
     assert np.array_equal(classify(picture, profile), levels)
     assert np.array_equal(grow(levels), np.where(levels > 0, 255, 0))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flightd.core.scanning import Quad
-from flightd.vision.deck import is_seen
+from flightd.vision.shelf.empty_deck import is_seen
 
 WIDTH, HEIGHT = 640, 720
 NEAR = 606

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from flightd.core.types import Image
-from flightd.vision import centroid, evidence
-from flightd.vision.colour import STRONG, WEAK, Levels
-from flightd.vision.plane import Plane
-from flightd.vision.sampling import Grid
+from flightd.vision.lines import band_evidence as evidence
+from flightd.vision.lines import centroid
+from flightd.vision.lines.colour_profile import STRONG, WEAK, Levels
+from flightd.vision.lines.sampling import Grid
+from flightd.vision.lines.undistortion import Plane
 from tests.unit.vision import drawing
 from tests.unit.vision.drawing import Band, grid
 

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightd.vision.combine import fuse
-from flightd.vision.fit import Moments, fit, is_bent, law, moments, robust_lines, rows_of, sagitta
-from flightd.vision.strip import LinearFit, Strip, bisector, swapped
+from flightd.vision.lines.band import Band, LinearFit, bisector, swapped
+from flightd.vision.lines.fusion import fuse
+from flightd.vision.lines.line_fit import Moments, fit, is_bent, law, moments, robust_lines, rows_of, sagitta
 
 
-def strip(a: float, b: float, *, steep: bool = True, sigma: float = 1.0, half: float = 5.0) -> Strip:
+def strip(a: float, b: float, *, steep: bool = True, sigma: float = 1.0, half: float = 5.0) -> Band:
     centre = LinearFit(a, b, sigma**2, (sigma / 100) ** 2)
-    return Strip(steep, centre, centre.shifted(-half), centre.shifted(half), -100.0, 100.0, 1.0)
+    return Band(steep, centre, centre.shifted(-half), centre.shifted(half), -100.0, 100.0, 1.0)
 
 
 def test_the_covariance_of_a_fit_is_that_of_repeated_fits() -> None:
@@ -112,11 +112,11 @@ def test_a_line_s_covariance_is_its_strip_s(a: float, b: float, steep: bool, see
     rng = np.random.default_rng(seed)
     cov = np.array([[0.04, -3e-5], [-3e-5, 4e-8]])
     centre = LinearFit(a, b, cov[0, 0], cov[1, 1], cov[0, 1])
-    line = Strip(steep, centre, centre, centre, -100.0, 100.0, 1.0).to_line()
+    line = Band(steep, centre, centre, centre, -100.0, 100.0, 1.0).to_line()
     lines = []
     for da, db in rng.multivariate_normal([0, 0], cov, 400):
         moved = LinearFit(a + da, b + db)
-        other = Strip(steep, moved, moved, moved, -100.0, 100.0, 1.0).to_line()
+        other = Band(steep, moved, moved, moved, -100.0, 100.0, 1.0).to_line()
         turn, rho = other.theta_rad - line.theta_rad, other.rho_px
         if abs(turn) > 1:
             turn, rho = turn - math.copysign(math.pi, turn), -rho

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.vision.gs1 import FNC1, Gs1Error, check_digit, has_check_digit, parse_element_string
+from flightd.vision.shelf.gs1 import FNC1, Gs1Error, check_digit, has_check_digit, parse_element_string
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,14 @@ from pathlib import Path
 import pytest
 
 from flightd.core.errors import InputError
-from flightd.vision.labels import LabelledImage, LabelledLine, LabelledNode, Labels, read_labels, write_labels
+from flightd.vision.training.labelled_frames import (
+    LabelledImage,
+    LabelledLine,
+    LabelledNode,
+    Labels,
+    read_labels,
+    write_labels,
+)
 
 REAL = Path(__file__).resolve().parents[4] / "shared" / "real" / "lines"
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightd.core.geometry import Lens
-from flightd.vision.plane import Plane
-from flightd.vision.sampling import OUTSIDE, Grid, coarsened, grid_for, look_up, sample
+from flightd.vision.lines.sampling import OUTSIDE, Grid, coarsened, grid_for, look_up, sample
+from flightd.vision.lines.undistortion import Plane
 
 FISHY = Lens(640, 360, 420.0, 415.0, 322.0, 178.0, (-0.25, 0.08, 0.002, -0.001, -0.01))
 

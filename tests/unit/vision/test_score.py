@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from flightd.core.geometry import normalise_line
 from flightd.core.types import Junction, JunctionKind, Line, LineSet
-from flightd.vision.labels import Grade, LabelledImage, LabelledLine, LabelledNode
-from flightd.vision.score import Gate, Score, score_picture
+from flightd.vision.training.labelled_frames import Grade, LabelledImage, LabelledLine, LabelledNode
+from flightd.vision.training.line_score import Gate, LineScore, score_picture
 
 WIDTH, HEIGHT = 640, 360
 
@@ -40,8 +40,8 @@ def shown(
     return LabelledImage(file="a.png", lines=list(lines), complete=complete, nodes=nodes or [])
 
 
-def scored(picture: LabelledImage, found: LineSet) -> Score:
-    score = Score()
+def scored(picture: LabelledImage, found: LineSet) -> LineScore:
+    score = LineScore()
     score_picture(score, picture, found, Gate())
     return score
 
@@ -136,7 +136,7 @@ def test_found_is_stricter_than_matched() -> None:
 
 
 def test_a_negative_is_clean_when_nothing_is_seen() -> None:
-    score = Score()
+    score = LineScore()
     negative = LabelledImage(file="a.png", complete=True, negative=True)
     for found in (seen(), seen(line(0, 1.0))):
         score_picture(score, negative, found, Gate())

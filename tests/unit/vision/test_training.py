@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from flightd.core.errors import InputError
-from flightd.vision.labels import LabelledImage, LabelledLine, Region
-from flightd.vision.training import (
+from flightd.vision.training.colour_training import (
     FLOOR,
     PAINT,
     UNKNOWN,
@@ -16,6 +15,7 @@ from flightd.vision.training import (
     teaching_from_label,
     teaching_from_mask,
 )
+from flightd.vision.training.labelled_frames import LabelledImage, LabelledLine, LabelledRegion
 
 SHAPE = (90, 160)
 LINE = LabelledLine(x1=0.0, y1=45.0, x2=159.0, y2=45.0, thickness=20.0)
@@ -43,8 +43,8 @@ def test_beside_lines_is_no_floor_where_not_everything_is_labelled() -> None:
 
 def test_boxes_and_strokes_teach_what_they_cover() -> None:
     regions = [
-        Region(paint=False, box=(0, 0, 40, 90)),
-        Region(paint=True, stroke=[(100.0, 10.0), (100.0, 80.0), (140.0, 80.0)], width=10),
+        LabelledRegion(paint=False, box=(0, 0, 40, 90)),
+        LabelledRegion(paint=True, stroke=[(100.0, 10.0), (100.0, 80.0), (140.0, 80.0)], width=10),
     ]
     teaching = teaching_from_label(LabelledImage(file="a", regions=regions), SHAPE)
     assert (teaching[:, :40] == FLOOR).all()

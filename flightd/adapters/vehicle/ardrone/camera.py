@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from flightd.adapters.vehicle.ardrone.settings import Camera
+from flightd.adapters.vehicle.ardrone.settings import DroneCamera
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
-from flightd.adapters.vehicle.ardrone.video import Picture, VideoStream
+from flightd.adapters.vehicle.ardrone.video import DecodedFrame, VideoStream
 from flightd.ports import Clock
-from flightd.runtime.ring import FrameRing, FrameTicket
+from flightd.runtime.frame_ring import FrameRing, FrameTicket
 
 SLOTS = 8
 
@@ -26,7 +26,7 @@ class ArDroneCamera:
         vehicle: ArDroneVehicle,
         latency_s: float,
         clock: Clock,
-        on_frame: dict[Camera, Callable[[FrameTicket], None]],
+        on_frame: dict[DroneCamera, Callable[[FrameTicket], None]],
     ) -> None:
         self._vehicle = vehicle
         self._on_frame = on_frame
@@ -54,7 +54,7 @@ class ArDroneCamera:
             if self._ring is not None:
                 self._ring.close()
 
-    def _show(self, picture: Picture) -> None:
+    def _show(self, picture: DecodedFrame) -> None:
         since_ns = self._vehicle.camera_since_ns
         take = self._on_frame.get(self._vehicle.camera)
         if take is None or since_ns is None or picture.arrival_ns < since_ns:

@@ -25,7 +25,7 @@ from flightd.adapters.vehicle.ardrone import at
 from flightd.adapters.vehicle.ardrone.at import AtCommand
 from flightd.adapters.vehicle.ardrone.navdata import DroneState, Major
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
-from flightd.adapters.vehicle.ardrone.telemetry import Telemetry
+from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
 from flightd.core.types import AttitudeSetpoint, Demand
 
 _TRIM_REPEATS = 3
@@ -35,7 +35,7 @@ _DESCENT_MPS = 0.05
 _HOVER_CLIMB_MPS = 0.05
 
 
-class Limits:
+class TiltLimits:
     """Full scale of PCMD's arguments, as the drone has them in force."""
 
     def __init__(self, settings: ArDroneSettings) -> None:
@@ -61,10 +61,10 @@ class Limits:
 class FlightLogic:
     """Decides REF and PCMD at each beat; see the module's rules."""
 
-    def __init__(self, settings: ArDroneSettings, telemetry: Telemetry) -> None:
+    def __init__(self, settings: ArDroneSettings, telemetry: NavdataTelemetry) -> None:
         self._settings = settings
         self._telemetry = telemetry
-        self.limits = Limits(settings)
+        self.limits = TiltLimits(settings)
         self.configured = False
         self.demand = Demand.HANDS_OFF
         self._setpoint: AttitudeSetpoint | None = None

@@ -17,7 +17,7 @@ _TILT_RAD, _CLIMB_MPS, _YAW_RATE_RADPS = (0.0, 0.52), (0.2, 2.0), (0.7, 6.11)
 _PORT_NAMES = ("at", "navdata", "video", "control")
 
 
-class Camera(enum.IntEnum):
+class DroneCamera(enum.IntEnum):
     """Values of `video:video_channel`; only one camera is streamed at a time."""
 
     FRONT = 0
@@ -50,7 +50,7 @@ class ArDroneSettings:
     climb_max_mps: float = 0.7
     yaw_rate_max_radps: float = math.radians(100.0)
     height_max_m: float = 6.0
-    camera: Camera = Camera.DOWN
+    camera: DroneCamera = DroneCamera.DOWN
     video_bitrate_kbps: int = 4000
     full_navdata: bool = False
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections import deque
 
+from flightd.adapters.vehicle.ardrone.clock_counters import WrappingCounter
 from flightd.adapters.vehicle.ardrone.navdata import Demo, DroneState, Major, Navdata
-from flightd.adapters.vehicle.ardrone.stamps import WrappingCounter
 from flightd.core.types import Attitude
-from flightd.tracking.clocks import DeviceClock
+from flightd.tracking.clock_offset import DeviceClock
 
 CLOCK_WRAP_US = 2048 * 1_000_000
 AIRBORNE = frozenset(
@@ -30,7 +30,7 @@ EMERGENCIES = {
 }
 
 
-class Telemetry:
+class NavdataTelemetry:
     """The newest of each quantity with its own time, and the attitude samples not yet drained.
 
     Heights that leap farther than a drone can climb are sonar echoes of something else: they are passed

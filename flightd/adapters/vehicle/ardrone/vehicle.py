@@ -7,12 +7,12 @@ import logging
 import math
 
 from flightd.adapters.vehicle.ardrone import at
-from flightd.adapters.vehicle.ardrone.config import Configurator
+from flightd.adapters.vehicle.ardrone.configurator import Configurator
 from flightd.adapters.vehicle.ardrone.flight import FlightLogic
 from flightd.adapters.vehicle.ardrone.link import Link
 from flightd.adapters.vehicle.ardrone.navdata import DroneState, Major, Navdata
-from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, Camera
-from flightd.adapters.vehicle.ardrone.telemetry import Telemetry
+from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, DroneCamera
+from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
 from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, LandedState, VehicleState
 from flightd.ports import Clock
 
@@ -52,7 +52,7 @@ class ArDroneVehicle:
     def __init__(self, settings: ArDroneSettings, clock: Clock) -> None:
         self._settings = settings
         self._clock = clock
-        self._telemetry = Telemetry(round(settings.attitude_latency_s * 1e9))
+        self._telemetry = NavdataTelemetry(round(settings.attitude_latency_s * 1e9))
         self._flight = FlightLogic(settings, self._telemetry)
         self._link = Link(settings, clock, self._receive)
         self._configurator = Configurator(self._link, settings)
@@ -127,7 +127,7 @@ class ArDroneVehicle:
 
     # Camera
 
-    def select_camera(self, camera: Camera) -> None:
+    def select_camera(self, camera: DroneCamera) -> None:
         """Have the video show this camera; `camera_since_ns` tells when it does."""
         if camera != self._camera:
             self._camera = camera
@@ -140,7 +140,7 @@ class ArDroneVehicle:
         return self._settings.host, self._settings.video_port
 
     @property
-    def camera(self) -> Camera:
+    def camera(self) -> DroneCamera:
         """The camera asked for."""
         return self._camera
 

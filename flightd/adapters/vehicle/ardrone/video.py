@@ -14,12 +14,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
+from flightd.adapters.vehicle.ardrone.clock_counters import WrappingCounter
 from flightd.adapters.vehicle.ardrone.pave import CODEC_H264, Control, FrameType, PaveFrame, PaveParser
-from flightd.adapters.vehicle.ardrone.stamps import WrappingCounter
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Image
 from flightd.ports import Clock
-from flightd.tracking.clocks import DeviceClock
+from flightd.tracking.clock_offset import DeviceClock
 
 _log = logging.getLogger(__name__)
 
@@ -31,7 +31,7 @@ _COUNTER_WRAP_MS = 1 << 32
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class DecodedFrame:
     """One decoded picture: (H, W, 3) uint8 BGR; `stamp_ns` mid-exposure by the encoder's own clock less
     the least delay, `arrival_ns` when its last byte was here."""
 
@@ -128,7 +128,7 @@ class VideoStream:
     """
 
     def __init__(
-        self, address: tuple[str, int], latency_s: float, clock: Clock, show: Callable[[Picture], None]
+        self, address: tuple[str, int], latency_s: float, clock: Clock, show: Callable[[DecodedFrame], None]
     ) -> None:
         self._address = address
         self._clock = clock
@@ -209,4 +209,4 @@ class VideoStream:
         self.pictures += 1
         device_ns = self._counter.unwrap(frame.header.timestamp_ms) * 1_000_000
         stamp_ns = self._device.to_ours(device_ns, arrival_ns)
-        self._show(Picture(frame.header.frame_number, stamp_ns, arrival_ns, bgr))
+        self._show(DecodedFrame(frame.header.frame_number, stamp_ns, arrival_ns, bgr))

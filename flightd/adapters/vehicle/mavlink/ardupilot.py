@@ -6,9 +6,9 @@ import asyncio
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.codec import Message
-from flightd.adapters.vehicle.mavlink.link import Firmware
-from flightd.adapters.vehicle.mavlink.origin import Origin
+from flightd.adapters.vehicle.mavlink.link.codec import Message
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.services.estimator_origin import Origin
 from flightd.adapters.vehicle.mavlink.setpoint import climb_thrust
 from flightd.adapters.vehicle.mavlink.vehicle import DEFAULTS, MavlinkOptions, MavlinkVehicle
 from flightd.core.types import AttitudeSetpoint

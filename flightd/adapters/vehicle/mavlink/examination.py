@@ -10,15 +10,15 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.beats import BEATS_HZ, Beats
-from flightd.adapters.vehicle.mavlink.codec import Codec, Message
-from flightd.adapters.vehicle.mavlink.commands import Commander
-from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
-from flightd.adapters.vehicle.mavlink.fitness import Finding, Job, judge, rules_for
-from flightd.adapters.vehicle.mavlink.link import Firmware, MavlinkLink
-from flightd.adapters.vehicle.mavlink.parameters import Parameters
-from flightd.adapters.vehicle.mavlink.signing import Signing, setup_message
-from flightd.adapters.vehicle.mavlink.transport import make_transport
+from flightd.adapters.vehicle.mavlink.link.codec import Codec, Message
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware, MavlinkLink
+from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
+from flightd.adapters.vehicle.mavlink.link.signing import Signing, setup_message
+from flightd.adapters.vehicle.mavlink.link.transport import make_transport
+from flightd.adapters.vehicle.mavlink.required_parameters import Job, ParameterFinding, judge, rules_for
+from flightd.adapters.vehicle.mavlink.services.commands import Commander
+from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, Beats
+from flightd.adapters.vehicle.mavlink.services.parameters import Parameters
 from flightd.core.errors import UnavailableError
 from flightd.ports import Clock
 
@@ -26,14 +26,14 @@ _BEATS_WINDOW_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class ExaminationReport:
     """What was found.  `version` is "" when the autopilot does not tell; `unread` are parameters that it
     does not have, under their newest names; `heartbeat_hz` is the rate that it keeps when asked for ours."""
 
     firmware: Firmware
     version: str
     armed: bool
-    findings: tuple[Finding, ...]
+    findings: tuple[ParameterFinding, ...]
     unread: tuple[str, ...]
     heartbeat_hz: float
 
@@ -91,7 +91,7 @@ class Examination:
         """Give it the key of a signed link; it never answers that."""
         self._link.send(setup_message(self._system_id, key, unix_time_s))
 
-    async def report(self) -> Report:
+    async def report(self) -> ExaminationReport:
         """Read afresh and judge every parameter of the firmware's table.  UnavailableError if none is
         answered."""
         firmware = self._link.firmware
@@ -115,9 +115,9 @@ class Examination:
         if math.isnan(self._heartbeat_hz):
             self._heartbeat_hz = await self._measure_beats()
         found_all = (tuple(findings), tuple(unread), self._heartbeat_hz)
-        return Report(firmware, self._version, self._armed, *found_all)
+        return ExaminationReport(firmware, self._version, self._armed, *found_all)
 
-    async def fix(self, findings: Sequence[Finding]) -> list[Finding]:
+    async def fix(self, findings: Sequence[ParameterFinding]) -> list[ParameterFinding]:
         """Write the better values and read them back; the findings that remain.  Nothing is written to
         an armed vehicle."""
         remaining = []

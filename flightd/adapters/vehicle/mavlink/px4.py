@@ -9,7 +9,7 @@ import asyncio
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.link import Firmware
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.vehicle import DEFAULTS, RATES_HZ, MavlinkOptions, MavlinkVehicle
 from flightd.core.types import AttitudeSetpoint

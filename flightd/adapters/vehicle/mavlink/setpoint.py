@@ -6,7 +6,7 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.codec import Message
+from flightd.adapters.vehicle.mavlink.link.codec import Message
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import AttitudeSetpoint
 
@@ -32,7 +32,7 @@ def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> list[float]
     return [part / norm for part in q]
 
 
-class Heading:
+class HeadingIntegrator:
     """The heading in our setpoints, which always carry one: the integral of the commanded yaw rate.
 
     It starts at the vehicle's measured yaw and never leads it by more than 20 degrees, so a vehicle that

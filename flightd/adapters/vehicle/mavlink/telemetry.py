@@ -7,8 +7,8 @@ from collections import deque
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.codec import Message
-from flightd.adapters.vehicle.mavlink.timesync import ClockSync
+from flightd.adapters.vehicle.mavlink.link.codec import Message
+from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _ATTITUDES_MAX = 512
@@ -32,7 +32,7 @@ _LANDED = {
 }
 
 
-class Telemetry:
+class MavlinkTelemetry:
     """The newest readings of one autopilot.  Values that are not finite or make no sense are not taken."""
 
     def __init__(self, sync: ClockSync) -> None:

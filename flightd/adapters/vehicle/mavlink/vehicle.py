@@ -12,22 +12,22 @@ from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.beats import BEATS_HZ, Beats, too_slow
-from flightd.adapters.vehicle.mavlink.codec import Codec, Message
-from flightd.adapters.vehicle.mavlink.commands import Commander
-from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
-from flightd.adapters.vehicle.mavlink.link import Firmware, MavlinkLink
-from flightd.adapters.vehicle.mavlink.outputs import PoseForm, PoseOutput, landing_target
-from flightd.adapters.vehicle.mavlink.parameters import Names, Parameters
-from flightd.adapters.vehicle.mavlink.pursuit import Pursuit
+from flightd.adapters.vehicle.mavlink.link.codec import Codec, Message
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware, MavlinkLink
+from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
+from flightd.adapters.vehicle.mavlink.link.signing import Signing
+from flightd.adapters.vehicle.mavlink.link.transport import make_transport
+from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
+from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
+from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.mavlink.services.commands import Commander
+from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, Beats, too_slow
+from flightd.adapters.vehicle.mavlink.services.parameters import Names, Parameters
+from flightd.adapters.vehicle.mavlink.services.statustext import SEVERITIES, TextAssembler, make_texts
+from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
-from flightd.adapters.vehicle.mavlink.signing import Signing
-from flightd.adapters.vehicle.mavlink.statustext import SEVERITIES, TextAssembler, make_texts
-from flightd.adapters.vehicle.mavlink.steering import Steering
-from flightd.adapters.vehicle.mavlink.streams import StreamKeeper
-from flightd.adapters.vehicle.mavlink.telemetry import Telemetry
-from flightd.adapters.vehicle.mavlink.timesync import ClockSync
-from flightd.adapters.vehicle.mavlink.transport import make_transport
+from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
+from flightd.adapters.vehicle.mavlink.telemetry import MavlinkTelemetry
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -98,14 +98,14 @@ class MavlinkVehicle(abc.ABC):
         self._clock = clock
         self._system_id = system_id
         self._sync = ClockSync()
-        self._telemetry = Telemetry(self._sync)
+        self._telemetry = MavlinkTelemetry(self._sync)
         self._pose_output = None if options.pose_form is None else PoseOutput(options.pose_form)
         transport = make_transport(parse_endpoint(url))
         codec = Codec(system_id, signing=options.signing)
         self.link = MavlinkLink(transport, codec, clock, system_id, self._received)
         self._commander = Commander(self.link, system_id)
-        self._pursuit = Pursuit(self, self._commander, self._telemetry, clock)
-        self._steering = Steering(self._pursuit, self._telemetry)
+        self._pursuit = ModeArmingManager(self, self._commander, self._telemetry, clock)
+        self._steering = SetpointShaper(self._pursuit, self._telemetry)
         self.streams = StreamKeeper(self._commander, clock, self.rates_hz)
         self.parameters = Parameters(self.link, system_id, bytewise=self.firmware is Firmware.PX4)
         self._texts = TextAssembler()

@@ -1,7 +1,7 @@
-"""The gate between MAVSDK and the wire: set points pass only while the mission is alive, changes of mode and
+"""The gate between MAVSDK and the wire: setpoints pass only while the mission is alive, changes of mode and
 arming only while the vehicle is ours to command.
 
-MAVSDK repeats the newest attitude set point 20 times a second by itself, on a thread of its own, until
+MAVSDK repeats the newest attitude setpoint 20 times a second by itself, on a thread of its own, until
 told otherwise: a dead control loop would be kept flying at its last tilt.  It also repeats a command that was
 not answered, for more than a second: the pilot who took over meanwhile would lose the vehicle again.
 """
@@ -15,7 +15,7 @@ _COMMAND_AT = 28
 _DO_SET_MODE, _ARM_DISARM = 176, 400
 
 FRESH_NS = 200_000_000
-"""A set point older than this does not go out any more; less than any autopilot's own time-out."""
+"""A setpoint older than this does not go out any more; less than any autopilot's own time-out."""
 
 _V1, _V2 = 0xFE, 0xFD
 
@@ -39,21 +39,21 @@ def commands_flight(frame: bytes) -> bool:
 
 
 class SetpointGate:
-    """Passes attitude set points only for `FRESH_NS` after each `refresh`, commands that change who flies
+    """Passes attitude setpoints only for `FRESH_NS` after each `refresh`, commands that change who flies
     only while it is `commanding`, everything else always."""
 
     def __init__(self) -> None:
         self._until_ns = 0
         self.commanding = False
         self.held_back = 0
-        """Repeats of old set points and commands that were kept from the wire."""
+        """Repeats of old setpoints and commands that were kept from the wire."""
 
     def refresh(self, now_ns: int) -> None:
-        """A set point was made now."""
+        """A setpoint was made now."""
         self._until_ns = now_ns + FRESH_NS
 
     def close(self) -> None:
-        """The vehicle is not ours: no set point passes until the next `refresh`."""
+        """The vehicle is not ours: no setpoint passes until the next `refresh`."""
         self._until_ns = 0
 
     def passes(self, frame: bytes, now_ns: int) -> bool:

@@ -20,8 +20,8 @@ from mavsdk.exceptions import MavsdkError
 from mavsdk.logging import LogLevel, log_subscribe
 from mavsdk.plugins.mavlink_direct import MavlinkMessage
 
-from flightd.adapters.vehicle.mavlink.codec import COMPANION
-from flightd.adapters.vehicle.mavlink.commands import Answer
+from flightd.adapters.vehicle.mavlink.link.codec import COMPANION
+from flightd.adapters.vehicle.mavlink.services.commands import Answer
 
 _LOG = logging.getLogger(__name__)
 _LEVELS = {

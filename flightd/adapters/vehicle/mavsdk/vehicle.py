@@ -1,6 +1,6 @@
 """PX4 through MAVSDK 4: attitude OFFBOARD, arming, landing and telemetry by the library's plugins.
 
-As far as its API reaches: the set point carries no yaw rate (mask 7), only the heading that we integrate;
+As far as its API reaches: the setpoint carries no yaw rate (mask 7), only the heading that we integrate;
 there is no signing; ArduPilot is left to the adapter of our own, since the library's offboard mode means
 GUIDED there, which needs a position.  After the library's documentation and behaviour; not tried on
 hardware.
@@ -23,17 +23,17 @@ from mavsdk.plugins.server_utility import StatusTextType
 from mavsdk.plugins.telemetry import FlightMode
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.endpoint import parse_endpoint
-from flightd.adapters.vehicle.mavlink.pursuit import Pursuit
-from flightd.adapters.vehicle.mavlink.steering import Steering
-from flightd.adapters.vehicle.mavlink.streams import StreamKeeper
-from flightd.adapters.vehicle.mavlink.timesync import ClockSync
-from flightd.adapters.vehicle.mavlink.transport import make_transport
-from flightd.adapters.vehicle.mavsdk.commander import SdkCommander
+from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
+from flightd.adapters.vehicle.mavlink.link.transport import make_transport
+from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
+from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
+from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
+from flightd.adapters.vehicle.mavsdk.commands import SdkCommander
+from flightd.adapters.vehicle.mavsdk.connection import MavsdkConnection
 from flightd.adapters.vehicle.mavsdk.gate import SetpointGate
 from flightd.adapters.vehicle.mavsdk.library import Library, Plugins, whole_fields
-from flightd.adapters.vehicle.mavsdk.line import Line
-from flightd.adapters.vehicle.mavsdk.readings import Readings
+from flightd.adapters.vehicle.mavsdk.telemetry import Readings
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -43,7 +43,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.ports import Clock
-from flightd.runtime.latest import Latest
+from flightd.runtime.latest_slot import Latest
 
 _LOG = logging.getLogger(__name__)
 
@@ -86,7 +86,7 @@ class MavsdkVehicle:
     flying_mode = int(FlightMode.OFFBOARD)
     landing_mode = int(FlightMode.LAND)
     prime_s = 1.3
-    """PX4 wants set points for more than a second before it enters OFFBOARD."""
+    """PX4 wants setpoints for more than a second before it enters OFFBOARD."""
 
     def __init__(self, url: str, clock: Clock, system_id: int = 1) -> None:
         self._clock = clock
@@ -94,10 +94,10 @@ class MavsdkVehicle:
         self._sync = ClockSync()
         self._readings = Readings(self._sync)
         self.gate = SetpointGate()
-        self._line = Line(make_transport(parse_endpoint(url)), self.gate, clock)
+        self._line = MavsdkConnection(make_transport(parse_endpoint(url)), self.gate, clock)
         self._commander = SdkCommander()
-        self._pursuit = Pursuit(self, self._commander, self._readings, clock)
-        self._steering = Steering(self._pursuit, self._readings)
+        self._pursuit = ModeArmingManager(self, self._commander, self._readings, clock)
+        self._steering = SetpointShaper(self._pursuit, self._readings)
         self._setpoints: Latest[SdkAttitude] = Latest()
         self._texts: deque[tuple[StatusTextType, str]] = deque(maxlen=_TEXTS_MAX)
         self._text_waits = asyncio.Event()
@@ -226,8 +226,8 @@ class MavsdkVehicle:
             tasks.create_task(self._take(source, streams, message_id, take), name=f"mavsdk {message_id}")
         tasks.create_task(streams.run(), name="mavsdk streams")
         tasks.create_task(self._compare_clocks(library, plugins), name="mavsdk timesync")
-        tasks.create_task(self._pass_on(library, plugins), name="mavsdk set points")
-        tasks.create_task(self._idle(), name="mavsdk idle set points")
+        tasks.create_task(self._pass_on(library, plugins), name="mavsdk setpoints")
+        tasks.create_task(self._idle(), name="mavsdk idle setpoints")
         tasks.create_task(self._tell(library, plugins), name="mavsdk texts")
 
     async def _take(
@@ -263,7 +263,7 @@ class MavsdkVehicle:
                 await library.call(plugins.direct.send_message(question))
             await asyncio.sleep(_SYNC_SLOW_S if self._sync.is_settled else _SYNC_FAST_S)
 
-    # Set points
+    # Setpoints
 
     def _mind_gate(self) -> None:
         """Shut it as soon as nobody here may steer any more, or command."""
@@ -284,7 +284,7 @@ class MavsdkVehicle:
                 await library.call(plugins.offboard.set_attitude(attitude))
 
     async def _idle(self) -> None:
-        """Set points while the mission makes none yet."""
+        """Setpoints while the mission makes none yet."""
         while True:
             await asyncio.sleep(_IDLE_PERIOD_S)
             now_ns = self._clock.now_ns()

@@ -1,0 +1,116 @@
+"""A camera that is a process of its own: pictures in shared memory, one UDP notice for each."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+from urllib.parse import urlsplit
+
+from flightd.core.errors import InputError, UnavailableError
+from flightd.ports import Clock
+from flightd.runtime.datagrams import is_stalled
+from flightd.runtime.frame_notice import ExposureRequest, decode_notice, encode_request
+from flightd.runtime.frame_ring import FrameTicket
+from flightd.tracking.clock_offset import DeviceClock
+
+_TELL_NS = 5_000_000_000
+
+
+def parse_address(url: str) -> tuple[str, int]:
+    """(host, port) of a `udp://HOST:PORT`; InputError otherwise."""
+    parts = urlsplit(url)
+    try:
+        port = parts.port
+    except ValueError:
+        port = None
+    if parts.scheme != "udp" or not parts.hostname or port is None:
+        raise InputError(f"camera.url {url!r}: expected udp://HOST:PORT, for example udp://127.0.0.1:5600")
+    return parts.hostname, port
+
+
+class SharedCamera(asyncio.DatagramProtocol):
+    """Listens for notices and hands each picture's ticket to `on_frame`; what is no usable notice is
+    counted and told to `on_trouble`, at most once in five seconds.  A notice of a picture that was taken
+    with another exposure than is wanted is answered by a request."""
+
+    def __init__(
+        self,
+        url: str,
+        size_px: tuple[int, int],
+        latency_s: float,
+        clock: Clock,
+        on_frame: Callable[[FrameTicket], None],
+        on_trouble: Callable[[str], None],
+    ) -> None:
+        self._address = parse_address(url)
+        self._url = url
+        self._size_px = size_px
+        self._clock = clock
+        self._device = DeviceClock(round(latency_s * 1e9))
+        self._on_frame = on_frame
+        self.frames = 0
+        self._on_trouble = on_trouble
+        self._told_ns: int | None = None
+        self._exposure = 1.0
+        self._transport: asyncio.DatagramTransport | None = None
+        self.rejected = 0
+
+    async def run(self) -> None:
+        """Listen until cancelled.  Raises UnavailableError when the port is taken."""
+        loop = asyncio.get_running_loop()
+        try:
+            transport, _ = await loop.create_datagram_endpoint(lambda: self, local_addr=self._address)
+        except OSError as err:
+            raise UnavailableError(
+                f"camera.url {self._url}: {err.strerror}; is another flightd running?"
+            ) from err
+        try:
+            self._transport = transport
+            await asyncio.get_running_loop().create_future()
+        finally:
+            self._transport = None
+            transport.close()
+
+    def expose(self, part: float) -> None:
+        """Ask for pictures of this part of the usual exposure from now on."""
+        self._exposure = part
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:
+        arrival_ns = self._clock.now_ns()
+        try:
+            notice = decode_notice(data)
+        except InputError as err:
+            self._reject(str(err))
+            return
+        if (notice.width_px, notice.height_px) != self._size_px:
+            wanted = "{}x{}".format(*self._size_px)
+            self._reject(
+                f"pictures are {notice.width_px}x{notice.height_px}, the configuration says {wanted}"
+            )
+            return
+        line = self._transport
+        if notice.exposure != self._exposure and line is not None and not is_stalled(line):
+            line.sendto(encode_request(ExposureRequest(self._exposure)), addr)
+        self.frames += 1
+        stamp_ns = self._device.to_ours(notice.device_ns, arrival_ns)
+        self._on_frame(
+            FrameTicket(
+                notice.ring,
+                notice.slot,
+                notice.slots,
+                notice.seq,
+                stamp_ns,
+                arrival_ns,
+                notice.width_px,
+                notice.height_px,
+                notice.exposure,
+            )
+        )
+
+    def _reject(self, reason: str) -> None:
+        self.rejected += 1
+        now_ns = self._clock.now_ns()
+        if self._told_ns is None or now_ns - self._told_ns >= _TELL_NS:
+            self._told_ns = now_ns
+            self._on_trouble(f"camera {self._url}: {reason} ({self.rejected} notices refused so far)")

@@ -1,0 +1,1 @@
+"""The ZMQ link to ground stations: sockets, requests, keys, audit."""

@@ -1,0 +1,232 @@
+"""A client of the ground link, as `flightctl` and tests use it."""
+
+from __future__ import annotations
+
+import asyncio
+import uuid
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Any, Self, TypeVar
+
+import zmq
+import zmq.asyncio
+from zmq.utils.monitor import parse_monitor_message
+
+from flightd.adapters.ground_link.keys import KeyPair
+from flightd.adapters.ground_link.protocol import (
+    DECODE_ERRORS,
+    EVENT_TOPIC,
+    STATUS_TOPIC,
+    VERSION,
+    Accepted,
+    Answer,
+    AskInventory,
+    AskPicture,
+    AskStatus,
+    Attend,
+    Code,
+    EventReport,
+    Hello,
+    InventoryAnswer,
+    Order,
+    PictureAnswer,
+    Refused,
+    Request,
+    StatusAnswer,
+    StatusReport,
+    Welcome,
+    decode_answer,
+    decode_event,
+    decode_status,
+    encode,
+)
+from flightd.core.errors import InputError, RunError, TransientError, UnavailableError
+from flightd.core.types import CommandKind
+
+RETRY_S = 1.0
+"""An answer that does not come for so long is asked for again, with the same id."""
+
+_KINDS_OF_INPUT = {Code.MALFORMED, Code.VERSION, Code.NODE, Code.UNAVAILABLE}
+_SHUT_OUT = {zmq.Event.HANDSHAKE_FAILED_AUTH, zmq.Event.HANDSHAKE_FAILED_PROTOCOL}
+"""Events after which asking again is of no use."""
+
+_A = TypeVar("_A")
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """Where a daemon listens, and the keys to it: ours, and the daemon's public one (both or none)."""
+
+    host: str = "127.0.0.1"
+    status_port: int = 5571
+    command_port: int = 5572
+    keys: KeyPair | None = None
+    server_key: str | None = None
+
+    def endpoint(self, port: int) -> str:
+        return f"tcp://[{self.host}]:{port}" if ":" in self.host else f"tcp://{self.host}:{port}"
+
+
+class GroundClient:
+    """Connected while entered: `async with GroundClient(address) as client`.
+
+    Each call raises UnavailableError when no daemon answers within `timeout_s` (saying why, as far as
+    ZMQ knows), InputError when it refuses what was asked for, RunError when it refuses to do it.
+    """
+
+    def __init__(self, address: Address, name: str = "flightctl", timeout_s: float = 3.0) -> None:
+        self._address = address
+        self._name = name
+        self._timeout_s = timeout_s
+        self._context = zmq.asyncio.Context()
+        self._requests: Any = self._socket(zmq.DEALER)
+        self._status: Any = self._socket(zmq.SUB)
+        self._monitor: Any = self._requests.get_monitor_socket()
+        self._asking = asyncio.Lock()
+        self._seen: set[int] = set()
+        self.session = ""
+
+    async def __aenter__(self) -> Self:
+        address = self._address
+        self._status.subscribe(STATUS_TOPIC)
+        self._status.subscribe(EVENT_TOPIC)
+        try:
+            self._requests.connect(address.endpoint(address.command_port))
+            self._status.connect(address.endpoint(address.status_port))
+        except zmq.ZMQError as err:
+            self._close()
+            raise InputError(
+                f"{address.endpoint(address.command_port)}: {err.strerror}: no such host"
+            ) from None
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self._close()
+
+    async def hello(self) -> Welcome:
+        """Say hello; raises InputError when the daemon speaks another version of the protocol."""
+        welcome = await self._ask(Hello(version=VERSION, id=_new_id(), client=self._name), Welcome)
+        self.session = welcome.session
+        return welcome
+
+    async def order(self, kind: CommandKind, node: str = "", order_id: str = "") -> Accepted:
+        """Give a command; sent again until it is answered, done once."""
+        order = Order(
+            version=VERSION, id=order_id or _new_id(), command=kind, node=node, session=self.session
+        )
+        return await self._ask(order, Accepted)
+
+    async def attend(self, leave: bool = False) -> Accepted:
+        """Say that somebody watches this flight (at least once a second), or no longer does."""
+        return await self._ask(Attend(version=VERSION, id=_new_id(), leave=leave), Accepted)
+
+    async def status(self) -> StatusReport | None:
+        """The newest status, None before the daemon's first tick."""
+        return (await self._ask(AskStatus(version=VERSION, id=_new_id()), StatusAnswer)).status
+
+    async def inventory(self) -> tuple[dict[str, str], ...]:
+        """What has been counted, place by place."""
+        return (await self._ask(AskInventory(version=VERSION, id=_new_id()), InventoryAnswer)).places
+
+    async def picture(self) -> tuple[PictureAnswer, bytes]:
+        """The down camera's next picture and its JPEG."""
+        request = AskPicture(version=VERSION, id=_new_id())
+        answer, frames = await self._answer(request, max(self._timeout_s, 4.0))
+        return _expected(answer, PictureAnswer), frames[1]
+
+    async def published(self) -> AsyncIterator[StatusReport | EventReport]:
+        """Every status and event from now on, for ever.  InputError for a message of another version."""
+        while True:
+            topic, body = (await self._status.recv_multipart())[:2]
+            try:
+                yield decode_status(body) if topic == STATUS_TOPIC else decode_event(body)
+            except DECODE_ERRORS as err:
+                raise InputError(f"the daemon's {topic.decode()} message is not ours: {err}") from None
+
+    async def _ask(self, request: Request, kind: type[_A]) -> _A:
+        return _expected((await self._answer(request, self._timeout_s))[0], kind)
+
+    async def _answer(self, request: Request, timeout_s: float) -> tuple[Answer, list[bytes]]:
+        """The answer to this request, asked for again while it does not come."""
+        async with self._asking:
+            try:
+                async with asyncio.timeout(timeout_s):
+                    return await self._repeated(request)
+            except TimeoutError:
+                raise UnavailableError(await self._why_silent()) from None
+
+    async def _repeated(self, request: Request) -> tuple[Answer, list[bytes]]:
+        patience_s = 4.0 if isinstance(request, AskPicture) else RETRY_S
+        while True:
+            await self._requests.send(encode(request))
+            try:
+                async with asyncio.timeout(patience_s):
+                    return await self._received(request.id)
+            except TimeoutError:
+                await self._note_events()
+                if self._seen & _SHUT_OUT:
+                    raise
+
+    async def _received(self, request_id: str) -> tuple[Answer, list[bytes]]:
+        """The next answer to this request; late ones to earlier requests are left out."""
+        while True:
+            frames = await self._requests.recv_multipart()
+            try:
+                answer = decode_answer(frames[0])
+            except DECODE_ERRORS as err:
+                raise InputError(
+                    f"the daemon's answer is not of our protocol ({err}): update the older"
+                ) from None
+            if answer.request in {request_id, ""}:
+                return answer, frames
+
+    async def _why_silent(self) -> str:
+        """What ZMQ saw happen to the connection, in words."""
+        where = self._address.endpoint(self._address.command_port)
+        await self._note_events()
+        seen = self._seen
+        if zmq.Event.HANDSHAKE_FAILED_AUTH in seen:
+            return f"{where}: refused: this key is not on the daemon's list of clients"
+        if zmq.Event.HANDSHAKE_FAILED_PROTOCOL in seen or zmq.Event.HANDSHAKE_FAILED_NO_DETAIL in seen:
+            needs = "wrong keys" if self._address.keys else "it wants a key (--key, --server-key)"
+            return f"{where}: refused the connection: {needs}, or it is no flightd"
+        if zmq.Event.HANDSHAKE_SUCCEEDED in seen:
+            return f"{where}: connected, but no answer in {self._timeout_s:g} s"
+        if zmq.Event.CONNECTED in seen:
+            needs = "wrong server key" if self._address.keys else "it wants a key (--key, --server-key)"
+            return f"{where}: something listens there but does not shake hands: {needs}, or it is no flightd"
+        return f"{where}: nobody listens; is flightd running, with [ground] listen set?"
+
+    async def _note_events(self) -> None:
+        """Keep what ZMQ told of the connection since the last call."""
+        while await self._monitor.poll(0):
+            self._seen.add(parse_monitor_message(await self._monitor.recv_multipart())["event"])
+
+    def _socket(self, kind: int) -> Any:
+        socket: Any = self._context.socket(kind)
+        socket.linger = 0
+        socket.rcvhwm = 200
+        socket.sndhwm = 50
+        socket.ipv6 = ":" in self._address.host
+        if self._address.keys is not None:
+            socket.curve_publickey = self._address.keys.public.encode()
+            socket.curve_secretkey = self._address.keys.secret.encode()
+            socket.curve_serverkey = (self._address.server_key or "").encode()
+        return socket
+
+    def _close(self) -> None:
+        self._requests.disable_monitor()
+        self._context.destroy(linger=0)
+
+
+def _new_id() -> str:
+    return uuid.uuid4().hex
+
+
+def _expected(answer: Answer, kind: type[_A]) -> _A:
+    if isinstance(answer, Refused):
+        error = InputError if answer.code in _KINDS_OF_INPUT else RunError
+        raise error(f"refused: {answer.text}")
+    if not isinstance(answer, kind):
+        raise TransientError(f"the daemon answered {type(answer).__name__}, not {kind.__name__}")
+    return answer

@@ -1,0 +1,286 @@
+"""The ground link's sockets: status and events out, requests in."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
+from typing import Any, Self
+
+import zmq
+import zmq.asyncio
+
+from flightd.adapters.ground_link.audit import AuditEntry, AuditLog
+from flightd.adapters.ground_link.authenticator import DOMAIN, Authenticator
+from flightd.adapters.ground_link.keys import Client, KeyPair, load_clients, load_pair
+from flightd.adapters.ground_link.protocol import (
+    EVENT_TOPIC,
+    MAX_REQUEST_BYTES,
+    STATUS_TOPIC,
+    VERSION,
+    Answer,
+    AskPicture,
+    Code,
+    EventReport,
+    LinkReport,
+    PictureAnswer,
+    Role,
+    encode,
+)
+from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
+from flightd.adapters.ground_link.status_report import status_report
+from flightd.config.ground import GroundConfig
+from flightd.core.errors import TransientError, UnavailableError
+from flightd.core.types import Command, Event, Status
+from flightd.pilot import TickInput, TickOutput
+from flightd.ports import Clock
+from flightd.site.site import Site
+
+_LOCAL = Client("local", Role.OPERATOR)
+"""Who may connect without a key: this machine's own users."""
+
+_REQUESTS_AT_ONCE = 10
+_TURN_S = 0.001
+_REST_S = 0.005
+_REST_SHARE = 4.0
+"""After so many requests, or so long, the loop is left to the flight: for the rest, or a multiple of the
+time taken if that is longer.  2,000 requests a second and a fifth of the loop's time at most."""
+
+_PICTURES_WAITING = 32
+_PICTURE_NS = 3_000_000_000
+_STATUS_WAITING = 100
+_REQUESTS_WAITING = 64
+_LINGER_MS = 200
+
+
+class ZmqGround:
+    """`ports.Ground` over ZMQ.  A context manager: entered, it listens; `run` answers requests.
+
+    Publishing never waits: a client that does not keep up misses messages, which their `seq` shows.
+    """
+
+    def __init__(
+        self,
+        config: GroundConfig,
+        site: Site,
+        clock: Clock,
+        inventory: Callable[[], Sequence[dict[str, str]]] | None = None,
+    ) -> None:
+        """Read keys and allow-list.  InputError names what is wrong with them."""
+        self._config = config
+        self._clock = clock
+        self._keys: KeyPair | None = load_pair(config.server_key) if config.server_key else None
+        self._clients = load_clients(config.clients) if config.clients else {}
+        self._session = secrets.token_hex(8)
+        self._audit: AuditLog | None = None
+        self._desk = RequestHandler(site, self._session, self._write_down, config.picture_fps, inventory)
+        self._seq: Counter[bytes] = Counter()
+        self._waiting: deque[tuple[list[bytes], AskPicture, int]] = deque()
+        self._picture_ns = -(10**12)
+        self._dropped = 0
+        self._context: zmq.asyncio.Context | None = None
+        self._door: Authenticator | None = None
+        self._status: Any = None
+        self._requests: Any = None
+
+    def __enter__(self) -> Self:
+        """Listen.  UnavailableError when a port is taken or the audit log cannot be written."""
+        if self._config.audit is not None:
+            self._audit = AuditLog(self._config.audit)
+        self._context = zmq.asyncio.Context()
+        try:
+            if self._keys is not None:
+                self._door = Authenticator(self._context, self._clients)
+            plain: zmq.Context[Any] = zmq.Context.shadow(self._context)
+            self._status = self._listen(plain.socket(zmq.PUB), self._config.status_port, "status_port")
+            self._requests = self._listen(
+                self._context.socket(zmq.ROUTER), self._config.command_port, "command_port"
+            )
+        except UnavailableError:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._door is not None:
+            self._door.close()
+        for socket in (self._status, self._requests):
+            if socket is not None:
+                socket.close(linger=_LINGER_MS)
+        if self._context is not None:
+            self._context.term()
+        if self._audit is not None:
+            self._audit.close()
+
+    @property
+    def endpoints(self) -> tuple[str, str]:
+        """Where it listens: status, commands."""
+        return _endpoint(self._status), _endpoint(self._requests)
+
+    async def run(self) -> None:
+        """Answer requests until cancelled.  TransientError when the sockets fail."""
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self._answer_requests(), name="ground requests")
+                if self._door is not None:
+                    tasks.create_task(self._door.run(), name="ground door")
+        except ExceptionGroup as group:
+            failed, other = group.split(zmq.ZMQError)
+            if failed is None or other is not None:
+                raise
+            raise TransientError(f"ground link: {failed.exceptions[0]}") from group
+
+    def tell(self, status: Status, tick: TickInput, output: TickOutput) -> None:
+        """Publish the status, made of what the daemon knows at this tick."""
+        self._give_up_pictures(tick.now_ns)
+        door = self._door
+        link = LinkReport(
+            attending=self._desk.attending(tick.now_ns),
+            requests=self._desk.requests,
+            refused=self._desk.refused,
+            denied=door.denied if door is not None else 0,
+            dropped=self._dropped + (self._audit.dropped if self._audit is not None else 0),
+        )
+        report = status_report(status, tick, output, self._session, self._next(STATUS_TOPIC), link)
+        self._desk.status = report
+        self._publish(STATUS_TOPIC, encode(report))
+
+    def event(self, event: Event) -> None:
+        """Publish an event."""
+        report = EventReport(
+            version=VERSION,
+            session=self._session,
+            seq=self._next(EVENT_TOPIC),
+            stamp_ns=event.stamp_ns,
+            level=event.level,
+            name=event.name,
+            text=event.text,
+        )
+        self._desk.events.append(report)
+        self._publish(EVENT_TOPIC, encode(report))
+
+    def take_commands(self) -> list[Command]:
+        return self._desk.take_commands()
+
+    def silent_s(self, now_ns: int) -> float:
+        return self._desk.silent_ns(now_ns) * 1e-9
+
+    def picture_due(self, stamp_ns: int) -> bool:
+        """Somebody waits for a picture, and one exposed then does not exceed the rate."""
+        due = bool(self._waiting) and (stamp_ns - self._picture_ns) * self._config.picture_fps >= 10**9
+        if due:
+            self._picture_ns = stamp_ns
+        return due
+
+    def picture(self, seq: int, stamp_ns: int, jpeg: bytes) -> None:
+        """Give the picture to all who wait for one."""
+        while self._waiting:
+            head, request, _ = self._waiting.popleft()
+            self._send(head, PictureAnswer(request=request.id, seq=seq, stamp_ns=stamp_ns), jpeg)
+
+    def _listen(self, socket: Any, port: int, key: str) -> Any:
+        config = self._config
+        socket.linger = _LINGER_MS
+        socket.maxmsgsize = MAX_REQUEST_BYTES
+        socket.sndhwm = _STATUS_WAITING
+        socket.rcvhwm = _REQUESTS_WAITING
+        socket.handshake_ivl = 5000
+        socket.heartbeat_ivl = 2000
+        socket.heartbeat_timeout = 6000
+        socket.tcp_keepalive = 1
+        socket.ipv6 = ":" in config.listen
+        if self._keys is not None:
+            socket.curve_server = True
+            socket.curve_secretkey = self._keys.secret.encode()
+            socket.zap_domain = DOMAIN
+        if socket.type == zmq.ROUTER:
+            socket.router_mandatory = True
+        host = f"[{config.listen}]" if ":" in config.listen else config.listen
+        host = "127.0.0.1" if host == "localhost" else host
+        try:
+            socket.bind(f"tcp://{host}:{port or '*'}")
+        except zmq.ZMQError as err:
+            socket.close()
+            raise UnavailableError(
+                f"ground.listen {config.listen}, {key} {port}: {err.strerror}; give an address of this "
+                "machine and a free port"
+            ) from None
+        return socket
+
+    async def _answer_requests(self) -> None:
+        """One request after the other, with rests: a flood waits in the network, not in the flight."""
+        while True:
+            taken_s = 0.0
+            for _ in range(_REQUESTS_AT_ONCE):
+                frames = await self._requests.recv_multipart(copy=False)
+                began_ns = self._clock.now_ns()
+                self._take(frames)
+                taken_s += (self._clock.now_ns() - began_ns) * 1e-9
+                if taken_s > _TURN_S:
+                    break
+            await asyncio.sleep(max(_REST_S, _REST_SHARE * taken_s))
+
+    def _take(self, frames: Sequence[zmq.Frame]) -> None:
+        """Answer one request; REQ sockets put an empty frame before the body, which is given back."""
+        now_ns = self._clock.now_ns()
+        *head, body = (frame.bytes for frame in frames)
+        if len(head) not in {1, 2} or (len(head) == 2 and head[1]):
+            head, body = head[:1], b""
+        if not head:
+            return
+        peer = self._peer(head[0], frames[-1])
+        if peer is None:
+            return
+        answer = self._desk.answer(body, peer, now_ns)
+        if not isinstance(answer, AskPicture):
+            self._send(head, answer)
+        elif len(self._waiting) < _PICTURES_WAITING:
+            self._waiting.append((head, answer, now_ns))
+        else:
+            text = "too many clients wait for a picture; ask again later"
+            self._send(head, self._desk.refuse_picture(answer, Code.BUSY, text))
+
+    def _peer(self, route: bytes, frame: zmq.Frame) -> Peer | None:
+        """Who sent it, by the key of its connection; None for nobody that is known."""
+        client = _LOCAL if self._keys is None else self._clients.get(_property(frame, "User-Id"))
+        if client is None:
+            return None
+        return Peer(client.name, client.role, route, _property(frame, "Peer-Address"))
+
+    def _send(self, head: list[bytes], answer: Answer, *more: bytes) -> None:
+        sent = self._requests.send_multipart([*head, encode(answer), *more], zmq.NOBLOCK)
+        if sent.done() and sent.exception() is not None:
+            self._dropped += 1  # it is gone, or does not read its answers
+
+    def _publish(self, topic: bytes, body: bytes) -> None:
+        try:
+            self._status.send_multipart([topic, body], zmq.NOBLOCK)
+        except zmq.ZMQError:
+            self._dropped += 1
+
+    def _give_up_pictures(self, now_ns: int) -> None:
+        while self._waiting and now_ns - self._waiting[0][2] > _PICTURE_NS:
+            head, request, _ = self._waiting.popleft()
+            text = "the down camera delivers no picture"
+            self._send(head, self._desk.refuse_picture(request, Code.UNAVAILABLE, text))
+
+    def _next(self, topic: bytes) -> int:
+        self._seq[topic] += 1
+        return self._seq[topic]
+
+    def _write_down(self, entry: AuditEntry) -> None:
+        if self._audit is not None:
+            self._audit.write(entry)
+
+
+def _property(frame: zmq.Frame, name: str) -> str:
+    """A property of the connection, empty where it has none (peers of ZMQ's first protocols)."""
+    try:
+        return str(frame.get(name))
+    except zmq.ZMQError:
+        return ""
+
+
+def _endpoint(socket: Any) -> str:
+    return str(socket.getsockopt_string(zmq.LAST_ENDPOINT)).rstrip("\0")

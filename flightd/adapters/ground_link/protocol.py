@@ -1,0 +1,306 @@
+"""What goes over the ground link: every message, every field, in one place.
+
+Two sockets of ZMQ, all bodies JSON.  On the status port (PUB) the daemon says `[topic, body]` with the
+topics `status` and `event`; on the command port (ROUTER) a client asks with one JSON body and gets one
+answer with the `request` it belongs to.  `VERSION` is in every body; whoever speaks another one is told so.
+Angles are radians, times nanoseconds of the daemon's monotonic clock, unknown numbers null.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable
+from typing import Annotated, Literal, TypeAlias
+
+import msgspec
+from msgspec import Meta
+
+from flightd.core.types import CommandKind, EventLevel, Phase
+
+VERSION = 1
+STATUS_TOPIC = b"status"
+EVENT_TOPIC = b"event"
+MAX_REQUEST_BYTES = 8192
+"""A longer request ends its connection."""
+
+
+class Role(enum.StrEnum):
+    """What a client may do: look, or also command."""
+
+    VIEWER = "viewer"
+    OPERATOR = "operator"
+
+
+_Version = Annotated[int, Meta(description="version of this protocol: 1")]
+_Session = Annotated[str, Meta(description="random name of this run of the daemon")]
+_Seq = Annotated[int, Meta(description="counts the messages of this topic from 1; a gap is what you missed")]
+_Stamp = Annotated[int, Meta(description="the daemon's monotonic clock, ns")]
+_RequestId = Annotated[
+    str,
+    Meta(
+        min_length=8,
+        max_length=64,
+        description="chosen by the client, 8 to 64 characters, never used twice (a UUID); a command sent "
+        "again with the same id is answered again, not done again",
+    ),
+]
+_Node = Annotated[str, Meta(max_length=64, description="node of the map, only with goto")]
+
+
+# What the daemon says on the status port
+
+
+class Position(msgspec.Struct, frozen=True):
+    """Where the drone is on the map."""
+
+    x_m: Annotated[float, Meta(description="m along the aisles")]
+    y_m: Annotated[float, Meta(description="m to the right of x, seen from above")]
+    yaw_rad: Annotated[float, Meta(description="heading, clockwise from x, seen from above")]
+    speed_mps: Annotated[float, Meta(description="speed over the floor, m/s")]
+    integrity: Annotated[float, Meta(description="probability that the node is right, 0..1")]
+
+
+class SeenLine(msgspec.Struct, frozen=True):
+    """A painted line that is being tracked, in grid axes centred on the drone."""
+
+    runs: Annotated[Literal["along", "across"], Meta(description="along: parallel to x; across: to y")]
+    offset_m: Annotated[float, Meta(description="m from the drone to the line, towards +y (along) or +x")]
+    sigma_m: Annotated[float, Meta(description="standard deviation of the offset, m")]
+
+
+class VehicleReport(msgspec.Struct, frozen=True):
+    """The autopilot at one glance."""
+
+    mode: Annotated[str, Meta(description="flight mode in the autopilot's own words")]
+    armed: Annotated[bool, Meta(description="motors may turn")]
+    in_control: Annotated[bool, Meta(description="it obeys flightd; false: hands off, the pilot flies")]
+    landed: Annotated[str, Meta(description="on_ground, in_air or unknown")]
+    roll_rad: Annotated[float, Meta(description="+ right side down")]
+    pitch_rad: Annotated[float, Meta(description="+ nose up")]
+    battery_frac: Annotated[float | None, Meta(description="charge, 0..1")]
+    battery_v: Annotated[float | None, Meta(description="V")]
+    telemetry_age_s: Annotated[float, Meta(description="age of the newest attitude, s")]
+    heartbeat_age_s: Annotated[float, Meta(description="age of the newest heartbeat, s")]
+    refusal: Annotated[str, Meta(description="what the vehicle refused last and why, else empty")]
+
+
+class LinkReport(msgspec.Struct, frozen=True):
+    """The ground link's own counters since the daemon started."""
+
+    attending: Annotated[int, Meta(description="clients that attend this flight now")]
+    requests: Annotated[int, Meta(description="requests answered")]
+    refused: Annotated[int, Meta(description="of these refused, for whatever reason")]
+    denied: Annotated[int, Meta(description="connections with a key that is not on the allow-list")]
+    dropped: Annotated[int, Meta(description="answers, events and audit lines lost: a queue was full")]
+
+
+class StatusReport(msgspec.Struct, frozen=True):
+    """Topic `status`, ten times a second and at each change of phase; also the answer to `status`."""
+
+    version: _Version
+    session: _Session
+    seq: _Seq
+    stamp_ns: _Stamp
+    phase: Annotated[Phase, Meta(description="what the mission does: " + ", ".join(Phase))]
+    reason: Annotated[str, Meta(description="why it is in this phase, or what it waits for")]
+    node: Annotated[str, Meta(description="nearest node, empty before it is known")]
+    goal: Annotated[str, Meta(description="node flown to or hovered at")]
+    nodes_done: Annotated[int, Meta(description="planned nodes visited")]
+    nodes_planned: Annotated[int, Meta(description="nodes of the plan")]
+    height_m: Annotated[float | None, Meta(description="above the floor, m; null before it is known")]
+    position: Annotated[Position | None, Meta(description="null before the floor was seen")]
+    lines: Annotated[tuple[SeenLine, ...], Meta(description="lines tracked now")]
+    lines_age_s: Annotated[float | None, Meta(description="since a line was last seen, s; null: never")]
+    vehicle: Annotated[VehicleReport | None, Meta(description="null before it was heard")]
+    frames: Annotated[int, Meta(description="pictures delivered")]
+    frames_dropped: Annotated[int, Meta(description="of these not looked at")]
+    fps: Annotated[float, Meta(description="pictures used in the last second")]
+    latency_ms: Annotated[
+        dict[str, float],
+        Meta(description="newest picture's stages: capture, transport, detection, track, wire; total"),
+    ]
+    link: Annotated[LinkReport, Meta(description="the ground link's counters")]
+
+
+class EventReport(msgspec.Struct, frozen=True):
+    """Topic `event`, at once when it happens."""
+
+    version: _Version
+    session: _Session
+    seq: _Seq
+    stamp_ns: _Stamp
+    level: Annotated[EventLevel, Meta(description="info, warning or error")]
+    name: Annotated[str, Meta(description="what kind of event: phase, visited, command, failure ...")]
+    text: Annotated[str, Meta(description="for a person")]
+
+
+# What a client asks on the command port
+
+
+class _Request(msgspec.Struct, frozen=True, kw_only=True, tag_field="op", forbid_unknown_fields=True):
+    version: _Version
+    id: _RequestId
+
+
+class Hello(_Request, frozen=True, tag="hello"):
+    """First of all: do we speak the same protocol, who am I, where does what fly?  Answer: `welcome`."""
+
+    client: Annotated[str, Meta(max_length=64, description="name of the client program, for the log")] = ""
+
+
+class Order(_Request, frozen=True, tag="command"):
+    """A command to the mission; operators only.  Answer: `accepted`, or `refused`."""
+
+    command: Annotated[CommandKind, Meta(description=", ".join(CommandKind))]
+    node: _Node = ""
+    session: Annotated[
+        str, Meta(max_length=64, description="from `welcome`; given, a daemon started since then refuses")
+    ] = ""
+
+
+class AskStatus(_Request, frozen=True, tag="status"):
+    """The newest status report.  Answer: `status`."""
+
+
+class AskPicture(_Request, frozen=True, tag="picture"):
+    """The down camera's next picture.  Answer: `picture`, with the JPEG as a second frame."""
+
+
+class AskInventory(_Request, frozen=True, tag="inventory"):
+    """What has been counted.  Answer: `inventory`, or `refused` where no store is kept."""
+
+
+class Attend(_Request, frozen=True, tag="attend"):
+    """ "I watch this flight": operators only, to be repeated at least once a second.  When all who attend
+    fall silent for `ground.lost_s`, the ground link counts as lost.  Answer: `accepted`."""
+
+    leave: Annotated[bool, Meta(description="true: I stop watching, my silence means nothing")] = False
+
+
+Request: TypeAlias = Hello | Order | AskStatus | AskPicture | AskInventory | Attend
+
+
+class Envelope(msgspec.Struct, frozen=True):
+    """The part of a request that any version has; whatever else there is, is not looked at."""
+
+    version: int = 0
+    id: str = ""
+
+
+# What the daemon answers
+
+
+class _Answer(msgspec.Struct, frozen=True, kw_only=True, tag_field="answer"):
+    version: _Version = VERSION
+    request: Annotated[str, Meta(description="id of the request; empty if it could not be read")]
+
+
+class FloorNode(msgspec.Struct, frozen=True):
+    """A crossing on the map."""
+
+    id: Annotated[str, Meta(description="name")]
+    x_m: Annotated[float, Meta(description="m along the aisles")]
+    y_m: Annotated[float, Meta(description="m to the right of x")]
+
+
+class FloorLine(msgspec.Struct, frozen=True):
+    """A stroke of guide paint."""
+
+    x0_m: Annotated[float, Meta(description="one end")]
+    y0_m: Annotated[float, Meta(description="one end")]
+    x1_m: Annotated[float, Meta(description="other end")]
+    y1_m: Annotated[float, Meta(description="other end")]
+
+
+class FloorStatus(msgspec.Struct, frozen=True):
+    """The warehouse map, as far as a client draws it."""
+
+    name: Annotated[str, Meta(description="of the site")]
+    home: Annotated[str, Meta(description="node of the pad")]
+    nodes: Annotated[tuple[FloorNode, ...], Meta(description="every node")]
+    lines: Annotated[tuple[FloorLine, ...], Meta(description="every painted line")]
+
+
+class Welcome(_Answer, frozen=True, tag="welcome"):
+    """Who answers, what you may do, what flies where, and what happened last."""
+
+    flightd: Annotated[str, Meta(description="version of the program")]
+    session: _Session
+    role: Annotated[Role, Meta(description="viewer: look; operator: command")]
+    client: Annotated[str, Meta(description="your name on the allow-list; `local` without keys")]
+    picture_fps: Annotated[float, Meta(description="most pictures per second, all clients together")]
+    floor: Annotated[FloorStatus, Meta(description="the map")]
+    events: Annotated[tuple[EventReport, ...], Meta(description="newest events, oldest first")]
+
+
+class Accepted(_Answer, frozen=True, tag="accepted"):
+    """The command goes to the mission at its next tick; what it does shows in status and events."""
+
+    repeated: Annotated[bool, Meta(description="this id was done before; it was not done again")] = False
+
+
+class Code(enum.StrEnum):
+    """Why a request was refused."""
+
+    MALFORMED = "malformed"
+    VERSION = "version"
+    ROLE = "role"
+    SESSION = "session"
+    ID_REUSED = "id_reused"
+    PHASE = "phase"
+    NODE = "node"
+    BUSY = "busy"
+    UNAVAILABLE = "unavailable"
+
+
+class Refused(_Answer, frozen=True, tag="refused"):
+    """The request had no effect."""
+
+    code: Annotated[Code, Meta(description=", ".join(Code))]
+    text: Annotated[str, Meta(description="why, and what to do, for a person")]
+
+
+class StatusAnswer(_Answer, frozen=True, tag="status"):
+    """The newest status."""
+
+    status: Annotated[StatusReport | None, Meta(description="null before the first tick")]
+
+
+class PictureAnswer(_Answer, frozen=True, tag="picture"):
+    """A picture of the down camera; the next frame of the message is the JPEG."""
+
+    seq: Annotated[int, Meta(description="number of the frame")]
+    stamp_ns: Annotated[int, Meta(description="middle of its exposure, the daemon's monotonic clock, ns")]
+
+
+class InventoryAnswer(_Answer, frozen=True, tag="inventory"):
+    """What has been counted so far."""
+
+    places: Annotated[tuple[dict[str, str], ...], Meta(description="one object per place")]
+
+
+Answer: TypeAlias = Welcome | Accepted | Refused | StatusAnswer | PictureAnswer | InventoryAnswer
+
+_encoder = msgspec.json.Encoder()
+encode = _encoder.encode
+"""Any message of this module as JSON; a number that is none becomes null."""
+
+decode_envelope = msgspec.json.Decoder(Envelope).decode
+decode_request: Callable[[bytes], Request] = msgspec.json.Decoder(Request).decode
+decode_answer: Callable[[bytes], Answer] = msgspec.json.Decoder(Answer).decode
+decode_status = msgspec.json.Decoder(StatusReport).decode
+decode_event = msgspec.json.Decoder(EventReport).decode
+
+DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+"""All that decoding bytes of a stranger can raise (msgspec.ValidationError is a DecodeError)."""
+
+PUBLISHED = (StatusReport, EventReport)
+REQUESTS = (Hello, Order, AskStatus, AskPicture, AskInventory, Attend)
+ANSWERS = (Welcome, Accepted, Refused, StatusAnswer, PictureAnswer, InventoryAnswer)
+PARTS = (Position, SeenLine, VehicleReport, LinkReport, FloorStatus, FloorNode, FloorLine)
+
+
+def finite(value: float) -> float | None:
+    """The number, or None where JSON has no form for it."""
+    return value if math.isfinite(value) else None

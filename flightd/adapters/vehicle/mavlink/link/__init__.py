@@ -1,0 +1,1 @@
+"""MAVLink on the wire: transports, framing, signing, one connection."""

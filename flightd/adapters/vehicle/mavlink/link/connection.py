@@ -1,0 +1,167 @@
+"""One MAVLink connection: kept for ever, with our heartbeat and the recognition of the autopilot."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from enum import Enum
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser, Message
+from flightd.adapters.vehicle.mavlink.link.endpoint import Endpoint
+from flightd.adapters.vehicle.mavlink.link.transport import Source, Transport
+from flightd.ports import Clock
+
+_LOG = logging.getLogger(__name__)
+
+_HEARTBEAT_S = 1.0
+_BACKOFF_S = (0.5, 1.0, 2.0, 5.0)
+_PARSERS_MAX = 16
+_LATE_MAX, _LATE_RUN_MAX = 64, 16
+_STATES = frozenset({"HEARTBEAT", "EXTENDED_SYS_STATE"})
+"""Messages of which only the newest counts and which carry no time stamp of their own."""
+_PEER_SILENT_NS = 3_000_000_000
+"""After this long another address may take over as the autopilot's."""
+
+
+class Firmware(Enum):
+    """What flies the vehicle, by HEARTBEAT.autopilot."""
+
+    ARDUPILOT = dialect.MAV_AUTOPILOT_ARDUPILOTMEGA
+    PX4 = dialect.MAV_AUTOPILOT_PX4
+
+
+_FIRMWARES = {firmware.value: firmware for firmware in Firmware}
+
+
+class MavlinkLink:
+    """Sends and receives as the companion (component 191) of one vehicle.
+
+    `on_message(message, now_ns)` gets every sound message of that vehicle's autopilot, its HEARTBEAT
+    included; what others say (ground stations, gimbals, other vehicles) is not passed on.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        codec: Codec,
+        clock: Clock,
+        system_id: int,
+        on_message: Callable[[Message, int], None],
+    ) -> None:
+        self._transport = transport
+        self._codec = codec
+        self._clock = clock
+        self._system_id = system_id
+        self._on_message = on_message
+        self._parsers: dict[Source, FrameParser] = {}
+        self._lost = asyncio.Event()
+        self._sequence = 0
+        self._late = 0
+        self._heard_ns = -2 * _PEER_SILENT_NS
+        self.system_status = dialect.MAV_STATE_STANDBY
+        self.firmware: Firmware | None = None
+        self.sent = 0
+        self.dropped = 0
+        """What no line could take."""
+        self.received = 0
+        transport.received = self._received
+        transport.lost = self._lost.set
+
+    @property
+    def endpoint(self) -> Endpoint:
+        return self._transport.endpoint
+
+    async def run(self) -> None:
+        """Hold the connection until cancelled.  UnavailableError when it can never work (port in use)."""
+        attempt = 0
+        try:
+            while True:
+                try:
+                    await self._transport.open()
+                except OSError as err:
+                    wait_s = _BACKOFF_S[min(attempt, len(_BACKOFF_S) - 1)]
+                    if attempt == 0:
+                        _LOG.warning("%s: %s; trying again", self.endpoint, err.strerror or err)
+                    attempt += 1
+                    await asyncio.sleep(wait_s)
+                    continue
+                attempt = 0
+                self._lost.clear()
+                await self._beat()
+                _LOG.warning("%s: connection lost; trying again", self.endpoint)
+                self._transport.close()
+                self._parsers.clear()
+                await asyncio.sleep(_BACKOFF_S[0])
+        finally:
+            self._transport.close()
+
+    async def _beat(self) -> None:
+        """Our HEARTBEAT once a second while the connection stands."""
+        while not self._lost.is_set():
+            self.send(
+                dialect.MAVLink_heartbeat_message(
+                    dialect.MAV_TYPE_ONBOARD_CONTROLLER,
+                    dialect.MAV_AUTOPILOT_INVALID,
+                    0,
+                    0,
+                    self.system_status,
+                    3,
+                )
+            )
+            try:
+                async with asyncio.timeout(_HEARTBEAT_S):
+                    await self._lost.wait()
+            except TimeoutError:
+                continue
+
+    def send(self, message: Message) -> bool:
+        """Pack and hand over one message; False when the line could not take it."""
+        out = self._transport.send(self._codec.pack(message))
+        self.sent += out
+        self.dropped += not out
+        return out
+
+    def _received(self, data: bytes, source: Source) -> None:
+        parser = self._parsers.get(source)
+        if parser is None:
+            if len(self._parsers) >= _PARSERS_MAX:
+                self._parsers.clear()  # parsers of datagram peers hold no state worth keeping
+            parser = self._parsers[source] = FrameParser(self._codec)
+        messages = parser.datagram(data) if self._transport.datagrams else parser.stream(data)
+        now_ns = self._clock.now_ns()
+        for message in messages:
+            self._sort(message, source, now_ns)
+
+    def _is_late(self, message: Message) -> bool:
+        """Whether a newer message overtook this one on the way and it says what is no longer so.
+
+        Told by the sequence number, which counts modulo 256; one that stays behind is that of an
+        autopilot which started anew.
+        """
+        behind = (self._sequence - message.get_seq()) % 256
+        if not 0 < behind < _LATE_MAX or self._late >= _LATE_RUN_MAX:
+            self._sequence, self._late = message.get_seq(), 0
+            return False
+        self._late += 1
+        return message.get_type() in _STATES
+
+    def _sort(self, message: Message, source: Source, now_ns: int) -> None:
+        header = message.get_header()
+        if header.srcSystem != self._system_id or header.srcComponent != dialect.MAV_COMP_ID_AUTOPILOT1:
+            return
+        if message.get_type() == "HEARTBEAT":
+            firmware = _FIRMWARES.get(message.autopilot)
+            if firmware is None or message.type == dialect.MAV_TYPE_GCS:
+                return
+            if source != self._transport.peer and now_ns - self._heard_ns > _PEER_SILENT_NS:
+                self._transport.peer = source
+            if source == self._transport.peer:
+                self._heard_ns = now_ns
+                self.firmware = firmware
+        if source != self._transport.peer or self._is_late(message):
+            return
+        self.received += 1
+        self._on_message(message, now_ns)

@@ -1,0 +1,266 @@
+"""Works towards what the mission demands: modes, arming, landing, each asked for until it is so."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections import deque
+from collections.abc import Callable
+from typing import Protocol
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.adapters.vehicle.mavlink.authority import Authority
+from flightd.adapters.vehicle.mavlink.services.commands import Answer
+from flightd.core.types import Attitude, Demand, LandedState
+from flightd.ports import Clock
+
+_LOG = logging.getLogger(__name__)
+
+_SILENT_NS = 3_000_000_000
+_TELLING_NS = 500_000_000
+"""An attitude this young shows that the line is alive, whatever has become of the heartbeats."""
+_STEP_S = 0.05
+_ARM_PAUSE_S = 1.0
+_MODE_PAUSE_S = 0.5
+_REASON_NS = 2_000_000_000
+_FLOOR_M = 0.3
+"""Higher than this by the range finder the motors are not stopped, whatever the autopilot says."""
+_HAND_BACK_S = 0.2
+_HAND_BACK_ANSWER_S = 0.06
+_ENGAGED = frozenset({Demand.KEEP, Demand.FLY, Demand.LAND, Demand.DISARM})
+
+
+class FirmwareRules(Protocol):
+    """What differs from firmware to firmware."""
+
+    flying_mode: int
+    landing_mode: int
+    prime_s: float
+
+    def mode_name(self, custom_mode: int) -> str: ...
+
+    def mode_params(self, custom_mode: int) -> tuple[float, ...]: ...
+
+    def not_fit(self) -> str: ...
+
+
+class Heard(Protocol):
+    """What has to be known of the vehicle; `heartbeat_ns` is 0 until it was heard."""
+
+    heartbeat_ns: int
+    armed: bool
+
+    @property
+    def custom_mode(self) -> int | None: ...
+
+    @property
+    def attitude(self) -> Attitude | None: ...
+
+    def landed(self, now_ns: int) -> LandedState: ...
+
+    def height_m(self, now_ns: int) -> float: ...
+
+
+class Commands(Protocol):
+    """How the vehicle is commanded: repeated when unanswered while `wanted`."""
+
+    async def send(
+        self, command: int, /, *params: float, patience_s: float = ..., wanted: Callable[[], bool] = ...
+    ) -> Answer: ...
+
+
+class ModeArmingManager:
+    """Holds the demand and pursues it while the vehicle is ours.
+
+    One arming per FLY demand: a vehicle that was armed under it and is disarmed again (landed, timed
+    out, the pilot's switch) is not armed anew until FLY follows another demand.
+    """
+
+    def __init__(self, firmware: FirmwareRules, commander: Commands, telemetry: Heard, clock: Clock) -> None:
+        self._firmware = firmware
+        self._commander = commander
+        self._telemetry = telemetry
+        self._clock = clock
+        self._authority = Authority()
+        self._reasons: deque[tuple[int, str]] = deque(maxlen=4)
+        self._demand = Demand.STANDBY
+        self._was_armed = False
+        self._refused = ""
+        self._refused_ns = 0
+        self._wake = asyncio.Event()
+
+    # What is so
+
+    @property
+    def is_engaged(self) -> bool:
+        """Whether the mission wants something of the vehicle."""
+        return self._demand in _ENGAGED
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether the vehicle has not been heard for three seconds."""
+        heard_ns = self._telemetry.heartbeat_ns
+        return not heard_ns or self._clock.now_ns() - heard_ns > _SILENT_NS
+
+    @property
+    def in_control(self) -> bool:
+        """Whether the vehicle is in a mode that we asked for."""
+        return self._authority.held is not None and not self.is_silent
+
+    @property
+    def may_steer(self) -> bool:
+        """Whether setpoints may go out.  Heartbeats alone that fail to come do not end them: an autopilot
+        whose setpoints stop flies on by the last lean until its own time-out, and one that a pilot has
+        taken meanwhile passes over them."""
+        flying = self._authority.held == self._firmware.flying_mode
+        return self.is_engaged and flying and (not self.is_silent or self._tells())
+
+    def _tells(self) -> bool:
+        attitude = self._telemetry.attitude
+        return attitude is not None and self._clock.now_ns() - attitude.stamp_ns < _TELLING_NS
+
+    @property
+    def wants_flight(self) -> bool:
+        """Whether FLY is demanded of a vehicle that nobody has taken from us."""
+        return self._demand is Demand.FLY and not self._authority.taken and not self.is_silent
+
+    @property
+    def may_command(self) -> bool:
+        """Whether the mission wants something of a vehicle that nobody has taken from us."""
+        return self.is_engaged and not self._authority.taken
+
+    @property
+    def stands(self) -> bool:
+        """On the floor, as far as the autopilot knows."""
+        says = self._telemetry.landed(self._clock.now_ns())
+        return not self._telemetry.armed or says is LandedState.ON_GROUND
+
+    @property
+    def refusal(self) -> str:
+        """What was refused and the autopilot's own words at that time."""
+        if self._authority.taken:
+            return "the pilot or a failsafe changed the mode"
+        said = [text for at_ns, text in self._reasons if abs(at_ns - self._refused_ns) < _REASON_NS]
+        return f"{self._refused} ({said[-1]})" if self._refused and said else self._refused
+
+    # What happens
+
+    def demand(self, demand: Demand) -> None:
+        """What the mission wants from now on."""
+        if demand is self._demand:
+            return
+        if demand not in _ENGAGED or self._demand not in _ENGAGED:
+            self._authority.release()
+        if demand is Demand.FLY:
+            self._was_armed = False
+        self._demand = demand
+        self._refused = ""
+        self._wake.set()
+
+    def heartbeat(self, now_ns: int) -> None:
+        """The telemetry has taken a heartbeat."""
+        mode = self._telemetry.custom_mode
+        assert mode is not None
+        if self._authority.heartbeat(mode, now_ns):
+            _LOG.warning("taken over by mode %s", self._firmware.mode_name(mode))
+            self._wake.set()
+        if self._telemetry.armed and self._authority.held == self._firmware.flying_mode:
+            self._was_armed = True
+
+    def text(self, severity: int, text: str, now_ns: int) -> None:
+        """The autopilot said something; a warning may be the reason of a refusal."""
+        if severity <= dialect.MAV_SEVERITY_WARNING:
+            self._reasons.append((now_ns, text))
+
+    # What is done
+
+    async def run(self) -> None:
+        """Pursue the demand until cancelled."""
+        while True:
+            await self._step(self._demand)
+            await self._pause(_STEP_S)
+
+    async def hand_back(self) -> None:
+        """Leave the vehicle in a state that needs no companion: landing, or disarmed when both the autopilot
+        and the range finder have it on the floor."""
+        if self._authority.held != self._firmware.flying_mode or not self._telemetry.armed:
+            return
+        command: int = dialect.MAV_CMD_DO_SET_MODE
+        params = self._firmware.mode_params(self._firmware.landing_mode)
+        if self.stands and self._telemetry.height_m(self._clock.now_ns()) < _FLOOR_M:  # not when unknown
+            command, params = dialect.MAV_CMD_COMPONENT_ARM_DISARM, (0.0,)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_HAND_BACK_S):
+                await self._commander.send(command, *params, patience_s=_HAND_BACK_ANSWER_S)
+
+    async def _step(self, demand: Demand) -> None:
+        """One step from what the vehicle does towards what is demanded.  Of a vehicle that is not heard
+        nothing is asked: the pilot may have taken it meanwhile."""
+        if demand not in _ENGAGED or self._authority.taken or self.is_silent:
+            return
+        firmware, held, armed = self._firmware, self._authority.held, self._telemetry.armed
+        takes_over = demand is Demand.FLY or (demand is Demand.KEEP and held is None)
+        problem = firmware.not_fit() if takes_over else ""
+        match demand:
+            case Demand.FLY | Demand.KEEP if problem:
+                self._refuse(problem)
+            case Demand.KEEP if (
+                held is None and armed and self._telemetry.custom_mode == firmware.flying_mode
+            ):
+                self._refused = ""
+                self._authority.ask(firmware.flying_mode, firmware.flying_mode)
+            case Demand.FLY if held != firmware.flying_mode:
+                await self._ask_mode(firmware.flying_mode)
+            case Demand.FLY if not armed and not self._was_armed:
+                await self._ask("arming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+            case Demand.LAND if held is not None and held != firmware.landing_mode:
+                await self._ask_mode(firmware.landing_mode)
+            case Demand.DISARM if held is not None and armed:
+                await self._ask("disarming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+            case _:
+                pass
+
+    async def _ask_mode(self, mode: int) -> None:
+        firmware, demand = self._firmware, self._demand
+        if mode == firmware.flying_mode and firmware.prime_s > 0.0:
+            await self._pause(firmware.prime_s)
+            if not self._still(demand):
+                return
+        self._authority.ask(mode, self._telemetry.custom_mode)
+        what, params = f"mode {firmware.mode_name(mode)}", firmware.mode_params(mode)
+        if await self._ask(what, dialect.MAV_CMD_DO_SET_MODE, *params, pause_s=0.0):
+            self._authority.accepted(mode, self._clock.now_ns())
+        if self._still(demand):
+            await self._pause(_MODE_PAUSE_S)
+
+    async def _ask(self, what: str, command: int, *params: float, pause_s: float = _ARM_PAUSE_S) -> bool:
+        """Ask once and keep the refusal; then give the heartbeat time to show what changed."""
+        demand = self._demand
+        answer = await self._commander.send(command, *params, wanted=lambda: self._still(demand))
+        if self._still(demand):
+            self._note(what, answer)
+            if pause_s > 0.0:
+                await self._pause(pause_s)
+        return answer.accepted
+
+    def _note(self, what: str, answer: Answer) -> None:
+        if answer.accepted:
+            self._refused = ""
+        else:
+            self._refuse(f"{what}: {answer}")
+
+    def _refuse(self, text: str) -> None:
+        self._refused = text
+        self._refused_ns = self._clock.now_ns()
+
+    def _still(self, demand: Demand) -> bool:
+        return self._demand is demand and not self._authority.taken
+
+    async def _pause(self, duration_s: float) -> None:
+        """Wait, or until the demand or the vehicle's owner changes."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(duration_s):
+                await self._wake.wait()
+        self._wake.clear()

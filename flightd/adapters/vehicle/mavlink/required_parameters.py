@@ -1,0 +1,265 @@
+"""Which autopilot parameters this job needs, and why: data, one table for each firmware.
+
+A value that is missing in the firmware at hand is not judged.  `better` is what a fix would write; None
+where only a person can choose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.services.parameters import Names
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One parameter (under the names it has had), what it may be, in words too, and why."""
+
+    names: Names
+    fits: Callable[[float], bool]
+    expected: str
+    reason: str
+    better: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What the daemon is configured to ask of the autopilot beyond flight by attitude."""
+
+    guided: bool = False
+    """ArduCopter flies in GUIDED, which wants an estimate of its motion."""
+    raw_thrust: bool | None = None
+    """What bit 3 of ArduCopter's GUID_OPTIONS must be; None: either."""
+    shares_pose: bool = False
+    landing_target: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterFinding:
+    """A parameter that is unsafe or wrong for this job."""
+
+    name: str
+    value: float
+    expected: str
+    reason: str
+    better: float | None
+
+    def __str__(self) -> str:
+        return f"{self.name} is {self.value:g}, expected {self.expected}: {self.reason}"
+
+
+def _one_of(*values: float) -> Callable[[float], bool]:
+    return lambda value: value in values
+
+
+def _within(low: float, high: float) -> Callable[[float], bool]:
+    return lambda value: low <= value <= high + 1e-6
+
+
+def _has_bits(bits: int) -> Callable[[float], bool]:
+    return lambda value: int(value) & bits == bits
+
+
+_ARDUPILOT: tuple[Rule, ...] = (
+    Rule(
+        ("GUID_TIMEOUT",),
+        _within(0.1, 0.5),
+        "0.3 to 0.5 s",
+        "so long the last tilt is flown on after this computer has died",
+        0.5,
+    ),
+    Rule(
+        ("GUID_OPTIONS",),
+        lambda value: not int(value) & ~(1 | 8),
+        "0, or 8 for raw thrust",
+        "the other bits change what set-points mean",
+    ),
+    Rule(
+        ("DISARM_DELAY",), _within(2, 30), "2 to 30 s", "an armed vehicle on the pad must disarm itself", 10
+    ),
+    Rule(
+        ("FS_EKF_ACTION",),
+        _one_of(1, 3),
+        "1 (land) or 3 (land in all modes)",
+        "without position there is nothing else to fall back to",
+        1,
+    ),
+    Rule(
+        ("FS_GCS_ENABLE",),
+        _one_of(0, 5),
+        "0 (off) or 5 (land)",
+        "a return to launch needs a position",
+        0,
+    ),
+    Rule(
+        ("FS_THR_ENABLE",),
+        _one_of(0, 3),
+        "3 (land), or 0 for flight without RC",
+        "a return to launch needs a position",
+        3,
+    ),
+    Rule(
+        ("RC_OPTIONS",),
+        lambda value: not int(value) & 1,
+        "bit 0 clear",
+        "the receiver is ignored: no pilot could take over",
+    ),
+    Rule(("BATT_FS_LOW_ACT",), _one_of(1), "1 (land)", "an empty battery must end in a landing", 1),
+    Rule(("BATT_LOW_VOLT",), lambda value: value > 0, "above 0 V", "else the battery failsafe never acts"),
+    Rule(("AHRS_EKF_TYPE",), _one_of(3), "3 (EKF3)", "the heights and attitudes used here are EKF3's", 3),
+    Rule(("EK3_ENABLE",), _one_of(1), "1", "EKF3 must run", 1),
+    Rule(("EK3_SRC1_POSXY",), _one_of(0, 6), "0 (none) or 6 (external)", "there is no GPS in the hall", 0),
+    Rule(
+        ("EK3_SRC1_VELXY",),
+        _one_of(0, 5, 6),
+        "0 (none), 5 (flow) or 6 (external)",
+        "there is no GPS in the hall",
+        0,
+    ),
+    Rule(
+        ("EK3_SRC1_POSZ",),
+        _one_of(1, 2, 6),
+        "1 (barometer), 2 (range finder) or 6 (external)",
+        "there is no GPS in the hall",
+        1,
+    ),
+    Rule(("EK3_SRC1_VELZ",), _one_of(0, 6), "0 (none) or 6 (external)", "there is no GPS in the hall", 0),
+    Rule(
+        ("EK3_SRC1_YAW",),
+        _one_of(0, 1, 6),
+        "1 (compass), 0 (gyro) or 6 (external)",
+        "there is no GPS in the hall",
+        1,
+    ),
+    Rule(("GPS1_TYPE", "GPS_TYPE"), _one_of(0), "0 (none)", "indoors a GPS reports nonsense", 0),
+    Rule(
+        ("RNGFND1_TYPE",),
+        lambda value: value != 0,
+        "a range finder",
+        "the height above the floor comes from it",
+    ),
+    Rule(("RNGFND1_ORIENT",), _one_of(25), "25 (down)", "the height above the floor comes from it", 25),
+    Rule(("ARMING_CHECK",), lambda value: value != 0, "1 (all)", "arming unchecked hides faults", 1),
+    Rule(("ARMING_SKIPCHK",), _one_of(0), "0 (none skipped)", "arming unchecked hides faults", 0),
+    Rule(("LAND_SPEED",), _within(20, 70), "20 to 70 cm/s", "a landing of last resort is blind", 40),
+)
+
+_PX4: tuple[Rule, ...] = (
+    Rule(
+        ("COM_OF_LOSS_T",),
+        _within(0.2, 1.0),
+        "0.5 to 1 s",
+        "so long the last tilt and thrust are flown on after this computer has died",
+        0.5,
+    ),
+    Rule(
+        ("COM_OBL_RC_ACT",),
+        _one_of(4),
+        "4 (land)",
+        "the default, Position, cannot be held without a position",
+        4,
+    ),
+    Rule(
+        ("COM_RCL_EXCEPT",),
+        _has_bits(4),
+        "bit 2 set (4)",
+        "without RC the loss of RC must not end OFFBOARD",
+    ),
+    Rule(
+        ("COM_RC_OVERRIDE",),
+        _has_bits(2),
+        "bit 1 set (3)",
+        "a pilot who moves the sticks must get the vehicle out of OFFBOARD",
+        3,
+    ),
+    Rule(
+        ("COM_RC_IN_MODE",),
+        _one_of(0, 1, 2, 3, 5, 6, 7, 8),
+        "any of 0 to 8 but 4 (stick input disabled)",
+        "the sticks are ignored: no pilot could take over",
+    ),
+    Rule(("COM_DISARM_LAND",), _within(0.1, 20), "above 0 s", "a landed vehicle must disarm itself", 2),
+    Rule(
+        ("COM_DISARM_PRFLT",),
+        _within(1, 30),
+        "1 to 30 s",
+        "an armed vehicle on the pad must disarm itself",
+        10,
+    ),
+    Rule(("MAV_FWDEXTSP",), _one_of(1), "1", "without it set-points are not passed on", 1),
+    Rule(("COM_ARM_WO_GPS",), lambda value: value != 0, "1 or 2", "there is no GPS in the hall", 1),
+    Rule(("EKF2_GPS_CTRL",), _one_of(0), "0", "indoors a GPS reports nonsense", 0),
+    Rule(
+        ("EKF2_HGT_REF",),
+        _one_of(0, 2, 3),
+        "0 (barometer), 2 (range finder) or 3 (vision)",
+        "there is no GPS in the hall",
+        0,
+    ),
+    Rule(("MPC_THR_HOVER",), _within(0.1, 0.8), "0.1 to 0.8", "the first guess of the hover thrust"),
+)
+
+_GUID_OPTIONS = "the thrust of our set-points would be taken for something else (vehicle.raw_thrust)"
+_POSE = "the grid pose that is shared (vehicle.pose_output) is in the map's frame, its yaw too"
+
+_ARDUPILOT_GUIDED = (
+    Rule(
+        ("EK3_SRC1_VELXY",),
+        _one_of(5, 6),
+        "5 (flow) or 6 (external)",
+        "GUIDED needs an estimate of the motion (vehicle.flying_mode)",
+    ),
+)
+_ARDUPILOT_POSE = (
+    Rule(("VISO_TYPE",), _one_of(1, 3), "1 (MAVLink) or 3 (VOXL)", "else the shared pose is not heard", 1),
+    Rule(("EK3_SRC1_POSXY",), _one_of(6), "6 (external)", _POSE, 6),
+    Rule(("EK3_SRC1_YAW",), _one_of(6), "6 (external)", _POSE, 6),
+)
+_ARDUPILOT_LANDING = (
+    Rule(("PLND_ENABLED",), _one_of(1), "1", "else the landing target is not heard", 1),
+    Rule(("PLND_TYPE",), _one_of(1), "1 (MAVLink)", "else the landing target is not heard", 1),
+)
+_PX4_POSE = (Rule(("EKF2_EV_CTRL",), _has_bits(1 | 8), "bits 0 and 3 set (9: position and yaw)", _POSE, 9),)
+
+
+def _guid_options(raw: bool) -> Rule:
+    expected = "8 (raw thrust)" if raw else "0 (thrust is a climb rate)"
+    return Rule(
+        ("GUID_OPTIONS",),
+        lambda value: bool(int(value) & 8) is raw and not int(value) & ~(1 | 8),
+        expected,
+        _GUID_OPTIONS,
+        8.0 if raw else 0.0,
+    )
+
+
+RULES: dict[Firmware, tuple[Rule, ...]] = {Firmware.ARDUPILOT: _ARDUPILOT, Firmware.PX4: _PX4}
+
+
+def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
+    """The firmware's table, with the rules that the job adds or makes stricter in their places."""
+    extra: tuple[Rule, ...] = ()
+    if firmware is Firmware.ARDUPILOT:
+        if job.guided:
+            extra += _ARDUPILOT_GUIDED
+        if job.raw_thrust is not None:
+            extra += (_guid_options(job.raw_thrust),)
+        if job.shares_pose:
+            extra += _ARDUPILOT_POSE
+        if job.landing_target:
+            extra += _ARDUPILOT_LANDING
+    elif job.shares_pose:
+        extra += _PX4_POSE
+    stricter = {rule.names: rule for rule in extra}
+    table = [stricter.pop(rule.names, rule) for rule in RULES[firmware]]
+    return (*table, *stricter.values())
+
+
+def judge(rule: Rule, found: tuple[str, float] | None) -> ParameterFinding | None:
+    """What is wrong with a parameter as it was read; None when nothing is, or it does not exist."""
+    if found is None or rule.fits(found[1]):
+        return None
+    name, value = found
+    return ParameterFinding(name, value, rule.expected, rule.reason, rule.better)

@@ -1,0 +1,1 @@
+"""What rides on the connection: commands, parameters, streams, clock, texts."""

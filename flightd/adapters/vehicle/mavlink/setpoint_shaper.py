@@ -1,0 +1,67 @@
+"""From a setpoint to heading and thrust, and what streams while the mission makes none: the same for our own
+MAVLink adapters and for MAVSDK's."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
+from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
+from flightd.adapters.vehicle.mavlink.setpoint import HeadingIntegrator
+from flightd.core.types import AttitudeSetpoint
+
+
+class Measured(Protocol):
+    """What has to be known of the vehicle's motion; NaN or None while it is unknown."""
+
+    armed: bool
+
+    @property
+    def yaw_rad(self) -> float | None: ...
+
+    def height_m(self, now_ns: int) -> float: ...
+
+    def climb_mps(self, now_ns: int) -> float: ...
+
+
+class SetpointShaper:
+    """Heading and own height loop of one vehicle, let go of whenever the vehicle is not ours."""
+
+    def __init__(self, pursuit: ModeArmingManager, measured: Measured) -> None:
+        self._pursuit = pursuit
+        self._measured = measured
+        self._heading = HeadingIntegrator()
+        self.height = HeightLoop()
+
+    def heading_rad(self, setpoint: AttitudeSetpoint, now_ns: int) -> float | None:
+        """The heading for a setpoint that goes out now; None when none may."""
+        yaw_rad = self._measured.yaw_rad
+        if not self._pursuit.may_steer or yaw_rad is None:
+            self._heading.release()
+            self.height.release()
+            return None
+        if self._pursuit.stands:
+            self._heading.release()  # the vehicle may be turned by hand, its compass may still settle
+        return self._heading.step(now_ns, setpoint.yaw_rate_radps, yaw_rad)
+
+    def collective(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
+        """Raw thrust for a setpoint's climb rate, by the height loop."""
+        return self.height.step(
+            now_ns,
+            setpoint.climb_mps,
+            climb_mps=self._measured.climb_mps(now_ns),
+            height_m=self._measured.height_m(now_ns),
+            tilt_cos=math.cos(setpoint.roll_rad) * math.cos(setpoint.pitch_rad),
+            armed=self._measured.armed,
+            on_floor=self._pursuit.stands,
+        )
+
+    def idle_thrust(self) -> float | None:
+        """Thrust of a level setpoint while the mission makes none: PX4 enters OFFBOARD only while they
+        stream.  On the floor nothing; in the air only until OFFBOARD is entered, never to keep it flying."""
+        if not self._pursuit.wants_flight:
+            return None
+        if self._pursuit.stands and not (self._measured.armed and self.height.in_air):
+            return 0.0
+        return None if self._pursuit.may_steer else self.height.hover

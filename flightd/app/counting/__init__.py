@@ -1,0 +1,1 @@
+"""What a flight that counts shelves needs beside the tick: readers, store, writer."""

@@ -1,0 +1,83 @@
+"""The count of a flight, around the tick: pictures read on the way in, findings stored on the way out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from flightd.app.counting.code_readers import Readers, ShelfWatch
+from flightd.app.counting.store_writer import StoreWriter
+from flightd.core.scanning import CodeSet, Finding, Place
+from flightd.pilot import TickOutput
+from flightd.runtime.frame_ring import FrameTicket
+
+
+class Counting:
+    """Readers of the front camera's pictures and, if the inventory is kept, its writer.
+
+    `counted` are locations that an earlier flight of this count has booked."""
+
+    def __init__(
+        self,
+        readers: Readers,
+        workers: int,
+        writer: StoreWriter | None = None,
+        counted: frozenset[str] = frozenset(),
+    ) -> None:
+        self._readers = readers
+        self._workers = workers
+        self._writer = writer
+        self._counted: tuple[str, ...] = tuple(sorted(counted))
+        self._watch: ShelfWatch | None = None
+        self._findings: dict[str, Finding] = {}
+        self._confirmed: set[str] = set()
+
+    def begin(
+        self, places: Callable[[int], tuple[Place, ...]], on_trouble: Callable[[str], None]
+    ) -> dict[str, Coroutine[Any, Any, None]]:
+        """The tasks of a flight, by name.  `places` says what a picture exposed at a time is wanted for."""
+        self._watch = ShelfWatch(self._readers, places)
+        tasks = {f"read-{i}": self._watch.run() for i in range(self._workers)}
+        return tasks if self._writer is None else tasks | {"store": self._writer.run(on_trouble)}
+
+    def frame(self, ticket: FrameTicket) -> None:
+        """A picture of the front camera."""
+        if self._watch is not None:
+            self._watch.frames.put(ticket)
+
+    def take(self) -> tuple[CodeSet, ...]:
+        """What was read since the last tick."""
+        return self._watch.take() if self._watch is not None else ()
+
+    def take_counted(self) -> tuple[str, ...]:
+        """The locations counted before, told once."""
+        counted, self._counted = self._counted, ()
+        return counted
+
+    def keep(self, output: TickOutput) -> None:
+        """Hand a tick's findings to the inventory."""
+        for finding in output.findings:
+            self._findings[finding.location] = finding
+            if self._writer is not None and self._watch is not None:
+                self._writer.put(finding, self._watch.evidence(finding.evidence))
+        for settled in output.settled:
+            if settled.confirmed:
+                self._confirmed.update(settled.locations)
+            else:
+                for location in settled.locations:
+                    self._findings.pop(location, None)
+            if self._writer is not None:
+                self._writer.settle(settled)
+
+    def places(self) -> tuple[dict[str, str], ...]:
+        """What this flight has counted so far, location by location, for people."""
+        return tuple(
+            {
+                "location": location,
+                "node": finding.node,
+                "state": finding.state.value,
+                "standing": "confirmed" if location in self._confirmed else "pending",
+                "texts": " ".join(dict.fromkeys(read.text for read in finding.reads)),
+            }
+            for location, finding in sorted(self._findings.items())
+        )

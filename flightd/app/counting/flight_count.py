@@ -1,0 +1,111 @@
+"""What a flight that counts shelves needs beside the daemon: readers, store and writer, opened and closed."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from contextlib import AsyncExitStack, ExitStack
+from datetime import UTC, datetime
+from pathlib import Path
+
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.app.build import scanner_of
+from flightd.app.counting.code_readers import ReaderPool, Readers
+from flightd.app.counting.count import Counting
+from flightd.app.counting.store_writer import StoreWriter
+from flightd.config.schema import Config
+from flightd.core.errors import FlightdError, InputError, UnavailableError
+from flightd.core.inventory import PlannedLocation
+from flightd.mission.scan.scanner import nodes_to_count
+from flightd.ports import Clock
+from flightd.site.site import Site
+
+
+def going_on(config: Config, site: Site, folder: Path | None, *, in_air: bool = False) -> Config:
+    """The configuration of a flight that goes on with a count (`inventory.run`) in `folder`: it visits only
+    nodes with locations that are not booked yet.  InputError when there are none left, and what the store
+    raises; neither where the flight may be `in_air` already (the daemon was started anew)."""
+    run = config.inventory.run
+    if not run or folder is None or not (folder / "inventory.db").exists():
+        return config
+    try:
+        with SqliteStore(folder, create=False) as store:
+            counted = store.counted(run)
+    except (InputError, UnavailableError):
+        if not in_air:
+            raise
+        return config
+    if not counted:
+        return config
+    nodes = nodes_to_count(site, config.mission.nodes or site.serpentine_route(), counted)
+    if not nodes and in_air:
+        return config
+    if not nodes:
+        raise InputError(
+            f"inventory.run {run!r}: every location is counted; give the next count another name"
+        )
+    return config.model_copy(update={"mission": config.mission.model_copy(update={"nodes": nodes})})
+
+
+class FlightCount:
+    """The inventory of one flight, kept in `folder` if one is given.  Raises what the store raises; where
+    the vehicle may be `in_air` already, that is its `error` instead, and nothing is kept."""
+
+    def __init__(
+        self,
+        config: Config,
+        site: Site,
+        folder: Path | None,
+        stack: ExitStack | AsyncExitStack,
+        *,
+        in_air: bool = False,
+    ) -> None:
+        self._scan = config.scan
+        self._stack = stack
+        self._store: SqliteStore | None = None
+        self._run = config.inventory.run or f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
+        self._counted: frozenset[str] = frozenset()
+        self.error: FlightdError | None = None
+        self.scans = scanner_of(config, site) is not None
+        if not self.scans or folder is None:
+            return
+        try:
+            self._store, self._counted = self._opened(folder, site)
+        except (InputError, UnavailableError) as err:
+            if not in_air:
+                raise
+            self.error = err
+
+    def _opened(self, folder: Path, site: Site) -> tuple[SqliteStore, frozenset[str]]:
+        """The store, ready for this flight, and what is counted already."""
+        with ExitStack() as opened:
+            store = opened.enter_context(SqliteStore(folder))
+            places = site.locations.values()
+            store.plan(PlannedLocation(location.code, location.node) for location in places)
+            store.withdraw_pending(self._run)
+            counted = store.counted(self._run)
+            self._stack.callback(opened.pop_all().close)
+        return store, counted
+
+    async def begun(
+        self, clock: Clock, timed: Callable[[Readers], Readers] = lambda readers: readers
+    ) -> Counting | None:
+        """The count itself for the daemon, its readers started (and put behind what `timed` makes of them);
+        None where nothing is scanned."""
+        if not self.scans:
+            return None
+        scan = self._scan
+        pool = self._stack.enter_context(ReaderPool(scan.workers, scan.timeout_s, clock))
+        await pool.ready()
+        writer = None
+        if self._store is not None:
+            utc_at_zero_ns = time.time_ns() - clock.now_ns()
+            writer = self._stack.enter_context(
+                StoreWriter(self._store, self._run, utc_at_zero_ns, clock, _to_stderr)
+            )
+        return Counting(timed(pool), scan.workers, writer, self._counted)
+
+
+def _to_stderr(text: str) -> None:
+    print(f"flightd: {text}", file=sys.stderr)

@@ -1,0 +1,1 @@
+"""Down camera frames through the detector processes, with the time each took."""

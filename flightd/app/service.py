@@ -1,0 +1,76 @@
+"""What surrounds `flightd run` as a service: who watches it, and whether it was started anew by itself."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import AsyncIterator, Mapping
+from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
+
+from flightd.adapters.journal import JournalFormatter, JournalMonitor, goes_to_journal
+from flightd.adapters.metrics.metrics import MetricsBook
+from flightd.adapters.metrics.server import MetricsServer
+from flightd.adapters.systemd import SystemdMonitor
+from flightd.config.metrics import MetricsConfig
+from flightd.ports import Monitor
+
+_MARK = "started"
+
+
+def logs_to_journal(environment: Mapping[str, str]) -> bool:
+    """Whether stderr goes to the journal; if so, the program's own log lines take its form from now on."""
+    if not goes_to_journal(sys.stderr, environment.get("JOURNAL_STREAM", "")):
+        return False
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(JournalFormatter())
+    logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
+    return True
+
+
+def was_started_before(environment: Mapping[str, str]) -> bool:
+    """Whether the service manager has started this service anew by itself.
+
+    The mark lies in the service's run-time folder, which systemd keeps through its own restarts only
+    (RuntimeDirectoryPreserve=restart) and removes when a person stops the service or the machine starts.
+    """
+    mark = _mark(environment)
+    return mark is not None and mark.exists()
+
+
+def note_start(environment: Mapping[str, str]) -> None:
+    """Leave the mark for a restart to find.  A run-time folder that cannot be written leaves none."""
+    mark = _mark(environment)
+    if mark is not None:
+        try:
+            mark.touch()
+        except OSError as err:
+            logging.getLogger(__name__).warning(
+                "%s: %s; a restart cannot be told from a start", mark, err.strerror
+            )
+
+
+@asynccontextmanager
+async def monitors(
+    settings: MetricsConfig, environment: Mapping[str, str], *, journal: bool
+) -> AsyncIterator[list[Monitor]]:
+    """Who watches the daemon from this machine.  UnavailableError when the metrics' port is taken."""
+    found: list[Monitor] = []
+    async with AsyncExitStack() as stack:
+        if journal:
+            found.append(JournalMonitor(sys.stderr))
+        if (systemd := SystemdMonitor.of_environment(environment)) is not None:
+            stack.callback(systemd.close)
+            found.append(systemd)
+        if settings.listen:
+            book = MetricsBook()
+            server = MetricsServer(settings.address, book.exposition)
+            await server.open()
+            stack.push_async_callback(server.close)
+            found.append(book)
+        yield found
+
+
+def _mark(environment: Mapping[str, str]) -> Path | None:
+    folder = environment.get("RUNTIME_DIRECTORY", "").split(":")[0]
+    return Path(folder) / _MARK if folder else None

@@ -1,0 +1,74 @@
+"""Setpoints on the wire at their own rate, whatever the rest of the daemon does."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from flightd.core.types import AttitudeSetpoint
+from flightd.ports import Clock, Vehicle
+from flightd.runtime.bounded_series import Series
+
+
+class SetpointPump:
+    """Sends each new setpoint at once and repeats the last one when none comes for `period_s`.
+
+    A setpoint older than `stale_s` is not repeated: the loop that made it is dead, so level and hold
+    go out instead (counted in `stale`).  With `set(None)` nothing goes out.  `on_sent` is told of each
+    fresh setpoint and the time it was on the wire.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        clock: Clock,
+        on_sent: Callable[[AttitudeSetpoint, int], None],
+        period_s: float = 0.02,
+        stale_s: float = 0.15,
+    ) -> None:
+        self._vehicle = vehicle
+        self._clock = clock
+        self._on_sent = on_sent
+        self._period_s = period_s
+        self._stale_ns = round(stale_s * 1e9)
+        self._setpoint: AttitudeSetpoint | None = None
+        self._fresh = asyncio.Event()
+        self._last_ns: int | None = None
+        self.stale = 0
+        self.intervals_ms = Series()
+
+    def set(self, setpoint: AttitudeSetpoint | None) -> None:
+        """The setpoint to send from now on."""
+        self._setpoint = setpoint
+        if setpoint is None:
+            self._last_ns = None
+        else:
+            self._fresh.set()
+
+    async def run(self) -> None:
+        while True:
+            fresh = True
+            try:
+                # a little more than the period, so that a steady maker of setpoints sets the pace
+                async with asyncio.timeout(self._period_s * 1.2):
+                    await self._fresh.wait()
+            except TimeoutError:
+                fresh = False
+            self._fresh.clear()
+            if self._setpoint is not None:
+                self._send(self._setpoint, fresh)
+
+    def _send(self, setpoint: AttitudeSetpoint, fresh: bool) -> None:
+        now_ns = self._clock.now_ns()
+        if now_ns - setpoint.stamp_ns > self._stale_ns:
+            setpoint = AttitudeSetpoint(now_ns)
+            self.stale += 1
+            fresh = False
+        if not self._vehicle.send(setpoint):
+            self._last_ns = None
+            return
+        if self._last_ns is not None:
+            self.intervals_ms.add((now_ns - self._last_ns) * 1e-6)
+        self._last_ns = now_ns
+        if fresh:
+            self._on_sent(setpoint, now_ns)

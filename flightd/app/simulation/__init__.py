@@ -1,0 +1,1 @@
+"""Starts world and daemon together, alone in lockstep or as two processes by the clock."""

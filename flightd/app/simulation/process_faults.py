@@ -1,0 +1,143 @@
+"""Faults that are done to the daemon from outside: to its processes, and over its ground link."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import resource
+import signal
+from collections.abc import Sequence
+from contextlib import suppress
+
+from flightd.adapters.ground_link.client import Address, GroundClient
+from flightd.adapters.ground_link.link import ZmqGround
+from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.app.detection.detector_pool import DetectorPool
+from flightd.config.schema import Config
+from flightd.core.errors import FlightdError, InputError
+from flightd.sim.scenario.fault_schema import (
+    CpuTaken,
+    DetectorKilled,
+    Fault,
+    GroundOrder,
+    GroundSilent,
+    OfCamera,
+    ProcessFault,
+)
+from flightd.sim.scenario.faults import place_of
+from flightd.site.site import Site
+
+_ATTEND_S = 0.5
+_TURN_S = 0.4
+"""One turn in which the processor is taken and given back."""
+
+
+def check_faults(faults: Sequence[Fault], config: Config, site: Site, *, external: bool) -> None:
+    """InputError for a fault that this site or this vehicle's simulation cannot have."""
+    for fault in faults:
+        place_of(fault, site)
+        if fault.by_vehicle and (external or config.vehicle.kind == "ardrone"):
+            raise InputError(
+                f"scenario: fault {fault.kind}: only the simulated MAVLink autopilots have it;"
+                " fly --vehicle ardupilot or px4, without --truth-url"
+            )
+        if fault.by_airframe and external:
+            raise InputError(f"scenario: fault {fault.kind}: leave out --truth-url, its airframe is not ours")
+        if isinstance(fault, OfCamera) and fault.camera == "front" and not config.front_camera.is_fitted:
+            raise InputError(f"scenario: fault {fault.kind}: no front camera; fly a --warehouse with racks")
+
+
+def attended(config: Config, faults: Sequence[Fault]) -> Config:
+    """The configuration with a ground link on any free ports, where a fault needs one."""
+    if config.ground.listen or not any(isinstance(fault, GroundSilent | GroundOrder) for fault in faults):
+        return config
+    update = {"listen": "127.0.0.1", "status_port": 0, "command_port": 0}
+    return config.model_copy(update={"ground": config.ground.model_copy(update=update)})
+
+
+class LauncherFaults:
+    """`tell` takes a fault's number when it begins or ends; `run` does what goes on, until cancelled."""
+
+    def __init__(
+        self,
+        faults: Sequence[Fault],
+        pool: DetectorPool,
+        recorder: McapRecorder,
+        ground: ZmqGround | None = None,
+    ) -> None:
+        self._faults = tuple(faults)
+        self._pool = pool
+        self._recorder = recorder
+        self._ground = ground
+        self._turns: asyncio.Queue[tuple[Fault, bool]] = asyncio.Queue()
+        self._attending = any(isinstance(fault, GroundSilent) for fault in faults)
+        self._taken = 0.0
+
+    def tell(self, index: int, begins: bool) -> None:
+        self._turns.put_nowait((self._faults[index], begins))
+
+    async def run(self) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            if self._attending:
+                tasks.create_task(self._attend(), name="ground station")
+            if any(isinstance(fault, CpuTaken) for fault in self._faults):
+                tasks.create_task(self._take_cpu(), name="taken cpu")
+            while True:
+                fault, begins = await self._turns.get()
+                await self._turn(fault, begins)
+
+    async def _turn(self, fault: Fault, on: bool) -> None:
+        match fault:
+            case DetectorKilled() if on:
+                _signal(self._pool.pids, signal.SIGKILL)
+            case ProcessFault(kind="detector_hung"):
+                _signal(self._pool.pids, signal.SIGSTOP if on else signal.SIGCONT)
+            case ProcessFault(kind="writer_killed") if on:
+                _signal((self._recorder.pid,), signal.SIGKILL)
+            case ProcessFault(kind="disk_full"):
+                self._fill_disk(on)
+            case CpuTaken():
+                self._taken = fault.share if on else 0.0
+            case GroundSilent():
+                self._attending = not on
+            case GroundOrder() if on:
+                async with GroundClient(self._address()) as client:
+                    await client.hello()
+                    await client.order(fault.command)
+
+    def _fill_disk(self, full: bool) -> None:
+        """Nothing that the log's writer writes grows beyond its present size, as on a full disk."""
+        _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        soft = self._recorder.path.stat().st_size if full else hard
+        with suppress(ProcessLookupError):
+            resource.prlimit(self._recorder.pid, resource.RLIMIT_FSIZE, (soft, hard))
+
+    async def _take_cpu(self) -> None:
+        """The detectors stand still for their share of each turn, as a processor's quota makes them."""
+        while True:
+            taken_s = self._taken * _TURN_S
+            if taken_s:
+                stopped = self._pool.pids
+                _signal(stopped, signal.SIGSTOP)
+                await asyncio.sleep(taken_s)
+                _signal(stopped, signal.SIGCONT)
+            await asyncio.sleep(_TURN_S - taken_s)
+
+    async def _attend(self) -> None:
+        async with GroundClient(self._address(), "station") as client:
+            await client.hello()
+            while self._attending:
+                with suppress(FlightdError):  # asked again in a moment
+                    await client.attend()
+                await asyncio.sleep(_ATTEND_S)
+
+    def _address(self) -> Address:
+        assert self._ground is not None
+        status, command = (int(endpoint.rpartition(":")[2]) for endpoint in self._ground.endpoints)
+        return Address("127.0.0.1", status, command)
+
+
+def _signal(pids: Sequence[int], what: signal.Signals) -> None:
+    for pid in pids:
+        with suppress(ProcessLookupError):
+            os.kill(pid, what)

@@ -1,0 +1,76 @@
+"""The count of a simulated flight: `inventory.csv`, and how good it was against the truth."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.app.build import plan_of
+from flightd.app.simulation.launch import Simulation, truth_of
+from flightd.core.csv_text import inert
+from flightd.core.inventory import LocationRecord
+from flightd.inventory.formats import utc_text
+from flightd.sim.racks.stock_truth import score_stock
+
+_COLUMNS = (
+    "location", "node", "state", "texts", "symbology", "confidence", "utc", "x_m", "y_m", "height_m", "run",
+    "evidence",
+)  # fmt: skip
+
+
+def inventory_csv(folder: Path) -> bytes | None:
+    """One line for each location of the inventory in `folder`, several texts behind one another with
+    " | " between, all of it inert (`core.cells`); None where there is no inventory."""
+    records = _records(folder)
+    if records is None:
+        return None
+    out = io.StringIO()
+    writer = csv.writer(out)
+    writer.writerow(_COLUMNS)
+    writer.writerows(
+        [inert(value) if isinstance(value, str) else value for value in _row(record)] for record in records
+    )
+    return out.getvalue().encode()
+
+
+def stock_summary(simulation: Simulation, flight_time_s: float) -> dict[str, Any]:
+    """The summary's part on codes and places, over the locations of the wanted nodes."""
+    truth, records = truth_of(simulation), _records(simulation.folder)
+    if not truth or records is None:
+        return {"codes_expected": 0, "codes_read": 0, "codes_wrong": 0}
+    wanted = {stop.node for stop in plan_of(simulation.config, simulation.site).stops if stop.visit}
+    planned = {code for code, place in truth.items() if place.node in wanted}
+    scored = score_stock(truth, records, planned).as_summary()
+    hours = flight_time_s / 3600
+    return scored | {"locations_per_hour": round(scored["locations_visited"] / hours, 1) if hours else 0.0}
+
+
+def _records(folder: Path) -> list[LocationRecord] | None:
+    if not (folder / "inventory.db").exists():
+        return None
+    with SqliteStore(folder, create=False) as store:
+        return store.locations()
+
+
+def _row(record: LocationRecord) -> list[str | float]:
+    seen = record.observation
+    if seen is None:
+        return [record.code, record.node, record.state.value, *[""] * (len(_COLUMNS) - 3)]
+    pose = seen.pose
+    symbologies = dict.fromkeys(read.symbology for read in seen.reads)
+    where = (pose.x_m, pose.y_m, pose.height_m) if pose else ("", "", "")
+    return [
+        record.code,
+        record.node,
+        record.state.value,
+        " | ".join(record.texts),
+        " | ".join(symbologies),
+        seen.confidence,
+        utc_text(seen.utc_ns),
+        *(round(value, 3) if isinstance(value, float) else value for value in where),
+        seen.run,
+        seen.evidence,
+    ]

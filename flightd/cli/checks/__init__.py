@@ -1,1 +1,0 @@
-"""What `flightd doctor` looks at, a module for each kind of thing."""

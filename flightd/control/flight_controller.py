@@ -1,0 +1,137 @@
+"""From where the drone is and should be to an attitude setpoint: four PID loops and the geometry."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from flightd.control.pid import Pid, PidGains
+from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
+from flightd.core.types import AttitudeSetpoint
+
+_TRIM_MPS2 = 0.8
+"""The most that is leaned against a push when not even the velocity is reckoned any more: five degrees."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightGains:
+    """Horizontal loop in m/s^2 per m, one each for the grid's x and y; yaw in rad/s per rad; height in
+    m/s per m."""
+
+    horizontal: PidGains
+    yaw: PidGains
+    height: PidGains
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Measured, in grid axes: position and velocity, yaw, and the height with its rate."""
+
+    x_m: float
+    y_m: float
+    vx_mps: float
+    vy_mps: float
+    yaw_rad: float
+    yaw_rate_radps: float
+    height_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """Wanted, in grid axes; velocities and accelerations are fed forward."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    height_m: float
+    vx_mps: float = 0.0
+    vy_mps: float = 0.0
+    ax_mps2: float = 0.0
+    ay_mps2: float = 0.0
+    yaw_rate_radps: float = 0.0
+    climb_mps: float = 0.0
+
+
+class FlightController:
+    """Position, yaw and height loops.  Reset before flying after a time without control."""
+
+    def __init__(self, gains: FlightGains) -> None:
+        self._gains = gains
+        self._x = Pid(gains.horizontal)
+        self._y = Pid(gains.horizontal)
+        self._yaw = Pid(gains.yaw)
+        self._height = Pid(gains.height)
+
+    def reset(self) -> None:
+        for loop in (self._x, self._y, self._yaw, self._height):
+            loop.reset()
+
+    def step(self, now_ns: int, motion: Motion, reference: Reference, dt_s: float) -> AttitudeSetpoint:
+        """The full setpoint, all loops closed; level when any number it would be made of is not finite."""
+        known = (motion.x_m, motion.y_m, motion.vx_mps, motion.vy_mps, motion.yaw_rad, motion.yaw_rate_radps)
+        if not all(map(math.isfinite, (*known, reference.x_m, reference.y_m, reference.yaw_rad))):
+            return self.level(now_ns, motion, reference, dt_s)
+        kd = self._gains.horizontal.kd
+        ax = self._x.step(
+            reference.x_m - motion.x_m, motion.vx_mps, dt_s, reference.ax_mps2 + kd * reference.vx_mps
+        )
+        ay = self._y.step(
+            reference.y_m - motion.y_m, motion.vy_mps, dt_s, reference.ay_mps2 + kd * reference.vy_mps
+        )
+        return self._tilted(now_ns, ax, ay, motion, reference, dt_s)
+
+    def level(self, now_ns: int, motion: Motion, reference: Reference, dt_s: float) -> AttitudeSetpoint:
+        """Level and straight, height held: what is flown without a view of the floor.  The integrals
+        stand still, ready for when the view comes back."""
+        return AttitudeSetpoint(now_ns, 0.0, 0.0, 0.0, self._climb(motion, reference, dt_s))
+
+    def rest(
+        self,
+        now_ns: int,
+        motion: Motion,
+        reference: Reference,
+        dt_s: float,
+        push_mps2: tuple[float, float],
+        *,
+        reckoned: bool,
+    ) -> AttitudeSetpoint:
+        """Come to rest by the velocity alone (`reckoned`: it is known), then lean only against the steady
+        push as it was last known (grid axes), at most `_TRIM_MPS2`; straight, height held."""
+        gains = self._gains.horizontal
+        most = gains.output_limit
+        trim = most if reckoned else _TRIM_MPS2
+        ax, ay = (-min(max(push, -trim), trim) for push in push_mps2)
+        moving = (motion.vx_mps, motion.vy_mps, motion.yaw_rad)
+        if not all(map(math.isfinite, moving)):
+            return self.level(now_ns, motion, reference, dt_s)
+        if reckoned:
+            ax = min(max(ax - gains.kd * motion.vx_mps, -most), most)
+            ay = min(max(ay - gains.kd * motion.vy_mps, -most), most)
+        cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+        return AttitudeSetpoint(
+            now_ns,
+            math.atan2(-sin * ax + cos * ay, GRAVITY_MPS2),
+            -math.atan2(cos * ax + sin * ay, GRAVITY_MPS2),
+            0.0,
+            self._climb(motion, reference, dt_s),
+        )
+
+    def _tilted(
+        self, now_ns: int, ax: float, ay: float, motion: Motion, reference: Reference, dt_s: float
+    ) -> AttitudeSetpoint:
+        cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+        forward, right = cos * ax + sin * ay, -sin * ax + cos * ay
+        yaw_error = wrap_pi(reference.yaw_rad - motion.yaw_rad)
+        return AttitudeSetpoint(
+            now_ns,
+            math.atan2(right, GRAVITY_MPS2),
+            -math.atan2(forward, GRAVITY_MPS2),
+            self._yaw.step(yaw_error, motion.yaw_rate_radps, dt_s, reference.yaw_rate_radps),
+            self._climb(motion, reference, dt_s),
+        )
+
+    def _climb(self, motion: Motion, reference: Reference, dt_s: float) -> float:
+        """Height loop; without a height only the climb rate that is fed forward."""
+        if not math.isfinite(motion.height_m - reference.height_m):
+            return reference.climb_mps if math.isfinite(reference.climb_mps) else 0.0
+        return self._height.step(reference.height_m - motion.height_m, 0.0, dt_s, reference.climb_mps)

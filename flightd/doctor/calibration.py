@@ -1,0 +1,64 @@
+"""Are lens and mount, as configured, those of a camera that can fly by this floor?"""
+
+from __future__ import annotations
+
+import math
+
+from flightd.config.schema import CameraConfig
+from flightd.core.geometry import Lens
+from flightd.doctor.check import Check, error, ok, warning
+from flightd.site.site import Site
+
+_FIELD_DEG = (15.0, 150.0)
+_ASPECT = 0.03
+_OFF_CENTRE = 0.15
+_LINE_MIN_PX = 4.0
+_CALIBRATE = "calibrate the camera: flightd calibrate"
+_NAME = "calibration"
+_STEPS = 50
+
+
+def check_calibration(camera: CameraConfig, site: Site, height_m: float) -> list[Check]:
+    """One line for each complaint, or one that says all is well."""
+    lens = camera.lens()
+    field_deg = math.degrees(2.0 * math.atan(lens.width_px / (2.0 * lens.fx_px)))
+    across_m = lens.width_px / lens.fx_px * height_m
+    line_px = site.line_width_m * lens.fx_px / height_m
+    text = (
+        f"the lens sees {field_deg:.0f} deg across, {across_m:.1f} m of floor from {height_m:g} m; "
+        f"a line is {line_px:.0f} px wide there"
+    )
+    checks = []
+    if not _FIELD_DEG[0] < field_deg < _FIELD_DEG[1]:
+        checks.append(
+            error(_NAME, f"camera.fx_px {lens.fx_px:g}: {field_deg:.0f} deg across is no lens", _CALIBRATE)
+        )
+    if abs(lens.fx_px / lens.fy_px - 1.0) > _ASPECT:
+        checks.append(
+            warning(_NAME, f"camera.fx_px {lens.fx_px:g} and fy_px {lens.fy_px:g} differ", _CALIBRATE)
+        )
+    middle = (lens.width_px - 1) / 2, (lens.height_px - 1) / 2
+    if (
+        abs(lens.cx_px - middle[0]) > _OFF_CENTRE * lens.width_px
+        or abs(lens.cy_px - middle[1]) > _OFF_CENTRE * lens.height_px
+    ):
+        place = f"camera.cx_px {lens.cx_px:g}, cy_px {lens.cy_px:g}"
+        checks.append(error(_NAME, f"{place}: far from the picture's middle", _CALIBRATE))
+    if not _unfolds(lens):
+        checks.append(error(_NAME, "camera.distortion folds the picture over itself", _CALIBRATE))
+    if line_px < _LINE_MIN_PX:
+        remedy = (
+            f"fly lower (mission.height_m), use larger pictures or a longer lens: {_LINE_MIN_PX:g} px needed"
+        )
+        checks.append(error(_NAME, text, remedy))
+    if not {"fx_px", "fy_px"} & camera.model_fields_set:
+        checks.append(warning(_NAME, "camera.fx_px and fy_px are not given: a guess is used", _CALIBRATE))
+    return checks or [ok(_NAME, text)]
+
+
+def _unfolds(lens: Lens) -> bool:
+    """Whether the radial distortion grows from the middle to the corner of the picture."""
+    k1, k2, _, _, k3 = lens.distortion
+    corner = math.hypot(lens.width_px / 2 / lens.fx_px, lens.height_px / 2 / lens.fy_px)
+    radii = [corner * step / _STEPS for step in range(1, _STEPS + 1)]
+    return all(1.0 + 3.0 * k1 * r**2 + 5.0 * k2 * r**4 + 7.0 * k3 * r**6 > 0.0 for r in radii)

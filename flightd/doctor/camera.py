@@ -1,0 +1,168 @@
+"""The down camera: does it open, give the configured pictures at the configured rate, and are they of use?"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from dataclasses import dataclass, field
+
+from flightd.adapters.camera.connect import connect_camera
+from flightd.config.schema import Config
+from flightd.core.errors import TransientError, UnavailableError
+from flightd.core.types import Image
+from flightd.doctor.check import Check, error, ok, warning
+from flightd.pilot import TICK_S
+from flightd.ports import Clock, Vehicle
+from flightd.runtime.frame_ring import FrameRing, FrameTicket
+from flightd.vision.lines.detector import Detector
+
+_FIRST_S = 6.0
+_WATCH_S = 2.0
+_LEAST_PICTURES = 5
+_SLOW = 0.85
+_DARK, _BRIGHT = 12.0, 243.0
+_BUSY = 0.8
+_TRIES = 3
+_NEAR = 0.8
+"""Of the latency that is allowed: what is measured here is not the slowest picture of a flight."""
+
+
+@dataclass(slots=True)
+class Pictures:
+    """What came: arrival times, the newest picture of a second ago or later, what was refused, and the delays
+    since mid-exposure."""
+
+    arrivals_ns: list[int] = field(default_factory=list)
+    picture: Image | None = None
+    trouble: str = ""
+    delays_s: list[float] = field(default_factory=list)
+
+    @property
+    def rate_hz(self) -> float:
+        """Pictures per second; 0 for fewer than two."""
+        if len(self.arrivals_ns) < 2:
+            return 0.0
+        return (len(self.arrivals_ns) - 1) * 1e9 / max(self.arrivals_ns[-1] - self.arrivals_ns[0], 1)
+
+
+async def watch(config: Config, clock: Clock, vehicle: Vehicle | None) -> Pictures:
+    """Let the camera run for some seconds.  InputError for a wrong address."""
+    pictures = Pictures()
+    first = asyncio.Event()
+
+    def take(ticket: FrameTicket) -> None:
+        pictures.arrivals_ns.append(ticket.arrival_ns)
+        pictures.delays_s.append((ticket.arrival_ns - ticket.stamp_ns) * 1e-9)
+        first.set()
+        if pictures.picture is None and len(pictures.arrivals_ns) >= _LEAST_PICTURES:
+            pictures.picture = _copy(ticket)  # the first ones are exposed badly
+
+    def complain(text: str) -> None:
+        pictures.trouble = text
+
+    camera = connect_camera(config.camera, clock, take, complain, vehicle)
+    running = asyncio.ensure_future(camera.run())
+    started = asyncio.ensure_future(first.wait())
+    try:
+        await asyncio.wait({running, started}, timeout=_FIRST_S, return_when=asyncio.FIRST_COMPLETED)
+        await asyncio.wait({running}, timeout=_WATCH_S if first.is_set() else 0.0)
+    finally:
+        started.cancel()
+        running.cancel()
+        ended = await asyncio.gather(running, started, return_exceptions=True)
+    if isinstance(ended[0], TransientError | UnavailableError):
+        pictures.trouble = str(ended[0])
+    elif isinstance(ended[0], Exception):
+        raise ended[0]
+    return pictures
+
+
+def judge_camera(config: Config, found: Pictures) -> list[Check]:
+    """Size (pictures of another are refused by the adapter), rate and brightness."""
+    camera, rate_hz = config.camera, found.rate_hz
+    if len(found.arrivals_ns) < _LEAST_PICTURES:
+        text = found.trouble or f"{camera.url}: no picture in {_FIRST_S:g} s"
+        return [error("camera", text, "check camera.url, cable, rights (group video) and who else uses it")]
+    text = f"{camera.url}: {camera.width_px}x{camera.height_px} px, {rate_hz:.1f} pictures a second"
+    checks = []
+    least_hz = 2.0 / config.mission.lines_hold_s
+    if rate_hz < least_hz:
+        remedy = (
+            f"at least {least_hz:.0f} are needed (mission.lines_hold_s); more light, another size or format"
+        )
+        checks.append(error("camera", text, remedy))
+    elif rate_hz < _SLOW * camera.fps:
+        remedy = f"camera.fps is {camera.fps:g}: more light, another size or format, or correct the key"
+        checks.append(warning("camera", text, remedy))
+    else:
+        checks.append(ok("camera", text))
+    if found.picture is not None and not _DARK < (level := float(found.picture.mean())) < _BRIGHT:
+        word = "black" if level <= _DARK else "white"
+        checks.append(error("camera", f"pictures are {word}", "take off the lens cap; check the exposure"))
+    return checks
+
+
+def check_vision(config: Config, detector: Detector, picture: Image | None) -> list[Check]:
+    """What the detector finds in a picture, and whether the detectors keep up with the camera."""
+    name = f"{config.vision.method}, profile {detector.profile.name}"
+    if picture is None:
+        return [warning("vision", f"{name}: loads, had no picture to look at", "see the camera's line")]
+    best_s, lines = _look(detector, picture)
+    text = f"{name}: {best_s * 1000:.0f} ms a picture, {lines} lines seen"
+    busy = best_s * config.camera.fps / config.vision.workers
+    checks = []
+    if busy > _BUSY:
+        remedy = "more vision.workers, smaller pictures or a lower camera.fps; pictures will be dropped"
+        checks.append(warning("vision", f"{text}: detectors are {busy:.0%} busy", remedy))
+    if not lines:
+        remedy = "none may be in view here; else train the colour: flightd train-colour"
+        checks.append(warning("vision", text, remedy))
+    return checks or [ok("vision", text)]
+
+
+def check_latency(config: Config, detector: Detector, found: Pictures) -> list[Check]:
+    """Whether setpoints are made soon enough after the exposure of what they are made from."""
+    if found.picture is None or not found.delays_s:
+        return []
+    most_s = config.hazards.latency_s
+    camera_s, (detector_s, _) = max(found.delays_s), _look(detector, found.picture)
+    whole_s = camera_s + detector_s + TICK_S
+    text = (
+        f"{whole_s * 1000:.0f} ms from exposure to setpoint: camera {camera_s * 1000:.0f},"
+        f" detector {detector_s * 1000:.0f}, up to {TICK_S * 1000:.0f} until the next tick"
+    )
+    remedy = (
+        f"hazards.latency_s allows {most_s * 1000:.0f} ms: a camera with less delay (camera.latency_s is its"
+        " measured share), smaller pictures, a faster computer"
+    )
+    if whole_s > most_s:
+        return [error("latency", text, remedy)]
+    if whole_s > _NEAR * most_s:
+        return [warning("latency", text, remedy)]
+    return [ok("latency", text)]
+
+
+def _look(detector: Detector, picture: Image) -> tuple[float, int]:
+    """The shortest time of some looks at a picture, s, and the lines in it."""
+    best_s, lines = float("inf"), 0
+    for _ in range(_TRIES):
+        start_s = time.perf_counter()
+        lines = len(detector.detect(picture).lines)
+        best_s = min(best_s, time.perf_counter() - start_s)
+    return best_s, lines
+
+
+def _copy(ticket: FrameTicket) -> Image | None:
+    """The picture behind a ticket; None when it is gone already."""
+    try:
+        ring = FrameRing.attach(ticket.ring, ticket.slots, ticket.width_px, ticket.height_px)
+    except UnavailableError:
+        return None
+    try:
+        picture = ring.pixels(ticket.slot).copy()
+        ring.check(ticket.slot, ticket.seq)
+    except TransientError:
+        return None
+    finally:
+        ring.close()
+    return picture

@@ -1,0 +1,36 @@
+"""The outcome of one check."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class CheckLevel(StrEnum):
+    """OK, WARNING (flies, but look at it) or ERROR (not fit to fly)."""
+
+    OK = "ok"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One line: what was looked at, what was found, and what a person can do about it ("" if nothing)."""
+
+    name: str
+    level: CheckLevel
+    text: str
+    remedy: str = ""
+
+
+def ok(name: str, text: str) -> Check:
+    return Check(name, CheckLevel.OK, text)
+
+
+def warning(name: str, text: str, remedy: str) -> Check:
+    return Check(name, CheckLevel.WARNING, text, remedy)
+
+
+def error(name: str, text: str, remedy: str) -> Check:
+    return Check(name, CheckLevel.ERROR, text, remedy)

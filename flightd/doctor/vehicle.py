@@ -1,0 +1,130 @@
+"""The vehicle: does it answer, is it what the configuration says, is it set up for this job?"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
+from flightd.adapters.vehicle.connect import signing_of
+from flightd.adapters.vehicle.mavlink.examination import Examination, ExaminationReport
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.required_parameters import Job
+from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import too_slow
+from flightd.config.schema import Config
+from flightd.config.vehicle import VehicleConfig
+from flightd.core.errors import UnavailableError
+from flightd.doctor.check import Check, error, ok, warning
+from flightd.ports import Clock
+
+_FIRMWARES = {"ardupilot": Firmware.ARDUPILOT, "px4": Firmware.PX4, "mavsdk": Firmware.PX4}
+_NAMES = {Firmware.ARDUPILOT: "ArduCopter", Firmware.PX4: "PX4"}
+_CABLE = "check vehicle.url, cable (TX to RX), baud rate and power; is another flightd running?"
+_KEY = "; does the autopilot have the same signing key?"
+_BEATS = "grant SET_MESSAGE_INTERVAL of HEARTBEAT (newer firmware), or a faster line; else warn the pilot"
+_POLL_S = 0.1
+_PATIENCE_S = 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class Autopilot:
+    """What was read of an autopilot; None when it could not be read.  `fixed` are the parameters that
+    were written and read back."""
+
+    checks: tuple[Check, ...]
+    report: ExaminationReport | None = None
+    fixed: tuple[str, ...] = ()
+
+
+async def examine(config: VehicleConfig, clock: Clock, agreed: Collection[str] = ()) -> Autopilot:
+    """Read and judge the parameters, after writing the better values of those `agreed` on by name.
+
+    InputError for a wrong address or signing key."""
+    signing = signing_of(config, clock)
+    job = Job(
+        guided=config.flying_mode == "guided",
+        raw_thrust=config.raw_thrust,
+        shares_pose=config.shares_pose,
+        landing_target=config.landing_target,
+    )
+    examination = Examination(config.url, clock, config.system_id, signing, job)
+    try:
+        async with examination.connected():
+            report = await examination.report()
+            wanted = [found for found in report.findings if found.name in agreed]
+            if not wanted:
+                return Autopilot(tuple(judge(config, report)), report)
+            left = {found.name for found in await examination.fix(wanted)}
+            fixed = tuple(found.name for found in wanted if found.name not in left)
+            report = await examination.report()
+            return Autopilot((*judge(config, report), *_after_fix(fixed, sorted(left))), report, fixed)
+    except UnavailableError as err:
+        return Autopilot((error("vehicle", str(err), _CABLE + (_KEY if signing else "")),))
+
+
+def judge(config: VehicleConfig, report: ExaminationReport) -> list[Check]:
+    """Kind and state of the autopilot, then a line for each parameter that is wrong."""
+    name = _NAMES[report.firmware]
+    text = f"{name} {report.version}".strip() + f" answers at {config.url}"
+    checks = []
+    if _FIRMWARES[config.kind] is not report.firmware:
+        remedy = f'set vehicle.kind = "{report.firmware.name.lower()}"'
+        if report.firmware is Firmware.ARDUPILOT:
+            remedy = 'set vehicle.kind = "ardupilot"'
+        checks.append(error("vehicle", f"{text}; the configuration says {config.kind}", remedy))
+    elif report.armed:
+        checks.append(error("vehicle", f"{text}; it is armed", "disarm it: nothing is changed while it is"))
+    else:
+        checks.append(ok("vehicle", text))
+    slow = too_slow(report.heartbeat_hz)
+    if slow:
+        checks.append(warning("heartbeat", slow, _BEATS))
+    else:
+        checks.append(ok("heartbeat", f"{report.heartbeat_hz:.0f} heartbeats a second"))
+    for found in report.findings:
+        remedy = (
+            "choose it yourself, in a ground station"
+            if found.better is None
+            else f"--fix sets {found.better:g}"
+        )
+        checks.append(error("parameter", str(found), remedy))
+    return checks
+
+
+def _after_fix(fixed: tuple[str, ...], left: list[str]) -> list[Check]:
+    checks = []
+    if fixed:
+        text = f"{', '.join(fixed)} set and read back"
+        checks.append(warning("fix", text, "reboot the autopilot, some act only then; run doctor again"))
+    if left:
+        checks.append(error("fix", f"{', '.join(left)} did not stay as set", "set it in a ground station"))
+    return checks
+
+
+async def examine_ardrone(vehicle: ArDroneVehicle, config: Config) -> list[Check]:
+    """Wait until the running adapter hears the drone; its battery and whether it refuses to fly."""
+    url = config.vehicle.url
+    for _ in range(round(_PATIENCE_S / _POLL_S)):
+        state = vehicle.state()
+        if state is not None:
+            break
+        await asyncio.sleep(_POLL_S)
+    else:
+        remedy = "join its wireless network; only one client at a time can fly it"
+        return [error("vehicle", f"{url}: no navdata in {_PATIENCE_S:g} s", remedy)]
+    checks = []
+    if state.mode == "emergency":
+        text = f"{url}: {state.refusal or 'emergency'}"
+        checks.append(error("vehicle", text, "look at propellers and attitude, then press its reset button"))
+    elif state.armed:
+        checks.append(error("vehicle", f"{url}: the drone is flying", "land it"))
+    else:
+        checks.append(ok("vehicle", f"AR.Drone answers at {url}, {state.mode}"))
+    least = config.mission.battery_start
+    text = f"{state.battery_frac:.0%} charged, {least:.0%} are needed to start (mission.battery_start)"
+    if state.battery_frac < least:
+        checks.append(error("battery", text, "charge it"))
+    else:
+        checks.append(ok("battery", text))
+    return checks

@@ -1,0 +1,1 @@
+"""The count against the books, and what goes out to other programs."""

@@ -1,0 +1,1 @@
+"""What the battery still gives, when to turn back, and going on with a fresh one."""

@@ -1,0 +1,115 @@
+"""When a phase of the mission has reached its end, and how long it may take.  Pure."""
+
+from __future__ import annotations
+
+import math
+
+from flightd.core.geometry import wrap_pi
+from flightd.core.types import Phase
+from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.mission.plan.itinerary import Itinerary
+from flightd.mission.safety.found_flying import FoundFlyingCheck
+from flightd.mission.safety.hazard_monitor import DebounceTimer
+from flightd.mission.scan.scan_phase import ScanPhase
+from flightd.mission.triggers import Trigger
+
+
+class PhaseProgress:
+    """The phase in hand: call `begin` when it changes, then `step` at each tick."""
+
+    def __init__(self, params: MissionParams, itinerary: Itinerary, scan: ScanPhase) -> None:
+        self._params = params
+        self._itinerary = itinerary
+        self._scan = scan
+        self._first_look = FoundFlyingCheck(params)
+        self._settling = DebounceTimer()
+        self._limit_s = math.inf
+        self._since_ns = 0
+
+    def begin(self, s: MissionInputs, phase: Phase) -> None:
+        """A phase begins with this tick."""
+        self._since_ns = s.now_ns
+        self._settling = DebounceTimer()
+        self._limit_s = self._time_limit_s(s, phase)
+
+    def phase_s(self, now_ns: int) -> float:
+        """Time since the phase began."""
+        return (now_ns - self._since_ns) * 1e-9
+
+    def timed_out(self, now_ns: int) -> bool:
+        return self.phase_s(now_ns) > self._limit_s
+
+    def step(self, s: MissionInputs, phase: Phase, *, may_start: bool) -> set[Trigger]:
+        """The trigger by which `phase` reaches its end, if it has; on the ground it ends when the mission
+        `may_start`."""
+        p, v, goal = self._params, s.vehicle, self._itinerary.goal
+        match phase:
+            case Phase.PREFLIGHT if self._first_look.flies_already(s):
+                done, trigger = True, Trigger.FOUND_FLYING
+            case Phase.RECOVER:
+                done, trigger = self.phase_s(s.now_ns) >= p.recover_s, Trigger.UNATTENDED
+            case Phase.PREFLIGHT | Phase.SWAP:
+                done, trigger = may_start, Trigger.READY
+            case Phase.ARMING:
+                ready = v is not None and v.armed and v.in_control and not math.isnan(s.height_m)
+                done, trigger = ready, Trigger.ARMED
+            case Phase.TAKE_OFF:
+                done, trigger = s.height_m > p.height_m - p.height_reached_m, Trigger.AT_HEIGHT
+            case Phase.ACQUIRE:
+                calm = s.localised and s.is_sure(p) and s.speed_mps < 2 * p.arrive_mps
+                done, trigger = self._settled(s, calm), Trigger.ACQUIRED
+            case Phase.TURN:
+                turned = s.pose is not None and abs(wrap_pi(goal.yaw_rad - s.pose.yaw_rad)) < p.arrive_yaw_rad
+                done, trigger = self._settled(s, turned), Trigger.TURNED
+            case Phase.FOLLOW:
+                there = s.distance_m((goal.x_m, goal.y_m)) < p.arrive_m and s.speed_mps < p.arrive_mps
+                done, trigger = self._settled(s, there), Trigger.ARRIVED
+            case Phase.HOVER | Phase.CLIMB | Phase.SCAN:
+                done, trigger = self._at_node(s, phase)
+            case _:
+                return set()
+        return {trigger} if done else set()
+
+    def _at_node(self, s: MissionInputs, phase: Phase) -> tuple[bool, Trigger]:
+        """Whether the dwell, the way to a view or the view is over, and what that leads to."""
+        goal, scan, returning = self._itinerary.goal, self._scan, self._itinerary.returning
+        due = not returning and scan.due(phase, goal)
+        if phase is Phase.CLIMB:
+            view = scan.view(phase)
+            away_m = s.distance_m((view.x_m, view.y_m)) if view is not None else math.inf
+            return self._settled(s, scan.at_view(s, away_m, s.speed_mps)) or not due, Trigger.AT_VIEW
+        over = Trigger.ROUTE_DONE if self._itinerary.is_last else Trigger.DWELLED
+        if phase is Phase.SCAN:
+            done = not due or (s.is_sure(self._params) and scan.is_over(s.now_ns))
+            more = not returning and scan.due(phase, goal)
+            return done, Trigger.VIEW_DONE if more else over
+        if due:
+            return True, Trigger.SCAN_DUE
+        dwelt = not goal.visit or returning or scan.is_scanned(goal)
+        dwell_s = 0.0 if dwelt else self._params.dwell_s
+        return self.phase_s(s.now_ns) >= dwell_s and s.is_sure(self._params), over
+
+    def _settled(self, s: MissionInputs, condition: bool) -> bool:
+        """True once `condition` has held for the settling time."""
+        return self._settling.step(condition, s.now_ns) >= self._params.settle_s and condition
+
+    def _time_limit_s(self, s: MissionInputs, phase: Phase) -> float:
+        """How long the phase just begun may take: a fixed slack, and a multiple of its way's own time."""
+        p, goal = self._params, self._itinerary.goal
+        match phase:
+            case Phase.ARMING:
+                return p.arm_timeout_s
+            case Phase.SWAP:
+                return p.battery.swap_wait_s
+            case Phase.TAKE_OFF:
+                way_s = p.height_m / p.climb_mps
+            case Phase.TURN:
+                way_s = math.pi / p.turn_rate_radps
+            case Phase.CLIMB:
+                way_s = self._scan.way_s(s)
+            case Phase.FOLLOW:
+                here_m = s.distance_m((goal.x_m, goal.y_m))
+                way_s = (0.0 if math.isinf(here_m) else here_m) / p.speed_mps
+            case _:
+                way_s = 0.0
+        return p.phase_slack_s + p.phase_share * way_s

@@ -1,0 +1,222 @@
+"""Where the drone is led: the reference in all axes, and what control is to make of it.  Pure."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from flightd.control.flight_controller import Reference
+from flightd.control.motion_profile import Profile
+from flightd.core.geometry import wrap_pi
+from flightd.core.types import Demand, LandedState, Phase
+from flightd.mission.flight.relocation import Relocator
+from flightd.mission.flight.touchdown import Touchdown
+from flightd.mission.guidance import Guidance, Guide, MissionInputs, MissionParams
+from flightd.mission.plan.flight_plan import Stop
+from flightd.mission.safety.hazard_monitor import HazardMonitor
+from flightd.mission.scan.views import View
+
+_BY_PAD = {Phase.TAKE_OFF, Phase.ACQUIRE, Phase.HOLD}
+_TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
+_SETTLE_S = 3.0
+"""The most that a landing waits for the drone to come to rest."""
+_REST_MPS = 0.15
+_HURRY = 4.0 / 3.0
+"""How much faster than usual a take-off out of sight climbs, within the limits."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceTask:
+    """What the mission is at: its phase, flown for `phase_s`, the stop it is for and the view from there.
+
+    `on_pad` lands on that stop's pad, `cruise` flies at the height of the plan rather than at that of the
+    last view; `stopped` neither steers nor brakes, `unknown` (where it is, and so where it may go) nor
+    does it disarm by itself."""
+
+    phase: Phase
+    phase_s: float
+    goal: Stop
+    view: View | None
+    cruise: bool
+    on_pad: bool
+    stopped: bool
+    unknown: bool
+
+
+class ReferenceGenerator:
+    """The reference of a flying drone: call `step` at each tick in the air."""
+
+    def __init__(
+        self,
+        params: MissionParams,
+        ceiling_m: float,
+        watch: HazardMonitor,
+        relocator: Relocator,
+        start: tuple[float, float, float],
+    ) -> None:
+        """`start` is the place on the map, m, and the heading, rad, before the first flight."""
+        p = params
+        self._params = params
+        self._ceiling_m = ceiling_m
+        self._watch = watch
+        self._blind = watch.blind
+        self._relocator = relocator
+        self._touchdown = Touchdown(params)
+        self.anchor = (start[0], start[1])
+        """Where it holds when no stop is flown to."""
+        self._steers = False
+        self._cruise_m = p.height_m
+        self._x = Profile(start[0], p.speed_mps, p.accel_mps2)
+        self._y = Profile(start[1], p.speed_mps, p.accel_mps2)
+        self._yaw = Profile(start[2], p.turn_rate_radps, p.turn_accel_radps2)
+        self._height = Profile(0.0, p.climb_mps, p.climb_accel_mps2)
+        self._rise = Profile(0.0, _HURRY * p.climb_mps, 2.0 * p.climb_accel_mps2)
+
+    def take_off(self, height_m: float) -> None:
+        """A climb begins from here."""
+        self._height.reset(0.0 if math.isnan(height_m) else height_m)
+
+    def land(self) -> None:
+        """A landing begins."""
+        self._touchdown.begin()
+
+    def begin_anew(self) -> None:
+        """Start the reference at the drone, which is not where it was believed to be."""
+        self._steers = False
+
+    def on_ground(self, phase: Phase, demand: Demand) -> Guidance:
+        """What is wanted while nothing is flown."""
+        return Guidance(phase, Guide.NONE, self._reference(0.0), demand)
+
+    def step(self, s: MissionInputs, task: ReferenceTask) -> Guidance:
+        """Move the reference on by one tick."""
+        demand = Demand.KEEP if task.phase is Phase.RECOVER else Demand.FLY
+        self._steers = not (task.stopped or task.unknown) and self._steer(s, task)
+        if task.phase is Phase.LAND:
+            climb, demand = self._descend(s, task)
+        elif task.phase is Phase.RECOVER:
+            self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m)
+            climb = 0.0
+        elif (
+            math.isnan(s.height_m)
+            or s.telemetry_age_s > self._params.telemetry_hold_s
+            or abs(s.warnings.height_share - 1.0) > self._params.hazards.height_share
+        ):
+            self._height.reset(self._height.position)  # no climb by heights of the past
+            climb = 0.0
+        elif task.phase is Phase.HOLD and self._blind.is_blind:
+            climb = -self._blind.sink_mps(s.height_m)
+            self._height.reset(s.height_m, climb)
+        else:
+            climb = self._climb_mps(s, task)
+        guide = Guide.STEER if self._steers else Guide.BRAKE if self._may_brake(s, task) else Guide.LEVEL
+        reckoned = min(s.x_age_s, s.y_age_s) < self._params.hazards.brake_s
+        return Guidance(task.phase, guide, self._reference(climb), demand, reckoned, task.stopped)
+
+    def _climb_mps(self, s: MissionInputs, task: ReferenceTask) -> float:
+        """Climb rate towards the wanted height.  A take-off that drifts where no line tells how hurries: the
+        picture has to widen faster than it leaves the lines behind."""
+        rises = task.phase is Phase.TAKE_OFF and s.height_m >= self._params.steer_above_m
+        if rises and not self._steers:
+            self._rise.reset(self._height.position, self._height.velocity)
+            self._rise.step(self._wanted_height_m(task), s.dt_s)
+            self._height.reset(self._rise.position, self._rise.velocity)
+        else:
+            self._height.step(self._wanted_height_m(task), s.dt_s)
+        return self._height.velocity
+
+    def _may_brake(self, s: MissionInputs, task: ReferenceTask) -> bool:
+        """Without a view of the floor, but with an attitude by which to reckon on from the last one; or, the
+        other way round, with a view to brake by while the vehicle is not heard."""
+        p = self._params
+        heard = s.telemetry_age_s <= p.telemetry_hold_s
+        seen = min(s.x_age_s, s.y_age_s) <= p.lines_hold_s
+        known = (heard or seen) and s.pose is not None and not task.unknown
+        return known and not task.stopped and task.phase is not Phase.TAKE_OFF
+
+    def _wanted_height_m(self, task: ReferenceTask) -> float:
+        """Flying height; a little more in search of lines that stay lost."""
+        p, h = self._params, self._params.hazards
+        if task.phase is Phase.RELOCATE:
+            return self._relocator.height_m(self._height_goal_m(task))
+        if task.phase is not Phase.HOLD or self._watch.unseen_s < h.search_s:
+            return self._height_goal_m(task)
+        highest_m = self._ceiling_m - h.headroom_m
+        return max(p.height_m, min(self._height_goal_m(task) + h.search_climb_m, highest_m))
+
+    def _descend(self, s: MissionInputs, task: ReferenceTask) -> tuple[float, Demand]:
+        """Climb rate and demand of a landing: at rest first, unless stopped or out of sight; down until
+        the vehicle says that it stands; then disarm."""
+        p, v = self._params, s.vehicle
+        moving = self._steers and s.speed_mps > _REST_MPS
+        if moving and not task.on_pad and task.phase_s < _SETTLE_S:
+            self._height.reset(self._height.position)
+            return 0.0, Demand.FLY
+        rate = self._touchdown.rate_mps(s, _target(s, task))
+        if rate > 0.0 and not self._steers:  # what drifts unseen should not do so for long
+            rate = self._blind.rate_mps(s.height_m)
+        self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
+        deaf = s.telemetry_age_s > p.telemetry_land_s
+        standing = v is not None and v.landed is LandedState.ON_GROUND and not deaf
+        by_itself = deaf or task.unknown
+        return -rate, Demand.DISARM if standing else Demand.LAND if by_itself else Demand.FLY
+
+    def _steer(self, s: MissionInputs, task: ReferenceTask) -> bool:
+        """Move the reference towards where the phase wants it; False when the floor cannot be relied on."""
+        p, pose, phase = self._params, s.pose, task.phase
+        too_low = phase is Phase.TAKE_OFF and s.height_m < p.steer_above_m
+        unseen_s = self._touchdown.unseen_s(s, _target(s, task))
+        stale = min(s.x_age_s, s.y_age_s) > unseen_s or s.telemetry_age_s > p.telemetry_hold_s
+        unknown = not (s.by_pad and phase in _BY_PAD) and (stale or not s.localised)
+        if pose is None or unknown or too_low:
+            return False
+        if not self._steers:
+            self._x.reset(pose.x_m, pose.vx_mps)
+            self._y.reset(pose.y_m, pose.vy_mps)
+            self._yaw.reset(pose.yaw_rad)
+        if phase is Phase.RELOCATE:
+            self.anchor = self._relocator.next_look(s, self.anchor)
+        to_goal = phase in _TO_GOAL or task.on_pad
+        at = _target(s, task) or ((task.goal.x_m, task.goal.y_m) if to_goal else self.anchor)
+        x, y, yaw = (*at, task.goal.yaw_rad)
+        if task.view is not None:
+            x, y, yaw = task.view.x_m, task.view.y_m, task.view.yaw_rad
+        if math.hypot(self._x.position - pose.x_m, self._y.position - pose.y_m) < p.max_lead_m:
+            self._x.step(x, s.dt_s)
+            self._y.step(y, s.dt_s)
+        else:  # wait for the vehicle at rest: a speed kept here would be fed forward and hold it off
+            self._x.brake(s.dt_s)
+            self._y.brake(s.dt_s)
+        if to_goal or task.view is not None or phase is Phase.TURN:
+            self._yaw.step(self._yaw.position + wrap_pi(yaw - self._yaw.position), s.dt_s)
+        return True
+
+    def _height_goal_m(self, task: ReferenceTask) -> float:
+        """The view's height while scanning; the legs between an aisle's scanned nodes are flown at the last
+        one's, unless a doubt on the way asks for a wider view."""
+        if task.view is not None:
+            self._cruise_m = task.view.height_m
+        elif task.phase is Phase.RELOCATE:
+            self._cruise_m = max(self._cruise_m, self._params.height_m)
+        elif task.cruise:
+            self._cruise_m = self._params.height_m
+        return self._cruise_m
+
+    def _reference(self, climb_mps: float) -> Reference:
+        return Reference(
+            x_m=self._x.position,
+            y_m=self._y.position,
+            yaw_rad=self._yaw.position,
+            height_m=self._height.position,
+            vx_mps=self._x.velocity,
+            vy_mps=self._y.velocity,
+            ax_mps2=self._x.acceleration,
+            ay_mps2=self._y.acceleration,
+            yaw_rate_radps=self._yaw.velocity,
+            climb_mps=climb_mps,
+        )
+
+
+def _target(s: MissionInputs, task: ReferenceTask) -> tuple[float, float] | None:
+    """The pad to come down on; None while it lands on none."""
+    return (s.pad_m or (task.goal.x_m, task.goal.y_m)) if task.on_pad else None

@@ -1,0 +1,99 @@
+"""Doubt about the position, and what to do about it: stop, look, climb a little, move on if that is safe.
+
+The localiser says how sure it is of the node (`GridPose.integrity`) and, now and then, that the drone
+was somewhere else all along: then its position jumps.  Either stops the flight where it is.
+"""
+
+from __future__ import annotations
+
+import math
+
+from flightd.core.types import Phase
+from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.mission.safety.hazard_monitor import DebounceTimer
+from flightd.mission.triggers import Trigger
+
+_JUMP_M = 0.3
+_SPEED_SHARE = 3.0
+"""A position that changes faster than this many times the flying speed has jumped."""
+
+
+class Relocator:
+    """Call `step` at each tick, first of all; then `jump_m` says how far the position jumped with it, and
+    `shift_m` how far in all since it was last sure for a while."""
+
+    def __init__(self, params: MissionParams) -> None:
+        self._params = params
+        self._doubt = DebounceTimer()
+        self._sure = DebounceTimer()
+        self._look = DebounceTimer()
+        self._last: tuple[float, float] | None = None
+        self._moved = False
+        self._doubted_ns: int | None = None
+        self.jump_m = (0.0, 0.0)
+        self._shift = (0.0, 0.0)
+
+    @property
+    def shift_m(self) -> float:
+        """How far off the position was when the doubt began, as far as it is known by now."""
+        return math.hypot(*self._shift)
+
+    @property
+    def jumped(self) -> bool:
+        """The position is another one with this tick."""
+        return self.jump_m != (0.0, 0.0)
+
+    def step(self, s: MissionInputs, phase: Phase, phase_s: float) -> set[Trigger]:
+        """The triggers of a position doubted, sure again, or not found in time."""
+        p = self._params
+        self._watch_jumps(s)
+        sure = s.pose is not None and s.pose.integrity >= p.integrity_min
+        doubt_s = self._doubt.step(s.pose is not None and not sure, s.now_ns)
+        sure_s = self._sure.step(sure, s.now_ns)
+        if phase is not Phase.RELOCATE:
+            patience_s = p.first_look_s if phase is Phase.ACQUIRE else p.doubt_s
+            if sure_s > p.settled_s and not self._moved:
+                self._doubted_ns = None
+                self._shift = (0.0, 0.0)
+            doubted = (
+                self._moved or min(doubt_s, phase_s if phase is Phase.ACQUIRE else math.inf) > patience_s
+            )
+            return {Trigger.POSITION_DOUBTED} if doubted else set()
+        self._moved = False
+        self._doubted_ns = self._doubted_ns or s.now_ns
+        if sure_s > p.settled_s and phase_s > p.settled_s:
+            return {Trigger.POSITION_SURE}
+        lost = (s.now_ns - self._doubted_ns) * 1e-9 > p.relocate_s
+        return {Trigger.POSITION_UNKNOWN} if lost else set()
+
+    def next_look(self, s: MissionInputs, anchor: tuple[float, float]) -> tuple[float, float]:
+        """Where to look from: the same place for a while, then along a way that is safe."""
+        if self._look.step(True, s.now_ns) > self._params.relocate_look_s and s.way_out is not None:
+            self._look = DebounceTimer()
+            return anchor[0] + s.way_out[0], anchor[1] + s.way_out[1]
+        return anchor
+
+    def begin(self) -> None:
+        """A new look begins."""
+        self._look = DebounceTimer()
+
+    def height_m(self, flown_m: float) -> float:
+        """The height to look from: above what is flown now, more of the floor is in view.  Wherever it is, it
+        stays below the ceiling and below the keep-outs that begin above what is flown now."""
+        p = self._params
+        above = (height_m for height_m in p.overhead_m if height_m >= flown_m)
+        return max(flown_m, min(flown_m + p.relocate_climb_m, p.ceiling_m, *above))
+
+    def _watch_jumps(self, s: MissionInputs) -> None:
+        self.jump_m = (0.0, 0.0)
+        if s.pose is None:  # a new flight begins on its pad, wherever the last one was believed to end
+            self._last = None
+            return
+        at = s.pose.x_m, s.pose.y_m
+        if self._last is not None:
+            dx, dy = at[0] - self._last[0], at[1] - self._last[1]
+            if max(abs(dx), abs(dy)) > _JUMP_M + _SPEED_SHARE * self._params.speed_mps * s.dt_s:
+                self.jump_m = (dx, dy)
+                self._shift = (self._shift[0] + dx, self._shift[1] + dy)
+                self._moved = s.height_m > self._params.steer_above_m
+        self._last = at

@@ -1,0 +1,1 @@
+"""Which nodes, in what order, by which legs, in how many seconds."""

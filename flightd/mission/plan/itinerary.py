@@ -1,0 +1,153 @@
+"""The stops of a mission: what is done, what is flown to, what is left for another battery.  Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flightd.core.types import EventLevel, GridPose
+from flightd.mission.event_log import EventLog
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop, make_plan
+from flightd.site.site import Site
+from flightd.site.ways import NoWayError
+
+
+class Itinerary:
+    """The stops in order, re-planned on the way; says to `events` what became of an order or a doubt."""
+
+    def __init__(self, site: Site, plan: FlightPlan, policy: HeadingPolicy, events: EventLog) -> None:
+        self._site = site
+        self._home = plan.home
+        self._policy = policy
+        self._events = events
+        self._stops: list[Stop] = list(plan.stops)
+        self._next = 0
+        self._left_over: tuple[str, ...] = ()
+        self.stand = (plan.start, plan.start_yaw_rad)
+        """The node on which the drone stands before it flies, and its heading there."""
+        self.visited: list[str] = []
+        self.returning = False
+        """On the way to a pad: nothing on it is visited."""
+
+    @property
+    def goal(self) -> Stop:
+        """The stop flown to or hovered at."""
+        return self._stops[min(self._next, len(self._stops) - 1)]
+
+    @property
+    def is_last(self) -> bool:
+        """No stop follows the goal."""
+        return self._next + 1 >= len(self._stops)
+
+    @property
+    def next_stop(self) -> Stop:
+        """The stop after the goal, which must not be the last one."""
+        return self._stops[self._next + 1]
+
+    @property
+    def ahead(self) -> tuple[str, ...]:
+        """The nodes to visit after the goal, in order."""
+        return tuple(stop.node for stop in self._stops[self._next + 1 :] if stop.visit)
+
+    @property
+    def left_over(self) -> tuple[str, ...]:
+        """What the way home leaves unvisited."""
+        return self._left_over
+
+    @property
+    def remaining(self) -> tuple[str, ...]:
+        """The stops that this mission still wants to visit, in order."""
+        ahead = (stop.node for stop in self._stops[self._next :] if stop.visit)
+        return self._left_over or tuple(ahead)
+
+    def advance(self, stop: Stop) -> None:
+        """Go on to the next stop, flown as `stop` says."""
+        self._next += 1
+        self._stops[self._next] = stop
+
+    def note_visit(self, now_ns: int) -> None:
+        """The goal was visited, if it was a wanted one; a stop on the way home is none of them."""
+        if self.goal.visit and not self.returning:
+            self.visited.append(self.goal.node)
+            self._events.tell(now_ns, EventLevel.INFO, "visited", self.goal.node)
+
+    def leave(self, nodes: Sequence[str]) -> None:
+        """Visit these later, on another battery."""
+        self._left_over = tuple(nodes)
+
+    def turn_home(self, now_ns: int, reason: str, *, in_need: bool, pad: str | None = None) -> None:
+        """Fly to the home pad or another; `in_need` by the shortest way, against one-way lines too."""
+        self._left_over = self.remaining
+        self.returning = True
+        self._events.tell(now_ns, EventLevel.WARNING, "home", reason)
+        self._replan([], in_need=in_need, home=pad)
+
+    def go_to(self, now_ns: int, node: str) -> None:
+        """Fly over `node` home, as ordered; an order that cannot be followed changes nothing."""
+        if self.returning:
+            why = f"goto {node} refused: on the way home"
+        elif node not in self._site.nodes:
+            why = f"no node {node!r} on site {self._site.name}"
+        else:
+            try:
+                self._replan([node])
+            except NoWayError as err:
+                why = f"goto {node} refused: {err}"
+            else:
+                return
+        self._events.tell(now_ns, EventLevel.WARNING, "command", why)
+
+    def rejoin(self, now_ns: int, pose: GridPose) -> None:
+        """From where the drone turned out to be: over the nearest node along open lines to the goal."""
+        goal = self.goal
+        self._events.tell(now_ns, EventLevel.INFO, "position", f"sure again: {pose.node}")
+        node = self._site.nodes[pose.node]
+        if node.id == goal.node:
+            return
+        way = make_plan(
+            self._site, [goal.node], node.id, goal.node, self._policy, pose.yaw_rad, in_need=True
+        ).stops[:-1]
+        first = Stop(node.id, node.x_m, node.y_m, way[0].yaw_rad, False)
+        self._stops[self._next : self._next + 1] = [first, *way[:-1], goal]
+
+    def recount(self, now_ns: int, due: Sequence[str]) -> None:
+        """Put nodes whose count was withdrawn before what is left, near as they are; they are left for the
+        next battery where the way leads home already."""
+        if not due:
+            return
+        if not self.returning:
+            nodes = [*due, *(stop.node for stop in self._stops[self._next :] if stop.visit)]
+            try:
+                rest = make_plan(self._site, nodes, due[0], self._home, self._policy, self.goal.yaw_rad)
+            except NoWayError as err:
+                self._events.tell(now_ns, EventLevel.WARNING, "recount", f"{', '.join(due)} left out: {err}")
+                return
+            self._stops[self._next :] = rest.stops
+        else:
+            self._left_over = (*due, *self._left_over)
+        self.visited = [node for node in self.visited if node not in due]
+        self._events.tell(now_ns, EventLevel.WARNING, "recount", f"{', '.join(due)} to visit again")
+
+    def resume_from_pad(self, now_ns: int) -> None:
+        """Stand on the pad that was flown to, with what was left over ahead."""
+        pad = self.goal
+        self.stand = (pad.node, pad.yaw_rad)
+        rest = make_plan(self._site, self._left_over, pad.node, self._home, self._policy, pad.yaw_rad)
+        self._stops, self._next = list(rest.stops), 0
+        self.returning = False
+        text = f"{len(self._left_over)} stops left; change the battery on the pad at {pad.node}"
+        self._events.tell(now_ns, EventLevel.WARNING, "swap", text)
+        self._left_over = ()
+
+    def _replan(self, visits: list[str], *, in_need: bool = False, home: str | None = None) -> None:
+        """Finish the present leg, then fly over `visits` home.  NoWayError leaves everything as it is."""
+        here = self.goal
+        onward = make_plan(
+            self._site,
+            visits,
+            here.node,
+            home or self._home,
+            self._policy,
+            here.yaw_rad,
+            in_need=in_need,
+        )
+        self._stops[self._next + 1 :] = onward.stops

@@ -1,0 +1,191 @@
+"""What the mission's senses say of hazards: which of them hold now, each after its own time.  Pure."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from flightd.core.types import VehicleState
+from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.mission.safety.hazards import Action, triggers_of
+from flightd.mission.safety.view_monitor import FloorViewMonitor
+from flightd.mission.triggers import Trigger
+
+_HEARTBEAT_S = 2.0
+"""A heartbeat comes each second; older than this, modes and arming are those of the past."""
+_GIVE_UP_S = 60.0
+"""A vehicle that nobody heard for so long while it should land is not waited for."""
+_TICK_S = 0.06
+_GAP_S = 0.5
+_NEWS_S = 1.0
+"""Something that was replaced is news for so long."""
+_JUMPED = 3
+"""So many attitudes with a senseless time are no stray datagram."""
+
+_HOLDING = triggers_of(Action.HOLD)
+_Conditions: TypeAlias = dict[Trigger, tuple[bool, float]]
+"""Whether each hazard's condition holds now, and for how long it is borne."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightContext:
+    """What the mission is at: in the air, paused, on or stopped on a leg along the map's x axis (None: on no
+    leg), holding, high enough that lines are to be seen."""
+
+    airborne: bool
+    paused: bool
+    leg_along_x: bool | None
+    holds: bool = False
+    at_height: bool = True
+
+
+class DebounceTimer:
+    """For how long something has held without a break."""
+
+    def __init__(self) -> None:
+        self._since_ns: int | None = None
+
+    def step(self, condition: bool, now_ns: int) -> float:
+        """Seconds for which `condition` has held; 0 while it does not."""
+        if not condition:
+            self._since_ns = None
+            return 0.0
+        if self._since_ns is None:
+            self._since_ns = now_ns
+        return (now_ns - self._since_ns) * 1e-9
+
+
+class Counted:
+    """Whether a count has lately risen, by at least `step` at once or within the time it is news."""
+
+    def __init__(self, least: int = 1) -> None:
+        self._least = least
+        self._base = 0
+        self._count = 0
+        self._risen_ns: int | None = None
+
+    def step(self, count: int, now_ns: int) -> bool:
+        if count > self._count:
+            self._risen_ns = now_ns
+        elif self._risen_ns is not None and (now_ns - self._risen_ns) * 1e-9 > _NEWS_S:
+            self._risen_ns, self._base = None, count
+        self._count = count
+        return self._risen_ns is not None and count - self._base >= self._least
+
+
+class HazardMonitor:
+    """Call `step` at each tick: the triggers of all hazards that hold, and of lines found again."""
+
+    def __init__(self, params: MissionParams) -> None:
+        self._params = params
+        self._lasting: defaultdict[Trigger, DebounceTimer] = defaultdict(DebounceTimer)
+        self._trouble = DebounceTimer()
+        self._detectors, self._writers, self._stamps = Counted(), Counted(), Counted(_JUMPED)
+        self._seen = DebounceTimer()
+        self.blind = FloorViewMonitor(params)
+        self._unseen_ns: int | None = None
+        self.unseen_s = 0.0
+        """For how long the lines have been lost, glimpses not counted."""
+
+    def step(self, s: MissionInputs, situation: FlightContext) -> set[Trigger]:
+        conditions = self._links(s) | self._daemon(s)
+        found = self._sight(s, situation)
+        if s.vehicle is not None:
+            found |= self._authority(s, s.vehicle) if situation.airborne else set()
+            conditions |= self._vehicle(s, s.vehicle)
+        conditions |= self._pictures(s) | self._place(s)
+        for trigger, (present, borne_s) in conditions.items():
+            holds = present and situation.airborne
+            if self._lasting[trigger].step(holds, s.now_ns) >= borne_s and holds:
+                found.add(trigger)
+        holding = found & (_HOLDING - {Trigger.LINES_LOST})
+        if self._trouble.step(bool(holding), s.now_ns) > self._params.lines_land_s:
+            found.add(Trigger.HAZARD_LASTS)
+        return found - {Trigger.LINES_FOUND} if holding else found
+
+    def ground_lost(self, s: MissionInputs) -> bool:
+        return s.ground_silent_s > self._params.ground_lost_s
+
+    def battery_low(self, s: MissionInputs) -> bool:
+        p = self._params
+        return s.vehicle is not None and p.battery_land_frac <= s.vehicle.battery_frac < p.battery_home_frac
+
+    def _authority(self, s: MissionInputs, v: VehicleState) -> set[Trigger]:
+        silent_s = max(s.telemetry_age_s, (s.now_ns - v.heartbeat_ns) * 1e-9 - _HEARTBEAT_S)
+        if silent_s >= self._params.telemetry_hold_s:
+            return set()
+        if not v.armed:
+            return {Trigger.DISARMED}
+        return set() if v.in_control else {Trigger.PILOT_TOOK}  # silence is no pilot: a lost link is lost
+
+    def _vehicle(self, s: MissionInputs, v: VehicleState) -> _Conditions:
+        p, h = self._params, self._params.hazards
+        heartbeat_s = (s.now_ns - v.heartbeat_ns) * 1e-9
+        jumped = self._stamps.step(v.stamps_refused, s.now_ns) or s.dt_s > _GAP_S
+        return {
+            Trigger.HEARTBEAT_LOST: (heartbeat_s > h.heartbeat_land_s, 0.0),
+            Trigger.BATTERY_CRITICAL: (v.battery_frac < p.battery_land_frac, 0.0),
+            Trigger.BATTERY_LOW: (self.battery_low(s), 0.0),
+            Trigger.CLOCK_JUMP: (jumped, 0.0),
+        }
+
+    def _links(self, s: MissionInputs) -> _Conditions:
+        p = self._params
+        age_s = s.telemetry_age_s
+        beat_s = math.inf if s.vehicle is None else (s.now_ns - s.vehicle.heartbeat_ns) * 1e-9
+        return {
+            Trigger.TELEMETRY_STALE: (age_s > p.telemetry_hold_s, 0.0),
+            Trigger.TELEMETRY_LOST: (age_s > p.telemetry_land_s, 0.0),
+            Trigger.VANISHED: (max(age_s, beat_s) > p.telemetry_land_s, _GIVE_UP_S),
+            Trigger.HEIGHT_LOST: (math.isnan(s.height_m), p.telemetry_land_s),
+        }
+
+    def _daemon(self, s: MissionInputs) -> _Conditions:
+        h, w, health = self._params.hazards, s.warnings, s.warnings.health
+        slow = health.latency_p99_s > h.latency_s or w.tick_s > _TICK_S
+        return {
+            Trigger.OVERLOAD: (slow, h.overload_s),
+            Trigger.RECORD_LOST: (bool(health.recorder_error), 0.0),
+            Trigger.DETECTOR_LOST: (self._detectors.step(health.detectors_replaced, s.now_ns), 0.0),
+            Trigger.RECORDER_DEAD: (self._writers.step(health.recorder_restarts, s.now_ns), 0.0),
+        }
+
+    def _pictures(self, s: MissionInputs) -> _Conditions:
+        borne_s, w = self._params.lines_hold_s, s.warnings
+        return {
+            Trigger.CAMERA_FROZEN: (w.frozen_s > borne_s, 0.0),
+            Trigger.CAMERA_BLIND: (w.blank_s > borne_s, 0.0),
+            Trigger.FRAMES_STALE: (w.picture_age_s > borne_s, 0.0),
+        }
+
+    def _place(self, s: MissionInputs) -> _Conditions:
+        h, w = self._params.hazards, s.warnings
+        return {
+            Trigger.HEIGHT_WRONG: (abs(w.height_share - 1.0) > h.height_share, h.disagree_s),
+            Trigger.ATTITUDE_WRONG: (abs(w.heading_error_rad) > h.heading_rad, h.disagree_s),
+            Trigger.WIND: (w.push_mps2 > h.push_mps2 or w.off_m > h.off_m, h.push_s),
+            Trigger.CEILING_LEFT: (w.headroom_m < 0.0, h.outside_s),
+            Trigger.CORRIDOR_LEFT: (w.outside_m > 0.0, h.outside_s),
+        }
+
+    def _sight(self, s: MissionInputs, situation: FlightContext) -> set[Trigger]:
+        """Lines lost and found; on a leg the line that is followed must be seen, whatever else is.  The time
+        without lines runs on through short glimpses: only lines that stay for a while end it."""
+        p = self._params
+        lost = min(s.x_age_s, s.y_age_s) > p.lines_hold_s or not s.localised
+        self.blind.step(s, situation.leg_along_x)
+        borne_s = p.lines_hold_s if situation.holds else p.followed_hold_s
+        lost = lost or self.blind.unseen_s > borne_s
+        seen_s = self._seen.step(not lost, s.now_ns)
+        if seen_s > p.lines_found_s or not situation.at_height:
+            self._unseen_ns = None
+        elif lost and self._unseen_ns is None:
+            self._unseen_ns = s.now_ns
+        self.unseen_s = 0.0 if self._unseen_ns is None else (s.now_ns - self._unseen_ns) * 1e-9
+        if lost and (self.unseen_s > p.lines_land_s or self.blind.too_long):
+            return {Trigger.LINES_LOST, Trigger.LINES_LOST_LONG}
+        if lost:
+            return {Trigger.LINES_LOST}
+        return {Trigger.LINES_FOUND} if seen_s > p.lines_hold_s and not situation.paused else set()

@@ -1,0 +1,303 @@
+"""Every hazard in one table: how it is found, what is done, where that is flown.
+
+The transition table takes its safety rows from here, README prints it, and a test flies each row.
+Keys in backticks are those of the configuration.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from flightd.core.types import Phase
+from flightd.mission.triggers import Trigger
+
+
+class Action(enum.StrEnum):
+    """What answers a hazard, the strongest first."""
+
+    HANDS_OFF = "hands off"
+    STOP = "stop"
+    """Level at this very tick, down at once, no steering, no waiting."""
+    LAND = "land"
+    """Brake, settle, descend; by the lines while they are seen."""
+    HOLD = "hold"
+    """Stop where it is and wait; land when it lasts."""
+    RELOCATE = "relocate"
+    """Stop and find out where it is; land when that lasts."""
+    HOME = "home"
+    CONFIGURED = "as configured"
+    REPORT = "report"
+    """What failed is replaced; the flight goes on."""
+    LIMIT = "limit"
+
+
+PHASE_OF = {
+    Action.HANDS_OFF: Phase.PILOT,
+    Action.STOP: Phase.LAND,
+    Action.LAND: Phase.LAND,
+    Action.HOLD: Phase.HOLD,
+    Action.RELOCATE: Phase.RELOCATE,
+}
+"""The phase into which an action takes a flying mission."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hazard:
+    """One row.  `trigger` is what tells the mission (None: answered below it), `test` where it is flown; the
+    shipped scenario that makes it happen bears its `name`."""
+
+    name: str
+    trigger: Trigger | None
+    found_by: str
+    action: Action
+    then: str
+    test: str
+
+
+_FAST = "tests/sim/test_hazards.py"
+_HOLD = "brake, hold; on when it is over; land after `mission.lines_land_s`"
+_BLIND = (
+    "brake by dead reckoning and sink to `hazards.blind_m` at once; up and on when it is over; land after"
+    " `hazards.blind_land_s`"
+)
+
+HAZARDS: tuple[Hazard, ...] = (
+    Hazard(
+        "pilot",
+        Trigger.PILOT_TOOK,
+        "the autopilot is in a mode that was not asked for",
+        Action.HANDS_OFF,
+        "silence at once, for good",
+        _FAST,
+    ),
+    Hazard(
+        "stop",
+        Trigger.STOP,
+        "an operator's stop",
+        Action.STOP,
+        "level at this tick and down at once, without steering, whatever else holds",
+        _FAST,
+    ),
+    Hazard(
+        "telemetry_stale",
+        Trigger.TELEMETRY_STALE,
+        "newest attitude older than `mission.telemetry_hold_s`",
+        Action.HOLD,
+        "brake by the pictures, with the attitude that was asked for; level without them; no climb; never"
+        " taken for a pilot",
+        _FAST,
+    ),
+    Hazard(
+        "telemetry_lost",
+        Trigger.TELEMETRY_LOST,
+        "newest attitude older than `mission.telemetry_land_s`",
+        Action.LAND,
+        "braked or level as before, the autopilot's own landing is asked for; given up 60 s later",
+        _FAST,
+    ),
+    Hazard(
+        "heartbeat_lost",
+        Trigger.HEARTBEAT_LOST,
+        "no heartbeat for `hazards.heartbeat_land_s`, whatever else arrives",
+        Action.LAND,
+        "modes and arming are those of the past",
+        _FAST,
+    ),
+    Hazard(
+        "height_lost",
+        Trigger.HEIGHT_LOST,
+        "no range finder sample for a second, and then for `mission.telemetry_land_s`",
+        Action.LAND,
+        "no climb from the first; then down",
+        _FAST,
+    ),
+    Hazard(
+        "height_wrong",
+        Trigger.HEIGHT_WRONG,
+        "width of the seen lines against the map's by more than `hazards.height_share` for"
+        " `hazards.disagree_s`",
+        Action.HOLD,
+        "no climb by it; land after `mission.lines_land_s`",
+        _FAST,
+    ),
+    Hazard(
+        "attitude_wrong",
+        Trigger.ATTITUDE_WRONG,
+        "heading by the lines against the vehicle's by more than `hazards.heading_deg` for"
+        " `hazards.disagree_s`",
+        Action.LAND,
+        "the heading is taken from the lines; land by them",
+        _FAST,
+    ),
+    Hazard(
+        "battery_low",
+        Trigger.BATTERY_LOW,
+        "charge below `mission.battery_home`, or what flying took so far, times the time of the way back, and"
+        " `battery.reserve` left",
+        Action.HOME,
+        "fly to the nearest charge pad, against one-way lines when below",
+        _FAST,
+    ),
+    Hazard(
+        "battery_critical",
+        Trigger.BATTERY_CRITICAL,
+        "charge below `mission.battery_land`",
+        Action.LAND,
+        "land here",
+        _FAST,
+    ),
+    Hazard(
+        "wind",
+        Trigger.WIND,
+        "a steady push of more than `hazards.push_mps2`, or off its place by `hazards.off_m`, for"
+        " `hazards.push_s`",
+        Action.LAND,
+        "land by the lines",
+        _FAST,
+    ),
+    Hazard(
+        "ceiling_left",
+        Trigger.CEILING_LEFT,
+        "height above the ceiling less `hazards.headroom_m`",
+        Action.LAND,
+        "no setpoint climbs there; down",
+        _FAST,
+    ),
+    Hazard(
+        "corridor_left",
+        Trigger.CORRIDOR_LEFT,
+        "position further than `hazards.corridor_m` from the lines of the map, seen or reckoned, as long"
+        " as it is known to 0.3 m",
+        Action.HOLD,
+        "no setpoint leans further out; back to the nearest line, land after `mission.lines_land_s`",
+        _FAST,
+    ),
+    Hazard(
+        "ground_lost",
+        Trigger.GROUND_LOST,
+        "the last ground station that attends silent for `ground.lost_s`",
+        Action.CONFIGURED,
+        "`ground.lost_action`: continue, hold, home or land",
+        _FAST,
+    ),
+    Hazard(
+        "lines_lost",
+        Trigger.LINES_LOST,
+        "no line of the map newer than `mission.lines_hold_s`, the followed one older than 0.8 s, or the"
+        " position too uncertain",
+        Action.HOLD,
+        "brake by dead reckoning, hold; after `hazards.search_s` climb by `hazards.search_climb_m` to see"
+        " more; land after `hazards.search_land_s`, or with glimpses after `mission.lines_land_s`",
+        _FAST,
+    ),
+    Hazard(
+        "camera_frozen",
+        Trigger.CAMERA_FROZEN,
+        "the same picture for `mission.lines_hold_s`; a repeated one is never used",
+        Action.HOLD,
+        _BLIND,
+        _FAST,
+    ),
+    Hazard(
+        "camera_blind",
+        Trigger.CAMERA_BLIND,
+        "black, white or flat pictures for `mission.lines_hold_s`",
+        Action.HOLD,
+        _BLIND,
+        _FAST,
+    ),
+    Hazard(
+        "frames_stale",
+        Trigger.FRAMES_STALE,
+        "newest picture exposed more than `mission.lines_hold_s` ago",
+        Action.HOLD,
+        _BLIND + "; the camera is opened again",
+        _FAST,
+    ),
+    Hazard(
+        "camera_gone",
+        Trigger.FRAMES_STALE,
+        "no picture at all: as stale ones",
+        Action.HOLD,
+        _BLIND + "; the camera is opened again",
+        _FAST,
+    ),
+    Hazard(
+        "detector_killed",
+        Trigger.DETECTOR_LOST,
+        "the detector's pipe closes",
+        Action.REPORT,
+        "replaced at once, the frame counted as lost; all of them gone is as stale pictures",
+        _FAST,
+    ),
+    Hazard(
+        "detector_hung",
+        Trigger.DETECTOR_LOST,
+        "no answer within `vision.timeout_s`",
+        Action.REPORT,
+        "killed and replaced, the frame counted as lost",
+        _FAST,
+    ),
+    Hazard(
+        "overload",
+        Trigger.OVERLOAD,
+        "p99 from exposure to the wire, dropped frames included, above `hazards.latency_s`, or ticks late on"
+        " average by more than 40 ms, for `hazards.overload_s`",
+        Action.HOLD,
+        _HOLD,
+        _FAST,
+    ),
+    Hazard(
+        "clock_jump",
+        Trigger.CLOCK_JUMP,
+        "attitudes whose time makes no sense, or a tick half a second late",
+        Action.HOLD,
+        "times of arrival are used; on when the clocks agree again; wall time decides nothing",
+        _FAST,
+    ),
+    Hazard(
+        "map_wrong",
+        Trigger.POSITION_DOUBTED,
+        "probability of the node below `mission.integrity_min` for 0.3 s (3 s after take-off), or the"
+        " position turned out to be another",
+        Action.RELOCATE,
+        "stop, climb up to 1 m to see more, move along the line to where the possible places differ; on from"
+        " the right node when sure; land after `mission.relocate_s`; no node counts as visited meanwhile",
+        "tests/sim/test_carried.py",
+    ),
+    Hazard(
+        "disk_full",
+        Trigger.RECORD_LOST,
+        "the disk refuses the flight log",
+        Action.CONFIGURED,
+        "`hazards.record_lost`: continue, hold, home or land",
+        _FAST,
+    ),
+    Hazard(
+        "recorder_dead",
+        Trigger.RECORDER_DEAD,
+        "the log's writing process ends",
+        Action.REPORT,
+        "another goes on in the same file",
+        _FAST,
+    ),
+)
+
+ACTIONS = {row.trigger: row.action for row in HAZARDS if row.trigger is not None}
+"""What each hazard's trigger asks for."""
+
+
+def triggers_of(*actions: Action) -> frozenset[Trigger]:
+    """The hazards' triggers that are answered by one of `actions`."""
+    return frozenset(trigger for trigger, action in ACTIONS.items() if action in actions)
+
+
+def markdown() -> str:
+    """The table as README prints it."""
+    lines = ["| hazard | scenario | found by | action | then |", "|---|---|---|---|---|"]
+    lines += [
+        f"| {row.name.replace('_', ' ')} | `{row.name}` | {row.found_by} | {row.action} | {row.then} |"
+        for row in HAZARDS
+    ]
+    return "\n".join(lines) + "\n"

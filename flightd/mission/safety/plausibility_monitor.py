@@ -1,0 +1,106 @@
+"""How far what is sensed can be believed: sources held against each other, bounds against the map.  Pure."""
+
+from __future__ import annotations
+
+import math
+
+from flightd.core.types import GridPose, Health
+from flightd.mission.guidance import Guidance, Guide, MissionParams, Warnings
+from flightd.site.corridor import Corridor
+from flightd.site.site import Site
+from flightd.tracking.frame_monitor import FrameMonitor
+from flightd.tracking.line_tracker import LineTracker, TrackSet
+
+_TICK_MEMORY_S = 1.0
+_PUSH_MEMORY_S = 2.0
+_FRESH_NS = 250_000_000
+_KNOWN_M = 0.3
+"""A position less certain than this (standard deviation) cannot tell whether the corridor is left."""
+
+
+class PlausibilityMonitor:
+    """Call `step` at each tick for the warnings, `steered` with what the mission then wanted."""
+
+    def __init__(self, site: Site, params: MissionParams) -> None:
+        self._params = params
+        self._hazards = params.hazards
+        self._ceiling_m = site.ceiling_m - params.hazards.headroom_m
+        self._corridor = Corridor(site, params.hazards.corridor_m)
+        self._tick_s = 0.02
+        self._off_m = 0.0
+        self._doubt = False
+        self.push_mps2 = (0.0, 0.0)
+        """The mean push of the last seconds in which lines were seen, map axes."""
+
+    def step(
+        self,
+        now_ns: int,
+        dt_s: float,
+        pose: GridPose | None,
+        height_m: float,
+        tracks: TrackSet | None,
+        tracker: LineTracker,
+        pictures: FrameMonitor,
+        health: Health,
+    ) -> Warnings:
+        self._tick_s += min(dt_s / _TICK_MEMORY_S, 1.0) * (dt_s - self._tick_s)
+        share = tracker.height_share if height_m > self._params.steer_above_m else 1.0
+        self._doubt = abs(share - 1.0) > self._hazards.height_share
+        if tracks is not None and now_ns - tracks.lines_ns < _FRESH_NS:
+            part = min(dt_s / _PUSH_MEMORY_S, 1.0)
+            x, y = self.push_mps2
+            self.push_mps2 = x + part * (tracks.push_x_mps2 - x), y + part * (tracks.push_y_mps2 - y)
+        outside_m, line_m = 0.0, (0.0, 0.0)
+        if pose is not None:
+            near = self._corridor.nearest(pose.x_m, pose.y_m)
+            line_m = (near.x_m, near.y_m)
+            if _tells_side(pose, line_m):
+                outside_m = max(near.distance_m - self._corridor.half_width_m, 0.0)
+        return Warnings(
+            picture_age_s=pictures.age_s(now_ns),
+            frozen_s=pictures.frozen_s(now_ns),
+            blank_s=pictures.blank_s(now_ns),
+            heading_error_rad=tracker.heading_error_rad,
+            height_share=share,
+            push_mps2=math.hypot(*self.push_mps2),
+            off_m=self._off_m,
+            headroom_m=self._ceiling_m - height_m,
+            outside_m=outside_m,
+            line_m=line_m,
+            tick_s=self._tick_s,
+            health=health,
+        )
+
+    def steered(self, guidance: Guidance, pose: GridPose | None) -> None:
+        """What the mission made of it: how far the drone is from where it should be."""
+        self._off_m = 0.0
+        if guidance.guide is Guide.STEER and pose is not None:
+            reference = guidance.reference
+            self._off_m = math.hypot(reference.x_m - pose.x_m, reference.y_m - pose.y_m)
+
+    def height_m(self, told_m: float) -> float:
+        """The height by which to climb: NaN while the lines contradict it."""
+        return math.nan if self._doubt else told_m
+
+    def back(self, pose: GridPose | None, line_m: tuple[float, float]) -> tuple[float, float] | None:
+        """The way back into the corridor, (forward, right) of the body; None inside it, and where the
+        position is too uncertain to tell the side of the line, whose nearest point is `line_m`."""
+        if pose is None or not _tells_side(pose, line_m):
+            return None
+        back = self._corridor.back(pose.x_m, pose.y_m, pose.vx_mps, pose.vy_mps)
+        if back is None:
+            return None
+        cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+        return cos * back[0] + sin * back[1], -sin * back[0] + cos * back[1]
+
+
+def _tells_side(pose: GridPose, line_m: tuple[float, float]) -> bool:
+    return _across_sigma_m(pose, line_m) < _KNOWN_M
+
+
+def _across_sigma_m(pose: GridPose, line_m: tuple[float, float]) -> float:
+    """Standard deviation of the position towards the nearest line."""
+    dx, dy = line_m[0] - pose.x_m, line_m[1] - pose.y_m
+    square = dx * dx + dy * dy
+    xx, xy, yy = pose.covariance[0], pose.covariance[1], pose.covariance[4]
+    return math.sqrt(max(dx * dx * xx + 2.0 * dx * dy * xy + dy * dy * yy, 0.0) / square) if square else 0.0

@@ -1,0 +1,155 @@
+"""The scan of one node: view after view until each location there has its one state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from flightd.core.scanning import BodyPose, Finding, Light, Occupancy
+from flightd.mission.scan.code_assignment import PlacedRead, ShelfLook
+from flightd.mission.scan.location_votes import LocationVerdict, LocationVotes
+from flightd.mission.scan.views import ScanParams, View, ViewPlanner
+
+_SAME_EXPOSURE = 0.01
+
+
+class ScanTask:
+    """Pure state machine.  Fly to `view`, `begin` there, `take` what the pictures show, `step` until the
+    view is over; then `view` is the next one, None when nothing is left.  `drain` gives new findings.
+
+    With `relights` other exposures are tried; it turns false where the camera does not follow."""
+
+    def __init__(
+        self,
+        node: str,
+        views: Sequence[View],
+        planner: ViewPlanner,
+        params: ScanParams,
+        relights: bool = True,
+    ) -> None:
+        self.node = node
+        self.relights = relights
+        self._views = list(views)
+        self._planner = planner
+        self._params = params
+        self._open: dict[str, LocationVotes] = {
+            code: LocationVotes(params.pictures) for view in views for code in view.locations
+        }
+        self._begun_ns: int | None = None
+        self._relit = False
+        self._followed = self._unfollowed = 0
+        self._findings: list[Finding] = []
+
+    @property
+    def view(self) -> View | None:
+        """Where to look from now."""
+        return self._views[0] if self._views else None
+
+    @property
+    def since_ns(self) -> int | None:
+        """Pictures exposed from then on count, None while the view is not reached."""
+        return self._begun_ns
+
+    @property
+    def looking(self) -> tuple[str, ...]:
+        """The locations that pictures are wanted of now."""
+        view = self.view
+        if view is None or self._begun_ns is None:
+            return ()
+        return self._left(view)
+
+    def begin(self, now_ns: int) -> None:
+        """The view is reached and the drone at rest."""
+        self._begun_ns = now_ns
+        self._followed = self._unfollowed = 0
+
+    def take(self, look: ShelfLook) -> None:
+        """One picture; those exposed on the way to the view tell nothing."""
+        view = self.view
+        if view is None or self._begun_ns is None or look.pose.stamp_ns < self._begun_ns:
+            return
+        if not math.isclose(look.exposure, view.exposure, rel_tol=_SAME_EXPOSURE):
+            self._unfollowed += 1
+            return
+        self._followed += 1
+        places = {place.location: place for place in look.places}
+        reads: dict[str, list[PlacedRead]] = {}
+        for placed in look.reads:
+            reads.setdefault(placed.location, []).append(placed)
+        doubtful = {placed.likeliest for placed in look.reads if not placed.location}
+        for code in self._left(view):
+            place, own = places.get(code), reads.get(code, [])
+            if place is not None and code in doubtful:  # somebody's code: not an empty place
+                place = replace(place, occupancy=Occupancy.GOODS, light=Light.FAIR)
+            self._open[code].add(look.frame_seq, look.pose, place, own)
+            self._settle(code, final=False)
+
+    def step(self, now_ns: int) -> bool:
+        """True when the view is over; the next one, or another look at what is left of it, comes first."""
+        view = self.view
+        if view is None:
+            return True
+        if self._begun_ns is None:
+            return False
+        left = self._left(view)
+        waiting = any(not self._open[code].told for code in left)
+        if waiting and (now_ns - self._begun_ns) * 1e-9 < self._params.view_s:
+            return False
+        self._begun_ns = None
+        again = self._again(view, left)
+        if again is not None:
+            self._views[0] = again
+            return True
+        self._relit = False
+        for code in left:
+            self._settle(code, final=True)
+            self._open.pop(code, None)
+        self._views.pop(0)
+        return True
+
+    def _again(self, view: View, left: Sequence[str]) -> View | None:
+        """Another look at what is left of a view: once with another exposure, then from other places."""
+        lights = {code: self._open[code].light for code in left}
+        if view.exposure != 1.0 and self._unfollowed and not self._followed:
+            self.relights = False
+        if self.relights and not self._relit:
+            relit = self._planner.relit(view, lights)
+            self._relit = relit is not None
+            if relit is not None:
+                return relit
+        if not (self.relights and Light.FAIR in lights.values()):
+            view = replace(view, exposure=1.0)
+        return self._planner.retake(view, left)
+
+    def drain(self) -> tuple[Finding, ...]:
+        """The locations decided since the last call."""
+        found, self._findings = tuple(self._findings), []
+        return found
+
+    def _left(self, view: View) -> tuple[str, ...]:
+        return tuple(code for code in view.locations if code in self._open)
+
+    def _settle(self, code: str, final: bool) -> None:
+        verdict = self._open[code].verdict(final)
+        if verdict is not None:
+            del self._open[code]
+            self._findings.append(_finding(code, self.node, verdict))
+
+
+def _finding(location: str, node: str, verdict: LocationVerdict) -> Finding:
+    """A verdict as a message, with the time and place of its last look."""
+    pose: BodyPose = verdict.pose
+    return Finding(
+        stamp_ns=pose.stamp_ns,
+        location=location,
+        state=verdict.state,
+        confidence=round(verdict.confidence, 4),
+        reads=verdict.reads,
+        evidence=verdict.evidence,
+        node=node,
+        x_m=pose.x_m,
+        y_m=pose.y_m,
+        height_m=pose.height_m,
+        yaw_rad=pose.yaw_rad,
+    )

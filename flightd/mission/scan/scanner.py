@@ -1,0 +1,266 @@
+"""Scanning over a whole flight: which nodes still have locations to count, and which findings are proven.
+
+What is found at a node stays pending until the drone's place is proven: by a location label read there, or
+by arriving at `confirm_stops` further nodes without a doubt.  On a doubt nothing more is assigned; where it
+ends elsewhere or not at all, or a label contradicts the place, everything pending is withdrawn, so that
+nothing is ever booked on a wrong location; its locations are left to count, and its node is due again.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, field
+
+from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
+from flightd.core.types import Event, EventLevel
+from flightd.mission.plan.leg_times import Pace
+from flightd.mission.scan.code_assignment import Assigner, FrontSight, Sighting
+from flightd.mission.scan.node_scan import ScanTask
+from flightd.mission.scan.views import ScanParams, View, ViewPlanner, views_s
+from flightd.site.site import Site
+
+_BLIND_NODES = 3
+"""Scans in a row without a single picture after which the reader is taken to be dead."""
+_SAME_OFF_M = 0.3
+"""A label seen so near to where it was found to hang wrong still hangs there."""
+
+
+@dataclass(slots=True)
+class _Pending:
+    """What was found at one node and is not proven; `stops` counts the nodes reached since."""
+
+    node: str
+    locations: list[str] = field(default_factory=list)
+    stops: int = 0
+
+
+class Scanner:
+    """The scan phase of a flight, for the mission to ask and for pictures to be given to."""
+
+    def __init__(self, site: Site, sight: FrontSight, params: ScanParams) -> None:
+        self._params = params
+        self._assigner = Assigner(site, sight, params.least_probability)
+        self._planner = ViewPlanner(site, sight, self._assigner, params)
+        self._planned = frozenset(site.locations)
+        self._done: set[str] = set()
+        self._tasks: dict[str, ScanTask] = {}
+        self._task: ScanTask | None = None
+        self._pending: list[_Pending] = []
+        self._found: list[Finding] = []
+        self._settled: list[Settled] = []
+        self._events: list[Event] = []
+        self._sightings: list[Sighting] = []
+        self._accused: dict[str, float] = {}
+        self._overruled: dict[str, float] = {}
+        self._strangers: set[str] = set()
+        self._begun = self._begun_blind = 0
+        self._due: list[str] = []
+        self._again: Counter[str] = Counter()
+        self._relights = True
+        self.doubted = False
+
+    # What the mission asks
+
+    @property
+    def least_integrity(self) -> float:
+        """The integrity from which a place counts as certain."""
+        return self._params.least_integrity
+
+    @property
+    def view(self) -> View | None:
+        """Where to look from now, None when the present node has nothing left."""
+        return self._task.view if self._task else None
+
+    @property
+    def exposure(self) -> float:
+        """What the front camera's pictures are wanted with, as a part of its usual exposure."""
+        return self.view.exposure if self.view is not None else 1.0
+
+    @property
+    def blind(self) -> str:
+        """Why the count is none, or an empty text: no picture was read at the last nodes, nor is it yet."""
+        if not self._begun or self._begun_blind < min(_BLIND_NODES, self._begun):
+            return ""
+        return f"no picture of a shelf was read at the last {self._begun_blind} of {self._begun} scans"
+
+    def wants(self, node: str) -> bool:
+        """Whether locations of a node are left to count."""
+        return not self.doubted and bool(self._left(node))
+
+    def stop_s(self, node: str, pace: Pace) -> float:
+        """How long the count of what is left at a node takes, each view looked from once; 0 where nothing
+        is to be counted."""
+        if not self.wants(node):
+            return 0.0
+        views = self._planner.views(node, self._left(node), pace.height_m, 0.0)
+        return views_s(views, pace, self._params.view_s)
+
+    def skip(self, locations: Iterable[str]) -> None:
+        """These need no look any more: an earlier flight of the same count has booked them."""
+        self._done.update(self._planned.intersection(locations))
+
+    def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:
+        """Begin or continue the scan of a node that is reached."""
+        self.leave()
+        views = self._planner.views(node, self._left(node), height_m, yaw_rad)
+        self._task = ScanTask(node, views, self._planner, self._params, self._relights)
+        self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
+        if not self._pending or self._pending[-1].node != node:
+            self._pending.append(_Pending(node))
+
+    def begin(self, now_ns: int) -> None:
+        """The view is reached and the drone at rest."""
+        if self._task is not None:
+            self._task.begin(now_ns)
+
+    def step(self, now_ns: int) -> bool:
+        """True when the view is over; `view` is then the next one."""
+        over = self._task is None or self._task.step(now_ns)
+        if self._task is not None and self._relights and not self._task.relights:
+            self._relights = False
+            told = "the front camera does not follow a wanted exposure: what is lit wrongly stays unreadable"
+            self._events.append(Event(now_ns, EventLevel.WARNING, "exposure_fixed", told))
+        self._gather()
+        return over
+
+    def leave(self) -> None:
+        """The node is left; what was not decided there stays to count."""
+        self._gather()
+        self._task = None
+
+    def reached(self, node: str, certain: bool) -> None:
+        """A node is reached: earlier findings are the surer for it, if the place is `certain`."""
+        if not certain or self.doubted:
+            return
+        for pending in self._pending:
+            pending.stops += pending.node != node
+        self._confirm([p for p in self._pending if p.stops >= self._params.confirm_stops])
+
+    def home(self, certain: bool) -> None:
+        """The flight has come back to its pad over known lines: everything is where it should be."""
+        if certain and not self.doubted:
+            self._confirm(self._pending)
+
+    def doubt(self) -> None:
+        """The place may be another one: assign nothing, and keep what is pending, until `trust`."""
+        self.leave()
+        self.doubted = True
+
+    def withdraw(self, now_ns: int, reason: str) -> None:
+        """The place was or may have been another one: what is pending counts no more."""
+        self.leave()
+        codes = [code for pending in self._pending for code in pending.locations]
+        if codes:
+            self._settled.append(Settled(tuple(codes), confirmed=False))
+            self._done.difference_update(codes)
+        self._due += [p.node for p in self._pending if p.locations and p.node not in self._due]
+        self._pending.clear()
+        if codes or (self._accused and not self.doubted):
+            text = f"{reason}; {len(codes)} findings withdrawn"
+            self._events.append(Event(now_ns, EventLevel.WARNING, "map_contradiction", text))
+
+    def trust(self) -> None:
+        """The place is known again; labels that still contradict it hang wrong."""
+        self.doubted = False
+        self._overruled |= self._accused
+        self._accused.clear()
+
+    def take_due(self) -> tuple[str, ...]:
+        """The nodes to fly to once more, their findings having been withdrawn, in the order of their first
+        visit; each at most `revisits` times in a flight."""
+        due = [node for node in self._due if self._again[node] < self._params.revisits]
+        self._again.update(due)
+        self._due.clear()
+        return tuple(due)
+
+    # What pictures bring
+
+    @property
+    def looking(self) -> bool:
+        """Whether the front camera's pictures are wanted now."""
+        return self._task is not None and bool(self._task.looking)
+
+    def places(self, pose: BodyPose) -> tuple[Place, ...]:
+        """The places wanted in a picture taken at `pose`; none for one that would not count."""
+        task = self._task
+        if task is None or task.since_ns is None or pose.stamp_ns < task.since_ns or not pose.certain:
+            return ()
+        return self._assigner.places(pose, task.looking)
+
+    def take(self, codes: CodeSet, pose: BodyPose) -> None:
+        """One picture and the pose at its exposure."""
+        view = self.view
+        if self._task is None or view is None or self.doubted:
+            return
+        look = self._assigner.look(codes, pose, (view.aisle, view.side))
+        self._sightings += look.sightings
+        for text in look.strangers:
+            if text not in self._strangers:
+                self._strangers.add(text)
+                told = f"label {text}, seen from {self._task.node}, is not on the map: not counted as stock"
+                self._events.append(Event(pose.stamp_ns, EventLevel.WARNING, "unknown_location", told))
+        against = [seen for seen in look.sightings if seen.contradicts and not self._is_overruled(seen)]
+        if against:
+            self._accused = {seen.location: seen.off_m for seen in against}
+            text = f"label {against[0].location} seen {against[0].off_m:+.2f} m from its place"
+            self.withdraw(pose.stamp_ns, f"at {self._task.node}: {text}")
+            self.doubted = True
+            return
+        self._begun_blind = 0
+        self._task.take(look)
+        self._gather()
+        agreeing = [seen.location for seen in look.sightings if not seen.contradicts]
+        for location in agreeing:
+            self._overruled.pop(location, None)
+        if agreeing:
+            self._confirm([p for p in self._pending if p.node == self._task.node])
+
+    # What goes out
+
+    def drain(self) -> tuple[tuple[Finding, ...], tuple[Settled, ...]]:
+        """New findings, and what has become of earlier ones."""
+        found, self._found = tuple(self._found), []
+        settled, self._settled = tuple(self._settled), []
+        return found, settled
+
+    def drain_events(self) -> list[Event]:
+        events, self._events = self._events, []
+        return events
+
+    def drain_sightings(self) -> tuple[Sighting, ...]:
+        """Location labels seen, for the localiser."""
+        sightings, self._sightings = tuple(self._sightings), []
+        return sightings
+
+    def _is_overruled(self, seen: Sighting) -> bool:
+        """Whether this label has contradicted in the same way before, and the place proved right."""
+        known_m = self._overruled.get(seen.location)
+        return known_m is not None and abs(known_m - seen.off_m) < _SAME_OFF_M
+
+    def _left(self, node: str) -> frozenset[str]:
+        return frozenset(self._planner.locations(node)) - self._done
+
+    def _gather(self) -> None:
+        if self._task is None:
+            return
+        for found in self._task.drain():
+            self._found.append(found)
+            self._done.add(found.location)
+            self._pending[-1].locations.append(found.location)
+
+    def _confirm(self, proven: list[_Pending]) -> None:
+        codes = [code for pending in proven for code in pending.locations]
+        if codes:
+            self._settled.append(Settled(tuple(codes), confirmed=True))
+        for pending in proven:
+            pending.locations.clear()
+        present = self._task.node if self._task else ""
+        self._pending = [p for p in self._pending if p.locations or p.node == present]
+
+
+def nodes_to_count(site: Site, nodes: Iterable[str], counted: Collection[str]) -> tuple[str, ...]:
+    """Those of some nodes that a flight which goes on with a count must still visit, in their order: the
+    ones with a location that is not `counted`."""
+    left = {location.node for location in site.locations.values() if location.code not in counted}
+    return tuple(node for node in nodes if node in left)

@@ -1,0 +1,104 @@
+"""Look at a flight's recorded pictures again with today's detector and compare what is seen.
+
+The pictures were compressed after the daemon looked at them, so lines move by a little even where
+nothing changed; a line that comes or goes is a change of behaviour.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+
+from flightd.core.geometry import wrap_half_pi
+from flightd.core.topics import RecordedFrame, Topic
+from flightd.core.types import Image, Line, LineSet
+from flightd.replay.log import LogReader, read_log
+
+Detect: TypeAlias = Callable[[Image, int, int], LineSet]
+"""Picture, frame number and stamp to lines."""
+
+_GATE_PX = 20.0
+_GATE_RAD = math.radians(5.0)
+"""Lines farther apart than this are not the same."""
+
+_CHANGED = 0.02
+"""Share of lines at the edge of being seen, which the compression may tip over."""
+
+
+@dataclass(frozen=True, slots=True)
+class PerceptionDrift:
+    """`gone` lines were recorded and are not found again, `new` ones the other way round; the rest are
+    pairs, whose differences are told as 95th percentile and largest (0 without pairs)."""
+
+    pictures: int
+    pairs: int
+    gone: int
+    new: int
+    rho_p95_px: float
+    rho_max_px: float
+    theta_p95_deg: float
+    theta_max_deg: float
+
+    def within(self, tolerance_px: float) -> bool:
+        """Whether lines moved by no more than `tolerance_px` (95 of 100) and hardly any came or went."""
+        return self.gone + self.new <= _CHANGED * max(self.pairs, 1) and self.rho_p95_px <= tolerance_px
+
+
+def replay_pictures(path: Path, detect: Detect) -> PerceptionDrift:
+    """Run `detect` on every recorded picture whose lines were recorded too.  InputError as `read_log`."""
+    recorded = {lines.frame_seq: lines for lines in read_log(path, {Topic.LINES}).messages(LineSet)}
+    pictures = gone = new = 0
+    differences: list[tuple[float, float]] = []
+    for entry in LogReader(path).entries({Topic.FRAME}):
+        picture = entry.message
+        before = recorded.get(picture.seq) if isinstance(picture, RecordedFrame) else None
+        if before is None or not isinstance(picture, RecordedFrame):
+            continue
+        image = (
+            cv2.imdecode(np.frombuffer(picture.jpeg, np.uint8), cv2.IMREAD_COLOR) if picture.jpeg else None
+        )
+        if image is None or (image.shape[1], image.shape[0]) != (before.width_px, before.height_px):
+            continue
+        after = detect(image.astype(np.uint8, copy=False), picture.seq, picture.stamp_ns)
+        pairs = _pairs(before.lines, after.lines)
+        pictures += 1
+        gone += len(before.lines) - len(pairs)
+        new += len(after.lines) - len(pairs)
+        differences += pairs
+    rho_px, theta_rad = np.array(differences, np.float64).reshape(-1, 2).T
+    return PerceptionDrift(
+        pictures, len(differences), gone, new, *_spread(rho_px), *_spread(np.degrees(theta_rad))
+    )
+
+
+def _spread(values: np.ndarray) -> tuple[float, float]:
+    if not len(values):
+        return 0.0, 0.0
+    return float(np.percentile(values, 95)), float(values.max())
+
+
+def _pairs(before: Iterable[Line], after: Iterable[Line]) -> list[tuple[float, float]]:
+    """|difference| in rho and theta of the lines that are the same, nearest first."""
+    rest = list(after)
+    pairs = []
+    for line in before:
+        apart = [_apart(line, other) for other in rest]
+        near = [i for i, (rho, theta) in enumerate(apart) if rho < _GATE_PX and theta < _GATE_RAD]
+        if near:
+            nearest = min(near, key=lambda i: apart[i][0])
+            pairs.append(apart[nearest])
+            del rest[nearest]
+    return pairs
+
+
+def _apart(a: Line, b: Line) -> tuple[float, float]:
+    """|difference| in rho (px, in the middle of the picture) and theta (rad); theta is modulo pi."""
+    flipped = abs(a.theta_rad - b.theta_rad) > math.pi / 2
+    rho = abs(a.rho_px + b.rho_px) if flipped else abs(a.rho_px - b.rho_px)
+    return rho, abs(wrap_half_pi(a.theta_rad - b.theta_rad))

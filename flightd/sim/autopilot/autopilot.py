@@ -1,0 +1,362 @@
+"""What every simulated autopilot does, whatever its firmware: clock, steps, link, telemetry, truth."""
+
+from __future__ import annotations
+
+import abc
+import asyncio
+import math
+from dataclasses import dataclass, field
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.ports import Clock
+from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
+from flightd.sim.autopilot.link import Address, Channel, Message, UdpLink
+from flightd.sim.autopilot.parameters import ParameterServer
+from flightd.sim.autopilot.radio import PERFECT, RadioParams
+from flightd.sim.autopilot.telemetry import DATA_STREAMS, Instruments
+from flightd.sim.plant.airframe import Airframe, AirframeCommand
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.truth_history import TruthHistory
+from flightd.sim.sensors.instruments import SensorParams, Sensors
+
+HEARTBEAT_ID = dialect.MAVLINK_MSG_ID_HEARTBEAT
+
+_NS_PER_MS = 1_000_000
+_TICK_NS = 10 * _NS_PER_MS
+_HEARTBEAT_NS = 1_000 * _NS_PER_MS
+_TIMESYNC_NS = 10_000 * _NS_PER_MS
+_TRUTH_EVERY = 2
+_TRUTH_SAMPLES = 1000
+_CATCH_UP_NS = 2_000 * _NS_PER_MS
+"""A process that slept longer than this goes on from now instead of simulating what it missed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sticks:
+    """The pilot's wishes in the modes he flies himself: angles, yaw rate and climb rate."""
+
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    yaw_rate_radps: float = 0.0
+    climb_mps: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PeerConfig:
+    """Where the autopilot listens and how it starts.
+
+    `remotes` are addresses it talks to unasked (a companion that only listens).  `ready_s` after boot
+    it can be armed (a real one takes about 20 s).  Its boot clock runs `clock_ppm` fast.
+    It has no estimate of its position unless `has_position`.  `radio` lies between it and the companion.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 0
+    remotes: tuple[Address, ...] = ()
+    system_id: int = 1
+    ready_s: float = 3.0
+    has_position: bool = False
+    step_ns: int = 2_500_000
+    clock_ppm: float = 20.0
+    sensors: SensorParams = field(default_factory=SensorParams)
+    seed: int = 0
+    signing_key: bytes | None = None
+    radio: RadioParams = PERFECT
+    parameters: dict[str, float] = field(default_factory=dict)
+
+
+class AutopilotPeer(abc.ABC):
+    """An autopilot with its airframe on the running loop's time.
+
+    Steps are `step_ns` apart on the loop's clock; whoever asks (a timer, a datagram, the renderer) brings
+    it up to the present first, so the flight does not depend on who asks when.
+    """
+
+    takes_keys = False
+    """Whether SETUP_SIGNING is obeyed (on the ground)."""
+
+    pilots_mode: int
+    """The mode into which a pilot's switch takes it: he flies, it keeps the height."""
+
+    landing_mode: int
+
+    def __init__(
+        self, clock: Clock, airframe: Airframe, config: PeerConfig, parameters: ParameterServer
+    ) -> None:
+        self.airframe = airframe
+        self.sensors = Sensors(config.sensors, config.seed)
+        self.instruments = Instruments(airframe, self.sensors)
+        self.parameters = parameters
+        self.link = UdpLink(
+            config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self._received, config.signing_key, config.seed
+        )
+        self.link.down.params = self.link.up.params = config.radio
+        self._config = config
+        self._clock = clock
+        self._now_ns = self._boot_ns = clock.now_ns()
+        self._heartbeat_due_ns = self._now_ns
+        self._timesync_due_ns = self._now_ns + _TIMESYNC_NS
+        self._steps = 0
+        self._truth = TruthHistory(_TRUTH_SAMPLES)
+        self._truth.add(airframe.kinematics(self._now_ns))
+        self._address: Address | None = None
+        self.armed = False
+        self.landed = True
+        self.sticks = Sticks()
+        self.arming_block = ""
+        """A sensor fault: the reason with which arming is refused while it is not empty."""
+        self._climb_loop = ClimbLoop(ClimbGains(hover_guess=airframe.params.hover_collective))
+        self._stick_yaw_rad = 0.0
+
+    async def open(self) -> Address:
+        """Bind the socket and greet the remotes; the address bound.  OSError when the port is taken."""
+        if self._address is None:
+            self._address = await self.link.open(self._config.host, self._config.port)
+            for remote in self._config.remotes:
+                self.link.channel(remote)
+        return self._address
+
+    async def run(self) -> None:
+        """Serve until cancelled."""
+        await self.open()
+        try:
+            while True:
+                now_ns = self._clock.now_ns()
+                self.advance(now_ns)
+                self._stream(now_ns)
+                await asyncio.sleep(max(0, self._next_due_ns(now_ns) - self._clock.now_ns()) / 1e9)
+        finally:
+            self.link.close()
+            self._address = None
+
+    def advance(self, now_ns: int) -> None:
+        """Step the vehicle up to `now_ns`."""
+        step_ns = self._config.step_ns
+        if now_ns - self._now_ns > _CATCH_UP_NS:
+            self._now_ns = now_ns - step_ns
+        dt_s = step_ns / 1e9
+        while self._now_ns + step_ns <= now_ns:
+            self._now_ns += step_ns
+            self.airframe.step(dt_s, self._control(dt_s))
+            self.sensors.update(dt_s, self.airframe)
+            self._steps += 1
+            if self._steps % _TRUTH_EVERY == 0:
+                self._truth.add(self.airframe.kinematics(self._now_ns))
+
+    def truth(self) -> Kinematics:
+        """The true motion now."""
+        return self.truth_at(self._clock.now_ns())
+
+    def truth_at(self, stamp_ns: int) -> Kinematics:
+        """The true motion at a moment of the last seconds, of the loop's clock."""
+        self.advance(min(stamp_ns, self._clock.now_ns()))
+        return self._truth.at(stamp_ns)
+
+    def pilot_mode(self, custom_mode: int, sticks: Sticks | None = None) -> bool:
+        """The pilot moves his mode switch; False when the autopilot refuses."""
+        self.advance(self._clock.now_ns())
+        self.sticks = sticks or Sticks()
+        return self._set_mode(custom_mode) == int(dialect.MAV_RESULT_ACCEPTED)
+
+    def pilot_arm(self) -> bool:
+        """The pilot's arming switch; False when the autopilot refuses."""
+        self.advance(self._clock.now_ns())
+        return self._arm() == int(dialect.MAV_RESULT_ACCEPTED)
+
+    def pilot_disarm(self) -> None:
+        """The pilot's disarm switch: motors stop at once, wherever the vehicle is."""
+        self.advance(self._clock.now_ns())
+        self._disarm()
+
+    def say(self, severity: int, text: str) -> None:
+        """STATUSTEXT to everyone."""
+        self.link.broadcast(
+            dialect.MAVLink_statustext_message(severity, text.encode("ascii", "replace")[:50])
+        )
+
+    def jump_clock(self, jump_ns: int) -> None:
+        """The boot clock goes on from elsewhere; streams keep their rates."""
+        self._boot_ns -= jump_ns
+        self.instruments.clock_changed()
+
+    def reboot(self) -> None:
+        """Power cycle: the boot clock starts again, streams are forgotten, motors stop."""
+        self._boot_ns = self._now_ns
+        self.instruments.clock_changed()
+        for channel in self.link.channels.values():
+            channel.intervals_ns.clear()
+            channel.due_ns.clear()
+
+    @property
+    def up_s(self) -> float:
+        """Seconds since boot by the autopilot's own clock."""
+        return self._boot_clock_ns(self._now_ns) / 1e9
+
+    @property
+    def is_ready(self) -> bool:
+        return self.up_s >= self._config.ready_s
+
+    @abc.abstractmethod
+    def _control(self, dt_s: float) -> AirframeCommand:
+        """One pass of the flight code: what the airframe shall do during the next step."""
+
+    @abc.abstractmethod
+    def _heartbeat(self) -> Message: ...
+
+    @abc.abstractmethod
+    def _command(self, command: int, params: tuple[float, ...]) -> int:
+        """Obey a command of this firmware's own; the MAV_RESULT."""
+
+    @abc.abstractmethod
+    def _set_mode(self, custom_mode: int) -> int:
+        """Change the mode on a client's wish; the MAV_RESULT."""
+
+    def _mode_of(self, params: tuple[float, ...]) -> int:
+        """custom_mode in the parameters of DO_SET_MODE."""
+        return _whole(params[1])
+
+    @abc.abstractmethod
+    def _arm(self) -> int:
+        """Arm if nothing is against it; the MAV_RESULT."""
+
+    @abc.abstractmethod
+    def _disarm(self) -> None:
+        """Stop the motors."""
+
+    @abc.abstractmethod
+    def _setpoint(self, message: Message) -> None:
+        """Take a SET_ATTITUDE_TARGET that is addressed to this system."""
+
+    def _hold_climb(self, dt_s: float, climb_mps: float) -> float:
+        """The collective by which the autopilot's own height loop keeps a climb rate."""
+        sensors = self.sensors
+        return self._climb_loop.step(
+            dt_s,
+            climb_mps,
+            height_m=sensors.height_m,
+            speed_mps=sensors.climb_mps,
+            tilt_cos=math.cos(sensors.roll_rad) * math.cos(sensors.pitch_rad),
+        )
+
+    def _fly(
+        self, roll_rad: float, pitch_rad: float, yaw_rad: float, yaw_rate_radps: float, collective: float
+    ) -> AirframeCommand:
+        """Attitude in the autopilot's own estimate to the airframe's truth."""
+        sensors = self.sensors
+        return AirframeCommand(
+            motors=True,
+            roll_rad=roll_rad - sensors.roll_error_rad,
+            pitch_rad=pitch_rad - sensors.pitch_error_rad,
+            yaw_rad=yaw_rad - sensors.yaw_error_rad,
+            yaw_rate_radps=yaw_rate_radps,
+            collective=collective,
+        )
+
+    def _boot_clock_ns(self, now_ns: int) -> int:
+        elapsed_ns = now_ns - self._boot_ns
+        return elapsed_ns + round(elapsed_ns * self._config.clock_ppm * 1e-6)
+
+    def _stream(self, now_ns: int) -> None:
+        self._refresh(now_ns)
+        if now_ns >= self._heartbeat_due_ns:
+            self._heartbeat_due_ns = max(self._heartbeat_due_ns + _HEARTBEAT_NS, now_ns)
+            for channel in self.link.channels.values():
+                if HEARTBEAT_ID not in channel.intervals_ns:
+                    self.link.send(channel, self._heartbeat())
+        if now_ns >= self._timesync_due_ns:
+            self._timesync_due_ns += _TIMESYNC_NS
+            self.link.broadcast(dialect.MAVLink_timesync_message(0, self._boot_clock_ns(now_ns)))
+        for channel in self.link.channels.values():
+            for message_id, due_ns in channel.due_ns.items():
+                if now_ns >= due_ns:
+                    period_ns = channel.intervals_ns[message_id]
+                    missed = (now_ns - due_ns) // period_ns
+                    channel.due_ns[message_id] = due_ns + (1 + missed) * period_ns
+                    self.link.send(channel, self._message(message_id))
+
+    def _refresh(self, now_ns: int) -> None:
+        self.instruments.boot_ms = self._boot_clock_ns(now_ns) // _NS_PER_MS
+        self.instruments.healthy = self.is_ready
+
+    def _message(self, message_id: int) -> Message:
+        return self._heartbeat() if message_id == HEARTBEAT_ID else self.instruments.message(message_id)
+
+    def _next_due_ns(self, now_ns: int) -> int:
+        due_ns = now_ns + _TICK_NS
+        for channel in self.link.channels.values():
+            due_ns = min(due_ns, *channel.due_ns.values()) if channel.due_ns else due_ns
+        return max(due_ns, now_ns + self._config.step_ns)
+
+    def _received(self, channel: Channel, message: Message) -> None:
+        now_ns = self._clock.now_ns()
+        self.advance(now_ns)
+        target = getattr(message, "target_system", 0)
+        if target not in {0, self._config.system_id}:
+            return
+        match message.get_type():
+            case "COMMAND_LONG":
+                self._answer(channel, message, now_ns)
+            case "SET_ATTITUDE_TARGET":
+                self._setpoint(message)
+            case "SET_MODE":
+                self._set_mode(message.custom_mode)
+            case "TIMESYNC" if message.tc1 == 0:
+                stamp_ns = self._boot_clock_ns(now_ns)
+                self.link.send(channel, dialect.MAVLink_timesync_message(stamp_ns, message.ts1))
+            case "REQUEST_DATA_STREAM":
+                self._data_stream(channel, message, now_ns)
+            case "SETUP_SIGNING" if self.takes_keys and not self.armed:
+                self.link.sign(bytes(message.secret_key), message.initial_timestamp)
+            case "PARAM_REQUEST_READ" | "PARAM_REQUEST_LIST" | "PARAM_SET":
+                self.parameters.answer(message, lambda reply: self.link.send(channel, reply))
+            case _:
+                pass
+
+    def _answer(self, channel: Channel, message: Message, now_ns: int) -> None:
+        params = tuple(float(getattr(message, f"param{i}")) for i in range(1, 8))
+        match message.command:
+            case dialect.MAV_CMD_SET_MESSAGE_INTERVAL:
+                result = self._set_interval(channel, params[0], params[1], now_ns)
+            case dialect.MAV_CMD_REQUEST_MESSAGE:
+                result = self._request(channel, params[0], now_ns)
+            case dialect.MAV_CMD_DO_SET_MODE:
+                custom = params[0] == params[0] and int(params[0]) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+                result = self._set_mode(self._mode_of(params)) if custom else dialect.MAV_RESULT_DENIED
+            case _:
+                result = self._command(message.command, params)
+        header = message.get_header()
+        ack = dialect.MAVLink_command_ack_message(
+            message.command, result, 0, 0, header.srcSystem, header.srcComponent
+        )
+        self.link.send(channel, ack)
+
+    def _knows(self, message_id: int) -> bool:
+        return message_id == HEARTBEAT_ID or self.instruments.knows(message_id)
+
+    def _set_interval(self, channel: Channel, message_id: float, period_us: float, now_ns: int) -> int:
+        wanted, period = _whole(message_id), _whole(period_us)
+        if not self._knows(wanted):
+            return int(dialect.MAV_RESULT_DENIED)
+        channel.stream(wanted, 0 if period <= 0 else max(period * 1000, self._config.step_ns), now_ns)
+        return int(dialect.MAV_RESULT_ACCEPTED)
+
+    def _request(self, channel: Channel, message_id: float, now_ns: int) -> int:
+        if not self._knows(_whole(message_id)):
+            return int(dialect.MAV_RESULT_FAILED)
+        self._refresh(now_ns)
+        self.link.send(channel, self._message(_whole(message_id)))
+        return int(dialect.MAV_RESULT_ACCEPTED)
+
+    def _data_stream(self, channel: Channel, message: Message, now_ns: int) -> None:
+        rate_hz = message.req_message_rate if message.start_stop else 0
+        period_ns = 1_000_000_000 // rate_hz if rate_hz else 0
+        for stream, message_ids in DATA_STREAMS.items():
+            if message.req_stream_id in {dialect.MAV_DATA_STREAM_ALL, stream}:
+                for message_id in message_ids:
+                    channel.stream(message_id, period_ns, now_ns)
+
+
+def _whole(value: float) -> int:
+    """A command parameter that means a whole number; -1 for what is none."""
+    return int(value) if abs(value) < 2**31 else -1  # NaN compares false

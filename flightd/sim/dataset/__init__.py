@@ -1,0 +1,1 @@
+"""Labelled frames with exact truth at three levels of difficulty."""

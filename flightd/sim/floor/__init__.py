@@ -1,0 +1,1 @@
+"""The painted, worn, lit floor as the down camera sees it."""

@@ -1,0 +1,207 @@
+"""The warehouse floor as pictures: small square tiles of it, painted when first looked at.
+
+A tile is seen from straight above, rows along +y and columns along +x of the map, so that the tile lies
+as the map does.  Colour is worked out as reflectance times light and stored with the sRGB gamma.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightd.core.types import Image
+from flightd.sim.floor.appearance import Appearance
+from flightd.sim.floor.lighting import Lighting
+from flightd.sim.floor.printed_markers import FloorSigns
+from flightd.sim.floor.texture import NoiseField, Patch
+from flightd.sim.floor.wear_marks import FloorMarks
+from flightd.site.site import LineColour, PadSign, PaintedLine, Side, Site
+
+Floats: TypeAlias = NDArray[np.float32]
+Box: TypeAlias = tuple[float, float, float, float]
+
+_PAINT_SRGB = {  # red, green, blue as a camera sees clean floor paint in good light
+    LineColour.YELLOW: (236, 190, 38),
+    LineColour.WHITE: (232, 232, 226),
+    LineColour.RED: (176, 40, 38),
+    LineColour.BLUE: (34, 84, 168),
+}
+_CONCRETE_SRGB = (152, 150, 144)
+_MAT_SRGB = (58, 58, 61)
+_UPRIGHT_SRGB = (40, 62, 110)
+_WOOD_SRGB = (148, 127, 101)
+_BOARD_M = 0.145
+_GAMMA_STEPS = 4096
+
+
+def _linear(srgb: tuple[int, int, int]) -> Floats:
+    """BGR reflectance of an sRGB colour."""
+    share = np.array(srgb[::-1]) / 255.0
+    linear: Floats = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4).astype(
+        np.float32
+    )
+    return linear
+
+
+def _gamma_table() -> Image:
+    share = np.linspace(0.0, 1.0, _GAMMA_STEPS)
+    curve = np.where(share <= 0.0031308, share * 12.92, 1.055 * share ** (1 / 2.4) - 0.055)
+    return np.round(curve * 255.0).astype(np.uint8)
+
+
+class Floor:
+    """Paints patches of one warehouse's floor; the same patch always looks the same."""
+
+    def __init__(
+        self, site: Site, look: Appearance, lighting: Lighting, seed: int, bare: Sequence[Box] = ()
+    ) -> None:
+        """Within the `bare` boxes there is no paint."""
+        self._look = look
+        self._bare = list(bare)
+        self._lighting = lighting
+        self._noise = NoiseField(seed)
+        self._marks = FloorMarks(site, look, seed)
+        self._signs = FloorSigns(site)
+        self._strokes = [_stroke_box(line) for line in site.lines]
+        self._mats = [
+            (x_m - half, y_m - half, x_m + half, y_m + half)
+            for pad in site.pads
+            if pad.sign is PadSign.MAT
+            for (x_m, y_m), half in ((site.pad_centre(pad), pad.size_m / 2),)
+        ]
+        self._uprights, self._pallets = _shelf_feet(site) if look.concrete > 0.0 else ([], [])
+        self._paint = _linear(_PAINT_SRGB[site.line_colour])
+        self._gamma = _gamma_table()
+
+    def paint(self, patch: Patch) -> Image:
+        """(size, size, 3) BGR picture of the patch."""
+        colour = self._concrete(patch)
+        mats = self._cover(patch, self._mats, None)
+        if mats is not None:
+            rubber = 1.0 + 0.12 * self._noise.mix(patch, "mat", {0.004: 1.0, 0.03: 0.6})
+            _lay(colour, _linear(_MAT_SRGB) * rubber[..., None], mats)
+        self._lay_paint(colour, patch, mats)
+        self._signs.lay(colour, patch)
+        shade = self._marks.shade(patch)
+        if mats is not None:  # the mat lies on the marks
+            shade += (1.0 - shade) * mats
+        colour *= shade[..., None]
+        self._lay_shelf_feet(colour, patch)
+        colour *= self._lighting.on(patch)[..., None]
+        np.clip(colour, 0.0, 1.0, out=colour)
+        picture: Image = self._gamma[(colour * np.float32(_GAMMA_STEPS - 1)).astype(np.uint16)]
+        return picture
+
+    def _concrete(self, patch: Patch) -> Floats:
+        strength = np.float32(self._look.concrete)
+        base = np.broadcast_to(_linear(_CONCRETE_SRGB), (patch.size, patch.size, 3)).copy()
+        if strength <= 0.0:
+            return base
+        clouds = self._noise.mix(patch, "clouds", {2.7: 0.13, 1.1: 0.11, 0.43: 0.10, 0.17: 0.08})
+        grain = self._noise.mix(
+            patch, "grain", {0.07: 0.06, 0.028: 0.06, 0.011: 0.08, 0.0045: 0.10, 0.002: 0.10}
+        )
+        tint = self._noise.mix(patch, "tint", {3.1: 0.04, 0.6: 0.02})
+        grit = self._noise.octave(patch, "grit", 0.009)
+        value = 1.0 + strength * (clouds + grain - 0.25 * np.clip(grit - 2.0, 0.0, 1.0))
+        base *= np.clip(value, 0.2, 2.0)[..., None]
+        base[..., 0] *= 1.0 - strength * tint
+        base[..., 2] *= 1.0 + strength * tint
+        return base
+
+    def _lay_shelf_feet(self, colour: Floats, patch: Patch) -> None:
+        wood = self._cover(patch, self._pallets, None)
+        if wood is not None:
+            # boards into the shelf, as pallets are stored: their own tone, dark gaps between, the grain
+            xs = patch.xs() + np.float32(patch.x_m)
+            tone = 0.16 * np.sin(np.floor(xs / _BOARD_M) * 12.9898)
+            gap = np.clip(1.5 - np.abs((xs / _BOARD_M) % 1.0 - 0.5) * _BOARD_M / 0.012, 0.0, 1.0)
+            grain = 0.2 * self._noise.mix(patch, "wood", {0.3: 0.6, 0.05: 0.5, 0.01: 0.5})
+            boards = (1.0 + tone - 0.8 * gap)[None, :] * (1.0 + grain)
+            _lay(colour, _linear(_WOOD_SRGB) * boards[..., None], wood)
+        steel = self._cover(patch, self._uprights, None)
+        if steel is not None:
+            _lay(colour, _linear(_UPRIGHT_SRGB), steel)
+
+    def _lay_paint(self, colour: Floats, patch: Patch, mats: Floats | None) -> None:
+        ragged = None
+        if self._look.ragged_m > 0.0:
+            ragged = self._look.ragged_m * self._noise.mix(patch, "edge", {0.15: 0.5, 0.02: 0.4, 0.006: 0.6})
+        cover = self._cover(patch, self._strokes, ragged)
+        if cover is None:
+            return
+        if self._look.wear > 0.0:
+            rubbed = self._noise.mix(patch, "rubbed", {0.9: 0.5, 0.3: 0.45, 0.09: 0.35})
+            chips = self._noise.mix(patch, "chips", {0.04: 0.35, 0.015: 0.5, 0.006: 0.5, 0.003: 0.4})
+            threshold = _WEAR_AT_NONE - _WEAR_PER_SHARE * self._look.wear
+            gone = np.clip((rubbed + chips - threshold) * 2.5, 0.0, 0.92)
+            if mats is not None:  # the mat is newer than the floor
+                gone *= 1.0 - 0.8 * mats
+            cover *= 1.0 - gone
+        bare = self._cover(patch, self._bare, None)
+        if bare is not None:
+            cover *= 1.0 - bare
+        paint = np.broadcast_to(self._paint, colour.shape).copy()
+        if self._look.dirt > 0.0:
+            film = self._noise.mix(patch, "film", {1.3: 0.3, 0.3: 0.3, 0.07: 0.25, 0.02: 0.2, 0.005: 0.25})
+            grey = np.clip(0.22 + 0.25 * film, 0.0, 0.8) * np.float32(self._look.dirt)
+            paint *= (1.0 - 0.35 * grey)[..., None]
+            paint += (_linear(_CONCRETE_SRGB) * 0.55 - paint) * (0.6 * grey)[..., None]
+        colour += (paint - colour) * cover[..., None]
+
+    def _cover(self, patch: Patch, boxes: list[Box], ragged: Floats | None) -> Floats | None:
+        """Share of each texel inside any of the boxes, their edges moved outward by `ragged` metres;
+        None when no box is near."""
+        cover: Floats | None = None
+        xs, texel = patch.xs(), np.float32(patch.texel_m)
+        margin = 0.02 + patch.texel_m
+        for x0, y0, x1, y1 in boxes:
+            if x1 < patch.x_m - margin or x0 > patch.x_m + patch.side_m + margin:
+                continue
+            if y1 < patch.y_m - margin or y0 > patch.y_m + patch.side_m + margin:
+                continue
+            x = np.minimum(xs - np.float32(x0 - patch.x_m), np.float32(x1 - patch.x_m) - xs)
+            y = np.minimum(xs - np.float32(y0 - patch.y_m), np.float32(y1 - patch.y_m) - xs)
+            inside = np.minimum(x[None, :], y[:, None])
+            if ragged is not None:
+                inside = inside + ragged
+            share = np.clip(inside / texel + np.float32(0.5), 0.0, 1.0)
+            cover = share if cover is None else np.maximum(cover, share)
+        return cover
+
+
+_WEAR_AT_NONE = 2.6
+_WEAR_PER_SHARE = 4.5
+
+
+def _lay(colour: Floats, reflectance: Floats, cover: Floats) -> None:
+    colour += (reflectance - colour) * cover[..., None]
+
+
+def _stroke_box(line: PaintedLine) -> Box:
+    """The painted rectangle; strokes run along x or y, square at the ends given."""
+    half = line.width_m / 2
+    if line.y0_m == line.y1_m:
+        return line.x0_m, line.y0_m - half, line.x1_m, line.y0_m + half
+    return line.x0_m - half, line.y0_m, line.x0_m + half, line.y1_m
+
+
+def _shelf_feet(site: Site) -> tuple[list[Box], list[Box]]:
+    """Foot plates of the uprights and the pallets standing between them, as floor rectangles."""
+    uprights: list[Box] = []
+    pallets: list[Box] = []
+    for shelf in site.shelves:
+        outward = -1.0 if shelf.side is Side.LEFT else 1.0
+        front, back = shelf.y_m, shelf.y_m + outward * 0.12
+        for x_m in np.arange(shelf.x0_m, shelf.x1_m + 0.01, 1.9):
+            left = float(min(x_m, shelf.x1_m - 0.1))
+            uprights.append((left, min(front, back), left + 0.1, max(front, back)))
+            near, far = shelf.y_m + outward * 0.18, shelf.y_m + outward * 0.9
+            for k in range(2):
+                start = left + 0.15 + 0.86 * k
+                if start + 0.8 < shelf.x1_m:
+                    pallets.append((start, min(near, far), start + 0.8, max(near, far)))
+    return uprights, pallets

@@ -1,0 +1,1 @@
+"""How good and how safe a flight was, by the truth."""

@@ -1,0 +1,1 @@
+"""The moving parts: airframe, air, external simulators, and the true motion."""

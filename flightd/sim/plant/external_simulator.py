@@ -1,0 +1,369 @@
+"""An autopilot simulator elsewhere (ArduCopter's or PX4's SITL) as the airframe: its truth link.
+
+The warehouse is laid where the vehicle stands when it is first heard: that place is the pad, and the way
+its nose points is the heading with which the mission starts.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import re
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.geometry import wrap_pi
+from flightd.ports import Clock
+from flightd.sim.autopilot.guided import euler
+from flightd.sim.plant.external_pace import PaceWatch
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.truth_history import TruthHistory
+from flightd.sim.sensors.instruments import SensorParams
+
+Message: TypeAlias = Any
+
+_LOG = logging.getLogger(__name__)
+
+_METRES_PER_DEGREE = 111_319.49
+_WANTED_HZ = 100
+_TRUTH_IDS = (
+    dialect.MAVLINK_MSG_ID_SIM_STATE,
+    dialect.MAVLINK_MSG_ID_SIMSTATE,
+    dialect.MAVLINK_MSG_ID_HIL_STATE_QUATERNION,
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    dialect.MAVLINK_MSG_ID_ATTITUDE,
+)
+_ASK_S = 2.0
+_RANGE_S = 0.04
+_AHEAD_MAX_S = 0.1
+_SAMPLES = 1000
+_WAITING_MAX = 4096
+"""Bytes that may wait for a simulator that does not read; what is said beyond is said again later."""
+_GPS_BLEND = 0.1
+"""Share of each position sample that is believed against the integrated velocity: latitude and longitude
+come in steps of a centimetre."""
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Where on the map the external vehicle stands at the start."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    rest_height_m: float = 0.10
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """Pose and motion in north, east, up and heading of the external simulator."""
+
+    north_m: float
+    east_m: float
+    up_m: float
+    north_mps: float
+    east_mps: float
+    up_mps: float
+    roll_rad: float
+    pitch_rad: float
+    heading_rad: float
+    rates_radps: tuple[float, float, float]
+
+
+class TruthReader:
+    """Folds a simulator's messages into the true motion on the map.
+
+    SIM_STATE (ArduPilot) and HIL_STATE_QUATERNION (PX4) are truth; LOCAL_POSITION_NED with ATTITUDE, the
+    autopilot's own estimate, serves until one of them is heard.  SIMSTATE (older ArduPilot) is true of
+    attitude and place but tells neither height nor velocity: those stay LOCAL_POSITION_NED's.
+    """
+
+    def __init__(self, placement: Placement) -> None:
+        self._placement = placement
+        self._origin: tuple[float, float, float] | None = None
+        self._start: _Motion | None = None
+        self._has_truth = False
+        self._attitude: Message | None = None
+        self._simstate: Message | None = None
+        self._blend: tuple[int, float, float] | None = None
+
+    def take(self, message: Message, now_ns: int) -> Kinematics | None:
+        """The motion that a message tells, stamped with its arrival; None when it tells none."""
+        motion = self._motion(message, now_ns)
+        if motion is None or not all(map(math.isfinite, (motion.north_m, motion.up_m, motion.heading_rad))):
+            return None
+        if self._start is None:
+            self._start = motion
+        return self._on_map(motion, self._start, now_ns)
+
+    def _motion(self, message: Message, now_ns: int) -> _Motion | None:
+        match message.get_type():
+            case "SIM_STATE":
+                if not self._has_truth:
+                    self._start_anew()
+                north, east, up = self._place(message.lat_int, message.lon_int, message.alt)
+                north, east = self._smooth(now_ns, north, east, message.vn, message.ve)
+                attitude = (message.roll, message.pitch, message.yaw)
+                rates = (message.xgyro, message.ygyro, message.zgyro)
+                return _Motion(north, east, up, message.vn, message.ve, -message.vd, *attitude, rates)
+            case "HIL_STATE_QUATERNION":
+                if not self._has_truth:
+                    self._start_anew()
+                vn, ve, vd = message.vx / 100.0, message.vy / 100.0, message.vz / 100.0
+                north, east, up = self._place(message.lat, message.lon, message.alt / 1000.0)
+                north, east = self._smooth(now_ns, north, east, vn, ve)
+                attitude = euler(*message.attitude_quaternion)
+                rates = (message.rollspeed, message.pitchspeed, message.yawspeed)
+                return _Motion(north, east, up, vn, ve, -vd, *attitude, rates)
+            case "SIMSTATE":
+                if self._simstate is None and not self._has_truth:
+                    self._start = None  # as estimated, it was another place
+                self._simstate = message
+            case "ATTITUDE":
+                self._attitude = message
+            case "LOCAL_POSITION_NED" if not self._has_truth and self._simstate is not None:
+                s = self._simstate
+                north, east, _ = self._place(s.lat, s.lng, 0.0)
+                north, east = self._smooth(now_ns, north, east, message.vx, message.vy)
+                motion = (north, east, -message.z, message.vx, message.vy, -message.vz)
+                return _Motion(*motion, s.roll, s.pitch, s.yaw, (s.xgyro, s.ygyro, s.zgyro))
+            case "LOCAL_POSITION_NED" if not self._has_truth and self._attitude is not None:
+                a = self._attitude
+                rates = (a.rollspeed, a.pitchspeed, a.yawspeed)
+                place = (message.x, message.y, -message.z, message.vx, message.vy, -message.vz)
+                return _Motion(*place, a.roll, a.pitch, a.yaw, rates)
+            case _:
+                pass
+        return None
+
+    def _start_anew(self) -> None:
+        """Truth is heard for the first time: what was estimated before is forgotten."""
+        self._has_truth = True
+        self._start = None
+
+    def _place(self, lat_e7: int, lon_e7: int, alt_m: float) -> tuple[float, float, float]:
+        lat, lon = lat_e7 * 1e-7, lon_e7 * 1e-7
+        if self._origin is None:
+            self._origin = (lat, lon, alt_m)
+        lat0, lon0, alt0 = self._origin
+        east_scale = _METRES_PER_DEGREE * math.cos(math.radians(lat0))
+        return (lat - lat0) * _METRES_PER_DEGREE, (lon - lon0) * east_scale, alt_m - alt0
+
+    def _smooth(self, now_ns: int, north: float, east: float, vn: float, ve: float) -> tuple[float, float]:
+        if self._blend is not None:
+            then_ns, north_then, east_then = self._blend
+            dt_s = (now_ns - then_ns) * 1e-9
+            carried_north, carried_east = north_then + vn * dt_s, east_then + ve * dt_s
+            if math.hypot(north - carried_north, east - carried_east) < 1.0:  # else it was moved by hand
+                north = carried_north + _GPS_BLEND * (north - carried_north)
+                east = carried_east + _GPS_BLEND * (east - carried_east)
+        self._blend = (now_ns, north, east)
+        return north, east
+
+    def _on_map(self, motion: _Motion, start: _Motion, now_ns: int) -> Kinematics:
+        placement = self._placement
+        turn = placement.yaw_rad - start.heading_rad
+        cos, sin = math.cos(turn), math.sin(turn)
+        north, east = motion.north_m - start.north_m, motion.east_m - start.east_m
+        return Kinematics(
+            now_ns,
+            placement.x_m + north * cos - east * sin,
+            placement.y_m + north * sin + east * cos,
+            placement.rest_height_m + motion.up_m - start.up_m,
+            motion.north_mps * cos - motion.east_mps * sin,
+            motion.north_mps * sin + motion.east_mps * cos,
+            motion.up_mps,
+            motion.roll_rad,
+            motion.pitch_rad,
+            wrap_pi(motion.heading_rad + turn),
+            *motion.rates_radps,
+        )
+
+
+class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
+    """The truth link to an external simulator over TCP or UDP, in the place of a simulated vehicle.
+
+    `open` waits for the first truth; a lost link is found again, the warehouse staying where it is.  The
+    distance to our floor goes back as DISTANCE_SENSOR, for an autopilot whose range finder is fed so.
+    The truth is that of the first autopilot heard: another vehicle on the same link tells nothing.
+    """
+
+    def __init__(self, url: str, clock: Clock, placement: Placement, patience_s: float = 30.0) -> None:
+        self._url = url
+        self._kind, self._host, self._port = truth_address(url)
+        self._clock = clock
+        self._reader = TruthReader(placement)
+        self._truth = TruthHistory(_SAMPLES)
+        self._patience_s = patience_s
+        self._mav = dialect.MAVLink(None, srcSystem=254, srcComponent=dialect.MAV_COMP_ID_MISSIONPLANNER)
+        self._mav.robust_parsing = True
+        self._transport: Any = None
+        self._peer: tuple[str, int] | None = None
+        self._system_id: int | None = None
+        self._range = SensorParams()
+        self._pace = PaceWatch()
+        self._first = asyncio.Event()
+        self._newest_ns = 0
+        self._line: asyncio.Task[None] | None = None
+
+    async def open(self) -> tuple[str, int]:
+        """Connect and wait until the simulator tells the truth; the address of the link.
+
+        UnavailableError when it does not within the patience.
+        """
+        if self._line is None:
+            self._line = asyncio.create_task(self._hold(), name="external truth")
+        try:
+            async with asyncio.timeout(self._patience_s):
+                await self._first.wait()
+        except TimeoutError:
+            await self._let_go()
+            text = "no simulator tells its true state there: start it, and check the port"
+            raise UnavailableError(f"--truth-url {self._url}: {text}") from None
+        return self._host, self._port
+
+    async def run(self) -> None:
+        """Listen until cancelled."""
+        await self.open()
+        assert self._line is not None
+        try:
+            await self._line
+        finally:
+            await self._let_go()
+
+    def truth(self) -> Kinematics:
+        """The true motion now."""
+        return self.truth_at(self._clock.now_ns())
+
+    def truth_at(self, stamp_ns: int) -> Kinematics:
+        """The true motion at a moment of the last seconds, of the loop's clock; beyond the newest sample it
+        goes on as it was, for a moment."""
+        newest = self._truth.latest()
+        if stamp_ns <= newest.stamp_ns:
+            return self._truth.at(stamp_ns)
+        ahead_s = min((stamp_ns - newest.stamp_ns) * 1e-9, _AHEAD_MAX_S)
+        return replace(
+            newest,
+            stamp_ns=stamp_ns,
+            x_m=newest.x_m + newest.vx_mps * ahead_s,
+            y_m=newest.y_m + newest.vy_mps * ahead_s,
+            height_m=newest.height_m + newest.climb_mps * ahead_s,
+            roll_rad=newest.roll_rad + newest.roll_rate_radps * ahead_s,
+            pitch_rad=newest.pitch_rad + newest.pitch_rate_radps * ahead_s,
+            yaw_rad=wrap_pi(newest.yaw_rad + newest.yaw_rate_radps * ahead_s),
+        )
+
+    async def _let_go(self) -> None:
+        if self._line is not None:
+            self._line.cancel()
+            await asyncio.gather(self._line, return_exceptions=True)
+            self._line = None
+        if self._transport is not None:
+            self._transport.abort()
+            self._transport = None
+
+    async def _hold(self) -> None:
+        while True:
+            if self._transport is None:
+                try:
+                    await self._connect()
+                except OSError:
+                    await asyncio.sleep(_ASK_S / 2)
+                    continue
+            self._ask()
+            for _ in range(round(_ASK_S / _RANGE_S)):
+                self._tell_range()
+                await asyncio.sleep(_RANGE_S)
+
+    async def _connect(self) -> None:
+        loop, place = asyncio.get_running_loop(), (self._host, self._port)
+        if self._kind == "tcp":
+            await loop.create_connection(lambda: self, *place)
+        else:
+            await loop.create_datagram_endpoint(lambda: self, local_addr=place)
+
+    def _tell_range(self) -> None:
+        """What a range finder sees of the floor; nothing out of its reach, as a real one."""
+        if not self._first.is_set():
+            return
+        truth = self.truth()
+        least_m, most_m = self._range.range_min_m, self._range.range_max_m
+        distance_m = truth.height_m / max(math.cos(truth.roll_rad) * math.cos(truth.pitch_rad), 0.1)
+        if least_m <= distance_m <= most_m:
+            limits_cm, distance_cm = (round(least_m * 100), round(most_m * 100)), round(distance_m * 100)
+            kind, down = dialect.MAV_DISTANCE_SENSOR_LASER, dialect.MAV_SENSOR_ROTATION_PITCH_270
+            boot_ms = truth.stamp_ns // 1_000_000 % 2**32
+            self._send(
+                dialect.MAVLink_distance_sensor_message(boot_ms, *limits_cm, distance_cm, kind, 1, down, 0)
+            )
+
+    def _ask(self) -> None:
+        """A heartbeat, and the rates (a rebooted simulator has forgotten them)."""
+        self._send(
+            dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
+        )
+        for message_id in _TRUTH_IDS:
+            params = (message_id, 1e6 / _WANTED_HZ, 0, 0, 0, 0, 0)
+            command = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+            self._send(dialect.MAVLink_command_long_message(1, 1, command, 0, *params))
+
+    def _send(self, message: Message) -> None:
+        if self._transport is None or self._transport.get_write_buffer_size() > _WAITING_MAX:
+            return
+        frame = message.pack(self._mav)
+        self._mav.seq = (self._mav.seq + 1) % 256
+        if self._kind == "tcp":
+            self._transport.write(frame)
+        elif self._peer is not None:
+            self._transport.sendto(frame, self._peer)
+
+    def connection_made(self, transport: Any) -> None:
+        self._transport = transport
+
+    def connection_lost(self, _exc: Exception | None) -> None:
+        self._transport = None
+
+    def _mind_pace(self, boot_ms: int, now_ns: int) -> None:
+        if (pace := self._pace.observe(boot_ms, now_ns)) is not None:
+            _LOG.warning("the simulator runs %.2f times as fast as --speed says: make the two equal", pace)
+
+    def error_received(self, exc: Exception) -> None:
+        """Nobody is there at the moment (ICMP)."""
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:
+        self._peer = (addr[0], addr[1])
+        self._mav.buf, self._mav.buf_index = bytearray(), 0  # a broken datagram must not eat the next one
+        self.data_received(data)
+
+    def _is_vehicle(self, message: Message) -> bool:
+        if message.get_srcComponent() != dialect.MAV_COMP_ID_AUTOPILOT1:
+            return False
+        if self._system_id is None:
+            self._system_id = message.get_srcSystem()
+        return bool(message.get_srcSystem() == self._system_id)
+
+    def data_received(self, data: bytes) -> None:
+        now_ns = self._clock.now_ns()
+        for message in self._mav.parse_buffer(data) or ():
+            if message.get_type().startswith(("BAD_DATA", "UNKNOWN")) or not self._is_vehicle(message):
+                continue
+            if message.get_type() == "ATTITUDE":
+                self._mind_pace(message.time_boot_ms, now_ns)
+            truth = self._reader.take(message, max(now_ns, self._newest_ns + 1))
+            if truth is not None:
+                self._newest_ns = truth.stamp_ns
+                self._truth.add(truth)
+                self._first.set()
+
+
+def truth_address(url: str) -> tuple[str, str, int]:
+    """Kind, host and port of `tcp:HOST:PORT` or `udpin:HOST:PORT`; InputError for anything else."""
+    match = re.fullmatch(r"(tcp|udpin):(?://)?([^\s:]+):(\d{1,5})", url)
+    if match is None or not 0 < int(match[3]) < 65536:
+        forms = "use tcp:HOST:PORT, e.g. tcp:127.0.0.1:5762 (ArduPilot), or udpin:0.0.0.0:14550 (PX4)"
+        raise InputError(f"--truth-url {url!r} is no address: {forms}")
+    return match[1], match[2], int(match[3])

@@ -1,0 +1,1 @@
+"""What a simulated flight is flown in, and what goes wrong."""

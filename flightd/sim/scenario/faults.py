@@ -1,0 +1,206 @@
+"""Faults of a simulated flight, done as the world would do them: to the floor, the air, the vehicle and its
+cameras, never to the daemon.  What concerns the daemon's own processes is told to who started them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flightd.core.errors import InputError
+from flightd.core.topics import Topic
+from flightd.ports import Clock, Recorder
+from flightd.sim.autopilot.autopilot import AutopilotPeer
+from flightd.sim.autopilot.radio import RadioParams
+from flightd.sim.floor.floor import Box
+from flightd.sim.plant.airframe import Airframe
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.wind import Draught, Wind
+from flightd.sim.scenario.fault_schema import (
+    AttitudeBiased,
+    BareFloor,
+    BatteryDrop,
+    CameraFault,
+    CameraLate,
+    CameraTurned,
+    ClockJump,
+    Fault,
+    HeightBiased,
+    HeightLost,
+    LinkFault,
+    VehicleFault,
+    WindChange,
+)
+from flightd.sim.sensors.camera import CameraPeer
+from flightd.site.site import Site
+
+_LOOKS_S = 0.01
+_OFF_FLOOR_M = 0.3
+_HERE_M = 0.4
+
+Told = Callable[[int, bool], None]
+"""Called with a fault's number and whether it begins or ends."""
+
+
+@dataclass(frozen=True, slots=True)
+class FaultNote:
+    """A fault began, or ended; `index` is its place in the scenario."""
+
+    stamp_ns: int
+    index: int
+    kind: str
+    began: bool
+
+
+class FaultSchedule:
+    """When each fault begins and ends, by the simulator's truth.  Pure: call `step` again and again."""
+
+    def __init__(self, faults: Sequence[Fault], site: Site) -> None:
+        """InputError for a node that the site does not have."""
+        self._faults = tuple(faults)
+        self._places = [place_of(fault, site) for fault in faults]
+        self._begun_ns: dict[int, int] = {}
+        self._over: set[int] = set()
+        self._off_ns: int | None = None
+
+    def step(self, now_ns: int, truth: Kinematics) -> list[tuple[int, bool]]:
+        """What begins (True) and ends (False) now, by the faults' numbers."""
+        if self._off_ns is None:
+            if truth.height_m < _OFF_FLOOR_M:
+                return []
+            self._off_ns = now_ns
+        turns: list[tuple[int, bool]] = []
+        for index, fault in enumerate(self._faults):
+            begun_ns = self._begun_ns.get(index)
+            if begun_ns is None:
+                if self._due(fault, self._places[index], (now_ns - self._off_ns) * 1e-9, truth):
+                    self._begun_ns[index] = now_ns
+                    turns.append((index, True))
+            elif index not in self._over and (now_ns - begun_ns) * 1e-9 >= fault.duration_s:
+                self._over.add(index)
+                turns.append((index, False))
+        return turns
+
+    def _due(self, fault: Fault, place: tuple[float, float] | None, up_s: float, truth: Kinematics) -> bool:
+        if place is None:
+            return fault.at_s is not None and up_s >= fault.at_s
+        dx_m, dy_m = abs(truth.x_m - place[0]), abs(truth.y_m - place[1])
+        if isinstance(fault, BareFloor):
+            return max(dx_m, dy_m) < fault.half_m
+        return math.hypot(dx_m, dy_m) < _HERE_M
+
+
+def place_of(fault: Fault, site: Site) -> tuple[float, float] | None:
+    """Where it begins, None for one that begins at a time.  InputError for an unknown node."""
+    if fault.at_node is not None:
+        node = site.nodes.get(fault.at_node)
+        if node is None:
+            raise InputError(f"scenario: fault {fault.kind}: no node {fault.at_node} on site {site.name}")
+        return node.x_m, node.y_m
+    if fault.at_x_m is None or fault.at_y_m is None:
+        return None
+    return fault.at_x_m, fault.at_y_m
+
+
+def bare_boxes(faults: Sequence[Fault], site: Site) -> tuple[Box, ...]:
+    """Where the floor has no paint."""
+    boxes: list[Box] = []
+    for fault in faults:
+        place = place_of(fault, site)
+        if isinstance(fault, BareFloor) and place is not None:
+            (x_m, y_m), half_m = place, fault.half_m
+            boxes.append((x_m - half_m, y_m - half_m, x_m + half_m, y_m + half_m))
+    return tuple(boxes)
+
+
+class WorldFaults:
+    """Does to the peers what the schedule says; records each turn beside the truth."""
+
+    def __init__(
+        self,
+        faults: Sequence[Fault],
+        site: Site,
+        cameras: Mapping[str, CameraPeer],
+        airframe: Airframe,
+        vehicle: object,
+        tell: Told,
+    ) -> None:
+        self._faults = tuple(faults)
+        self._schedule = FaultSchedule(faults, site)
+        self._cameras = cameras
+        self._airframe = airframe
+        self._vehicle = vehicle
+        self._calm = airframe.wind
+        self._tell = tell
+
+    async def run(self, clock: Clock, truth_at: Callable[[int], Kinematics], recorder: Recorder) -> None:
+        """Until cancelled."""
+        while self._faults:
+            now_ns = clock.now_ns()
+            for index, begins in self._schedule.step(now_ns, truth_at(now_ns)):
+                fault = self._faults[index]
+                recorder.record(Topic.FAULT, now_ns, FaultNote(now_ns, index, fault.kind, begins))
+                if fault.by_launcher:
+                    self._tell(index, begins)
+                else:
+                    self.turn(fault, begins)
+            await asyncio.sleep(_LOOKS_S)
+
+    def turn(self, fault: Fault, on: bool) -> None:
+        """Begin or end one fault that is the world's own."""
+        match fault:
+            case CameraFault() | CameraLate() | CameraTurned():
+                self._spoil(fault, on)
+            case BatteryDrop() if on:
+                self._airframe.battery_frac = fault.charge
+            case WindChange():
+                draught = Draught(fault.mean_x_mps, fault.mean_y_mps, fault.gust_mps)
+                self._airframe.wind = Wind(draught, 7) if on else self._calm
+            case _ if isinstance(self._vehicle, AutopilotPeer):
+                _break(self._vehicle, fault, on)
+
+    def _spoil(self, fault: CameraFault | CameraLate | CameraTurned, on: bool) -> None:
+        camera = self._cameras.get("camera" if fault.camera == "down" else "front-camera")
+        if camera is None:
+            return
+        trouble = camera.trouble
+        match fault:
+            case CameraLate():
+                trouble.late_s = fault.delay_s if on else 0.0
+            case CameraTurned():
+                trouble.turn_deg = fault.turn_deg if on else 0.0
+            case CameraFault(kind="camera_frozen"):
+                trouble.frozen = on
+            case CameraFault(kind="camera_gone"):
+                trouble.gone = on
+            case CameraFault():
+                level = 0 if fault.kind == "camera_black" else 255
+                trouble.level = level if on else None
+
+
+def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
+    """What goes wrong in an autopilot, or between it and its companion."""
+    wrong = vehicle.sensors.fault
+    match fault:
+        case LinkFault(kind="telemetry_silent"):
+            vehicle.link.down.params = RadioParams(loss=1.0) if on else vehicle.link.up.params
+        case LinkFault():
+            heartbeat = {dialect.MAVLINK_MSG_ID_HEARTBEAT}
+            vehicle.link.withheld = vehicle.link.withheld | heartbeat if on else set()
+        case AttitudeBiased():
+            angles = math.radians(fault.roll_deg), math.radians(fault.pitch_deg), math.radians(fault.yaw_deg)
+            wrong.roll_rad, wrong.pitch_rad, wrong.yaw_rad = angles if on else (0.0, 0.0, 0.0)
+        case HeightBiased():
+            wrong.range_m = fault.offset_m if on else 0.0
+        case HeightLost():
+            wrong.range_lost = on
+        case ClockJump():
+            vehicle.jump_clock(round(fault.jump_s * 1e9) * (1 if on else -1))
+        case VehicleFault(kind="pilot"):
+            vehicle.pilot_mode(vehicle.pilots_mode if on else vehicle.landing_mode)
+        case VehicleFault() if on:
+            vehicle.reboot()

@@ -1,0 +1,226 @@
+"""Scenarios: what a simulated flight is flown in.  A small typed TOML format; every key may be left out.
+
+[camera]                 # the down camera
+width_px = 640
+height_px = 360
+fps = 30
+capture_delay_s = 0.060  # from mid-exposure to arrival
+jitter_s = 0.003
+exposure_s = 0.004
+
+[front_camera]           # where the site has racks
+width_px = 1280
+height_px = 800
+focal_px = 1000.0
+fps = 4
+exposure_s = 0.002
+capture_delay_s = 0.080
+jitter_s = 0.005
+focus_m = 1.2            # distance that is in focus
+
+[racks]                  # shares of all places; what is left over has one clean label
+empty = 0.12
+tilted = 0.08
+glossy = 0.06
+several = 0.05           # two labels
+torn = 0.03
+too_small = 0.02
+missing = 0.03           # goods without a label
+occluded = 0.03          # a sheet hangs before the goods
+location_labels = true   # each location's code on the beam below it
+seed = 1                 # of the goods; left out: the flight's
+noise = 2.0              # grey levels at mid grey
+exposure = 1.0           # brightness
+
+[floor]
+appearance = "default"   # default, clean, harsh, dim, glossy or worn
+pad_off_m = [0.0, 0.0]   # how far the pads have been pushed from where the map has them, x and y
+
+[wind]
+mean_x_mps = 0.0         # steady draught in the map frame
+mean_y_mps = 0.0
+gust_mps = 0.3           # root mean square of the gusts
+
+[vehicle]
+battery = 1.0            # charge at the start, 0..1
+battery_ah = 5.0         # its capacity; hovering takes 14 A
+swap_s = 30.0            # time in which somebody changes it on the charge pad; 0: nobody does
+start_offset_m = [0.0, 0.0]  # how far from the pad it really stands at the start, x and y
+start_yaw_deg = 0.0      # how far it is turned from the heading in which it should stand, + to the right
+
+[[fault]]                # any number of them; the kinds and their keys are in `fault_spec`
+kind = "camera_frozen"
+at_x_m = 2.2             # or at_node = "A2", or at_s = 12.0 after take-off
+at_y_m = 0.0
+duration_s = 3.0         # left out: to the end
+
+[expect]                 # what `--scenario all` holds the flight to
+hazard = "camera_frozen" # as in `mission.hazards`
+found_s = 0.5            # after the first fault began; without faults after take-off
+ends = "landed"          # completed, home, landed, handed over
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from flightd.config.section import Section
+from flightd.sim.autopilot.radio import RadioParams
+from flightd.sim.floor.appearance import Appearance, preset
+from flightd.sim.plant.wind import Draught
+from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.front_camera import FrontCamera, front_lens
+from flightd.sim.racks.stock import StockShares
+from flightd.sim.scenario.fault_schema import Fault
+from flightd.sim.sensors.optics import SimCamera, wide_lens
+from flightd.site.site import Site
+
+_Shift = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
+_Carried = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
+
+
+class CameraScenario(Section):
+    width_px: int = Field(640, ge=64, le=3840)
+    height_px: int = Field(360, ge=36, le=2160)
+    fps: float = Field(30.0, gt=1, le=120)
+    capture_delay_s: float = Field(0.060, ge=0, le=1)
+    jitter_s: float = Field(0.003, ge=0, le=0.1)
+    exposure_s: float = Field(0.004, gt=0, le=0.1)
+
+    @model_validator(mode="after")
+    def _exposure_fits(self) -> Self:
+        self.camera()  # knows what does not fit together
+        return self
+
+    def camera(self) -> SimCamera:
+        return SimCamera(
+            lens=wide_lens().scaled(self.width_px, self.height_px),
+            fps=self.fps,
+            exposure_s=self.exposure_s,
+            capture_delay_s=self.capture_delay_s,
+            jitter_s=self.jitter_s,
+        )
+
+
+class FrontCameraScenario(Section):
+    width_px: int = Field(1280, ge=64, le=4096)
+    height_px: int = Field(800, ge=64, le=4096)
+    focal_px: float = Field(1000.0, gt=50, le=20_000)
+    fps: float = Field(4.0, ge=0.5, le=60)
+    exposure_s: float = Field(0.002, gt=0, le=0.01)
+    capture_delay_s: float = Field(0.080, ge=0, le=1)
+    jitter_s: float = Field(0.005, ge=0, le=0.1)
+    focus_m: float = Field(1.2, gt=0.1, le=100)
+
+    def camera(self) -> FrontCamera:
+        return FrontCamera(
+            lens=front_lens(self.width_px, self.height_px, self.focal_px),
+            fps=self.fps,
+            exposure_s=self.exposure_s,
+            capture_delay_s=self.capture_delay_s,
+            jitter_s=self.jitter_s,
+            focus_m=self.focus_m,
+        )
+
+
+_USUAL = StockShares()
+
+
+class RacksScenario(Section):
+    empty: float = Field(_USUAL.empty, ge=0, le=1)
+    tilted: float = Field(_USUAL.tilted, ge=0, le=1)
+    glossy: float = Field(_USUAL.glossy, ge=0, le=1)
+    several: float = Field(_USUAL.several, ge=0, le=1)
+    torn: float = Field(_USUAL.torn, ge=0, le=1)
+    too_small: float = Field(_USUAL.too_small, ge=0, le=1)
+    missing: float = Field(_USUAL.missing, ge=0, le=1)
+    occluded: float = Field(_USUAL.occluded, ge=0, le=1)
+    dark: float = Field(_USUAL.dark, ge=0, le=1)
+    location_labels: bool = True
+    seed: int | None = Field(None, ge=0)
+    noise: float = Field(2.0, ge=0, le=20)
+    exposure: float = Field(1.0, gt=0, le=3)
+
+    @model_validator(mode="after")
+    def _shares_leave_room(self) -> Self:
+        self.shares()
+        return self
+
+    def shares(self) -> StockShares:
+        return StockShares(**{name: getattr(self, name) for name in StockShares.names()})
+
+    def look(self) -> RackLook:
+        return RackLook(
+            shares=self.shares(),
+            seed=self.seed,
+            location_labels=self.location_labels,
+            noise=self.noise,
+            exposure=self.exposure,
+        )
+
+
+class FloorScenario(Section):
+    appearance: Literal["default", "clean", "harsh", "dim", "glossy", "worn"] = "default"
+
+    pad_off_m: tuple[_Shift, _Shift] = (0.0, 0.0)
+
+    def site(self, site: Site) -> Site:
+        """The site as it really is: its pads pushed about."""
+        dx_m, dy_m = self.pad_off_m
+        pads = (replace(pad, offset_m=(pad.offset_m[0] + dx_m, pad.offset_m[1] + dy_m)) for pad in site.pads)
+        return replace(site, pads=tuple(pads))
+
+    def look(self) -> Appearance:
+        return preset(self.appearance)
+
+
+class WindScenario(Section):
+    mean_x_mps: float = Field(0.0, ge=-10, le=10)
+    mean_y_mps: float = Field(0.0, ge=-10, le=10)
+    gust_mps: float = Field(Draught().gust_rms_mps, ge=0, le=10)
+
+    def draught(self) -> Draught:
+        return Draught(self.mean_x_mps, self.mean_y_mps, self.gust_mps)
+
+
+class VehicleScenario(Section):
+    battery: float = Field(1.0, ge=0, le=1)
+    battery_ah: float = Field(5.0, gt=0.05, le=100)
+    swap_s: float = Field(30.0, ge=0, le=3600)
+    start_offset_m: tuple[_Carried, _Carried] = (0.0, 0.0)
+    start_yaw_deg: float = Field(0.0, ge=-180, le=180)
+    radio_loss: float = Field(0.0, ge=0, le=1)
+    radio_delay_ms: float = Field(0.0, ge=0, le=2000)
+    radio_jitter_ms: float = Field(0.0, ge=0, le=2000)
+
+    def radio(self) -> RadioParams:
+        """Each way between a MAVLink autopilot and its companion."""
+        return RadioParams(self.radio_loss, self.radio_delay_ms / 1000, self.radio_jitter_ms / 1000)
+
+
+class Expectation(Section):
+    """How a flight of this scenario should go: which hazard is found, how soon, and how it ends."""
+
+    hazard: str = Field(min_length=1, max_length=40)
+    found_s: float = Field(1.0, gt=0, le=600)
+    ends: Literal["completed", "home", "landed", "handed over"]
+
+
+class Scenario(Section):
+    """One simulated world's conditions."""
+
+    camera: CameraScenario = CameraScenario()
+    front_camera: FrontCameraScenario = FrontCameraScenario()
+    racks: RacksScenario = RacksScenario()
+    floor: FloorScenario = FloorScenario()
+    wind: WindScenario = WindScenario()
+    vehicle: VehicleScenario = VehicleScenario()
+    fault: tuple[Fault, ...] = ()
+    expect: Expectation | None = None
+
+    @property
+    def needs_real_time(self) -> bool:
+        return any(fault.real_time for fault in self.fault)

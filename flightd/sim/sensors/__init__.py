@@ -1,0 +1,1 @@
+"""What the world's cameras and instruments make of the truth."""

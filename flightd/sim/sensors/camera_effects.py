@@ -1,0 +1,109 @@
+"""What the camera itself does to the picture: blur of lens and motion, vignetting, exposure, noise."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+
+from flightd.core.geometry import Lens
+from flightd.core.types import Image
+from flightd.sim.floor.appearance import Appearance
+from flightd.sim.sensors.optics import Floats
+
+_MIDDLE = 128
+"""A gain of one in the sensor's tables."""
+_TABLE_PIXELS = 6 * 640 * 360
+"""Enough tables that their repetition does not show, few enough to fit in memory."""
+_MAX_SMEAR_PX = 24.0
+_MAINS_HZ = 100.0
+
+
+class Sensor:
+    """Vignetting, photon noise, read noise, exposure and mains flicker of one camera.
+
+    Photon noise (a share of the signal) is baked into a few gain tables together with the vignetting;
+    read noise is cut from a larger bank.  `seq` chooses both, so the same frame always gets the same."""
+
+    def __init__(self, lens: Lens, look: Appearance, seed: int) -> None:
+        self._seed = seed
+        self._look = look
+        rng = np.random.default_rng([seed, 0x6E6F6973])
+        shape = (lens.height_px, lens.width_px)
+        fall = _vignette(lens, look.vignetting)
+        self._gains = []
+        if look.noise > 0.0 or look.vignetting > 0.0:
+            for _ in range(max(3, _TABLE_PIXELS // (shape[0] * shape[1])) if look.noise > 0.0 else 1):
+                # at mid grey two thirds of the variance is the photons', spread over three channels
+                grain = rng.standard_normal((*shape, 3), dtype=np.float32) * np.float32(
+                    0.8 * look.noise / 128
+                )
+                gain = fall[..., None] * (1.0 + grain) * _MIDDLE
+                self._gains.append(np.clip(np.round(gain), 0, 255).astype(np.uint8))
+        self._bank: tuple[Image, Image] | None = None
+        if look.noise > 0.0:
+            size = (shape[0] + _BANK_MARGIN, shape[1] + _BANK_MARGIN)
+            read = rng.standard_normal((*size, 1), dtype=np.float32) * np.float32(0.45)
+            read = (read + rng.standard_normal((*size, 3), dtype=np.float32) * np.float32(0.4)) * np.float32(
+                look.noise
+            )
+            steps = np.round(read)
+            self._bank = (
+                np.clip(steps, 0, 255).astype(np.uint8),
+                np.clip(-steps, 0, 255).astype(np.uint8),
+            )
+
+    def expose(self, picture: Image, stamp_ns: int, seq: int, part: float = 1.0) -> None:
+        """Turn an ideal picture into one taken with a part of the usual exposure, in place."""
+        draw = np.random.default_rng([self._seed, seq]) if self._bank is not None else None
+        beat = math.sin(math.tau * ((stamp_ns * 1e-9 * _MAINS_HZ) % 1.0))
+        exposure = part * self._look.exposure * (1.0 + self._look.flicker * beat)
+        if self._gains:
+            table = self._gains[int(draw.integers(len(self._gains))) if draw is not None else 0]
+            cv2.multiply(picture, table, dst=picture, scale=exposure / _MIDDLE)
+        elif exposure != 1.0:
+            cv2.convertScaleAbs(picture, dst=picture, alpha=exposure)
+        if self._bank is not None and draw is not None:
+            row, column = (int(v) for v in draw.integers(_BANK_MARGIN, size=2))
+            cut = (slice(row, row + picture.shape[0]), slice(column, column + picture.shape[1]))
+            cv2.add(picture, self._bank[0][cut], dst=picture)
+            cv2.subtract(picture, self._bank[1][cut], dst=picture)
+
+
+_BANK_MARGIN = 64
+
+
+def _vignette(lens: Lens, depth: float) -> Floats:
+    """(H, W) gain: 1 in the middle, 1 - depth in the corners, by the fourth power of the angle's cosine
+    stretched to that depth."""
+    cx, cy = lens.centre_px
+    x = (np.arange(lens.width_px, dtype=np.float32) - np.float32(cx)) / np.float32(lens.fx_px)
+    y = (np.arange(lens.height_px, dtype=np.float32) - np.float32(cy)) / np.float32(lens.fy_px)
+    cosine4 = 1.0 / (1.0 + x[None, :] ** 2 + y[:, None] ** 2) ** 2
+    fall: Floats = 1.0 - np.float32(depth) * (1.0 - cosine4) / (1.0 - cosine4.min())
+    return fall
+
+
+def blur_kernel(smear_px: tuple[float, float], soft_px: float) -> Floats | None:
+    """Kernel of a straight smear (right, down; the whole way in pixels) and a Gaussian lens blur,
+    centred, sum 1; None when it would hardly show."""
+    length = math.hypot(*smear_px)
+    if length > _MAX_SMEAR_PX:
+        smear_px = (smear_px[0] * _MAX_SMEAR_PX / length, smear_px[1] * _MAX_SMEAR_PX / length)
+        length = _MAX_SMEAR_PX
+    if length < 0.3 and soft_px < 0.2:
+        return None
+    # a uniform smear and a round blur, joined: Gaussians strung along the way
+    sigma = max(soft_px, 0.3)
+    half_x = max(1, math.ceil(abs(smear_px[0]) / 2 + 1.6 * sigma - 0.3))
+    half_y = max(1, math.ceil(abs(smear_px[1]) / 2 + 1.6 * sigma - 0.3))
+    xs = np.arange(-half_x, half_x + 1)[None, :]
+    ys = np.arange(-half_y, half_y + 1)[:, None]
+    kernel = np.zeros((2 * half_y + 1, 2 * half_x + 1))
+    beads = max(1, math.ceil(length * 2))
+    for bead in range(beads):
+        at = (bead + 0.5) / beads - 0.5
+        kernel += np.exp(-((xs - at * smear_px[0]) ** 2 + (ys - at * smear_px[1]) ** 2) / (2 * sigma**2))
+    normal: Floats = (kernel / kernel.sum()).astype(np.float32)
+    return normal

@@ -1,0 +1,105 @@
+"""What the autopilot believes: the truth seen through its gyro, compass, barometer and range finder."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import dataclass
+
+from flightd.core.geometry import wrap_pi
+from flightd.sim.plant.airframe import Airframe
+
+
+@dataclass(frozen=True, slots=True)
+class SensorParams:
+    """Errors of a cheap autopilot indoors.
+
+    `heading_offset_rad` is what the compass reads along the map's x axis; no one can know it beforehand.
+    """
+
+    heading_offset_rad: float = 0.7
+    yaw_drift_radps: float = math.radians(0.03)
+    yaw_noise_rad: float = math.radians(0.1)
+    tilt_bias_rad: float = math.radians(0.3)
+    tilt_wander_rad: float = math.radians(0.1)
+    baro_wander_m: float = 0.01
+    climb_noise_mps: float = 0.02
+    wander_s: float = 20.0
+    range_min_m: float = 0.05
+    range_max_m: float = 8.0
+    range_noise_m: float = 0.005
+    range_step_m: float = 0.01
+    range_dropout: float = 0.005
+
+
+@dataclass(slots=True)
+class SensorFault:
+    """What is wrong with the sensors just now, beyond their usual errors."""
+
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    yaw_rad: float = 0.0
+    range_m: float = 0.0
+    range_lost: bool = False
+
+
+class Sensors:
+    """Estimates of one airframe; `update` after each of its steps."""
+
+    def __init__(self, params: SensorParams | None = None, seed: int = 0) -> None:
+        self.params = p = params or SensorParams()
+        self.fault = SensorFault()
+        self._rng = rng = random.Random(seed)
+        self._roll_bias = rng.uniform(-p.tilt_bias_rad, p.tilt_bias_rad)
+        self._pitch_bias = rng.uniform(-p.tilt_bias_rad, p.tilt_bias_rad)
+        self._yaw_drift = rng.uniform(-p.yaw_drift_radps, p.yaw_drift_radps)
+        self._yaw_error = p.heading_offset_rad
+        self._roll_wander = self._pitch_wander = self._baro_wander = self._climb_error = 0.0
+        self.roll_rad = self.pitch_rad = self.yaw_rad = 0.0
+        self.height_m = self.climb_mps = 0.0
+
+    @property
+    def roll_error_rad(self) -> float:
+        """Estimate minus truth."""
+        return self._roll_bias + self._roll_wander + self.fault.roll_rad
+
+    @property
+    def pitch_error_rad(self) -> float:
+        return self._pitch_bias + self._pitch_wander + self.fault.pitch_rad
+
+    @property
+    def yaw_error_rad(self) -> float:
+        """Estimate minus truth, the compass's heading of the map's x axis included."""
+        return self._yaw_error + self.fault.yaw_rad
+
+    def update(self, dt_s: float, airframe: Airframe) -> None:
+        """Follow the airframe's present truth after `dt_s`."""
+        p, gauss = self.params, self._rng.gauss
+        fade = dt_s / p.wander_s
+        kick = math.sqrt(2.0 * fade)
+        self._roll_wander += -self._roll_wander * fade + gauss(0.0, p.tilt_wander_rad * kick)
+        self._pitch_wander += -self._pitch_wander * fade + gauss(0.0, p.tilt_wander_rad * kick)
+        self._baro_wander += -self._baro_wander * fade + gauss(0.0, p.baro_wander_m * kick)
+        fast = dt_s / 0.2
+        self._climb_error += -self._climb_error * fast + gauss(0.0, p.climb_noise_mps * math.sqrt(2.0 * fast))
+        self._yaw_error += self._yaw_drift * dt_s
+        self.roll_rad = airframe.roll_rad + self.roll_error_rad
+        self.pitch_rad = airframe.pitch_rad + self.pitch_error_rad
+        self.yaw_rad = wrap_pi(airframe.yaw_rad + self.yaw_error_rad)
+        self.height_m = airframe.height_m - airframe.params.rest_height_m + self._baro_wander
+        self.climb_mps = airframe.climb_mps + self._climb_error
+
+    def noisy_yaw_rad(self) -> float:
+        """The yaw estimate as a telemetry sample: with its noise."""
+        return wrap_pi(self.yaw_rad + self._rng.gauss(0.0, self.params.yaw_noise_rad))
+
+    def range_m(self, airframe: Airframe) -> float:
+        """One range finder sample along the body's z axis, quantised; 0 when nothing came back."""
+        p = self.params
+        tilt_cos = airframe.tilt_cos
+        if tilt_cos < 0.3 or self._rng.random() < p.range_dropout or self.fault.range_lost:
+            return 0.0
+        distance = airframe.height_m / tilt_cos + self._rng.gauss(0.0, p.range_noise_m) + self.fault.range_m
+        if not p.range_min_m <= distance <= p.range_max_m:
+            return 0.0
+        return round(distance / p.range_step_m) * p.range_step_m

@@ -1,0 +1,138 @@
+"""The simulated down camera: where each pixel looks on the floor, and how far the picture smears."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias, TypeVar, cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from flightd.core.camera_view import AnyMount, Viewpoint
+from flightd.core.distortion import undistorted
+from flightd.core.geometry import Lens, Mount
+from flightd.core.types import Image
+from flightd.sim.plant.kinematics import Kinematics
+
+Floats: TypeAlias = NDArray[np.float32]
+Cells = TypeVar("Cells", NDArray[np.float32], NDArray[np.uint8])
+
+CELL_PX = 8
+"""The pixel-to-floor map is exact at the middle of each cell and interpolated between: at 45° of tilt
+the error stays below 0.05 px."""
+MIN_HEIGHT_M = 0.02
+"""A camera standing on the floor still looks from somewhere."""
+MIN_SLOPE = 0.08
+"""Rays that hardly go down are bent to this (down per unit of ray), so that the horizon stays finite."""
+
+
+def wide_lens(width_px: int = 640, height_px: int = 360, hfov_rad: float = math.radians(80.0)) -> Lens:
+    """A cheap 80° lens with mild barrel distortion, principal point in the middle."""
+    focal_px = width_px / 2 / math.tan(hfov_rad / 2)
+    centre = ((width_px - 1) / 2, (height_px - 1) / 2)
+    return Lens(width_px, height_px, focal_px, focal_px, *centre, (-0.05, 0.01, 0.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class SimCamera:
+    """A down camera: its optics and its timing.  A frame reaches the daemon `capture_delay_s` after
+    mid-exposure, give or take a normal `jitter_s`."""
+
+    lens: Lens = field(default_factory=wide_lens)
+    mount: Mount = field(default_factory=Mount)
+    fps: float = 30.0
+    exposure_s: float = 0.004
+    capture_delay_s: float = 0.060
+    jitter_s: float = 0.003
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.exposure_s <= 1.0 / self.fps:
+            raise ValueError(f"exposure {self.exposure_s} s does not fit {self.fps} frames a second")
+
+
+def floor_viewpoint(kinematics: Kinematics, mount: Mount) -> Viewpoint:
+    """The down camera's pose for a pose of the airframe, never below `MIN_HEIGHT_M`."""
+    view = viewpoint(kinematics, mount)
+    return replace(view, height_m=max(view.height_m, MIN_HEIGHT_M))
+
+
+def viewpoint(kinematics: Kinematics, mount: AnyMount) -> Viewpoint:
+    """A camera's pose for a pose of the airframe."""
+    k = kinematics
+    return Viewpoint.at(k.x_m, k.y_m, k.height_m, k.roll_rad, k.pitch_rad, k.yaw_rad, mount)
+
+
+class RayTable:
+    """Ideal ray of each cell of the picture, the lens's distortion taken out once and for all."""
+
+    def __init__(self, lens: Lens) -> None:
+        self._lens = lens
+        columns, rows = -(-lens.width_px // CELL_PX) + 2, -(-lens.height_px // CELL_PX) + 2
+        # cv2.resize puts cell i over the pixels around CELL_PX * i + (CELL_PX - 1) / 2; one cell of margin
+        u = (np.arange(columns) - 1) * CELL_PX + (CELL_PX - 1) / 2
+        v = (np.arange(rows) - 1) * CELL_PX + (CELL_PX - 1) / 2
+        grid = np.stack(np.meshgrid((u - lens.cx_px) / lens.fx_px, (v - lens.cy_px) / lens.fy_px))
+        self._rays: Floats = undistorted(grid, lens).astype(np.float32)
+        self._padded = np.empty((rows * CELL_PX, columns * CELL_PX, 2), np.float32)
+
+    def floor(self, view: Viewpoint) -> tuple[Floats, Floats]:
+        """Floor points (x_m, y_m relative to the camera's foot) under the cells, each (rows, columns)."""
+        a = view.map_from_image.astype(np.float32)
+        right, down = self._rays
+        depth = a[2, 0] * right + a[2, 1] * down + a[2, 2]
+        scale = np.float32(view.height_m) / np.maximum(depth, np.float32(MIN_SLOPE))
+        x = (a[0, 0] * right + a[0, 1] * down + a[0, 2]) * scale
+        y = (a[1, 0] * right + a[1, 1] * down + a[1, 2]) * scale
+        return x, y
+
+    def to_pixels(self, cells: Cells) -> Cells:
+        """Cells interpolated to all pixels, (H, W, channels); of two channels it is a view that the next
+        such call overwrites."""
+        size = (self._padded.shape[1], self._padded.shape[0])
+        target = self._padded if cells.shape[2:] == (2,) else None
+        full = cv2.resize(cells, size, dst=target, interpolation=cv2.INTER_LINEAR)
+        stop = (CELL_PX + self._lens.height_px, CELL_PX + self._lens.width_px)
+        return cast("Cells", full[CELL_PX : stop[0], CELL_PX : stop[1]])
+
+    def footprint_m(self, view: Viewpoint) -> float:
+        """Metres of floor that the pixel in the middle covers, the smaller way."""
+        depth = max(float(view.map_from_image[2, 2]), MIN_SLOPE)
+        return view.height_m / depth / max(self._lens.fx_px, self._lens.fy_px)
+
+
+def smear_px(camera: SimCamera, kinematics: Kinematics) -> tuple[float, float]:
+    """How far (right, down) the picture's middle moves during the exposure, in pixels."""
+    half_s = camera.exposure_s / 2
+    before, after = (moved(kinematics, sign * half_s) for sign in (-1.0, 1.0))
+    start, end = floor_viewpoint(before, camera.mount), floor_viewpoint(after, camera.mount)
+    axis = start.map_from_image[:, 2]
+    reach = start.height_m / max(float(axis[2]), MIN_SLOPE)
+    point = np.array([start.x_m - end.x_m, start.y_m - end.y_m, end.height_m - start.height_m]) + axis * reach
+    right, down, depth = end.map_from_image.T @ point
+    return camera.lens.fx_px * float(right / depth), camera.lens.fy_px * float(down / depth)
+
+
+def moved(k: Kinematics, dt_s: float) -> Kinematics:
+    """The pose `dt_s` later at constant rates (small angles: body rates stand for angle rates)."""
+    return replace(
+        k,
+        x_m=k.x_m + k.vx_mps * dt_s,
+        y_m=k.y_m + k.vy_mps * dt_s,
+        height_m=k.height_m + k.climb_mps * dt_s,
+        roll_rad=k.roll_rad + k.roll_rate_radps * dt_s,
+        pitch_rad=k.pitch_rad + k.pitch_rate_radps * dt_s,
+        yaw_rad=k.yaw_rad + k.yaw_rate_radps * dt_s,
+    )
+
+
+def picture_for(lens: Lens, out: Image | None = None) -> Image:
+    """Where a camera with this lens draws its picture: `out`, or a new one.  ValueError where `out` does
+    not fit."""
+    picture = np.empty((lens.height_px, lens.width_px, 3), np.uint8) if out is None else out
+    if picture.shape != (lens.height_px, lens.width_px, 3) or picture.dtype != np.uint8:
+        raise ValueError(
+            f"out is {picture.shape} {picture.dtype}, the camera makes {lens.width_px}x{lens.height_px}"
+        )
+    return picture

@@ -1,0 +1,1 @@
+"""The warehouse map: layout, routes' ways, racks, cells, closures, coverage."""

@@ -1,0 +1,1 @@
+"""Vision on folders of frames: detect, evaluate, bench, train, overlays."""

@@ -1,0 +1,176 @@
+"""Codes in pictures: what was read, and how it compares with what should have been."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+from typing import TypeAlias
+
+from rich.console import Console
+
+from flightd.core.errors import InputError
+from flightd.core.types import CodeRead
+from flightd.studies.frame_files import list_files, pictures
+from flightd.studies.progress_bar import track
+from flightd.vision.shelf.code_reader import read_codes
+
+Expected: TypeAlias = Mapping[str, frozenset[str]]
+"""The texts of each picture by its file name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """What was read in one picture, and how long it took."""
+
+    name: str
+    width_px: int
+    height_px: int
+    ms: float
+    reads: tuple[CodeRead, ...]
+
+    @property
+    def believed(self) -> tuple[CodeRead, ...]:
+        return tuple(read for read in self.reads if read.believed)
+
+
+@dataclass(frozen=True, slots=True)
+class ReadVerdict:
+    """Reads against the labels: codes expected, read with exactly their text, and texts told that no
+    label of the picture knows."""
+
+    expected: int
+    read: int
+    missed: tuple[str, ...]
+    wrong: tuple[str, ...]
+    ms_median: float
+
+    @property
+    def read_part(self) -> float:
+        return self.read / self.expected if self.expected else 1.0
+
+
+def read(paths: Sequence[Path]) -> Iterator[Page]:
+    """Read every picture that `paths` mean, in order."""
+    for path in track(list_files(paths), "reading"):
+        for picture in pictures(path):
+            start = perf_counter()
+            reads = read_codes(picture.bgr)
+            ms = (perf_counter() - start) * 1e3
+            yield Page(picture.name, picture.bgr.shape[1], picture.bgr.shape[0], ms, reads)
+
+
+def read_expected(path: Path) -> Expected:
+    """The texts that a labels file expects.  Raises InputError naming the file and the entry."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as err:
+        raise InputError(f"{path}: cannot read the labels: {err.strerror or err}") from None
+    except ValueError as err:
+        raise InputError(f"{path}: not JSON: {err}") from None
+    entries = document.get("codes") if isinstance(document, dict) else None
+    if not isinstance(entries, list):
+        raise InputError(f'{path}: has no list "codes"; write {{"codes": [{{"file": …, "text": …}}]}}')
+    texts: dict[str, set[str]] = defaultdict(set)
+    for i, entry in enumerate(entries):
+        file, text = (entry.get("file"), entry.get("text")) if isinstance(entry, dict) else (None, None)
+        if not isinstance(file, str) or not isinstance(text, str):
+            raise InputError(f'{path}: codes[{i}]: needs "file" and "text", both strings')
+        texts[file].add(_plain(text))
+    return {file: frozenset(those) for file, those in texts.items()}
+
+
+def compare(pages: Sequence[Page], expected: Expected) -> ReadVerdict:
+    """Hold the believed reads against the labels; pictures without a label are left out."""
+    told = {Path(page.name).name: page for page in pages}
+    missed, wrong, read_count, count = [], [], 0, 0
+    for file, texts in expected.items():
+        page = told.get(file)
+        if page is None:
+            raise InputError(f"{file}: is labelled, but not among the pictures")
+        seen = {_plain(read.text) for read in page.believed}
+        count += len(texts)
+        read_count += len(texts & seen)
+        missed += [f"{file}: {text}" for text in sorted(texts - seen)]
+        wrong += [f"{file}: {text}" for text in sorted(seen - texts)]
+    times = [page.ms for page in pages]
+    return ReadVerdict(count, read_count, tuple(missed), tuple(wrong), median(times) if times else 0.0)
+
+
+def _plain(text: str) -> str:
+    """Texts that mean the same code: line ends at its end aside, an EAN-13 of a UPC-A as UPC-A."""
+    bare = text.strip()
+    return bare[1:] if len(bare) == 13 and bare.startswith("0") and bare.isdecimal() else bare
+
+
+def as_json(pages: Sequence[Page], expected: Expected | None) -> str:
+    """The one JSON document of `flightd codes --json`; corners are pixels from the top left."""
+    document: dict[str, object] = {"images": [_image(page) for page in pages]}
+    if expected is not None:
+        verdict = compare(pages, expected)
+        document["verdict"] = asdict(verdict) | {"read_part": round(verdict.read_part, 5)}
+    return json.dumps(document, indent=1, ensure_ascii=False)
+
+
+def _image(page: Page) -> dict[str, object]:
+    cx, cy = (page.width_px - 1) / 2, (page.height_px - 1) / 2
+    codes = [
+        {
+            "symbology": read.symbology,
+            "text": read.text,
+            "corners": [[round(x + cx, 1), round(y + cy, 1)] for x, y in read.corners_px],
+            "checksum": read.sure,
+            "agreeing": read.agreeing,
+            "quality": read.quality,
+            "gs1": dict(read.gs1),
+            "gs1_problem": read.gs1_problem,
+        }
+        for read in page.believed
+    ]
+    return {
+        "path": page.name,
+        "width": page.width_px,
+        "height": page.height_px,
+        "ms": round(page.ms, 3),
+        "codes": codes,
+        "doubtful": len(page.reads) - len(page.believed),
+    }
+
+
+def print_page(page: Page, console: Console) -> None:
+    """One picture for people."""
+    title = f"{page.name}  {page.width_px}x{page.height_px}  {page.ms:.1f} ms"
+    console.print(title, style="bold", highlight=False, markup=False, soft_wrap=True)
+    for read in page.believed:
+        how = "checksum" if read.sure else f"{read.agreeing} reads agree"
+        line = f"  {read.symbology:<12} {_visible(read.text)}  ({how})"
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+        for ai, value in read.gs1:
+            console.print(f"    ({ai}) {value}", highlight=False, markup=False)
+        if read.gs1_problem:
+            console.print(f"    no valid GS1: {read.gs1_problem}", highlight=False, markup=False)
+    doubtful = len(page.reads) - len(page.believed)
+    if not page.believed:
+        console.print("  no code")
+    if doubtful:
+        console.print(f"  {doubtful} doubtful, not told")
+
+
+def _visible(text: str) -> str:
+    """Control characters as escapes: a terminal obeys none of what a label says."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def print_verdict(verdict: ReadVerdict, console: Console) -> None:
+    """The comparison for people."""
+    share = f"{verdict.read} of {verdict.expected} codes read ({100 * verdict.read_part:.1f} %)"
+    console.print(
+        f"{share}, {len(verdict.wrong)} wrong texts, median {verdict.ms_median:.1f} ms", style="bold"
+    )
+    for kind, those in (("missed", verdict.missed), ("wrong", verdict.wrong)):
+        for entry in those:
+            console.print(f"  {kind} {_visible(entry)}", highlight=False, markup=False, soft_wrap=True)

@@ -1,0 +1,1 @@
+"""What else the floor shows: charge pads, markers, and whether a frame shows anything at all."""

@@ -1,0 +1,1 @@
+"""Codes, places and empties in the front camera's frames."""

@@ -1,0 +1,106 @@
+"""One look at a shelf: the codes in a front camera's picture, and what each wanted place shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+
+from flightd.core.scanning import CodeSet, Occupancy, Place, PlaceLook, Quad
+from flightd.core.types import CodeRead, Image
+from flightd.vision.shelf import empty_deck as deck
+from flightd.vision.shelf.code_reader import read_codes
+from flightd.vision.shelf.evidence_jpeg import evidence_jpeg, picture_name
+from flightd.vision.shelf.occupancy import judge, light_on, white_level
+
+Box: TypeAlias = tuple[int, int, int, int]
+"""(x0, y0, x1, y1) in pixels, far ends excluded."""
+
+_MARGIN = 0.1
+"""Room around the wanted places, as a part of their size: a pose is never exact."""
+
+
+def read_shelf(
+    bgr: Image, seq: int, stamp_ns: int, places: Sequence[Place], exposure: float = 1.0
+) -> tuple[CodeSet, dict[str, bytes]]:
+    """The codes and the places of one picture, (H, W, 3) BGR; the evidence of each place by its name.
+
+    Only the part of the picture with the places is read.
+    """
+    height, width = bgr.shape[:2]
+    box = _around(places, width, height)
+    started = cv2.getTickCount()
+    reads = _shifted(read_codes(np.ascontiguousarray(bgr[box[1] : box[3], box[0] : box[2]])), box, bgr)
+    read = cv2.getTickCount()
+    white = white_level(bgr)
+    looks, kept = [], {}
+    for place in places:
+        look, jpeg = _look(bgr, place, reads, white)
+        looks.append(look)
+        if jpeg:
+            kept[look.evidence] = jpeg
+    per_ms = cv2.getTickFrequency() * 1e-3
+    timings = {"codes": (read - started) / per_ms, "places": (cv2.getTickCount() - read) / per_ms}
+    return CodeSet(seq, stamp_ns, width, height, reads, tuple(looks), timings, exposure), kept
+
+
+def _around(places: Sequence[Place], width: int, height: int) -> Box:
+    """The pixels of all places with some room; the whole picture if there are none."""
+    if not places:
+        return 0, 0, width, height
+    boxes = np.array([_box(place.quad_px, width, height, _MARGIN) for place in places])
+    (x0, y0), (x1, y1) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+    return int(x0), int(y0), int(x1), int(y1)
+
+
+def _box(quad: Quad, width: int, height: int, room: float = 0.0) -> Box:
+    """The pixels around a quad with `room` as a part of its size, inside the picture."""
+    centre = (width - 1) / 2, (height - 1) / 2
+    corners = np.array(quad) + centre
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    spare = (high - low) * room
+    low, high = low - spare, high + spare
+    x0, x1 = (int(np.clip(x, 0, width)) for x in (low[0], high[0] + 1))
+    y0, y1 = (int(np.clip(y, 0, height)) for y in (low[1], high[1] + 1))
+    return x0, y0, x1, y1
+
+
+def _shifted(reads: Sequence[CodeRead], box: Box, picture: Image) -> tuple[CodeRead, ...]:
+    """The reads of a part of the picture, in the whole picture's centred coordinates."""
+    height, width = picture.shape[:2]
+    dx, dy = (box[0] + box[2] - width) / 2, (box[1] + box[3] - height) / 2
+    return tuple(
+        replace(read, corners_px=tuple((round(x + dx, 1), round(y + dy, 1)) for x, y in read.corners_px))
+        for read in reads
+    )
+
+
+def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> tuple[PlaceLook, bytes]:
+    """What one place shows, and its picture."""
+    height, width = bgr.shape[:2]
+    occupancy = Occupancy.UNSURE
+    if any(_contains(place, read) for read in reads):
+        occupancy = Occupancy.GOODS
+    elif _is_inside(place.core_px, width, height):
+        x0, y0, x1, y1 = _box(place.core_px, width, height)
+        core = bgr[y0:y1, x0:x1]
+        occupancy = judge(core, white, deck.is_seen(bgr, place.deck_px, core, white))
+    x0, y0, x1, y1 = _box(place.quad_px, width, height)
+    jpeg = evidence_jpeg(np.ascontiguousarray(bgr[y0:y1, x0:x1])) if x1 > x0 and y1 > y0 else b""
+    name = picture_name(jpeg) if jpeg else ""
+    light = light_on(bgr[y0:y1, x0:x1], white)
+    return PlaceLook(place.location, place.quad_px, place.share, occupancy, name, light), jpeg
+
+
+def _is_inside(quad: Quad, width: int, height: int) -> bool:
+    return all(abs(x) <= (width - 1) / 2 and abs(y) <= (height - 1) / 2 for x, y in quad)
+
+
+def _contains(place: Place, read: CodeRead) -> bool:
+    """Whether a code is in the core of a place: one below may be the shelf's own label."""
+    x, y = np.array(read.corners_px).mean(axis=0)
+    core = np.array(place.core_px, np.float32)
+    return cv2.pointPolygonTest(core, (float(x), float(y)), False) >= 0

@@ -1,0 +1,1 @@
+"""Labelled frames, colour training, and the score of detected lines."""

@@ -1,0 +1,99 @@
+"""Localisation: tracks matched to the map, false lines left out, position carried over gaps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flightd.localisation.grid_localiser import GridLocaliser
+from flightd.sim.random_sites import random_site
+from flightd.tracking.axis_filters import TrackedLine
+from flightd.tracking.line_tracker import TrackSet
+
+SITE = random_site(3)
+A1, A2 = SITE.nodes["A1"], SITE.nodes["A2"]
+TICK_NS = 20_000_000
+
+
+def line(id_: int, offset_m: float, sigma_m: float = 0.01, hits: int = 10) -> TrackedLine:
+    return TrackedLine(id_, offset_m, sigma_m, SITE.line_width_m, 0, hits)
+
+
+def tracks(
+    tick: int, across_x: list[TrackedLine], across_y: list[TrackedLine], vx: float = 0.0, vy: float = 0.0
+) -> TrackSet:
+    stamp = tick * TICK_NS
+    return TrackSet(stamp, stamp, 0.0, 0.01, vx, vy, 0.0, 0.0, tuple(across_x), tuple(across_y))
+
+
+def test_the_position_is_that_of_the_lines() -> None:
+    localiser = GridLocaliser(SITE, "A1")
+    pose = localiser.step(tracks(1, [line(0, -0.05)], [line(0, 0.03)]), 1.6)
+    assert (pose.node, round(pose.along_m, 3), round(pose.across_m, 3)) == ("A1", 0.05, -0.03)
+    assert pose.integrity < 0.95, "so far the pad is all that tells A1 from its like"
+
+
+def test_flying_to_the_next_node_changes_the_node_and_nothing_jumps() -> None:
+    localiser, gap = GridLocaliser(SITE, "A1"), A2.x_m - A1.x_m
+    x, last = 0.0, 0.0
+    for tick in range(1, 200):
+        x = min(tick * 0.02 * 0.8, gap)
+        seen = [line(i, at - x) for i, at in ((0, 0.0), (1, gap)) if abs(at - x) < 0.9]
+        pose = localiser.step(tracks(tick, seen, [line(0, 0.0)], vx=0.8 if x < gap else 0.0), 1.6)
+        assert abs(pose.x_m - A1.x_m - x) < 0.02
+        assert abs(pose.x_m - last) < 0.03 or tick == 1
+        last = pose.x_m
+    assert pose.node == "A2"
+
+
+def test_a_false_line_between_two_nodes_is_not_matched() -> None:
+    localiser, gap = GridLocaliser(SITE, "A1"), A2.x_m - A1.x_m
+    localiser.step(tracks(1, [line(0, 0.0)], [line(0, 0.0)]), 1.6)
+    for tick in range(2, 50):
+        pose = localiser.step(
+            tracks(tick, [line(0, 0.0), line(7, gap / 2), line(8, 0.25)], [line(0, 0.0)]), 1.6
+        )
+    assert abs(pose.x_m - A1.x_m) < 0.005
+
+
+def test_a_missed_cross_line_does_not_shift_the_node_count() -> None:
+    """A2's own line is never seen; A3's must be taken for A3's."""
+    localiser = GridLocaliser(SITE, "A1")
+    a3 = SITE.nodes["A3"]
+    for tick in range(1, 400):
+        x = min(tick * 0.02 * 0.8, a3.x_m - A1.x_m)
+        seen = [line(i, at - x) for i, at in ((0, 0.0), (2, a3.x_m - A1.x_m)) if abs(at - x) < 0.9]
+        moving = 0.8 * 1.03 if x < a3.x_m - A1.x_m else 0.0  # and odometry is 3 % off
+        pose = localiser.step(tracks(tick, seen, [line(0, 0.0)], vx=moving), 1.6)
+    assert pose.node == "A3"
+    assert abs(pose.along_m) < 0.02
+
+
+def test_without_lines_the_doubt_grows() -> None:
+    localiser = GridLocaliser(SITE, "A1")
+    first = localiser.step(tracks(1, [line(0, 0.0)], [line(0, 0.0)]), 1.6)
+    later = localiser.step(tracks(501, [], []), 1.6)
+    assert later.integrity < 0.7 * first.integrity
+    assert later.covariance[0] > 1.0
+
+
+def test_after_a_long_gap_a_line_between_two_is_held_for_either_until_the_next_one_tells() -> None:
+    localiser, gap = GridLocaliser(SITE, "A1"), A2.x_m - A1.x_m
+    localiser.step(tracks(1, [line(0, 0.0)], [line(0, 0.0)]), 1.6)
+    localiser.step(tracks(401, [], [line(0, 0.0)]), 1.6)
+    shift = 0.45 * gap  # it drifted back, unseen, by nearly half a cell
+    pose = localiser.step(tracks(402, [line(1, shift)], [line(0, 0.0)]), 1.6)
+    assert pose.integrity < 0.95
+    pose = localiser.step(tracks(403, [line(1, shift), line(2, shift + gap)], [line(0, 0.0)]), 1.6)
+    assert abs(pose.x_m - A1.x_m + shift) < 0.05
+
+
+def test_what_the_lines_ahead_look_like_makes_it_sure() -> None:
+    localiser, gap = GridLocaliser(SITE, "A1"), A2.x_m - A1.x_m
+    for tick in range(1, 150):
+        x = min(tick * 0.02 * 0.8, gap)
+        seen = [line(i, at - x) for i, at in ((0, 0.0), (1, gap)) if abs(at - x) < 0.9]
+        told = tracks(tick, seen, [line(0, 0.0)], vx=0.8 if x < gap else 0.0)
+        now = [replace(at, seen_ns=told.stamp_ns) for at in (*told.across_x, *told.across_y)]
+        pose = localiser.step(replace(told, across_x=tuple(now[:-1]), across_y=(now[-1],)), 1.6)
+    assert pose.node == "A2"
+    assert pose.integrity > 0.95

@@ -1,0 +1,38 @@
+"""Where a pad lies that is found by the end of a painted line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from flightd.config.site_file import load_site
+from flightd.core.types import GridPose
+from flightd.localisation.pad_finder import PadFinder
+from flightd.site.painted_lines import nearest_end
+from flightd.site.site import PadSign
+from flightd.tracking.ground_junctions import FloorJunction
+from flightd.tracking.line_tracker import TrackSet
+
+DEMO = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
+SITE = replace(DEMO, pads=(replace(DEMO.home, sign=PadSign.LINE_END, offset_m=(-0.4, 0.0)),))
+
+
+@pytest.mark.parametrize("first", [False, True])
+def test_an_end_in_worn_paint_beside_the_true_one_does_not_move_the_pad(first: bool) -> None:
+    end = nearest_end(SITE, *SITE.pad_centre(SITE.home), 0.5)
+    assert end is not None
+    x_m, y_m, arms = end
+    true, worn = FloorJunction(x_m + 0.05, y_m, arms), FloorJunction(x_m + 0.3, y_m, arms)
+    other_way = FloorJunction(x_m + 0.2, y_m, 5 - arms)
+    finder = PadFinder(SITE)
+    here = GridPose(0, "A1", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, (0.0,) * 9, 1.0)
+    for stamp_ns in range(1, 20):
+        ends = (worn, other_way, true) if first else (true, other_way, worn)
+        tracks = TrackSet(
+            stamp_ns, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (), (), junctions=ends, junctions_ns=stamp_ns
+        )
+        finder.step(tracks, here)
+    pad = SITE.pad_centre(SITE.home)
+    assert finder.centre("A1") == pytest.approx((pad[0] + 0.05, pad[1]), abs=1e-6)
