@@ -32,12 +32,12 @@ from tests.protocol.rig import Rig, ardupilot_rig, run_virtual
 # What we are and ask
 
 
-def test_we_are_an_onboard_computer_and_beat_once_a_second() -> None:
+def test_we_are_an_onboard_computer_and_beat_twice_a_second() -> None:
     async def test() -> None:
         async with scripted() as (autopilot, _):
             await asyncio.sleep(10.0)
             beats = autopilot.all("HEARTBEAT")
-            assert 10 <= len(beats) <= 12
+            assert 20 <= len(beats) <= 24
             assert {(b.type, b.autopilot, b.get_srcSystem(), b.get_srcComponent()) for b in beats} == {
                 (18, 8, 1, 191)
             }

@@ -100,6 +100,9 @@ class ArduPilotVehicle(MavlinkVehicle):
         self._flies_raw = bool(int(found[1]) & _THRUST_IS_COLLECTIVE)
         return self._flies_raw
 
+    def sinks_unmeasured(self) -> bool:
+        return self._thrust_is_raw() is False
+
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         raw = self._thrust_is_raw()
         if self._flies_raw if raw is None else raw:  # it is read anew in the air: it is what it was

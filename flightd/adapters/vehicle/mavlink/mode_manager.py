@@ -27,6 +27,11 @@ _MODE_PAUSE_S = 0.5
 _REASON_NS = 2_000_000_000
 _FLOOR_M = 0.3
 """Higher than this by the range finder the motors are not stopped, whatever the autopilot says."""
+_OWN_DESCENT_NS = 5_000_000_000
+"""For so long an unheard vehicle is brought down by setpoints before the landing is ordered."""
+_UNHEARD_ORDERS = 6
+"""Orders to land that an unheard vehicle gets in quick succession; then one now and again."""
+_UNHEARD_PAUSE_NS, _UNHEARD_AGAIN_NS = 500_000_000, 5_000_000_000
 _HAND_BACK_S = 0.2
 _HAND_BACK_ANSWER_S = 0.06
 _ENGAGED = frozenset({Demand.KEEP, Demand.FLY, Demand.LAND, Demand.DISARM})
@@ -44,6 +49,11 @@ class FirmwareRules(Protocol):
     def mode_params(self, custom_mode: int) -> tuple[float, ...]: ...
 
     def not_fit(self) -> str: ...
+
+    def sinks_unmeasured(self) -> bool:
+        """Whether the autopilot itself keeps a setpoint's climb rate: our own height loop cannot sink by
+        measurements that no longer come."""
+        ...
 
 
 class Heard(Protocol):
@@ -70,6 +80,10 @@ class Commands(Protocol):
         self, command: int, /, *params: float, patience_s: float = ..., wanted: Callable[[], bool] = ...
     ) -> Answer: ...
 
+    def post(self, command: int, *params: float) -> None:
+        """Send once, whether anybody answers or not."""
+        ...
+
 
 class ModeArmingManager:
     """Holds the demand and pursues it while the vehicle is ours.
@@ -90,6 +104,7 @@ class ModeArmingManager:
         self._refused = ""
         self._refused_ns = 0
         self._wake = asyncio.Event()
+        self._unheard_since_ns = self._unheard_ns = self._unheard_orders = 0
 
     # What is so
 
@@ -103,6 +118,26 @@ class ModeArmingManager:
         """Whether the vehicle has not been heard for three seconds."""
         heard_ns = self._telemetry.heartbeat_ns
         return not heard_ns or self._clock.now_ns() - heard_ns > _SILENT_NS
+
+    @property
+    def lands_unheard(self) -> bool:
+        """Whether a vehicle of ours that is no longer heard has to come down: what goes up to it may still
+        arrive, and nobody else tells it to."""
+        down = self._demand in {Demand.LAND, Demand.DISARM}
+        return down and self.is_silent and self._authority.held is not None and self._telemetry.armed
+
+    @property
+    def steers_unheard(self) -> bool:
+        """Whether setpoints go out to a vehicle that lands unheard: one that a pilot has taken meanwhile
+        passes over them."""
+        flying = self._authority.held == self._firmware.flying_mode
+        return self.lands_unheard and flying and self._firmware.sinks_unmeasured()
+
+    @property
+    def lets_failsafe_act(self) -> bool:
+        """Whether nothing that was ordered unheard has helped so far: then the autopilot's own failsafe for
+        a companion that fell silent is the way down."""
+        return self.lands_unheard and self._unheard_orders >= _UNHEARD_ORDERS
 
     @property
     def in_control(self) -> bool:
@@ -197,9 +232,14 @@ class ModeArmingManager:
 
     async def _step(self, demand: Demand) -> None:
         """One step from what the vehicle does towards what is demanded.  Of a vehicle that is not heard
-        nothing is asked: the pilot may have taken it meanwhile."""
-        if demand not in _ENGAGED or self._authority.taken or self.is_silent:
+        nothing is asked but to come down."""
+        if demand not in _ENGAGED or self._authority.taken:
             return
+        if self.is_silent:
+            if self.lands_unheard:
+                self._land_unheard()
+            return
+        self._unheard_since_ns = self._unheard_orders = 0
         firmware, held, armed = self._firmware, self._authority.held, self._telemetry.armed
         takes_over = demand is Demand.FLY or (demand is Demand.KEEP and held is None)
         problem = firmware.not_fit() if takes_over else ""
@@ -221,6 +261,28 @@ class ModeArmingManager:
                 await self._ask("disarming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
             case _:
                 pass
+
+    def _land_unheard(self) -> None:
+        """Bring down a vehicle that may hear us: by setpoints first, where they can sink it, for they brake
+        its drift by the pictures; then order the landing by every command there is, again and again.
+
+        A pilot may have taken it meanwhile, unheard: setpoints are passed over then, and after the first
+        orders there is time between them in which he keeps it.
+        """
+        now_ns = self._clock.now_ns()
+        since_ns = self._unheard_since_ns = self._unheard_since_ns or now_ns
+        if self.steers_unheard and now_ns - since_ns < _OWN_DESCENT_NS:
+            return
+        pause_ns = _UNHEARD_PAUSE_NS if self._unheard_orders < _UNHEARD_ORDERS else _UNHEARD_AGAIN_NS
+        if self._unheard_orders and now_ns - self._unheard_ns < pause_ns:
+            return
+        self._unheard_ns = now_ns
+        self._unheard_orders += 1
+        firmware = self._firmware
+        if self._authority.held != firmware.landing_mode:  # heard again in it, it is still ours
+            self._authority.ask(firmware.landing_mode, self._telemetry.custom_mode)
+        self._commander.post(dialect.MAV_CMD_DO_SET_MODE, *firmware.mode_params(firmware.landing_mode))
+        self._commander.post(dialect.MAV_CMD_NAV_LAND)
 
     async def _ask_mode(self, mode: int) -> None:
         firmware, demand = self._firmware, self._demand

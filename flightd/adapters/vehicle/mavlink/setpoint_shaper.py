@@ -37,7 +37,8 @@ class SetpointShaper:
     def heading_rad(self, setpoint: AttitudeSetpoint, now_ns: int) -> float | None:
         """The heading for a setpoint that goes out now; None when none may."""
         yaw_rad = self._measured.yaw_rad
-        if not self._pursuit.may_steer or yaw_rad is None:
+        may_steer = self._pursuit.may_steer or self._pursuit.steers_unheard
+        if not may_steer or yaw_rad is None:
             self._heading.release()
             self.height.release()
             return None

@@ -106,6 +106,7 @@ class MavlinkVehicle(abc.ABC):
         self._commander = Commander(self.link, system_id)
         self._pursuit = ModeArmingManager(self, self._commander, self._telemetry, clock)
         self._steering = SetpointShaper(self._pursuit, self._telemetry)
+        self.link.may_beat = lambda: not self._pursuit.lets_failsafe_act
         self.streams = StreamKeeper(self._commander, clock, self.rates_hz)
         self.parameters = Parameters(self.link, system_id, bytewise=self.firmware is Firmware.PX4)
         self._texts = TextAssembler()
@@ -190,6 +191,10 @@ class MavlinkVehicle(abc.ABC):
     @abc.abstractmethod
     def mode_params(self, custom_mode: int) -> tuple[float, ...]:
         """Parameters of DO_SET_MODE."""
+
+    def sinks_unmeasured(self) -> bool:
+        """Whether the autopilot itself keeps a setpoint's climb rate; not where our own height loop does."""
+        return False
 
     @abc.abstractmethod
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:

@@ -56,6 +56,14 @@ class SdkCommander:
             return Answer(_RESULTS.get(name, int(dialect.MAV_RESULT_FAILED)))
         return Answer(int(dialect.MAV_RESULT_ACCEPTED))
 
+    def post(self, command: int, *params: float) -> None:
+        """Send once, whether anybody answers or not.  A change of mode is not: its number is the library's,
+        and NAV_LAND asks for the same landing."""
+        if self._library is None or self._plugins is None or command == dialect.MAV_CMD_DO_SET_MODE:
+            return
+        message = self._library.command_message(command, *params)
+        self._library.begin(self._plugins.direct.send_message(message))
+
     def _call_for(
         self, plugins: Plugins, command: int, params: tuple[float, ...]
     ) -> Coroutine[Any, Any, Any] | None:

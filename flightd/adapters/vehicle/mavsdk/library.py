@@ -102,10 +102,14 @@ class Library:
     async def call(self, work: Coroutine[Any, Any, T]) -> T:
         """Await a call into the library.  A cancelled caller leaves the call to finish by itself: its
         thread cannot be stopped, and the library must not be taken down under it."""
+        return await asyncio.shield(self.begin(work))
+
+    def begin(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
+        """Start a call into the library that nobody may wait for."""
         task = asyncio.ensure_future(work)
         self._calls.add(task)
         task.add_done_callback(self._forget)
-        return await asyncio.shield(task)
+        return task
 
     async def command(self, command: int, *params: float) -> Answer:
         """COMMAND_LONG with its acknowledgement; the library repeats it."""

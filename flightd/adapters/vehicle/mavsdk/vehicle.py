@@ -186,6 +186,10 @@ class MavsdkVehicle:
         """Why the vehicle must not be flown by us, or an empty text."""
         return self._unfit
 
+    def sinks_unmeasured(self) -> bool:
+        """PX4 takes raw thrust, which our own height loop makes of measured climb rates."""
+        return False
+
     # Listening
 
     async def _look_at(self, plugins: Plugins) -> None:

@@ -16,7 +16,7 @@ from flightd.ports import Clock
 
 _LOG = logging.getLogger(__name__)
 
-_HEARTBEAT_S = 1.0
+_HEARTBEAT_S = 0.5
 _BACKOFF_S = (0.5, 1.0, 2.0, 5.0)
 _PARSERS_MAX = 16
 _LATE_MAX, _LATE_RUN_MAX = 64, 16
@@ -62,6 +62,8 @@ class MavlinkLink:
         self._late = 0
         self._heard_ns = -2 * _PEER_SILENT_NS
         self.system_status = dialect.MAV_STATE_STANDBY
+        self.may_beat: Callable[[], bool] = lambda: True
+        """Whether our HEARTBEAT goes out: without it the autopilot's failsafe for a lost companion acts."""
         self.firmware: Firmware | None = None
         self.sent = 0
         self.dropped = 0
@@ -99,18 +101,20 @@ class MavlinkLink:
             self._transport.close()
 
     async def _beat(self) -> None:
-        """Our HEARTBEAT once a second while the connection stands."""
+        """Our HEARTBEAT twice a second while the connection stands: a failsafe of two seconds on the
+        autopilot's side bears three lost ones."""
         while not self._lost.is_set():
-            self.send(
-                dialect.MAVLink_heartbeat_message(
-                    dialect.MAV_TYPE_ONBOARD_CONTROLLER,
-                    dialect.MAV_AUTOPILOT_INVALID,
-                    0,
-                    0,
-                    self.system_status,
-                    3,
+            if self.may_beat():
+                self.send(
+                    dialect.MAVLink_heartbeat_message(
+                        dialect.MAV_TYPE_ONBOARD_CONTROLLER,
+                        dialect.MAV_AUTOPILOT_INVALID,
+                        0,
+                        0,
+                        self.system_status,
+                        3,
+                    )
                 )
-            )
             try:
                 async with asyncio.timeout(_HEARTBEAT_S):
                     await self._lost.wait()

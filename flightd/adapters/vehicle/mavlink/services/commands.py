@@ -114,6 +114,10 @@ class Commander:
         finally:
             self._waiting.pop(command, None)
 
+    def post(self, command: int, *params: float) -> None:
+        """Send once, whether anybody answers or not."""
+        self._post(command, 0, params)
+
     def _post(self, command: int, confirmation: int, params: tuple[float, ...]) -> None:
         filled = [*params, *[0.0] * (7 - len(params))]
         target = dialect.MAV_COMP_ID_AUTOPILOT1
