@@ -43,6 +43,7 @@ async def examine(config: VehicleConfig, clock: Clock, agreed: Collection[str] =
     InputError for a wrong address or signing key."""
     signing = signing_of(config, clock)
     job = Job(
+        system_id=config.system_id,
         guided=config.flying_mode == "guided",
         raw_thrust=config.raw_thrust,
         shares_pose=config.shares_pose,

@@ -138,7 +138,9 @@ ardupilot_rig = partial(mavlink_rig, ArduCopterPeer, ArduPilotVehicle, CopterMod
 px4_rig = partial(mavlink_rig, Px4Peer, Px4Vehicle, Px4Mode.ALTCTL)
 mavsdk_rig = partial(mavlink_rig, Px4Peer, MavsdkVehicle, Px4Mode.ALTCTL)
 
-_RAW_THRUST = PeerConfig(ready_s=0.5, parameters={"GUID_OPTIONS": 8})
+_PATIENT: dict[str, float] = {"FS_GCS_TIMEOUT": 6.5}
+_PATIENT_COPTER = PeerConfig(ready_s=0.5, parameters=_PATIENT)
+_RAW_THRUST = PeerConfig(ready_s=0.5, parameters={"GUID_OPTIONS": 8, **_PATIENT})
 _PATIENT_PX4 = PeerConfig(ready_s=0.5, parameters={"COM_OF_LOSS_T": 6.5})
 """It waits through the contract's radio gap; what it does by default has its own tests."""
 
@@ -168,7 +170,7 @@ async def ardrone_rig(**settings: Any) -> AsyncIterator[Rig]:
 
 
 RIGS: dict[str, Callable[[], Any]] = {
-    "ardupilot": ardupilot_rig,
+    "ardupilot": partial(ardupilot_rig, _PATIENT_COPTER),
     "ardupilot raw thrust": partial(ardupilot_rig, _RAW_THRUST),
     "px4": partial(px4_rig, _PATIENT_PX4),
     "mavsdk": partial(mavsdk_rig, _PATIENT_PX4),

@@ -93,8 +93,19 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.TELEMETRY_LOST,
         "newest attitude older than `mission.telemetry_land_s`",
         Action.LAND,
-        "braked or level as before, the autopilot's own landing is asked for; given up 60 s later",
+        "down by setpoints, braked by the pictures, where the autopilot keeps their climb rate; then, or else at"
+        " once, its own landing is ordered unheard, again and again; given up 60 s later",
         _FAST,
+    ),
+    Hazard(
+        "companion_dead",
+        None,
+        "the autopilot hears neither heartbeats nor setpoints of this computer",
+        Action.LAND,
+        "level after half a second, then the autopilot lands by itself (ArduPilot: `FS_GCS_ENABLE`,"
+        " `FS_GCS_TIMEOUT`, `SYSID_MYGCS`; PX4: `COM_OF_LOSS_T`, `COM_OBL_RC_ACT`); without these nothing is"
+        " armed",
+        "tests/protocol/mavlink/test_companion_dead.py",
     ),
     Hazard(
         "heartbeat_lost",

@@ -228,6 +228,9 @@ class AutopilotPeer(abc.ABC):
     def _setpoint(self, message: Message) -> None:
         """Take a SET_ATTITUDE_TARGET that is addressed to this system."""
 
+    def _client_beat(self, system_id: int) -> None:  # noqa: B027 - PX4 goes by the setpoints alone
+        """Take the HEARTBEAT of somebody on the link."""
+
     def _hold_climb(self, dt_s: float, climb_mps: float) -> float:
         """The collective by which the autopilot's own height loop keeps a climb rate."""
         sensors = self.sensors
@@ -299,6 +302,8 @@ class AutopilotPeer(abc.ABC):
                 self._answer(channel, message, now_ns)
             case "SET_ATTITUDE_TARGET":
                 self._setpoint(message)
+            case "HEARTBEAT":
+                self._client_beat(message.get_srcSystem())
             case "SET_MODE":
                 self._set_mode(message.custom_mode)
             case "TIMESYNC" if message.tc1 == 0:

@@ -22,6 +22,8 @@ from flightd.sim.plant.airframe import Airframe, AirframeCommand
 _THRUST_IS_COLLECTIVE = 8
 _IDLE_COLLECTIVE = 0.05
 _LAND_DETECT_S = 1.0
+_GCS_LAND = 5
+"""FS_GCS_ENABLE: land."""
 _FORCE = 21196
 
 
@@ -70,6 +72,7 @@ class ArduCopterPeer(AutopilotPeer):
         self._idle_s = 0.0
         self._settled_s = 0.0
         self._low_battery_told = False
+        self._client_silent_s: float | None = None
 
     def reboot(self) -> None:
         super().reboot()
@@ -163,11 +166,16 @@ class ArduCopterPeer(AutopilotPeer):
         if self.mode in _GUIDED:
             self._target.take(message)
 
+    def _client_beat(self, system_id: int) -> None:
+        if system_id == self.parameters["SYSID_MYGCS"]:
+            self._client_silent_s = 0.0
+
     # Flight code
 
     def _control(self, dt_s: float) -> AirframeCommand:
         self._target.step(dt_s, max(0.1, self.parameters["GUID_TIMEOUT"]))
         self._watch_battery()
+        self._watch_client(dt_s)
         if not self.armed:
             return AirframeCommand()
         roll, pitch, yaw, yaw_rate, climb_mps = self._wishes(dt_s)
@@ -224,6 +232,17 @@ class ArduCopterPeer(AutopilotPeer):
         if self._settled_s >= _LAND_DETECT_S:
             self.landed = True
             self._settled_s = 0.0
+
+    def _watch_client(self, dt_s: float) -> None:
+        """The failsafe for the ground station: once the system it watches was heard and has fallen silent."""
+        if self._client_silent_s is None:
+            return
+        before_s, self._client_silent_s = self._client_silent_s, self._client_silent_s + dt_s
+        limit_s = self.parameters["FS_GCS_TIMEOUT"]
+        if self.armed and before_s <= limit_s < self._client_silent_s:
+            self.say(dialect.MAV_SEVERITY_WARNING, "GCS Failsafe")
+            if self.parameters["FS_GCS_ENABLE"] == _GCS_LAND:
+                self._set_mode(CopterMode.LAND)
 
     def _watch_battery(self) -> None:
         if self._low_battery_told or not self.armed:

@@ -12,7 +12,7 @@ from flightd.sim.autopilot.link import Message
 
 COPTER_PARAMETERS: dict[str, float] = {
     "SYSID_THISMAV": 1,
-    "SYSID_MYGCS": 255,
+    "SYSID_MYGCS": 1,
     "AHRS_EKF_TYPE": 3,
     "EK2_ENABLE": 0,
     "EK3_ENABLE": 1,
@@ -30,8 +30,8 @@ COPTER_PARAMETERS: dict[str, float] = {
     "ARMING_CHECK": 1,
     "DISARM_DELAY": 10,
     "FS_THR_ENABLE": 1,
-    "FS_GCS_ENABLE": 0,
-    "FS_GCS_TIMEOUT": 5,
+    "FS_GCS_ENABLE": 5,
+    "FS_GCS_TIMEOUT": 2,
     "FS_EKF_ACTION": 1,
     "FS_EKF_THRESH": 0.8,
     "RC_OPTIONS": 32,

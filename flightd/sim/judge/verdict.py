@@ -65,9 +65,10 @@ def judge(
     off_m = max(corridor.nearest(t.x_m, t.y_m).distance_m for t in flying)
     outcome = _outcome(site, after[-1] if after else None, truth[-1])
     wrongs = []
-    if found_s is None or found_s > expected.found_s:
+    if row.trigger is not None and (found_s is None or found_s > expected.found_s):
         wrongs.append("not found" if found_s is None else f"found later than {expected.found_s:g} s")
-    if (phase := PHASE_OF.get(row.action)) is not None and phase not in after:
+    phase = PHASE_OF.get(row.action) if row.trigger is not None else None
+    if phase is not None and phase not in after:
         wrongs.append(f"never in {phase.value}")
     if outcome != expected.ends:
         wrongs.append(f"{outcome} instead of {expected.ends}")

@@ -83,10 +83,11 @@ class BareFloor(_Fault):
 
 
 class LinkFault(_Fault):
-    """What the autopilot tells no longer arrives: nothing at all, or no heartbeats."""
+    """What the autopilot tells no longer arrives (nothing at all, or no heartbeats); or nothing passes either
+    way, as when the companion computer is dead."""
 
     by_vehicle = True
-    kind: Literal["telemetry_silent", "heartbeat_silent"]
+    kind: Literal["telemetry_silent", "heartbeat_silent", "companion_dead"]
 
 
 class AttitudeBiased(_Fault):

@@ -188,6 +188,8 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
     match fault:
         case LinkFault(kind="telemetry_silent"):
             vehicle.link.down.params = RadioParams(loss=1.0) if on else vehicle.link.up.params
+        case LinkFault(kind="companion_dead"):
+            vehicle.link.muted = on
         case LinkFault():
             heartbeat = {dialect.MAVLINK_MSG_ID_HEARTBEAT}
             vehicle.link.withheld = vehicle.link.withheld | heartbeat if on else set()

@@ -34,7 +34,14 @@ class ScriptedAutopilot:
         self.link = UdpLink(system_id, component_id, self._received)
         self.heard: list[tuple[float, Any]] = []
         self.results: dict[int, list[int | None] | int | None] = {}
-        self.parameters: dict[str, float] = {"GUID_OPTIONS": 0, "WPNAV_SPEED_UP": 250, "WPNAV_SPEED_DN": 150}
+        self.parameters: dict[str, float] = {
+            "GUID_OPTIONS": 0,
+            "WPNAV_SPEED_UP": 250,
+            "WPNAV_SPEED_DN": 150,
+            "FS_GCS_ENABLE": 5,
+            "FS_GCS_TIMEOUT": 2,
+            "SYSID_MYGCS": 1,
+        }
         self.mode, self.armed, self.autopilot, self.kind = 0, False, ARDUPILOT, 2
         self.obeys = True
         self.after: Callable[[Any], None] = lambda message: None

@@ -50,6 +50,10 @@ class FirmwareRules(Protocol):
 
     def not_fit(self) -> str: ...
 
+    def no_way_down(self) -> str:
+        """Why the vehicle would stay in the air if this computer died, or an empty text."""
+        ...
+
     def sinks_unmeasured(self) -> bool:
         """Whether the autopilot itself keeps a setpoint's climb rate: our own height loop cannot sink by
         measurements that no longer come."""
@@ -243,6 +247,8 @@ class ModeArmingManager:
         firmware, held, armed = self._firmware, self._authority.held, self._telemetry.armed
         takes_over = demand is Demand.FLY or (demand is Demand.KEEP and held is None)
         problem = firmware.not_fit() if takes_over else ""
+        if demand is Demand.FLY and not armed:  # one that flies already is looked after all the same
+            problem = problem or firmware.no_way_down()
         match demand:
             case Demand.FLY | Demand.KEEP if problem:
                 self._refuse(problem)

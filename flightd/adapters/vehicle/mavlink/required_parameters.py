@@ -26,8 +26,10 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What the daemon is configured to ask of the autopilot beyond flight by attitude."""
+    """What the daemon is configured to ask of the autopilot beyond flight by attitude.  `system_id` is the
+    vehicle's, which this computer bears as well."""
 
+    system_id: int = 1
     guided: bool = False
     """ArduCopter flies in GUIDED, which wants an estimate of its motion."""
     raw_thrust: bool | None = None
@@ -88,10 +90,17 @@ _ARDUPILOT: tuple[Rule, ...] = (
     ),
     Rule(
         ("FS_GCS_ENABLE",),
-        _one_of(0, 5),
-        "0 (off) or 5 (land)",
-        "a return to launch needs a position",
-        0,
+        _one_of(5),
+        "5 (land)",
+        "else nothing lands the vehicle when this computer dies in flight",
+        5,
+    ),
+    Rule(
+        ("FS_GCS_TIMEOUT",),
+        _within(1.5, 3.0),
+        "1.5 to 3 s",
+        "so long it hovers without anybody before it lands by itself",
+        2,
     ),
     Rule(
         ("FS_THR_ENABLE",),
@@ -158,7 +167,8 @@ _PX4: tuple[Rule, ...] = (
         ("COM_OBL_RC_ACT",),
         _one_of(4),
         "4 (land)",
-        "the default, Position, cannot be held without a position",
+        "else nothing lands the vehicle when this computer dies: the default, Position, cannot be held"
+        " without a position",
         4,
     ),
     Rule(
@@ -235,6 +245,16 @@ def _guid_options(raw: bool) -> Rule:
     )
 
 
+def _supervised(system_id: int) -> Rule:
+    return Rule(
+        ("SYSID_MYGCS", "MAV_GCS_SYSID"),
+        _one_of(system_id),
+        f"{system_id} (vehicle.system_id)",
+        "FS_GCS_ENABLE watches the heartbeats of that system, which must be this computer's",
+        system_id,
+    )
+
+
 RULES: dict[Firmware, tuple[Rule, ...]] = {Firmware.ARDUPILOT: _ARDUPILOT, Firmware.PX4: _PX4}
 
 
@@ -242,6 +262,7 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
     """The firmware's table, with the rules that the job adds or makes stricter in their places."""
     extra: tuple[Rule, ...] = ()
     if firmware is Firmware.ARDUPILOT:
+        extra += (_supervised(job.system_id),)
         if job.guided:
             extra += _ARDUPILOT_GUIDED
         if job.raw_thrust is not None:
@@ -255,6 +276,15 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
     stricter = {rule.names: rule for rule in extra}
     table = [stricter.pop(rule.names, rule) for rule in RULES[firmware]]
     return (*table, *stricter.values())
+
+
+_WAY_DOWN = frozenset({"FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "SYSID_MYGCS", "COM_OBL_RC_ACT", "COM_OF_LOSS_T"})
+
+
+def way_down_rules(firmware: Firmware, system_id: int) -> tuple[Rule, ...]:
+    """What must be so before a flight begins: the autopilot itself lands when this computer dies."""
+    table = rules_for(firmware, Job(system_id))
+    return tuple(rule for rule in table if _WAY_DOWN.intersection(rule.names))
 
 
 def judge(rule: Rule, found: tuple[str, float] | None) -> ParameterFinding | None:

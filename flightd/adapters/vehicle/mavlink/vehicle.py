@@ -19,6 +19,7 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
+from flightd.adapters.vehicle.mavlink.required_parameters import judge, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, Beats, too_slow
@@ -111,6 +112,7 @@ class MavlinkVehicle(abc.ABC):
         self.parameters = Parameters(self.link, system_id, bytewise=self.firmware is Firmware.PX4)
         self._texts = TextAssembler()
         self._text_id = 0
+        self._way_down = way_down_rules(self.firmware, system_id)
         self._heard = asyncio.Event()
         self._beats = Beats(_BEATS_WINDOW_S)
 
@@ -192,6 +194,16 @@ class MavlinkVehicle(abc.ABC):
     def mode_params(self, custom_mode: int) -> tuple[float, ...]:
         """Parameters of DO_SET_MODE."""
 
+    def no_way_down(self) -> str:
+        """Why the vehicle would stay in the air if this computer died, or an empty text."""
+        for rule in self._way_down:
+            found = self.parameters.get(rule.names)
+            if found is None:
+                return f"{rule.names[0]} not read yet"
+            if finding := judge(rule, found):
+                return f"{finding} (flightd doctor --fix sets it)"
+        return ""
+
     def sinks_unmeasured(self) -> bool:
         """Whether the autopilot itself keeps a setpoint's climb rate; not where our own height loop does."""
         return False
@@ -253,7 +265,8 @@ class MavlinkVehicle(abc.ABC):
         await work()
 
     async def _read_parameters(self) -> None:
-        await self.parameters.keep(self.parameter_names, self.required_names)
+        way_down = tuple(rule.names for rule in self._way_down)
+        await self.parameters.keep((*self.parameter_names, *way_down), self.required_names)
 
     async def _mind_beats(self) -> None:
         """Tell people once, when the heartbeats stay too far apart to see a take-over in time."""

@@ -186,6 +186,10 @@ class MavsdkVehicle:
         """Why the vehicle must not be flown by us, or an empty text."""
         return self._unfit
 
+    def no_way_down(self) -> str:
+        """The library tells no parameters: `flightd doctor` looks at them."""
+        return ""
+
     def sinks_unmeasured(self) -> bool:
         """PX4 takes raw thrust, which our own height loop makes of measured climb rates."""
         return False

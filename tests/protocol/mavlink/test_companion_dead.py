@@ -1,0 +1,50 @@
+"""A vehicle whose companion computer dies in the air is landed by its autopilot; without that nothing is armed."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from flightd.core.types import Demand
+from flightd.sim.autopilot.autopilot import PeerConfig
+from tests.protocol.rig import ardupilot_rig, px4_rig, run_virtual
+
+
+@pytest.mark.parametrize("make", [ardupilot_rig, px4_rig], ids=["ardupilot", "px4"])
+def test_it_lands_and_disarms_by_itself(make: Callable[[], Any]) -> None:
+    async def test() -> None:
+        async with make() as rig:
+            await rig.take_off()
+            rig.cut(True)
+            await rig.until(lambda: not rig.peer.armed, 15.0)
+            assert rig.peer.truth().height_m < 0.15
+
+    run_virtual(test)
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "value"),
+    [
+        (ardupilot_rig, "FS_GCS_ENABLE", 0.0),
+        (ardupilot_rig, "FS_GCS_TIMEOUT", 30.0),
+        (ardupilot_rig, "SYSID_MYGCS", 255.0),
+        (px4_rig, "COM_OBL_RC_ACT", 0),
+        (px4_rig, "COM_OF_LOSS_T", 20.0),
+    ],
+)
+def test_nothing_is_armed_that_would_stay_in_the_air(
+    make: Callable[[PeerConfig], Any], name: str, value: float
+) -> None:
+    async def test() -> None:
+        async with make(PeerConfig(ready_s=0.5, parameters={name: value})) as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            rig.vehicle.demand(Demand.FLY)
+            await asyncio.sleep(6.0)
+            assert not rig.known().armed
+            assert name in rig.known().refusal
+            assert "flightd doctor --fix" in rig.known().refusal
+
+    run_virtual(test)
