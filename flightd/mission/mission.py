@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from flightd.config.hazards import LossAction
+from flightd.config.schema import Config
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, Phase
 from flightd.mission.battery.swap import BatterySwap
 from flightd.mission.event_log import EventLog
 from flightd.mission.flight.phase_progress import PhaseProgress
 from flightd.mission.flight.reference import ReferenceGenerator, ReferenceTask
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.guidance import Guidance, LossAction, MissionInputs, MissionParams
+from flightd.mission.guidance import CEILING_MARGIN_M, Guidance, MissionInputs
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
@@ -41,25 +43,27 @@ _STOPPED = (Phase.HOLD, Phase.RELOCATE, Phase.ACQUIRE)
 class Mission:
     """One flight of one plan: call `step` at a fixed rate, `drain_events` for what happened.
 
-    With a `scanner` the locations of each visited node are counted instead of a plain hover."""
+    With a `scanner` the locations of each visited node are counted instead of a plain hover; `overhead_m` are
+    the heights below the keep-outs (`Site.overhead_m`)."""
 
     def __init__(
         self,
         site: Site,
         plan: FlightPlan,
         policy: HeadingPolicy,
-        params: MissionParams,
+        params: Config,
         scanner: Scanner | None = None,
+        overhead_m: Sequence[float] = (),
     ) -> None:
         start = site.nodes[plan.start]
         self._params = params
         self._scanner = scanner
         self._events = EventLog()
         self._route = Itinerary(site, plan, policy, self._events)
-        self._scan = ScanPhase(site, scanner, params, policy)
+        self._scan = ScanPhase(site, scanner, params.mission, policy)
         self._progress = PhaseProgress(params, self._route, self._scan)
         self._watch = HazardMonitor(params)
-        self._relocator = Relocator(params)
+        self._relocator = Relocator(params.mission, site.ceiling_m - CEILING_MARGIN_M, overhead_m)
         self._steering = ReferenceGenerator(
             params, site.ceiling_m, self._watch, self._relocator, (start.x_m, start.y_m, plan.start_yaw_rad)
         )
@@ -72,7 +76,7 @@ class Mission:
         self._leg_along_x: bool | None = None
         self._stopped = False
         self._ground_lost = False
-        self._started = params.autostart
+        self._started = params.mission.autostart
         self._found_flying = False
         self._ordered: Trigger | None = None
 
@@ -183,7 +187,7 @@ class Mission:
 
     def _ground(self, s: MissionInputs) -> set[Trigger]:
         """What a lost ground link asks for, by the configured action; the link's return ends a hold."""
-        action = self._params.ground_lost
+        action = self._params.ground.lost_action
         lost = self._watch.ground_lost(s)
         if lost is not self._ground_lost:
             self._ground_lost = lost
@@ -193,11 +197,14 @@ class Mission:
 
     def _adopting(self, s: MissionInputs) -> bool:
         """A vehicle found flying is given a moment to show that it obeys."""
-        return self.phase is Phase.RECOVER and self._progress.phase_s(s.now_ns) < self._params.adopt_s
+        return (
+            self.phase is Phase.RECOVER
+            and self._progress.phase_s(s.now_ns) < self._params.mission.expert.adopt_s
+        )
 
     def _grounded(self, s: MissionInputs) -> str:
         """Why it stays on the ground, or an empty text."""
-        silent = self._ground_lost and self._params.ground_lost is not LossAction.CONTINUE
+        silent = self._ground_lost and self._params.ground.lost_action is not LossAction.CONTINUE
         stale = not_fresh(s, self._params, len(self.remaining)) if self.phase is Phase.SWAP else ""
         return stale or not_ready(s, self._params, silent)
 
@@ -241,7 +248,7 @@ class Mission:
         if phase is Phase.SWAP:
             self._steering.anchor = (self.goal.x_m, self.goal.y_m)
             self._charging.await_battery(s.now_ns)
-            self._aborting, self._started = False, self._params.autostart
+            self._aborting, self._started = False, self._params.mission.autostart
         if phase is Phase.TAKE_OFF:
             self._steering.take_off(s.height_m)
         if phase is Phase.RECOVER and s.vehicle is not None:

@@ -16,13 +16,13 @@ from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.detection.detector_pool import Detection
 from flightd.app.simulation.ports import free_port
 from flightd.config.schema import Config, load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.types import Command, CommandKind, Demand, Phase, Status
 from flightd.ports import Monitor
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.sim.autopilot.copter import CopterMode
+from flightd.site.site_file import load_site
 from tests.protocol.rig import Rig, ardupilot_rig, run_virtual
 
 ROOT = Path(__file__).parents[2]

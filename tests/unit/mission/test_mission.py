@@ -8,6 +8,9 @@ from dataclasses import replace
 
 import pytest
 
+from flightd.config.mission import Heading
+from flightd.config.scan import ScanConfig
+from flightd.config.schema import Config
 from flightd.core.types import (
     Attitude,
     Command,
@@ -19,14 +22,14 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.guidance import Guidance, Guide, MissionInputs, MissionParams
+from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.mission import Mission
-from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
 from flightd.mission.scan.scanner import Scanner
-from flightd.mission.scan.views import ScanParams
 from flightd.sim.random_sites import random_site
 from flightd.site.site import Site
 from tests.unit.mission import shelves
+from tests.unit.mission.configured import configured
 
 SITE = random_site(3)
 POLICY = HeadingPolicy(Heading.ALONG)
@@ -37,11 +40,11 @@ class Flight:
     """Feeds a mission with senses: by default all is well and the drone is wherever the mission wants."""
 
     def __init__(
-        self, params: MissionParams | None = None, site: Site = SITE, scanner: Scanner | None = None
+        self, params: Config | None = None, site: Site = SITE, scanner: Scanner | None = None
     ) -> None:
         home = site.home.node
         plan = make_plan(site, site.serpentine_route(), home, home, POLICY)
-        self.mission = Mission(site, plan, POLICY, params or MissionParams(dwell_s=1.0), scanner)
+        self.mission = Mission(site, plan, POLICY, params or configured(dwell_s=1.0), scanner)
         self.site = site
         self.integrity = 1.0
         self.now_ns = 10**12
@@ -126,7 +129,7 @@ def test_a_flight_where_all_is_well_visits_everything() -> None:
 
 
 def test_on_the_ground_only_a_hazard_that_decides_something_is_told() -> None:
-    flight = Flight(MissionParams(autostart=False))
+    flight = Flight(configured(autostart=False))
     flight.set(localised=False, x_age_s=60.0, y_age_s=60.0)
     flight.run(2.0)
     assert not [event for event in flight.mission.drain_events() if event.name == "hazard"]
@@ -145,7 +148,7 @@ def test_on_the_ground_only_a_hazard_that_decides_something_is_told() -> None:
 
 
 def test_a_position_lost_between_two_flights_does_not_shift_the_second_one() -> None:
-    relocator = Relocator(MissionParams())
+    relocator = Relocator(configured().mission, math.inf, ())
     flight = Flight()
     flight.to(Phase.FOLLOW)
     sure = flight.senses
@@ -239,7 +242,7 @@ def test_lines_that_only_flicker_end_in_a_landing() -> None:
 
 
 def test_a_view_lost_at_height_is_borne_as_long_as_any_however_long_the_climb_saw_no_line() -> None:
-    flight = Flight(MissionParams(climb_mps=0.2))
+    flight = Flight(configured(climb_mps=0.2))
     flight.set(x_age_s=60.0, y_age_s=60.0)
     flight.to(Phase.TAKE_OFF)
     flight.run(60.0, lambda: flight.senses.height_m > 1.35)
@@ -264,14 +267,14 @@ def test_on_a_leg_other_lines_do_not_stand_in_for_the_one_followed() -> None:
 
 def test_a_long_leg_is_given_its_time() -> None:
     """Ten times as long as the slack that every phase has."""
-    flight = Flight(MissionParams(dwell_s=0.0, speed_mps=0.1, accel_mps2=0.5, phase_slack_s=3.0))
+    flight = Flight(configured(dwell_s=0.0, speed_mps=0.1, accel_mps2=0.5, expert={"phase_slack_s": 3.0}))
     flight.to(Phase.LAND, 1200)
     assert flight.mission.reason == "route done"
 
 
 @pytest.mark.parametrize("kind", [CommandKind.STOP, CommandKind.LAND])
 def test_an_order_to_end_before_the_start_never_arms(kind: CommandKind) -> None:
-    flight = Flight(MissionParams(autostart=False))
+    flight = Flight(configured(autostart=False))
     flight.run(0.2)
     flight.order(kind)
     flight.order(CommandKind.START)
@@ -285,7 +288,7 @@ def test_an_order_to_end_before_the_start_never_arms(kind: CommandKind) -> None:
 
 
 def test_low_battery_flies_home_even_when_paused_and_without_dwelling() -> None:
-    flight = Flight(MissionParams(dwell_s=500.0))
+    flight = Flight(configured(dwell_s=500.0))
     flight.to(Phase.FOLLOW)
     flight.order(CommandKind.PAUSE)
     flight.run(2.0)
@@ -297,7 +300,7 @@ def test_low_battery_flies_home_even_when_paused_and_without_dwelling() -> None:
 
 
 def test_home_is_refused_on_the_floor() -> None:
-    flight = Flight(MissionParams(autostart=False))
+    flight = Flight(configured(autostart=False))
     flight.run(0.1)
     flight.order(CommandKind.HOME)
     flight.order(CommandKind.START)
@@ -306,8 +309,8 @@ def test_home_is_refused_on_the_floor() -> None:
 
 
 def test_a_moment_of_doubt_as_a_view_ends_does_not_hold_the_scan_for_ever() -> None:
-    scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanParams(max_height_m=4.0, view_s=2.0, retakes=0))
-    flight = Flight(MissionParams(view_height_m=0.15), shelves.SITE, scanner)
+    scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanConfig(max_height_m=4.0, view_s=2.0, retakes=0))
+    flight = Flight(configured(expert={"view_height_m": 0.15}), shelves.SITE, scanner)
     flight.to(Phase.SCAN)
     first = scanner.view
     flight.run(1.9)

@@ -7,9 +7,10 @@ import math
 
 import pytest
 
+from flightd.config.mission import Heading
 from flightd.core.errors import InputError
 from flightd.core.types import Phase
-from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
 from flightd.mission.safety.hazards import Action, triggers_of
 from flightd.mission.transition_table import next_phase
 from flightd.mission.triggers import Trigger
