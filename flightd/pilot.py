@@ -9,24 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from flightd.config.schema import Config
 from flightd.control.flight_controller import FlightController, Motion
 from flightd.control.limits import Limiter, Surroundings
-from flightd.core.scanning import CodeSet, Finding, Place, Settled
+from flightd.core.scanning import Place
+from flightd.core.tick import TICK_S, TickInput, TickOutput
+from flightd.core.tracks import TrackSet
 from flightd.core.types import (
-    HEALTHY,
-    Attitude,
     AttitudeSetpoint,
-    Command,
-    Demand,
-    Event,
     GridPose,
-    Health,
-    LineSet,
     Phase,
-    VehicleState,
 )
 from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.localisation.pad_finder import PadFinder
@@ -40,50 +34,10 @@ from flightd.site.site import Site
 from flightd.tracking.attitude_extrapolation import AttitudeExtrapolation
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.height_history import HeightHistory
-from flightd.tracking.line_tracker import LineTracker, TrackSet
-
-TICK_S = 0.02
-"""Period of the control tick."""
+from flightd.tracking.line_tracker import LineTracker
 
 _FRAMES_ARRIVE_S = 0.5
 _TOUCHDOWN_S = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class TickInput:
-    """What arrived since the last tick, oldest first.  `vehicle` is the newest state, None until there
-    is one; `ground_silent_s` the time since an attending ground station was heard, 0 if none attends;
-    `counted` names locations that an earlier flight of the same count has booked."""
-
-    now_ns: int
-    lines: tuple[LineSet, ...] = ()
-    vehicle: VehicleState | None = None
-    attitudes: tuple[Attitude, ...] = ()
-    commands: tuple[Command, ...] = ()
-    ground_silent_s: float = 0.0
-    codes: tuple[CodeSet, ...] = ()
-    counted: tuple[str, ...] = ()
-    health: Health = HEALTHY
-
-
-@dataclass(frozen=True, slots=True)
-class TickOutput:
-    """What goes out.  `setpoint` is None when nothing may be sent (hands off, or not flying).
-
-    `findings` are pending until a later `settled` names their locations."""
-
-    setpoint: AttitudeSetpoint | None
-    demand: Demand
-    phase: Phase
-    reason: str
-    goal: str
-    visited: int
-    planned: int
-    pose: GridPose | None
-    tracks: TrackSet | None
-    events: tuple[Event, ...] = field(default=())
-    findings: tuple[Finding, ...] = ()
-    settled: tuple[Settled, ...] = ()
 
 
 class Pilot:

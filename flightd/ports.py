@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from flightd.core.inventory import LocationRecord, Observation, PlannedLocation
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -18,7 +19,6 @@ from flightd.core.types import (
     Status,
     VehicleState,
 )
-from flightd.pilot import TickInput, TickOutput
 
 
 class Clock(Protocol):

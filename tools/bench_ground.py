@@ -29,8 +29,8 @@ from flightd.adapters.ground_link.keys import load_pair, load_public, make_keys
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.config.ground import GroundConfig
 from flightd.core.errors import FlightdError
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import CommandKind, Demand, Phase, Status
-from flightd.pilot import TickInput, TickOutput
 from flightd.runtime.clock import LoopClock
 from flightd.site.site_file import load_site
 

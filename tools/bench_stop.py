@@ -27,8 +27,9 @@ from flightd.adapters.ground_link.link import ZmqGround
 from flightd.app.setpoint_pump import SetpointPump
 from flightd.config.ground import GroundConfig
 from flightd.config.schema import load_config
+from flightd.core.tick import TickInput
 from flightd.core.types import Attitude, AttitudeSetpoint, CommandKind, Demand, Event, Phase, VehicleState
-from flightd.pilot import Pilot, TickInput
+from flightd.pilot import Pilot
 from flightd.runtime.clock import LoopClock
 from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import IdealFlight

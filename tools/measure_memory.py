@@ -24,9 +24,9 @@ from flightd.app.build import pilot_of
 from flightd.app.detection.detector_pool import Detection
 from flightd.app.detection.latency import LatencyBook
 from flightd.config.schema import load_config
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
 from flightd.core.types import LineSet, Status
-from flightd.pilot import TickInput, TickOutput
 from flightd.ports import Vitals
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.site.site_file import load_site

@@ -23,9 +23,9 @@ from flightd.app.publishers import TelemetryPublishers
 from flightd.app.setpoint_pump import SetpointPump
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, TransientError, UnavailableError
+from flightd.core.tick import TICK_S, TickInput, TickOutput
 from flightd.core.topics import Topic
 from flightd.core.types import AttitudeSetpoint, Command, CommandKind, Health, Phase, Status
-from flightd.pilot import TICK_S, TickInput, TickOutput
 from flightd.ports import Camera, Clock, CountsDrops, Ground, Monitor, PoseTaker, Recorder, Vehicle, Vitals
 from flightd.runtime.supervisor import restarted
 from flightd.site.site import Site

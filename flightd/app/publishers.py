@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
 from flightd.core.types import Event, EventLevel, Phase, Status
-from flightd.pilot import TickInput, TickOutput
 from flightd.ports import Ground, Monitor, Recorder, Vehicle, Vitals
 
 _STATUS_NS = 100_000_000

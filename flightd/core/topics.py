@@ -22,8 +22,8 @@ from flightd.core.types import (
 class Topic(enum.StrEnum):
     """Names of the streams in `flight.mcap`; TRUTH, SCENARIO and FAULT are in the simulator's `truth.mcap`.
 
-    TICK and DECISION are all that the pilot was given and all that it answered (`pilot.TickInput`,
-    `pilot.TickOutput`), so that a flight can be replayed; the others are for people and their tools.
+    TICK and DECISION are all that the pilot was given and all that it answered (`core.tick.TickInput`,
+    `core.tick.TickOutput`), so that a flight can be replayed; the others are for people and their tools.
     """
 
     LINES = "/lines"

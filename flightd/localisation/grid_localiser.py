@@ -27,6 +27,7 @@ import numpy as np
 
 from flightd.config.localisation import LocalisationConfig
 from flightd.core.camera_view import FloorReach
+from flightd.core.tracks import TrackedLine, TrackSet
 from flightd.core.types import GridPose
 from flightd.localisation.hypotheses import Places
 from flightd.localisation.junction_landmarks import Landmark, LandmarkBook
@@ -42,8 +43,6 @@ from flightd.localisation.safe_moves import Reach
 from flightd.site.nearest_node import NodeIndex
 from flightd.site.painted_lines import PaintMap
 from flightd.site.site import Site
-from flightd.tracking.axis_filters import TrackedLine
-from flightd.tracking.line_tracker import TrackSet
 
 _MIN_HITS = 3
 _ENDS_ALONG_X = (1, 4)

@@ -15,8 +15,8 @@ import msgspec
 import numpy as np
 
 from flightd.core.errors import InputError
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
-from flightd.pilot import TickInput, TickOutput
 from flightd.replay.log import FlightLog, with_nan
 
 Step: TypeAlias = Callable[[TickInput], TickOutput]

@@ -16,6 +16,7 @@ import numpy as np
 
 from flightd.config.tracking import MotionNoise
 from flightd.core.geometry import Matrix
+from flightd.core.tracks import TrackedLine
 from flightd.tracking.kalman import KalmanFilter
 
 _GATE_SIGMAS = 4.0
@@ -23,21 +24,6 @@ _UNSEEN_S = 0.1
 """An axis without a line for so long is reckoned: the gust that was last felt on it fades."""
 _BIAS_GAIN, _BIASED = 0.25, 0.6
 """Innovations whose running mean is beyond this, in sigmas, all err to one side: the wind has changed."""
-
-
-@dataclass(frozen=True, slots=True)
-class TrackedLine:
-    """One line across an axis: `offset_m` from the drone along the axis, at the time of the set.  When
-    last seen it was in view from `from_m` to `to_m` along itself, from the drone; equal where unknown."""
-
-    id: int
-    offset_m: float
-    sigma_m: float
-    width_m: float
-    seen_ns: int
-    hits: int
-    from_m: float = 0.0
-    to_m: float = 0.0
 
 
 class LineMeasurement(NamedTuple):

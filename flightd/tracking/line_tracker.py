@@ -9,22 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from statistics import median
 from typing import TypeVar
 
 from flightd.config.control import TiltCompensation
 from flightd.config.tracking import TrackingConfig
 from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount, wrap_pi
+from flightd.core.tracks import FloorJunction, MarkerOffset, PadOffset, TrackedLine, TrackSet
 from flightd.core.types import Attitude, LineSet, MarkerSight, PadSight
 from flightd.tracking.attitude_history import AttitudeHistory
-from flightd.tracking.axis_filters import (
-    AxisTracker,
-    HeadingTracker,
-    LineMeasurement,
-    TrackedLine,
-)
-from flightd.tracking.ground_junctions import FloorJunction, floor_junctions
+from flightd.tracking.axis_filters import AxisTracker, HeadingTracker, LineMeasurement
+from flightd.tracking.ground_junctions import floor_junctions
 from flightd.tracking.tilt_compensation import (
     FloorView,
     GroundLine,
@@ -41,55 +37,6 @@ _SAME_RAD = math.radians(3.0)
 _DISPUTE_NS, _SHOWN_NS = 600_000_000, 1_500_000_000
 _DEFAULTS = TrackingConfig()
 _Square = TypeVar("_Square", PadSight, MarkerSight)
-
-
-@dataclass(frozen=True, slots=True)
-class PadOffset:
-    """A pad on the floor: its centre from the drone in grid axes, and the length of its sides."""
-
-    x_m: float
-    y_m: float
-    side_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class MarkerOffset:
-    """A floor marker: its centre from the drone in grid axes, and the length of its sides."""
-
-    id: int
-    x_m: float
-    y_m: float
-    side_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class TrackSet:
-    """The tracks at one time, in grid axes (x along the aisles, y to the right of x).
-
-    `across_x` are the lines that cross the x axis (parallel to y), offsets in x; `across_y` the others.
-    `lines_ns` is the capture time of the newest frame in which any line was taken; `junctions` and
-    `markers` are those of the newest frame, taken at `junctions_ns`; `push` is the acceleration that no
-    lean explains, as far as it is expected to last.
-    """
-
-    stamp_ns: int
-    lines_ns: int
-    yaw_rad: float
-    yaw_sigma_rad: float
-    vx_mps: float
-    vy_mps: float
-    ax_mps2: float
-    ay_mps2: float
-    across_x: tuple[TrackedLine, ...]
-    across_y: tuple[TrackedLine, ...]
-    pads: tuple[PadOffset, ...] = ()
-    pads_ns: int = 0
-    """Capture time of the frame in which the `pads` were seen."""
-    junctions: tuple[FloorJunction, ...] = ()
-    junctions_ns: int = 0
-    push_x_mps2: float = 0.0
-    push_y_mps2: float = 0.0
-    markers: tuple[MarkerOffset, ...] = ()
 
 
 class LineTracker:

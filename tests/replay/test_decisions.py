@@ -13,9 +13,9 @@ from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.app.build import pilot_of
 from flightd.config.schema import Config, load_config
 from flightd.core.errors import InputError
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Document, Topic
 from flightd.core.types import AttitudeSetpoint, Phase
-from flightd.pilot import TickInput, TickOutput
 from flightd.replay.decision_compare import replay_decisions
 from flightd.replay.log import read_log
 from flightd.site.site import Site

@@ -17,14 +17,12 @@ from dataclasses import dataclass, replace
 
 from flightd.config.localisation import LocalisationConfig
 from flightd.core.camera_view import FloorReach
+from flightd.core.tracks import FloorJunction, TrackedLine, TrackSet
 from flightd.core.types import GridPose
 from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.sim.random_sites import random_site
 from flightd.site.painted_lines import PaintMap
 from flightd.site.site import PaintedLine, Site
-from flightd.tracking.axis_filters import TrackedLine
-from flightd.tracking.ground_junctions import FloorJunction
-from flightd.tracking.line_tracker import TrackSet
 
 STEP_S = 0.06
 SURE = 0.95

@@ -14,6 +14,7 @@ from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.keys import load_pair, load_public, make_keys
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.config.ground import GroundConfig
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import (
     Attitude,
     Demand,
@@ -25,7 +26,6 @@ from flightd.core.types import (
     Status,
     VehicleState,
 )
-from flightd.pilot import TickInput, TickOutput
 from flightd.runtime.clock import LoopClock
 from flightd.site.site_file import load_site
 

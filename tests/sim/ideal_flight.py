@@ -11,6 +11,7 @@ from flightd.config.mission import Heading
 from flightd.config.schema import Config
 from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import CodeSet
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import (
     HEALTHY,
     Attitude,
@@ -27,7 +28,7 @@ from flightd.core.types import (
 )
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
 from flightd.mission.scan.scanner import Scanner
-from flightd.pilot import Pilot, TickInput, TickOutput
+from flightd.pilot import Pilot
 from flightd.sim.autopilot.climb_loop import ClimbLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
 from flightd.sim.plant.kinematics import Kinematics

@@ -10,8 +10,8 @@ import pytest
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import load_config
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import Phase
-from flightd.pilot import TickInput, TickOutput
 from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import Flown, IdealFlight
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from flightd.config.schema import load_config
+from flightd.core.tracks import TrackSet
 from flightd.core.types import Phase
 from flightd.mission.scan.scanner import Scanner
 from flightd.site.site_file import parse_site
-from flightd.tracking.line_tracker import TrackSet
 from tests.sim.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import SIGHT

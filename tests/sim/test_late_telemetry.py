@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from flightd.config.schema import load_config
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import Attitude, Phase, VehicleState
-from flightd.pilot import TickInput, TickOutput
 from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import IdealFlight
 

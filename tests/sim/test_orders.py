@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from flightd.config.schema import load_config
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import Command, CommandKind, Demand, Phase
-from flightd.pilot import TickInput, TickOutput
 from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import Flown, IdealFlight
 

@@ -9,8 +9,8 @@ import pytest
 
 from flightd.config.battery import BatteryConfig
 from flightd.config.schema import Config, load_config
+from flightd.core.tick import TickOutput
 from flightd.core.types import Command, CommandKind, Phase
-from flightd.pilot import TickOutput
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.plant.pad_crew import PadCrew
 from flightd.site.site_file import load_site, parse_site, site_toml

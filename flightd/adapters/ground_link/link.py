@@ -32,8 +32,8 @@ from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
 from flightd.adapters.ground_link.status_report import status_report
 from flightd.config.ground import GroundConfig
 from flightd.core.errors import TransientError, UnavailableError
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import Command, Event, Status
-from flightd.pilot import TickInput, TickOutput
 from flightd.ports import Clock
 from flightd.site.site import Site
 

@@ -13,9 +13,9 @@ from flightd.adapters.ground_link.protocol import (
     VehicleReport,
     finite,
 )
+from flightd.core.tick import TickInput, TickOutput
+from flightd.core.tracks import TrackSet
 from flightd.core.types import GridPose, Status, VehicleState
-from flightd.pilot import TickInput, TickOutput
-from flightd.tracking.line_tracker import TrackSet
 
 
 def status_report(

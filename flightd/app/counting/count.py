@@ -8,7 +8,7 @@ from typing import Any
 from flightd.app.counting.code_readers import Readers, ShelfWatch
 from flightd.app.counting.store_writer import StoreWriter
 from flightd.core.scanning import CodeSet, Finding, Place
-from flightd.pilot import TickOutput
+from flightd.core.tick import TickOutput
 from flightd.runtime.frame_ring import FrameTicket
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 from flightd.config.schema import Config
+from flightd.core.tracks import TrackSet
 from flightd.core.types import GridPose, Health
 from flightd.mission.guidance import Guidance, Guide, Warnings
 from flightd.site.corridor import Corridor
 from flightd.site.site import Site
 from flightd.tracking.frame_monitor import FrameMonitor
-from flightd.tracking.line_tracker import LineTracker, TrackSet
+from flightd.tracking.line_tracker import LineTracker
 
 _TICK_MEMORY_S = 1.0
 _PUSH_MEMORY_S = 2.0

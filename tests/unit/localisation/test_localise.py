@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flightd.core.camera_view import FloorReach
+from flightd.core.tracks import TrackedLine, TrackSet
 from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.sim.random_sites import random_site
-from flightd.tracking.axis_filters import TrackedLine
-from flightd.tracking.line_tracker import TrackSet
 
 SITE = random_site(3)
 A1, A2 = SITE.nodes["A1"], SITE.nodes["A2"]

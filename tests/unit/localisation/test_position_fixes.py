@@ -5,14 +5,13 @@ from __future__ import annotations
 from flightd.config.localisation import LocalisationConfig, LocalisationExpert
 from flightd.core.camera_view import FloorReach
 from flightd.core.markers import MarkerDictionary
+from flightd.core.tracks import MarkerOffset, PadOffset, TrackedLine, TrackSet
 from flightd.core.types import GridPose
 from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.localisation.position_fixes import FixBook
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, Marker, Pad, Site
 from flightd.site.site_file import parse_site
-from flightd.tracking.axis_filters import TrackedLine
-from flightd.tracking.line_tracker import MarkerOffset, PadOffset, TrackSet
 
 TICK_NS = 20_000_000
 HEIGHT_M = 1.2
