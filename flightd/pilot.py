@@ -44,7 +44,7 @@ class Pilot:
     """The whole flying state of one mission.
 
     `overhead_m` are the heights below the keep-outs, also of those that `site` leaves out because the
-    flight's own heights pass them by."""
+    flight's own heights pass them by; `autostart` is the order's, None: the configuration's."""
 
     def __init__(
         self,
@@ -54,12 +54,14 @@ class Pilot:
         config: Config,
         scanner: Scanner | None = None,
         overhead_m: Sequence[float] = (),
+        *,
+        autostart: bool | None = None,
     ) -> None:
         self._config = config
         self._plan = plan
         self._site = site
         self._scanner = scanner
-        self._mission = Mission(site, plan, policy, config, scanner, overhead_m)
+        self._mission = Mission(site, plan, policy, config, scanner, overhead_m, autostart=autostart)
         self._begin()
         self._heights = HeightHistory()
         self._control = FlightController(config.control)
@@ -78,9 +80,9 @@ class Pilot:
         return self._mission
 
     @property
-    def scans(self) -> bool:
-        """Whether this flight counts shelves."""
-        return self._scanner is not None
+    def planned(self) -> int:
+        """Nodes that the plan visits."""
+        return self._plan.visits
 
     @property
     def exposure(self) -> float:
@@ -128,7 +130,7 @@ class Pilot:
             reason=mission.reason,
             goal=mission.goal.node,
             visited=len(mission.visited),
-            planned=self._plan.visits,
+            planned=self.planned,
             pose=pose,
             tracks=tracks,
             events=mission.drain_events(),

@@ -24,10 +24,10 @@ from flightd.app.build import pilot_of
 from flightd.app.detection.detector_pool import Detection
 from flightd.app.detection.latency import LatencyBook
 from flightd.config.schema import load_config
+from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
-from flightd.core.types import LineSet, Status
-from flightd.ports import Vitals
+from flightd.core.types import LineSet
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import IdealFlight
@@ -59,15 +59,11 @@ class Watched:
         self._recorder.record(Topic.TICK, tick.now_ns, tick)
         self._recorder.record(Topic.DECISION, tick.now_ns, output)
         if self.ticks % 5 == 0:
-            self._book.tell(self._vitals(tick, output))
+            latencies_ms = self._latency.drain()
+            self._book.tell(
+                Snapshot(tick, output, fps=30.0, tick_late_s=(0.001,) * 5, latencies_ms=latencies_ms)
+            )
         return output
-
-    def _vitals(self, tick: TickInput, output: TickOutput) -> Vitals:
-        status = Status(
-            tick.now_ns, output.phase, output.reason, "", output.goal, 0, 0, 0.5, 1.5, 0, 0, 30.0, {}
-        )
-        late_s, latencies = (0.001,) * 5, self._latency.drain()
-        return Vitals(status, tick.vehicle, 0.0, late_s, latencies, {"recorder": 0}, {}, 0)
 
 
 def main() -> None:

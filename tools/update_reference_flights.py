@@ -105,7 +105,7 @@ def keep(reference: Reference, log: Path, to: Path) -> None:
 
 def _beginning(log: Path, seconds: float) -> Iterator[Entry]:
     """Configuration, map, the ticks and decisions of so many seconds, the last picture and its lines."""
-    wanted = {Topic.CONFIG, Topic.MAP, Topic.TICK, Topic.DECISION, Topic.LINES, Topic.FRAME}
+    wanted = {Topic.CONFIG, Topic.MAP, Topic.ORDER, Topic.TICK, Topic.DECISION, Topic.LINES, Topic.FRAME}
     entries = read_log(log, wanted).entries
     end_ns = min(entry.stamp_ns for entry in entries if entry.topic == Topic.TICK) + round(seconds * 1e9)
     seen = {entry.stamp_ns for entry in entries if entry.topic == Topic.LINES}

@@ -158,7 +158,7 @@ def _check_ground(config: Config, site: Site, clock: Clock) -> list[Check]:
     from flightd.doctor.check import error, ok
 
     ground = config.ground
-    link = ground_link(config, site, clock)
+    link = ground_link(config.ground, site, clock)
     if link is None:
         return []
     try:

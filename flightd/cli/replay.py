@@ -5,19 +5,16 @@ from __future__ import annotations
 import json
 import math
 import sys
-import tomllib
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flightd.core.errors import InputError, RunError
+from flightd.core.errors import RunError
 
 if TYPE_CHECKING:
-    from flightd.config.schema import Config
     from flightd.replay.decision_compare import Comparison
-    from flightd.replay.log import FlightLog
 
 
 def register(app: typer.Typer) -> None:
@@ -47,17 +44,16 @@ def replay(
     flightd replay out/flight.mcap --tolerance 1e-6 --json
     """
     from flightd.app.build import detector_of, pilot_of
+    from flightd.app.recording import SETTING_TOPICS, recorded_setting
     from flightd.core.topics import Topic
     from flightd.replay.decision_compare import replay_decisions
     from flightd.replay.log import read_log
     from flightd.replay.perception_compare import replay_pictures
-    from flightd.site.site_file import parse_site
 
-    recorded = read_log(log, {Topic.TICK, Topic.DECISION, Topic.CONFIG, Topic.MAP})
-    config = _config(recorded)
-    site = parse_site(_document(recorded, Topic.MAP), f"{log} (map)")
-    decisions = replay_decisions(recorded, pilot_of(config, site).step)
-    seen = replay_pictures(log, detector_of(config, site)().detect)
+    recorded = read_log(log, {Topic.TICK, Topic.DECISION, *SETTING_TOPICS})
+    flown = recorded_setting(recorded)
+    decisions = replay_decisions(recorded, pilot_of(flown.config, flown.site, flown.order).step)
+    seen = replay_pictures(log, detector_of(flown.config, flown.site)().detect)
     passed = decisions.within(tolerance) and seen.within(pixels)
     if as_json:
         print(json.dumps(_told(decisions) | {"pictures": asdict(seen), "passed": passed}))
@@ -77,28 +73,6 @@ def _complaint(decisions: Comparison, tolerance: float) -> str:
     if not decisions.within(tolerance):
         return f"{decisions.differing} of {decisions.ticks} decisions drift"
     return "the pictures are seen differently"
-
-
-def _config(log: FlightLog) -> Config:
-    """The configuration of the flight."""
-    from flightd.config.schema import recorded_config
-    from flightd.core.topics import Topic
-
-    text = _document(log, Topic.CONFIG)
-    try:
-        table = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
-    except ValueError as err:
-        raise InputError(f"{log.path}: its configuration cannot be read ({err})") from None
-    return recorded_config(table, log.path)
-
-
-def _document(log: FlightLog, topic: str) -> str:
-    from flightd.core.topics import Document
-
-    documents = log.messages(Document, topic)
-    if not documents:
-        raise InputError(f"{log.path}: holds no {topic.strip('/')}, so it cannot be replayed")
-    return documents[-1].text
 
 
 def _told(comparison: Comparison) -> dict[str, Any]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, fields, replace
-from typing import Any
+from dataclasses import asdict, replace
 
 from rich.console import Console
 from rich.table import Table
 
 from flightd.app.simulation.launch import Simulation, fly
+from flightd.app.simulation.summary import kinematics_of
 from flightd.cli.flight_progress import FlightProgress
 from flightd.core.errors import RunError
 from flightd.core.topics import Topic
@@ -19,7 +19,6 @@ from flightd.core.types import Event, Status
 from flightd.mission.safety.hazards import HAZARDS
 from flightd.replay.log import read_log
 from flightd.sim.judge.verdict import ScenarioVerdict, judge
-from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.scenario.scenario import Scenario
 from flightd.sim.scenario.scenario_files import load_scenario, shipped_scenarios
 
@@ -72,13 +71,8 @@ def verdict_of(simulation: Simulation, name: str) -> ScenarioVerdict:
         [note["stamp_ns"] for topic, note in told if topic == Topic.FAULT and note["began"]],
         flight.messages(Status),
         flight.messages(Event),
-        [_kinematics(message) for topic, message in told if topic == Topic.TRUTH],
+        kinematics_of([entry for entry in truth if entry.topic == Topic.TRUTH]),
     )
-
-
-def _kinematics(message: dict[str, Any]) -> Kinematics:
-    """Viewers' fields stand beside the truth's own."""
-    return Kinematics(**{field.name: message[field.name] for field in fields(Kinematics)})
 
 
 def _print(rows: Sequence[tuple[ScenarioVerdict, str]]) -> None:

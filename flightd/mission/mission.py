@@ -44,7 +44,8 @@ class Mission:
     """One flight of one plan: call `step` at a fixed rate, `drain_events` for what happened.
 
     With a `scanner` the locations of each visited node are counted instead of a plain hover; `overhead_m` are
-    the heights below the keep-outs (`Site.overhead_m`)."""
+    the heights below the keep-outs (`Site.overhead_m`); with `autostart` (None: as configured) it waits for
+    no start command."""
 
     def __init__(
         self,
@@ -54,6 +55,8 @@ class Mission:
         params: Config,
         scanner: Scanner | None = None,
         overhead_m: Sequence[float] = (),
+        *,
+        autostart: bool | None = None,
     ) -> None:
         start = site.nodes[plan.start]
         self._params = params
@@ -76,7 +79,8 @@ class Mission:
         self._leg_along_x: bool | None = None
         self._stopped = False
         self._ground_lost = False
-        self._started = params.mission.autostart
+        self._autostart = params.mission.autostart if autostart is None else autostart
+        self._started = self._autostart
         self._found_flying = False
         self._ordered: Trigger | None = None
 
@@ -248,7 +252,7 @@ class Mission:
         if phase is Phase.SWAP:
             self._steering.anchor = (self.goal.x_m, self.goal.y_m)
             self._charging.await_battery(s.now_ns)
-            self._aborting, self._started = False, self._params.mission.autostart
+            self._aborting, self._started = False, self._autostart
         if phase is Phase.TAKE_OFF:
             self._steering.take_off(s.height_m)
         if phase is Phase.RECOVER and s.vehicle is not None:

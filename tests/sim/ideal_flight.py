@@ -5,13 +5,18 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 
+from flightd.app.absent_parts import NO_CAMERA, NO_PROGRESS, keep_pose
+from flightd.app.flight import Flight
+from flightd.app.publishers import TelemetryPublishers
+from flightd.app.tick import Tick
 from flightd.config.mission import Heading
 from flightd.config.schema import Config
 from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import CodeSet
-from flightd.core.tick import TickInput, TickOutput
+from flightd.core.tick import TickOutput
 from flightd.core.types import (
     HEALTHY,
     Attitude,
@@ -37,6 +42,14 @@ from flightd.sim.plant.wind import Draught
 from flightd.sim.sensors.instruments import Sensors
 from flightd.site.site import Site
 from tests.sim.ideal_front import IdealFront
+from tests.sim.ideal_ports import (
+    HeldSetpoint,
+    IdealCount,
+    IdealGround,
+    IdealRecorder,
+    IdealVehicle,
+    IdealVision,
+)
 from tests.sim.ideal_sight import EyeErrors, IdealEye
 
 STEP_NS = 5_000_000
@@ -134,51 +147,60 @@ class IdealFlight:
         self.counted: tuple[str, ...] = ()
         self.on_tick: Callable[[Phase, int], None] = lambda _phase, _now_ns: None
 
+    def now_ns(self) -> int:
+        """`ports.Clock`."""
+        return self._now_ns
+
+    def hold(self) -> AbstractContextManager[None]:
+        """`ports.Clock`."""
+        return nullcontext()
+
+    def _composed(self, vehicle: IdealVehicle, vision: IdealVision, setpoints: HeldSetpoint) -> Flight:
+        """The daemon's own tick flies it, with these behind its ports."""
+        recorder = IdealRecorder(lambda: self.faults.health)
+        ground = IdealGround(self._take_commands, lambda: self.ground_silent_s)
+        return Flight(
+            clock=self,
+            pilot=self.pilot,
+            vehicle=vehicle,
+            setpoints=setpoints,
+            camera=NO_CAMERA,
+            front_camera=NO_CAMERA,
+            vision=vision,
+            counting=IdealCount(self._codes, self._take_counted),
+            recorder=recorder,
+            ground=ground,
+            progress=NO_PROGRESS,
+            publishers=TelemetryPublishers(self, vehicle, recorder, ground),
+            share_pose=keep_pose,
+        )
+
     def fly(self, limit_s: float = 600.0) -> Flown:
         flown = Flown()
-        late: deque[tuple[int, LineSet]] = deque()
-        attitudes: list[Attitude] = []
-        setpoint: AttitudeSetpoint | None = None
+        vehicle = IdealVehicle(self._state, self._obey)
+        vision, setpoints = IdealVision(lambda: self.faults.health), HeldSetpoint()
+        tick = Tick(self._composed(vehicle, vision, setpoints))
         frame_ns = tick_ns = self._now_ns
         seq = 0
         end_ns = self._now_ns + round(limit_s * 1e9)
         self.sensors.update(STEP_NS * 1e-9, self.airframe)
         while self._now_ns < end_ns:
             self._now_ns += STEP_NS
-            self._step(setpoint)
+            self._step(setpoints.newest)
             if self._now_ns % 10_000_000 == 0 and not self.faults.silent:
-                attitudes.append(self._attitude())
+                vehicle.samples.append(self._attitude())
             if self._now_ns >= frame_ns:
                 frame_ns += FRAME_NS
                 seq += 1
                 if not self.faults.blind:
                     due_ns = self._now_ns + self._delay_ns + self.faults.late_ns
-                    late.append((due_ns, self._see(seq)))
+                    vision.put(due_ns, self._see(seq))
             self._photograph()
             if self._now_ns >= tick_ns:
                 tick_ns += TICK_NS
-                lines = []
-                while late and late[0][0] <= self._now_ns:
-                    lines.append(late.popleft()[1])
                 if self._crew is not None:
                     self._crew.look(self._now_ns)
-                orders, self.commands = tuple(self.commands), []
-                output = self.pilot.step(
-                    TickInput(
-                        self._now_ns,
-                        tuple(lines),
-                        self._state(),
-                        tuple(attitudes),
-                        orders,
-                        ground_silent_s=self.ground_silent_s,
-                        codes=self._codes(),
-                        counted=self._take_counted(),
-                        health=self.faults.health,
-                    )
-                )
-                attitudes = []
-                setpoint = output.setpoint
-                self._obey(output.demand)
+                output = tick.run(self._now_ns)
                 self.on_tick(output.phase, self._now_ns)
                 flown.outputs.append(output)
                 flown.events.extend(output.events)
@@ -202,6 +224,10 @@ class IdealFlight:
             if places:
                 seen = self._front.see(then, places, then.stamp_ns)
                 self._looked.append((self._now_ns + READING_NS, seen))
+
+    def _take_commands(self) -> list[Command]:
+        orders, self.commands = self.commands, []
+        return orders
 
     def _take_counted(self) -> tuple[str, ...]:
         counted, self.counted = self.counted, ()

@@ -17,7 +17,8 @@ from flightd.app.build import detector_pool
 from flightd.app.detection.detector_pool import DetectorPool
 from flightd.app.simulation import launch as simulate
 from flightd.config.schema import Config, load_config
-from flightd.core.types import Phase, Status
+from flightd.core.snapshot import Snapshot
+from flightd.core.types import Phase
 from flightd.sim.scenario.scenario import Scenario
 from flightd.site.site_file import load_site
 from tests.command import Command
@@ -141,7 +142,7 @@ def test_detectors_killed_in_flight_are_replaced_and_the_mission_completes(
         pools.append(make(*args))
         return pools[-1]
 
-    def kill_once(status: Status) -> None:
+    def kill_once(status: Snapshot) -> None:
         if status.phase is Phase.FOLLOW and status.goal == "A2" and not pools[0].replaced:
             for pid in pools[0].pids:
                 os.kill(pid, signal.SIGKILL)

@@ -13,8 +13,8 @@ import pytest
 
 from flightd.adapters.camera.shared_memory import SharedCamera
 from flightd.app.simulation.launch import Simulation, truth_of
-from flightd.app.simulation.ports import free_port, has_front_camera
-from flightd.cli.sim import _camera_keys, _configured
+from flightd.app.simulation.ports import free_port
+from flightd.app.simulation.simulator_config import simulator_config
 from flightd.config.schema import Config
 from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
@@ -123,9 +123,7 @@ def test_a_camera_without_any_delay_takes_pictures() -> None:
 
 
 def configured(site: Path, *settings: str, scenario: Scenario = Scenario()) -> Config:  # noqa: B008
-    config, _ = _configured(None, str(site), None, settings, _camera_keys(scenario))
-    assert isinstance(config, Config)
-    return config
+    return simulator_config(None, str(site), scenario, settings)[0]
 
 
 def test_the_daemon_is_given_the_simulated_cameras_calibration() -> None:
@@ -137,12 +135,11 @@ def test_the_daemon_is_given_the_simulated_cameras_calibration() -> None:
 
 
 def test_there_is_a_front_camera_where_there_are_racks_or_one_is_asked_for() -> None:
-    demo = load_site(CONFIGS / "site-large.toml")
-    small = load_site(SMALL)
-    assert has_front_camera(configured(SMALL), small)
-    assert not has_front_camera(configured(SMALL), demo)
-    assert has_front_camera(configured(SMALL, "front_camera.url=udp://127.0.0.1:5601"), demo)
-    assert not has_front_camera(configured(SMALL, "vehicle.kind=ardrone"), small)
+    bare = CONFIGS / "site-large.toml"
+    assert configured(SMALL).front_camera.is_fitted
+    assert not configured(bare).front_camera.is_fitted
+    assert configured(bare, "front_camera.url=udp://127.0.0.1:5601").front_camera.is_fitted
+    assert not configured(SMALL, "vehicle.kind=ardrone").front_camera.is_fitted
 
 
 def test_the_truth_of_a_simulation_is_that_of_its_scenario_and_seed(tmp_path: Path) -> None:

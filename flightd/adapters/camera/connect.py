@@ -25,18 +25,21 @@ def connect_camera(
     on_frame: Callable[[FrameTicket], None],
     on_trouble: Callable[[str], None],
     vehicle: Vehicle | None = None,
+    url: str | None = None,
 ) -> Camera:
     """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address.
 
-    `on_trouble` hears, now and then, in a line for a person, why pictures are refused."""
-    if config.url == ARDRONE_URL:
+    `on_trouble` hears, now and then, in a line for a person, why pictures are refused.
+    `url` is where its pictures come from, unless that is the configuration's."""
+    url = config.url if url is None else url
+    if url == ARDRONE_URL:
         if isinstance(config, FrontCameraConfig):
             raise InputError(f"front_camera.url {ARDRONE_URL!r}: the AR.Drone sends one camera at a time")
         if not isinstance(vehicle, ArDroneVehicle):
             raise InputError(f'camera.url {ARDRONE_URL!r} needs vehicle.kind = "ardrone"')
         return ArDroneCamera(vehicle, config.latency_s, clock, {DroneCamera.DOWN: on_frame})
-    if config.url.startswith("udp:"):
+    if url.startswith("udp:"):
         size_px = config.width_px, config.height_px
-        return SharedCamera(config.url, size_px, config.latency_s, clock, on_frame, on_trouble)
-    source = parse_source(config.url, config.width_px, config.height_px, config.fps)
+        return SharedCamera(url, size_px, config.latency_s, clock, on_frame, on_trouble)
+    source = parse_source(url, config.width_px, config.height_px, config.fps)
     return CaptureCamera(source, config.latency_s, clock, on_frame)

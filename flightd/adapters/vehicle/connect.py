@@ -17,33 +17,37 @@ from flightd.core.errors import InputError
 from flightd.ports import Clock, Vehicle
 
 
-def connect_vehicle(config: VehicleConfig, clock: Clock, limits: ControlConfig | None = None) -> Vehicle:
+def connect_vehicle(
+    config: VehicleConfig, clock: Clock, limits: ControlConfig | None = None, *, url: str | None = None
+) -> Vehicle:
     """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address or a
     signing key that cannot be used.
 
     `limits` are those of the setpoints: an AR.Drone's own are set to them, for it takes shares of its own.
+    `url` is where the vehicle is reached, unless that is the configuration's.
     """
+    url = config.url if url is None else url
     match config.kind:
         case "ardupilot":
             mode = GUIDED if config.flying_mode == "guided" else GUIDED_NOGPS
-            return ArduPilotVehicle(config.url, clock, _options(config, clock), flying_mode=mode)
+            return ArduPilotVehicle(url, clock, _options(config, clock), flying_mode=mode)
         case "px4":
-            return Px4Vehicle(config.url, clock, _options(config, clock))
+            return Px4Vehicle(url, clock, _options(config, clock))
         case "ardrone":
-            return ArDroneVehicle(settings_of(config.url, limits), clock)
+            return ArDroneVehicle(settings_of(url, limits), clock)
         case "mavsdk":
-            return _mavsdk_vehicle(config, clock)
+            return _mavsdk_vehicle(url, config, clock)
     raise InputError(f"vehicle.kind {config.kind}: no such adapter")
 
 
-def _mavsdk_vehicle(config: VehicleConfig, clock: Clock) -> Vehicle:
+def _mavsdk_vehicle(url: str, config: VehicleConfig, clock: Clock) -> Vehicle:
     """The library is an extra, and 19 MB that nobody else has to load."""
     try:
         from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle  # noqa: PLC0415
     except ImportError as err:
         text = f"vehicle.kind mavsdk: {err}; install the library: pip install 'flightd[mavsdk]'"
         raise InputError(text) from err
-    return MavsdkVehicle(config.url, clock, config.system_id)
+    return MavsdkVehicle(url, clock, config.system_id)
 
 
 def signing_of(config: VehicleConfig, clock: Clock) -> Signing | None:

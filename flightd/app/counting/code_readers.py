@@ -52,7 +52,7 @@ class ShelfWatch:
 
     def __init__(self, readers: Readers, places: Callable[[int], tuple[Place, ...]]) -> None:
         self._readers = readers
-        self._places = places
+        self.places = places
         self._sets: list[CodeSet] = []
         self._evidence: OrderedDict[str, bytes] = OrderedDict()
         self.frames: Latest[FrameTicket] = Latest()
@@ -63,7 +63,7 @@ class ShelfWatch:
         """Read one picture after the other; as many of these may run as there are readers."""
         while True:
             ticket = await self.frames.get()
-            places = self._places(ticket.stamp_ns)
+            places = self.places(ticket.stamp_ns)
             if not places:
                 continue
             reading = await self._readers.read(ticket, places)

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.build import flown_between_m
-from flightd.app.counting.flight_count import going_on
+from flightd.app.flight_orders import configured_order, going_on
 from flightd.cli.main import app
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
@@ -235,13 +235,13 @@ def test_bad_stock_files_are_refused(counted: Path, tmp_path: Path, text: str, w
 def test_a_count_with_nothing_left_is_refused_on_the_ground_and_never_in_the_air(tmp_path: Path) -> None:
     site = load_site(CONFIGS / "site-racks.toml")
     config = load_config(CONFIGS / "sim.toml")
-    config = config.model_copy(update={"inventory": config.inventory.model_copy(update={"run": "monday"})})
+    order = configured_order(config)
     with SqliteStore(tmp_path) as store:
         for number, code in enumerate(site.locations):
             store.commit(Observation("monday", code, number, LocationState.EMPTY, 0.9))
     with pytest.raises(InputError, match="every location is counted"):
-        going_on(config, site, tmp_path)
-    assert going_on(config, site, tmp_path, in_air=True) is config
+        going_on(order, "monday", site, tmp_path)
+    assert going_on(order, "monday", site, tmp_path, in_air=True) is order
 
 
 def test_the_heights_flown_between_hold_the_views_of_a_tilted_front_camera() -> None:

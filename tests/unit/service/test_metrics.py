@@ -63,7 +63,7 @@ def test_before_the_first_tick_and_without_a_vehicle_it_can_be_scraped_too() -> 
 def test_a_number_that_is_none_is_told_as_such() -> None:
     book = MetricsBook()
     told = vitals(START_NS)
-    object.__setattr__(told.status, "height_m", math.inf)
+    object.__setattr__(told.output.pose, "height_m", math.inf)
     book.tell(told)
     assert math.isnan(scraped(book)["flightd_height_meters", ""])
 

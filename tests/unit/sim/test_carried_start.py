@@ -30,7 +30,7 @@ def test_the_drone_stands_where_the_scenario_carried_it(tmp_path: Path) -> None:
 
     async def start() -> Kinematics:
         with McapRecorder(tmp_path / "truth.mcap", lossless=True) as recorder:
-            spec = _spec(simulation, free_ports(config, site))
+            spec = _spec(simulation, free_ports(config))
             return World(spec, LoopClock(), recorder).vehicle.truth()
 
     loop = VirtualLoop()
