@@ -80,9 +80,9 @@ class Pilot:
         return self._mission
 
     @property
-    def planned(self) -> int:
-        """Nodes that the plan visits."""
-        return self._plan.visits
+    def plan(self) -> FlightPlan:
+        """The plan at the start of the flight."""
+        return self._plan
 
     @property
     def exposure(self) -> float:
@@ -130,7 +130,7 @@ class Pilot:
             reason=mission.reason,
             goal=mission.goal.node,
             visited=len(mission.visited),
-            planned=self.planned,
+            planned=self._plan.visits,
             pose=pose,
             tracks=tracks,
             events=mission.drain_events(),

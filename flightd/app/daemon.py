@@ -29,16 +29,22 @@ _LINGER_NS = 1_500_000_000
 
 @dataclass(slots=True)
 class FlightResult:
-    """What the daemon itself knows of a flight when it is over."""
+    """What the daemon itself knows of a flight when it is over; `visited` are the nodes in order, one to
+    which the route comes twice stands there twice."""
 
     phase: Phase
     reason: str
     visited: tuple[str, ...]
-    planned: int
+    nodes_planned: int
     frames: int
     frames_dropped: int
     latency_ms: dict[str, float]
     setpoint_interval_ms: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def nodes_done(self) -> int:
+        """Nodes visited, each counted once."""
+        return len(set(self.visited))
 
 
 class Daemon:
@@ -144,7 +150,7 @@ class Daemon:
             phase=mission.phase,
             reason=mission.reason,
             visited=tuple(mission.visited),
-            planned=flight.pilot.planned,
+            nodes_planned=flight.pilot.plan.nodes,
             frames=flight.camera.frames,
             frames_dropped=sum(flight.vision.dropped.values()),
             latency_ms=flight.vision.latency_quantiles_ms(),

@@ -70,7 +70,7 @@ class Tick:
         flight.progress.put(LeftOver(mission.remaining, *mission.stand))
 
     def _snapshot(self, tick: TickInput, output: TickOutput, late_s: float) -> Snapshot:
-        flight = self._flight
+        flight, pilot = self._flight, self._flight.pilot
         vision, dropped = flight.vision, dict(flight.vision.dropped)
         lost = sum(dropped.values())
         dropped["recorder"] = flight.recorder.dropped
@@ -79,6 +79,8 @@ class Tick:
         return Snapshot(
             tick,
             output,
+            nodes_done=len(set(pilot.mission.visited)),
+            nodes_planned=pilot.plan.nodes,
             frames=flight.camera.frames,
             frames_dropped=lost,
             fps=vision.fps,

@@ -147,8 +147,7 @@ def _check_plan(config: Config, site: Site, path: Path) -> Check:
     from flightd.app.build import plan_of
     from flightd.doctor.check import ok
 
-    nodes = len(config.mission.nodes) or len(site.nodes)
-    plan_of(config, site)
+    nodes = plan_of(config, site).nodes
     return ok("config", f"{path}: site {site.name}, {nodes} nodes to visit at {config.mission.height_m:g} m")
 
 

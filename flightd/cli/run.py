@@ -48,6 +48,6 @@ def run(
     if isinstance(result, signal.Signals):
         print(f"flightd: stopped by {result.name}; the vehicle was handed back", file=sys.stderr)
         raise typer.Exit(128 + result)
-    print(f"{result.reason}; {len(result.visited)} of {result.planned} nodes visited", file=sys.stderr)
+    print(f"{result.reason}; {result.nodes_done} of {result.nodes_planned} nodes visited", file=sys.stderr)
     if result.phase is not Phase.DONE:
         raise RunError(f"mission {result.phase}: {result.reason}")

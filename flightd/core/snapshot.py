@@ -13,17 +13,19 @@ from flightd.core.types import Phase, Status, VehicleState
 class Snapshot:
     """What the pilot was given and what it answered at one tick, and how the daemon itself does.
 
-    `frames` were delivered so far, `frames_dropped` of them never became lines, `fps` became lines in the
-    last second.  `latency_ms` are the newest frame's stages: capture, transport, detection, track, wire
-    (each from its predecessor), and total (mid-exposure to setpoint on the wire).  `tick_late_s` is how late
-    each tick came and `latencies_ms` the stages of each frame flown by, both since the last that was told.
-    The others count since the start: `dropped` what a full queue or a lost worker cost, `restarts` what died
-    and was brought back, each by the part's name; `repeated_level` the setpoints that went out because no
-    tick made one.
+    `nodes_done` of the `nodes_planned` were visited, each counted once.  `frames` were delivered so far,
+    `frames_dropped` of them never became lines, `fps` became lines in the last second.  `latency_ms` are the
+    newest frame's stages: capture, transport, detection, track, wire (each from its predecessor), and total
+    (mid-exposure to setpoint on the wire).  `tick_late_s` is how late each tick came and `latencies_ms` the
+    stages of each frame flown by, both since the last that was told.  The others count since the start:
+    `dropped` what a full queue or a lost worker cost, `restarts` what died and was brought back, each by the
+    part's name; `repeated_level` the setpoints that went out because no tick made one.
     """
 
     tick: TickInput
     output: TickOutput
+    nodes_done: int = 0
+    nodes_planned: int = 0
     frames: int = 0
     frames_dropped: int = 0
     fps: float = 0.0
@@ -54,14 +56,6 @@ class Snapshot:
     @property
     def goal(self) -> str:
         return self.output.goal
-
-    @property
-    def nodes_done(self) -> int:
-        return self.output.visited
-
-    @property
-    def nodes_planned(self) -> int:
-        return self.output.planned
 
     @property
     def vehicle(self) -> VehicleState | None:

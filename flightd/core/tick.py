@@ -45,7 +45,8 @@ class TickInput:
 class TickOutput:
     """What goes out.  `setpoint` is None when nothing may be sent (hands off, or not flying).
 
-    `findings` are pending until a later `settled` names their locations."""
+    `visited` and `planned` count visits: a node to which the route comes twice counts twice.  `findings` are
+    pending until a later `settled` names their locations."""
 
     setpoint: AttitudeSetpoint | None
     demand: Demand

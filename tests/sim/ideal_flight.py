@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 
@@ -16,6 +16,7 @@ from flightd.config.mission import Heading
 from flightd.config.schema import Config
 from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import CodeSet
+from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickOutput
 from flightd.core.types import (
     HEALTHY,
@@ -113,7 +114,9 @@ class IdealFlight:
         front: IdealFront | None = None,
         world: Site | None = None,
         carried_to: str = "",
+        observers: Sequence[Callable[[Snapshot], None]] = (),
     ) -> None:
+        self._observers = observers
         policy = policy or HeadingPolicy(Heading.ALONG)
         pad = site.home.node
         self.plan: FlightPlan = make_plan(site, visits or site.serpentine_route(), pad, pad, policy)
@@ -171,7 +174,7 @@ class IdealFlight:
             recorder=recorder,
             ground=ground,
             progress=NO_PROGRESS,
-            publishers=TelemetryPublishers(self, vehicle, recorder, ground),
+            publishers=TelemetryPublishers(self, vehicle, recorder, ground, observers=self._observers),
             share_pose=keep_pose,
         )
 

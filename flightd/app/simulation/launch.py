@@ -12,7 +12,7 @@ import math
 import multiprocessing
 import signal
 from collections.abc import Callable, Coroutine
-from contextlib import ExitStack
+from contextlib import AsyncExitStack, ExitStack
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -26,6 +26,7 @@ from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.flight import Flight
 from flightd.app.flight_orders import configured_order
 from flightd.app.recording import FlightSetting, record_setting
+from flightd.app.service import monitors
 from flightd.app.simulation.lockstep import LockstepDetectors, LockstepReaders
 from flightd.app.simulation.ports import WorldPorts, free_ports, peers_at
 from flightd.app.simulation.process_faults import LauncherFaults, needs_ground
@@ -178,7 +179,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
     peers = peers_at(ports, config)
     if simulation.truth_url:
         peers = replace(peers, vehicle=config.vehicle.url)
-    with ExitStack() as stack:
+    async with monitors(config.metrics, {}, journal=False) as watchers, AsyncExitStack() as stack:
         recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=False))
         process, pipe = _started_world(simulation, ports, factor, stack)
         pool = stack.enter_context(detector_pool(config, site, clock))
@@ -196,6 +197,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
             recorder=recorder,
             ground=ground,
             counting=counting,
+            monitors=watchers,
             observers=[simulation.observer],
             peers=peers,
         )
@@ -205,7 +207,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
 
 
 def _started_world(
-    simulation: Simulation, ports: WorldPorts, factor: float, stack: ExitStack
+    simulation: Simulation, ports: WorldPorts, factor: float, stack: AsyncExitStack
 ) -> tuple[Any, Connection]:
     """The world's process and the pipe from it; it ends when the pipe closes, however this process ends."""
     context = multiprocessing.get_context("spawn")

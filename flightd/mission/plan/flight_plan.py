@@ -52,7 +52,13 @@ class FlightPlan:
 
     @property
     def visits(self) -> int:
+        """Stops that are visits; a node may be visited twice."""
         return sum(stop.visit for stop in self.stops)
+
+    @property
+    def nodes(self) -> int:
+        """Nodes that are visited, each counted once."""
+        return len({stop.node for stop in self.stops if stop.visit})
 
 
 def make_plan(

@@ -32,6 +32,8 @@ def vitals(
     return Snapshot(
         TickInput(now_ns, vehicle=None if heard_ns is None else vehicle(heard_ns)),
         TickOutput(None, Demand.FLY, phase, reason, "A3", 1, 12, pose, None),
+        nodes_done=1,
+        nodes_planned=12,
         frames=300,
         frames_dropped=2,
         fps=fps,
