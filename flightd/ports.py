@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from contextlib import AbstractContextManager
 from typing import Protocol, runtime_checkable
 
 from flightd.core.inventory import LocationRecord, Observation, PlannedLocation
@@ -23,10 +22,6 @@ class Clock(Protocol):
     """Monotonic time of the running event loop (real, scaled or virtual)."""
 
     def now_ns(self) -> int: ...
-
-    def hold(self) -> AbstractContextManager[None]:
-        """Entered while work outside the loop is awaited: virtual time stands still, real time cannot."""
-        ...
 
 
 class Vehicle(Protocol):

@@ -17,7 +17,6 @@ import random
 import socket
 import statistics
 import struct
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -51,9 +50,6 @@ class ShiftedClock:
 
     def set(self, now_ns: int) -> None:
         self._shift_ns = now_ns - self._clock.now_ns()
-
-    def hold(self) -> AbstractContextManager[None]:
-        return self._clock.hold()
 
 
 class UdpVehicle:

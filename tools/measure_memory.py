@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from flightd.adapters.metrics.metrics import MetricsBook
-from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.app.build import pilot_of
 from flightd.app.detection.detector_pool import Detection
 from flightd.app.detection.latency import LatencyBook
@@ -75,7 +75,7 @@ def main() -> None:
     flown_s, missions, first_mb = 0.0, 0, 0.0
     with (
         tempfile.TemporaryDirectory() as folder,
-        McapRecorder(Path(folder) / "f.mcap", lossless=True) as recorder,
+        McapRecorder(Path(folder) / "f.mcap", when_full=wait_for_disk) as recorder,
     ):
         watched = Watched(recorder, MetricsBook(), LatencyBook())
         while flown_s < options.seconds:

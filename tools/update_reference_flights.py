@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.replay.log import Entry, read_log
 
@@ -93,7 +93,7 @@ def flown(reference: Reference, folder: Path) -> Path:
 def keep(reference: Reference, log: Path, to: Path) -> None:
     """The part of a log that a replay needs, in as little room as possible."""
     to.parent.mkdir(parents=True, exist_ok=True)
-    with McapRecorder(to, lossless=True) as recorder:
+    with McapRecorder(to, when_full=wait_for_disk) as recorder:
         for entry in _beginning(log, reference.seconds):
             if isinstance(entry.message, RecordedFrame):
                 recorder.image(entry.topic, entry.stamp_ns, entry.message.seq, entry.message.jpeg)

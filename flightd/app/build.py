@@ -6,6 +6,7 @@ What differs between a real vehicle and a simulated one (clock, detectors, recor
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 
@@ -40,6 +41,8 @@ from flightd.mission.scan.scanner import Scanner
 from flightd.mission.scan.views import view_height_m
 from flightd.pilot import Pilot
 from flightd.ports import Camera, Clock, Ground, Monitor, PoseTaker, Recorder, Vehicle
+from flightd.runtime.clock import Hold
+from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 from flightd.site.site import Site
 from flightd.vision.lines.detector import Detector
 
@@ -72,18 +75,21 @@ def build(
     observers: Sequence[Callable[[Snapshot], None]] = (),
     keep_progress: bool = False,
     peers: Peers | None = None,
+    opener: OpenDatagrams = open_datagrams,
+    hold: Hold = nullcontext,
     startup_fault: FlightdError | None = None,
 ) -> Flight:
     """Compose the flight that `order` asks for.  `peers` are those of the configuration unless given;
+    `opener` opens sockets and time is held by `hold` while threads work, as the event loop wants it;
     `keep_progress`: the stops left over are kept in `mission.progress`, if that names a file.  InputError
     where configuration, map and order contradict each other."""
     peers = peers or configured_peers(config)
     pilot = pilot_of(config, site, order)
-    vehicle = connect_vehicle(config.vehicle, clock, config.control, url=peers.vehicle)
+    vehicle = connect_vehicle(config.vehicle, clock, config.control, url=peers.vehicle, opener=opener)
     publishers = TelemetryPublishers(clock, vehicle, recorder, ground, monitors, observers)
     kept_fps = 0.0 if recorder is NO_RECORDER else config.recorder.picture_fps
     vision = DetectionPipeline(detectors, config.vision.workers, recorder, ground, kept_fps)
-    connect = partial(connect_camera, clock=clock, on_trouble=publishers.trouble, vehicle=vehicle)
+    connect = partial(connect_camera, clock=clock, on_trouble=publishers.trouble, vehicle=vehicle, hold=hold)
     camera = connect(config.camera, on_frame=vision.frames.put, url=peers.camera)
     front_camera: Camera = NO_CAMERA
     if counting is not None:
@@ -183,12 +189,12 @@ def profile_of(config: Config, site: Site) -> str:
     return config.vision.profile or site.line_colour.value
 
 
-def detector_pool(config: Config, site: Site, clock: Clock) -> DetectorPool:
+def detector_pool(config: Config, site: Site, clock: Clock, hold: Hold = nullcontext) -> DetectorPool:
     """Detector processes after the configuration; the colour profile is read here, so that a wrong one
     is found before anything flies."""
     make = detector_of(config, site)
     make()
-    return DetectorPool(make, config.vision.workers, config.vision.timeout_s, clock)
+    return DetectorPool(make, config.vision.workers, config.vision.timeout_s, clock, hold)
 
 
 def detector_of(config: Config, site: Site) -> Callable[[], Detector]:

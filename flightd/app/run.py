@@ -25,6 +25,7 @@ from flightd.core.errors import InputError, TransientError
 from flightd.core.snapshot import Snapshot
 from flightd.ports import Recorder
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.datagrams import open_paced_datagrams
 from flightd.runtime.supervisor import restarted
 from flightd.site.site_file import load_site
 
@@ -100,6 +101,7 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
             monitors=monitors,
             observers=[observer],
             keep_progress=True,
+            opener=open_paced_datagrams,
             startup_fault=count.error,
         )
         daemon = Daemon(flight)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal, Protocol
@@ -15,6 +16,7 @@ from flightd.core.errors import UnavailableError
 from flightd.core.topics import Topic
 from flightd.core.types import Image
 from flightd.ports import Clock, Recorder
+from flightd.runtime.clock import Hold
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.px4 import Px4Peer
@@ -92,9 +94,15 @@ class World:
     """The running peers.  `open` binds the vehicle's port, `run` lives until cancelled."""
 
     def __init__(
-        self, spec: WorldSpec, clock: Clock, recorder: Recorder, tell: Told = lambda _index, _begins: None
+        self,
+        spec: WorldSpec,
+        clock: Clock,
+        recorder: Recorder,
+        tell: Told = lambda _index, _begins: None,
+        hold: Hold = nullcontext,
     ) -> None:
-        """`tell` hears of the faults that are not the world's own.  InputError for one at an unknown node."""
+        """`tell` hears of the faults that are not the world's own; time is held by `hold` while pictures are
+        being drawn.  InputError for a fault at an unknown node."""
         self._clock = clock
         self._recorder = recorder
         start = spec.start or spec.site.home.node
@@ -116,7 +124,7 @@ class World:
         if spec.truth_url:
             self.vehicle = ExternalVehicle(spec.truth_url, clock, Placement(x_m, y_m, spec.start_yaw_rad))
         elif spec.vehicle == "ardrone":
-            self.vehicle, show, own_front = _ardrone(spec, airframe, clock)
+            self.vehicle, show, own_front = _ardrone(spec, airframe, clock, hold)
         else:
             (port,) = spec.vehicle_ports
             peer = Px4Peer if spec.vehicle == "px4" else ArduCopterPeer
@@ -139,6 +147,7 @@ class World:
                 self.vehicle.truth_at,
                 clock,
                 show,
+                hold=hold,
             )
         }
         if own_front is not None:
@@ -152,6 +161,7 @@ class World:
                 front.address,
                 self.vehicle.truth_at,
                 clock,
+                hold=hold,
             )
 
         self._faults = WorldFaults(spec.faults, spec.site, self._cameras, airframe, self.vehicle, tell)
@@ -191,7 +201,7 @@ class World:
 
 
 def _ardrone(
-    spec: WorldSpec, airframe: Airframe, clock: Clock
+    spec: WorldSpec, airframe: Airframe, clock: Clock, hold: Hold
 ) -> tuple[VehiclePeer, Callable[[Image, int], None], CameraPeer]:
     """The emulated AR.Drone, where the floor's pictures go, and its own front camera.  UnavailableError
     without its video library."""
@@ -208,5 +218,5 @@ def _ardrone(
     ports = DronePorts("127.0.0.1", *spec.vehicle_ports)
     server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)
     look = spec.front.look if spec.front is not None else RackLook()
-    front = front_peer(server, spec.site, look, spec.seed, clock)
+    front = front_peer(server, spec.site, look, spec.seed, clock, hold)
     return server, partial(server.show, camera=VideoChannel.BOTTOM), front

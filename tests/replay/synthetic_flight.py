@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.core.topics import Document, Topic
 from flightd.core.types import (
     Attitude,
@@ -113,7 +113,9 @@ def write_flight(
     site = parse_site(SITE_TOML, "demo")
     path = folder / "flight.mcap"
     truths: list[Kinematics] = []
-    with McapRecorder(path, lossless=True, metadata={"vehicle": "ardupilot", "site": site.name}) as recorder:
+    with McapRecorder(
+        path, when_full=wait_for_disk, metadata={"vehicle": "ardupilot", "site": site.name}
+    ) as recorder:
         recorder.record(Topic.MAP, 0, Document(SITE_TOML))  # stamps before the flight
         recorder.record(Topic.CONFIG, START_NS, Document('[vehicle]\nkind = "ardupilot"\n'))
         t_s, frames, done, sway = 0.0, 0, 0, np.zeros(2)
@@ -212,7 +214,7 @@ def write_flight(
                 t_s += TICK_S
             done += leg.phase == Phase.HOVER
     if truth:
-        with McapRecorder(folder / "truth.mcap", lossless=True) as recorder:
+        with McapRecorder(folder / "truth.mcap", when_full=wait_for_disk) as recorder:
             for kinematics in truths:
                 recorder.record(Topic.TRUTH, kinematics.stamp_ns, asdict(kinematics))
     if summary:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 
 from flightd.app.absent_parts import NO_CAMERA, NO_PROGRESS, keep_pose
@@ -153,10 +152,6 @@ class IdealFlight:
     def now_ns(self) -> int:
         """`ports.Clock`."""
         return self._now_ns
-
-    def hold(self) -> AbstractContextManager[None]:
-        """`ports.Clock`."""
-        return nullcontext()
 
     def _composed(self, vehicle: IdealVehicle, vision: IdealVision, setpoints: HeldSetpoint) -> Flight:
         """The daemon's own tick flies it, with these behind its ports."""

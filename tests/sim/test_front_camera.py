@@ -27,6 +27,7 @@ from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.scenario.scenario import FrontCameraScenario, Scenario
 from flightd.sim.sensors.camera import CameraPeer, PictureMaker
 from flightd.site.site_file import load_site
+from tests.held_time import held
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SMALL = CONFIGS / "site-racks-small.toml"
@@ -60,7 +61,7 @@ def taken(
 
         address = f"udp://127.0.0.1:{port}"
         listener = SharedCamera(address, (320, 200), 0.08, clock, take, pytest.fail)
-        peer = CameraPeer(camera, make, "front camera 1", ("127.0.0.1", port), hovering, clock)
+        peer = CameraPeer(camera, make, "front camera 1", ("127.0.0.1", port), hovering, clock, hold=held)
         listening = asyncio.ensure_future(listener.run())
         await asyncio.sleep(0)
         running = asyncio.ensure_future(peer.run())

@@ -17,10 +17,10 @@ import pytest
 from flightd.app.simulation.prepare import SimOptions, prepare
 from flightd.app.simulation.simulator_config import simulator_config
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.core.snapshot import Snapshot
 from flightd.sim.scenario.scenario import Scenario
+from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import IdealFlight
 
 ROOT = Path(__file__).parents[2]
@@ -102,8 +102,8 @@ def test_a_bare_word_for_a_number_is_still_refused() -> None:
 def test_a_node_to_which_the_route_comes_twice_is_one_node() -> None:
     site = load_site(CONFIGS / "site-demo.toml")
     told: list[Snapshot] = []
-    params = load_config(CONFIGS / "sim.toml").pilot_params(site)
-    flight = IdealFlight(site, params, visits=("A1", "A2", "A1"), observers=[told.append])
+    config = load_config(CONFIGS / "sim.toml")
+    flight = IdealFlight(site, config, visits=("A1", "A2", "A1"), observers=[told.append])
     flown = flight.fly(120)
     assert flown.visited == ["A1", "A2", "A1"]
     assert flight.plan.nodes == 2, "what the summary counts"

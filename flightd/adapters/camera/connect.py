@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 
 from flightd.adapters.camera.capture import CaptureCamera, parse_source
 from flightd.adapters.camera.shared_memory import SharedCamera
@@ -13,6 +14,7 @@ from flightd.config.camera import CameraConfig
 from flightd.config.front_camera import FrontCameraConfig
 from flightd.core.errors import InputError
 from flightd.ports import Camera, Clock, Vehicle
+from flightd.runtime.clock import Hold
 from flightd.runtime.frame_ring import FrameTicket
 
 ARDRONE_URL = "ardrone:"
@@ -26,18 +28,20 @@ def connect_camera(
     on_trouble: Callable[[str], None],
     vehicle: Vehicle | None = None,
     url: str | None = None,
+    hold: Hold = nullcontext,
 ) -> Camera:
     """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address.
 
     `on_trouble` hears, now and then, in a line for a person, why pictures are refused.
-    `url` is where its pictures come from, unless that is the configuration's."""
+    `url` is where its pictures come from, unless that is the configuration's; time is held by `hold`
+    while threads work."""
     url = config.url if url is None else url
     if url == ARDRONE_URL:
         if isinstance(config, FrontCameraConfig):
             raise InputError(f"front_camera.url {ARDRONE_URL!r}: the AR.Drone sends one camera at a time")
         if not isinstance(vehicle, ArDroneVehicle):
             raise InputError(f'camera.url {ARDRONE_URL!r} needs vehicle.kind = "ardrone"')
-        return ArDroneCamera(vehicle, config.latency_s, clock, {DroneCamera.DOWN: on_frame})
+        return ArDroneCamera(vehicle, config.latency_s, clock, {DroneCamera.DOWN: on_frame}, hold)
     if url.startswith("udp:"):
         size_px = config.width_px, config.height_px
         return SharedCamera(url, size_px, config.latency_s, clock, on_frame, on_trouble)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Protocol, TypeAlias
 
 from flightd.app.detection.detector_pool import PicturePool, Work
 from flightd.core.scanning import CodeSet, Place
 from flightd.core.types import Image
 from flightd.ports import Clock
+from flightd.runtime.clock import Hold
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.runtime.latest_slot import Latest
 from flightd.vision.shelf.shelf_look import read_shelf
@@ -38,8 +40,8 @@ def _shelf_reader() -> Work[tuple[Place, ...], Reading]:
 class ReaderPool(PicturePool[tuple[Place, ...], Reading]):
     """Processes that read codes; one that dies or hangs is replaced, its picture counts as lost."""
 
-    def __init__(self, size: int, timeout_s: float, clock: Clock) -> None:
-        super().__init__(_shelf_reader, size, timeout_s, clock, "code reader")
+    def __init__(self, size: int, timeout_s: float, clock: Clock, hold: Hold = nullcontext) -> None:
+        super().__init__(_shelf_reader, size, timeout_s, clock, "code reader", hold)
 
     async def read(self, ticket: FrameTicket, places: tuple[Place, ...]) -> Reading | None:
         """Codes and places of one picture, or None when it was lost."""

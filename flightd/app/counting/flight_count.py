@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from contextlib import AsyncExitStack, ExitStack
+from contextlib import AsyncExitStack, ExitStack, nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import PlannedLocation
 from flightd.ports import Clock
+from flightd.runtime.clock import Hold
 from flightd.site.site import Site
 
 
@@ -62,20 +63,24 @@ class FlightCount:
         return store, counted
 
     async def begun(
-        self, clock: Clock, timed: Callable[[Readers], Readers] = lambda readers: readers
+        self,
+        clock: Clock,
+        timed: Callable[[Readers], Readers] = lambda readers: readers,
+        hold: Hold = nullcontext,
     ) -> Counting | None:
-        """The count itself for the daemon, its readers started (and put behind what `timed` makes of them);
+        """The count itself for the daemon, its readers started (and put behind what `timed` makes of them),
+        time held by `hold` while processes and disk are waited for;
         None where nothing is scanned."""
         if not self.scans:
             return None
         scan = self._scan
-        pool = self._stack.enter_context(ReaderPool(scan.workers, scan.timeout_s, clock))
+        pool = self._stack.enter_context(ReaderPool(scan.workers, scan.timeout_s, clock, hold))
         await pool.ready()
         writer = None
         if self._store is not None:
             utc_at_zero_ns = time.time_ns() - clock.now_ns()
             writer = self._stack.enter_context(
-                StoreWriter(self._store, self._run, utc_at_zero_ns, clock, _to_stderr)
+                StoreWriter(self._store, self._run, utc_at_zero_ns, clock, _to_stderr, hold)
             )
         return Counting(timed(pool), scan.workers, writer, self._counted)
 

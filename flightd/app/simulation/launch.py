@@ -18,7 +18,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.adapters.recorder.recorder import McapRecorder, WhenFull, drop_newest, wait_for_disk
 from flightd.app.absent_parts import NO_GROUND
 from flightd.app.build import build, detector_pool, ground_link, plan_of, start_of
 from flightd.app.counting.flight_count import FlightCount
@@ -38,7 +38,8 @@ from flightd.core.flight_order import FlightOrder
 from flightd.core.snapshot import Snapshot
 from flightd.core.topics import Document, Topic
 from flightd.mission.plan.flight_plan import FlightPlan
-from flightd.runtime.clock import LoopClock
+from flightd.runtime.clock import Hold, LoopClock
+from flightd.runtime.datagrams import open_paced_datagrams
 from flightd.runtime.event_loops import ScaledLoop, VirtualLoop
 from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
 from flightd.sim.scenario.scenario import Scenario
@@ -105,8 +106,9 @@ def fly(simulation: Simulation) -> FlightResult:
     ended_by: list[signal.Signals] = []
     try:
         if simulation.speed is None:
-            with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-                return runner.run(_lockstep(simulation, ended_by))
+            virtual = VirtualLoop()
+            with asyncio.Runner(loop_factory=lambda: virtual) as runner:
+                return runner.run(_lockstep(simulation, virtual.hold, ended_by))
         factor = simulation.speed
         with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
             return runner.run(_real_time(simulation, factor, ended_by))
@@ -128,40 +130,41 @@ def _end_on_signals(ended_by: list[signal.Signals]) -> None:
         loop.add_signal_handler(number, end, number)
 
 
-async def _lockstep(simulation: Simulation, ended_by: list[signal.Signals]) -> FlightResult:
+async def _lockstep(simulation: Simulation, hold: Hold, ended_by: list[signal.Signals]) -> FlightResult:
     _end_on_signals(ended_by)
     clock, config, site = LoopClock(), simulation.config, simulation.site
     with ExitStack() as stack:
-        recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=True))
-        truth = stack.enter_context(McapRecorder(simulation.truth_log, lossless=True))
-        pool = stack.enter_context(detector_pool(config, site, clock))
+        recorder = stack.enter_context(_flight_recorder(simulation, clock, wait_for_disk))
+        truth = stack.enter_context(McapRecorder(simulation.truth_log, when_full=wait_for_disk))
+        pool = stack.enter_context(detector_pool(config, site, clock, hold))
         faults = LauncherFaults(simulation.scenario.fault, pool, recorder)
-        world, ports = await _opened(simulation, clock, truth, faults)
+        world, ports = await _opened(simulation, clock, hold, truth, faults)
         count = FlightCount(config, site, simulation.folder, stack)
-        counting = await count.begun(clock, lambda readers: LockstepReaders(readers, clock, READING_S))
+        counting = await count.begun(clock, lambda readers: LockstepReaders(readers, READING_S, hold), hold)
         await pool.ready()
         flight = build(
             config,
             site,
             simulation.setting.order,
             clock=clock,
-            detectors=LockstepDetectors(pool, clock, DETECTION_S),
+            detectors=LockstepDetectors(pool, clock, DETECTION_S, hold),
             recorder=recorder,
             counting=counting,
             observers=[simulation.observer],
             peers=peers_at(ports, config),
+            hold=hold,
         )
         return await _beside(simulation, flight, ended_by, world.run(), faults.run())
 
 
 async def _opened(
-    simulation: Simulation, clock: LoopClock, truth: McapRecorder, faults: LauncherFaults
+    simulation: Simulation, clock: LoopClock, hold: Hold, truth: McapRecorder, faults: LauncherFaults
 ) -> tuple[World, WorldPorts]:
     """A world that listens, and its ports.  A port that was free a moment ago may have been taken by
     another simulation: then others are tried."""
     for attempt in range(1, _PORT_TRIES + 1):
         ports = free_ports(simulation.config)
-        world = World(_spec(simulation, ports), clock, truth, faults.tell)
+        world = World(_spec(simulation, ports), clock, truth, faults.tell, hold)
         try:
             await world.open()
         except UnavailableError:
@@ -180,7 +183,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
     if simulation.truth_url:
         peers = replace(peers, vehicle=config.vehicle.url)
     async with monitors(config.metrics, {}, journal=False) as watchers, AsyncExitStack() as stack:
-        recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=False))
+        recorder = stack.enter_context(_flight_recorder(simulation, clock, drop_newest))
         process, pipe = _started_world(simulation, ports, factor, stack)
         pool = stack.enter_context(detector_pool(config, site, clock))
         counting = await FlightCount(config, site, simulation.folder, stack).begun(clock)
@@ -200,6 +203,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
             monitors=watchers,
             observers=[simulation.observer],
             peers=peers,
+            opener=open_paced_datagrams,
         )
         return await _beside(
             simulation, flight, ended_by, watch_world(process, pipe, faults.tell), faults.run()
@@ -277,8 +281,8 @@ async def _within_limit(
     raise RunError(f"the flight was not over after {limit_s:.0f} s of its own time")
 
 
-def _flight_recorder(simulation: Simulation, clock: LoopClock, lossless: bool) -> McapRecorder:
-    recorder = McapRecorder(simulation.flight_log, lossless=lossless)
+def _flight_recorder(simulation: Simulation, clock: LoopClock, when_full: WhenFull) -> McapRecorder:
+    recorder = McapRecorder(simulation.flight_log, when_full=when_full)
     now_ns = clock.now_ns()
     record_setting(recorder, now_ns, simulation.setting)
     recorder.record(Topic.SCENARIO, now_ns, Document(simulation.scenario.model_dump_json(indent=1)))

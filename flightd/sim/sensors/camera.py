@@ -22,6 +22,7 @@ from flightd.core.geometry import Lens
 from flightd.core.types import Image
 from flightd.ports import Clock
 from flightd.runtime.child_process import Child
+from flightd.runtime.clock import Hold
 from flightd.runtime.frame_notice import FrameNotice, decode_request, encode_notice
 from flightd.runtime.frame_ring import FrameRing
 from flightd.sim.plant.kinematics import Kinematics
@@ -98,7 +99,7 @@ class CameraPeer:
     `address`; or, with `show`, hands the pictures themselves to a vehicle that transmits them.
 
     `make` is called in the rendering process (it must be picklable); `seed` draws the delivery's jitter.
-    While `wanted` says no, no picture is taken."""
+    While `wanted` says no, no picture is taken.  Time is held by `hold` while one is being drawn."""
 
     def __init__(
         self,
@@ -110,8 +111,10 @@ class CameraPeer:
         clock: Clock,
         show: Callable[[Image, int], None] | None = None,
         wanted: Callable[[], bool] = lambda: True,
+        hold: Hold = contextlib.nullcontext,
     ) -> None:
         self._wanted = wanted
+        self._hold = hold
         self._show = show
         self._camera = camera
         self._period_ns = round(1e9 / camera.fps)
@@ -138,7 +141,7 @@ class CameraPeer:
         make = partial(self._make, self._ring.name)
         child = Child(make, lambda _: self._ready.set(), lambda _: None)
         try:
-            with self._clock.hold():
+            with self._hold():
                 await self._ready.wait()
             async with asyncio.TaskGroup() as pictures:
                 await self._expose(child, transport, pictures)
@@ -182,7 +185,7 @@ class CameraPeer:
         rendering = asyncio.ensure_future(self._render(child, truth, seq, exposure, due_ns + self._period_ns))
         try:
             await asyncio.sleep((due_ns - self._clock.now_ns()) * 1e-9)
-            with self._clock.hold():
+            with self._hold():
                 slot = await rendering
         except TransientError:
             self.late += 1

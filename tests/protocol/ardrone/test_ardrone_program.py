@@ -59,7 +59,7 @@ def test_a_wrong_url_is_named_with_its_remedy(url: str) -> None:
 
 def test_the_drones_camera_needs_the_drone() -> None:
     clock = StillClock()
-    plane = connect_vehicle(VehicleConfig(kind="ardupilot"), clock)  # type: ignore[arg-type]
+    plane = connect_vehicle(VehicleConfig(kind="ardupilot"), clock)
     with pytest.raises(InputError, match=r'needs vehicle\.kind = "ardrone"'):
         connect_camera(CameraConfig(url="ardrone:"), clock, lambda _: None, plane)  # type: ignore[arg-type]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.app.simulation.launch import Simulation, _spec
 from flightd.app.simulation.ports import free_ports
 from flightd.config.schema import load_config
@@ -29,7 +29,7 @@ def test_the_drone_stands_where_the_scenario_carried_it(tmp_path: Path) -> None:
     simulation = Simulation(config, site, load_scenario(file), 1, None, tmp_path)
 
     async def start() -> Kinematics:
-        with McapRecorder(tmp_path / "truth.mcap", lossless=True) as recorder:
+        with McapRecorder(tmp_path / "truth.mcap", when_full=wait_for_disk) as recorder:
             spec = _spec(simulation, free_ports(config))
             return World(spec, LoopClock(), recorder).vehicle.truth()
 

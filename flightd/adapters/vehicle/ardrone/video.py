@@ -19,6 +19,7 @@ from flightd.adapters.vehicle.ardrone.pave import CODEC_H264, Control, FrameType
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Image
 from flightd.ports import Clock
+from flightd.runtime.clock import Hold
 from flightd.tracking.clock_offset import DeviceClock
 
 _log = logging.getLogger(__name__)
@@ -122,17 +123,23 @@ class Decoder:
 
 class VideoStream:
     """Hands every picture, the newest when several wait, to `show`; runs until cancelled.  `latency_s` is
-    the least delay from mid-exposure to arrival.
+    the least delay from mid-exposure to arrival; time is held by `hold` while a picture is decoded.
 
     Counts: `pictures` shown, `dropped` frames never decoded, `broken` batches, `connections` made.
     """
 
     def __init__(
-        self, address: tuple[str, int], latency_s: float, clock: Clock, show: Callable[[DecodedFrame], None]
+        self,
+        address: tuple[str, int],
+        latency_s: float,
+        clock: Clock,
+        show: Callable[[DecodedFrame], None],
+        hold: Hold = contextlib.nullcontext,
     ) -> None:
         self._address = address
         self._clock = clock
         self._show = show
+        self._hold = hold
         self._backlog = Backlog()
         self._arrived = asyncio.Event()
         self._decoder = Decoder()
@@ -192,7 +199,7 @@ class VideoStream:
             if not batch:
                 continue
             try:
-                with self._clock.hold():
+                with self._hold():
                     bgr = await loop.run_in_executor(
                         worker, self._decoder.newest, [frame.payload for frame, _ in batch]
                     )

@@ -38,6 +38,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.ports import Clock
+from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 
 _LOG = logging.getLogger(__name__)
 
@@ -68,6 +69,8 @@ class MavlinkOptions:
     pose_form: PoseForm | None = None
     raw_thrust: bool | None = None
     origin_deg: tuple[float, float] = (51.4778, 0.0)
+    opener: OpenDatagrams = open_datagrams
+    """What opens its UDP socket."""
 
 
 DEFAULTS = MavlinkOptions()
@@ -100,7 +103,7 @@ class MavlinkVehicle(abc.ABC):
         self._sync = ClockSync()
         self._telemetry = MavlinkTelemetry(self._sync)
         self._pose_output = None if options.pose_form is None else PoseOutput(options.pose_form)
-        transport = make_transport(parse_endpoint(url))
+        transport = make_transport(parse_endpoint(url), options.opener)
         codec = Codec(system_id, signing=options.signing)
         self.link = MavlinkLink(transport, codec, clock, system_id, self._received)
         self._commander = Commander(self.link, system_id)

@@ -43,6 +43,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.ports import Clock
+from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 from flightd.runtime.latest_slot import Latest
 
 _LOG = logging.getLogger(__name__)
@@ -88,13 +89,15 @@ class MavsdkVehicle:
     prime_s = 1.3
     """PX4 wants setpoints for more than a second before it enters OFFBOARD."""
 
-    def __init__(self, url: str, clock: Clock, system_id: int = 1) -> None:
+    def __init__(
+        self, url: str, clock: Clock, system_id: int = 1, opener: OpenDatagrams = open_datagrams
+    ) -> None:
         self._clock = clock
         self._system_id = system_id
         self._sync = ClockSync()
         self._readings = Readings(self._sync)
         self.gate = SetpointGate()
-        self._line = MavsdkConnection(make_transport(parse_endpoint(url)), self.gate, clock)
+        self._line = MavsdkConnection(make_transport(parse_endpoint(url), opener), self.gate, clock)
         self._commander = SdkCommander()
         self._pursuit = ModeArmingManager(self, self._commander, self._readings, clock)
         self._steering = SetpointShaper(self._pursuit, self._readings)

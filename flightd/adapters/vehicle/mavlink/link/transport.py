@@ -21,7 +21,7 @@ from typing import Any, TypeAlias
 from flightd.adapters.vehicle.mavlink.link.endpoint import Endpoint, EndpointKind
 from flightd.core.errors import InputError, UnavailableError
 from flightd.runtime.batched_reader import PacedReader
-from flightd.runtime.datagrams import Datagrams, open_datagrams
+from flightd.runtime.datagrams import Datagrams, OpenDatagrams, open_datagrams
 
 Source: TypeAlias = tuple[str, int] | None
 """Address a datagram came from; None on a stream."""
@@ -72,8 +72,9 @@ class UdpTransport(Transport):
 
     datagrams = True
 
-    def __init__(self, endpoint: Endpoint) -> None:
+    def __init__(self, endpoint: Endpoint, opener: OpenDatagrams = open_datagrams) -> None:
         super().__init__(endpoint)
+        self._opener = opener
         self._open: Datagrams | None = None
 
     async def open(self) -> None:
@@ -81,7 +82,7 @@ class UdpTransport(Transport):
         listening = self.endpoint.kind is EndpointKind.UDP_IN
         place: dict[str, Any] = {"local_addr": address} if listening else {"remote_addr": address}
         try:
-            self._open = await open_datagrams(self._take, self._failed, **place)
+            self._open = await self._opener(self._take, self._failed, **place)
         except OSError as err:
             if err.errno == errno.EADDRINUSE:
                 text = f"{self.endpoint}: the port is in use: stop the other program or choose another port"
@@ -251,12 +252,13 @@ class SerialTransport(Transport):
         self.lost()
 
 
-def make_transport(endpoint: Endpoint) -> Transport:
-    """The transport for an endpoint; InputError for a baud rate that this machine cannot set."""
+def make_transport(endpoint: Endpoint, opener: OpenDatagrams = open_datagrams) -> Transport:
+    """The transport for an endpoint; `opener` opens a UDP one.  InputError for a baud rate that this machine
+    cannot set."""
     match endpoint.kind:
         case EndpointKind.TCP:
             return TcpTransport(endpoint)
         case EndpointKind.SERIAL:
             return SerialTransport(endpoint)
         case _:
-            return UdpTransport(endpoint)
+            return UdpTransport(endpoint, opener)
