@@ -10,7 +10,8 @@ from dataclasses import asdict, replace
 from rich.console import Console
 from rich.table import Table
 
-from flightd.app.simulation.launch import Simulation, fly
+from flightd.app.simulation.launch import fly
+from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.summary import kinematics_of
 from flightd.cli.flight_progress import FlightProgress
 from flightd.core.errors import RunError

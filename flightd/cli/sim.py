@@ -14,7 +14,7 @@ import typer
 from flightd.core.errors import RunError
 
 if TYPE_CHECKING:
-    from flightd.app.simulation.launch import Simulation
+    from flightd.app.simulation.simulation import Simulation
 
 EXAMPLES = """Examples:
 

@@ -16,6 +16,7 @@ import pytest
 from flightd.app.build import detector_pool
 from flightd.app.detection.detector_pool import DetectorPool
 from flightd.app.simulation import launch as simulate
+from flightd.app.simulation.simulation import Simulation
 from flightd.config.schema import Config, load_config
 from flightd.core.snapshot import Snapshot
 from flightd.core.types import Phase
@@ -111,12 +112,12 @@ def test_a_taken_camera_port_is_one_line(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
-def short_flight(folder: Path, speed: float, observer: Any) -> simulate.Simulation:
+def short_flight(folder: Path, speed: float, observer: Any) -> Simulation:
     config = load_config(CONFIG)
     mission = config.mission.model_copy(update={"nodes": ("A1", "A2")})
     vision = config.vision.model_copy(update={"workers": 2})
     config = _with_sim_lens(config.model_copy(update={"mission": mission, "vision": vision}))
-    return simulate.Simulation(config, load_site(mission.site), Scenario(), 2, speed, folder, observer)
+    return Simulation(config, load_site(mission.site), Scenario(), 2, speed, folder, observer)
 
 
 def _with_sim_lens(config: Config) -> Config:

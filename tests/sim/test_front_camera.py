@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from flightd.adapters.camera.shared_memory import SharedCamera
-from flightd.app.simulation.launch import Simulation, truth_of
 from flightd.app.simulation.ports import free_port
+from flightd.app.simulation.simulation import Simulation, truth_of
 from flightd.app.simulation.simulator_config import simulator_config
 from flightd.config.schema import Config
 from flightd.core.types import Image

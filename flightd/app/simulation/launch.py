@@ -8,43 +8,34 @@ or a multiple of it; only then does the ground link run, whose sockets have thre
 from __future__ import annotations
 
 import asyncio
-import math
 import multiprocessing
 import signal
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from contextlib import AsyncExitStack, ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
 from flightd.adapters.recorder.recorder import McapRecorder, WhenFull, drop_newest, wait_for_disk
 from flightd.app.absent_parts import NO_GROUND
-from flightd.app.build import build, detector_pool, ground_link, plan_of, start_of
+from flightd.app.build import build, detector_pool, ground_link
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.flight import Flight
-from flightd.app.flight_orders import configured_order
-from flightd.app.recording import FlightSetting, record_setting
+from flightd.app.recording import record_setting
 from flightd.app.service import monitors
 from flightd.app.simulation.lockstep import LockstepDetectors, LockstepReaders
 from flightd.app.simulation.ports import WorldPorts, free_ports, peers_at
 from flightd.app.simulation.process_faults import LauncherFaults, needs_ground
+from flightd.app.simulation.simulation import Simulation, world_spec
 from flightd.app.simulation.world_process import run_world, watch_world
 from flightd.config.ground import GroundConfig
-from flightd.config.schema import Config
 from flightd.core.errors import RunError, UnavailableError
-from flightd.core.flight_order import FlightOrder
-from flightd.core.snapshot import Snapshot
 from flightd.core.topics import Document, Topic
-from flightd.mission.plan.flight_plan import FlightPlan
 from flightd.runtime.clock import Hold, LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
 from flightd.runtime.event_loops import ScaledLoop, VirtualLoop
-from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
-from flightd.sim.scenario.scenario import Scenario
-from flightd.sim.world import FrontSpec, World, WorldSpec
-from flightd.site.site import Site
+from flightd.sim.world import World
 
 DETECTION_S = 0.008
 """Modelled time of a detection in lockstep: what a companion computer needs."""
@@ -54,40 +45,6 @@ READING_S = 0.15
 _SCAN_S = 30.0
 """More than the count of one location can take, re-takes included."""
 _PORT_TRIES = 5
-
-
-@dataclass(frozen=True, slots=True)
-class Simulation:
-    """One simulated flight to be flown; `speed` None is lockstep."""
-
-    config: Config
-    site: Site
-    scenario: Scenario
-    seed: int
-    speed: float | None
-    folder: Path
-    observer: Callable[[Snapshot], None] = lambda _: None
-    truth_url: str = ""
-    """An external simulator's truth link; the configuration says where its vehicle is flown."""
-    order: FlightOrder | None = None
-    """What this flight is to do; None: what the configuration says."""
-
-    @property
-    def flight_log(self) -> Path:
-        return self.folder / "flight.mcap"
-
-    @property
-    def truth_log(self) -> Path:
-        return self.folder / "truth.mcap"
-
-    @property
-    def setting(self) -> FlightSetting:
-        """What it is flown by."""
-        return FlightSetting(self.config, self.site, self.order or configured_order(self.config))
-
-    def plan(self) -> FlightPlan:
-        """The plan of the flight at its start."""
-        return plan_of(self.config, self.site, self.setting.order)
 
 
 class FlightInterruptedError(RunError):
@@ -164,7 +121,7 @@ async def _opened(
     another simulation: then others are tried."""
     for attempt in range(1, _PORT_TRIES + 1):
         ports = free_ports(simulation.config)
-        world = World(_spec(simulation, ports), clock, truth, faults.tell, hold)
+        world = World(world_spec(simulation, ports), clock, truth, faults.tell, hold)
         try:
             await world.open()
         except UnavailableError:
@@ -216,7 +173,7 @@ def _started_world(
     """The world's process and the pipe from it; it ends when the pipe closes, however this process ends."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    spec = _spec(simulation, ports)
+    spec = world_spec(simulation, ports)
     arguments = (spec, factor, simulation.truth_log, theirs)
     process = context.Process(target=run_world, args=arguments, name="world")
     process.start()
@@ -287,45 +244,3 @@ def _flight_recorder(simulation: Simulation, clock: LoopClock, when_full: WhenFu
     record_setting(recorder, now_ns, simulation.setting)
     recorder.record(Topic.SCENARIO, now_ns, Document(simulation.scenario.model_dump_json(indent=1)))
     return recorder
-
-
-def _spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
-    scenario, config = simulation.scenario, simulation.config
-    adapter, order = config.vehicle.kind, simulation.setting.order
-    return WorldSpec(
-        site=scenario.floor.site(simulation.site),
-        seed=simulation.seed,
-        camera_address=("127.0.0.1", ports.camera),
-        vehicle="px4" if adapter == "mavsdk" else adapter,
-        vehicle_ports=ports.vehicle,
-        start=start_of(order, simulation.site),
-        start_yaw_rad=order.start_yaw_rad + math.radians(scenario.vehicle.start_yaw_deg),
-        start_offset_m=scenario.vehicle.start_offset_m,
-        camera=replace(scenario.camera.camera(), mount=config.camera.mount()),
-        front=_front(simulation, ports.front_camera),
-        appearance=scenario.floor.look(),
-        draught=scenario.wind.draught(),
-        battery_frac=scenario.vehicle.battery,
-        battery_ah=scenario.vehicle.battery_ah,
-        swap_s=scenario.vehicle.swap_s,
-        radio=scenario.vehicle.radio(),
-        truth_url=simulation.truth_url,
-        faults=scenario.fault,
-    )
-
-
-def _front(simulation: Simulation, port: int | None) -> FrontSpec | None:
-    if port is None:
-        return None
-    scenario = simulation.scenario
-    camera = replace(scenario.front_camera.camera(), mount=simulation.config.front_camera.mount())
-    return FrontSpec(("127.0.0.1", port), camera, scenario.racks.look())
-
-
-def truth_of(simulation: Simulation) -> dict[str, LocationTruth]:
-    """What is really at every location of the simulated racks; empty without a front camera before them."""
-    if not simulation.config.front_camera.is_fitted:
-        return {}
-    scenario = simulation.scenario
-    focal_px = scenario.front_camera.camera().lens.fx_px
-    return stock_truth(simulation.site, scenario.racks.look(), focal_px, simulation.seed)

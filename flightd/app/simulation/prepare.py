@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flightd.app.flight_orders import configured_order, going_on
-from flightd.app.simulation.launch import Simulation
 from flightd.app.simulation.process_faults import check_faults
+from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.simulator_config import simulator_config
 from flightd.config.schema import Config
 from flightd.core.errors import InputError

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.app.simulation.launch import Simulation, truth_of
+from flightd.app.simulation.simulation import Simulation, truth_of
 from flightd.core.csv_text import inert
 from flightd.core.inventory import LocationRecord
 from flightd.inventory.formats import utc_text

@@ -9,7 +9,7 @@ from dataclasses import fields
 from typing import Any
 
 from flightd.app.daemon import FlightResult
-from flightd.app.simulation.launch import Simulation, truth_of
+from flightd.app.simulation.simulation import Simulation, truth_of
 from flightd.app.simulation.stock_summary import inventory_csv, stock_summary
 from flightd.core.topics import Topic
 from flightd.core.types import Event, Status

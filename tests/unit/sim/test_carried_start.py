@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
-from flightd.app.simulation.launch import Simulation, _spec
 from flightd.app.simulation.ports import free_ports
+from flightd.app.simulation.simulation import Simulation, world_spec
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
 from flightd.runtime.clock import LoopClock
@@ -30,7 +30,7 @@ def test_the_drone_stands_where_the_scenario_carried_it(tmp_path: Path) -> None:
 
     async def start() -> Kinematics:
         with McapRecorder(tmp_path / "truth.mcap", when_full=wait_for_disk) as recorder:
-            spec = _spec(simulation, free_ports(config))
+            spec = world_spec(simulation, free_ports(config))
             return World(spec, LoopClock(), recorder).vehicle.truth()
 
     loop = VirtualLoop()
