@@ -71,12 +71,29 @@ def _print_page(page: Page, *, as_json: bool) -> None:
     if as_json:
         print(json.dumps(asdict(page)))
     elif sys.stdout.isatty():
-        from rich.console import Console
-        from rich.markdown import Markdown
-
-        Console().print(Markdown(page.text))
+        _print_markdown(page.text)
     else:
         print(page.text, end="")
+
+
+def _print_markdown(text: str) -> None:
+    """For a person at a terminal; what does not fit a table's cell is folded, never cut."""
+    from rich.console import Console, ConsoleOptions, RenderResult
+    from rich.markdown import Markdown, TableElement
+    from rich.table import Table
+
+    class Folded(TableElement):
+        def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+            for part in super().__rich_console__(console, options):
+                if isinstance(part, Table):
+                    for column in part.columns:
+                        column.overflow = "fold"
+                yield part
+
+    class Folding(Markdown):
+        elements = {**Markdown.elements, "table_open": Folded}  # noqa: RUF012 - as the library declares it
+
+    Console().print(Folding(text, hyperlinks=False))
 
 
 def _print_hits(word: str, *, as_json: bool) -> None:

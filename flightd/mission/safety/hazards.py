@@ -296,9 +296,6 @@ def triggers_of(*actions: Action) -> frozenset[Trigger]:
 
 def markdown() -> str:
     """The table as the guide prints it."""
-    lines = ["| hazard | scenario | found by | action | then |", "|---|---|---|---|---|"]
-    lines += [
-        f"| {row.name.replace('_', ' ')} | `{row.name}` | {row.found_by} | {row.action} | {row.then} |"
-        for row in HAZARDS
-    ]
+    lines = ["| hazard | found by | action | then |", "|---|---|---|---|"]
+    lines += [f"| `{row.name}` | {row.found_by} | {row.action} | {row.then} |" for row in HAZARDS]
     return "\n".join(lines) + "\n"
