@@ -20,7 +20,7 @@ UNITS = {
     "mps2": "m/s²", "mps3": "m/s³", "degps": "°/s", "degps2": "°/s²", "radps": "rad/s", "fps": "1/s",
     "hz": "Hz", "gb": "GB", "wh": "Wh", "w": "W", "ah": "Ah",
 }  # fmt: skip
-"""The last word of a key says its unit."""
+"""The last word of a key says its unit, where its schema names none."""
 _MOST_DEFAULT = 60
 
 
@@ -112,7 +112,7 @@ def _row(key: str, spec: Schema, root: Schema, required: bool, given: Schema) ->
     needed = required and key not in given
     default = "**required**" if needed else _default(given.get(key, spec.get("default")))
     values = _values(_resolved(spec, root), root)
-    unit = UNITS.get(key.rpartition("_")[2], "")
+    unit = spec.get("unit", UNITS.get(key.rpartition("_")[2], ""))
     return Row(key, unit, values, default, " ".join(spec.get("description", "").split()))
 
 

@@ -18,7 +18,6 @@ from pathlib import Path
 from flightd.adapters.ground_link import protocol_text
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, Rule, rules_for
-from flightd.cli import ctl, main
 from flightd.config.schema import Config
 from flightd.config.site_file import SiteFile
 from flightd.guide import pages
@@ -41,7 +40,7 @@ def _site_file() -> str:
 
 
 def _commands() -> str:
-    return "\n".join([*help_pages(main.app, "flightd"), *help_pages(ctl.app, "flightctl")])
+    return "\n".join(help_pages(ROOT / "pyproject.toml"))
 
 
 def _parameters(firmware: Firmware) -> str:

@@ -18,6 +18,7 @@ import pytest
 
 from flightd.guide.pages import TOPICS
 from tests.command import Command
+from tools.command_help import scripts
 from tools.write_guide import ROOT, guide_files
 
 _SH = re.compile(r"(?P<before>[^\n]*)\n```sh\n(?P<script>.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -25,7 +26,7 @@ _MARK = re.compile(r"<!-- (?P<what>run|not run)(?:: (?P<text>.+))? -->")
 _LONGEST_S = 240
 
 
-def scripts(path: Path) -> list[str]:
+def runnable(path: Path) -> list[str]:
     """What of this page is run, block by block; a block without a mark fails."""
     wanted = []
     for block in _SH.finditer(path.read_text(encoding="utf-8")):
@@ -45,9 +46,10 @@ def checkout(tmp_path: Path) -> Path:
         (tmp_path / name).symlink_to(ROOT / name)
     commands = tmp_path / "bin"
     commands.mkdir()
-    for name, module in (("flightd", "flightd"), ("flightctl", "flightd.cli.ctl")):
+    for name, (module, function) in scripts(ROOT / "pyproject.toml").items():
         command = commands / name
-        command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m {module} "$@"\n')
+        start = f'if __name__ == "__main__":\n    {function}()\n'
+        command.write_text(f"#!{sys.executable}\nfrom {module} import {function}\n\n{start}")
         command.chmod(0o755)
     (tmp_path / "out" / "sim").mkdir(parents=True)
     shutil.copy(
@@ -61,7 +63,7 @@ def checkout(tmp_path: Path) -> Path:
 def test_the_commands_of_a_page_run(path: Path, checkout: Path) -> None:
     search = os.pathsep.join([str(checkout / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = {**os.environ, "PATH": search, "PYTHONPATH": str(ROOT)}
-    for script in scripts(path):
+    for script in runnable(path):
         done = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", script],
             cwd=checkout,
