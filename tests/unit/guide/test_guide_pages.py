@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import ast
 import re
+import socket
+import sys
 import tomllib
+from contextlib import closing
 from pathlib import Path
+from types import ModuleType
 from typing import Any, get_args
 
+import numpy as np
 import pytest
 
 from flightd.adapters.metrics.metrics import MetricsBook
 from flightd.config.schema import parse_config
 from flightd.config.site_file import parse_site
 from flightd.core.inventory import LocationState
-from flightd.core.types import Phase
+from flightd.core.types import Image, Phase
 from flightd.guide.pages import FOLDER, TOPICS, page, pages
+from flightd.runtime.frame_notice import decode_notice, encode_notice
 from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.scenario.scenario import Scenario
 from tools.write_guide import ROOT, guide_files, stale
@@ -141,3 +147,50 @@ def test_what_troubleshooting_quotes_is_what_the_program_says() -> None:
     gone = [piece for piece in pieces if not any(piece in text for text in texts)]
     assert gone == [], "reworded in the code: correct guide/troubleshooting.md"
     assert len(pieces) > 40
+
+
+def test_the_camera_process_of_the_cameras_page_sends_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    ours.bind(("127.0.0.1", 0))
+    ours.settimeout(5.0)
+    picture = np.full((360, 640, 3), 7, np.uint8)
+    camera = ModuleType("picamera2")
+    monkeypatch.setattr(camera, "Picamera2", lambda: PiCamera(picture, count=2), raising=False)
+    monkeypatch.setitem(sys.modules, "picamera2", camera)
+    program = next(text for name, text in blocks("python") if name == "cameras.md")
+    names: dict[str, Any] = {}
+    with ours, pytest.raises(StopIteration):
+        exec(program.replace("5600", str(ours.getsockname()[1])), names)
+    with closing(names["ring"]), closing(names["daemon"]):
+        assert np.array_equal(names["ring"].pixels(names["slot"]), picture)
+        notice = decode_notice(encode_notice(names["notice"]))
+        assert (notice.seq, notice.width_px, notice.height_px, notice.device_ns) == (1, 640, 360, 2)
+
+
+class PiCamera:
+    """As much of Picamera2 as the page uses; the `count` frames are stamped 1, 2, …"""
+
+    def __init__(self, picture: Image, count: int) -> None:
+        self._picture = picture
+        self._frames = iter(range(1, count + 1))
+        self._stamp_ns = 0
+
+    def create_video_configuration(self, main: dict[str, Any], controls: dict[str, Any]) -> dict[str, Any]:
+        return main | controls
+
+    def configure(self, configuration: dict[str, Any]) -> None:
+        assert configuration["size"] == self._picture.shape[1::-1]
+
+    def start(self) -> None: ...
+
+    def capture_request(self) -> PiCamera:
+        self._stamp_ns = next(self._frames)
+        return self
+
+    def make_array(self, name: str) -> Image:
+        return self._picture
+
+    def get_metadata(self) -> dict[str, int]:
+        return {"SensorTimestamp": self._stamp_ns}
+
+    def release(self) -> None: ...
