@@ -19,24 +19,16 @@ from flightd.adapters.ground_link import protocol_text
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, Rule, rules_for
 from flightd.config.schema import Config
-from flightd.config.site_file import SiteFile
 from flightd.guide import pages
 from flightd.mission.safety import hazards
+from flightd.site.site_file import SiteFile
+from tools import reference_tables
 from tools.command_help import help_pages
 from tools.layer_picture import layers, picture
-from tools.schema_tables import tables_of
 
 ROOT = Path(__file__).parent.parent
 LAYERS = pages.FOLDER / "pictures" / "layers.svg"
 _PART = re.compile(r"(<!-- made: (\S+) -->\n).*?(<!-- end: \2 -->)", re.DOTALL)
-
-
-def _configuration() -> str:
-    return "\n".join(table.markdown() for table in tables_of(Config))
-
-
-def _site_file() -> str:
-    return "\n".join(table.markdown() for table in tables_of(SiteFile))
 
 
 def _commands() -> str:
@@ -74,8 +66,8 @@ def _page_list(prefix: str) -> str:
 
 
 PARTS: Mapping[str, Callable[[], str]] = {
-    "configuration": _configuration,
-    "site-file": _site_file,
+    "configuration": lambda: reference_tables.markdown(Config),
+    "site-file": lambda: reference_tables.markdown(SiteFile),
     "commands": _commands,
     "protocol": protocol_text.markdown,
     "hazards": hazards.markdown,

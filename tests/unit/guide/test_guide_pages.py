@@ -16,14 +16,15 @@ import numpy as np
 import pytest
 
 from flightd.adapters.metrics.metrics import MetricsBook
+from flightd.config.reference import rows, tables
 from flightd.config.schema import parse_config
-from flightd.config.site_file import parse_site
 from flightd.core.inventory import LocationState
 from flightd.core.types import Image, Phase
 from flightd.guide.pages import FOLDER, TOPICS, page, pages
 from flightd.runtime.frame_notice import decode_notice, encode_notice
 from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.scenario.scenario import Scenario
+from flightd.site.site_file import parse_site
 from tools.write_guide import ROOT, guide_files, stale
 
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -109,9 +110,18 @@ def test_every_kind_of_fault_has_a_row_with_its_keys() -> None:
 def test_every_phase_location_state_and_metric_is_told() -> None:
     assert [phase for phase in Phase if f"`{phase}`" not in page("glossary").text] == []
     assert [state for state in LocationState if f"`{state}`" not in page("counting").text] == []
-    kinds = re.findall(r"# TYPE (\w+)", MetricsBook().exposition().decode())
-    metrics = [name for name in kinds if not name.endswith("_created")]
+    metrics = [metric.name for metric in MetricsBook().registry.collect()]
     assert [name for name in metrics if f"`{name}" not in page("service").text] == []
+
+
+def test_every_key_that_a_page_names_is_one_of_the_configuration() -> None:
+    keys, files = {row.name for row in rows()}, {"inventory.db", "inventory.csv"}
+    sections = {table.name.split(".")[0] for table in tables()}
+    for path in guide_files():
+        for name in _CODE.findall(path.read_text(encoding="utf-8")):
+            key = name.partition("=")[0].strip()
+            if re.fullmatch(r"\w+(\.\w+)+", key) and key.split(".")[0] in sections:
+                assert key in keys | files, f"{path.name}: {key}"
 
 
 @pytest.mark.parametrize(("name", "text"), blocks("python"))
