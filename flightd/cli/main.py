@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from flightd import __version__
-from flightd.cli import calibrate, doctor, inventory, keygen, log, replay, report, run, sim, vision
+from flightd.cli import calibrate, doctor, guide, inventory, keygen, log, replay, report, run, sim, vision
 from flightd.cli import map as site_map
 from flightd.cli.exits import run_app
 
@@ -23,6 +23,7 @@ log.register(app)
 keygen.register(app)
 site_map.register(app)
 inventory.register(app)
+guide.register(app)
 
 
 def _version(wanted: bool) -> None:

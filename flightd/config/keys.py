@@ -65,9 +65,15 @@ def range_of(field: FieldInfo) -> str:
 
 
 def section_of(field: FieldInfo) -> type[BaseModel] | None:
-    """The section that a field holds; None for a plain key."""
-    kind = field.annotation
+    """The section that a field holds, once or any number of times; None for a plain key."""
+    kind = typing.get_args(field.annotation)[0] if holds_many(field) else field.annotation
     return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+
+
+def holds_many(field: FieldInfo) -> bool:
+    """Whether a field is a list of any length: of sections, that is `[[section]]` in the file."""
+    kind = field.annotation
+    return typing.get_origin(kind) is tuple and typing.get_args(kind)[1:] == (Ellipsis,)
 
 
 REQUIRED = object()

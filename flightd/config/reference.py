@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from pydantic import BaseModel
 
-from flightd.config.keys import default_of, range_of, section_of, type_of, unit_of, written
+from flightd.config.keys import default_of, holds_many, range_of, section_of, type_of, unit_of, written
 from flightd.config.schema import Config
 
 
@@ -35,10 +35,11 @@ class Row(NamedTuple):
 
 
 class Table(NamedTuple):
-    """One table of the file, with what its section says of itself."""
+    """One table of the file, with what its section says of itself; `repeated`: there may be several."""
 
     name: str
     description: str
+    repeated: bool = False
 
 
 def rows(model: type[BaseModel] = Config) -> list[Row]:
@@ -53,7 +54,7 @@ def rows(model: type[BaseModel] = Config) -> list[Row]:
             written(default),
             field.description or "",
         )
-        for section, table, defaults in _tables(model)
+        for section, table, defaults, _ in _tables(model)
         for key, field in table.model_fields.items()
         if section_of(field) is None
         for default in (default_of(key, field, defaults),)
@@ -63,19 +64,20 @@ def rows(model: type[BaseModel] = Config) -> list[Row]:
 def tables(model: type[BaseModel] = Config) -> list[Table]:
     """Every table with its first paragraph of documentation."""
     return [
-        Table(name, " ".join((table.__doc__ or "").strip().split("\n\n")[0].split()))
-        for name, table, _ in _tables(model)
+        Table(name, " ".join((table.__doc__ or "").strip().split("\n\n")[0].split()), repeated)
+        for name, table, _, repeated in _tables(model)
     ]
 
 
 def _tables(
     model: type[BaseModel], prefix: str = "", default: object = None
-) -> Iterator[tuple[str, type[BaseModel], object]]:
-    """Name, section and the defaults of each table, parents first; the top level has no name."""
+) -> Iterator[tuple[str, type[BaseModel], object, bool]]:
+    """Name, section, defaults of each table and whether it may be repeated, parents first; the top level has
+    no name."""
     for key, field in model.model_fields.items():
         section = section_of(field)
         if section is not None:
             name = f"{prefix}.{key}" if prefix else key
             inner = default_of(key, field, default)
-            yield name, section, inner
+            yield name, section, inner, holds_many(field)
             yield from _tables(section, name, inner)

@@ -163,7 +163,9 @@ class _MarkerTable(Section):
         return Marker(self.id, self.dictionary, self.x_m, self.y_m, self.size_m, turned)
 
 
-class _SiteFile(Section):
+class SiteFile(Section):
+    """The whole file, as it is written."""
+
     site: _SiteTable
     aisle: tuple[_AisleTable, ...] = Field(min_length=1)
     cross: tuple[_CrossTable, ...] = ()
@@ -192,7 +194,7 @@ def parse_site(text: str, source: str) -> Site:
     except tomllib.TOMLDecodeError as err:
         raise InputError(f"{source}: not valid TOML: {err}") from None
     try:
-        file = _SiteFile.model_validate(tables)
+        file = SiteFile.model_validate(tables)
     except ValidationError as err:
         raise InputError(f"{source}: {_first_mistake(err, tables)}") from None
     try:
@@ -327,5 +329,5 @@ def _fields(location: tuple[int | str, ...]) -> list[str]:
         "pad": _PadTable,
         "marker": _MarkerTable,
     }
-    table = tables[cast(str, location[0])] if len(location) > 1 else _SiteFile
+    table = tables[cast(str, location[0])] if len(location) > 1 else SiteFile
     return list(table.model_fields)

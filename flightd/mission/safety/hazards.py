@@ -1,6 +1,6 @@
 """Every hazard in one table: how it is found, what is done, where that is flown.
 
-The transition table takes its safety rows from here, README prints it, and a test flies each row.
+The transition table takes its safety rows from here, the guide prints it, and a test flies each row.
 Keys in backticks are those of the configuration.
 """
 
@@ -295,10 +295,7 @@ def triggers_of(*actions: Action) -> frozenset[Trigger]:
 
 
 def markdown() -> str:
-    """The table as README prints it."""
-    lines = ["| hazard | scenario | found by | action | then |", "|---|---|---|---|---|"]
-    lines += [
-        f"| {row.name.replace('_', ' ')} | `{row.name}` | {row.found_by} | {row.action} | {row.then} |"
-        for row in HAZARDS
-    ]
+    """The table as the guide prints it."""
+    lines = ["| hazard | found by | action | then |", "|---|---|---|---|"]
+    lines += [f"| `{row.name}` | {row.found_by} | {row.action} | {row.then} |" for row in HAZARDS]
     return "\n".join(lines) + "\n"

@@ -1,6 +1,6 @@
 """ArduCopter's semantics: modes, arming, attitude flight without position, landing, time-outs.
 
-Measured on ArduCopter 4.5.6 or read in its sources: set-points are obeyed in GUIDED_NOGPS and GUIDED
+Measured on ArduCopter 4.5.6 or read in its sources: setpoints are obeyed in GUIDED_NOGPS and GUIDED
 only and dropped in silence elsewhere; 0.5 thrust holds the height; after GUID_TIMEOUT the vehicle levels
 and holds, it does not land; on the floor with nothing asked it disarms after DISARM_DELAY.
 """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from flightd.config.reference import Row, rows, tables
+from flightd.site.site_file import SiteFile
 
 ROWS = rows()
 NUMBERS = {"number", "whole number"}
@@ -42,3 +43,9 @@ def test_a_row_tells_type_unit_range_and_default_as_the_file_has_them() -> None:
 
 def test_names_tell_apart_what_stands_in_several_tables() -> None:
     assert len({row.name for row in ROWS}) == len(ROWS)
+
+
+def test_tables_that_may_be_repeated_are_told_with_their_keys() -> None:
+    repeated = {table.name: table.repeated for table in tables(SiteFile)}
+    assert (repeated["site"], repeated["aisle"], repeated["pad"]) == (False, True, True)
+    assert {"aisle.id", "aisle.spacing_m", "rack.levels_m"} <= {row.name for row in rows(SiteFile)}

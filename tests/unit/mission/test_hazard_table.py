@@ -1,4 +1,4 @@
-"""The hazard table: complete, true to the configuration, and the one that README prints."""
+"""The hazard table: complete and true to the configuration."""
 
 from __future__ import annotations
 
@@ -8,14 +8,10 @@ from pathlib import Path
 import pytest
 
 from flightd.config.reference import rows
-from flightd.mission.safety.hazards import HAZARDS, Action, Hazard, markdown
+from flightd.mission.safety.hazards import HAZARDS, Action, Hazard
 from flightd.mission.triggers import Trigger
 
 ROOT = Path(__file__).parents[3]
-
-
-def test_readme_prints_the_table() -> None:
-    assert markdown() in (ROOT / "README.md").read_text(encoding="utf-8"), "print it: hazards.markdown()"
 
 
 def test_names_are_unique_and_a_trigger_has_one_action() -> None:
