@@ -6,13 +6,13 @@ It knows nothing of the daemon but the address that its camera reports to.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal, Protocol
 
-from flightd.core.errors import UnavailableError
+from flightd.core.errors import FlightdError, RunError, UnavailableError
 from flightd.core.topics import Topic
 from flightd.core.types import Image
 from flightd.ports import Clock, Recorder
@@ -162,6 +162,7 @@ class World:
                 self.vehicle.truth_at,
                 clock,
                 hold=hold,
+                name="front camera",
             )
 
         self._faults = WorldFaults(spec.faults, spec.site, self._cameras, airframe, self.vehicle, tell)
@@ -176,18 +177,22 @@ class World:
 
     async def run(self, opened: Callable[[], None] = lambda: None) -> None:
         """Live until cancelled; `opened` is called when the vehicle can be talked to (an external one's truth
-        is known then, so that it can be drawn).  UnavailableError as for `open`."""
+        is known then, so that it can be drawn).  UnavailableError as for `open`; RunError when a peer fails:
+        the world ends with it."""
         await self.open()
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self.vehicle.run(), name="autopilot")
-            for name, camera in self._cameras.items():
-                tasks.create_task(camera.run(), name=name)
-            tasks.create_task(self._log_truth(), name="truth")
-            faults = self._faults.run(self._clock, self.vehicle.truth_at, self._recorder)
-            tasks.create_task(faults, name="faults")
-            if self._crew is not None:
-                tasks.create_task(self._crew.run(self._clock, self._at), name="crew")
-            opened()
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self.vehicle.run(), name="autopilot")
+                for name, camera in self._cameras.items():
+                    tasks.create_task(camera.run(), name=name)
+                tasks.create_task(self._log_truth(), name="truth")
+                faults = self._faults.run(self._clock, self.vehicle.truth_at, self._recorder)
+                tasks.create_task(faults, name="faults")
+                if self._crew is not None:
+                    tasks.create_task(self._crew.run(self._clock, self._at), name="crew")
+                opened()
+        except ExceptionGroup as failures:
+            raise _cause(failures) from failures
 
     def _at(self, now_ns: int) -> None:
         """Bring the vehicle up to the present."""
@@ -198,6 +203,21 @@ class World:
             truth: Kinematics = self.vehicle.truth()
             self._recorder.record(Topic.TRUTH, truth.stamp_ns, truth)
             await asyncio.sleep(_TRUTH_PERIOD_S)
+
+
+def _cause(failures: ExceptionGroup[Exception]) -> FlightdError:
+    """Of what a world died, as one error: what a person can do something about comes first."""
+    leaves = list(_leaves(failures))
+    told = next((leaf for leaf in leaves if isinstance(leaf, FlightdError)), None)
+    return told or RunError(f"the simulated world failed: {type(leaves[0]).__name__}: {leaves[0]}")
+
+
+def _leaves(failure: Exception) -> Iterator[Exception]:
+    if isinstance(failure, ExceptionGroup):
+        for part in failure.exceptions:
+            yield from _leaves(part)
+    else:
+        yield failure
 
 
 def _ardrone(

@@ -37,4 +37,5 @@ def front_peer(
         partial(server.show, camera=VideoChannel.FRONT),
         lambda: server.watched and server.channel is VideoChannel.FRONT,
         hold,
+        "front camera",
     )

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from flightd.config.site_file import load_site, parse_site
+
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackLook
 from flightd.sim.racks.front_camera import FrontCamera, front_lens
