@@ -81,6 +81,9 @@ class AutopilotPeer(abc.ABC):
 
     landing_mode: int
 
+    refused_arming: int
+    """The MAV_RESULT of an arming that something is against."""
+
     def __init__(
         self, clock: Clock, airframe: Airframe, config: PeerConfig, parameters: ParameterServer
     ) -> None:
@@ -108,6 +111,8 @@ class AutopilotPeer(abc.ABC):
         """A sensor fault: the reason with which arming is refused while it is not empty."""
         self._climb_loop = ClimbLoop(ClimbGains(hover_guess=airframe.params.hover_collective))
         self._stick_yaw_rad = 0.0
+        self._idle_s = 0.0
+        self._settled_s = 0.0
 
     async def open(self) -> Address:
         """Bind the socket and greet the remotes; the address bound.  OSError when the port is taken."""
@@ -204,6 +209,11 @@ class AutopilotPeer(abc.ABC):
     @abc.abstractmethod
     def _heartbeat(self) -> Message: ...
 
+    def _base_mode(self) -> int:
+        """HEARTBEAT.base_mode of what every firmware says there."""
+        base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
+        return int(base | (dialect.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0))
+
     @abc.abstractmethod
     def _command(self, command: int, params: tuple[float, ...]) -> int:
         """Obey a command of this firmware's own; the MAV_RESULT."""
@@ -216,13 +226,34 @@ class AutopilotPeer(abc.ABC):
         """custom_mode in the parameters of DO_SET_MODE."""
         return _whole(params[1])
 
-    @abc.abstractmethod
     def _arm(self) -> int:
         """Arm if nothing is against it; the MAV_RESULT."""
+        if self.armed:
+            return int(dialect.MAV_RESULT_ACCEPTED)
+        reason = self._arming_refusal()
+        if reason:
+            self.say(dialect.MAV_SEVERITY_CRITICAL, reason)
+            return self.refused_arming
+        self.armed, self.landed = True, True
+        self._idle_s = 0.0
+        self._on_armed()
+        return int(dialect.MAV_RESULT_ACCEPTED)
 
-    @abc.abstractmethod
     def _disarm(self) -> None:
         """Stop the motors."""
+        if self.armed:
+            self.armed, self.landed = False, True
+            self._on_disarmed()
+
+    @abc.abstractmethod
+    def _arming_refusal(self) -> str:
+        """What is against arming, as the autopilot says it; an empty text for nothing."""
+
+    @abc.abstractmethod
+    def _on_armed(self) -> None: ...
+
+    @abc.abstractmethod
+    def _on_disarmed(self) -> None: ...
 
     @abc.abstractmethod
     def _setpoint(self, message: Message) -> None:
