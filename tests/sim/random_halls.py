@@ -22,12 +22,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from flightd.config.site_file import load_site
+
 from flightd.app.simulation.launch import Simulation, fly
 from flightd.app.simulation.ports import fitted
 from flightd.cli.map import new
 from flightd.config.paths import shipped
 from flightd.config.schema import Config, load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError, RunError
 from flightd.core.types import Phase, Status
 from flightd.sim.scenario.scenario import Scenario

@@ -24,7 +24,7 @@ from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import VirtualLoop
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera, front_lens
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.scenario.scenario import FrontCameraScenario, Scenario
@@ -41,7 +41,7 @@ def hovering(stamp_ns: int) -> Kinematics:
 
 
 CAMERA = FrontCamera(lens=front_lens(320, 200, 250.0), fps=5.0, capture_delay_s=0.08, jitter_s=0.0)
-MAKE = partial(FrontRenderer, load_site(SMALL), CAMERA, RackLook(), 1)
+MAKE = partial(FrontRenderer, load_site(SMALL), CAMERA, RackAppearance(), 1)
 
 
 def taken(
@@ -166,7 +166,7 @@ def test_a_renderer_that_cannot_keep_up_costs_pictures_and_does_not_let_them_que
 @pytest.mark.realtime
 def test_a_camera_without_any_delay_takes_pictures() -> None:
     at_once = replace(CAMERA, capture_delay_s=0.0)
-    make = partial(FrontRenderer, load_site(SMALL), at_once, RackLook(), 1)
+    make = partial(FrontRenderer, load_site(SMALL), at_once, RackAppearance(), 1)
     assert len(taken(2.0, make=make, camera=at_once, loop=asyncio.new_event_loop)) >= 2
 
 

@@ -12,7 +12,7 @@ import pytest
 from flightd.app.simulation.world_process import run_world, watch_world
 from flightd.config.paths import shipped
 from flightd.core.errors import FlightdError, RunError, UnavailableError
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.world import FrontSpec, WorldSpec
 from flightd.site.site_file import load_site
 
@@ -50,8 +50,8 @@ def test_a_fault_of_the_world_itself_is_named(tmp_path: Path) -> None:
 
 
 def test_a_camera_that_cannot_draw_ends_the_world_and_names_itself(tmp_path: Path) -> None:
-    broken = RackLook(shares="no shares at all")  # type: ignore[arg-type]
-    front = FrontSpec(("127.0.0.1", 9), look=broken)
+    broken = RackAppearance(shares="no shares at all")  # type: ignore[arg-type]
+    front = FrontSpec(("127.0.0.1", 9), appearance=broken)
     spec = WorldSpec(load_site(shipped("site-racks-small.toml")), 1, ("127.0.0.1", 9), front=front)
     death = death_of(spec, tmp_path / "truth.mcap")
     assert isinstance(death, RunError)

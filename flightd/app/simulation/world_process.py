@@ -13,11 +13,11 @@ from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.core.errors import FlightdError, RunError
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import ScaledLoop
-from flightd.sim.scenario.faults import Told
+from flightd.sim.scenario.faults import FaultListener
 from flightd.sim.world import World, WorldSpec
 
 
-async def watch_world(process: Any, pipe: Connection, tell: Told) -> None:
+async def watch_world(process: Any, pipe: Connection, tell: FaultListener) -> None:
     """Pass on what the world tells; return when its process has died; raises what it died of."""
     loop, died, failed = asyncio.get_running_loop(), asyncio.Event(), list[BaseException]()
 

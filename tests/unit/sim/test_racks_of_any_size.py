@@ -11,7 +11,7 @@ import pytest
 from flightd.config.site_file import load_site, parse_site
 
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera, front_lens
 from flightd.sim.racks.rack_layout import faces
 from flightd.sim.racks.renderer import FrontRenderer
@@ -43,7 +43,7 @@ def site_with(rack: str, shelf_distance_m: float = 1.2, shelf_height_m: float = 
 
 def look_at(site: Site, count: int) -> None:
     """Draw what is seen from before so many of the site's locations, from one end of it to the other."""
-    renderer = FrontRenderer(site, CAMERA, RackLook(shares=SHARES), 3)
+    renderer = FrontRenderer(site, CAMERA, RackAppearance(shares=SHARES), 3)
     locations = list(site.locations.values())
     for at in np.linspace(0, len(locations) - 1, count).astype(int):
         location = locations[at]
