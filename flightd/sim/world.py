@@ -25,7 +25,8 @@ from flightd.sim.floor.appearance import DEFAULT, Appearance
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe, AirframeParams
 from flightd.sim.plant.battery_swapper import BatterySwapper
-from flightd.sim.plant.external_simulator import ExternalVehicle, Placement
+from flightd.sim.plant.external_simulator import ExternalVehicle
+from flightd.sim.plant.external_truth import Placement
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance
