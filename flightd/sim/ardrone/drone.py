@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from flightd.sim.ardrone.at_commands import DroneCommand, SequenceRule, parse
 from flightd.sim.ardrone.configuration import Configuration, Ids
-from flightd.sim.ardrone.flight import FlightLoops, Wish
+from flightd.sim.ardrone.flight import FlightLoops, LoopTargets
 from flightd.sim.ardrone.navdata_writer import ALL_OPTIONS, OPTION_BYTES, NavdataReport, bootstrap, packet
 from flightd.sim.ardrone.states import (
     AIRBORNE,
@@ -172,7 +172,7 @@ class Drone:
             self._booted_ns = now_ns
         self._watch(now_ns)
         self._advance(now_ns)
-        self.loops.step(dt_s, self._wish())
+        self.loops.step(dt_s, self._targets())
 
     def _watch(self, now_ns: int) -> None:
         silent_ns = now_ns - self._command_ns if self._command_ns is not None else None
@@ -226,18 +226,18 @@ class Drone:
     def _too_high(self) -> bool:
         return self.loops.height_m >= self.configuration.number("control:altitude_max") / 1000.0
 
-    def _wish(self) -> Wish:
+    def _targets(self) -> LoopTargets:
         if not self.airborne or self.emergency:
-            return Wish()
+            return LoopTargets()
         if self.major == MajorState.TAKE_OFF:
-            return Wish(motors=True, idle=not self.minor, climb_mps=self.options.take_off_climb_mps)
+            return LoopTargets(motors=True, idle=not self.minor, climb_mps=self.options.take_off_climb_mps)
         if self.major == MajorState.LANDING:
-            return Wish(motors=True, climb_mps=-self.options.land_sink_mps)
+            return LoopTargets(motors=True, climb_mps=-self.options.land_sink_mps)
         if self.major != MajorState.FLYING:
-            return Wish(motors=True)
+            return LoopTargets(motors=True)
         tilt_rad = self.configuration.number("control:euler_angle_max")
         climb_mps = self._stick.gaz * self.configuration.number("control:control_vz_max") / 1000.0
-        return Wish(
+        return LoopTargets(
             motors=True,
             hold=False,
             roll_rad=self._stick.roll * tilt_rad,

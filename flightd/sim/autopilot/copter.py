@@ -156,7 +156,7 @@ class ArduCopterPeer(AutopilotPeer):
         self._watch_battery()
         if not self.armed:
             return AirframeCommand()
-        roll, pitch, yaw, yaw_rate, climb_mps = self._wishes(dt_s)
+        roll, pitch, yaw, yaw_rate, climb_mps = self._targets(dt_s)
         raw = self._raw_collective()
         if raw is not None:
             climb_mps = 1.0 if raw > self.parameters["MOT_THST_HOVER"] else -1.0
@@ -169,7 +169,7 @@ class ArduCopterPeer(AutopilotPeer):
         self._detect_landing(dt_s, climb_mps, collective)
         return self._fly(roll, pitch, yaw, yaw_rate, collective)
 
-    def _wishes(self, dt_s: float) -> tuple[float, float, float, float, float]:
+    def _targets(self, dt_s: float) -> tuple[float, float, float, float, float]:
         """Roll, pitch, yaw, yaw rate and climb rate of the present mode."""
         if self.mode in _GUIDED:
             target = self._target

@@ -161,12 +161,12 @@ class Px4Peer(AutopilotPeer):
             return AirframeCommand()
         if self.mode == Px4Mode.OFFBOARD and self._setpoint_age_s > self.parameters["COM_OF_LOSS_T"]:
             self._lose_offboard()
-        roll, pitch, yaw, yaw_rate, collective, down = self._wishes(dt_s)
+        roll, pitch, yaw, yaw_rate, collective, down = self._targets(dt_s)
         self._detect_landing(dt_s, collective, down=down)
         self._disarm_when_done(dt_s)
         return self._fly(roll, pitch, yaw, yaw_rate, max(collective, _IDLE_COLLECTIVE))
 
-    def _wishes(self, dt_s: float) -> tuple[float, float, float, float, float, bool]:
+    def _targets(self, dt_s: float) -> tuple[float, float, float, float, float, bool]:
         """Roll, pitch, yaw, yaw rate, collective, and whether a height loop wants to go down."""
         if self.mode == Px4Mode.OFFBOARD:
             return *self._q_target, self._yaw_rate_radps, self._thrust, False

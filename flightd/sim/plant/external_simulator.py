@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.geometry import wrap_pi
 from flightd.ports import Clock
-from flightd.sim.plant.external_pace import PaceWatch
+from flightd.sim.plant.external_pace import PaceMonitor
 from flightd.sim.plant.external_truth import Placement, TruthReader
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.truth_history import TruthHistory
@@ -65,7 +65,7 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
         self._peer: tuple[str, int] | None = None
         self._system_id: int | None = None
         self._range = SensorParams()
-        self._pace = PaceWatch()
+        self._pace = PaceMonitor()
         self._first = asyncio.Event()
         self._newest_ns = 0
         self._line: asyncio.Task[None] | None = None

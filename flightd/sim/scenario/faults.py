@@ -42,7 +42,7 @@ _LOOKS_S = 0.01
 _OFF_FLOOR_M = 0.3
 _HERE_M = 0.4
 
-Told = Callable[[int, bool], None]
+FaultListener = Callable[[int, bool], None]
 """Called with a fault's number and whether it begins or ends."""
 
 
@@ -127,7 +127,7 @@ class WorldFaults:
         cameras: Mapping[str, CameraPeer],
         airframe: Airframe,
         vehicle: object,
-        tell: Told,
+        tell: FaultListener,
     ) -> None:
         self._faults = tuple(faults)
         self._schedule = FaultSchedule(faults, site)
