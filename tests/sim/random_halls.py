@@ -22,8 +22,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from flightd.config.site_file import load_site
-
 from flightd.app.simulation.launch import Simulation, fly
 from flightd.app.simulation.ports import fitted
 from flightd.cli.map import new
@@ -33,6 +31,7 @@ from flightd.core.errors import InputError, RunError
 from flightd.core.types import Phase, Status
 from flightd.sim.scenario.scenario import Scenario
 from flightd.site.site import Site
+from flightd.site.site_file import load_site
 
 LIMIT_S = 900.0
 _SITE_OPTIONS = set(inspect.signature(new).parameters) - {"out", "name", "force", "as_json"}

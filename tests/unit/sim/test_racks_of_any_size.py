@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flightd.config.site_file import load_site, parse_site
 
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackAppearance
@@ -17,6 +16,7 @@ from flightd.sim.racks.rack_layout import faces
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.racks.stock import StockShares, StockSituation, stock
 from flightd.site.site import Side, Site
+from flightd.site.site_file import load_site, parse_site
 from tests.command import Command
 
 CAMERA = FrontCamera(lens=front_lens(320, 200, 250.0))
