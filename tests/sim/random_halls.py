@@ -23,12 +23,13 @@ from pathlib import Path
 from typing import Any
 
 from flightd.app.simulation.launch import Simulation, fly
-from flightd.app.simulation.ports import fitted
 from flightd.cli.map import new
 from flightd.config.paths import shipped
 from flightd.config.schema import Config, load_config
 from flightd.core.errors import InputError, RunError
-from flightd.core.types import Phase, Status
+from flightd.core.geometry import Lens
+from flightd.core.snapshot import Snapshot
+from flightd.core.types import Phase
 from flightd.sim.scenario.scenario import Scenario
 from flightd.site.site import Site
 from flightd.site.site_file import load_site
@@ -120,7 +121,7 @@ def fly_to_first_scan(seed: int, folder: Path) -> FirstScan:
     node = next(node for node in site.serpentine_route() if node in counted)
     watch = _Watch()
     try:
-        fly(Simulation(_config(site, node), site, Scenario(), seed, None, folder, watch))
+        fly(Simulation(_config(node), site, Scenario(), seed, None, folder, watch))
     except RunError:
         if not watch.scanned:
             raise
@@ -139,7 +140,7 @@ class _Watch:
         self._began_ns: int | None = None
         self._phase = Phase.PREFLIGHT
 
-    def __call__(self, status: Status) -> None:
+    def __call__(self, status: Snapshot) -> None:
         if self._began_ns is None:
             self._began_ns = status.stamp_ns
         if self.scanned:
@@ -152,18 +153,22 @@ class _Watch:
         self._phase = status.phase
 
 
-def _config(site: Site, node: str) -> Config:
-    """What `flightd sim` flies with, to one node."""
+def _config(node: str) -> Config:
+    """What `flightd sim` flies with where there are racks, to one node."""
     config, scenario = load_config(shipped("sim.toml")), Scenario()
-    down, front = scenario.camera.camera(), scenario.front_camera.camera()
-    cameras = {"camera": down.lens, "front_camera": front.lens}
-    updates: dict[str, Any] = {}
-    for name, lens in cameras.items():
-        keys = {field: getattr(lens, field) for field in ("width_px", "height_px", "distortion")}
-        keys |= {field: getattr(lens, field) for field in ("fx_px", "fy_px", "cx_px", "cy_px")}
-        updates[name] = getattr(config, name).model_copy(update=keys)
-    updates["mission"] = config.mission.model_copy(update={"nodes": (node,)})
-    return fitted(config.model_copy(update=updates), site)
+    down, front = _lens_keys(scenario.camera.camera().lens), _lens_keys(scenario.front_camera.camera().lens)
+    return config.model_copy(
+        update={
+            "mission": config.mission.model_copy(update={"nodes": (node,)}),
+            "camera": config.camera.model_copy(update=down),
+            "front_camera": config.front_camera.model_copy(update={"url": "udp://127.0.0.1:5601", **front}),
+        }
+    )
+
+
+def _lens_keys(lens: Lens) -> dict[str, Any]:
+    keys = "width_px", "height_px", "fx_px", "fy_px", "cx_px", "cy_px", "distortion"
+    return {key: getattr(lens, key) for key in keys}
 
 
 def _fly_each(seeds: Sequence[int]) -> int:
