@@ -145,6 +145,11 @@ def new(
     pitch_m: Annotated[float, typer.Option(help="Metres from aisle to aisle.", min=0.5, max=100)] = 3.0,
     line_width_m: Annotated[float, typer.Option(help="Width of the painted lines.")] = 0.075,
     line_colour: Annotated[str, typer.Option(help="yellow, white, red or blue.")] = "yellow",
+    cross_half_m: Annotated[float, typer.Option(help="Half the length of a node's own cross line.")] = 0.5,
+    overrun_m: Annotated[float, typer.Option(help="How far the lines run past their end nodes.")] = 0.4,
+    shelves: Annotated[
+        str, typer.Option(help="Sides of the aisles with shelves, seen along +x: both, left, right or none.")
+    ] = "both",
     shelf_distance_m: Annotated[float, typer.Option(help="From the line to the shelf front.")] = 1.2,
     shelf_height_m: Annotated[float, typer.Option(help="Height of the shelves.")] = 3.0,
     ceiling_m: Annotated[float, typer.Option(help="Height of the hall.")] = 6.0,
@@ -153,6 +158,12 @@ def new(
     ] = None,
     bay_width_m: Annotated[float, typer.Option(help="Width of the racks' bays.", min=0.2, max=50)] = 1.35,
     positions: Annotated[int, typer.Option(help="Places in each bay on each level.", min=1, max=100)] = 1,
+    deck_below_label_m: Annotated[
+        float | None, typer.Option(help="From the labels down to what goods stand on; 2/5 of the spacing.")
+    ] = None,
+    pattern: Annotated[
+        str | None, typer.Option(help="Location codes, as in {aisle}{side}-{bay:02}-{level}-{position}.")
+    ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the site; the file's name.")] = None,
     force: Force = False,
     as_json: AsJson = False,
@@ -164,6 +175,11 @@ def new(
     """
     from flightd.site.site_file import parse_site, site_toml
 
+    sides = _sides(shelves)
+    if levels_m is not None and not sides:
+        raise InputError(
+            f"--shelves {shelves}: racks (--levels-m) stand on shelves; give both, left or right"
+        )
     steps = [repr(step) for step in _spacings(spacing_m, nodes)]
     letters = _LETTERS[:aisles]
     blocks = [
@@ -173,16 +189,21 @@ def new(
     for i, letter in enumerate(letters):
         blocks.append(
             f'[[aisle]]\nid = "{letter}"\nx_m = 0.0\ny_m = {round(i * pitch_m, 6)}\n'
-            f"spacing_m = [{', '.join(steps)}]\nshelf_distance_m = {shelf_distance_m}\n"
+            f"spacing_m = [{', '.join(steps)}]\ncross_half_m = {cross_half_m}\noverrun_m = {overrun_m}\n"
+            f"shelves = {json.dumps(sides)}\nshelf_distance_m = {shelf_distance_m}\n"
             f"shelf_height_m = {shelf_height_m}"
         )
     for a, b in itertools.pairwise(letters):
         blocks += [f'[[cross]]\nnodes = ["{a}{end}", "{b}{end}"]' for end in (1, nodes)]
     if levels_m is not None:
         levels = ", ".join(repr(level) for level in _numbers("--levels-m", levels_m))
-        blocks.append(
-            f"[[rack]]\nbay_width_m = {bay_width_m}\nlevels_m = [{levels}]\npositions = {positions}"
-        )
+        rack = f"[[rack]]\nsides = {json.dumps(sides)}\nbay_width_m = {bay_width_m}\nlevels_m = [{levels}]"
+        rack += f"\npositions = {positions}"
+        if deck_below_label_m is not None:
+            rack += f"\ndeck_below_label_m = {deck_below_label_m}"
+        if pattern is not None:
+            rack += f"\npattern = {json.dumps(pattern)}"
+        blocks.append(rack)
     blocks.append('[[pad]]\nid = "home"\nnode = "A1"')
     site = parse_site("\n\n".join(blocks), str(out))
     _write(out, site_toml(site), force)
@@ -208,6 +229,13 @@ def _facts(site: Site) -> dict[str, Any]:
         "paint_m": round(math.fsum(abs(p.x1_m - p.x0_m) + abs(p.y1_m - p.y0_m) for p in site.lines), 1),
         "route_m": round(site.length_m(route), 1),
     }
+
+
+def _sides(shelves: str) -> list[str]:
+    known = {"both": ["left", "right"], "left": ["left"], "right": ["right"], "none": []}
+    if shelves not in known:
+        raise InputError(f"--shelves {shelves!r}: give both, left, right or none")
+    return known[shelves]
 
 
 def _spacings(text: str, nodes: int) -> list[float]:

@@ -27,10 +27,10 @@ def target(folder: Path) -> Target:
             return in_one_line(err)
         read.camera.camera()
         read.front_camera.camera()
-        read.racks.look()
-        read.floor.look()
+        read.racks.appearance()
+        read.floor.surface()
         read.floor.site(site)
-        read.wind.draught()
+        read.wind.params()
         read.vehicle.radio()
         return False
 

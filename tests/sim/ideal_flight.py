@@ -36,9 +36,9 @@ from flightd.mission.scan.scanner import Scanner
 from flightd.pilot import Pilot
 from flightd.sim.autopilot.climb_loop import ClimbLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
+from flightd.sim.plant.battery_swapper import BatterySwapper
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.plant.pad_crew import PadCrew
-from flightd.sim.plant.wind import Draught
+from flightd.sim.plant.wind import WindParams
 from flightd.sim.sensors.instruments import Sensors
 from flightd.site.site import Site
 from tests.sim.ideal_front import IdealFront
@@ -104,7 +104,7 @@ class IdealFlight:
         policy: HeadingPolicy | None = None,
         visits: tuple[str, ...] = (),
         seed: int = 1,
-        draught: Draught | None = None,
+        wind: WindParams | None = None,
         errors: EyeErrors | None = None,
         delay_ns: int = 68_000_000,
         airframe: AirframeParams | None = None,
@@ -128,7 +128,7 @@ class IdealFlight:
         x_m, y_m = world.pad_centre(world.home)
         if carried_to:
             x_m, y_m = site.nodes[carried_to].x_m, site.nodes[carried_to].y_m
-        self.airframe = Airframe(airframe, draught=draught, seed=seed, x_m=x_m, y_m=y_m)
+        self.airframe = Airframe(airframe, wind=wind, seed=seed, x_m=x_m, y_m=y_m)
         self.sensors = Sensors(seed=seed)
         self._eye = IdealEye(world, config.camera.lens(), config.camera.mount(), errors, seed)
         self._climb = ClimbLoop()
@@ -145,7 +145,7 @@ class IdealFlight:
         self.ground_silent_s = 0.0
         self.commands: list[Command] = []
         """Orders that the next tick takes."""
-        self._crew = PadCrew(site, self.airframe, swap_s) if swap_s else None
+        self._battery_swapper = BatterySwapper(site, self.airframe, swap_s) if swap_s else None
         self.counted: tuple[str, ...] = ()
         self.on_tick: Callable[[Phase, int], None] = lambda _phase, _now_ns: None
 
@@ -196,8 +196,8 @@ class IdealFlight:
             self._photograph()
             if self._now_ns >= tick_ns:
                 tick_ns += TICK_NS
-                if self._crew is not None:
-                    self._crew.look(self._now_ns)
+                if self._battery_swapper is not None:
+                    self._battery_swapper.look(self._now_ns)
                 output = tick.run(self._now_ns)
                 self.on_tick(output.phase, self._now_ns)
                 flown.outputs.append(output)

@@ -12,7 +12,7 @@ from flightd.core.types import Image
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
 from flightd.mission.scan.views import View, ViewPlanner
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.site.site import Site
@@ -32,7 +32,7 @@ class ShelfPicture:
 def shelf_pictures(
     site: Site,
     camera: FrontCamera,
-    look: RackLook,
+    look: RackAppearance,
     seed: int,
     nodes: Sequence[str],
     parts: Sequence[float] = (1.0,),

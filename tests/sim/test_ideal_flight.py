@@ -11,7 +11,7 @@ from flightd.config.mission import Heading
 from flightd.config.schema import load_config
 from flightd.core.types import Phase
 from flightd.mission.plan.flight_plan import HeadingPolicy
-from flightd.sim.plant.wind import Draught
+from flightd.sim.plant.wind import WindParams
 from flightd.sim.random_sites import random_site
 from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import Flown, IdealFlight, rms_off_line
@@ -47,7 +47,7 @@ def test_a_random_site_is_flown_too() -> None:
 
 
 def test_lines_lost_make_it_level_hold_and_land() -> None:
-    flight = IdealFlight(DEMO, CONFIG, visits=NEAR, draught=Draught(gust_rms_mps=0.0))
+    flight = IdealFlight(DEMO, CONFIG, visits=NEAR, wind=WindParams(gust_rms_mps=0.0))
     lost_ns: list[int] = []
     step = flight.pilot.step
 

@@ -12,7 +12,7 @@ from flightd.config.schema import Config, load_config
 from flightd.core.tick import TickOutput
 from flightd.core.types import Command, CommandKind, Phase
 from flightd.sim.plant.airframe import AirframeParams
-from flightd.sim.plant.pad_crew import PadCrew
+from flightd.sim.plant.battery_swapper import BatterySwapper
 from flightd.site.site_file import load_site, parse_site, site_toml
 from tests.sim.ideal_flight import Flown, IdealFlight
 
@@ -109,7 +109,7 @@ def test_ordered_home_it_lands_there_with_the_rest_unvisited() -> None:
 
 @pytest.mark.parametrize(("order", "within_m"), [(CommandKind.LAND, 0.15), (CommandKind.STOP, 0.6)])
 def test_ordered_down_it_lands_where_it_is(order: CommandKind, within_m: float) -> None:
-    """A stop goes down level and unsteered: the draught carries it."""
+    """A stop goes down level and unsteered: the wind carries it."""
     flight = IdealFlight(DEMO, config(), visits=ROW)
     when(flight, (lambda o: o.phase is Phase.HOVER and o.goal == "A3", order, ""))
     flown = flight.fly()
@@ -201,19 +201,19 @@ def test_the_plan_left_over_is_flown_by_the_next_start() -> None:
     assert (*done, *second.visited) == ROW
 
 
-def test_the_crew_changes_the_battery_of_a_drone_that_came_back() -> None:
+def test_the_battery_swapper_changes_the_battery_of_a_drone_that_came_back() -> None:
     flight = IdealFlight(DEMO, config(), visits=("A2",))
     frame = flight.airframe
-    crew = PadCrew(DEMO, frame, 30.0)
+    swapper = BatterySwapper(DEMO, frame, 30.0)
     frame.battery_frac = 0.4
     for t in range(100):
-        crew.look(t * 10**9)
+        swapper.look(t * 10**9)
     assert frame.battery_frac == 0.4, "it has not flown"
     frame.on_floor = False
-    crew.look(100 * 10**9)
+    swapper.look(100 * 10**9)
     frame.on_floor = True
     for t in range(101, 130):
-        crew.look(t * 10**9)
+        swapper.look(t * 10**9)
     assert frame.battery_frac == 0.4
-    crew.look(131 * 10**9)
+    swapper.look(131 * 10**9)
     assert frame.battery_frac == 1.0

@@ -70,8 +70,8 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
         start_offset_m=scenario.vehicle.start_offset_m,
         camera=replace(scenario.camera.camera(), mount=config.camera.mount()),
         front=_front(simulation, ports.front_camera),
-        appearance=scenario.floor.look(),
-        draught=scenario.wind.draught(),
+        appearance=scenario.floor.surface(),
+        wind=scenario.wind.params(),
         battery_frac=scenario.vehicle.battery,
         battery_ah=scenario.vehicle.battery_ah,
         swap_s=scenario.vehicle.swap_s,
@@ -86,7 +86,7 @@ def _front(simulation: Simulation, port: int | None) -> FrontSpec | None:
         return None
     scenario = simulation.scenario
     camera = replace(scenario.front_camera.camera(), mount=simulation.config.front_camera.mount())
-    return FrontSpec(("127.0.0.1", port), camera, scenario.racks.look())
+    return FrontSpec(("127.0.0.1", port), camera, scenario.racks.appearance())
 
 
 def truth_of(simulation: Simulation) -> dict[str, LocationTruth]:
@@ -95,4 +95,4 @@ def truth_of(simulation: Simulation) -> dict[str, LocationTruth]:
         return {}
     scenario = simulation.scenario
     focal_px = scenario.front_camera.camera().lens.fx_px
-    return stock_truth(simulation.site, scenario.racks.look(), focal_px, simulation.seed)
+    return stock_truth(simulation.site, scenario.racks.appearance(), focal_px, simulation.seed)

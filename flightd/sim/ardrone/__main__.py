@@ -24,7 +24,7 @@ from flightd.sim.ardrone.video import VideoChannel
 from flightd.sim.floor.appearance import DEFAULT
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.sensors.camera import CameraPeer
 from flightd.sim.sensors.instruments import Sensors
 from flightd.sim.sensors.optics import SimCamera
@@ -69,7 +69,7 @@ async def _serve(site: Site, ports: DronePorts, seed: int, battery_frac: float) 
     make = partial(Renderer, site, optics, DEFAULT, seed)
     show = partial(server.show, camera=VideoChannel.BOTTOM)
     camera = CameraPeer(optics, make, f"camera {seed}", _NOBODY, server.truth_at, clock, show)
-    front = front_peer(server, site, RackLook(), seed, clock)
+    front = front_peer(server, site, RackAppearance(), seed, clock)
     async with asyncio.TaskGroup() as tasks:
         tasks.create_task(server.run(), name="drone")
         tasks.create_task(camera.run(), name="camera")

@@ -60,6 +60,7 @@ class ArduCopterPeer(AutopilotPeer):
     takes_keys = True
     pilots_mode = CopterMode.ALT_HOLD
     landing_mode = CopterMode.LAND
+    refused_arming = dialect.MAV_RESULT_FAILED
 
     def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
         config = config or PeerConfig()
@@ -67,8 +68,6 @@ class ArduCopterPeer(AutopilotPeer):
         super().__init__(clock, airframe, config, parameters)
         self.mode = CopterMode.STABILIZE
         self._target = AngleTarget()
-        self._idle_s = 0.0
-        self._settled_s = 0.0
         self._low_battery_told = False
 
     def reboot(self) -> None:
@@ -124,20 +123,10 @@ class ArduCopterPeer(AutopilotPeer):
         self._disarm()
         return int(dialect.MAV_RESULT_ACCEPTED)
 
-    def _arm(self) -> int:
-        if self.armed:
-            return int(dialect.MAV_RESULT_ACCEPTED)
-        reason = self._arming_refusal()
-        if reason:
-            self.say(dialect.MAV_SEVERITY_CRITICAL, reason)
-            return int(dialect.MAV_RESULT_FAILED)
-        self.armed = True
-        self.landed = True
-        self._idle_s = 0.0
+    def _on_armed(self) -> None:
         self._climb_loop.reset(self.sensors.height_m)
         self.say(dialect.MAV_SEVERITY_INFO, "Arming motors")
         self.link.broadcast(self._heartbeat())
-        return int(dialect.MAV_RESULT_ACCEPTED)
 
     def _arming_refusal(self) -> str:
         if not self.is_ready:
@@ -152,12 +141,9 @@ class ArduCopterPeer(AutopilotPeer):
             return "PreArm: Need Position Estimate"
         return ""
 
-    def _disarm(self) -> None:
-        if self.armed:
-            self.armed = False
-            self.landed = True
-            self.say(dialect.MAV_SEVERITY_INFO, "Disarming motors")
-            self.link.broadcast(self._heartbeat())
+    def _on_disarmed(self) -> None:
+        self.say(dialect.MAV_SEVERITY_INFO, "Disarming motors")
+        self.link.broadcast(self._heartbeat())
 
     def _setpoint(self, message: Message) -> None:
         if self.mode in _GUIDED:
@@ -170,7 +156,7 @@ class ArduCopterPeer(AutopilotPeer):
         self._watch_battery()
         if not self.armed:
             return AirframeCommand()
-        roll, pitch, yaw, yaw_rate, climb_mps = self._wishes(dt_s)
+        roll, pitch, yaw, yaw_rate, climb_mps = self._targets(dt_s)
         raw = self._raw_collective()
         if raw is not None:
             climb_mps = 1.0 if raw > self.parameters["MOT_THST_HOVER"] else -1.0
@@ -183,7 +169,7 @@ class ArduCopterPeer(AutopilotPeer):
         self._detect_landing(dt_s, climb_mps, collective)
         return self._fly(roll, pitch, yaw, yaw_rate, collective)
 
-    def _wishes(self, dt_s: float) -> tuple[float, float, float, float, float]:
+    def _targets(self, dt_s: float) -> tuple[float, float, float, float, float]:
         """Roll, pitch, yaw, yaw rate and climb rate of the present mode."""
         if self.mode in _GUIDED:
             target = self._target
@@ -245,11 +231,7 @@ class ArduCopterPeer(AutopilotPeer):
             self.instruments.landed_state = LANDED_LANDING if landing else LANDED_AIR
 
     def _heartbeat(self) -> Message:
-        base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
-        if self.mode in _GUIDED:
-            base |= dialect.MAV_MODE_FLAG_GUIDED_ENABLED
-        if self.armed:
-            base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        base = self._base_mode() | (dialect.MAV_MODE_FLAG_GUIDED_ENABLED if self.mode in _GUIDED else 0)
         active = dialect.MAV_STATE_ACTIVE if self.armed and not self.landed else dialect.MAV_STATE_STANDBY
         return dialect.MAVLink_heartbeat_message(
             dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, base, self.mode, active, 3

@@ -15,7 +15,7 @@ from flightd.core.types import Demand
 from flightd.sim.ardrone import configuration
 from flightd.sim.ardrone.at_commands import DroneCommand
 from flightd.sim.ardrone.configuration import Configuration, Ids
-from flightd.sim.ardrone.drone import DroneOptions
+from flightd.sim.ardrone.states import DroneOptions
 from tests.protocol.ardrone.bench import Bench, Ear, bench, make_drone, virtually
 
 

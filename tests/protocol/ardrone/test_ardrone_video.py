@@ -25,7 +25,7 @@ from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from flightd.sim.ardrone.front_camera import front_peer
 from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.ardrone.video import Encoder, Packer, VideoChannel, is_idr
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.site.site_file import load_site
 from tests.held_time import held
 from tests.protocol.ardrone import golden
@@ -329,7 +329,7 @@ def test_the_front_channel_shows_the_racks_and_the_bottom_one_the_floor() -> Non
         async with bench() as b:
             taken: list[FrameTicket] = []
             camera = ArDroneCamera(b.vehicle, 0.0, b.clock, dict.fromkeys(DroneCamera, taken.append), held)
-            front = front_peer(b.server, site, RackLook(), 1, b.clock, held)
+            front = front_peer(b.server, site, RackAppearance(), 1, b.clock, held)
             tasks = [asyncio.create_task(part.run()) for part in (camera, front)]
             await b.configured()
             floor = bars(0, (60, 220, 60))

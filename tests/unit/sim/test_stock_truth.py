@@ -10,7 +10,7 @@ import pytest
 
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.code_symbols import Symbol, Symbology
 from flightd.sim.racks.rack_layout import BEAM_M, faces, rack_levels
 from flightd.sim.racks.stock import Condition, StockPlace, StockShares, StockSituation, stock
@@ -30,7 +30,7 @@ def places() -> dict[str, StockPlace]:
 
 @cache
 def truth() -> dict[str, LocationTruth]:
-    return stock_truth(SITE, RackLook(), FOCAL_PX, 1)
+    return stock_truth(SITE, RackAppearance(), FOCAL_PX, 1)
 
 
 def record(code: str, state: LocationState, *texts: str) -> LocationRecord:
@@ -124,12 +124,12 @@ def test_a_scenario_sets_shares_and_camera(tmp_path: Path) -> None:
     file = tmp_path / "half.toml"
     file.write_text("[racks]\nempty = 0.5\nseed = 4\n[front_camera]\nwidth_px = 640\n")
     scenario = load_scenario(file)
-    assert scenario.racks.look() == RackLook(replace(StockShares(), empty=0.5), seed=4)
+    assert scenario.racks.appearance() == RackAppearance(replace(StockShares(), empty=0.5), seed=4)
     assert scenario.front_camera.camera().lens.centre_px == (319.5, 399.5)
 
 
 def test_the_racks_own_seed_keeps_the_stock_whatever_the_flights_seed_is() -> None:
-    look = RackLook(seed=4)
+    look = RackAppearance(seed=4)
     assert stock_truth(SITE, look, FOCAL_PX, 1) == stock_truth(SITE, look, FOCAL_PX, 2)
 
 

@@ -33,7 +33,7 @@ from flightd.adapters.vehicle.mavsdk.commands import SdkCommander
 from flightd.adapters.vehicle.mavsdk.connection import MavsdkConnection
 from flightd.adapters.vehicle.mavsdk.gate import SetpointGate
 from flightd.adapters.vehicle.mavsdk.library import Library, Plugins, whole_fields
-from flightd.adapters.vehicle.mavsdk.telemetry import Readings
+from flightd.adapters.vehicle.mavsdk.telemetry import MavsdkTelemetry
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -95,7 +95,7 @@ class MavsdkVehicle:
         self._clock = clock
         self._system_id = system_id
         self._sync = ClockSync()
-        self._readings = Readings(self._sync)
+        self._readings = MavsdkTelemetry(self._sync)
         self.gate = SetpointGate()
         self._line = MavsdkConnection(make_transport(parse_endpoint(url), opener), self.gate, clock)
         self._commander = SdkCommander()

@@ -16,7 +16,7 @@ _WORTH_FRAC = 0.9
 """A fuller battery is left where it is."""
 
 
-class PadCrew:
+class BatterySwapper:
     """Changes the battery of a drone that has flown and stands on a charge pad with its motors off."""
 
     def __init__(self, site: Site, airframe: Airframe, swap_s: float) -> None:
