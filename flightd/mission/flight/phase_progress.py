@@ -7,6 +7,7 @@ import math
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Phase
 from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.mission.machine import State
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.safety.found_flying import FoundFlyingCheck
 from flightd.mission.safety.hazard_monitor import DebounceTimer
@@ -39,11 +40,11 @@ class PhaseProgress:
     def timed_out(self, now_ns: int) -> bool:
         return self.phase_s(now_ns) > self._limit_s
 
-    def step(self, s: MissionInputs, phase: Phase, *, may_start: bool) -> set[Trigger]:
-        """The trigger by which `phase` reaches its end, if it has; on the ground it ends when the mission
+    def step(self, s: MissionInputs, state: State, *, may_start: bool) -> set[Trigger]:
+        """The trigger by which the phase reaches its end, if it has; on the ground it ends when the mission
         `may_start`."""
         p, v, goal = self._params, s.vehicle, self._itinerary.goal
-        match phase:
+        match state.phase:
             case Phase.PREFLIGHT if self._first_look.flies_already(s):
                 done, trigger = True, Trigger.FOUND_FLYING
             case Phase.RECOVER:
@@ -65,14 +66,14 @@ class PhaseProgress:
                 there = s.distance_m((goal.x_m, goal.y_m)) < p.arrive_m and s.speed_mps < p.arrive_mps
                 done, trigger = self._settled(s, there), Trigger.ARRIVED
             case Phase.HOVER | Phase.CLIMB | Phase.SCAN:
-                done, trigger = self._at_node(s, phase)
+                done, trigger = self._at_node(s, state.phase, state.returning)
             case _:
                 return set()
         return {trigger} if done else set()
 
-    def _at_node(self, s: MissionInputs, phase: Phase) -> tuple[bool, Trigger]:
+    def _at_node(self, s: MissionInputs, phase: Phase, returning: bool) -> tuple[bool, Trigger]:
         """Whether the dwell, the way to a view or the view is over, and what that leads to."""
-        goal, scan, returning = self._itinerary.goal, self._scan, self._itinerary.returning
+        goal, scan = self._itinerary.goal, self._scan
         due = not returning and scan.due(phase, goal)
         if phase is Phase.CLIMB:
             view = scan.view(phase)

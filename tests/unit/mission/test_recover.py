@@ -8,7 +8,7 @@ import pytest
 
 from flightd.core.types import Command, CommandKind, Demand, LandedState, Phase
 from flightd.mission.guidance import Guide, MissionParams
-from tests.unit.mission.test_mission import Flight
+from tests.unit.mission.driven import Flight
 
 PARAMS = MissionParams(dwell_s=1.0, recover_s=3.0, autostart=True)
 
