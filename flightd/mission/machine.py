@@ -242,7 +242,8 @@ def _intent_of(state: State, phase: Phase, trigger: Trigger) -> Intent:
 def _outcome(state: State, trigger: Trigger) -> Outcome | None:
     phases, intents = _TURNS.get(trigger, ((), {}))
     if state.phase in phases and state.intent in intents:
-        return Outcome(State(state.phase, intents[state.intent]), False, Cause.KEPT)
+        cause = Cause.TRIGGER if trigger is Trigger.POSITION_CORRECTED else Cause.KEPT
+        return Outcome(State(state.phase, intents[state.intent]), False, cause)
     return _begins(state, trigger)
 
 

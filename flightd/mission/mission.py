@@ -216,6 +216,7 @@ class Mission:
         outcome = TABLE[self.state][trigger]
         if outcome is not None:
             self.state = outcome.state
+            self._cause = trigger.value if outcome.cause is Cause.TRIGGER else self._cause
 
     def _refuse(self, command: Command, now_ns: int) -> None:
         """Say why an order has no effect."""

@@ -34,6 +34,22 @@ def test_a_flight_where_all_is_well_visits_everything() -> None:
     assert flight.mission.visited == list(SITE.serpentine_route())
 
 
+def test_a_correction_over_the_pad_is_the_reason_for_the_end_that_it_makes() -> None:
+    flight = Flight()
+    flight.to(Phase.LAND, 600)
+    pose = flight.senses.pose
+    assert pose is not None
+    flight.set(pose=replace(pose, x_m=pose.x_m + 2.0))
+    flight.run(0.1, follow=False)
+    assert flight.phase is Phase.LAND
+    assert flight.mission.reason == "the position was corrected while landing"
+    flight.set(landed=LandedState.ON_GROUND, armed=False)
+    flight.run(0.1, follow=False)
+    assert flight.mission.state.over
+    assert flight.phase is Phase.ABORTED
+    assert flight.mission.reason == "the position was corrected while landing"
+
+
 def test_on_the_ground_only_a_hazard_that_decides_something_is_told() -> None:
     flight = Flight(MissionParams(autostart=False))
     flight.set(localised=False, x_age_s=60.0, y_age_s=60.0)
