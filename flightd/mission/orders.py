@@ -9,7 +9,8 @@ _URGENT = {CommandKind.LAND: Trigger.LAND_HERE, CommandKind.STOP: Trigger.STOP}
 
 
 class StandingOrders:
-    """A pause until the flight is resumed or turns back, a landing or stop until the mission has acted."""
+    """A pause until the flight is resumed or turns back, a landing or stop until the mission has acted; a
+    landing does not take back a stop."""
 
     def __init__(self) -> None:
         self.paused = False
@@ -19,7 +20,7 @@ class StandingOrders:
         """Let an order stand; those that are obeyed at once do not."""
         if kind in {CommandKind.PAUSE, CommandKind.RESUME}:
             self.paused = kind is CommandKind.PAUSE
-        elif kind in _URGENT:
+        elif kind in _URGENT and self._urgent is not Trigger.STOP:
             self._urgent = _URGENT[kind]
 
     def acted_on(self, trigger: Trigger) -> None:

@@ -9,11 +9,11 @@ class Trigger(enum.Enum):
     """Tried in this order: what keeps people safe stands first, and the cause before its consequence."""
 
     PILOT_TOOK = "the pilot took control"
+    STOP = "stop ordered"
     DOWN_TO_SWAP = "down on the pad for a fresh battery"
     NOT_COUNTED = "nothing was counted"
     DISARMED = "the vehicle disarmed"
     VANISHED = "the vehicle stayed silent"
-    STOP = "stop ordered"
     TELEMETRY_LOST = "vehicle telemetry lost"
     HEARTBEAT_LOST = "heartbeat lost"
     HEIGHT_LOST = "height lost"

@@ -15,6 +15,7 @@ from flightd.core.types import (
 )
 from flightd.mission.flight.relocation import Relocator
 from flightd.mission.guidance import Guide, MissionParams
+from flightd.mission.machine import Intent, State
 from flightd.mission.scan.scanner import Scanner
 from flightd.mission.scan.views import ScanParams
 from tests.unit.mission import shelves
@@ -48,6 +49,27 @@ def test_a_correction_over_the_pad_is_the_reason_for_the_end_that_it_makes() -> 
     assert flight.mission.state.over
     assert flight.phase is Phase.ABORTED
     assert flight.mission.reason == "the position was corrected while landing"
+
+
+@pytest.mark.parametrize("orders", [("stop", "land"), ("land", "stop")])
+def test_a_stop_stands_whatever_else_is_ordered_at_the_same_tick(orders: tuple[str, str]) -> None:
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    for order in orders:
+        flight.order(CommandKind(order))
+    flight.run(0.02)
+    assert flight.mission.state == State(Phase.LAND, Intent.STOP)
+    assert flight.guidance is not None
+    assert flight.guidance.at_once
+
+
+def test_a_stop_as_it_comes_to_stand_on_the_pad_ends_the_mission() -> None:
+    flight = Flight()
+    flight.to(Phase.LAND, 600)
+    flight.order(CommandKind.STOP)
+    flight.set(landed=LandedState.ON_GROUND, armed=False)
+    flight.run(0.1, follow=False)
+    assert (flight.phase, flight.mission.reason) == (Phase.ABORTED, "stop ordered")
 
 
 def test_on_the_ground_only_a_hazard_that_decides_something_is_told() -> None:
