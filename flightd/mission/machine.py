@@ -137,7 +137,8 @@ _SAFETY = {
     Trigger.GROUND_LOST: Phase.LAND,
     Trigger.RECORD_LOST: Phase.LAND,
 }
-_SEEING = _SAFETY | dict.fromkeys(triggers_of(Action.HOLD) | {Trigger.HOLD}, Phase.HOLD)
+_UNDER_WAY = _SAFETY | {Trigger.TIMED_OUT: Phase.LAND}
+_SEEING = _UNDER_WAY | dict.fromkeys(triggers_of(Action.HOLD) | {Trigger.HOLD}, Phase.HOLD)
 _ON_LINES = _SEEING | dict.fromkeys(triggers_of(Action.RELOCATE), Phase.RELOCATE)
 _GIVEN_UP = {Trigger.STOP: Phase.ABORTED, Trigger.LAND_HERE: Phase.ABORTED}
 
@@ -146,16 +147,16 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.RECOVER: _SAFETY | {Trigger.UNATTENDED: Phase.LAND},
     Phase.ARMING: _GIVEN_UP
     | {Trigger.GROUND_LOST: Phase.ABORTED, Trigger.TIMED_OUT: Phase.ABORTED, Trigger.ARMED: Phase.TAKE_OFF},
-    Phase.TAKE_OFF: _SAFETY | {Trigger.TIMED_OUT: Phase.LAND, Trigger.AT_HEIGHT: Phase.ACQUIRE},
-    Phase.ACQUIRE: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.ACQUIRED: Phase.TURN},
-    Phase.FOLLOW: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.ARRIVED: Phase.HOVER},
+    Phase.TAKE_OFF: _UNDER_WAY | {Trigger.AT_HEIGHT: Phase.ACQUIRE},
+    Phase.ACQUIRE: _ON_LINES | {Trigger.ACQUIRED: Phase.TURN},
+    Phase.FOLLOW: _ON_LINES | {Trigger.ARRIVED: Phase.HOVER},
     Phase.HOVER: _ON_LINES
     | {Trigger.SCAN_DUE: Phase.CLIMB, Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
-    Phase.CLIMB: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.AT_VIEW: Phase.SCAN},
+    Phase.CLIMB: _ON_LINES | {Trigger.AT_VIEW: Phase.SCAN},
     Phase.SCAN: _ON_LINES
     | {Trigger.VIEW_DONE: Phase.CLIMB, Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
-    Phase.TURN: _ON_LINES | {Trigger.TIMED_OUT: Phase.LAND, Trigger.TURNED: Phase.FOLLOW},
-    Phase.HOLD: _SAFETY
+    Phase.TURN: _ON_LINES | {Trigger.TURNED: Phase.FOLLOW},
+    Phase.HOLD: _UNDER_WAY
     | {
         Trigger.HAZARD_LASTS: Phase.LAND,
         Trigger.LINES_LOST_LONG: Phase.LAND,

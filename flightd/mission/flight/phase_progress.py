@@ -95,7 +95,8 @@ class PhaseProgress:
         return self._settling.step(condition, s.now_ns) >= self._params.settle_s and condition
 
     def _time_limit_s(self, s: MissionInputs, phase: Phase) -> float:
-        """How long the phase just begun may take: a fixed slack, and a multiple of its way's own time."""
+        """How long the phase just begun may take: a fixed slack, and a multiple of its way's own time.  A
+        pause may last as long as a full battery does; a landing lasts until the vehicle stands."""
         p, goal = self._params, self._itinerary.goal
         match phase:
             case Phase.ARMING:
@@ -104,6 +105,14 @@ class PhaseProgress:
                 return p.battery.swap_wait_s
             case Phase.TAKE_OFF:
                 way_s = p.height_m / p.climb_mps
+            case Phase.HOVER:
+                way_s = p.dwell_s
+            case Phase.SCAN:
+                way_s = self._scan.look_s
+            case Phase.RELOCATE:
+                way_s = p.relocate_s
+            case Phase.HOLD:
+                return p.battery.flight_s
             case Phase.TURN:
                 way_s = math.pi / p.turn_rate_radps
             case Phase.CLIMB:

@@ -75,6 +75,11 @@ class ScanPhase:
         """Whether the view that is looked from has told enough."""
         return self._scanner is None or self._scanner.step(now_ns)
 
+    @property
+    def look_s(self) -> float:
+        """The most that one view is looked from."""
+        return self._scanner.look_s if self._scanner is not None else 0.0
+
     def way_s(self, s: MissionInputs) -> float:
         """How long it may take to reach the view."""
         p, view = self._params, self.view(Phase.CLIMB)

@@ -68,6 +68,11 @@ class Scanner:
         return self._params.least_integrity
 
     @property
+    def look_s(self) -> float:
+        """The most that one view is looked from."""
+        return self._params.view_s
+
+    @property
     def view(self) -> View | None:
         """Where to look from now, None when the present node has nothing left."""
         return self._task.view if self._task else None

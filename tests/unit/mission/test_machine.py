@@ -104,6 +104,16 @@ def test_nothing_arms_that_was_not_ordered_to_start(state: State, happened: froz
             assert trigger is Trigger.START
 
 
+@pytest.mark.parametrize("state", AIRBORNE, ids=ids)
+def test_time_alone_leads_out_of_every_airborne_state_but_a_landing(state: State) -> None:
+    """A landing ends when the vehicle stands or falls silent; how long that takes is not bounded yet."""
+    after, _ = next_state(state, {Trigger.TIMED_OUT, Trigger.UNATTENDED})
+    if state.phase is Phase.LAND:
+        assert after == state
+    else:
+        assert after.phase is Phase.LAND
+
+
 @pytest.mark.parametrize("state", [state for state in STATES if state.over], ids=ids)
 def test_the_end_is_final(state: State) -> None:
     assert following(state) == set()

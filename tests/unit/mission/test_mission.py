@@ -13,6 +13,7 @@ from flightd.core.types import (
     LandedState,
     Phase,
 )
+from flightd.mission.battery.consumption import BatteryParams
 from flightd.mission.flight.relocation import Relocator
 from flightd.mission.guidance import Guide, MissionParams
 from flightd.mission.machine import Intent, State
@@ -70,6 +71,17 @@ def test_a_stop_as_it_comes_to_stand_on_the_pad_ends_the_mission() -> None:
     flight.set(landed=LandedState.ON_GROUND, armed=False)
     flight.run(0.1, follow=False)
     assert (flight.phase, flight.mission.reason) == (Phase.ABORTED, "stop ordered")
+
+
+def test_a_pause_lasts_no_longer_than_a_full_battery() -> None:
+    """Whatever the vehicle says of its charge."""
+    flight = Flight(MissionParams(dwell_s=1.0, battery=BatteryParams(flight_s=200.0)))
+    flight.to(Phase.FOLLOW)
+    flight.order(CommandKind.PAUSE)
+    flight.run(199.0)
+    assert flight.phase is Phase.HOLD
+    flight.run(2.0)
+    assert (flight.phase, flight.mission.reason) == (Phase.LAND, "the phase took too long")
 
 
 def test_on_the_ground_only_a_hazard_that_decides_something_is_told() -> None:
