@@ -175,6 +175,9 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
 }
 """Which phase a trigger begins, whatever the intent; `_begins` has what depends on that."""
 
+_FOR_VISITS = frozenset({Trigger.READY, Trigger.SCAN_DUE, Trigger.VIEW_DONE})
+"""What leads on only where the plan is flown: nothing starts unordered, nothing is scanned on the way back."""
+
 _OVER_PAD: Mapping[tuple[Trigger, Intent], tuple[Phase, Cause]] = {
     (Trigger.DOWN_TO_SWAP, Intent.RETURN): (Phase.SWAP, Cause.TRIGGER),
     (Trigger.DOWN_TO_SWAP, Intent.HOME): (Phase.SWAP, Cause.TRIGGER),
@@ -218,7 +221,7 @@ def _begins(state: State, trigger: Trigger) -> Outcome | None:
         phase, cause = _OVER_PAD[trigger, state.intent]
     elif state.phase is Phase.LAND and trigger is Trigger.DISARMED:
         phase, cause = Phase.ABORTED, Cause.KEPT
-    elif trigger not in _BEGINS[state.phase] or (trigger is Trigger.READY and state.intent is Intent.WAIT):
+    elif trigger not in _BEGINS[state.phase] or (trigger in _FOR_VISITS and state.intent is not Intent.VISIT):
         return STAYS
     else:
         phase, cause = _BEGINS[state.phase][trigger], Cause.TRIGGER

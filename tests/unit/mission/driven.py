@@ -39,6 +39,7 @@ class Flight:
         self.mission = Mission(site, plan, POLICY, params or MissionParams(dwell_s=1.0), scanner)
         self.site = site
         self.integrity = 1.0
+        self.heartbeat_s = 0.0
         self.now_ns = 10**12
         self.guidance: Guidance | None = None
         state = VehicleState(
@@ -92,9 +93,10 @@ class Flight:
                     self.integrity,
                 )
                 self.senses = replace(self.senses, pose=pose)
-            if g is not None and g.demand is Demand.FLY:
+            if follow and g is not None and g.demand is Demand.FLY:
                 self.set(armed=True)
-            self.set(heartbeat_ns=self.now_ns - round(self.senses.telemetry_age_s * 1e9))
+            heard_s = self.senses.telemetry_age_s + self.heartbeat_s
+            self.set(heartbeat_ns=self.now_ns - round(heard_s * 1e9))
             self.guidance = self.mission.step(replace(self.senses, now_ns=self.now_ns))
             if until():
                 return
