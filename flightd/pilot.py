@@ -8,10 +8,12 @@ control turns its reference into a setpoint, the limits have the last word.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from flightd.control.flight_controller import FlightController, FlightGains, Motion
-from flightd.control.limits import Limiter, Limits, Surroundings
+from flightd.config.schema import Config
+from flightd.control.flight_controller import FlightController, Motion
+from flightd.control.limits import Limiter, Surroundings
 from flightd.core.scanning import CodeSet, Finding, Place, Settled
 from flightd.core.types import (
     HEALTHY,
@@ -26,10 +28,10 @@ from flightd.core.types import (
     Phase,
     VehicleState,
 )
-from flightd.localisation.grid_localiser import GridLocaliser, LocaliserParams
+from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.localisation.pad_finder import PadFinder
 from flightd.localisation.pose_history import PoseHistory
-from flightd.mission.guidance import Guidance, Guide, MissionInputs, MissionParams
+from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.mission import Mission
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
 from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
@@ -38,25 +40,13 @@ from flightd.site.site import Site
 from flightd.tracking.attitude_extrapolation import AttitudeExtrapolation
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.height_history import HeightHistory
-from flightd.tracking.line_tracker import LineTracker, TrackerParams, TrackSet
+from flightd.tracking.line_tracker import LineTracker, TrackSet
 
 TICK_S = 0.02
 """Period of the control tick."""
 
 _FRAMES_ARRIVE_S = 0.5
 _TOUCHDOWN_S = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class PilotParams:
-    """Everything that tunes flying, in SI units."""
-
-    tracker: TrackerParams
-    gains: FlightGains
-    limits: Limits
-    mission: MissionParams
-    max_sigma_m: float = 1.2
-    localiser: LocaliserParams = field(default_factory=LocaliserParams)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,31 +87,35 @@ class TickOutput:
 
 
 class Pilot:
-    """The whole flying state of one mission."""
+    """The whole flying state of one mission.
+
+    `overhead_m` are the heights below the keep-outs, also of those that `site` leaves out because the
+    flight's own heights pass them by."""
 
     def __init__(
         self,
         site: Site,
         plan: FlightPlan,
         policy: HeadingPolicy,
-        params: PilotParams,
+        config: Config,
         scanner: Scanner | None = None,
+        overhead_m: Sequence[float] = (),
     ) -> None:
-        self._params = params
+        self._config = config
         self._plan = plan
         self._site = site
         self._scanner = scanner
-        self._mission = Mission(site, plan, policy, params.mission, scanner)
+        self._mission = Mission(site, plan, policy, config, scanner, overhead_m)
         self._begin()
         self._heights = HeightHistory()
-        self._control = FlightController(params.gains)
-        self._limiter = Limiter(params.limits)
+        self._control = FlightController(config.control)
+        self._limiter = Limiter(config.control)
         self._armed = False
         self._last_ns: int | None = None
         self._last_yaw: float | None = None
         self._yaw_rate = 0.0
         self._pictures = FrameMonitor()
-        self._caution = PlausibilityMonitor(site, params.mission)
+        self._caution = PlausibilityMonitor(site, config)
         self._unheard = AttitudeExtrapolation()
         self._asked: AttitudeSetpoint | None = None
 
@@ -205,8 +199,17 @@ class Pilot:
     def _begin(self) -> None:
         """Stand on the pad and know nothing else."""
         node, yaw_rad = self._mission.stand
-        self._tracker = LineTracker(self._params.tracker, yaw_rad)
-        self._localiser = GridLocaliser(self._site, node, self._params.localiser)
+        camera, control = self._config.camera, self._config.control
+        self._tracker = LineTracker(
+            camera.lens(),
+            camera.mount(),
+            self._site.line_width_m,
+            yaw_rad,
+            control.tilt_compensation,
+            self._config.tracking,
+        )
+        view = camera.floor_reach(control.max_tilt_rad)
+        self._localiser = GridLocaliser(self._site, node, view, self._config.localisation)
         self._past = PoseHistory(self._scanner.least_integrity if self._scanner else 0.0)
         self._pads = PadFinder(self._site)
 
@@ -239,9 +242,10 @@ class Pilot:
     ) -> MissionInputs:
         now_ns, v = tick.now_ns, tick.vehicle
         x_ns, y_ns = self._localiser.seen_ns
-        known = pose is not None and max(pose.covariance[0], pose.covariance[4]) < self._params.max_sigma_m**2
+        max_sigma_m = self._config.localisation.expert.max_sigma_m
+        known = pose is not None and max(pose.covariance[0], pose.covariance[4]) < max_sigma_m**2
         seeking = self._mission.phase is Phase.RELOCATE
-        doubted = seeking or (pose is not None and pose.integrity < self._params.mission.integrity_min)
+        doubted = seeking or (pose is not None and pose.integrity < self._config.mission.integrity_min)
         return MissionInputs(
             now_ns=now_ns,
             dt_s=dt_s,

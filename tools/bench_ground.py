@@ -28,11 +28,11 @@ from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.keys import load_pair, load_public, make_keys
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.config.ground import GroundConfig
-from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError
 from flightd.core.types import CommandKind, Demand, Phase, Status
 from flightd.pilot import TickInput, TickOutput
 from flightd.runtime.clock import LoopClock
+from flightd.site.site_file import load_site
 
 ROOT = Path(__file__).parents[1]
 TICK_S = 0.02

@@ -24,12 +24,12 @@ from flightd.app.build import pilot_of
 from flightd.app.detection.detector_pool import Detection
 from flightd.app.detection.latency import LatencyBook
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.topics import Topic
 from flightd.core.types import LineSet, Status
 from flightd.pilot import TickInput, TickOutput
 from flightd.ports import Vitals
 from flightd.runtime.frame_ring import FrameTicket
+from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import IdealFlight
 
 ROOT = Path(__file__).parents[1]
@@ -84,7 +84,7 @@ def main() -> None:
         watched = Watched(recorder, MetricsBook(), LatencyBook())
         while flown_s < options.seconds:
             missions += 1
-            flight = IdealFlight(site, config.pilot_params(site), seed=missions)
+            flight = IdealFlight(site, config, seed=missions)
             flight.pilot = pilot_of(config, site)
             flight.pilot.step = watched.around(flight.pilot.step)  # type: ignore[method-assign, assignment]
             flight.fly()

@@ -1,4 +1,8 @@
-"""Structured log lines: key=value with systemd's priority prefix, as the journal takes them from stderr."""
+"""Structured log lines: key=value with systemd's priority prefix, as the journal takes them from stderr.
+
+Own code: structlog 26.1's logfmt lines cannot be read back (a line feed and the two characters `\\n` look the
+same, an empty value has no quotes) and know no priority, for 0.6 MB and 0.1 s of import against ten lines.
+"""
 
 from __future__ import annotations
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.app.counting.count import Counting
 from flightd.app.detection.detector_pool import DetectorPool
-from flightd.config.schema import HEIGHT_ROOM_M, Config
+from flightd.config.mission import HEIGHT_ROOM_M, VisitOrder
+from flightd.config.schema import Config
 from flightd.core.errors import InputError
 from flightd.mission.battery.sorties import check_battery
 from flightd.mission.guidance import CEILING_MARGIN_M
-from flightd.mission.plan.flight_plan import FlightPlan, VisitOrder, make_plan
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.plan.route_optimiser import ordered_best
 from flightd.mission.scan.code_assignment import FrontSight
@@ -36,13 +36,11 @@ def _plan_on(config: Config, site: Site) -> FlightPlan:
     visits: Sequence[str] = mission.nodes or site.serpentine_route()
     start, policy, yaw_rad = (
         start_of(config, site),
-        config.heading_policy(),
-        math.radians(mission.start_yaw_deg),
+        HeadingPolicy.of(config),
+        mission.start_yaw_rad,
     )
     if mission.order is VisitOrder.BEST:
-        visits = ordered_best(
-            site, visits, (start, site.home.node), policy, Pace.of(mission.params()), yaw_rad
-        )
+        visits = ordered_best(site, visits, (start, site.home.node), policy, Pace.of(mission), yaw_rad)
     return make_plan(site, visits, start, site.home.node, policy, yaw_rad)
 
 
@@ -64,11 +62,10 @@ def pilot_of(config: Config, site: Site) -> Pilot:
             f" {site.name} ({site.ceiling_m} m)"
         )
     flown = site.between(*flown_between_m(config, site))
-    plan, policy = _plan_on(config, flown), config.heading_policy()
-    params = config.pilot_params(site)
+    plan, policy = _plan_on(config, flown), HeadingPolicy.of(config)
     scanner = scanner_of(config, site)
-    check_battery(flown, plan, policy, params.mission, scanner)
-    return Pilot(flown, plan, policy, params, scanner)
+    check_battery(flown, plan, policy, config, scanner)
+    return Pilot(flown, plan, policy, config, scanner, site.overhead_m)
 
 
 def scanner_of(config: Config, site: Site) -> Scanner | None:
@@ -82,7 +79,8 @@ def scanner_of(config: Config, site: Site) -> Scanner | None:
             f"scan.min_height_m {config.scan.min_height_m} is not {CEILING_MARGIN_M} m below the ceiling of"
             f" {site.name} ({site.ceiling_m} m)"
         )
-    return Scanner(site, FrontSight(front.lens(), front.mount()), config.scan_params(highest_m))
+    sight = FrontSight(front.lens(), front.mount())
+    return Scanner(site, sight, config.scan, highest_m, config.camera.aside_per_height)
 
 
 def flown_between_m(config: Config, site: Site) -> tuple[float, float]:
@@ -90,9 +88,10 @@ def flown_between_m(config: Config, site: Site) -> tuple[float, float]:
     low_m, high_m = config.mission.flown_between_m()
     if not config.front_camera.is_fitted or not site.locations:
         return low_m, high_m
-    scan, mount = config.scan_params(site.ceiling_m - CEILING_MARGIN_M), config.front_camera.mount()
+    scan, mount = config.scan, config.front_camera.mount()
+    heights_m = scan.min_height_m, scan.highest_m(site.ceiling_m - CEILING_MARGIN_M)
     views_m = [
-        view_height_m(place.height_m, abs(place.y_m - site.nodes[place.node].y_m), mount, scan)
+        view_height_m(place.height_m, abs(place.y_m - site.nodes[place.node].y_m), mount, heights_m)
         for place in site.locations.values()
     ]
     return min(low_m, min(views_m) - HEIGHT_ROOM_M), max(high_m, max(views_m) + HEIGHT_ROOM_M)

@@ -79,7 +79,7 @@ class Daemon:
         self._progress = progress
         self._pilot = pilot_of(config, site)
         self._sight = DetectionPipeline(detectors, recorder, ground, config.recorder.picture_fps)
-        self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock, config.control.limits())
+        self._vehicle: Vehicle = connect_vehicle(config.vehicle, clock, config.control)
         self._audience = TelemetryPublishers(self._vehicle, recorder, ground, monitors, observers)
         self._pose_taker: PoseTaker | None = None
         if config.vehicle.shares_pose and isinstance(self._vehicle, PoseTaker):

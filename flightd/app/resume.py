@@ -6,10 +6,10 @@ import math
 from pathlib import Path
 
 from flightd.adapters.store.progress import NothingLeftError, load_left_over
+from flightd.config.mission import VisitOrder
 from flightd.config.schema import Config
 from flightd.core.errors import InputError
 from flightd.core.geometry import wrap_pi
-from flightd.mission.plan.flight_plan import VisitOrder
 from flightd.site.site import Site
 
 

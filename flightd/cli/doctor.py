@@ -63,7 +63,7 @@ def doctor(
     flightd doctor --config configs/ardupilot.toml --json | jq .parameters
     """
     from flightd.config.schema import load_config
-    from flightd.config.site_file import load_site
+    from flightd.site.site_file import load_site
 
     if quick and fix:
         raise InputError("--quick looks at no vehicle: it does not go with --fix")
@@ -105,7 +105,7 @@ async def _examine(config: Config, site: Site, path: Path) -> Diagnosis:
     ]
     autopilot = vehicle.Autopilot(())
     if config.vehicle.kind == "ardrone":
-        drone = connect_vehicle(config.vehicle, clock, config.control.limits())
+        drone = connect_vehicle(config.vehicle, clock, config.control)
         assert isinstance(drone, ArDroneVehicle)
         flying = asyncio.ensure_future(drone.run())
         try:

@@ -42,8 +42,8 @@ def plan(
     flightd inventory plan out/inventory hall-3.toml
     """
     from flightd.adapters.store.sqlite import SqliteStore
-    from flightd.config.site_file import load_site
     from flightd.core.inventory import PlannedLocation
+    from flightd.site.site_file import load_site
 
     site = load_site(site_file)
     if not site.locations:

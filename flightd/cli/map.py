@@ -61,9 +61,9 @@ def check(
     flightd map check hall-3.toml --json
     flightd map check hall-3.toml --fov-deg 75 --width-px 1920 --exposure-ms 2 --module-mm 3
     """
-    from flightd.config.site_file import load_site
     from flightd.site.ambiguity import alike
     from flightd.site.coverage import FrontView, check_coverage
+    from flightd.site.site_file import load_site
 
     site = load_site(site_file)
     facts = _facts(site)
@@ -127,8 +127,8 @@ def draw(
     \b
     flightd map draw configs/site-demo.toml --out demo.svg
     """
-    from flightd.config.site_file import load_site
     from flightd.site.floor_plan_svg import draw_site
+    from flightd.site.site_file import load_site
 
     target = out if out is not None else site_file.with_suffix(".svg")
     _write(target, draw_site(load_site(site_file)), force)
@@ -162,7 +162,7 @@ def new(
     \b
     flightd map new hall-3.toml --aisles 4 --nodes 8 --spacing-m 1.4,1.7 --pitch-m 3.2
     """
-    from flightd.config.site_file import parse_site, site_toml
+    from flightd.site.site_file import parse_site, site_toml
 
     steps = [repr(step) for step in _spacings(spacing_m, nodes)]
     letters = _LETTERS[:aisles]

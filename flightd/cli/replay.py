@@ -47,11 +47,11 @@ def replay(
     flightd replay out/flight.mcap --tolerance 1e-6 --json
     """
     from flightd.app.build import detector_of, pilot_of
-    from flightd.config.site_file import parse_site
     from flightd.core.topics import Topic
     from flightd.replay.decision_compare import replay_decisions
     from flightd.replay.log import read_log
     from flightd.replay.perception_compare import replay_pictures
+    from flightd.site.site_file import parse_site
 
     recorded = read_log(log, {Topic.TICK, Topic.DECISION, Topic.CONFIG, Topic.MAP})
     config = _config(recorded)
@@ -81,7 +81,7 @@ def _complaint(decisions: Comparison, tolerance: float) -> str:
 
 def _config(log: FlightLog) -> Config:
     """The configuration of the flight."""
-    from flightd.config.schema import parse_config
+    from flightd.config.schema import recorded_config
     from flightd.core.topics import Topic
 
     text = _document(log, Topic.CONFIG)
@@ -89,7 +89,7 @@ def _config(log: FlightLog) -> Config:
         table = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
     except ValueError as err:
         raise InputError(f"{log.path}: its configuration cannot be read ({err})") from None
-    return parse_config(table, log.path)
+    return recorded_config(table, log.path)
 
 
 def _document(log: FlightLog, topic: str) -> str:

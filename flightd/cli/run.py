@@ -54,8 +54,8 @@ def run(
     from flightd.app.resume import resumed
     from flightd.cli.flight_progress import FlightProgress
     from flightd.config.schema import load_config
-    from flightd.config.site_file import load_site
     from flightd.core.types import Phase
+    from flightd.site.site_file import load_site
 
     chosen = load_config(config)
     if not chosen.mission.autostart and not chosen.ground.listen:
@@ -158,8 +158,8 @@ def _black_box(config: Config, site: Site, now_ns: int) -> tuple[McapRecorder, F
     """The recorder of this flight and the archive of all, if the configuration wants them."""
     from flightd.adapters.recorder.archive import FlightArchive
     from flightd.adapters.recorder.recorder import McapRecorder
-    from flightd.config.site_file import site_toml
     from flightd.core.topics import Document, Topic
+    from flightd.site.site_file import site_toml
 
     settings = config.recorder
     if settings.folder is None:

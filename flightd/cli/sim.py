@@ -165,8 +165,8 @@ def _configured(
     simulated cameras' keys, which hold unless a setting says otherwise."""
     from flightd.config.paths import shipped
     from flightd.config.schema import load_table, parse_config
-    from flightd.config.site_file import load_site
     from flightd.sim.random_sites import random_site
+    from flightd.site.site_file import load_site
 
     path = path or shipped("sim.toml")
     table = load_table(path)

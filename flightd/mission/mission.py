@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from flightd.config.hazards import LossAction
+from flightd.config.schema import Config
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, Phase
 from flightd.mission.battery.swap import BatterySwap
 from flightd.mission.event_log import EventLog
 from flightd.mission.flight.phase_progress import PhaseProgress
 from flightd.mission.flight.reference import ReferenceGenerator, ReferenceTask
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.guidance import Guidance, LossAction, MissionInputs, MissionParams
+from flightd.mission.guidance import CEILING_MARGIN_M, Guidance, MissionInputs
 from flightd.mission.machine import BEGIN, COMMANDS, TABLE, Cause, State, next_state, taken_in
 from flightd.mission.orders import StandingOrders
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
@@ -45,30 +47,32 @@ _VISITED = (Trigger.DWELLED, Trigger.ROUTE_DONE)
 class Mission:
     """One flight of one plan: call `step` at a fixed rate, `drain_events` for what happened.
 
-    With a `scanner` the locations of each visited node are counted instead of a plain hover."""
+    With a `scanner` the locations of each visited node are counted instead of a plain hover; `overhead_m` are
+    the heights below the keep-outs (`Site.overhead_m`)."""
 
     def __init__(
         self,
         site: Site,
         plan: FlightPlan,
         policy: HeadingPolicy,
-        params: MissionParams,
+        config: Config,
         scanner: Scanner | None = None,
+        overhead_m: Sequence[float] = (),
     ) -> None:
         start = site.nodes[plan.start]
-        self._params = params
+        self._config = config
         self._scanner = scanner
         self._events = EventLog()
         self._orders = StandingOrders()
         self._route = Itinerary(site, plan, policy, self._events)
-        self._scan = ScanPhase(site, scanner, params, policy)
-        self._progress = PhaseProgress(params, self._route, self._scan)
-        self._watch = HazardMonitor(params)
-        self._relocator = Relocator(params)
+        self._scan = ScanPhase(site, scanner, config.mission, policy)
+        self._progress = PhaseProgress(config, self._route, self._scan)
+        self._watch = HazardMonitor(config)
+        self._relocator = Relocator(config.mission, site.ceiling_m - CEILING_MARGIN_M, overhead_m)
         self._steering = ReferenceGenerator(
-            params, site.ceiling_m, self._watch, self._relocator, (start.x_m, start.y_m, plan.start_yaw_rad)
+            config, site.ceiling_m, self._watch, self._relocator, (start.x_m, start.y_m, plan.start_yaw_rad)
         )
-        self._charging = BatterySwap(site, policy, params, scanner, self._route, self._watch)
+        self._charging = BatterySwap(site, policy, config, scanner, self._route, self._watch)
         self.state = BEGIN
         self.reason = self._cause = ""
         self._leg_along_x: bool | None = None
@@ -153,7 +157,7 @@ class Mission:
         found |= self._watch.step(s, self._situation(Trigger.HOLD in found))
         if Trigger.RECORD_LOST in found:
             found.remove(Trigger.RECORD_LOST)
-            found |= self._lost(self._params.hazards.record_lost, Trigger.RECORD_LOST, s.now_ns)
+            found |= self._lost(self._config.hazards.record_lost, Trigger.RECORD_LOST, s.now_ns)
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found
@@ -191,7 +195,7 @@ class Mission:
 
     def _ground(self, s: MissionInputs) -> set[Trigger]:
         """What a lost ground link asks for, by the configured action; the link's return ends a hold."""
-        action = self._params.ground_lost
+        action = self._config.ground.lost_action
         lost = self._watch.ground_lost(s)
         if lost is not self._ground_lost:
             self._ground_lost = lost
@@ -201,13 +205,16 @@ class Mission:
 
     def _adopting(self, s: MissionInputs) -> bool:
         """A vehicle found flying is given a moment to show that it obeys."""
-        return self.phase is Phase.RECOVER and self._progress.phase_s(s.now_ns) < self._params.adopt_s
+        return (
+            self.phase is Phase.RECOVER
+            and self._progress.phase_s(s.now_ns) < self._config.mission.expert.adopt_s
+        )
 
     def _grounded(self, s: MissionInputs) -> str:
         """Why it stays on the ground, or an empty text."""
-        silent = self._ground_lost and self._params.ground_lost is not LossAction.CONTINUE
-        stale = not_fresh(s, self._params, len(self.remaining)) if self.phase is Phase.SWAP else ""
-        return stale or not_ready(s, self._params, silent)
+        silent = self._ground_lost and self._config.ground.lost_action is not LossAction.CONTINUE
+        stale = not_fresh(s, self._config, len(self.remaining)) if self.phase is Phase.SWAP else ""
+        return stale or not_ready(s, self._config, silent)
 
     # Changing the intent of the phase in hand
 
@@ -242,7 +249,7 @@ class Mission:
 
     def _await_start(self) -> None:
         """On the ground before a flight: with autostart nobody has to order it."""
-        if self._params.autostart:
+        if self._config.mission.autostart:
             self._turn(Trigger.START)
 
     # Changing phase

@@ -1,4 +1,9 @@
-"""A child process that answers one request at a time over a pipe."""
+"""A child process that answers one request at a time over a pipe.
+
+Own code: a picture costs 0.2 ms on its way there and back, 0.3 ms in pebble 5.2 and 19 ms in loky 3.7; after
+a worker's death the next answer comes in 0.08 s, theirs in 0.11 to 0.19 s and 2.1 s (tools/bench_pools.py,
+on two loaded cores).  And here the loop itself waits for the pipe, no thread does.
+"""
 
 from __future__ import annotations
 

@@ -12,11 +12,11 @@ from time import thread_time
 import cv2
 import numpy as np
 
-from flightd.config.site_file import load_site
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackLook
 from flightd.sim.racks.front_camera import FrontCamera, front_lens
 from flightd.sim.racks.renderer import FrontRenderer
+from flightd.site.site_file import load_site
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
 FRAMES = 30

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.sim.scenario import scenario
 from flightd.sim.scenario.scenario_files import load_scenario
+from flightd.site.site_file import load_site
 from tests.fuzz.drive import Target, in_one_line, main
 from tests.fuzz.mutate import spoil_text
 

@@ -13,7 +13,6 @@ import cv2
 import numpy as np
 
 from flightd.adapters.recorder.recorder import McapRecorder
-from flightd.config.site_file import parse_site
 from flightd.core.topics import Document, Topic
 from flightd.core.types import (
     Attitude,
@@ -30,6 +29,7 @@ from flightd.core.types import (
 )
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.site.site import Site
+from flightd.site.site_file import parse_site
 
 SITE_TOML = (Path(__file__).parents[2] / "configs" / "site-demo.toml").read_text()
 NS = 1_000_000_000

@@ -12,7 +12,6 @@ import pytest
 from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.app.build import pilot_of
 from flightd.config.schema import Config, load_config
-from flightd.config.site_file import load_site, site_toml
 from flightd.core.errors import InputError
 from flightd.core.topics import Document, Topic
 from flightd.core.types import AttitudeSetpoint, Phase
@@ -20,6 +19,7 @@ from flightd.pilot import TickInput, TickOutput
 from flightd.replay.decision_compare import replay_decisions
 from flightd.replay.log import read_log
 from flightd.site.site import Site
+from flightd.site.site_file import load_site, site_toml
 from tests.command import Command
 from tests.sim.ideal_flight import IdealFlight
 
@@ -37,7 +37,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short flight by ideal sight, recorded as the daemon does."""
     path = tmp_path_factory.mktemp("flight") / "flight.mcap"
     config, site = _setting()
-    flight = IdealFlight(site, config.pilot_params(site))
+    flight = IdealFlight(site, config)
     flight.pilot = pilot_of(config, site)
     step = flight.pilot.step
     with McapRecorder(path, lossless=True) as recorder:

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from flightd.adapters.recorder.recorder import McapRecorder
-from flightd.config.site_file import parse_site
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.topics import Document, Topic
 from flightd.core.types import Event, EventLevel, GridPose, Phase, Status
@@ -20,6 +19,7 @@ from flightd.replay.report.figures import key_figures, outcome
 from flightd.replay.report.loader import load_flight
 from flightd.replay.report.markup import clock, number, path_data, thin, ticks
 from flightd.replay.report.page import render, write_report
+from flightd.site.site_file import parse_site
 from tests.command import Command
 from tests.replay.synthetic_flight import SITE_TOML, SUMMARY, legs, write_flight
 

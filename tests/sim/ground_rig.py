@@ -14,7 +14,6 @@ from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.keys import load_pair, load_public, make_keys
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.config.ground import GroundConfig
-from flightd.config.site_file import load_site
 from flightd.core.types import (
     Attitude,
     Demand,
@@ -28,6 +27,7 @@ from flightd.core.types import (
 )
 from flightd.pilot import TickInput, TickOutput
 from flightd.runtime.clock import LoopClock
+from flightd.site.site_file import load_site
 
 _P = ParamSpec("_P")
 

@@ -7,6 +7,8 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from flightd.config.mission import Heading
+from flightd.config.schema import Config
 from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import CodeSet
 from flightd.core.types import (
@@ -23,9 +25,9 @@ from flightd.core.types import (
     PictureCheck,
     VehicleState,
 )
-from flightd.mission.plan.flight_plan import FlightPlan, Heading, HeadingPolicy, make_plan
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
 from flightd.mission.scan.scanner import Scanner
-from flightd.pilot import Pilot, PilotParams, TickInput, TickOutput
+from flightd.pilot import Pilot, TickInput, TickOutput
 from flightd.sim.autopilot.climb_loop import ClimbLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
@@ -83,7 +85,7 @@ class IdealFlight:
     def __init__(
         self,
         site: Site,
-        params: PilotParams,
+        config: Config,
         *,
         policy: HeadingPolicy | None = None,
         visits: tuple[str, ...] = (),
@@ -101,7 +103,7 @@ class IdealFlight:
         policy = policy or HeadingPolicy(Heading.ALONG)
         pad = site.home.node
         self.plan: FlightPlan = make_plan(site, visits or site.serpentine_route(), pad, pad, policy)
-        self.pilot = Pilot(site, self.plan, policy, params, scanner)
+        self.pilot = Pilot(site, self.plan, policy, config, scanner, site.overhead_m)
         self._front = front
         self._looked: deque[tuple[int, CodeSet]] = deque()
         self._exposed: deque[Kinematics] = deque()
@@ -112,7 +114,7 @@ class IdealFlight:
             x_m, y_m = site.nodes[carried_to].x_m, site.nodes[carried_to].y_m
         self.airframe = Airframe(airframe, draught=draught, seed=seed, x_m=x_m, y_m=y_m)
         self.sensors = Sensors(seed=seed)
-        self._eye = IdealEye(world, params.tracker.lens, params.tracker.mount, errors, seed)
+        self._eye = IdealEye(world, config.camera.lens(), config.camera.mount(), errors, seed)
         self._climb = ClimbLoop()
         self._delay_ns = delay_ns
         self._armed = False

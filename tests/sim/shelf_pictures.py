@@ -6,10 +6,11 @@ import random
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from flightd.config.scan import ScanConfig
 from flightd.core.scanning import BodyPose
 from flightd.core.types import Image
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
-from flightd.mission.scan.views import ScanParams, View, ViewPlanner
+from flightd.mission.scan.views import View, ViewPlanner
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackLook
 from flightd.sim.racks.front_camera import FrontCamera
@@ -40,7 +41,7 @@ def shelf_pictures(
     """A picture of each view of some nodes for each of the exposures; with `retakes` from all places that
     re-takes look from, too."""
     sight = FrontSight(camera.lens, camera.mount)
-    planner = ViewPlanner(site, sight, Assigner(site, sight), ScanParams(max_height_m=4.0))
+    planner = ViewPlanner(site, sight, Assigner(site, sight), ScanConfig(max_height_m=4.0))
     renderer = FrontRenderer(site, camera, look, seed)
     rng = random.Random(seed)
     stamp_ns = 0

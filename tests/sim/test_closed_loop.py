@@ -17,9 +17,9 @@ from flightd.app.build import detector_pool
 from flightd.app.detection.detector_pool import DetectorPool
 from flightd.app.simulation import launch as simulate
 from flightd.config.schema import Config, load_config
-from flightd.config.site_file import load_site
 from flightd.core.types import Phase, Status
 from flightd.sim.scenario.scenario import Scenario
+from flightd.site.site_file import load_site
 from tests.command import Command
 
 ROOT = Path(__file__).parents[2]

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from flightd.config.site_file import load_site
 from flightd.core.scanning import Light, Occupancy
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
 from flightd.sim.racks.appearance import RackLook
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.stock import StockShares, StockSituation, stock
+from flightd.site.site_file import load_site
 from flightd.vision.shelf.shelf_look import read_shelf
 from tests.sim.shelf_pictures import shelf_pictures
 

@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from prometheus_client import generate_latest
 
 from flightd.adapters.metrics.metrics import MetricsBook
 from flightd.app.counting.flight_count import FlightCount
@@ -16,13 +17,13 @@ from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.detection.detector_pool import Detection
 from flightd.app.simulation.ports import free_port
 from flightd.config.schema import Config, load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.types import Command, CommandKind, Demand, Phase, Status
 from flightd.ports import Monitor
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.sim.autopilot.copter import CopterMode
+from flightd.site.site_file import load_site
 from tests.protocol.rig import Rig, ardupilot_rig, run_virtual
 
 ROOT = Path(__file__).parents[2]
@@ -105,7 +106,7 @@ def test_it_keeps_the_vehicle_level_reports_and_lands_it(alone_s: float) -> None
             assert rig.peer.truth().height_m < 0.15
             assert max(tilts) < math.radians(3)
             assert max(heights) < 1.9, "it never climbs away"
-            told = book.exposition().decode()
+            told = generate_latest(book.registry).decode()
             assert 'flightd_phase{phase="aborted"} 1.0' in told
             assert 'flightd_events_total{level="error",name="restart"} 1.0' in told
             assert 'flightd_events_total{level="error",name="failure"}' in told, "the camera's"

@@ -16,7 +16,6 @@ from flightd.app.simulation.launch import Simulation, truth_of
 from flightd.app.simulation.ports import free_port, has_front_camera
 from flightd.cli.sim import _camera_keys, _configured
 from flightd.config.schema import Config
-from flightd.config.site_file import load_site
 from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import VirtualLoop
@@ -27,6 +26,7 @@ from flightd.sim.racks.front_camera import FrontCamera, front_lens
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.scenario.scenario import FrontCameraScenario, Scenario
 from flightd.sim.sensors.camera import CameraPeer, PictureMaker
+from flightd.site.site_file import load_site
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SMALL = CONFIGS / "site-racks-small.toml"

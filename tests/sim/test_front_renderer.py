@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flightd.config.site_file import load_site
 from flightd.core.camera_view import ForwardMount
 from flightd.core.geometry import Lens
 from flightd.core.types import CodeRead
@@ -21,6 +20,7 @@ from flightd.sim.racks.rack_layout import faces
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.racks.stock import Condition, Label, StockPlace, StockShares, StockSituation, stock
 from flightd.site.site import Side
+from flightd.site.site_file import load_site
 from flightd.vision.shelf.code_reader import read_codes
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")

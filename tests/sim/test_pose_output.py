@@ -10,10 +10,10 @@ import pytest
 
 from flightd.app.simulation import launch as simulate
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.types import Phase
 from flightd.sim.autopilot.autopilot import AutopilotPeer
 from flightd.sim.scenario.scenario import Scenario
+from flightd.site.site_file import load_site
 
 CONFIG = Path(__file__).parents[2] / "configs" / "sim.toml"
 

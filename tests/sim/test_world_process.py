@@ -11,9 +11,9 @@ import pytest
 
 from flightd.app.simulation.world_process import run_world, watch_world
 from flightd.config.paths import shipped
-from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError, RunError, UnavailableError
 from flightd.sim.world import WorldSpec
+from flightd.site.site_file import load_site
 
 
 def death_of(spec: WorldSpec, log: Path) -> FlightdError:

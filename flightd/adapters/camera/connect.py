@@ -9,8 +9,8 @@ from flightd.adapters.camera.shared_memory import SharedCamera
 from flightd.adapters.vehicle.ardrone.camera import ArDroneCamera
 from flightd.adapters.vehicle.ardrone.settings import DroneCamera
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
+from flightd.config.camera import CameraConfig
 from flightd.config.front_camera import FrontCameraConfig
-from flightd.config.schema import CameraConfig
 from flightd.core.errors import InputError
 from flightd.ports import Camera, Clock, Vehicle
 from flightd.runtime.frame_ring import FrameTicket

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info
 from prometheus_client.core import CounterMetricFamily
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
@@ -14,17 +14,15 @@ from flightd import __version__
 from flightd.core.types import Event, Phase
 from flightd.ports import Vitals
 
-CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
-
 _STAGE_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)
 _LATE_S = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 
 
 class MetricsBook:
-    """`ports.Monitor` that keeps the numbers; `exposition` is what a scrape gets."""
+    """`ports.Monitor` that keeps the numbers; a scrape reads `registry`, from a thread of its own."""
 
     def __init__(self) -> None:
-        registry = self._registry = CollectorRegistry(auto_describe=False)
+        registry = self.registry = CollectorRegistry(auto_describe=False)
         Info("flightd", "version of the daemon", registry=registry).info({"version": __version__})
         self._stages = Histogram(
             "flightd_stage_seconds",
@@ -93,10 +91,6 @@ class MetricsBook:
 
     def event(self, event: Event) -> None:
         self._events.labels(event.level.value, event.name).inc()
-
-    def exposition(self) -> bytes:
-        """All metrics in Prometheus' text format."""
-        return generate_latest(self._registry)
 
 
 class _Counts(Collector):

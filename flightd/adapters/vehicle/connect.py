@@ -11,13 +11,13 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing, read_key
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
+from flightd.config.control import ControlConfig
 from flightd.config.vehicle import VehicleConfig
-from flightd.control.limits import Limits
 from flightd.core.errors import InputError
 from flightd.ports import Clock, Vehicle
 
 
-def connect_vehicle(config: VehicleConfig, clock: Clock, limits: Limits | None = None) -> Vehicle:
+def connect_vehicle(config: VehicleConfig, clock: Clock, limits: ControlConfig | None = None) -> Vehicle:
     """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address or a
     signing key that cannot be used.
 

@@ -26,7 +26,6 @@ from flightd.app.simulation.ports import WorldPorts, connected, free_ports, has_
 from flightd.app.simulation.process_faults import LauncherFaults, attended
 from flightd.app.simulation.world_process import run_world, watch_world
 from flightd.config.schema import Config
-from flightd.config.site_file import site_toml
 from flightd.core.errors import RunError, UnavailableError
 from flightd.core.topics import Document, Topic
 from flightd.core.types import Status
@@ -36,6 +35,7 @@ from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
 from flightd.sim.scenario.scenario import Scenario
 from flightd.sim.world import FrontSpec, World, WorldSpec
 from flightd.site.site import Site
+from flightd.site.site_file import site_toml
 
 DETECTION_S = 0.008
 """Modelled time of a detection in lockstep: what a companion computer needs."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from flightd.config.battery import BatteryConfig
+from flightd.config.schema import Config
 from flightd.core.errors import InputError
-from flightd.mission.battery.consumption import BatteryGauge, BatteryParams
-from flightd.mission.guidance import MissionParams
+from flightd.mission.battery.consumption import BatteryGauge
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
 from flightd.mission.plan.leg_times import Legs, Pace
 from flightd.mission.scan.scanner import Scanner
@@ -19,16 +20,16 @@ def check_battery(
     site: Site,
     plan: FlightPlan,
     policy: HeadingPolicy,
-    params: MissionParams,
+    config: Config,
     scanner: Scanner | None = None,
 ) -> None:
     """InputError when a full battery does not reach one of the stops, last for what is done there, and come
     back with its reserve."""
-    sorties = Sorties(site, Legs(site, policy, Pace.of(params)), params.battery, scanner)
+    sorties = Sorties(site, Legs(site, policy, Pace.of(config.mission)), config.battery, scanner)
     far = sorties.out_of_reach([stop.node for stop in plan.stops if stop.visit])
     if far:
         raise InputError(
-            f"site {site.name}: a full battery (battery.flight_s = {params.battery.flight_s:g}) does not"
+            f"site {site.name}: a full battery (battery.flight_s = {config.battery.hover_s:g}) does not"
             f" reach {far[0]}, last for the stop there and come back with its reserve; add a charge pad, or"
             " leave the node out"
         )
@@ -47,12 +48,14 @@ class Sorties:
 
     With a `scanner` a stop lasts as long as what it has left to count there."""
 
-    def __init__(self, site: Site, legs: Legs, params: BatteryParams, scanner: Scanner | None = None) -> None:
+    def __init__(
+        self, site: Site, legs: Legs, battery: BatteryConfig, scanner: Scanner | None = None
+    ) -> None:
         self._site = site
         self._legs = legs
         self._scanner = scanner
-        self._params = params
-        self._gauge = BatteryGauge(params.flight_s)
+        self._battery = battery
+        self._gauge = BatteryGauge(battery.hover_s)
         self._ways: dict[str, WayBack] = {}
         self._charge_frac = 1.0
 
@@ -96,7 +99,7 @@ class Sorties:
         return tuple(
             node
             for node in dict.fromkeys(nodes)
-            if min(self._fresh_frac(pad, node) for pad in pads) > 1.0 - self._params.reserve_frac
+            if min(self._fresh_frac(pad, node) for pad in pads) > 1.0 - self._battery.reserve
         )
 
     def _out_s(self, on_s: float, there: str) -> float:
@@ -113,11 +116,11 @@ class Sorties:
 
     def _short(self, seconds: float, what: str) -> str:
         needed = seconds * self.rate_per_s
-        if not self._charge_frac < needed + self._params.reserve_frac:  # NaN: no charge told, nothing known
+        if not self._charge_frac < needed + self._battery.reserve:  # NaN: no charge told, nothing known
             return ""
         return (
             f"battery at {self._charge_frac:.0%}: {what} needs {needed:.0%}"
-            f" and {self._params.reserve_frac:.0%} stay in reserve"
+            f" and {self._battery.reserve:.0%} stay in reserve"
         )
 
     def _ways_back(self, node: str, *, in_need: bool) -> list[WayBack]:

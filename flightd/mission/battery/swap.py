@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+from flightd.config.schema import Config
 from flightd.core.types import Phase
 from flightd.mission.battery.sorties import Sorties
-from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.mission.guidance import MissionInputs
 from flightd.mission.machine import State
 from flightd.mission.plan.flight_plan import HeadingPolicy
 from flightd.mission.plan.itinerary import Itinerary
@@ -24,13 +25,13 @@ class BatterySwap:
         self,
         site: Site,
         policy: HeadingPolicy,
-        params: MissionParams,
+        config: Config,
         scanner: Scanner | None,
         itinerary: Itinerary,
         watch: HazardMonitor,
     ) -> None:
-        self._sorties = Sorties(site, Legs(site, policy, Pace.of(params)), params.battery, scanner)
-        self._swap = params.battery.swap
+        self._sorties = Sorties(site, Legs(site, policy, Pace.of(config.mission)), config.battery, scanner)
+        self._swap = config.battery.swap
         self._route = itinerary
         self._watch = watch
         self._short = False

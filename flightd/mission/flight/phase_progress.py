@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+from flightd.config.schema import Config
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Phase
-from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.mission.guidance import MissionInputs
 from flightd.mission.machine import State
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.safety.found_flying import FoundFlyingCheck
@@ -18,11 +19,12 @@ from flightd.mission.triggers import Trigger
 class PhaseProgress:
     """The phase in hand: call `begin` when it changes, then `step` at each tick."""
 
-    def __init__(self, params: MissionParams, itinerary: Itinerary, scan: ScanPhase) -> None:
-        self._params = params
+    def __init__(self, config: Config, itinerary: Itinerary, scan: ScanPhase) -> None:
+        self._params = config.mission
+        self._battery = config.battery
         self._itinerary = itinerary
         self._scan = scan
-        self._first_look = FoundFlyingCheck(params)
+        self._first_look = FoundFlyingCheck(config.mission)
         self._settling = DebounceTimer()
         self._limit_s = math.inf
         self._since_ns = 0
@@ -55,15 +57,18 @@ class PhaseProgress:
                 ready = v is not None and v.armed and v.in_control and not math.isnan(s.height_m)
                 done, trigger = ready, Trigger.ARMED
             case Phase.TAKE_OFF:
-                done, trigger = s.height_m > p.height_m - p.height_reached_m, Trigger.AT_HEIGHT
+                done, trigger = s.height_m > p.height_m - p.expert.height_reached_m, Trigger.AT_HEIGHT
             case Phase.ACQUIRE:
-                calm = s.localised and s.is_sure(p) and s.speed_mps < 2 * p.arrive_mps
+                calm = s.localised and s.is_sure(p) and s.speed_mps < 2 * p.expert.arrive_mps
                 done, trigger = self._settled(s, calm), Trigger.ACQUIRED
             case Phase.TURN:
-                turned = s.pose is not None and abs(wrap_pi(goal.yaw_rad - s.pose.yaw_rad)) < p.arrive_yaw_rad
+                turned = (
+                    s.pose is not None
+                    and abs(wrap_pi(goal.yaw_rad - s.pose.yaw_rad)) < p.expert.arrive_yaw_rad
+                )
                 done, trigger = self._settled(s, turned), Trigger.TURNED
             case Phase.FOLLOW:
-                there = s.distance_m((goal.x_m, goal.y_m)) < p.arrive_m and s.speed_mps < p.arrive_mps
+                there = s.distance_m((goal.x_m, goal.y_m)) < p.arrive_m and s.speed_mps < p.expert.arrive_mps
                 done, trigger = self._settled(s, there), Trigger.ARRIVED
             case Phase.HOVER | Phase.CLIMB | Phase.SCAN:
                 done, trigger = self._at_node(s, state.phase, state.returning)
@@ -100,9 +105,9 @@ class PhaseProgress:
         p, goal = self._params, self._itinerary.goal
         match phase:
             case Phase.ARMING:
-                return p.arm_timeout_s
+                return p.expert.arm_timeout_s
             case Phase.SWAP:
-                return p.battery.swap_wait_s
+                return self._battery.swap_wait_s
             case Phase.TAKE_OFF:
                 way_s = p.height_m / p.climb_mps
             case Phase.HOVER:
@@ -112,7 +117,7 @@ class PhaseProgress:
             case Phase.RELOCATE:
                 way_s = p.relocate_s
             case Phase.HOLD:
-                return p.battery.flight_s
+                return self._battery.hover_s
             case Phase.TURN:
                 way_s = math.pi / p.turn_rate_radps
             case Phase.CLIMB:
@@ -122,4 +127,4 @@ class PhaseProgress:
                 way_s = (0.0 if math.isinf(here_m) else here_m) / p.speed_mps
             case _:
                 way_s = 0.0
-        return p.phase_slack_s + p.phase_share * way_s
+        return p.expert.phase_slack_s + p.expert.phase_share * way_s

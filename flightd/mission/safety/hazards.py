@@ -58,8 +58,8 @@ class Hazard:
 _FAST = "tests/sim/test_hazards.py"
 _HOLD = "brake, hold; on when it is over; land after `mission.lines_land_s`"
 _BLIND = (
-    "brake by dead reckoning and sink to `hazards.blind_m` at once; up and on when it is over; land after"
-    " `hazards.blind_land_s`"
+    "brake by dead reckoning and sink to `hazards.expert.blind_m` at once; up and on when it is over; land"
+    " after `hazards.expert.blind_land_s`"
 )
 
 HAZARDS: tuple[Hazard, ...] = (
@@ -150,8 +150,8 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "wind",
         Trigger.WIND,
-        "a steady push of more than `hazards.push_mps2`, or off its place by `hazards.off_m`, for"
-        " `hazards.push_s`",
+        "a steady push of more than `hazards.expert.push_mps2`, or off its place by `hazards.expert.off_m`,"
+        " for `hazards.expert.push_s`",
         Action.LAND,
         "land by the lines",
         _FAST,
@@ -187,8 +187,9 @@ HAZARDS: tuple[Hazard, ...] = (
         "no line of the map newer than `mission.lines_hold_s`, the followed one older than 0.8 s, or the"
         " position too uncertain",
         Action.HOLD,
-        "brake by dead reckoning, hold; after `hazards.search_s` climb by `hazards.search_climb_m` to see"
-        " more; land after `hazards.search_land_s`, or with glimpses after `mission.lines_land_s`",
+        "brake by dead reckoning, hold; after `hazards.expert.search_s` climb by"
+        " `hazards.expert.search_climb_m` to see more; land after `hazards.expert.search_land_s`, or with"
+        " glimpses after `mission.lines_land_s`",
         _FAST,
     ),
     Hazard(

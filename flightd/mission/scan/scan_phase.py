@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+from flightd.config.mission import Heading, MissionConfig
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Phase
-from flightd.mission.guidance import MissionInputs, MissionParams
-from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, Stop
+from flightd.mission.guidance import MissionInputs
+from flightd.mission.plan.flight_plan import HeadingPolicy, Stop
 from flightd.mission.scan.scanner import Scanner
 from flightd.mission.scan.views import View
 from flightd.mission.triggers import Trigger
@@ -27,7 +28,7 @@ class ScanPhase:
     """The mission's side of scanning; without a scanner there is never anything to scan."""
 
     def __init__(
-        self, site: Site, scanner: Scanner | None, params: MissionParams, policy: HeadingPolicy
+        self, site: Site, scanner: Scanner | None, params: MissionConfig, policy: HeadingPolicy
     ) -> None:
         self._site = site
         self._heading = policy.heading
@@ -67,9 +68,9 @@ class ScanPhase:
         p, view = self._params, self.view(Phase.CLIMB)
         if view is None or s.pose is None:
             return False
-        there = distance_m < p.arrive_m and speed_mps < p.arrive_mps
-        level = abs(s.height_m - view.height_m) < p.view_height_m
-        return there and level and abs(wrap_pi(view.yaw_rad - s.pose.yaw_rad)) < p.arrive_yaw_rad
+        there = distance_m < p.arrive_m and speed_mps < p.expert.arrive_mps
+        level = abs(s.height_m - view.height_m) < p.expert.view_height_m
+        return there and level and abs(wrap_pi(view.yaw_rad - s.pose.yaw_rad)) < p.expert.arrive_yaw_rad
 
     def is_over(self, now_ns: int) -> bool:
         """Whether the view that is looked from has told enough."""

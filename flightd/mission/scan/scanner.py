@@ -8,16 +8,18 @@ nothing is ever booked on a wrong location; its locations are left to count, and
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 
+from flightd.config.scan import ScanConfig
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
 from flightd.core.types import Event, EventLevel
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.scan.code_assignment import Assigner, FrontSight, Sighting
 from flightd.mission.scan.node_scan import ScanTask
-from flightd.mission.scan.views import ScanParams, View, ViewPlanner, views_s
+from flightd.mission.scan.views import View, ViewPlanner, views_s
 from flightd.site.site import Site
 
 _BLIND_NODES = 3
@@ -36,12 +38,20 @@ class _Pending:
 
 
 class Scanner:
-    """The scan phase of a flight, for the mission to ask and for pictures to be given to."""
+    """The scan phase of a flight, for the mission to ask and for pictures to be given to; `highest_m` and
+    `aside_per_height` are those of `ViewPlanner`."""
 
-    def __init__(self, site: Site, sight: FrontSight, params: ScanParams) -> None:
+    def __init__(
+        self,
+        site: Site,
+        sight: FrontSight,
+        params: ScanConfig,
+        highest_m: float = math.inf,
+        aside_per_height: float = 0.35,
+    ) -> None:
         self._params = params
-        self._assigner = Assigner(site, sight, params.least_probability)
-        self._planner = ViewPlanner(site, sight, self._assigner, params)
+        self._assigner = Assigner(site, sight, params.expert.least_probability)
+        self._planner = ViewPlanner(site, sight, self._assigner, params, highest_m, aside_per_height)
         self._planned = frozenset(site.locations)
         self._done: set[str] = set()
         self._tasks: dict[str, ScanTask] = {}
@@ -174,7 +184,7 @@ class Scanner:
     def take_due(self) -> tuple[str, ...]:
         """The nodes to fly to once more, their findings having been withdrawn, in the order of their first
         visit; each at most `revisits` times in a flight."""
-        due = [node for node in self._due if self._again[node] < self._params.revisits]
+        due = [node for node in self._due if self._again[node] < self._params.expert.revisits]
         self._again.update(due)
         self._due.clear()
         return tuple(due)

@@ -12,7 +12,6 @@ from typing import TypeAlias
 import msgspec
 import numpy as np
 
-from flightd.config.site_file import parse_site
 from flightd.core.errors import InputError
 from flightd.core.topics import FOR_PEOPLE, RETAINED, Document, Topic
 from flightd.core.types import AttitudeSetpoint, Event, GridPose, LineSet, Phase, Status, VehicleState
@@ -30,6 +29,7 @@ from flightd.replay.report.flight import (
     Visit,
 )
 from flightd.site.site import Site
+from flightd.site.site_file import parse_site
 
 _SHORTEST_STOP_S = 0.2
 """A hover that the mission leaves at once is no stop."""

@@ -15,7 +15,6 @@ from functools import partial
 from pathlib import Path
 
 from flightd.config.paths import shipped
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.runtime.clock import LoopClock
 from flightd.sim.ardrone.drone import Drone
@@ -30,6 +29,7 @@ from flightd.sim.sensors.camera import CameraPeer
 from flightd.sim.sensors.instruments import Sensors
 from flightd.sim.sensors.optics import SimCamera
 from flightd.site.site import Site
+from flightd.site.site_file import load_site
 
 _NOBODY = ("127.0.0.1", 9)
 

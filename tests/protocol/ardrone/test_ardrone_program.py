@@ -13,7 +13,8 @@ import pytest
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.vehicle.ardrone.settings import settings_of
 from flightd.adapters.vehicle.connect import connect_vehicle
-from flightd.config.schema import CameraConfig, load_table, parse_config
+from flightd.config.camera import CameraConfig
+from flightd.config.schema import load_table, parse_config
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import InputError
 from flightd.sim.ardrone.__main__ import main

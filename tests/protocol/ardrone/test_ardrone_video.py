@@ -18,7 +18,6 @@ from flightd.adapters.vehicle.ardrone.pave import FrameType, PaveFrame, PavePars
 from flightd.adapters.vehicle.ardrone.settings import DroneCamera
 from flightd.adapters.vehicle.ardrone.video import MAX_BACKLOG, Backlog, DecodedFrame, Decoder, VideoStream
 from flightd.config.paths import shipped
-from flightd.config.site_file import load_site
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
@@ -27,6 +26,7 @@ from flightd.sim.ardrone.front_camera import front_peer
 from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.ardrone.video import Encoder, Packer, VideoChannel, is_idr
 from flightd.sim.racks.appearance import RackLook
+from flightd.site.site_file import load_site
 from tests.protocol.ardrone import golden
 from tests.protocol.ardrone.bench import ANY_PORTS, bench, ended, make_drone, virtually
 

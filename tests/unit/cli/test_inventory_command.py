@@ -21,10 +21,10 @@ from flightd.app.build import flown_between_m
 from flightd.app.counting.flight_count import going_on
 from flightd.cli.main import app
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, StoredRead
 from flightd.inventory.formats import as_csv, as_epcis, as_xlsx
+from flightd.site.site_file import load_site
 
 RUNNER = CliRunner()
 CONFIGS = Path(__file__).parents[3] / "configs"

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from flightd.config.site_file import load_site
 from flightd.core.types import GridPose
 from flightd.localisation.pad_finder import PadFinder
 from flightd.site.painted_lines import nearest_end
 from flightd.site.site import PadSign
+from flightd.site.site_file import load_site
 from flightd.tracking.ground_junctions import FloorJunction
 from flightd.tracking.line_tracker import TrackSet
 

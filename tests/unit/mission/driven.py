@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from flightd.config.mission import Heading
+from flightd.config.schema import Config
 from flightd.core.types import (
     Attitude,
     Command,
@@ -16,12 +18,13 @@ from flightd.core.types import (
     Phase,
     VehicleState,
 )
-from flightd.mission.guidance import Guidance, Guide, MissionInputs, MissionParams
+from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.mission import Mission
-from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
 from flightd.mission.scan.scanner import Scanner
 from flightd.sim.random_sites import random_site
 from flightd.site.site import Site
+from tests.unit.mission.configured import configured
 
 SITE = random_site(3)
 POLICY = HeadingPolicy(Heading.ALONG)
@@ -32,11 +35,11 @@ class Flight:
     """Feeds a mission with senses: by default all is well and the drone is wherever the mission wants."""
 
     def __init__(
-        self, params: MissionParams | None = None, site: Site = SITE, scanner: Scanner | None = None
+        self, params: Config | None = None, site: Site = SITE, scanner: Scanner | None = None
     ) -> None:
         home = site.home.node
         plan = make_plan(site, site.serpentine_route(), home, home, POLICY)
-        self.mission = Mission(site, plan, POLICY, params or MissionParams(dwell_s=1.0), scanner)
+        self.mission = Mission(site, plan, POLICY, params or configured(dwell_s=1.0), scanner)
         self.site = site
         self.integrity = 1.0
         self.heartbeat_s = 0.0

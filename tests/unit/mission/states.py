@@ -6,54 +6,73 @@ import copy
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
+from flightd.config.battery import BatteryConfig
+from flightd.config.hazards import HazardConfig, HazardExpert, LossAction
+from flightd.config.scan import ScanConfig
+from flightd.config.schema import Config
 from flightd.core.types import CommandKind, GridPose, LandedState, Phase
-from flightd.mission.battery.consumption import BatteryParams
-from flightd.mission.guidance import ALL_WELL, HazardParams, LossAction, MissionParams
+from flightd.mission.guidance import ALL_WELL
 from flightd.mission.machine import FLYING, Intent, State
 from flightd.mission.scan.scanner import Scanner
-from flightd.mission.scan.views import ScanParams
 from flightd.mission.triggers import Trigger
 from tests.unit.mission import shelves
+from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import Flight
 
-PARAMS = MissionParams(
+_SHIPPED = configured(
+    BatteryConfig(flight_s=60.0, swap=True, swap_wait_s=4.0),
     dwell_s=1.0,
-    view_height_m=0.15,
+    settle_s=0.5,
     speed_mps=1.5,
     accel_mps2=2.0,
     autostart=False,
     telemetry_hold_s=0.1,
     telemetry_land_s=0.3,
     lines_land_s=1.0,
-    arm_timeout_s=2.0,
-    adopt_s=0.1,
-    recover_s=1.0,
-    phase_slack_s=3.0,
-    doubt_s=0.05,
-    first_look_s=0.05,
-    settled_s=0.2,
+    recover_s=1.5,
     relocate_s=3.0,
-    ground_lost=LossAction.LAND,
-    battery=BatteryParams(flight_s=60.0, swap=True, swap_wait_s=4.0),
-    hazards=HazardParams(
-        disagree_s=0.0, push_s=0.0, outside_s=0.0, overload_s=0.0, record_lost=LossAction.LAND
-    ),
+    expert={
+        "view_height_m": 0.15,
+        "arm_timeout_s": 2.0,
+        "adopt_s": 0.1,
+        "phase_slack_s": 3.0,
+        "doubt_s": 0.05,
+        "first_look_s": 0.05,
+        "settled_s": 0.2,
+    },
 )
+_AT_ONCE = HazardConfig().model_copy(
+    update={
+        "disagree_s": 0.0,
+        "overload_s": 0.0,
+        "record_lost": LossAction.LAND,
+        "expert": HazardExpert().model_copy(update={"push_s": 0.0, "outside_s": 0.0}),
+    }
+)
+
+
+def losing(ground: LossAction = LossAction.LAND, record: LossAction = LossAction.LAND) -> Config:
+    """What is tested with, and what is done when links are lost."""
+    hazards = _AT_ONCE.model_copy(update={"record_lost": record})
+    link = _SHIPPED.ground.model_copy(update={"lost_action": ground})
+    return _SHIPPED.model_copy(update={"hazards": hazards, "ground": link})
+
+
+PARAMS = losing()
 """Everything soon, nothing started by itself."""
 
 
-def flight_of(params: MissionParams, scans: bool = False) -> Flight:
+def flight_of(params: Config, scans: bool = False) -> Flight:
     """A flight over four nodes in a row; one that `scans` never gets a picture of a shelf."""
     scanner = None
     if scans:
-        scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanParams(max_height_m=4.0, view_s=0.4, retakes=0))
+        scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanConfig(max_height_m=4.0, view_s=0.4, retakes=0))
     return Flight(params, shelves.SITE, scanner)
 
 
-def in_state(state: State, params: MissionParams = PARAMS, scans: bool = False) -> Flight:
+def in_state(state: State, params: Config = PARAMS, scans: bool = False) -> Flight:
     """A flight that has just come into a state."""
     flight = flight_of(params, scans or state.phase in {Phase.CLIMB, Phase.SCAN})
     _lead(flight, state)
@@ -151,7 +170,7 @@ class Stimulus:
 
     act: Callable[[Flight], None]
     within_s: float = 0.4
-    params: MissionParams = PARAMS
+    params: Config = PARAMS
     scanning: tuple[Phase, ...] = ()
     """Where a scanner is needed for it."""
     hold: bool = True
@@ -168,7 +187,7 @@ def warned(within_s: float = 0.4, **changes: Any) -> Stimulus:
     return Stimulus(lambda flight: flight.set(warnings=replace(ALL_WELL, **changes)), within_s)
 
 
-def sick(params: MissionParams = PARAMS, **changes: Any) -> Stimulus:
+def sick(params: Config = PARAMS, **changes: Any) -> Stimulus:
     health = replace(ALL_WELL.health, **changes)
     return Stimulus(lambda flight: flight.set(warnings=replace(ALL_WELL, health=health)), params=params)
 
@@ -227,9 +246,9 @@ def _found(flight: Flight) -> None:
     flight.set(armed=True, landed=LandedState.IN_AIR, height_m=1.5)
 
 
-_HOME = replace(PARAMS, hazards=replace(PARAMS.hazards, record_lost=LossAction.HOME))
-_HELD = replace(PARAMS, ground_lost=LossAction.HOLD)
-_ONE_BATTERY = replace(PARAMS, battery=replace(PARAMS.battery, swap=False))
+_HOME = losing(record=LossAction.HOME)
+_HELD = losing(ground=LossAction.HOLD)
+_ONE_BATTERY = PARAMS.model_copy(update={"battery": BatteryConfig(flight_s=60.0)})
 
 STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.PILOT_TOOK: sensed(in_control=False),
@@ -266,7 +285,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.LINES_FOUND: Stimulus(_resume, 0.6, hold=False),
     Trigger.POSITION_SURE: placed(),
     Trigger.FOUND_FLYING: Stimulus(_found),
-    Trigger.UNATTENDED: Stimulus(_idle, 1.2),
+    Trigger.UNATTENDED: Stimulus(_idle, 1.7),
     Trigger.READY: Stimulus(_full),
     Trigger.ARMED: sensed(armed=True, in_control=True),
     Trigger.AT_HEIGHT: sensed(height_m=1.5),
@@ -293,13 +312,12 @@ STIMULI: Mapping[Trigger, Stimulus] = {
 }
 
 
-@cache
-def _begun(state: State, params: MissionParams, scans: bool) -> Flight:
-    return in_state(state, params, scans)
+_BEGUN: dict[tuple[State, int, bool], Flight] = {}
 
 
-def fresh(state: State, params: MissionParams = PARAMS, scans: bool = False) -> Flight:
+def fresh(state: State, params: Config = PARAMS, scans: bool = False) -> Flight:
     """A flight of its own in a state."""
-    begun = _begun(state, params, scans)
-    shared = {id(thing): thing for thing in (begun.site, shelves.SIGHT)}
+    key = state, id(params), scans
+    begun = _BEGUN[key] = _BEGUN.get(key) or in_state(state, params, scans)
+    shared = {id(thing): thing for thing in (begun.site, shelves.SIGHT, params)}
     return copy.deepcopy(begun, shared)

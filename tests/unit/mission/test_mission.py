@@ -7,19 +7,20 @@ from dataclasses import replace
 
 import pytest
 
+from flightd.config.battery import BatteryConfig
+from flightd.config.scan import ScanConfig
 from flightd.core.types import (
     CommandKind,
     Demand,
     LandedState,
     Phase,
 )
-from flightd.mission.battery.consumption import BatteryParams
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.guidance import Guide, MissionParams
+from flightd.mission.guidance import Guide
 from flightd.mission.machine import Intent, State
 from flightd.mission.scan.scanner import Scanner
-from flightd.mission.scan.views import ScanParams
 from tests.unit.mission import shelves
+from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import SITE, TICK_NS, Flight
 
 
@@ -47,8 +48,7 @@ def test_a_correction_over_the_pad_is_the_reason_for_the_end_that_it_makes() -> 
     assert flight.mission.reason == "the position was corrected while landing"
     flight.set(landed=LandedState.ON_GROUND, armed=False)
     flight.run(0.1, follow=False)
-    assert flight.mission.state.over
-    assert flight.phase is Phase.ABORTED
+    assert flight.mission.state == State(Phase.ABORTED, Intent.END)
     assert flight.mission.reason == "the position was corrected while landing"
 
 
@@ -75,7 +75,7 @@ def test_a_stop_as_it_comes_to_stand_on_the_pad_ends_the_mission() -> None:
 
 def test_a_pause_lasts_no_longer_than_a_full_battery() -> None:
     """Whatever the vehicle says of its charge."""
-    flight = Flight(MissionParams(dwell_s=1.0, battery=BatteryParams(flight_s=200.0)))
+    flight = Flight(configured(BatteryConfig(flight_s=200.0), dwell_s=1.0))
     flight.to(Phase.FOLLOW)
     flight.order(CommandKind.PAUSE)
     flight.run(199.0)
@@ -85,7 +85,7 @@ def test_a_pause_lasts_no_longer_than_a_full_battery() -> None:
 
 
 def test_on_the_ground_only_a_hazard_that_decides_something_is_told() -> None:
-    flight = Flight(MissionParams(autostart=False))
+    flight = Flight(configured(autostart=False))
     flight.set(localised=False, x_age_s=60.0, y_age_s=60.0)
     flight.run(2.0)
     assert not [event for event in flight.mission.drain_events() if event.name == "hazard"]
@@ -104,7 +104,7 @@ def test_on_the_ground_only_a_hazard_that_decides_something_is_told() -> None:
 
 
 def test_a_position_lost_between_two_flights_does_not_shift_the_second_one() -> None:
-    relocator = Relocator(MissionParams())
+    relocator = Relocator(configured().mission, math.inf, ())
     flight = Flight()
     flight.to(Phase.FOLLOW)
     sure = flight.senses
@@ -198,7 +198,7 @@ def test_lines_that_only_flicker_end_in_a_landing() -> None:
 
 
 def test_a_view_lost_at_height_is_borne_as_long_as_any_however_long_the_climb_saw_no_line() -> None:
-    flight = Flight(MissionParams(climb_mps=0.2))
+    flight = Flight(configured(climb_mps=0.2))
     flight.set(x_age_s=60.0, y_age_s=60.0)
     flight.to(Phase.TAKE_OFF)
     flight.run(60.0, lambda: flight.senses.height_m > 1.35)
@@ -223,14 +223,14 @@ def test_on_a_leg_other_lines_do_not_stand_in_for_the_one_followed() -> None:
 
 def test_a_long_leg_is_given_its_time() -> None:
     """Ten times as long as the slack that every phase has."""
-    flight = Flight(MissionParams(dwell_s=0.0, speed_mps=0.1, accel_mps2=0.5, phase_slack_s=3.0))
+    flight = Flight(configured(dwell_s=0.0, speed_mps=0.1, accel_mps2=0.5, expert={"phase_slack_s": 3.0}))
     flight.to(Phase.LAND, 1200)
     assert flight.mission.reason == "route done"
 
 
 @pytest.mark.parametrize("kind", [CommandKind.STOP, CommandKind.LAND])
 def test_an_order_to_end_before_the_start_never_arms(kind: CommandKind) -> None:
-    flight = Flight(MissionParams(autostart=False))
+    flight = Flight(configured(autostart=False))
     flight.run(0.2)
     flight.order(kind)
     flight.order(CommandKind.START)
@@ -244,7 +244,7 @@ def test_an_order_to_end_before_the_start_never_arms(kind: CommandKind) -> None:
 
 
 def test_low_battery_flies_home_even_when_paused_and_without_dwelling() -> None:
-    flight = Flight(MissionParams(dwell_s=500.0))
+    flight = Flight(configured(dwell_s=500.0))
     flight.to(Phase.FOLLOW)
     flight.order(CommandKind.PAUSE)
     flight.run(2.0)
@@ -256,7 +256,7 @@ def test_low_battery_flies_home_even_when_paused_and_without_dwelling() -> None:
 
 
 def test_home_is_refused_on_the_floor() -> None:
-    flight = Flight(MissionParams(autostart=False))
+    flight = Flight(configured(autostart=False))
     flight.run(0.1)
     flight.order(CommandKind.HOME)
     flight.order(CommandKind.START)
@@ -265,8 +265,8 @@ def test_home_is_refused_on_the_floor() -> None:
 
 
 def test_a_moment_of_doubt_as_a_view_ends_does_not_hold_the_scan_for_ever() -> None:
-    scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanParams(max_height_m=4.0, view_s=2.0, retakes=0))
-    flight = Flight(MissionParams(view_height_m=0.15), shelves.SITE, scanner)
+    scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanConfig(max_height_m=4.0, view_s=2.0, retakes=0))
+    flight = Flight(configured(expert={"view_height_m": 0.15}), shelves.SITE, scanner)
     flight.to(Phase.SCAN)
     first = scanner.view
     flight.run(1.9)

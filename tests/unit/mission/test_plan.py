@@ -7,8 +7,9 @@ import math
 
 import pytest
 
+from flightd.config.mission import Heading
 from flightd.core.errors import InputError
-from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
 from flightd.sim.random_sites import random_site
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flightd.core.types import Attitude, LandedState, VehicleState
-from flightd.mission.guidance import ALL_WELL, MissionInputs, MissionParams
+from flightd.mission.guidance import ALL_WELL, MissionInputs
 from flightd.mission.safety.readiness import not_ready
+from tests.unit.mission.configured import configured
 
-PARAMS = MissionParams()
+PARAMS = configured()
 VEHICLE = VehicleState(
     attitude=Attitude(10**9, 0.0, 0.0, 0.0),
     height_m=0.1,

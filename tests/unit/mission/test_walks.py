@@ -14,11 +14,12 @@ from typing import Any, TypeAlias
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightd.config.hazards import LossAction
 from flightd.core.types import CommandKind, Demand, LandedState, Phase
-from flightd.mission.guidance import ALL_WELL, LossAction
+from flightd.mission.guidance import ALL_WELL
 from flightd.mission.machine import STATES, TABLE, Cause, Intent, State
 from tests.unit.mission.driven import Flight
-from tests.unit.mission.states import PARAMS, flight_of, fresh
+from tests.unit.mission.states import PARAMS, flight_of, fresh, losing
 
 WALKS = int(os.environ.get("FLIGHTD_WALKS", "200"))
 
@@ -125,7 +126,7 @@ class Walk:
 
     def pilot_wins(self, before: State, after: State) -> None:
         s = self.flight.senses
-        heard = s.telemetry_age_s < PARAMS.telemetry_hold_s and s.vehicle is not None
+        heard = s.telemetry_age_s < PARAMS.mission.telemetry_hold_s and s.vehicle is not None
         if heard and before.airborne and before.phase is not Phase.RECOVER and s.vehicle is not None:
             assert not s.vehicle.armed or s.vehicle.in_control or after.phase is Phase.PILOT
 
@@ -173,8 +174,7 @@ def test_whatever_comes_a_mission_in_any_state_stays_safe(spells: Spells, state:
 def test_whatever_is_done_when_links_are_lost_stays_safe(
     spells: Spells, ground: LossAction, record: LossAction, scans: bool
 ) -> None:
-    hazards = replace(PARAMS.hazards, record_lost=record)
-    flight = flight_of(replace(PARAMS, ground_lost=ground, hazards=hazards), scans)
+    flight = flight_of(losing(ground, record), scans)
     flight.order(CommandKind.START)
     flight.run(4.0)
     flight.mission.drain_events()

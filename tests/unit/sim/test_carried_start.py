@@ -11,13 +11,13 @@ from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.app.simulation.launch import Simulation, _spec
 from flightd.app.simulation.ports import free_ports
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import VirtualLoop
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.scenario.scenario_files import load_scenario
 from flightd.sim.world import World
+from flightd.site.site_file import load_site
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from flightd.config.site_file import load_site
+from flightd.config.mission import Heading
 from flightd.core.types import Event, EventLevel, Phase, Status
-from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
 from flightd.sim.judge.flight_score import score
 from flightd.sim.plant.kinematics import Kinematics
+from flightd.site.site_file import load_site
 
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
 PLAN = make_plan(SITE, ["A2"], "A1", "A1", HeadingPolicy(Heading.ALONG))

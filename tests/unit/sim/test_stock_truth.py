@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
 from flightd.sim.racks.appearance import RackLook
@@ -18,6 +17,7 @@ from flightd.sim.racks.stock import Condition, StockPlace, StockShares, StockSit
 from flightd.sim.racks.stock_truth import LocationTruth, score_stock, stock_truth, write_truth
 from flightd.sim.scenario.scenario_files import load_scenario
 from flightd.site.site import Rack
+from flightd.site.site_file import load_site
 
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-racks.toml")
 FOCAL_PX = 1000.0

@@ -11,8 +11,8 @@ from flightd.adapters.store.progress import LeftOver, NothingLeftError, Progress
 from flightd.app.build import plan_of
 from flightd.app.resume import resumed as take_up
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError, TransientError
+from flightd.site.site_file import load_site
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 DEMO = load_site(CONFIGS / "site-demo.toml")

@@ -1,4 +1,9 @@
-"""UDP, TCP and serial lines behind one small interface, on asyncio alone."""
+"""UDP, TCP and serial lines behind one small interface, on asyncio alone.
+
+Own code for serial lines too: pyserial-asyncio-fast 0.16 wakes the loop 412 times a second at 500 frames
+where `PacedReader` does 72 times, 19 ms of processor a second against 9 (tools/bench_serial.py); it keeps
+what the line does not take, and setpoints that are late are better dropped.
+"""
 
 from __future__ import annotations
 

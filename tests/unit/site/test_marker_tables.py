@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightd.config.site_file import parse_site, site_toml
 from flightd.core.errors import InputError
 from flightd.core.markers import MarkerDictionary, MarkerSet
 from flightd.site.floor_plan_svg import draw_site
 from flightd.site.site import Marker
+from flightd.site.site_file import parse_site, site_toml
 
 AISLE = """
 [site]

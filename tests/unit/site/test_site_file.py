@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightd.config.site_file import load_site, parse_site, site_toml
 from flightd.core.errors import InputError
 from flightd.sim.random_sites import random_site
 from flightd.site.site import LineColour, Side, Site
+from flightd.site.site_file import load_site, parse_site, site_toml
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 
