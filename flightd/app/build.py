@@ -17,6 +17,7 @@ from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_pla
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.plan.route_optimiser import ordered_best
 from flightd.mission.scan.code_assignment import FrontSight
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.scanner import Scanner
 from flightd.mission.scan.views import view_height_m
 from flightd.pilot import Pilot
@@ -68,11 +69,11 @@ def pilot_of(config: Config, site: Site) -> Pilot:
     return Pilot(flown, plan, policy, config, scanner, site.overhead_m)
 
 
-def scanner_of(config: Config, site: Site) -> Scanner | None:
-    """What counts the shelves; None without a front camera or locations."""
+def scanner_of(config: Config, site: Site) -> AnyScanner:
+    """What counts the shelves; `NO_SCAN` without a front camera or locations."""
     front = config.front_camera
     if not front.is_fitted or not site.locations:
-        return None
+        return NO_SCAN
     highest_m = site.ceiling_m - CEILING_MARGIN_M
     if config.scan.min_height_m > highest_m:
         raise InputError(

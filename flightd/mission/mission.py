@@ -24,8 +24,8 @@ from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
 from flightd.mission.safety.hazards import ACTIONS, Action, triggers_of
 from flightd.mission.safety.readiness import not_fresh, not_ready
-from flightd.mission.scan.scan_phase import ScanPhase
-from flightd.mission.scan.scanner import Scanner
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
+from flightd.mission.scan.shelf_scan import ShelfScan
 from flightd.mission.triggers import Trigger
 from flightd.site.site import Site
 
@@ -56,7 +56,7 @@ class Mission:
         plan: FlightPlan,
         policy: HeadingPolicy,
         config: Config,
-        scanner: Scanner | None = None,
+        scanner: AnyScanner = NO_SCAN,
         overhead_m: Sequence[float] = (),
     ) -> None:
         start = site.nodes[plan.start]
@@ -65,8 +65,8 @@ class Mission:
         self._events = EventLog()
         self._orders = StandingOrders()
         self._route = Itinerary(site, plan, policy, self._events)
-        self._scan = ScanPhase(site, scanner, config.mission, policy)
-        self._progress = PhaseProgress(config, self._route, self._scan)
+        self._scan = ShelfScan(site, scanner)
+        self._progress = PhaseProgress(config, self._route, self._scan, scanner)
         self._watch = HazardMonitor(config)
         self._relocator = Relocator(config.mission, site.ceiling_m - CEILING_MARGIN_M, overhead_m)
         self._steering = ReferenceGenerator(
@@ -110,8 +110,7 @@ class Mission:
         return self._route.remaining
 
     def drain_events(self) -> tuple[Event, ...]:
-        told = self._scanner.drain_events() if self._scanner else []
-        return (*self._events.drain(), *told)
+        return (*self._events.drain(), *self._scanner.drain_events())
 
     def command(self, command: Command, now_ns: int) -> None:
         """Take an operator's order; a landing or stop acts at the next step."""
@@ -166,7 +165,7 @@ class Mission:
         """What a landing on the pad is more than its end."""
         if self._charging.swaps:
             return {Trigger.DOWN_TO_SWAP}
-        return {Trigger.NOT_COUNTED} if self._scan.blind else set()
+        return {Trigger.NOT_COUNTED} if self._scanner.blind else set()
 
     def _lost(self, action: LossAction, trigger: Trigger, now_ns: int) -> set[Trigger]:
         """What the configured action makes of something lost."""
@@ -262,7 +261,7 @@ class Mission:
         self.state = outcome.state
         if trigger in _VISITED and not before.returning:
             self._route.note_visit(s.now_ns)
-        self._scan.changed(s, before.phase, self.phase, trigger, self.goal, self._relocator.shift_m)
+        self._scan.follow(s, before.phase, self.phase, trigger, self.goal, self._relocator.shift_m)
         if trigger is Trigger.DWELLED:
             self._go_on(s)
         self._anchor(s, trigger)
@@ -287,7 +286,7 @@ class Mission:
         """Set the reason for the phase that begins."""
         refusal = s.vehicle.refusal if s.vehicle is not None and trigger is Trigger.TIMED_OUT else ""
         if trigger is Trigger.NOT_COUNTED:
-            self._cause = self._scan.blind
+            self._cause = self._scanner.blind
             self._events.tell(s.now_ns, EventLevel.ERROR, "not_counted", self._cause)
         elif cause is Cause.LANDED:
             self._cause = cause.value
@@ -318,7 +317,7 @@ class Mission:
         """To the next stop, which is the way back where the battery does not reach another one."""
         if not self.state.returning:
             self._turn_back(self._charging.look_ahead(s.now_ns))
-        self._route.advance(self._scan.heading_kept(s, self.goal, self._route.next_stop))
+        self._route.advance(s.pose, either_side=self._scan.is_scanned(self.goal))
 
     def _relocate(self, s: MissionInputs) -> None:
         """Begin to look for the position."""
@@ -331,8 +330,7 @@ class Mission:
         """Go on from where the drone turned out to be."""
         if s.pose is None:
             return
-        due = self._scan.take_due(self._route.visited)
-        self._route.recount(s.now_ns, due, returning=self.state.returning)
+        self._route.recount(s.now_ns, self._scanner.take_due(), returning=self.state.returning)
         self._route.rejoin(s.now_ns, s.pose)
 
     def _correct(self, s: MissionInputs) -> None:

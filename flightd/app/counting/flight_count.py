@@ -67,7 +67,7 @@ class FlightCount:
         self._run = config.inventory.run or f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         self._counted: frozenset[str] = frozenset()
         self.error: FlightdError | None = None
-        self.scans = scanner_of(config, site) is not None
+        self.scans = scanner_of(config, site).counts
         if not self.scans or folder is None:
             return
         try:

@@ -11,7 +11,7 @@ from flightd.core.errors import InputError
 from flightd.mission.battery.consumption import BatteryGauge
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
 from flightd.mission.plan.leg_times import Legs, Pace
-from flightd.mission.scan.scanner import Scanner
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
 
@@ -21,7 +21,7 @@ def check_battery(
     plan: FlightPlan,
     policy: HeadingPolicy,
     config: Config,
-    scanner: Scanner | None = None,
+    scanner: AnyScanner = NO_SCAN,
 ) -> None:
     """InputError when a full battery does not reach one of the stops, last for what is done there, and come
     back with its reserve."""
@@ -48,9 +48,7 @@ class Sorties:
 
     With a `scanner` a stop lasts as long as what it has left to count there."""
 
-    def __init__(
-        self, site: Site, legs: Legs, battery: BatteryConfig, scanner: Scanner | None = None
-    ) -> None:
+    def __init__(self, site: Site, legs: Legs, battery: BatteryConfig, scanner: AnyScanner = NO_SCAN) -> None:
         self._site = site
         self._legs = legs
         self._scanner = scanner
@@ -107,7 +105,7 @@ class Sorties:
 
     def _stop_s(self, node: str) -> float:
         pace = self._legs.pace
-        counted_s = self._scanner.stop_s(node, pace) if self._scanner is not None else 0.0
+        counted_s = self._scanner.stop_s(node, pace)
         return counted_s or pace.dwell_s
 
     def _fresh_frac(self, pad: str, node: str) -> float:

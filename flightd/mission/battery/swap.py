@@ -13,7 +13,7 @@ from flightd.mission.plan.flight_plan import HeadingPolicy
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.plan.leg_times import Legs, Pace
 from flightd.mission.safety.hazard_monitor import HazardMonitor
-from flightd.mission.scan.scanner import Scanner
+from flightd.mission.scan.no_scan import AnyScanner
 from flightd.mission.triggers import Trigger
 from flightd.site.site import Site
 
@@ -26,7 +26,7 @@ class BatterySwap:
         site: Site,
         policy: HeadingPolicy,
         config: Config,
-        scanner: Scanner | None,
+        scanner: AnyScanner,
         itinerary: Itinerary,
         watch: HazardMonitor,
     ) -> None:

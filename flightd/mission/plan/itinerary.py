@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
+from flightd.config.mission import Heading
+from flightd.core.geometry import wrap_pi
 from flightd.core.types import EventLevel, GridPose
 from flightd.mission.event_log import EventLog
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop, make_plan
@@ -57,10 +61,16 @@ class Itinerary:
         ahead = (stop.node for stop in self._stops[self._next :] if stop.visit)
         return self._left_over or tuple(ahead)
 
-    def advance(self, stop: Stop) -> None:
-        """Go on to the next stop, flown as `stop` says."""
+    def advance(self, pose: GridPose | None, *, either_side: bool) -> None:
+        """Go on to the next stop; backwards where that saves half a turn and `either_side` of the aisle may
+        be faced: along an aisle with the nose to the shelf, after a scan that ended facing one of them."""
+        before, stop = self.goal, self.next_stop
+        sideways = self._site.nodes[before.node].aisle == self._site.nodes[stop.node].aisle
         self._next += 1
-        self._stops[self._next] = stop
+        if not either_side or not sideways or self._policy.heading is not Heading.SHELF or pose is None:
+            return
+        if abs(wrap_pi(stop.yaw_rad - pose.yaw_rad)) > math.pi * 0.75:
+            self._stops[self._next] = replace(stop, yaw_rad=wrap_pi(stop.yaw_rad + math.pi))
 
     def note_visit(self, now_ns: int) -> None:
         """The goal was visited, if it was a wanted one."""
@@ -105,8 +115,9 @@ class Itinerary:
         self._stops[self._next : self._next + 1] = [first, *way[:-1], goal]
 
     def recount(self, now_ns: int, due: Sequence[str], *, returning: bool) -> None:
-        """Put nodes whose count was withdrawn before what is left, near as they are; they are left for the
-        next battery where the way leads home already."""
+        """Put visited nodes whose count was withdrawn before what is left, near as they are; they are left
+        for the next battery where the way leads home already."""
+        due = [node for node in due if node in self.visited]
         if not due:
             return
         if not returning:

@@ -73,6 +73,11 @@ class Scanner:
     # What the mission asks
 
     @property
+    def counts(self) -> bool:
+        """Whether this flight counts anything."""
+        return True
+
+    @property
     def least_integrity(self) -> float:
         """The integrity from which a place counts as certain."""
         return self._params.least_integrity

@@ -21,7 +21,7 @@ from flightd.core.types import (
 from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.mission import Mission
 from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
-from flightd.mission.scan.scanner import Scanner
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.sim.random_sites import random_site
 from flightd.site.site import Site
 from tests.unit.mission.configured import configured
@@ -35,7 +35,7 @@ class Flight:
     """Feeds a mission with senses: by default all is well and the drone is wherever the mission wants."""
 
     def __init__(
-        self, params: Config | None = None, site: Site = SITE, scanner: Scanner | None = None
+        self, params: Config | None = None, site: Site = SITE, scanner: AnyScanner = NO_SCAN
     ) -> None:
         home = site.home.node
         plan = make_plan(site, site.serpentine_route(), home, home, POLICY)

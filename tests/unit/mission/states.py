@@ -15,6 +15,7 @@ from flightd.config.schema import Config
 from flightd.core.types import CommandKind, GridPose, LandedState, Phase
 from flightd.mission.guidance import ALL_WELL
 from flightd.mission.machine import FLYING, Intent, State
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.scanner import Scanner
 from flightd.mission.triggers import Trigger
 from tests.unit.mission import shelves
@@ -66,7 +67,7 @@ PARAMS = losing()
 
 def flight_of(params: Config, scans: bool = False) -> Flight:
     """A flight over four nodes in a row; one that `scans` never gets a picture of a shelf."""
-    scanner = None
+    scanner: AnyScanner = NO_SCAN
     if scans:
         scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanConfig(max_height_m=4.0, view_s=0.4, retakes=0))
     return Flight(params, shelves.SITE, scanner)
