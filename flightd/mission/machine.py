@@ -113,7 +113,7 @@ class Cause(enum.Enum):
 
     TRIGGER = "what has just happened"
     KEPT = "what it gave before"
-    LANDED = "landed on the pad"
+    LANDED = "it stands where it should"
 
 
 @dataclass(frozen=True, slots=True)

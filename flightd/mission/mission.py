@@ -21,6 +21,7 @@ from flightd.mission.machine import BEGIN, COMMANDS, TABLE, Cause, State, next_s
 from flightd.mission.orders import StandingOrders
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
+from flightd.mission.reasons import Happened, Plain, Reason, Refused, in_words
 from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
 from flightd.mission.safety.hazards import ACTIONS, Action, triggers_of
 from flightd.mission.safety.readiness import not_fresh, not_ready
@@ -74,7 +75,8 @@ class Mission:
         )
         self._charging = BatterySwap(site, policy, config, scanner, self._route, self._watch)
         self.state = BEGIN
-        self.reason = self._cause = ""
+        self._reason: Reason | None = None
+        self._cause: Reason | None = None
         self._leg_along_x: bool | None = None
         self._ground_lost = False
         self._await_start()
@@ -83,6 +85,11 @@ class Mission:
     def phase(self) -> Phase:
         """What it does now."""
         return self.state.phase
+
+    @property
+    def reason(self) -> str:
+        """Why it does that, in words; empty before the first tick."""
+        return "" if self._reason is None else in_words(self._reason)
 
     @property
     def airborne(self) -> bool:
@@ -121,7 +128,7 @@ class Mission:
             return
         self._orders.take(kind)
         if kind is CommandKind.HOME:
-            self._go_home(trigger, "ordered home", now_ns)
+            self._go_home(trigger, Happened(trigger), now_ns)
         elif kind is CommandKind.GOTO:
             self._route.go_to(now_ns, command.node)
         elif kind is CommandKind.START:
@@ -172,7 +179,7 @@ class Mission:
         if self.airborne or (not self.state.over and action is not LossAction.CONTINUE):
             self._events.hazard(now_ns, trigger, action.value)
         if action is LossAction.HOME and Trigger.HOME_IN_NEED in taken_in(self.state):
-            self._go_home(Trigger.HOME_IN_NEED, trigger.value, now_ns)
+            self._go_home(Trigger.HOME_IN_NEED, Happened(trigger), now_ns)
         return {LossAction.HOLD: {Trigger.HOLD}, LossAction.LAND: {trigger}}.get(action, set())
 
     def _tell_hazards(self, triggers: set[Trigger], now_ns: int) -> None:
@@ -209,10 +216,10 @@ class Mission:
             and self._progress.phase_s(s.now_ns) < self._config.mission.expert.adopt_s
         )
 
-    def _grounded(self, s: MissionInputs) -> str:
-        """Why it stays on the ground, or an empty text."""
+    def _grounded(self, s: MissionInputs) -> Reason | None:
+        """Why it stays on the ground, None if nothing keeps it there."""
         silent = self._ground_lost and self._config.ground.lost_action is not LossAction.CONTINUE
-        stale = not_fresh(s, self._config, len(self.remaining)) if self.phase is Phase.SWAP else ""
+        stale = not_fresh(s, self._config, len(self.remaining)) if self.phase is Phase.SWAP else None
         return stale or not_ready(s, self._config, silent)
 
     # Changing the intent of the phase in hand
@@ -222,7 +229,7 @@ class Mission:
         outcome = TABLE[self.state][trigger]
         if outcome is not None:
             self.state = outcome.state
-            self._cause = trigger.value if outcome.cause is Cause.TRIGGER else self._cause
+            self._cause = Happened(trigger) if outcome.cause is Cause.TRIGGER else self._cause
 
     def _refuse(self, command: Command, now_ns: int) -> None:
         """Say why an order has no effect."""
@@ -235,7 +242,7 @@ class Mission:
             text = f"{ordered} refused: not in phase {self.phase.value}"
         self._events.tell(now_ns, EventLevel.WARNING, "command", text)
 
-    def _go_home(self, trigger: Trigger, reason: str, now_ns: int) -> None:
+    def _go_home(self, trigger: Trigger, reason: Reason, now_ns: int) -> None:
         """Fly to the home pad; in need by the shortest way, against one-way lines too."""
         self._route.turn_home(now_ns, reason, in_need=trigger is Trigger.HOME_IN_NEED)
         self._turn_back(trigger)
@@ -285,14 +292,15 @@ class Mission:
     def _explain(self, s: MissionInputs, trigger: Trigger, cause: Cause) -> None:
         """Set the reason for the phase that begins."""
         refusal = s.vehicle.refusal if s.vehicle is not None and trigger is Trigger.TIMED_OUT else ""
-        if trigger is Trigger.NOT_COUNTED:
-            self._cause = self._scanner.blind
-            self._events.tell(s.now_ns, EventLevel.ERROR, "not_counted", self._cause)
+        if trigger is Trigger.NOT_COUNTED and (blind := self._scanner.blind) is not None:
+            self._cause = blind
+            self._events.tell(s.now_ns, EventLevel.ERROR, "not_counted", in_words(blind))
         elif cause is Cause.LANDED:
-            self._cause = cause.value
+            self._cause = Plain.LANDED
         elif cause is Cause.TRIGGER:
-            self._cause = f"{trigger.value}: {refusal}" if refusal else trigger.value
-        self.reason = self._cause
+            happened = Happened(trigger)
+            self._cause = Refused(happened, refusal) if refusal else happened
+        self._reason = self._cause
 
     def _enter(self, s: MissionInputs, trigger: Trigger) -> None:
         """What the phase that begins starts with."""
@@ -351,13 +359,15 @@ class Mission:
 
     def _guide(self, s: MissionInputs) -> Guidance:
         if self.state.waiting:
-            self.reason = self._grounded(s) or "waiting for the start command"
+            self._reason = self._grounded(s) or Plain.AWAITS_START
         if not self.airborne:
             return self._steering.on_ground(self.phase, _DEMANDS.get(self.phase, Demand.FLY))
         guidance = self._steering.step(s, self._task(s.now_ns))
         if self.phase is Phase.LAND:
-            refused = guidance.demand is Demand.DISARM and s.vehicle is not None and s.vehicle.refusal
-            self.reason = f"{self._cause}: {s.vehicle.refusal}" if refused and s.vehicle else self._cause
+            refusal = s.vehicle.refusal if s.vehicle is not None else ""
+            self._reason = self._cause
+            if refusal and self._cause is not None and guidance.demand is Demand.DISARM:
+                self._reason = Refused(self._cause, refusal)
         return guidance
 
     def _leads_along_x(self) -> bool:

@@ -59,7 +59,7 @@ class Trigger(enum.Enum):
     RECORDER_DEAD = "the log's writer was started again"
     START = "start ordered"
     GOTO = "another node ordered"
-    GO_HOME = "home ordered"
+    GO_HOME = "ordered home"
     PAUSE = "wait ordered"
     RESUME = "going on ordered"
     HOME_IN_NEED = "home because of what was lost"

@@ -12,6 +12,7 @@ from flightd.mission.machine import State
 from flightd.mission.plan.flight_plan import HeadingPolicy
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.plan.leg_times import Legs, Pace
+from flightd.mission.reasons import ChargeLow, Reason
 from flightd.mission.safety.hazard_monitor import HazardMonitor
 from flightd.mission.scan.no_scan import AnyScanner
 from flightd.mission.triggers import Trigger
@@ -56,10 +57,10 @@ class BatterySwap:
         if not state.airborne or state.returning or state.phase is Phase.LAND:
             return None
         if self._watch.battery_low(s):
-            return self._go_charge(s.now_ns, f"battery low: {charge:.0%}", in_need=True)
+            return self._go_charge(s.now_ns, ChargeLow(charge), in_need=True)
         goal = self._route.goal
         left_m = s.distance_m((goal.x_m, goal.y_m)) if state.phase is Phase.FOLLOW else 0.0
-        if math.isfinite(left_m) and (reason := self._sorties.why_return(goal.node, left_m)):
+        if math.isfinite(left_m) and (reason := self._sorties.must_return(goal.node, left_m)):
             return self._go_charge(s.now_ns, reason, in_need=False)
         return None
 
@@ -67,8 +68,8 @@ class BatterySwap:
         """Turn back here rather than half-way to a stop that the battery does not reach.  How it turned
         back, None if it did not."""
         route = self._route
-        why = self._sorties.why_not_on(route.goal.node, route.ahead[0]) if route.ahead else ""
-        if not why:
+        why = self._sorties.must_not_go_on(route.goal.node, route.ahead[0]) if route.ahead else None
+        if why is None:
             return None
         route.leave(route.ahead)
         return self._go_charge(now_ns, why, in_need=False)
@@ -79,7 +80,7 @@ class BatterySwap:
         self._short = False
         self._route.resume_from_pad(now_ns)
 
-    def _go_charge(self, now_ns: int, reason: str, *, in_need: bool) -> Trigger:
+    def _go_charge(self, now_ns: int, reason: Reason, *, in_need: bool) -> Trigger:
         """Fly to the charge pad that is reached soonest; with batteries swapped the rest is flown later."""
         pad = self._sorties.way_back(self._route.goal.node).pad
         self._route.turn_home(now_ns, reason, in_need=in_need, pad=pad)

@@ -11,6 +11,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.core.types import EventLevel, GridPose
 from flightd.mission.event_log import EventLog
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop, make_plan
+from flightd.mission.reasons import Reason, in_words
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
 
@@ -82,10 +83,10 @@ class Itinerary:
         """Visit these later, on another battery."""
         self._left_over = tuple(nodes)
 
-    def turn_home(self, now_ns: int, reason: str, *, in_need: bool, pad: str | None = None) -> None:
+    def turn_home(self, now_ns: int, reason: Reason, *, in_need: bool, pad: str | None = None) -> None:
         """Fly to the home pad or another; `in_need` by the shortest way, against one-way lines too."""
         self._left_over = self.remaining
-        self._events.tell(now_ns, EventLevel.WARNING, "home", reason)
+        self._events.tell(now_ns, EventLevel.WARNING, "home", in_words(reason))
         self._replan([], in_need=in_need, home=pad)
 
     def go_to(self, now_ns: int, node: str) -> None:

@@ -20,7 +20,7 @@ class NoScan:
     look_s = 0.0
     view = None
     exposure = 1.0
-    blind = ""
+    blind = None
     doubted = False
     looking = False
 
