@@ -29,7 +29,7 @@ from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.mission import Mission
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
 from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
-from flightd.mission.scan.scanner import Scanner
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.site.site import Site
 from flightd.tracking.attitude_extrapolation import AttitudeExtrapolation
 from flightd.tracking.frame_monitor import FrameMonitor
@@ -52,7 +52,7 @@ class Pilot:
         plan: FlightPlan,
         policy: HeadingPolicy,
         config: Config,
-        scanner: Scanner | None = None,
+        scanner: AnyScanner = NO_SCAN,
         overhead_m: Sequence[float] = (),
         *,
         autostart: bool | None = None,
@@ -87,12 +87,12 @@ class Pilot:
     @property
     def exposure(self) -> float:
         """What the front camera's pictures are wanted with, as a part of its usual exposure."""
-        return self._scanner.exposure if self._scanner is not None else 1.0
+        return self._scanner.exposure
 
     def places(self, stamp_ns: int) -> tuple[Place, ...]:
         """Which locations the front camera's picture exposed at `stamp_ns` is wanted for, and where it
         shows them; none while nothing is scanned.  Changes nothing."""
-        if self._scanner is None or not self._scanner.looking:
+        if not self._scanner.looking:
             return ()
         pose = self._past.at(stamp_ns)
         return self._scanner.places(pose) if pose is not None else ()
@@ -122,7 +122,7 @@ class Pilot:
         setpoint = self._asked = self._setpoint(senses, guidance, push_mps2)
         self._caution.steered(guidance, pose)
         mission = self._mission
-        findings, settled = self._scanner.drain() if self._scanner is not None else ((), ())
+        findings, settled = self._scanner.drain()
         return TickOutput(
             setpoint=setpoint,
             demand=guidance.demand,
@@ -141,8 +141,6 @@ class Pilot:
     def _scan(self, tick: TickInput) -> None:
         """Give each picture's codes to the scan, with the pose at its exposure, and the location labels
         among them to the localiser."""
-        if self._scanner is None:
-            return
         if tick.counted:
             self._scanner.skip(tick.counted)
         for codes in tick.codes:
@@ -166,7 +164,7 @@ class Pilot:
         )
         view = camera.floor_reach(control.max_tilt_rad)
         self._localiser = GridLocaliser(self._site, node, view, self._config.localisation)
-        self._past = PoseHistory(self._scanner.least_integrity if self._scanner else 0.0)
+        self._past = PoseHistory(self._scanner.least_integrity)
         self._pads = PadFinder(self._site)
 
     def _take(self, tick: TickInput) -> None:

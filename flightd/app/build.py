@@ -37,6 +37,7 @@ from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_pla
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.plan.route_optimiser import ordered_best
 from flightd.mission.scan.code_assignment import FrontSight
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.scanner import Scanner
 from flightd.mission.scan.views import view_height_m
 from flightd.pilot import Pilot
@@ -156,10 +157,10 @@ def counts_shelves(config: Config, site: Site) -> bool:
     return config.front_camera.is_fitted and bool(site.locations)
 
 
-def scanner_of(config: Config, site: Site) -> Scanner | None:
-    """What counts the shelves; None where nothing is counted."""
+def scanner_of(config: Config, site: Site) -> AnyScanner:
+    """What counts the shelves; `NO_SCAN` where nothing is counted."""
     if not counts_shelves(config, site):
-        return None
+        return NO_SCAN
     front, highest_m = config.front_camera, site.ceiling_m - CEILING_MARGIN_M
     if config.scan.min_height_m > highest_m:
         raise InputError(

@@ -32,7 +32,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
-from flightd.mission.scan.scanner import Scanner
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.pilot import Pilot
 from flightd.sim.autopilot.climb_loop import ClimbLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
@@ -109,7 +109,7 @@ class IdealFlight:
         delay_ns: int = 68_000_000,
         airframe: AirframeParams | None = None,
         swap_s: float = 0.0,
-        scanner: Scanner | None = None,
+        scanner: AnyScanner = NO_SCAN,
         front: IdealFront | None = None,
         world: Site | None = None,
         carried_to: str = "",

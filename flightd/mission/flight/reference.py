@@ -13,6 +13,7 @@ from flightd.core.types import Demand, LandedState, Phase
 from flightd.mission.flight.relocation import Relocator
 from flightd.mission.flight.touchdown import Touchdown
 from flightd.mission.guidance import Guidance, Guide, MissionInputs
+from flightd.mission.machine import State
 from flightd.mission.plan.flight_plan import Stop
 from flightd.mission.safety.hazard_monitor import HazardMonitor
 from flightd.mission.scan.views import View
@@ -28,20 +29,18 @@ _HURRY = 4.0 / 3.0
 
 @dataclass(frozen=True, slots=True)
 class ReferenceTask:
-    """What the mission is at: its phase, flown for `phase_s`, the stop it is for and the view from there.
+    """What the mission is at: its state, whose phase is flown for `phase_s`, the stop it is for and the view
+    from there; `cruise` flies at the height of the plan rather than at that of the last view."""
 
-    `on_pad` lands on that stop's pad, `cruise` flies at the height of the plan rather than at that of the
-    last view; `stopped` neither steers nor brakes, `unknown` (where it is, and so where it may go) nor
-    does it disarm by itself."""
-
-    phase: Phase
+    state: State
     phase_s: float
     goal: Stop
     view: View | None
     cruise: bool
-    on_pad: bool
-    stopped: bool
-    unknown: bool
+
+    @property
+    def phase(self) -> Phase:
+        return self.state.phase
 
 
 class ReferenceGenerator:
@@ -93,7 +92,7 @@ class ReferenceGenerator:
     def step(self, s: MissionInputs, task: ReferenceTask) -> Guidance:
         """Move the reference on by one tick."""
         demand = Demand.KEEP if task.phase is Phase.RECOVER else Demand.FLY
-        self._steers = not (task.stopped or task.unknown) and self._steer(s, task)
+        self._steers = not (task.state.stopped or task.state.adopted) and self._steer(s, task)
         if task.phase is Phase.LAND:
             climb, demand = self._descend(s, task)
         elif task.phase is Phase.RECOVER:
@@ -113,7 +112,7 @@ class ReferenceGenerator:
             climb = self._climb_mps(s, task)
         guide = Guide.STEER if self._steers else Guide.BRAKE if self._may_brake(s, task) else Guide.LEVEL
         reckoned = min(s.x_age_s, s.y_age_s) < self._hazards.expert.brake_s
-        return Guidance(task.phase, guide, self._reference(climb), demand, reckoned, task.stopped)
+        return Guidance(task.phase, guide, self._reference(climb), demand, reckoned, task.state.stopped)
 
     def _climb_mps(self, s: MissionInputs, task: ReferenceTask) -> float:
         """Climb rate towards the wanted height.  A take-off that drifts where no line tells how hurries: the
@@ -133,8 +132,8 @@ class ReferenceGenerator:
         p = self._params
         heard = s.telemetry_age_s <= p.telemetry_hold_s
         seen = min(s.x_age_s, s.y_age_s) <= p.lines_hold_s
-        known = (heard or seen) and s.pose is not None and not task.unknown
-        return known and not task.stopped and task.phase is not Phase.TAKE_OFF
+        known = (heard or seen) and s.pose is not None and not task.state.adopted
+        return known and not task.state.stopped and task.phase is not Phase.TAKE_OFF
 
     def _wanted_height_m(self, task: ReferenceTask) -> float:
         """Flying height; a little more in search of lines that stay lost."""
@@ -151,7 +150,7 @@ class ReferenceGenerator:
         the vehicle says that it stands; then disarm."""
         p, v = self._params, s.vehicle
         moving = self._steers and s.speed_mps > _REST_MPS
-        if moving and not task.on_pad and task.phase_s < _SETTLE_S:
+        if moving and not task.state.on_pad and task.phase_s < _SETTLE_S:
             self._height.reset(self._height.position)
             return 0.0, Demand.FLY
         rate = self._touchdown.rate_mps(s, _target(s, task))
@@ -160,7 +159,7 @@ class ReferenceGenerator:
         self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
         deaf = s.telemetry_age_s > p.telemetry_land_s
         standing = v is not None and v.landed is LandedState.ON_GROUND and not deaf
-        by_itself = deaf or task.unknown
+        by_itself = deaf or task.state.adopted
         return -rate, Demand.DISARM if standing else Demand.LAND if by_itself else Demand.FLY
 
     def _steer(self, s: MissionInputs, task: ReferenceTask) -> bool:
@@ -178,7 +177,7 @@ class ReferenceGenerator:
             self._yaw.reset(pose.yaw_rad)
         if phase is Phase.RELOCATE:
             self.anchor = self._relocator.next_look(s, self.anchor)
-        to_goal = phase in _TO_GOAL or task.on_pad
+        to_goal = phase in _TO_GOAL or task.state.on_pad
         at = _target(s, task) or ((task.goal.x_m, task.goal.y_m) if to_goal else self.anchor)
         x, y, yaw = (*at, task.goal.yaw_rad)
         if task.view is not None:
@@ -221,4 +220,4 @@ class ReferenceGenerator:
 
 def _target(s: MissionInputs, task: ReferenceTask) -> tuple[float, float] | None:
     """The pad to come down on; None while it lands on none."""
-    return (s.pad_m or (task.goal.x_m, task.goal.y_m)) if task.on_pad else None
+    return (s.pad_m or (task.goal.x_m, task.goal.y_m)) if task.state.on_pad else None

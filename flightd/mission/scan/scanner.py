@@ -17,6 +17,7 @@ from flightd.config.scan import ScanConfig
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
 from flightd.core.types import Event, EventLevel
 from flightd.mission.plan.leg_times import Pace
+from flightd.mission.reasons import NothingRead
 from flightd.mission.scan.code_assignment import Assigner, FrontSight, Sighting
 from flightd.mission.scan.node_scan import ScanTask
 from flightd.mission.scan.views import View, ViewPlanner, views_s
@@ -73,9 +74,19 @@ class Scanner:
     # What the mission asks
 
     @property
+    def counts(self) -> bool:
+        """Whether this flight counts anything."""
+        return True
+
+    @property
     def least_integrity(self) -> float:
         """The integrity from which a place counts as certain."""
         return self._params.least_integrity
+
+    @property
+    def look_s(self) -> float:
+        """The most that one view is looked from."""
+        return self._params.view_s
 
     @property
     def view(self) -> View | None:
@@ -88,11 +99,11 @@ class Scanner:
         return self.view.exposure if self.view is not None else 1.0
 
     @property
-    def blind(self) -> str:
-        """Why the count is none, or an empty text: no picture was read at the last nodes, nor is it yet."""
+    def blind(self) -> NothingRead | None:
+        """Why the count is none, if it is: no picture was read at the last nodes, nor is it yet."""
         if not self._begun or self._begun_blind < min(_BLIND_NODES, self._begun):
-            return ""
-        return f"no picture of a shelf was read at the last {self._begun_blind} of {self._begun} scans"
+            return None
+        return NothingRead(self._begun_blind, self._begun)
 
     def wants(self, node: str) -> bool:
         """Whether locations of a node are left to count."""

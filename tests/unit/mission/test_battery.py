@@ -18,6 +18,7 @@ from flightd.mission.battery.consumption import BatteryGauge
 from flightd.mission.battery.sorties import Sorties, check_battery
 from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
 from flightd.mission.plan.leg_times import Legs, Pace
+from flightd.mission.reasons import in_words
 from flightd.mission.scan.scanner import Scanner
 from flightd.site.site_file import load_site
 from tests.unit.mission import shelves
@@ -63,10 +64,12 @@ def test_it_turns_back_just_when_the_way_home_needs_what_is_left() -> None:
     for charge, turns in ((needed + 0.005, False), (needed - 0.005, True), (math.nan, False)):
         watch = sorties()
         watch.step(0, charge, True)
-        assert bool(watch.why_return("J10", 0.0)) is turns
+        assert (watch.must_return("J10", 0.0) is not None) is turns
     watch = sorties()
     watch.step(0, needed + 0.005, True)
-    assert "the way back to A1" in watch.why_return("J10", 8.0), "the rest of the leg counts"
+    short = watch.must_return("J10", 8.0)
+    assert short is not None, "the rest of the leg counts"
+    assert "the way back to A1" in in_words(short)
 
 
 def test_the_nearest_charge_pad_is_chosen() -> None:
@@ -96,9 +99,9 @@ def test_what_is_left_to_count_at_a_stop_counts_as_flying_time() -> None:
     needed = 0.1 + (legs.way_s("A2", "A3") + scan_s + counting.way_back("A3").seconds) / 600.0
     for charge, short in ((needed + 0.002, False), (needed - 0.002, True)):
         counting.step(0, charge, False)
-        assert bool(counting.why_not_on("A2", "A3")) is short
+        assert (counting.must_not_go_on("A2", "A3") is not None) is short
     scanner.skip(shelves.SITE.locations)
-    assert not counting.why_not_on("A2", "A3"), "nothing left: a plain stop"
+    assert counting.must_not_go_on("A2", "A3") is None, "nothing left: a plain stop"
 
 
 def test_a_count_that_no_battery_lasts_for_is_refused_before_the_flight() -> None:

@@ -3,116 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
-from flightd.config.mission import Heading
+from flightd.config.battery import BatteryConfig
 from flightd.config.scan import ScanConfig
-from flightd.config.schema import Config
 from flightd.core.types import (
-    Attitude,
-    Command,
     CommandKind,
     Demand,
-    GridPose,
     LandedState,
     Phase,
-    VehicleState,
 )
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.guidance import Guidance, Guide, MissionInputs
-from flightd.mission.mission import Mission
-from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
+from flightd.mission.guidance import Guide
+from flightd.mission.machine import Intent, State
 from flightd.mission.scan.scanner import Scanner
-from flightd.sim.random_sites import random_site
-from flightd.site.site import Site
 from tests.unit.mission import shelves
 from tests.unit.mission.configured import configured
-
-SITE = random_site(3)
-POLICY = HeadingPolicy(Heading.ALONG)
-TICK_NS = 20_000_000
-
-
-class Flight:
-    """Feeds a mission with senses: by default all is well and the drone is wherever the mission wants."""
-
-    def __init__(
-        self, params: Config | None = None, site: Site = SITE, scanner: Scanner | None = None
-    ) -> None:
-        home = site.home.node
-        plan = make_plan(site, site.serpentine_route(), home, home, POLICY)
-        self.mission = Mission(site, plan, POLICY, params or configured(dwell_s=1.0), scanner)
-        self.site = site
-        self.integrity = 1.0
-        self.now_ns = 10**12
-        self.guidance: Guidance | None = None
-        state = VehicleState(
-            Attitude(0, 0, 0, 0),
-            0.1,
-            0,
-            0.0,
-            "GUIDED_NOGPS",
-            True,
-            False,
-            LandedState.ON_GROUND,
-            0.9,
-            12.0,
-            0,
-        )
-        self.senses = MissionInputs(0, 0.02, None, True, 0.1, True, 0.0, 0.0, 0.0, state)
-
-    @property
-    def phase(self) -> Phase:
-        return self.mission.phase
-
-    def set(self, **changes: object) -> None:
-        vehicle = {k: v for k, v in changes.items() if k in VehicleState.__slots__ and k != "height_m"}
-        other = {k: v for k, v in changes.items() if k not in vehicle}
-        assert self.senses.vehicle is not None
-        state = replace(self.senses.vehicle, **vehicle)  # type: ignore[arg-type]
-        self.senses = replace(self.senses, vehicle=state, **other)  # type: ignore[arg-type]
-
-    def run(self, seconds: float, until: Callable[[], bool] = lambda: False, follow: bool = True) -> None:
-        for _ in range(round(seconds / 0.02)):
-            self.now_ns += TICK_NS
-            g = self.guidance
-            if follow and g is not None and g.guide is not Guide.NONE:
-                height = 0.1 + (0.0 if math.isnan(g.reference.height_m) else g.reference.height_m)
-                if not math.isnan(self.senses.height_m):
-                    self.senses = replace(self.senses, height_m=height)
-                r = g.reference
-                node = self.site.nearest(r.x_m, r.y_m)
-                pose = GridPose(
-                    self.now_ns,
-                    node.id,
-                    0,
-                    0,
-                    r.yaw_rad,
-                    r.x_m,
-                    r.y_m,
-                    r.vx_mps,
-                    r.vy_mps,
-                    height,
-                    (0.0,) * 9,
-                    self.integrity,
-                )
-                self.senses = replace(self.senses, pose=pose)
-            if g is not None and g.demand is Demand.FLY:
-                self.set(armed=True)
-            self.set(heartbeat_ns=self.now_ns - round(self.senses.telemetry_age_s * 1e9))
-            self.guidance = self.mission.step(replace(self.senses, now_ns=self.now_ns))
-            if until():
-                return
-
-    def to(self, phase: Phase, within_s: float = 60.0) -> None:
-        self.run(within_s, lambda: self.phase is phase)
-        assert self.phase is phase, self.mission.reason
-
-    def order(self, kind: CommandKind, node: str = "") -> None:
-        self.mission.command(Command("1", kind, node), self.now_ns)
+from tests.unit.mission.driven import SITE, TICK_NS, Flight
 
 
 def test_a_flight_where_all_is_well_visits_everything() -> None:
@@ -126,6 +35,53 @@ def test_a_flight_where_all_is_well_visits_everything() -> None:
     flight.run(0.1)
     assert flight.phase is Phase.DONE
     assert flight.mission.visited == list(SITE.serpentine_route())
+
+
+def test_a_correction_over_the_pad_is_the_reason_for_the_end_that_it_makes() -> None:
+    flight = Flight()
+    flight.to(Phase.LAND, 600)
+    pose = flight.senses.pose
+    assert pose is not None
+    flight.set(pose=replace(pose, x_m=pose.x_m + 2.0))
+    flight.run(0.1, follow=False)
+    assert flight.phase is Phase.LAND
+    assert flight.mission.reason == "the position was corrected while landing"
+    flight.set(landed=LandedState.ON_GROUND, armed=False)
+    flight.run(0.1, follow=False)
+    assert flight.mission.state == State(Phase.ABORTED, Intent.END)
+    assert flight.mission.reason == "the position was corrected while landing"
+
+
+@pytest.mark.parametrize("orders", [("stop", "land"), ("land", "stop")])
+def test_a_stop_stands_whatever_else_is_ordered_at_the_same_tick(orders: tuple[str, str]) -> None:
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    for order in orders:
+        flight.order(CommandKind(order))
+    flight.run(0.02)
+    assert flight.mission.state == State(Phase.LAND, Intent.STOP)
+    assert flight.guidance is not None
+    assert flight.guidance.at_once
+
+
+def test_a_stop_as_it_comes_to_stand_on_the_pad_ends_the_mission() -> None:
+    flight = Flight()
+    flight.to(Phase.LAND, 600)
+    flight.order(CommandKind.STOP)
+    flight.set(landed=LandedState.ON_GROUND, armed=False)
+    flight.run(0.1, follow=False)
+    assert (flight.phase, flight.mission.reason) == (Phase.ABORTED, "stop ordered")
+
+
+def test_a_pause_lasts_no_longer_than_a_full_battery() -> None:
+    """Whatever the vehicle says of its charge."""
+    flight = Flight(configured(BatteryConfig(flight_s=200.0), dwell_s=1.0))
+    flight.to(Phase.FOLLOW)
+    flight.order(CommandKind.PAUSE)
+    flight.run(199.0)
+    assert flight.phase is Phase.HOLD
+    flight.run(2.0)
+    assert (flight.phase, flight.mission.reason) == (Phase.LAND, "the phase took too long")
 
 
 def test_on_the_ground_only_a_hazard_that_decides_something_is_told() -> None:

@@ -9,7 +9,7 @@ import pytest
 from flightd.core.types import Command, CommandKind, Demand, LandedState, Phase
 from flightd.mission.guidance import Guide
 from tests.unit.mission.configured import configured
-from tests.unit.mission.test_mission import Flight
+from tests.unit.mission.driven import Flight
 
 PARAMS = configured(dwell_s=1.0, recover_s=3.0, autostart=True)
 
