@@ -6,6 +6,7 @@ Exit 0 on success, 1 for a failed run, 2 for bad input, configuration or a resou
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Final, NoReturn, cast
 
@@ -20,8 +21,15 @@ _CommandLineError: Final[type[Exception]] = next(
 """What typer raises for arguments that it refuses; it has no public name of its own in every version."""
 
 
+_QUIET: Final = {"OPENCV_LOG_LEVEL": "SILENT", "OPENCV_FFMPEG_LOGLEVEL": "-8"}
+"""OpenCV reads these when it is loaded, here and in child processes: what it cannot open is told by our own
+line.  Whoever looks for a fault of its own sets them otherwise."""
+
+
 def run_app(app: typer.Typer, name: str) -> NoReturn:
     """Run the command line `name`, by whatever way it was started, and leave the process."""
+    for variable, level in _QUIET.items():
+        os.environ.setdefault(variable, level)
     try:
         code = app(prog_name=name, standalone_mode=False)
     except _CommandLineError as err:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
@@ -133,6 +134,7 @@ _worker_frames: dict[tuple[int, int], list[Image]] = {}
 
 
 def _start_worker(sizes: Sequence[tuple[int, int]]) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's, which ends its workers
     cv2.setNumThreads(1)
     for size in sizes:
         _worker_frames[size] = frames_of(size)
