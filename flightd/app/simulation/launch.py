@@ -41,6 +41,7 @@ from flightd.mission.plan.flight_plan import FlightPlan
 from flightd.runtime.clock import Hold, LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
 from flightd.runtime.event_loops import ScaledLoop, VirtualLoop
+from flightd.runtime.undisturbed_start import undisturbed
 from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
 from flightd.sim.scenario.scenario import Scenario
 from flightd.sim.world import FrontSpec, World, WorldSpec
@@ -219,7 +220,8 @@ def _started_world(
     spec = _spec(simulation, ports)
     arguments = (spec, factor, simulation.truth_log, theirs)
     process = context.Process(target=run_world, args=arguments, name="world")
-    process.start()
+    with undisturbed():
+        process.start()
     theirs.close()
     stack.callback(process.join, 15.0)
     stack.callback(ours.close)

@@ -154,3 +154,10 @@ def test_ctrl_c_is_one_line_and_exit_130(run: Run, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr("flightd.replay.log_summary.summary_of", interrupted)
     assert run("flightd log info", "empty.mcap") == (130, "", "flightd: interrupted\n")
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in COMMANDS if path not in {"flightd run", "flightctl watch"}]
+)
+def test_what_answers_once_can_answer_in_json(path: str) -> None:
+    assert "--json" in {option for parameter in COMMANDS[path].params for option in parameter.opts}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pty
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -87,3 +88,20 @@ def test_a_replay_shows_how_far_it_is() -> None:
     assert "deciding" in shown
     assert len(set(re.findall(r"\d+%", shown))) > 2
     assert "seeing" in shown
+
+
+@pytest.mark.parametrize("wait_s", [1.0, 3.0])
+def test_ctrl_c_at_the_terminal_is_one_line_whatever_was_just_begun(tmp_path: Path, wait_s: float) -> None:
+    # the children are interrupted with it, as a terminal does
+    with subprocess.Popen(
+        [sys.executable, "-m", "flightd", "bench", "--seconds", "0.02"],
+        cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    ) as program:  # fmt: skip
+        try:
+            program.wait(wait_s)
+        except subprocess.TimeoutExpired:
+            os.killpg(program.pid, signal.SIGINT)
+        assert program.stderr is not None
+        said = program.stderr.read()
+        code = program.wait(60.0)
+    assert (code, said) in {(130, "flightd: interrupted\n"), (0, "")}

@@ -57,7 +57,7 @@ def test_an_installed_flightd_finds_them_from_any_folder(installed: Path, tmp_pa
     code = (
         "from flightd.config.paths import shipped\n"
         "from flightd.config.schema import load_config\n"
-        "from flightd.config.site_file import load_site\n"
+        "from flightd.site.site_file import load_site\n"
         "from flightd.sim.scenario.scenario_files import shipped_scenarios\n"
         "print(shipped('sim.toml'), load_site(load_config(shipped('sim.toml')).mission.site).name)\n"
         "print(len(shipped_scenarios()))\n"

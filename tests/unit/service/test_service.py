@@ -102,7 +102,7 @@ def test_the_install_script_refuses_what_it_does_not_know(words: list[str]) -> N
 
 @pytest.mark.parametrize("extras", ["nosuch", "ardrone,nosuch", "dev", "*"])
 def test_the_install_script_refuses_an_extra_that_is_not_there(extras: str, tmp_path: Path) -> None:
-    command = [SYSTEMD / "install.sh", "--extras", extras, "--root", tmp_path]
+    command = [str(SYSTEMD / "install.sh"), "--extras", extras, "--root", str(tmp_path)]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (result.returncode, result.stdout) == (2, "")
     (line,) = result.stderr.splitlines()
