@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import platform
-import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
@@ -26,6 +25,7 @@ from rich.table import Table
 from flightd import __version__
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Image
+from flightd.runtime.undisturbed_start import undisturbed
 from flightd.sim.dataset.generate import generate
 from flightd.studies.baselines import BASELINES
 from flightd.studies.progress_bar import track
@@ -134,7 +134,6 @@ _worker_frames: dict[tuple[int, int], list[Image]] = {}
 
 
 def _start_worker(sizes: Sequence[tuple[int, int]]) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's, which ends its workers
     cv2.setNumThreads(1)
     for size in sizes:
         _worker_frames[size] = frames_of(size)
@@ -156,7 +155,9 @@ def _all_cores(timings: Sequence[Timing], seconds: float) -> None:
     cores = os.cpu_count() or 1
     sizes = sorted({timing.size for timing in timings})
     with ProcessPoolExecutor(cores, get_context("spawn"), _start_worker, (sizes,)) as pool:
-        list(pool.map(_warm, range(4 * cores)))
+        with undisturbed():
+            started = pool.map(_warm, range(4 * cores))
+        list(started)
         for timing in track(timings, f"all {cores} cores"):
             if not timing.missing:
                 jobs = [pool.submit(_rate, timing.method, timing.size, seconds) for _ in range(cores)]
