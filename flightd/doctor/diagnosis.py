@@ -25,8 +25,9 @@ from flightd.vision.lines.detector import Detector
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What is examined, composed as for a flight: `path` is the configuration's file, `nodes` are planned, `ground` is the link that
-    would listen (None: none is configured).  Whoever composes it has found configuration and site sound."""
+    """What is examined, composed as for a flight: `path` is the configuration's file, `nodes` so many are
+    planned, `ground` the link that would listen (None: none is configured).  Whoever composes it has found
+    configuration and site sound."""
 
     config: Config
     site: Site

@@ -10,6 +10,7 @@ from typing import Any, Final, TypeAlias
 from flightd.app.simulation.launch import Simulation, fly
 from flightd.app.simulation.summary import kinematics_of
 from flightd.core.errors import RunError
+from flightd.core.snapshot import Snapshot
 from flightd.core.topics import Topic
 from flightd.core.types import Event, Status
 from flightd.mission.safety.hazards import HAZARDS
@@ -22,7 +23,7 @@ SHORT_ROUTE: Final = 'mission.nodes=["A2", "A4"]'
 """On the demo site, past the place where the shipped faults begin."""
 
 Prepare: TypeAlias = Callable[[Scenario, str], Simulation]
-Observe: TypeAlias = Callable[[str, Simulation], AbstractContextManager[Callable[[Status], None]]]
+Observe: TypeAlias = Callable[[str, Simulation], AbstractContextManager[Callable[[Snapshot], None]]]
 """Gives, for the hazard that is flown now, what looks on."""
 
 
