@@ -70,7 +70,8 @@ def sim(
 
     Interrupted (Ctrl-C), it leaves those of what was flown so far."""
     from flightd.app.simulation.prepare import SimOptions, prepare
-    from flightd.cli.scenario_sweep import SHORT_ROUTE, sweep
+    from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
+    from flightd.cli.scenario_sweep import sweep
     from flightd.sim.scenario.scenario import Scenario
     from flightd.sim.scenario.scenario_files import load_scenarios
 
@@ -93,8 +94,8 @@ def _fly(simulation: Simulation, *, as_json: bool) -> None:
     from flightd.app.simulation.launch import FlightInterruptedError, fly
     from flightd.app.simulation.summary import write_results
     from flightd.cli.flight_progress import FlightProgress
-    from flightd.cli.inventory_count import counted_beside
     from flightd.replay.report.page import write_report
+    from flightd.studies.counted_stock import counted_beside
 
     started = time.monotonic()
     interrupted: FlightInterruptedError | None = None

@@ -17,6 +17,7 @@ from multiprocessing.context import ForkServerContext
 from typing import Any
 
 from flightd.core.errors import TransientError
+from flightd.runtime.undisturbed_start import undisturbed
 
 _PRELOAD = [
     "flightd.app.detection.detector_pool",
@@ -66,8 +67,12 @@ class Child:
         self._process = context.Process(target=_live, args=(self._theirs, make), daemon=True)
         self.alive = True
         # in a thread: where the server that forks children has died too, a new one takes seconds
-        self._starting = self._loop.run_in_executor(None, self._process.start)
+        self._starting = self._loop.run_in_executor(None, self._start)
         self._starting.add_done_callback(self._started)
+
+    def _start(self) -> None:
+        with undisturbed():
+            self._process.start()
 
     @property
     def pid(self) -> int | None:

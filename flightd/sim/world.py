@@ -13,6 +13,7 @@ from functools import partial
 from typing import Literal, Protocol
 
 from flightd.core.errors import FlightdError, RunError, UnavailableError
+from flightd.core.extras import missing_extra
 from flightd.core.topics import Topic
 from flightd.core.types import Image
 from flightd.ports import Clock, Recorder
@@ -230,9 +231,7 @@ def _ardrone(
         from flightd.sim.ardrone.server import ArDroneServer, DronePorts  # noqa: PLC0415
         from flightd.sim.ardrone.video import VideoChannel  # noqa: PLC0415
     except ModuleNotFoundError as err:
-        raise UnavailableError(
-            f"simulating an AR.Drone needs {err.name}: pip install 'flightd[ardrone]'"
-        ) from err
+        raise missing_extra("ardrone", "simulating an AR.Drone") from err
     drone = Drone(airframe, Sensors(seed=spec.seed))
     ports = DronePorts("127.0.0.1", *spec.vehicle_ports)
     server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)

@@ -24,7 +24,7 @@ from typing import Any
 
 from flightd.app.simulation.launch import fly
 from flightd.app.simulation.simulation import Simulation
-from flightd.cli.map import new
+from flightd.cli.map.new import new
 from flightd.config.paths import shipped
 from flightd.config.schema import Config, load_config
 from flightd.core.errors import InputError, RunError

@@ -23,6 +23,7 @@ from flightd.adapters.recorder.writer_protocol import HEADER, PICTURE_SEQ, Defin
 from flightd.core.errors import UnavailableError
 from flightd.core.topics import RETAINED, Topic
 from flightd.core.types import Event, EventLevel
+from flightd.runtime.undisturbed_start import undisturbed
 
 QUEUE_BYTES = 8 << 20
 """What may wait for the writing process; pictures may fill half of it, so that they are lost first."""
@@ -282,7 +283,7 @@ class McapRecorder:
         self._link.setblocking(False)
         package_root = str(Path(flightd.__file__).parents[1])
         search_path = os.pathsep.join(filter(None, (package_root, os.environ.get("PYTHONPATH"))))
-        with theirs:
+        with theirs, undisturbed():
             self._child = subprocess.Popen(  # noqa: S603
                 [
                     sys.executable,

@@ -14,6 +14,7 @@ from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
 from flightd.config.control import ControlConfig
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import InputError
+from flightd.core.extras import missing_extra
 from flightd.ports import Clock, Vehicle
 from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 
@@ -52,8 +53,7 @@ def _mavsdk_vehicle(url: str, config: VehicleConfig, clock: Clock, opener: OpenD
     try:
         from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle  # noqa: PLC0415
     except ImportError as err:
-        text = f"vehicle.kind mavsdk: {err}; install the library: pip install 'flightd[mavsdk]'"
-        raise InputError(text) from err
+        raise missing_extra("mavsdk", "vehicle.kind mavsdk") from err
     return MavsdkVehicle(url, clock, config.system_id, opener)
 
 

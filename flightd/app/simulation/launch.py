@@ -35,6 +35,7 @@ from flightd.core.topics import Document, Topic
 from flightd.runtime.clock import Hold, LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
 from flightd.runtime.event_loops import ScaledLoop, VirtualLoop
+from flightd.runtime.undisturbed_start import undisturbed
 from flightd.sim.world import World
 
 DETECTION_S = 0.008
@@ -176,7 +177,8 @@ def _started_world(
     spec = world_spec(simulation, ports)
     arguments = (spec, factor, simulation.truth_log, theirs)
     process = context.Process(target=run_world, args=arguments, name="world")
-    process.start()
+    with undisturbed():
+        process.start()
     theirs.close()
     stack.callback(process.join, 15.0)
     stack.callback(ours.close)

@@ -11,7 +11,7 @@ from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.simulation.simulation import Simulation, truth_of
 from flightd.core.csv_text import inert
 from flightd.core.inventory import LocationRecord
-from flightd.inventory.formats import utc_text
+from flightd.core.utc_time import utc_text
 from flightd.sim.racks.stock_truth import score_stock
 
 _COLUMNS = (
@@ -22,7 +22,7 @@ _COLUMNS = (
 
 def inventory_csv(folder: Path) -> bytes | None:
     """One line for each location of the inventory in `folder`, several texts behind one another with
-    " | " between, all of it inert (`core.cells`); None where there is no inventory."""
+    " | " between, all of it inert (`core.csv_text`); None where there is no inventory."""
     records = _records(folder)
     if records is None:
         return None

@@ -23,7 +23,9 @@ from flightd.cli.main import app
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
 from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, StoredRead
-from flightd.inventory.formats import as_csv, as_epcis, as_xlsx
+from flightd.inventory.export.csv_table import as_csv
+from flightd.inventory.export.epcis import as_epcis
+from flightd.inventory.export.xlsx import as_xlsx
 from flightd.site.site_file import load_site
 
 RUNNER = CliRunner()
@@ -265,6 +267,13 @@ def test_bad_arguments_are_refused(counted: Path, tmp_path: Path) -> None:
     assert "holds no inventory" in error_of("show", tmp_path / "nowhere")
     assert "knows no location 'Q'" in error_of("show", counted, "--location", "Q")
     assert "--format pdf" in error_of("export", counted, "--format", "pdf")
+    assert "choose one of .csv (csv), .xlsx (xlsx), .json (json), .jsonld (epcis)" in error_of(
+        "export", counted, "--out", tmp_path / "stock.pdf"
+    )
+    assert not (tmp_path / "stock.pdf").exists()
+    said = error_of("export", counted, "--out", tmp_path / "stock.json", "--format", "epcis")
+    assert "its ending says json, --format says epcis" in said
+    assert said.endswith("name the file stock.jsonld")
     assert "give both" in error_of("compare", counted, stock, "--recount", tmp_path / "r.toml")
     elsewhere = tmp_path / "deep" / "r.toml"
     config = CONFIGS / "sim.toml"

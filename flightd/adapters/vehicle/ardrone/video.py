@@ -16,7 +16,7 @@ from typing import Any
 
 from flightd.adapters.vehicle.ardrone.clock_counters import WrappingCounter
 from flightd.adapters.vehicle.ardrone.pave import CODEC_H264, Control, FrameType, PaveFrame, PaveParser
-from flightd.core.errors import UnavailableError
+from flightd.core.extras import missing_extra
 from flightd.core.types import Image
 from flightd.ports import Clock
 from flightd.runtime.clock import Hold
@@ -90,9 +90,7 @@ class Decoder:
         try:
             import av  # noqa: PLC0415 - an optional extra
         except ImportError as error:
-            raise UnavailableError(
-                "the AR.Drone's video needs PyAV: pip install 'flightd[ardrone]'"
-            ) from error
+            raise missing_extra("ardrone", "the AR.Drone's video") from error
         self._av: Any = av
         self._context: Any = None
         self.restart()

@@ -16,7 +16,7 @@ from textual.widgets import Footer, RichLog, Static
 
 from flightd.adapters.ground_link.client import GroundClient
 from flightd.adapters.ground_link.protocol import EventReport, Role, StatusReport, Welcome
-from flightd.cli.floor_map import FloorMap
+from flightd.cli.watch.floor_map import FloorMap
 from flightd.core.errors import FlightdError
 from flightd.core.types import CommandKind, EventLevel, Phase
 
