@@ -133,6 +133,9 @@ def write_flight(
             for step in range(round(leg.seconds / TICK_S)):
                 part = (1 - math.cos(math.pi * step * TICK_S / leg.seconds)) / 2
                 flying = leg.phase not in {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE}
+                turn = math.pi / leg.seconds
+                pace = turn / 2 * math.sin(turn * step * TICK_S)
+                vx, vy, _ = ((b - a) * pace for a, b in zip(leg.start, leg.end, strict=True))
                 sway = 0.995 * sway + rng.normal(0, 0.002, 2) * flying
                 x, y, height = (a + (b - a) * part for a, b in zip(leg.start, leg.end, strict=True))
                 x, y = x + sway[0], y + sway[1]
@@ -180,8 +183,8 @@ def write_flight(
                             yaw,
                             ex,
                             ey,
-                            0.0,
-                            0.0,
+                            vx,
+                            vy,
                             height,
                             (0.0001, 0.0, 0.0, 0.0, 0.0001, 0.0, 0.0, 0.0, 0.0001),
                             0.999,

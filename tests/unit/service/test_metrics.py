@@ -153,7 +153,7 @@ def test_clients_that_only_hold_the_line_do_not_fill_the_server_for_ever() -> No
         flood = await ask(server, b"x" * 100_000)
         assert b"flightd_info" not in flood
 
-    serve(test)
+    serve(test, patience_s=60.0)
 
 
 def test_a_client_that_says_nothing_is_hung_up_on_without_a_word_in_the_journal(

@@ -19,6 +19,7 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
+from flightd.adapters.vehicle.mavlink.refusal import WrongFirmware
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, Beats, too_slow
@@ -28,6 +29,7 @@ from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavlink.telemetry import MavlinkTelemetry
+from flightd.adapters.vehicle.refusal import Refusal, words
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -142,7 +144,7 @@ class MavlinkVehicle(abc.ABC):
             now_ns,
             "" if mode is None else self.mode_name(mode),
             in_control=self._pursuit.in_control,
-            refusal=self._pursuit.refusal,
+            refusal=words(self._pursuit.refusal),
         )
 
     def attitudes(self) -> list[Attitude]:
@@ -198,11 +200,12 @@ class MavlinkVehicle(abc.ABC):
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         """The thrust field for a setpoint's climb rate."""
 
-    def not_fit(self) -> str:
-        """Why the vehicle must not be flown by us, or an empty text."""
-        if self.link.firmware is not None and self.link.firmware is not self.firmware:
-            return f"the autopilot is {self.link.firmware.name}, the configuration says {self.firmware.name}"
-        return ""
+    def not_fit(self) -> Refusal | None:
+        """Why the vehicle must not be flown by us; None where it may."""
+        found = self.link.firmware
+        if found is not None and found is not self.firmware:
+            return WrongFirmware(found.name, self.firmware.name)
+        return None
 
     def _serve(self, tasks: asyncio.TaskGroup) -> None:
         """Start what runs beside the demand loop."""
@@ -260,10 +263,10 @@ class MavlinkVehicle(abc.ABC):
         while True:
             await asyncio.sleep(_BEATS_CHECK_S)
             now_ns = self._clock.now_ns()
-            problem = "" if self._pursuit.is_silent else too_slow(self._beats.rate_hz(now_ns))
-            if problem:
+            problem = None if self._pursuit.is_silent else too_slow(self._beats.rate_hz(now_ns))
+            if problem is not None:
                 _LOG.warning("%s", problem)
-                self.notify(Event(now_ns, EventLevel.WARNING, "heartbeat_rate", problem))
+                self.notify(Event(now_ns, EventLevel.WARNING, "heartbeat_rate", str(problem)))
                 return
 
     async def _compare_clocks(self) -> None:

@@ -26,6 +26,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
+from flightd.adapters.vehicle.mavlink.refusal import BeyondLibrary, WrongSystemId
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
@@ -34,6 +35,7 @@ from flightd.adapters.vehicle.mavsdk.connection import MavsdkConnection
 from flightd.adapters.vehicle.mavsdk.gate import SetpointGate
 from flightd.adapters.vehicle.mavsdk.library import Library, Plugins, whole_fields
 from flightd.adapters.vehicle.mavsdk.telemetry import MavsdkTelemetry
+from flightd.adapters.vehicle.refusal import Refusal, words
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -105,7 +107,7 @@ class MavsdkVehicle:
         self._texts: deque[tuple[StatusTextType, str]] = deque(maxlen=_TEXTS_MAX)
         self._text_waits = asyncio.Event()
         self._sent_ns = 0
-        self._unfit = ""
+        self._unfit: Refusal | None = None
 
     # The port
 
@@ -144,7 +146,7 @@ class MavsdkVehicle:
     def state(self) -> VehicleState | None:
         pursuit = self._pursuit
         return self._readings.state(
-            self._clock.now_ns(), in_control=pursuit.in_control, refusal=pursuit.refusal
+            self._clock.now_ns(), in_control=pursuit.in_control, refusal=words(pursuit.refusal)
         )
 
     def attitudes(self) -> list[Attitude]:
@@ -185,19 +187,19 @@ class MavsdkVehicle:
         """The mode, for the commander to choose the library's call."""
         return (float(custom_mode),)
 
-    def not_fit(self) -> str:
-        """Why the vehicle must not be flown by us, or an empty text."""
+    def not_fit(self) -> Refusal | None:
+        """Why the vehicle must not be flown by us; None where it may."""
         return self._unfit
 
     # Listening
 
     async def _look_at(self, plugins: Plugins) -> None:
         found, kind = await plugins.system.get_system_id(), await plugins.system.autopilot_type()
-        self._unfit = ""
+        self._unfit = None
         if found != self._system_id:
-            self._unfit = f"the vehicle's system id is {found}, the configuration says {self._system_id}"
+            self._unfit = WrongSystemId(found, self._system_id)
         elif kind != Autopilot.PX4:
-            self._unfit = f"the autopilot is {Autopilot(kind).name}: MAVSDK flies PX4 only, use vehicle.kind"
+            self._unfit = BeyondLibrary(Autopilot(kind).name)
 
     def _listen(self, tasks: asyncio.TaskGroup, library: Library, plugins: Plugins) -> None:
         telemetry, readings = plugins.telemetry, self._readings
