@@ -1,3 +1,3 @@
 """flightd: fly a camera drone along the painted guide lines of a warehouse floor."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

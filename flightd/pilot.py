@@ -8,120 +8,70 @@ control turns its reference into a setpoint, the limits have the last word.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
-from flightd.control.flight_controller import FlightController, FlightGains, Motion
-from flightd.control.limits import Limiter, Limits, Surroundings
-from flightd.core.scanning import CodeSet, Finding, Place, Settled
+from flightd.config.schema import Config
+from flightd.control.flight_controller import FlightController, Motion
+from flightd.control.limits import Limiter, Surroundings
+from flightd.core.scanning import Place
+from flightd.core.tick import TICK_S, TickInput, TickOutput
+from flightd.core.tracks import TrackSet
 from flightd.core.types import (
-    HEALTHY,
-    Attitude,
     AttitudeSetpoint,
-    Command,
-    Demand,
-    Event,
     GridPose,
-    Health,
-    LineSet,
     Phase,
-    VehicleState,
 )
-from flightd.localisation.grid_localiser import GridLocaliser, LocaliserParams
+from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.localisation.pad_finder import PadFinder
 from flightd.localisation.pose_history import PoseHistory
-from flightd.mission.guidance import Guidance, Guide, MissionInputs, MissionParams
+from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.mission import Mission
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
 from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
-from flightd.mission.scan.scanner import Scanner
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.site.site import Site
 from flightd.tracking.attitude_extrapolation import AttitudeExtrapolation
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.height_history import HeightHistory
-from flightd.tracking.line_tracker import LineTracker, TrackerParams, TrackSet
-
-TICK_S = 0.02
-"""Period of the control tick."""
+from flightd.tracking.line_tracker import LineTracker
 
 _FRAMES_ARRIVE_S = 0.5
 _TOUCHDOWN_S = 2.0
 
 
-@dataclass(frozen=True, slots=True)
-class PilotParams:
-    """Everything that tunes flying, in SI units."""
-
-    tracker: TrackerParams
-    gains: FlightGains
-    limits: Limits
-    mission: MissionParams
-    max_sigma_m: float = 1.2
-    localiser: LocaliserParams = field(default_factory=LocaliserParams)
-
-
-@dataclass(frozen=True, slots=True)
-class TickInput:
-    """What arrived since the last tick, oldest first.  `vehicle` is the newest state, None until there
-    is one; `ground_silent_s` the time since an attending ground station was heard, 0 if none attends;
-    `counted` names locations that an earlier flight of the same count has booked."""
-
-    now_ns: int
-    lines: tuple[LineSet, ...] = ()
-    vehicle: VehicleState | None = None
-    attitudes: tuple[Attitude, ...] = ()
-    commands: tuple[Command, ...] = ()
-    ground_silent_s: float = 0.0
-    codes: tuple[CodeSet, ...] = ()
-    counted: tuple[str, ...] = ()
-    health: Health = HEALTHY
-
-
-@dataclass(frozen=True, slots=True)
-class TickOutput:
-    """What goes out.  `setpoint` is None when nothing may be sent (hands off, or not flying).
-
-    `findings` are pending until a later `settled` names their locations."""
-
-    setpoint: AttitudeSetpoint | None
-    demand: Demand
-    phase: Phase
-    reason: str
-    goal: str
-    visited: int
-    planned: int
-    pose: GridPose | None
-    tracks: TrackSet | None
-    events: tuple[Event, ...] = field(default=())
-    findings: tuple[Finding, ...] = ()
-    settled: tuple[Settled, ...] = ()
-
-
 class Pilot:
-    """The whole flying state of one mission."""
+    """The whole flying state of one mission.
+
+    `overhead_m` are the heights below the keep-outs, also of those that `site` leaves out because the
+    flight's own heights pass them by; `autostart` is the order's, None: the configuration's."""
 
     def __init__(
         self,
         site: Site,
         plan: FlightPlan,
         policy: HeadingPolicy,
-        params: PilotParams,
-        scanner: Scanner | None = None,
+        config: Config,
+        scanner: AnyScanner = NO_SCAN,
+        overhead_m: Sequence[float] = (),
+        *,
+        autostart: bool | None = None,
     ) -> None:
-        self._params = params
+        self._config = config
         self._plan = plan
         self._site = site
         self._scanner = scanner
-        self._mission = Mission(site, plan, policy, params.mission, scanner)
+        self._mission = Mission(site, plan, policy, config, scanner, overhead_m, autostart=autostart)
         self._begin()
         self._heights = HeightHistory()
-        self._control = FlightController(params.gains)
-        self._limiter = Limiter(params.limits)
+        self._control = FlightController(config.control)
+        self._limiter = Limiter(config.control)
         self._armed = False
         self._last_ns: int | None = None
         self._last_yaw: float | None = None
         self._yaw_rate = 0.0
         self._pictures = FrameMonitor()
-        self._caution = PlausibilityMonitor(site, params.mission)
+        self._caution = PlausibilityMonitor(site, config)
         self._unheard = AttitudeExtrapolation()
         self._asked: AttitudeSetpoint | None = None
 
@@ -130,19 +80,19 @@ class Pilot:
         return self._mission
 
     @property
-    def scans(self) -> bool:
-        """Whether this flight counts shelves."""
-        return self._scanner is not None
+    def plan(self) -> FlightPlan:
+        """The plan at the start of the flight."""
+        return self._plan
 
     @property
     def exposure(self) -> float:
         """What the front camera's pictures are wanted with, as a part of its usual exposure."""
-        return self._scanner.exposure if self._scanner is not None else 1.0
+        return self._scanner.exposure
 
     def places(self, stamp_ns: int) -> tuple[Place, ...]:
         """Which locations the front camera's picture exposed at `stamp_ns` is wanted for, and where it
         shows them; none while nothing is scanned.  Changes nothing."""
-        if self._scanner is None or not self._scanner.looking:
+        if not self._scanner.looking:
             return ()
         pose = self._past.at(stamp_ns)
         return self._scanner.places(pose) if pose is not None else ()
@@ -172,7 +122,7 @@ class Pilot:
         setpoint = self._asked = self._setpoint(senses, guidance, push_mps2)
         self._caution.steered(guidance, pose)
         mission = self._mission
-        findings, settled = self._scanner.drain() if self._scanner is not None else ((), ())
+        findings, settled = self._scanner.drain()
         return TickOutput(
             setpoint=setpoint,
             demand=guidance.demand,
@@ -191,8 +141,6 @@ class Pilot:
     def _scan(self, tick: TickInput) -> None:
         """Give each picture's codes to the scan, with the pose at its exposure, and the location labels
         among them to the localiser."""
-        if self._scanner is None:
-            return
         if tick.counted:
             self._scanner.skip(tick.counted)
         for codes in tick.codes:
@@ -205,9 +153,18 @@ class Pilot:
     def _begin(self) -> None:
         """Stand on the pad and know nothing else."""
         node, yaw_rad = self._mission.stand
-        self._tracker = LineTracker(self._params.tracker, yaw_rad)
-        self._localiser = GridLocaliser(self._site, node, self._params.localiser)
-        self._past = PoseHistory(self._scanner.least_integrity if self._scanner else 0.0)
+        camera, control = self._config.camera, self._config.control
+        self._tracker = LineTracker(
+            camera.lens(),
+            camera.mount(),
+            self._site.line_width_m,
+            yaw_rad,
+            control.tilt_compensation,
+            self._config.tracking,
+        )
+        view = camera.floor_reach(control.max_tilt_rad)
+        self._localiser = GridLocaliser(self._site, node, view, self._config.localisation)
+        self._past = PoseHistory(self._scanner.least_integrity)
         self._pads = PadFinder(self._site)
 
     def _take(self, tick: TickInput) -> None:
@@ -239,9 +196,10 @@ class Pilot:
     ) -> MissionInputs:
         now_ns, v = tick.now_ns, tick.vehicle
         x_ns, y_ns = self._localiser.seen_ns
-        known = pose is not None and max(pose.covariance[0], pose.covariance[4]) < self._params.max_sigma_m**2
+        max_sigma_m = self._config.localisation.expert.max_sigma_m
+        known = pose is not None and max(pose.covariance[0], pose.covariance[4]) < max_sigma_m**2
         seeking = self._mission.phase is Phase.RELOCATE
-        doubted = seeking or (pose is not None and pose.integrity < self._params.mission.integrity_min)
+        doubted = seeking or (pose is not None and pose.integrity < self._config.mission.integrity_min)
         return MissionInputs(
             now_ns=now_ns,
             dt_s=dt_s,

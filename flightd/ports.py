@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
 
 from flightd.core.inventory import LocationRecord, Observation, PlannedLocation
+from flightd.core.snapshot import Snapshot
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -15,20 +14,14 @@ from flightd.core.types import (
     Demand,
     Event,
     GridPose,
-    Status,
     VehicleState,
 )
-from flightd.pilot import TickInput, TickOutput
 
 
 class Clock(Protocol):
     """Monotonic time of the running event loop (real, scaled or virtual)."""
 
     def now_ns(self) -> int: ...
-
-    def hold(self) -> AbstractContextManager[None]:
-        """Entered while work outside the loop is awaited: virtual time stands still, real time cannot."""
-        ...
 
 
 class Vehicle(Protocol):
@@ -124,16 +117,16 @@ class Recorder(Protocol):
 class Ground(Protocol):
     """People on the ground: they are told what happens and give orders.  Nothing but `run` ever waits.
 
-    `tell` comes with each status, `event` with each event.  `take_commands` drains the orders since the
-    last call, oldest first; `silent_s` is the time since any client that attends the flight was heard,
-    0 when none attends.  `picture_due` says whether the picture exposed at that time is asked for (True at
-    a capped rate only), `picture` then hands it over.  `run` serves until cancelled; TransientError when
-    another `run` may succeed.
+    `tell` comes ten times a second and at each change of phase, `event` with each event.  `take_commands`
+    drains the orders since the last call, oldest first; `silent_s` is the time since any client that attends
+    the flight was heard, 0 when none attends.  `picture_due` says whether the picture exposed at that time is
+    asked for (True at a capped rate only), `picture` then hands it over.  `run` serves until cancelled;
+    TransientError when another `run` may succeed.
     """
 
     async def run(self) -> None: ...
 
-    def tell(self, status: Status, tick: TickInput, output: TickOutput) -> None: ...
+    def tell(self, snapshot: Snapshot) -> None: ...
 
     def event(self, event: Event) -> None: ...
 
@@ -146,32 +139,12 @@ class Ground(Protocol):
     def picture(self, seq: int, stamp_ns: int, jpeg: bytes) -> None: ...
 
 
-@dataclass(frozen=True, slots=True)
-class Vitals:
-    """The daemon at one glance, and how it is doing itself; `ground_silent_s` as in TickInput.
-
-    `tick_late_s` and `latencies_ms` are those since the last status: how late each tick came, and for each
-    picture flown by the time of its stages.  The others count since the start: `dropped` what a full queue
-    or a lost worker cost, `restarts` what died and was brought back, each by the part's name;
-    `repeated_level` the setpoints that went out because no tick made one.
-    """
-
-    status: Status
-    vehicle: VehicleState | None
-    ground_silent_s: float
-    tick_late_s: tuple[float, ...]
-    latencies_ms: tuple[Mapping[str, float], ...]
-    dropped: Mapping[str, int]
-    restarts: Mapping[str, int]
-    repeated_level: int
-
-
 class Monitor(Protocol):
     """Who watches the daemon: a service manager, metrics, a log.  Called by the control tick itself: nothing
     here waits."""
 
-    def tell(self, vitals: Vitals) -> None:
-        """With each status."""
+    def tell(self, snapshot: Snapshot) -> None:
+        """Ten times a second and at each change of phase."""
         ...
 
     def event(self, event: Event) -> None:

@@ -9,7 +9,7 @@ usage() {
 usage: systemd/install.sh [--extras LIST] [--root DIR]
        systemd/install.sh --uninstall [--purge] [--root DIR]
 
-  --extras LIST   optional parts, by commas: ardrone, mavsdk, ground, xlsx
+  --extras LIST   optional parts, by commas, for example ardrone,xlsx; a wrong name tells them all
   --root DIR      install into the system below DIR (an image); nothing is started
   --uninstall     remove program, unit and rules; keep configuration, state and user
   --purge         with --uninstall: remove those, too
@@ -34,9 +34,22 @@ while [ $# -gt 0 ]; do
     shift
 done
 [ "$root" != / ] || root=''
-[ "$(id -u)" = 0 ] || fail "it writes to /opt, /etc and /var: run it with sudo"
 
 source=$(cd "$(dirname "$0")/.." && pwd)
+
+# The names under [project.optional-dependencies], but for what only a developer needs.
+known_extras() {
+    sed -n '/^\[project.optional-dependencies\]/,/^\[project.scripts\]/s/^\([a-z0-9-]*\) = .*/\1/p' \
+        "$source/pyproject.toml" | grep -vx 'dev\|docs'
+}
+
+IFS=', ' read -ra wanted <<<"$extras"
+for extra in "${wanted[@]}"; do
+    known_extras | grep -qxF -- "$extra" ||
+        fail "--extras $extra: unknown; choose among $(known_extras | paste -sd ' ' | sed 's/ /, /g')"
+done
+[ "$(id -u)" = 0 ] || fail "it writes to /opt, /etc and /var: run it with sudo"
+
 program=/opt/flightd
 unit=/etc/systemd/system/flightd.service
 rules=/etc/udev/rules.d/99-flightd.rules

@@ -28,11 +28,12 @@ from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.keys import load_pair, load_public, make_keys
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.config.ground import GroundConfig
-from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError
-from flightd.core.types import CommandKind, Demand, Phase, Status
-from flightd.pilot import TickInput, TickOutput
+from flightd.core.snapshot import Snapshot
+from flightd.core.tick import TickInput, TickOutput
+from flightd.core.types import CommandKind, Demand, Phase
 from flightd.runtime.clock import LoopClock
+from flightd.site.site_file import load_site
 
 ROOT = Path(__file__).parents[1]
 TICK_S = 0.02
@@ -132,9 +133,7 @@ async def _fly(link: ZmqGround, address: Address, seconds: float) -> dict[str, A
 def _tell(link: ZmqGround) -> Any:
     now_ns = LoopClock().now_ns()
     output = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 0, 2, None, None)
-    link.tell(
-        Status(now_ns, Phase.FOLLOW, "", "A1", "A2", 0, 2, 1, 1.6, 1, 0, 30, {}), TickInput(now_ns), output
-    )
+    link.tell(Snapshot(TickInput(now_ns), output, frames=1, fps=30.0))
     return link._desk.status  # noqa: SLF001 - the counters as they were just published
 
 

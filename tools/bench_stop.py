@@ -17,7 +17,6 @@ import random
 import socket
 import statistics
 import struct
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,10 +26,11 @@ from flightd.adapters.ground_link.link import ZmqGround
 from flightd.app.setpoint_pump import SetpointPump
 from flightd.config.ground import GroundConfig
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
+from flightd.core.tick import TickInput
 from flightd.core.types import Attitude, AttitudeSetpoint, CommandKind, Demand, Event, Phase, VehicleState
-from flightd.pilot import Pilot, TickInput
+from flightd.pilot import Pilot
 from flightd.runtime.clock import LoopClock
+from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import IdealFlight
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -50,9 +50,6 @@ class ShiftedClock:
 
     def set(self, now_ns: int) -> None:
         self._shift_ns = now_ns - self._clock.now_ns()
-
-    def hold(self) -> AbstractContextManager[None]:
-        return self._clock.hold()
 
 
 class UdpVehicle:
@@ -101,7 +98,7 @@ def main() -> None:
 def _flying() -> tuple[Pilot, int, VehicleState]:
     """A pilot amid a leg, its time and what it last heard from the vehicle."""
     site = load_site(CONFIGS / "site-demo.toml")
-    flight = IdealFlight(site, load_config(CONFIGS / "sim.toml").pilot_params(site), visits=("A4",))
+    flight = IdealFlight(site, load_config(CONFIGS / "sim.toml"), visits=("A4",))
     step = flight.pilot.step
     last: list[TickInput] = []
 

@@ -19,17 +19,17 @@ from pathlib import Path
 from typing import TypeAlias
 
 from flightd.adapters.metrics.metrics import MetricsBook
-from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.app.build import pilot_of
 from flightd.app.detection.detector_pool import Detection
 from flightd.app.detection.latency import LatencyBook
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
+from flightd.core.snapshot import Snapshot
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
-from flightd.core.types import LineSet, Status
-from flightd.pilot import TickInput, TickOutput
-from flightd.ports import Vitals
+from flightd.core.types import LineSet
 from flightd.runtime.frame_ring import FrameTicket
+from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import IdealFlight
 
 ROOT = Path(__file__).parents[1]
@@ -59,15 +59,11 @@ class Watched:
         self._recorder.record(Topic.TICK, tick.now_ns, tick)
         self._recorder.record(Topic.DECISION, tick.now_ns, output)
         if self.ticks % 5 == 0:
-            self._book.tell(self._vitals(tick, output))
+            latencies_ms = self._latency.drain()
+            self._book.tell(
+                Snapshot(tick, output, fps=30.0, tick_late_s=(0.001,) * 5, latencies_ms=latencies_ms)
+            )
         return output
-
-    def _vitals(self, tick: TickInput, output: TickOutput) -> Vitals:
-        status = Status(
-            tick.now_ns, output.phase, output.reason, "", output.goal, 0, 0, 0.5, 1.5, 0, 0, 30.0, {}
-        )
-        late_s, latencies = (0.001,) * 5, self._latency.drain()
-        return Vitals(status, tick.vehicle, 0.0, late_s, latencies, {"recorder": 0}, {}, 0)
 
 
 def main() -> None:
@@ -79,12 +75,12 @@ def main() -> None:
     flown_s, missions, first_mb = 0.0, 0, 0.0
     with (
         tempfile.TemporaryDirectory() as folder,
-        McapRecorder(Path(folder) / "f.mcap", lossless=True) as recorder,
+        McapRecorder(Path(folder) / "f.mcap", when_full=wait_for_disk) as recorder,
     ):
         watched = Watched(recorder, MetricsBook(), LatencyBook())
         while flown_s < options.seconds:
             missions += 1
-            flight = IdealFlight(site, config.pilot_params(site), seed=missions)
+            flight = IdealFlight(site, config, seed=missions)
             flight.pilot = pilot_of(config, site)
             flight.pilot.step = watched.around(flight.pilot.step)  # type: ignore[method-assign, assignment]
             flight.fly()

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.replay.log import Entry, read_log
 
@@ -93,7 +93,7 @@ def flown(reference: Reference, folder: Path) -> Path:
 def keep(reference: Reference, log: Path, to: Path) -> None:
     """The part of a log that a replay needs, in as little room as possible."""
     to.parent.mkdir(parents=True, exist_ok=True)
-    with McapRecorder(to, lossless=True) as recorder:
+    with McapRecorder(to, when_full=wait_for_disk) as recorder:
         for entry in _beginning(log, reference.seconds):
             if isinstance(entry.message, RecordedFrame):
                 recorder.image(entry.topic, entry.stamp_ns, entry.message.seq, entry.message.jpeg)
@@ -105,7 +105,7 @@ def keep(reference: Reference, log: Path, to: Path) -> None:
 
 def _beginning(log: Path, seconds: float) -> Iterator[Entry]:
     """Configuration, map, the ticks and decisions of so many seconds, the last picture and its lines."""
-    wanted = {Topic.CONFIG, Topic.MAP, Topic.TICK, Topic.DECISION, Topic.LINES, Topic.FRAME}
+    wanted = {Topic.CONFIG, Topic.MAP, Topic.ORDER, Topic.TICK, Topic.DECISION, Topic.LINES, Topic.FRAME}
     entries = read_log(log, wanted).entries
     end_ns = min(entry.stamp_ns for entry in entries if entry.topic == Topic.TICK) + round(seconds * 1e9)
     seen = {entry.stamp_ns for entry in entries if entry.topic == Topic.LINES}

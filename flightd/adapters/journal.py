@@ -1,4 +1,8 @@
-"""Structured log lines: key=value with systemd's priority prefix, as the journal takes them from stderr."""
+"""Structured log lines: key=value with systemd's priority prefix, as the journal takes them from stderr.
+
+Own code: structlog 26.1's logfmt lines cannot be read back (a line feed and the two characters `\\n` look the
+same, an empty value has no quotes) and know no priority, for 0.6 MB and 0.1 s of import against ten lines.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +12,8 @@ import os
 import re
 from typing import TextIO
 
+from flightd.core.snapshot import Snapshot
 from flightd.core.types import Event, EventLevel
-from flightd.ports import Vitals
 
 _PRIORITY = {EventLevel.INFO: 6, EventLevel.WARNING: 4, EventLevel.ERROR: 3}
 _PLAIN = re.compile(r"[\w.,:/@%+-]+")
@@ -38,22 +42,21 @@ class JournalMonitor:
         self._said_ns = -(10**18)
         self._phase = ""
 
-    def tell(self, vitals: Vitals) -> None:
-        status = vitals.status
-        if status.phase == self._phase and status.stamp_ns - self._said_ns < _STATUS_NS:
+    def tell(self, snapshot: Snapshot) -> None:
+        if snapshot.phase == self._phase and snapshot.stamp_ns - self._said_ns < _STATUS_NS:
             return
-        self._phase, self._said_ns = status.phase, status.stamp_ns
+        self._phase, self._said_ns = snapshot.phase, snapshot.stamp_ns
         fields = {
-            "status": status.phase.value,
-            "reason": status.reason,
-            "node": status.node,
-            "goal": status.goal,
-            "nodes": f"{status.nodes_done}/{status.nodes_planned}",
-            "height_m": f"{status.height_m:.2f}",
-            "battery": f"{status.battery_frac:.2f}",
-            "fps": f"{status.fps:.0f}",
-            "latency_ms": f"{status.latency_ms.get('total', 0.0):.0f}",
-            "dropped": sum(vitals.dropped.values()),
+            "status": snapshot.phase.value,
+            "reason": snapshot.reason,
+            "node": snapshot.node,
+            "goal": snapshot.goal,
+            "nodes": f"{snapshot.nodes_done}/{snapshot.nodes_planned}",
+            "height_m": f"{snapshot.height_m:.2f}",
+            "battery": f"{snapshot.battery_frac:.2f}",
+            "fps": f"{snapshot.fps:.0f}",
+            "latency_ms": f"{snapshot.latency_ms.get('total', 0.0):.0f}",
+            "dropped": sum(snapshot.dropped.values()),
         }
         self._write(line(6, **fields))
 

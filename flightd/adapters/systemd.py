@@ -2,6 +2,9 @@
 
 The messages are lines of KEY=VALUE in one datagram to the socket that NOTIFY_SOCKET names, a path or,
 with a leading @, a name in the abstract space.
+
+Own code: sdnotify 0.3.2 waits where the manager does not read (after 11 messages, for ever; here the control
+tick calls), counts nothing that is lost, and writes Latin-1 where systemd reads UTF-8.
 """
 
 from __future__ import annotations
@@ -11,8 +14,8 @@ import socket
 from collections.abc import Mapping
 
 from flightd.core.errors import InputError
-from flightd.core.types import Event, Status
-from flightd.ports import Vitals
+from flightd.core.snapshot import Snapshot
+from flightd.core.types import Event
 
 _FRESH_NS = 1_000_000_000
 _STATUS_NS = 1_000_000_000
@@ -75,9 +78,9 @@ class SystemdMonitor:
         """READY=1 was said."""
         return self._ready
 
-    def tell(self, vitals: Vitals) -> None:
-        now_ns = vitals.status.stamp_ns
-        missing = _missing(vitals)
+    def tell(self, snapshot: Snapshot) -> None:
+        now_ns = snapshot.stamp_ns
+        missing = _missing(snapshot)
         if not self._ready and not missing:
             self._ready = True
             self._notifier.send(READY=1)
@@ -87,7 +90,7 @@ class SystemdMonitor:
         if self._watchdog_ns and now_ns - self._fed_ns >= self._watchdog_ns:
             self._fed_ns = now_ns
             self._notifier.send(WATCHDOG=1)
-        self._say(now_ns, _line(vitals.status, missing if not self._ready else []))
+        self._say(now_ns, _line(snapshot, missing if not self._ready else []))
 
     def event(self, event: Event) -> None:
         """Events are the log's."""
@@ -102,16 +105,16 @@ class SystemdMonitor:
             self._notifier.send(STATUS=line)
 
 
-def _missing(vitals: Vitals) -> list[str]:
+def _missing(snapshot: Snapshot) -> list[str]:
     """What must come before the daemon is ready; config, keys and map were checked before the first tick."""
-    status, vehicle = vitals.status, vitals.vehicle
-    heard = vehicle is not None and status.stamp_ns - vehicle.attitude.stamp_ns < _FRESH_NS
-    return [what for what, there in (("the vehicle", heard), ("the camera", status.fps > 0)) if not there]
+    vehicle = snapshot.vehicle
+    heard = vehicle is not None and snapshot.stamp_ns - vehicle.attitude.stamp_ns < _FRESH_NS
+    return [what for what, there in (("the vehicle", heard), ("the camera", snapshot.fps > 0)) if not there]
 
 
-def _line(status: Status, missing: list[str]) -> str:
+def _line(snapshot: Snapshot, missing: list[str]) -> str:
     if missing:
         return f"waiting for {' and '.join(missing)}"
-    done = f"{status.nodes_done}/{status.nodes_planned} nodes"
-    reason = f" ({status.reason})" if status.reason else ""
-    return f"{status.phase}{reason}, {done}, battery {status.battery_frac:.0%}"
+    done = f"{snapshot.nodes_done}/{snapshot.nodes_planned} nodes"
+    reason = f" ({snapshot.reason})" if snapshot.reason else ""
+    return f"{snapshot.phase}{reason}, {done}, battery {snapshot.battery_frac:.0%}"

@@ -1,54 +1,134 @@
-"""What a configuration and a map ask for: the plan, the pilot, what counts, what sees, the ground link."""
+"""Configuration, map and explicit arguments -> a flight: everything is composed here, and nothing runs yet.
+
+What differs between a real vehicle and a simulated one (clock, detectors, recorder, addresses) is handed in.
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
 from functools import partial
 
+from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.ground_link.link import ZmqGround
+from flightd.adapters.store.progress import ProgressFile
+from flightd.adapters.vehicle.connect import connect_vehicle
+from flightd.app.absent_parts import NO_CAMERA, NO_COUNTING, NO_GROUND, NO_PROGRESS, NO_RECORDER, keep_pose
 from flightd.app.counting.count import Counting
-from flightd.app.detection.detector_pool import DetectorPool
-from flightd.config.schema import HEIGHT_ROOM_M, Config
-from flightd.core.errors import InputError
+from flightd.app.detection.detector_pool import DetectorPool, Detectors
+from flightd.app.detection.pipeline import DetectionPipeline
+from flightd.app.flight import Flight
+from flightd.app.flight_orders import configured_order
+from flightd.app.publishers import TelemetryPublishers
+from flightd.app.setpoint_pump import SetpointPump
+from flightd.config.ground import GroundConfig
+from flightd.config.mission import HEIGHT_ROOM_M
+from flightd.config.schema import Config
+from flightd.core.errors import FlightdError, InputError
+from flightd.core.flight_order import FlightOrder
+from flightd.core.snapshot import Snapshot
+from flightd.core.tick import TICK_S
+from flightd.core.topics import Topic
+from flightd.core.types import AttitudeSetpoint, GridPose
 from flightd.mission.battery.sorties import check_battery
 from flightd.mission.guidance import CEILING_MARGIN_M
-from flightd.mission.plan.flight_plan import FlightPlan, VisitOrder, make_plan
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.plan.route_optimiser import ordered_best
 from flightd.mission.scan.code_assignment import FrontSight
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.scanner import Scanner
 from flightd.mission.scan.views import view_height_m
 from flightd.pilot import Pilot
-from flightd.ports import Clock
+from flightd.ports import Camera, Clock, Ground, Monitor, PoseTaker, Recorder, Vehicle
+from flightd.runtime.clock import Hold
+from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 from flightd.site.site import Site
 from flightd.vision.lines.detector import Detector
 
 
-def plan_of(config: Config, site: Site) -> FlightPlan:
-    """The flight plan that the configuration asks for, from the home pad and back."""
-    return _plan_on(config, site.between(*flown_between_m(config, site)))
+@dataclass(frozen=True, slots=True)
+class Peers:
+    """Where the vehicle and the cameras are reached, as URLs of their sections."""
+
+    vehicle: str
+    camera: str
+    front_camera: str
 
 
-def _plan_on(config: Config, site: Site) -> FlightPlan:
-    """The plan on a site that has only the keep-outs of the heights flown."""
-    mission = config.mission
-    visits: Sequence[str] = mission.nodes or site.serpentine_route()
-    start, policy, yaw_rad = (
-        start_of(config, site),
-        config.heading_policy(),
-        math.radians(mission.start_yaw_deg),
+def configured_peers(config: Config) -> Peers:
+    """Those of the configuration."""
+    return Peers(config.vehicle.url, config.camera.url, config.front_camera.url)
+
+
+def build(
+    config: Config,
+    site: Site,
+    order: FlightOrder,
+    *,
+    clock: Clock,
+    detectors: Detectors,
+    recorder: Recorder = NO_RECORDER,
+    ground: Ground = NO_GROUND,
+    counting: Counting | None = None,
+    monitors: Sequence[Monitor] = (),
+    observers: Sequence[Callable[[Snapshot], None]] = (),
+    keep_progress: bool = False,
+    peers: Peers | None = None,
+    opener: OpenDatagrams = open_datagrams,
+    hold: Hold = nullcontext,
+    startup_fault: FlightdError | None = None,
+) -> Flight:
+    """Compose the flight that `order` asks for.  `peers` are those of the configuration unless given;
+    `opener` opens sockets and time is held by `hold` while threads work, as the event loop wants it;
+    `keep_progress`: the stops left over are kept in `mission.progress`, if that names a file.  InputError
+    where configuration, map and order contradict each other."""
+    peers = peers or configured_peers(config)
+    pilot = pilot_of(config, site, order)
+    vehicle = connect_vehicle(config.vehicle, clock, config.control, url=peers.vehicle, opener=opener)
+    publishers = TelemetryPublishers(clock, vehicle, recorder, ground, monitors, observers)
+    kept_fps = 0.0 if recorder is NO_RECORDER else config.recorder.picture_fps
+    vision = DetectionPipeline(detectors, config.vision.workers, recorder, ground, kept_fps)
+    connect = partial(connect_camera, clock=clock, on_trouble=publishers.trouble, vehicle=vehicle, hold=hold)
+    camera = connect(config.camera, on_frame=vision.frames.put, url=peers.camera)
+    front_camera: Camera = NO_CAMERA
+    if counting is not None:
+        counting.read_for(pilot.places)
+        front_camera = connect(config.front_camera, on_frame=counting.frame, url=peers.front_camera)
+    kept = config.mission.progress if keep_progress else None
+
+    def sent(setpoint: AttitudeSetpoint, now_ns: int) -> None:
+        vision.latency.sent(now_ns)
+        recorder.record(Topic.SETPOINT, setpoint.stamp_ns, setpoint)
+
+    return Flight(
+        clock=clock,
+        pilot=pilot,
+        vehicle=vehicle,
+        setpoints=SetpointPump(vehicle, clock, sent, TICK_S),
+        camera=camera,
+        front_camera=front_camera,
+        vision=vision,
+        counting=NO_COUNTING if counting is None else counting,
+        recorder=recorder,
+        ground=ground,
+        progress=NO_PROGRESS if kept is None else ProgressFile(kept, site.name),
+        publishers=publishers,
+        share_pose=_pose_sharing(config, site, vehicle),
+        startup_fault=startup_fault,
     )
-    if mission.order is VisitOrder.BEST:
-        visits = ordered_best(
-            site, visits, (start, site.home.node), policy, Pace.of(mission.params()), yaw_rad
-        )
-    return make_plan(site, visits, start, site.home.node, policy, yaw_rad)
 
 
-def start_of(config: Config, site: Site) -> str:
+def plan_of(config: Config, site: Site, order: FlightOrder | None = None) -> FlightPlan:
+    """The flight plan for an order (by default the configuration's), from its pad and back."""
+    flown = site.between(*flown_between_m(config, site))
+    return _plan_on(config, flown, order or configured_order(config))
+
+
+def start_of(order: FlightOrder, site: Site) -> str:
     """The node of the pad on which the drone stands at first.  InputError when the site lacks that pad."""
-    wanted = config.mission.pad
+    wanted = order.pad
     pad = site.home if wanted is None else next((pad for pad in site.pads if pad.id == wanted), None)
     if pad is None:
         names = ", ".join(pad.id for pad in site.pads)
@@ -56,43 +136,50 @@ def start_of(config: Config, site: Site) -> str:
     return pad.node
 
 
-def pilot_of(config: Config, site: Site) -> Pilot:
-    """A fresh pilot for one flight.  Raises InputError where map and configuration contradict each other."""
+def pilot_of(config: Config, site: Site, order: FlightOrder | None = None) -> Pilot:
+    """A fresh pilot for one flight of an order (by default the configuration's).  InputError where map and
+    configuration contradict each other."""
+    order = order or configured_order(config)
     if config.mission.height_m > site.ceiling_m - CEILING_MARGIN_M:
         raise InputError(
             f"mission.height_m {config.mission.height_m} is not {CEILING_MARGIN_M} m below the ceiling of"
             f" {site.name} ({site.ceiling_m} m)"
         )
     flown = site.between(*flown_between_m(config, site))
-    plan, policy = _plan_on(config, flown), config.heading_policy()
-    params = config.pilot_params(site)
+    plan, policy = _plan_on(config, flown, order), HeadingPolicy.of(config)
     scanner = scanner_of(config, site)
-    check_battery(flown, plan, policy, params.mission, scanner)
-    return Pilot(flown, plan, policy, params, scanner)
+    check_battery(flown, plan, policy, config, scanner)
+    return Pilot(flown, plan, policy, config, scanner, site.overhead_m, autostart=order.autostart)
 
 
-def scanner_of(config: Config, site: Site) -> Scanner | None:
-    """What counts the shelves; None without a front camera or locations."""
-    front = config.front_camera
-    if not front.is_fitted or not site.locations:
-        return None
-    highest_m = site.ceiling_m - CEILING_MARGIN_M
+def counts_shelves(config: Config, site: Site) -> bool:
+    """Whether flights count: with a front camera, where there are locations."""
+    return config.front_camera.is_fitted and bool(site.locations)
+
+
+def scanner_of(config: Config, site: Site) -> AnyScanner:
+    """What counts the shelves; `NO_SCAN` where nothing is counted."""
+    if not counts_shelves(config, site):
+        return NO_SCAN
+    front, highest_m = config.front_camera, site.ceiling_m - CEILING_MARGIN_M
     if config.scan.min_height_m > highest_m:
         raise InputError(
             f"scan.min_height_m {config.scan.min_height_m} is not {CEILING_MARGIN_M} m below the ceiling of"
             f" {site.name} ({site.ceiling_m} m)"
         )
-    return Scanner(site, FrontSight(front.lens(), front.mount()), config.scan_params(highest_m))
+    sight = FrontSight(front.lens(), front.mount())
+    return Scanner(site, sight, config.scan, highest_m, config.camera.aside_per_height)
 
 
 def flown_between_m(config: Config, site: Site) -> tuple[float, float]:
     """The heights that are flown between: with a scan, those of its views too."""
     low_m, high_m = config.mission.flown_between_m()
-    if not config.front_camera.is_fitted or not site.locations:
+    if not counts_shelves(config, site):
         return low_m, high_m
-    scan, mount = config.scan_params(site.ceiling_m - CEILING_MARGIN_M), config.front_camera.mount()
+    scan, mount = config.scan, config.front_camera.mount()
+    heights_m = scan.min_height_m, scan.highest_m(site.ceiling_m - CEILING_MARGIN_M)
     views_m = [
-        view_height_m(place.height_m, abs(place.y_m - site.nodes[place.node].y_m), mount, scan)
+        view_height_m(place.height_m, abs(place.y_m - site.nodes[place.node].y_m), mount, heights_m)
         for place in site.locations.values()
     ]
     return min(low_m, min(views_m) - HEIGHT_ROOM_M), max(high_m, max(views_m) + HEIGHT_ROOM_M)
@@ -103,12 +190,12 @@ def profile_of(config: Config, site: Site) -> str:
     return config.vision.profile or site.line_colour.value
 
 
-def detector_pool(config: Config, site: Site, clock: Clock) -> DetectorPool:
+def detector_pool(config: Config, site: Site, clock: Clock, hold: Hold = nullcontext) -> DetectorPool:
     """Detector processes after the configuration; the colour profile is read here, so that a wrong one
     is found before anything flies."""
     make = detector_of(config, site)
     make()
-    return DetectorPool(make, config.vision.workers, config.vision.timeout_s, clock)
+    return DetectorPool(make, config.vision.workers, config.vision.timeout_s, clock, hold)
 
 
 def detector_of(config: Config, site: Site) -> Callable[[], Detector]:
@@ -120,9 +207,27 @@ def detector_of(config: Config, site: Site) -> Callable[[], Detector]:
 
 
 def ground_link(
-    config: Config, site: Site, clock: Clock, counting: Counting | None = None
+    settings: GroundConfig, site: Site, clock: Clock, counting: Counting | None = None
 ) -> ZmqGround | None:
-    """The link to ground stations, if the configuration wants one."""
-    if not config.ground.listen:
+    """The link to ground stations, not listening yet; None where none is wanted."""
+    if not settings.listen:
         return None
-    return ZmqGround(config.ground, site, clock, counting.places if counting is not None else None)
+    return ZmqGround(settings, site, clock, None if counting is None else counting.places)
+
+
+def _plan_on(config: Config, flown: Site, order: FlightOrder) -> FlightPlan:
+    """The plan on a site that has only the keep-outs of the heights flown."""
+    visits: Sequence[str] = order.nodes or flown.serpentine_route()
+    start, home, policy = start_of(order, flown), flown.home.node, HeadingPolicy.of(config)
+    if order.best_order:
+        pace = Pace.of(config.mission)
+        visits = ordered_best(flown, visits, (start, home), policy, pace, order.start_yaw_rad)
+    return make_plan(flown, visits, start, home, policy, order.start_yaw_rad)
+
+
+def _pose_sharing(config: Config, site: Site, vehicle: Vehicle) -> Callable[[GridPose], None]:
+    """What gives the grid pose to the vehicle's own estimator, with the pad to land on if it shall."""
+    if not config.vehicle.shares_pose or not isinstance(vehicle, PoseTaker):
+        return keep_pose
+    pad = site.nodes[site.home.node]
+    return partial(vehicle.share_pose, pad_m=(pad.x_m, pad.y_m) if config.vehicle.landing_target else None)

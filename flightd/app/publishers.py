@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
+from flightd.core.snapshot import Snapshot
 from flightd.core.topics import Topic
-from flightd.core.types import Event, EventLevel, Phase, Status
-from flightd.pilot import TickInput, TickOutput
-from flightd.ports import Ground, Monitor, Recorder, Vehicle, Vitals
+from flightd.core.types import Event, EventLevel, Phase
+from flightd.ports import Clock, Ground, Monitor, Recorder, Vehicle
 
 _STATUS_NS = 100_000_000
 
@@ -17,64 +18,64 @@ class TelemetryPublishers:
 
     def __init__(
         self,
+        clock: Clock,
         vehicle: Vehicle,
-        recorder: Recorder | None,
-        ground: Ground | None,
-        monitors: Sequence[Monitor],
-        observers: Sequence[Callable[[Status], None]],
+        recorder: Recorder,
+        ground: Ground,
+        monitors: Sequence[Monitor] = (),
+        observers: Sequence[Callable[[Snapshot], None]] = (),
     ) -> None:
+        self._clock = clock
         self._vehicle = vehicle
         self._recorder = recorder
         self._ground = ground
-        self._monitors = monitors
-        self._observers = observers
-        self._status_ns = 0
-        self._last_phase: Phase | None = None
+        self._monitors = tuple(monitors)
+        self._observers = tuple(observers)
+        self._told_ns = 0
+        self._told_phase: Phase | None = None
+        self._late_s: list[float] = []
+        self._latencies_ms: list[Mapping[str, float]] = []
 
-    def trouble(self, text: str, now_ns: int) -> None:
+    def trouble(self, text: str) -> None:
         """Something failed that people should know of, outside of any tick."""
-        event = Event(now_ns, EventLevel.ERROR, "failure", text)
-        if self._recorder is not None:
-            self._recorder.record(Topic.EVENT, event.stamp_ns, event)
+        event = Event(self._clock.now_ns(), EventLevel.ERROR, "failure", text)
+        self._recorder.record(Topic.EVENT, event.stamp_ns, event)
         self._event(event)
 
-    def flown(self, tick: TickInput, output: TickOutput) -> None:
-        """What came in and went out at a tick: its events to everybody, all of it to the record."""
-        for event in output.events:
+    def publish(self, snapshot: Snapshot) -> None:
+        """A tick: its events to everybody, all of it to the record; ten times a second and at each change of
+        phase it is told to everybody."""
+        for event in snapshot.output.events:
             self._event(event)
-        if self._recorder is not None:
-            _record(self._recorder, tick, output)
+        _record(self._recorder, snapshot)
+        self._late_s += snapshot.tick_late_s
+        self._latencies_ms += snapshot.latencies_ms
+        if snapshot.stamp_ns - self._told_ns >= _STATUS_NS or snapshot.phase is not self._told_phase:
+            self._tell(snapshot)
 
-    def status_due(self, now_ns: int, phase: Phase) -> bool:
-        """A status is told ten times a second and at each change of phase."""
-        if now_ns - self._status_ns < _STATUS_NS and phase is self._last_phase:
-            return False
-        self._status_ns, self._last_phase = now_ns, phase
-        return True
-
-    def status(self, vitals: Vitals, tick: TickInput, output: TickOutput) -> None:
+    def _tell(self, snapshot: Snapshot) -> None:
         """How the flight stands."""
-        status = vitals.status
-        if self._recorder is not None:
-            self._recorder.record(Topic.STATUS, status.stamp_ns, status)
-        if self._ground is not None:
-            self._ground.tell(status, tick, output)
+        self._told_ns, self._told_phase = snapshot.stamp_ns, snapshot.phase
+        snapshot = replace(snapshot, tick_late_s=tuple(self._late_s), latencies_ms=tuple(self._latencies_ms))
+        self._late_s.clear()
+        self._latencies_ms.clear()
+        self._recorder.record(Topic.STATUS, snapshot.stamp_ns, snapshot.status())
+        self._ground.tell(snapshot)
         for monitor in self._monitors:
-            monitor.tell(vitals)
+            monitor.tell(snapshot)
         for observer in self._observers:
-            observer(status)
+            observer(snapshot)
 
     def _event(self, event: Event) -> None:
         self._vehicle.notify(event)
-        if self._ground is not None:
-            self._ground.event(event)
+        self._ground.event(event)
         for monitor in self._monitors:
             monitor.event(event)
 
 
-def _record(recorder: Recorder, tick: TickInput, output: TickOutput) -> None:
+def _record(recorder: Recorder, snapshot: Snapshot) -> None:
     """All that the pilot was given and answered, for the replay, and its parts for people."""
-    now_ns = tick.now_ns
+    tick, output, now_ns = snapshot.tick, snapshot.output, snapshot.stamp_ns
     recorder.record(Topic.TICK, now_ns, tick)
     recorder.record(Topic.DECISION, now_ns, output)
     for lines in tick.lines:

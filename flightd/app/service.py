@@ -64,7 +64,7 @@ async def monitors(
             found.append(systemd)
         if settings.listen:
             book = MetricsBook()
-            server = MetricsServer(settings.address, book.exposition)
+            server = MetricsServer(settings.address, book.registry)
             await server.open()
             stack.push_async_callback(server.close)
             found.append(book)

@@ -45,6 +45,11 @@ class SetpointPump:
         else:
             self._fresh.set()
 
+    def interval_quantiles_ms(self) -> dict[str, float]:
+        """Between setpoints on the wire: p50, p99 and the longest."""
+        shares = (("p50", 0.5), ("p99", 0.99), ("max", 1.0))
+        return {name: round(self.intervals_ms.quantile(share), 2) for name, share in shares}
+
     async def run(self) -> None:
         while True:
             fresh = True

@@ -5,37 +5,20 @@ from __future__ import annotations
 import asyncio
 import json
 import sys
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightd.core.errors import InputError, RunError, UnavailableError
+from flightd.cli.options import AsJson, ConfigFile
+from flightd.core.errors import InputError, RunError
 
 if TYPE_CHECKING:
-    from flightd.adapters.vehicle.mavlink.examination import ExaminationReport
-    from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
+    from pathlib import Path
+
     from flightd.config.schema import Config
-    from flightd.doctor.check import Check
-    from flightd.doctor.vehicle import Autopilot
-    from flightd.ports import Clock
-    from flightd.site.site import Site
+    from flightd.doctor.diagnosis import Diagnosis
 
 _COLOURS = {"ok": typer.colors.GREEN, "warning": typer.colors.YELLOW, "error": typer.colors.RED}
-
-
-@dataclass(frozen=True, slots=True)
-class Diagnosis:
-    """Everything that was looked at; `report` and `fixed` are those of a MAVLink autopilot."""
-
-    checks: list[Check]
-    report: ExaminationReport | None = None
-    fixed: tuple[str, ...] = ()
-
-    @property
-    def errors(self) -> int:
-        return sum(check.level == "error" for check in self.checks)
 
 
 def register(app: typer.Typer) -> None:
@@ -44,171 +27,96 @@ def register(app: typer.Typer) -> None:
 
 
 def doctor(
-    config: Annotated[Path, typer.Option(help="Configuration file.")],
+    config: ConfigFile,
     fix: Annotated[bool, typer.Option("--fix", help="Offer to set wrong parameters right.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="With --fix: do not ask.")] = False,
     quick: Annotated[
         bool,
         typer.Option("--quick", help="Without camera and vehicle, in a second: before a service starts."),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Say whether configuration, computer, camera and vehicle are fit to fly, and what to do if not.
 
     Nothing moves: the vehicle is neither armed nor given a setpoint.  Exit 1 when it is not fit to fly.
 
     \b
-    flightd doctor --config /etc/flightd/flightd.toml
-    flightd doctor --config configs/ardupilot.toml --fix
-    flightd doctor --config configs/ardupilot.toml --json | jq .parameters
+    Examples:
+      flightd doctor --config /etc/flightd/flightd.toml
+      flightd doctor --config configs/ardupilot.toml --fix
+      flightd doctor --config configs/ardupilot.toml --json | jq .parameters
     """
     from flightd.config.schema import load_config
-    from flightd.config.site_file import load_site
 
     if quick and fix:
         raise InputError("--quick looks at no vehicle: it does not go with --fix")
     if fix and not yes and not sys.stdin.isatty():
-        raise InputError("--fix asks before it writes, and there is no terminal to ask on: add --yes")
+        raise InputError(
+            "--fix asks before it writes, and there is no terminal to ask on", remedy="add --yes"
+        )
     chosen = load_config(config)
     if fix and chosen.vehicle.kind == "ardrone":
         raise InputError("--fix is for autopilots with parameters; an AR.Drone is set up at each start")
-    site = load_site(chosen.mission.site)
-    examine = _examine_machine if quick else _examine
-    found = asyncio.run(examine(chosen, site, config))
-    if fix and found.report is not None:
-        agreed = _agreed(found.report, ask=not yes)
-        if agreed:
-            found = _with_autopilot(found, asyncio.run(_fix(chosen, agreed)))
-    print(json.dumps(_document(config, found))) if as_json else _print(
-        found, "no error found" if quick else "fit to fly"
-    )
+    found = asyncio.run(_examined(chosen, config, quick=quick))
+    if fix and (agreed := _agreed(found, ask=not yes)):
+        found = asyncio.run(_fixed(found, chosen, agreed))
+    if as_json:
+        print(json.dumps(found.document(config)))
+    else:
+        _print(found, "no error found" if quick else "fit to fly")
     if found.errors:
         raise RunError(f"not fit to fly: {found.errors} {'error' if found.errors == 1 else 'errors'}")
 
 
-async def _examine(config: Config, site: Site, path: Path) -> Diagnosis:
-    from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
-    from flightd.adapters.vehicle.connect import connect_vehicle
-    from flightd.app.build import detector_of
-    from flightd.doctor import camera, machine, vehicle
-    from flightd.doctor.calibration import check_calibration
+async def _examined(config: Config, path: Path, *, quick: bool) -> Diagnosis:
+    """Composed as for a flight: InputError where configuration and site are not sound."""
+    from flightd.app.build import detector_of, ground_link, pilot_of, plan_of
+    from flightd.doctor.diagnosis import Subject, examine, examine_quickly
     from flightd.runtime.clock import LoopClock
+    from flightd.site.site_file import load_site
 
-    clock = LoopClock()
-    detector = detector_of(config, site)()
-    checks = [
-        _check_plan(config, site, path),
-        machine.check_clock(),
-        machine.check_disk(config.recorder),
-        *machine.check_processor(config.vision.workers),
-        *check_calibration(config.camera, site, config.mission.height_m),
-    ]
-    autopilot = vehicle.Autopilot(())
-    if config.vehicle.kind == "ardrone":
-        drone = connect_vehicle(config.vehicle, clock, config.control.limits())
-        assert isinstance(drone, ArDroneVehicle)
-        flying = asyncio.ensure_future(drone.run())
-        try:
-            checks += await vehicle.examine_ardrone(drone, config)
-            pictures = await camera.watch(config, clock, drone)
-        finally:
-            flying.cancel()
-            await asyncio.wait([flying])
-    else:
-        pictures = await camera.watch(config, clock, None)
-        autopilot = await vehicle.examine(config.vehicle, clock)
-    checks += _check_ground(config, site, clock)
-    checks += camera.judge_camera(config, pictures)
-    checks += camera.check_vision(config, detector, pictures.picture)
-    checks += camera.check_latency(config, detector, pictures)
-    return Diagnosis([*checks, *autopilot.checks], autopilot.report)
-
-
-async def _examine_machine(config: Config, site: Site, path: Path) -> Diagnosis:
-    """What can be known without waiting for anything."""
-    from flightd.app.build import detector_of, pilot_of
-    from flightd.doctor import machine
-    from flightd.runtime.clock import LoopClock
-
-    detector_of(config, site)()
+    site, clock = load_site(config.mission.site), LoopClock()
     pilot_of(config, site)
-    checks = [
-        _check_plan(config, site, path),
-        machine.check_clock(),
-        machine.check_disk(config.recorder),
-        *machine.check_processor(config.vision.workers),
-        *_check_ground(config, site, LoopClock()),
-    ]
-    return Diagnosis(checks)
+    detector = detector_of(config, site)()
+    subject = Subject(
+        config,
+        site,
+        path,
+        plan_of(config, site).nodes,
+        detector,
+        ground_link(config.ground, site, clock),
+        clock,
+    )
+    return await (examine_quickly if quick else examine)(subject)
 
 
-def _check_plan(config: Config, site: Site, path: Path) -> Check:
-    """Configuration and site are sound, or InputError would have been raised: say what they mean."""
-    from flightd.app.build import plan_of
-    from flightd.doctor.check import ok
-
-    nodes = len(config.mission.nodes) or len(site.nodes)
-    plan_of(config, site)
-    return ok("config", f"{path}: site {site.name}, {nodes} nodes to visit at {config.mission.height_m:g} m")
-
-
-def _check_ground(config: Config, site: Site, clock: Clock) -> list[Check]:
-    """Keys and allow-list are read (InputError if they are wrong), the ports are listened on for a moment."""
-    from flightd.app.build import ground_link
-    from flightd.doctor.check import error, ok
-
-    ground = config.ground
-    link = ground_link(config, site, clock)
-    if link is None:
-        return []
-    try:
-        with link:
-            text = f"{ground.listen}, ports {ground.status_port} and {ground.command_port}"
-            keys = "with keys" if ground.server_key else "without keys, this machine only"
-            return [ok("ground", f"can listen on {text}, {keys}")]
-    except UnavailableError as err:
-        return [error("ground", str(err), "stop what has the port (another flightd?), or choose another")]
-
-
-async def _fix(config: Config, agreed: list[str]) -> Autopilot:
-    from flightd.doctor.vehicle import examine
+async def _fixed(found: Diagnosis, config: Config, agreed: list[str]) -> Diagnosis:
+    from flightd.doctor.diagnosis import fix_parameters
     from flightd.runtime.clock import LoopClock
 
-    return await examine(config.vehicle, LoopClock(), agreed)
+    return await fix_parameters(found, config, agreed, LoopClock())
 
 
-def _with_autopilot(found: Diagnosis, autopilot: Autopilot) -> Diagnosis:
-    """The diagnosis with what is now known of the autopilot."""
-    rest = [check for check in found.checks if check.name not in {"vehicle", "parameter"}]
-    return Diagnosis([*rest, *autopilot.checks], autopilot.report, autopilot.fixed)
-
-
-def _agreed(report: ExaminationReport, *, ask: bool) -> list[str]:
+def _agreed(found: Diagnosis, *, ask: bool) -> list[str]:
     """Names of the parameters that may be written."""
-    mendable = [found for found in report.findings if found.better is not None]
-    if not mendable or report.armed:
-        return []
-    if not ask:
-        return [found.name for found in mendable]
-    for found in mendable:
-        print(f"  {_change(found)}   {found.reason}", file=sys.stderr)
-    number = "this parameter" if len(mendable) == 1 else f"these {len(mendable)} parameters"
+    names = [parameter.name for parameter in found.mendable]
+    if not names or not ask:
+        return names
+    for parameter in found.mendable:
+        change = f"{parameter.name:<16} {parameter.value:g} -> {parameter.better:g}"
+        print(f"  {change}   {parameter.reason}", file=sys.stderr)
+    number = "this parameter" if len(names) == 1 else f"these {len(names)} parameters"
     print(f"Write {number} to the autopilot? [y/N] ", end="", file=sys.stderr, flush=True)
-    if sys.stdin.readline().strip().lower() not in {"y", "yes"}:
-        print("nothing was written", file=sys.stderr)
-        return []
-    return [found.name for found in mendable]
-
-
-def _change(found: ParameterFinding) -> str:
-    return f"{found.name:<16} {found.value:g} -> {found.better:g}"
+    if sys.stdin.readline().strip().lower() in {"y", "yes"}:
+        return names
+    print("nothing was written", file=sys.stderr)
+    return []
 
 
 def _print(found: Diagnosis, verdict: str) -> None:
     for check in found.checks:
-        label = typer.style(
-            f"{check.level.upper() if check.level != 'ok' else 'ok':<8}", _COLOURS[check.level]
-        )
+        word = "ok" if check.level == "ok" else check.level.upper()
+        label = typer.style(f"{word:<8}", _COLOURS[check.level])
         typer.echo(f"{label}{check.name:<12} {check.text}")
         if check.remedy:
             typer.echo(f"{'':<16} -> {check.remedy}")
@@ -216,21 +124,3 @@ def _print(found: Diagnosis, verdict: str) -> None:
         typer.echo(f"{'':<16} not known to this firmware: {', '.join(found.report.unread)}")
     if not found.errors:
         typer.echo(verdict)
-
-
-def _document(path: Path, found: Diagnosis) -> dict[str, Any]:
-    report = found.report
-    return {
-        "config": str(path),
-        "fit": found.errors == 0,
-        "checks": [asdict(check) for check in found.checks],
-        "autopilot": report
-        and {
-            "firmware": report.firmware.name.lower(),
-            "version": report.version,
-            "armed": report.armed,
-            "unread": report.unread,
-        },
-        "parameters": [asdict(finding) for finding in report.findings] if report else [],
-        "fixed": found.fixed,
-    }

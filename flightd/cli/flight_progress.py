@@ -8,13 +8,13 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from flightd.core.types import Status
+from flightd.core.snapshot import Snapshot
 
 _PLAIN_NS = 10_000_000_000
 
 
 class FlightProgress:
-    """Shows each status it is called with: a bar on a terminal, a line now and then elsewhere."""
+    """Shows each snapshot it is called with: a bar on a terminal, a line now and then elsewhere."""
 
     def __init__(self, shown: bool) -> None:
         self._shown = shown
@@ -37,24 +37,24 @@ class FlightProgress:
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
-    def __call__(self, status: Status) -> None:
+    def __call__(self, snapshot: Snapshot) -> None:
         if not self._shown:
             return
         detail = (
-            f"at {status.node or '-':<4} to {status.goal:<4} {status.height_m:4.1f} m  "
-            f"battery {status.battery_frac:4.0%}  {status.fps:3.0f} fps  "
-            f"latency {status.latency_ms.get('total', 0.0):3.0f} ms"
+            f"at {snapshot.node or '-':<4} to {snapshot.goal:<4} {snapshot.height_m:4.1f} m  "
+            f"battery {snapshot.battery_frac:4.0%}  {snapshot.fps:3.0f} fps  "
+            f"latency {snapshot.latency_ms.get('total', 0.0):3.0f} ms"
         )
         if not self._live:
-            if status.stamp_ns - self._plain_ns >= _PLAIN_NS:
-                self._plain_ns = status.stamp_ns
+            if snapshot.stamp_ns - self._plain_ns >= _PLAIN_NS:
+                self._plain_ns = snapshot.stamp_ns
                 print(
-                    f"{status.phase:<9} {status.nodes_done}/{status.nodes_planned} nodes  {detail}",
+                    f"{snapshot.phase:<9} {snapshot.nodes_done}/{snapshot.nodes_planned} nodes  {detail}",
                     file=sys.stderr,
                 )
             return
         if self._task is None:
-            self._task = self._progress.add_task("", total=max(status.nodes_planned, 1), detail="")
+            self._task = self._progress.add_task("", total=max(snapshot.nodes_planned, 1), detail="")
         self._progress.update(
-            self._task, completed=status.nodes_done, description=status.phase.value, detail=detail
+            self._task, completed=snapshot.nodes_done, description=snapshot.phase.value, detail=detail
         )

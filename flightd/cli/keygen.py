@@ -11,6 +11,8 @@ from typing import Annotated
 
 import typer
 
+from flightd.cli.options import AsJson
+
 
 def register(app: typer.Typer) -> None:
     """Hang the command under `app`."""
@@ -23,7 +25,7 @@ def keygen(
         str, typer.Option(metavar="URL", help="Give the autopilot the key over this cable.")
     ] = "",
     system_id: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id of the vehicle.")] = 1,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Make the secret key of a MAVLink 2 link that is signed, and give it to the autopilot.
 
@@ -32,9 +34,10 @@ def keygen(
     sent as it is.  The keys of ground stations are made by flightctl keygen.
 
     \b
-    flightd keygen --mavlink /etc/flightd/mavlink.key
-    flightd keygen --mavlink /etc/flightd/mavlink.key --send serial:///dev/ttyACM0:115200
-    then in the configuration: [vehicle] signing_key = "mavlink.key"
+    Examples:
+      flightd keygen --mavlink /etc/flightd/mavlink.key
+      flightd keygen --mavlink /etc/flightd/mavlink.key --send serial:///dev/ttyACM0:115200
+      then in the configuration: [vehicle] signing_key = "mavlink.key"
     """
     from flightd.adapters.vehicle.mavlink.link.key_transfer import give_key, refuse_overheard
     from flightd.adapters.vehicle.mavlink.link.signing import make_key, read_key

@@ -2,42 +2,50 @@
 
 from __future__ import annotations
 
-import typer
+from typing import Annotated
 
-from flightd import __version__
-from flightd.cli import calibrate, doctor, inventory, keygen, log, replay, report, run, sim, vision
+from flightd.cli import (
+    bench,
+    calibrate,
+    codes,
+    detect,
+    doctor,
+    evaluate,
+    guide,
+    inventory,
+    keygen,
+    log,
+    replay,
+    report,
+    run,
+    sim,
+    train_colour,
+)
 from flightd.cli import map as site_map
+from flightd.cli.application import application, keep_blocks, version_option
 from flightd.cli.exits import run_app
 
-app = typer.Typer(
-    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
-)
-vision.register(app)
-sim.register(app)
-calibrate.register(app)
-run.register(app)
-doctor.register(app)
-report.register(app)
-replay.register(app)
-log.register(app)
-keygen.register(app)
-site_map.register(app)
-inventory.register(app)
-
-
-def _version(wanted: bool) -> None:
-    if wanted:
-        print(f"flightd {__version__}")
-        raise typer.Exit
+app = application("flightd")
+for command in (
+    detect, evaluate, codes, bench, train_colour, sim, calibrate, run, doctor, report, replay, log, keygen,
+    site_map, inventory, guide,
+):  # fmt: skip
+    command.register(app)
 
 
 @app.callback()
-def flightd(
-    version: bool = typer.Option(
-        False, "--version", callback=_version, is_eager=True, help="Print the version."
-    ),
-) -> None:
-    """Fly a camera drone along the painted guide lines of a warehouse floor."""
+def flightd(_version: Annotated[bool, version_option("flightd")] = False) -> None:
+    """Fly a camera drone along the painted guide lines of a warehouse floor.
+
+    \b
+    Examples:
+      flightd sim
+      flightd doctor --config configs/ardupilot.toml
+      flightd run --config configs/ardupilot.toml
+    """
+
+
+keep_blocks(app)
 
 
 def main() -> None:

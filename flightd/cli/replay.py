@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-import sys
-import tomllib
 from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightd.core.errors import InputError, RunError
+from flightd.cli.options import AsJson, Log
+from flightd.cli.tables import stdout
+from flightd.core.errors import RunError
 
 if TYPE_CHECKING:
-    from flightd.config.schema import Config
     from flightd.replay.decision_compare import Comparison
-    from flightd.replay.log import FlightLog
 
 
 def register(app: typer.Typer) -> None:
@@ -26,16 +23,14 @@ def register(app: typer.Typer) -> None:
 
 
 def replay(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A flight log (flight.mcap).")],
+    log: Log,
     tolerance: Annotated[
         float, typer.Option(min=0.0, help="Largest difference of a decision's number that is no failure.")
     ] = 0.0,
     pixels: Annotated[
         float, typer.Option(min=0.0, help="The same for the lines in the (compressed) pictures.")
     ] = 0.5,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else.")
-    ] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Take a recorded flight through today's code and compare every decision with the record.
 
@@ -43,24 +38,28 @@ def replay(
     see the same (within the tolerances), 1 if they drift.
 
     \b
-    flightd replay out/flight.mcap
-    flightd replay out/flight.mcap --tolerance 1e-6 --json
+    Examples:
+      flightd replay out/flight.mcap
+      flightd replay out/flight.mcap --tolerance 1e-6 --json
     """
     from flightd.app.build import detector_of, pilot_of
-    from flightd.config.site_file import parse_site
+    from flightd.app.recording import SETTING_TOPICS, recorded_setting
     from flightd.core.topics import Topic
-    from flightd.replay.decision_compare import replay_decisions
+    from flightd.replay.decision_compare import comparison_document, replay_decisions
     from flightd.replay.log import read_log
     from flightd.replay.perception_compare import replay_pictures
+    from flightd.studies.progress_bar import watched
 
-    recorded = read_log(log, {Topic.TICK, Topic.DECISION, Topic.CONFIG, Topic.MAP})
-    config = _config(recorded)
-    site = parse_site(_document(recorded, Topic.MAP), f"{log} (map)")
-    decisions = replay_decisions(recorded, pilot_of(config, site).step)
-    seen = replay_pictures(log, detector_of(config, site)().detect)
+    recorded = read_log(log, {Topic.TICK, Topic.DECISION, *SETTING_TOPICS})
+    flown = recorded_setting(recorded)
+    ticks = sum(entry.topic == Topic.TICK for entry in recorded.entries)
+    with watched(pilot_of(flown.config, flown.site, flown.order).step, "deciding", ticks) as step:
+        decisions = replay_decisions(recorded, step)
+    with watched(detector_of(flown.config, flown.site)().detect, "seeing") as detect:
+        seen = replay_pictures(log, detect)
     passed = decisions.within(tolerance) and seen.within(pixels)
     if as_json:
-        print(json.dumps(_told(decisions) | {"pictures": asdict(seen), "passed": passed}))
+        print(json.dumps(comparison_document(decisions) | {"pictures": asdict(seen), "passed": passed}))
     else:
         _print(decisions)
         print(
@@ -68,7 +67,7 @@ def replay(
             f"{seen.theta_max_deg:.2f} degrees, {seen.gone} gone, {seen.new} new"
         )
     if not passed:
-        raise RunError(f"{log}: {_complaint(decisions, tolerance)}")
+        raise RunError(_complaint(decisions, tolerance), file=log)
 
 
 def _complaint(decisions: Comparison, tolerance: float) -> str:
@@ -79,46 +78,10 @@ def _complaint(decisions: Comparison, tolerance: float) -> str:
     return "the pictures are seen differently"
 
 
-def _config(log: FlightLog) -> Config:
-    """The configuration of the flight."""
-    from flightd.config.schema import parse_config
-    from flightd.core.topics import Topic
-
-    text = _document(log, Topic.CONFIG)
-    try:
-        table = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
-    except ValueError as err:
-        raise InputError(f"{log.path}: its configuration cannot be read ({err})") from None
-    return parse_config(table, log.path)
-
-
-def _document(log: FlightLog, topic: str) -> str:
-    from flightd.core.topics import Document
-
-    documents = log.messages(Document, topic)
-    if not documents:
-        raise InputError(f"{log.path}: holds no {topic.strip('/')}, so it cannot be replayed")
-    return documents[-1].text
-
-
-def _told(comparison: Comparison) -> dict[str, Any]:
-    return {
-        "ticks": comparison.ticks,
-        "identical": comparison.identical,
-        "differing": comparison.differing,
-        "missing": comparison.missing,
-        "drift": [
-            asdict(drift) | {"largest": drift.largest if math.isfinite(drift.largest) else None}
-            for drift in comparison.drifts
-        ],
-    }
-
-
 def _print(comparison: Comparison) -> None:
     if comparison.identical:
         print(f"{comparison.ticks} ticks replayed: every decision is the same")
         return
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(title=f"{comparison.differing} of {comparison.ticks} decisions drift")
@@ -129,4 +92,4 @@ def _print(comparison: Comparison) -> None:
         table.add_row(
             drift.field, str(drift.ticks), f"{drift.first_s:.2f} s", largest, drift.recorded, drift.replayed
         )
-    Console(width=None if sys.stdout.isatty() else 160).print(table)
+    stdout().print(table)

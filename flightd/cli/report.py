@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from flightd.cli.options import AsJson, Log
+
 
 def register(app: typer.Typer) -> None:
     """Hang `report` on `app`."""
@@ -15,7 +17,7 @@ def register(app: typer.Typer) -> None:
 
 
 def report(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A flight log (flight.mcap).")],
+    log: Log,
     out: Annotated[
         Path | None, typer.Option(metavar="F", help="Where to write the page; report.html beside LOG.")
     ] = None,
@@ -25,7 +27,7 @@ def report(
     expected: Annotated[
         Path | None, typer.Option(metavar="CSV", help="Expected stock to compare with: location,code.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Make a report of a flight: one HTML file that needs nothing else.
 
@@ -33,12 +35,13 @@ def report(
     shows the racks by state, the evidence pictures, the exceptions and what differs from the expected stock.
 
     \b
-    flightd report out/flight.mcap
-    flightd report /var/lib/flightd/flight.mcap --out flight.html
-    flightd report out/flight.mcap --expected stock.csv
+    Examples:
+      flightd report out/flight.mcap
+      flightd report /var/lib/flightd/flight.mcap --out flight.html
+      flightd report out/flight.mcap --expected stock.csv
     """
-    from flightd.cli.inventory_count import counted_beside
     from flightd.replay.report.page import write_report
+    from flightd.studies.counted_stock import counted_beside
 
     page = out if out is not None else log.with_name("report.html")
     write_report(log, page, counted_beside(log, inventory, expected))

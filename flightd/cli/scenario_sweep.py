@@ -1,100 +1,53 @@
-"""`flightd sim --scenario all`: every shipped scenario flown, one after the other, and one table of them."""
+"""What `flightd sim --scenario all` prints: a line for each flight that begins, and one table of all."""
 
 from __future__ import annotations
 
+import itertools
 import json
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, fields, replace
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from flightd.app.simulation.launch import Simulation, fly
+from flightd.app.simulation.scenario_sweep import Prepare, SweptFlight, fly_every_hazard
+from flightd.app.simulation.simulation import Simulation
 from flightd.cli.flight_progress import FlightProgress
 from flightd.core.errors import RunError
-from flightd.core.topics import Topic
-from flightd.core.types import Event, Status
 from flightd.mission.safety.hazards import HAZARDS
-from flightd.replay.log import read_log
-from flightd.sim.judge.verdict import ScenarioVerdict, judge
-from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.scenario.scenario import Scenario
-from flightd.sim.scenario.scenario_files import load_scenario, shipped_scenarios
 
-SHORT_ROUTE = 'mission.nodes=["A2", "A4"]'
-"""On the demo site, past the place where the shipped faults begin."""
+_HEADINGS = ("hazard", "found after", "action", "phases", "outcome", "shelf", "off line", "as it should")
 
 
-def sweep(prepare: Callable[[Scenario, str], Simulation], *, as_json: bool) -> None:
-    """Fly what `prepare` makes of each scenario.  RunError when one does not end as the table says."""
-    paths = shipped_scenarios()
-    flights = []
-    for number, row in enumerate(HAZARDS, start=1):
-        scenario = load_scenario(paths[row.name])
-        simulation = prepare(scenario, row.name)
-        speed = "lockstep" if simulation.speed is None else "in real time"
-        print(f"flightd: {number} of {len(HAZARDS)}: {row.name}, {speed}", file=sys.stderr, flush=True)
-        ended = ""
-        try:
-            with FlightProgress(shown=not as_json) as progress:
-                fly(replace(simulation, observer=progress))
-        except RunError as err:
-            ended = str(err)
-        flights.append((simulation, verdict_of(simulation, row.name), ended))
-    wrong = [verdict.hazard for _, verdict, ended in flights if verdict.wrong or ended]
+def sweep(prepare: Prepare, *, as_json: bool) -> None:
+    """Fly every hazard and print how it went.  RunError when one does not end as the table says."""
+    flights = list(fly_every_hazard(prepare, _announced(shown=not as_json)))
+    wrong = [flight.verdict.hazard for flight in flights if not flight.as_it_should]
     if as_json:
-        rows = [
-            asdict(verdict)
-            | {"error": ended, "real_time": simulation.speed is not None, "seed": simulation.seed}
-            for simulation, verdict, ended in flights
-        ]
-        print(json.dumps({"flights": rows, "wrong": wrong}, indent=2))
+        print(json.dumps({"flights": [flight.document() for flight in flights], "wrong": wrong}, indent=2))
     else:
-        _print([(verdict, ended) for _, verdict, ended in flights])
+        _print(flights)
     if wrong:
         raise RunError(f"{len(wrong)} of {len(flights)} did not go as the table says: {', '.join(wrong)}")
 
 
-def verdict_of(simulation: Simulation, name: str) -> ScenarioVerdict:
-    """What the logs of a flight say of the hazard `name`, which its scenario expects."""
-    expected = simulation.scenario.expect
-    assert expected is not None
-    row = next(row for row in HAZARDS if row.name == name)
-    flight = read_log(simulation.flight_log, {Topic.STATUS, Topic.EVENT})
-    truth = read_log(simulation.truth_log, {Topic.TRUTH, Topic.FAULT}).entries
-    told = [(entry.topic, entry.message) for entry in truth if isinstance(entry.message, dict)]
-    return judge(
-        row,
-        expected,
-        simulation.site,
-        [note["stamp_ns"] for topic, note in told if topic == Topic.FAULT and note["began"]],
-        flight.messages(Status),
-        flight.messages(Event),
-        [_kinematics(message) for topic, message in told if topic == Topic.TRUTH],
-    )
+def _announced(*, shown: bool) -> Callable[[str, Simulation], FlightProgress]:
+    numbers = itertools.count(1)
+
+    def observe(hazard: str, simulation: Simulation) -> FlightProgress:
+        speed = "lockstep" if simulation.speed is None else "in real time"
+        print(f"flightd: {next(numbers)} of {len(HAZARDS)}: {hazard}, {speed}", file=sys.stderr, flush=True)
+        return FlightProgress(shown=shown)
+
+    return observe
 
 
-def _kinematics(message: dict[str, Any]) -> Kinematics:
-    """Viewers' fields stand beside the truth's own."""
-    return Kinematics(**{field.name: message[field.name] for field in fields(Kinematics)})
-
-
-def _print(rows: Sequence[tuple[ScenarioVerdict, str]]) -> None:
+def _print(flights: Sequence[SweptFlight]) -> None:
     table = Table(title="Every hazard, flown", title_justify="left")
-    for heading in (
-        "hazard",
-        "found after",
-        "action",
-        "phases",
-        "outcome",
-        "shelf",
-        "off line",
-        "as it should",
-    ):
+    for heading in _HEADINGS:
         table.add_column(heading)
-    for v, ended in rows:
+    for flight in flights:
+        v = flight.verdict
         table.add_row(
             v.hazard,
             "-" if v.found_s is None else f"{v.found_s:.2f} s",
@@ -103,6 +56,6 @@ def _print(rows: Sequence[tuple[ScenarioVerdict, str]]) -> None:
             v.outcome,
             "-" if v.min_shelf_distance_m is None else f"{v.min_shelf_distance_m:.2f} m",
             f"{v.off_line_max_m:.2f} m",
-            "; ".join(filter(None, (v.wrong, ended))) or "yes",
+            "; ".join(filter(None, (v.wrong, flight.error))) or "yes",
         )
     Console(file=sys.stdout).print(table)

@@ -6,7 +6,7 @@ import math
 
 from pydantic import Field
 
-from flightd.config.section import FocalX, FocalY, Height, OpticsSection, Width
+from flightd.config.camera import FocalX, FocalY, Height, OpticsSection, Width
 from flightd.core.camera_view import ForwardMount
 
 
@@ -22,15 +22,21 @@ class FrontCameraConfig(OpticsSection):
     )
     width_px: Width = 1280
     height_px: Height = 800
-    fps: float = Field(4.0, gt=0, le=120, description="frame rate asked for")
+    fps: float = Field(4.0, gt=0, le=120, description="frame rate that the camera is set to")
     fx_px: FocalX = 1000.0
     fy_px: FocalY = 1000.0
     mount_yaw_deg: float = Field(
-        0.0, ge=-180, le=180, description="0 looks along the nose, + clockwise: 90 looks to the right"
+        0.0,
+        ge=-180,
+        le=180,
+        description="direction of the view: 0 along the nose, + clockwise, 90 to the right",
     )
-    mount_pitch_deg: float = Field(0.0, ge=-80, le=80, description="+ looks up")
+    mount_pitch_deg: float = Field(0.0, ge=-80, le=80, description="elevation of the view: + looks up")
     exposure_s: float = Field(
-        0.002, gt=0, le=0.1, description="limits the speed while looking: blur stays within 0.75 module"
+        0.002,
+        gt=0,
+        le=0.1,
+        description="exposure time; the speed while looking keeps the blur within 0.75 module",
     )
     latency_s: float = Field(
         0.080, ge=0, le=1, description="from mid-exposure to arrival, least delay of the path"

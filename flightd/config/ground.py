@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import ipaddress
 from pathlib import Path
-from typing import Self
+from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
+from flightd.config.hazards import LossAction
 from flightd.config.section import Section
-from flightd.mission.guidance import LossAction
 
 
 class GroundConfig(Section):
     """The link to ground stations (ZMQ): off until it is told where to listen."""
+
+    files: ClassVar = ("server_key", "clients", "audit")
 
     listen: str = Field(
         "",
@@ -48,13 +50,6 @@ class GroundConfig(Section):
                     '(see `flightctl keygen`), or set listen = "127.0.0.1"'
                 )
         return self
-
-    def beside(self, folder: Path) -> Self:
-        """The same with the key files' relative paths taken from `folder`."""
-        files = {key: getattr(self, key) for key in ("server_key", "clients", "audit")}
-        return self.model_copy(
-            update={key: (folder / path).resolve() for key, path in files.items() if path is not None}
-        )
 
 
 def is_loopback(host: str) -> bool:

@@ -7,12 +7,15 @@ from pathlib import Path
 import flightd
 from flightd.core.errors import InputError
 
-_PLACES = (Path("configs"), Path(flightd.__file__).parent.parent / "configs", Path("/etc/flightd"))
+_PACKAGE = Path(flightd.__file__).parent
+_PLACES = (Path("configs"), _PACKAGE.parent / "configs", Path("/etc/flightd"), _PACKAGE / "configs")
+"""The folder one stands in, the checkout, the installed service, and what every wheel carries."""
 
 
 def shipped(name: str) -> Path:
-    """The file `name` of `configs/`: of the folder one stands in, the checkout, or the installed system."""
+    """The file `name` of `configs/`, of the first place that has it.  InputError when none has."""
     for place in _PLACES:
         if (place / name).is_file():
             return place / name
-    raise InputError(f"{name}: not found in {', '.join(map(str, _PLACES))}; give a file of your own")
+    remedy = "give a file of your own"
+    raise InputError(f"not found in {', '.join(map(str, _PLACES))}", file=name, remedy=remedy)

@@ -1,18 +1,53 @@
-"""The configuration's sections on scanning shelves and on the inventory that it makes."""
+"""The section of the configuration on scanning shelves."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Self
 
 from pydantic import Field, model_validator
 
-from flightd.config.section import Section
-from flightd.mission.scan.views import ScanParams
+from flightd.config.section import Section, unit
+
+
+class ScanExpert(Section):
+    """What is left alone unless the shelves or their labels are unlike others."""
+
+    darker: float = Field(
+        0.4,
+        ge=0.05,
+        le=1,
+        description="exposure of a second look where labels are burnt out, against the usual one",
+        json_schema_extra=unit("share"),
+    )
+    brighter: float = Field(
+        2.5,
+        ge=1,
+        le=10,
+        description="exposure of a second look where labels are too dark, against the usual one",
+        json_schema_extra=unit("share"),
+    )
+    label_reach_m: float = Field(
+        0.3, ge=0, le=2, description="room above and below a label that must be in the picture with it"
+    )
+    least_probability: float = Field(
+        0.99,
+        ge=0.5,
+        lt=1,
+        description="least probability that a code belongs to a location for it to count there",
+        json_schema_extra=unit("probability"),
+    )
+    revisits: int = Field(
+        2, ge=0, le=10, description="most times that a node is flown to again, its findings withdrawn"
+    )
 
 
 class ScanConfig(Section):
-    """How the front camera counts the locations of a shelf.  Lengths in m, times in s."""
+    """How the front camera counts the locations of a shelf.
+
+    A view ends when every location in it is decided, at the latest after `view_s`; what is undecided then
+    is looked at again from `retakes` other places, up to `step_m` nearer and `aside_m` along the aisle.
+    Before that, where the light is the trouble, it is looked at again from the same place, `expert.darker`
+    or `expert.brighter`."""
 
     min_height_m: float = Field(0.8, ge=0.5, le=20, description="lowest flight along a shelf")
     max_height_m: float | None = Field(
@@ -25,13 +60,18 @@ class ScanConfig(Section):
     aside_m: float = Field(0.4, ge=0, le=1, description="and how far along the aisle")
     clearance_m: float = Field(0.8, ge=0.2, le=5, description="never nearer to the shelf than this")
     least_integrity: float = Field(
-        0.97, ge=0.5, lt=1, description="a picture counts where the place is at least so sure"
+        0.97,
+        ge=0.5,
+        lt=1,
+        description="a picture counts where the place is at least so sure",
+        json_schema_extra=unit("probability"),
     )
     confirm_stops: int = Field(
         2, ge=1, le=20, description="nodes reached without a doubt until a node's count is booked"
     )
     workers: int = Field(1, ge=1, le=16, description="code reader processes")
     timeout_s: float = Field(3.0, gt=0.05, le=30, description="a reader that takes longer is replaced")
+    expert: ScanExpert = ScanExpert()
 
     @model_validator(mode="after")
     def _heights_in_order(self) -> Self:
@@ -39,40 +79,6 @@ class ScanConfig(Section):
             raise ValueError("min_height_m <= max_height_m is required")
         return self
 
-    def params(self, highest_m: float, aside_per_height: float) -> ScanParams:
-        """`highest_m` is what the ceiling allows, `aside_per_height` how far from its node the drone still
-        sees the node's lines, for each metre of height."""
-        return ScanParams(
-            min_height_m=self.min_height_m,
-            max_height_m=highest_m if self.max_height_m is None else min(self.max_height_m, highest_m),
-            pictures=self.pictures,
-            view_s=self.view_s,
-            retakes=self.retakes,
-            step_m=self.step_m,
-            aside_m=self.aside_m,
-            aside_per_height=aside_per_height,
-            clearance_m=self.clearance_m,
-            least_integrity=self.least_integrity,
-            confirm_stops=self.confirm_stops,
-        )
-
-
-class InventoryConfig(Section):
-    """Where the count is kept."""
-
-    folder: Path | None = Field(
-        None,
-        description="folder of the inventory (`flightd inventory`), relative to this file; none: not kept",
-    )
-    run: str = Field(
-        "",
-        max_length=80,
-        description="name of the count; a flight of the same name goes on where the last one ended; "
-        "empty: each flight is a count of its own",
-    )
-
-    def beside(self, folder: Path) -> Self:
-        """The same with paths taken from `folder`."""
-        if self.folder is None:
-            return self
-        return self.model_copy(update={"folder": (folder / self.folder).resolve()})
+    def highest_m(self, ceiling_m: float) -> float:
+        """The highest view where nothing may be flown above `ceiling_m`."""
+        return ceiling_m if self.max_height_m is None else min(self.max_height_m, ceiling_m)

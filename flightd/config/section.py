@@ -2,47 +2,42 @@
 
 from __future__ import annotations
 
-from typing import Annotated, TypeAlias
+from pathlib import Path
+from typing import Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field
-
-from flightd.core.geometry import Lens
-
-Width: TypeAlias = Annotated[int, Field(ge=16, le=7680, description="picture width")]
-Height: TypeAlias = Annotated[int, Field(ge=16, le=4320, description="picture height")]
-FocalX: TypeAlias = Annotated[float, Field(gt=1, le=20000, description="focal length in x")]
-FocalY: TypeAlias = Annotated[float, Field(gt=1, le=20000, description="focal length in y")]
-_Bend = Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)]
-_Offset = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
+from pydantic import BaseModel, ConfigDict
 
 
 class Section(BaseModel):
-    """Frozen once read; a key that it does not know is refused."""
+    """Frozen once read; a key that it does not know is refused.
+
+    Keys whose names do not end in a unit name it: `Field(..., json_schema_extra=unit("share"))`."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    files: ClassVar[tuple[str, ...]] = ()
+    """The keys that name files relative to the configuration's own folder."""
 
-class OpticsSection(Section):
-    """A camera's picture, lens and place on the drone; pixels, metres."""
+    def with_values(self, **values: Any) -> Self:
+        """The same with other values, checked as those of a file; a table's by a dict of its keys:
+        `config.with_values(mission={"nodes": ("A2",)})`.  ValidationError where one is out of range."""
+        given = dict(self)
+        for key, value in values.items():
+            inner = given.get(key)
+            if isinstance(inner, Section) and isinstance(value, dict):
+                given[key] = inner.with_values(**value)
+            else:
+                given[key] = value
+        return type(self)(**given)
 
-    width_px: Width
-    height_px: Height
-    fx_px: FocalX
-    fy_px: FocalY
-    cx_px: float | None = Field(
-        None, allow_inf_nan=False, description="principal point x; the picture's middle when left out"
-    )
-    cy_px: float | None = Field(
-        None, allow_inf_nan=False, description="principal point y; the picture's middle when left out"
-    )
-    distortion: tuple[_Bend, _Bend, _Bend, _Bend, _Bend] = Field(
-        (0.0, 0.0, 0.0, 0.0, 0.0), description="k1 k2 p1 p2 k3, OpenCV's order"
-    )
-    mount_offset_m: tuple[_Offset, _Offset, _Offset] = Field(
-        (0.0, 0.0, 0.0), description="camera from the range finder's origin: forward, right, down"
-    )
+    def beside(self, folder: Path) -> Self:
+        """The same with its files' relative paths taken from `folder`."""
+        given = {key: getattr(self, key) for key in self.files}
+        return self.model_copy(
+            update={key: (folder / path).resolve() for key, path in given.items() if path is not None}
+        )
 
-    def lens(self) -> Lens:
-        cx = (self.width_px - 1) / 2 if self.cx_px is None else self.cx_px
-        cy = (self.height_px - 1) / 2 if self.cy_px is None else self.cy_px
-        return Lens(self.width_px, self.height_px, self.fx_px, self.fy_px, cx, cy, self.distortion)
+
+def unit(name: str) -> dict[str, Any]:
+    """The unit of a key whose name tells none."""
+    return {"unit": name}

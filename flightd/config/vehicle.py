@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -12,6 +12,8 @@ from flightd.config.section import Section
 
 class VehicleConfig(Section):
     """The link to the autopilot, and what it is given besides setpoints."""
+
+    files: ClassVar = ("signing_key", "signing_stamp")
 
     kind: Literal["ardupilot", "px4", "ardrone", "mavsdk"] = Field(
         "ardupilot", description="which adapter flies"
@@ -81,10 +83,3 @@ class VehicleConfig(Section):
         if self.signing_key is None:
             return None
         return self.signing_stamp or self.signing_key.with_name(f"{self.signing_key.name}.stamp")
-
-    def beside(self, folder: Path) -> Self:
-        """The same with the files' relative paths taken from `folder`."""
-        files = {key: getattr(self, key) for key in ("signing_key", "signing_stamp")}
-        return self.model_copy(
-            update={key: (folder / path).resolve() for key, path in files.items() if path is not None}
-        )

@@ -5,22 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from flightd.control.pid import Pid, PidGains
+from flightd.config.control import ControlConfig
+from flightd.control.pid import Pid
 from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.core.types import AttitudeSetpoint
 
 _TRIM_MPS2 = 0.8
 """The most that is leaned against a push when not even the velocity is reckoned any more: five degrees."""
-
-
-@dataclass(frozen=True, slots=True)
-class FlightGains:
-    """Horizontal loop in m/s^2 per m, one each for the grid's x and y; yaw in rad/s per rad; height in
-    m/s per m."""
-
-    horizontal: PidGains
-    yaw: PidGains
-    height: PidGains
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +46,15 @@ class Reference:
 class FlightController:
     """Position, yaw and height loops.  Reset before flying after a time without control."""
 
-    def __init__(self, gains: FlightGains) -> None:
-        self._gains = gains
-        self._x = Pid(gains.horizontal)
-        self._y = Pid(gains.horizontal)
-        self._yaw = Pid(gains.yaw)
-        self._height = Pid(gains.height)
+    def __init__(self, config: ControlConfig) -> None:
+        expert = config.expert
+        integral_mps2 = expert.horizontal_integral_limit_mps2
+        self._gains = config.horizontal
+        self._most_mps2 = expert.horizontal_output_limit_mps2
+        self._x = Pid(config.horizontal, integral_mps2, self._most_mps2)
+        self._y = Pid(config.horizontal, integral_mps2, self._most_mps2)
+        self._yaw = Pid(config.yaw, expert.yaw_integral_limit_radps, expert.yaw_output_limit_radps)
+        self._height = Pid(config.height, expert.height_integral_limit_mps, expert.height_output_limit_mps)
 
     def reset(self) -> None:
         for loop in (self._x, self._y, self._yaw, self._height):
@@ -71,7 +65,7 @@ class FlightController:
         known = (motion.x_m, motion.y_m, motion.vx_mps, motion.vy_mps, motion.yaw_rad, motion.yaw_rate_radps)
         if not all(map(math.isfinite, (*known, reference.x_m, reference.y_m, reference.yaw_rad))):
             return self.level(now_ns, motion, reference, dt_s)
-        kd = self._gains.horizontal.kd
+        kd = self._gains.kd
         ax = self._x.step(
             reference.x_m - motion.x_m, motion.vx_mps, dt_s, reference.ax_mps2 + kd * reference.vx_mps
         )
@@ -97,8 +91,7 @@ class FlightController:
     ) -> AttitudeSetpoint:
         """Come to rest by the velocity alone (`reckoned`: it is known), then lean only against the steady
         push as it was last known (grid axes), at most `_TRIM_MPS2`; straight, height held."""
-        gains = self._gains.horizontal
-        most = gains.output_limit
+        gains, most = self._gains, self._most_mps2
         trim = most if reckoned else _TRIM_MPS2
         ax, ay = (-min(max(push, -trim), trim) for push in push_mps2)
         moving = (motion.vx_mps, motion.vy_mps, motion.yaw_rad)

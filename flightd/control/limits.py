@@ -5,27 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from flightd.config.control import ControlConfig
 from flightd.core.geometry import GRAVITY_MPS2
 from flightd.core.types import AttitudeSetpoint
 
 _GAP_S = 0.1
 """A longer gap between two setpoints counts as this long."""
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Largest magnitudes.  Tilt and its rate are limited in roll and pitch each; `jerk_mps3` is that of
-    the horizontal acceleration g tan(tilt) as a vector.  By data older than `stale_s` nothing leans or
-    turns."""
-
-    tilt_rad: float
-    tilt_rate_radps: float
-    yaw_rate_radps: float
-    climb_mps: float
-    descend_mps: float
-    jerk_mps3: float = 12.0
-    yaw_accel_radps2: float = 3.0
-    stale_s: float = 0.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +32,11 @@ OPEN = Surroundings()
 
 
 class Limiter:
-    """Applies `Limits` to one stream of setpoints, each relative to the one before it."""
+    """Applies the limits to one stream of setpoints, each relative to the one before it: tilt and its rate
+    in roll and pitch each, the jerk of the horizontal acceleration g tan(tilt) as a vector.  By data older
+    than `expert.stale_s` nothing leans or turns."""
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: ControlConfig) -> None:
         self._limits = limits
         self._last = AttitudeSetpoint(0)
 
@@ -62,23 +49,23 @@ class Limiter:
         limits, last = self._limits, self._last
         dt_s = min(max((wanted.stamp_ns - last.stamp_ns) * 1e-9, 0.0), _GAP_S)
         roll, pitch, yaw_rate = wanted.roll_rad, wanted.pitch_rad, wanted.yaw_rate_radps
-        if around.at_once or not around.data_age_s <= limits.stale_s:  # NaN is stale, too
+        if around.at_once or not around.data_age_s <= limits.expert.stale_s:  # NaN is stale, too
             roll = pitch = yaw_rate = 0.0
-        roll, pitch = _clamp(roll, limits.tilt_rad), _clamp(pitch, limits.tilt_rad)
+        roll, pitch = _clamp(roll, limits.max_tilt_rad), _clamp(pitch, limits.max_tilt_rad)
         if around.back is not None:
             roll, pitch = _inwards(roll, pitch, around.back)
-            most = max(abs(roll), abs(pitch), limits.tilt_rad) / limits.tilt_rad
+            most = max(abs(roll), abs(pitch), limits.max_tilt_rad) / limits.max_tilt_rad
             roll, pitch = roll / most, pitch / most
         if not around.at_once:
             roll, pitch = self._swing(roll, pitch, dt_s)
             yaw_rate = last.yaw_rate_radps + _clamp(
-                yaw_rate - last.yaw_rate_radps, limits.yaw_accel_radps2 * dt_s
+                yaw_rate - last.yaw_rate_radps, limits.expert.max_yaw_accel_radps2 * dt_s
             )
-        climb = min(max(wanted.climb_mps, -limits.descend_mps), limits.climb_mps)
+        climb = min(max(wanted.climb_mps, -limits.max_descend_mps), limits.max_climb_mps)
         if not around.headroom_m > 0.0:  # NaN is no headroom
             climb = min(climb, 0.0)
         limited = AttitudeSetpoint(
-            wanted.stamp_ns, roll, pitch, _clamp(yaw_rate, limits.yaw_rate_radps), climb
+            wanted.stamp_ns, roll, pitch, _clamp(yaw_rate, limits.max_yaw_rate_radps), climb
         )
         self._last = limited
         return limited
@@ -89,12 +76,12 @@ class Limiter:
         # both axes by the same share, so that a lean which leads back never leads out on its way
         d_roll, d_pitch = roll - last.roll_rad, pitch - last.pitch_rad
         widest = max(abs(d_roll), abs(d_pitch))
-        share = min(1.0, limits.tilt_rate_radps * dt_s / widest) if widest else 1.0
+        share = min(1.0, limits.expert.max_tilt_rate_radps * dt_s / widest) if widest else 1.0
         roll, pitch = last.roll_rad + share * d_roll, last.pitch_rad + share * d_pitch
         change = GRAVITY_MPS2 * math.hypot(
             math.tan(roll) - math.tan(last.roll_rad), math.tan(pitch) - math.tan(last.pitch_rad)
         )
-        most = limits.jerk_mps3 * dt_s
+        most = limits.expert.max_jerk_mps3 * dt_s
         if change <= most:
             return roll, pitch
         part = most / change

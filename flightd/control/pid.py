@@ -2,30 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-
-@dataclass(frozen=True, slots=True)
-class PidGains:
-    """`kp` per unit of error, `ki` per unit second, `kd` per unit of the measurement's rate.
-    `integral_limit` bounds the integral's share of the output, `output_limit` the whole."""
-
-    kp: float
-    ki: float
-    kd: float
-    integral_limit: float
-    output_limit: float
-
-    def __post_init__(self) -> None:
-        if min(self.kp, self.ki, self.kd) < 0 or self.integral_limit < 0 or not self.output_limit > 0:
-            raise ValueError(f"PID gains must not be negative: {self}")
+from flightd.config.control import PidGains
 
 
 class Pid:
-    """One loop.  The derivative acts on the measured rate, so a jump of the setpoint does not kick."""
+    """One loop: kp per unit of error, ki per unit second, kd per unit of the measured rate; the integral's
+    share of the output is bounded, and the output as a whole.  The derivative acts on the measured rate, so
+    a jump of the setpoint does not kick."""
 
-    def __init__(self, gains: PidGains) -> None:
+    def __init__(self, gains: PidGains, integral_limit: float, output_limit: float) -> None:
         self._gains = gains
+        self._integral_limit = integral_limit
+        self._output_limit = output_limit
         self._integral = 0.0
 
     @property
@@ -34,7 +22,7 @@ class Pid:
         return self._integral
 
     def reset(self, integral: float = 0.0) -> None:
-        limit = self._gains.integral_limit
+        limit = self._integral_limit
         self._integral = min(max(integral, -limit), limit)
 
     def step(self, error: float, rate: float, dt_s: float, feed_forward: float = 0.0) -> float:
@@ -46,9 +34,9 @@ class Pid:
         g = self._gains
         direct = g.kp * error - g.kd * rate + feed_forward
         candidate = self._integral + g.ki * error * dt_s
-        candidate = min(max(candidate, -g.integral_limit), g.integral_limit)
+        candidate = min(max(candidate, -self._integral_limit), self._integral_limit)
         output = direct + candidate
-        if abs(output) <= g.output_limit or output * error < 0:
+        if abs(output) <= self._output_limit or output * error < 0:
             self._integral = candidate
         output = direct + self._integral
-        return min(max(output, -g.output_limit), g.output_limit)
+        return min(max(output, -self._output_limit), self._output_limit)

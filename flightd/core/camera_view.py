@@ -23,6 +23,15 @@ _LEAST_SLOPE = 1e-6
 """Rays that run so nearly along a shelf front (across per unit of ray) meet it nowhere of use."""
 
 
+@dataclass(frozen=True, slots=True)
+class FloorReach:
+    """How far a down camera surely sees the floor along the drone's nose and across it, from straight
+    below, for each metre of height."""
+
+    ahead: float = 0.28
+    aside: float = 0.28
+
+
 class AnyMount(Protocol):
     """How a camera sits in the body."""
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from flightd.core.flight_order import FlightOrder
 from flightd.core.scanning import CodeSet, Finding
 from flightd.core.types import (
     AttitudeSetpoint,
@@ -22,8 +23,8 @@ from flightd.core.types import (
 class Topic(enum.StrEnum):
     """Names of the streams in `flight.mcap`; TRUTH, SCENARIO and FAULT are in the simulator's `truth.mcap`.
 
-    TICK and DECISION are all that the pilot was given and all that it answered (`pilot.TickInput`,
-    `pilot.TickOutput`), so that a flight can be replayed; the others are for people and their tools.
+    TICK and DECISION are all that the pilot was given and all that it answered (`core.tick.TickInput`,
+    `core.tick.TickOutput`), so that a flight can be replayed; the others are for people and their tools.
     """
 
     LINES = "/lines"
@@ -40,6 +41,7 @@ class Topic(enum.StrEnum):
     DECISION = "/decision"
     CONFIG = "/config"
     MAP = "/map"
+    ORDER = "/order"
     TRUTH = "/truth"
     SCENARIO = "/scenario"
     FAULT = "/fault"
@@ -64,7 +66,7 @@ class Document:
 FOR_PEOPLE = frozenset(Topic) - {Topic.FRAME, Topic.TICK, Topic.DECISION}
 """All but the pictures and what only a replay needs."""
 
-RETAINED = frozenset({Topic.CONFIG, Topic.MAP, Topic.SCENARIO})
+RETAINED = frozenset({Topic.CONFIG, Topic.MAP, Topic.ORDER, Topic.SCENARIO})
 """Topics whose newest message holds for the whole flight, so that every log file must carry it."""
 
 MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(
@@ -81,6 +83,7 @@ MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(
         Topic.FRAME: RecordedFrame,
         Topic.CONFIG: Document,
         Topic.MAP: Document,
+        Topic.ORDER: FlightOrder,
         Topic.SCENARIO: Document,
     }
 )

@@ -358,7 +358,7 @@ class Phase(enum.StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """The daemon at one glance, made at each tick.
+    """A `core.snapshot.Snapshot` as the flight log keeps it.
 
     `latency_ms` are the newest frame's stages: capture, transport, detection, track (each from its
     predecessor), and total (mid-exposure to setpoint on the wire).

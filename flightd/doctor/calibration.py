@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from flightd.config.schema import CameraConfig
+from flightd.config.camera import CameraConfig
 from flightd.core.geometry import Lens
 from flightd.doctor.check import Check, error, ok, warning
 from flightd.site.site import Site

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from flightd.adapters.camera.connect import connect_camera
 from flightd.config.schema import Config
 from flightd.core.errors import TransientError, UnavailableError
+from flightd.core.tick import TICK_S
 from flightd.core.types import Image
 from flightd.doctor.check import Check, error, ok, warning
-from flightd.pilot import TICK_S
 from flightd.ports import Clock, Vehicle
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from flightd.vision.lines.detector import Detector

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from flightd.config.schema import RecorderConfig
+from flightd.config.recorder import RecorderConfig
 from flightd.doctor.check import Check, error, ok, warning
 
 _TICK_RESOLUTION_S = 0.001

@@ -79,8 +79,8 @@ def judge(config: VehicleConfig, report: ExaminationReport) -> list[Check]:
     else:
         checks.append(ok("vehicle", text))
     slow = too_slow(report.heartbeat_hz)
-    if slow:
-        checks.append(warning("heartbeat", slow, _BEATS))
+    if slow is not None:
+        checks.append(warning("heartbeat", str(slow), _BEATS))
     else:
         checks.append(ok("heartbeat", f"{report.heartbeat_hz:.0f} heartbeats a second"))
     for found in report.findings:

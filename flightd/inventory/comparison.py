@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -102,6 +102,34 @@ def _expected_code(
 
 def _confidence(record: LocationRecord) -> float:
     return record.observation.confidence if record.observation else 0.0
+
+
+def comparison_document(
+    lines: Sequence[Difference], doubtful: Mapping[str, str], without_node: Sequence[str]
+) -> dict[str, object]:
+    """The comparison as JSON has it; `without_node` are the doubtful locations that no mission reaches."""
+    return {
+        "outcomes": {outcome.value: count for outcome, count in outcome_counts(lines).items()},
+        "lines": [
+            {
+                "outcome": line.outcome.value,
+                "location": line.location,
+                "text": line.text,
+                "found": line.found,
+                "found_at": line.found_at,
+                "confidence": line.confidence,
+            }
+            for line in lines
+        ],
+        "recount": dict(doubtful),
+        "recount_without_node": list(without_node),
+    }
+
+
+def outcome_counts(lines: Iterable[Difference]) -> dict[ComparisonOutcome, int]:
+    """How many lines have each outcome, none left out."""
+    counts = Counter(line.outcome for line in lines)
+    return {outcome: counts[outcome] for outcome in ComparisonOutcome}
 
 
 def doubtful_locations(

@@ -22,10 +22,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from flightd.config.localisation import LocalisationConfig
+from flightd.core.camera_view import FloorReach
+from flightd.core.tracks import TrackedLine, TrackSet
 from flightd.core.types import GridPose
 from flightd.localisation.hypotheses import Places
 from flightd.localisation.junction_landmarks import Landmark, LandmarkBook
@@ -41,8 +43,6 @@ from flightd.localisation.safe_moves import Reach
 from flightd.site.nearest_node import NodeIndex
 from flightd.site.painted_lines import PaintMap
 from flightd.site.site import Site
-from flightd.tracking.axis_filters import TrackedLine
-from flightd.tracking.line_tracker import TrackSet
 
 _MIN_HITS = 3
 _ENDS_ALONG_X = (1, 4)
@@ -57,41 +57,23 @@ _GAP_S = 0.6
 """Without a line for so long, the count may have slipped."""
 
 
-@dataclass(frozen=True, slots=True)
-class LocaliserParams:
-    """What the filter starts from and how it doubts; shares are probabilities."""
-
-    start_sigma_m: float = 0.15
-    carried: float = 0.1
-    """Odds of standing on one certain other node nearby against standing on the start node: more than
-    what is tolerated of a position that is told, so that only what is seen makes it sure."""
-    carried_m: float = 3.0
-    """At this distance from the start node the odds have halved."""
-    most_places: int = 48
-    slip: float = 2e-4
-    """Of being one cell off, to each neighbour, at each new node."""
-    slip_in_gap: float = 5e-3
-    """The same after a gap without lines."""
-    elsewhere: float = 1e-5
-    view_ahead: float = 0.28
-    view_aside: float = 0.28
-    """What is within this times the height, along the nose and across it, is surely in the picture."""
-    due_s: float = 0.5
-    """Paint in sure view for so long is seen, or is not there."""
+_DEFAULTS = LocalisationConfig()
 
 
 class GridLocaliser:
-    """Position and node on the map, from `start_node` on."""
+    """Position and node on the map, from `start_node` on, by a camera whose picture surely shows `view`."""
 
     def __init__(
         self,
         site: Site,
         start_node: str,
-        params: LocaliserParams | None = None,
+        view: FloorReach,
+        config: LocalisationConfig = _DEFAULTS,
         model: SensorModel | None = None,
     ) -> None:
         self._site = site
-        self._params = params or LocaliserParams()
+        self._view = view
+        self._params = config.expert
         self._model = model or SensorModel()
         self._paint = PaintMap.of(site)
         self._nodes = NodeIndex(site)
@@ -214,7 +196,7 @@ class GridLocaliser:
     def _see(self, tracks: TrackSet, height_m: float) -> None:
         """Weigh the places by junctions that have become sure."""
         places = self._places
-        sure_m = 1.5 * height_m * min(self._params.view_ahead, self._params.view_aside)
+        sure_m = 1.5 * height_m * min(self._view.ahead, self._view.aside)
         here = places.at_m[places.best]
         for mark in self._marks.frame(
             tracks.junctions, float(here[0]), float(here[1]), sure_m, self._leave_m(height_m)
@@ -263,7 +245,7 @@ class GridLocaliser:
 
     def _view_m(self, yaw_rad: float, height_m: float) -> tuple[float, float]:
         """How far the picture surely reaches along x and along y."""
-        ahead, aside = self._params.view_ahead * height_m, self._params.view_aside * height_m
+        ahead, aside = self._view.ahead * height_m, self._view.aside * height_m
         c, s = abs(math.cos(yaw_rad)) + 1e-6, abs(math.sin(yaw_rad)) + 1e-6
         return min(ahead / c, aside / s), min(ahead / s, aside / c)
 

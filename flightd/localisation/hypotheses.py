@@ -13,9 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from flightd.core.geometry import Matrix
+from flightd.core.tracks import TrackedLine
 from flightd.localisation.observation_model import Flags, Indices, SensorModel, line_density
 from flightd.site.painted_lines import AxisLines, PaintMap
-from flightd.tracking.axis_filters import TrackedLine
 
 _FAR_M = 1e7
 _DRIFT_MPS = 0.15

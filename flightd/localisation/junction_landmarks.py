@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flightd.tracking.ground_junctions import FloorJunction
+from flightd.core.tracks import FloorJunction
 
 _SAME_M = 0.2
 _FRAMES = 6

@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from flightd.core.tracks import TrackSet
 from flightd.core.types import GridPose
 from flightd.site.painted_lines import nearest_end
 from flightd.site.site import PAD_REACH_M, Pad, PadSign, Site
-from flightd.tracking.line_tracker import TrackSet
 
 _SIZE_SHARE = 0.3
 _LEAST_SEEN = 4

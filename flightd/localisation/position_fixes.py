@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from flightd.core.geometry import Matrix
+from flightd.core.tracks import MarkerOffset, PadOffset
 from flightd.site.site import Marker, PadSign, Site
-from flightd.tracking.line_tracker import MarkerOffset, PadOffset
 
 _AWAY_M = 2.0
 _FRAMES = 3

@@ -1,108 +1,17 @@
-"""What the mission knows, is told to do, and wants: its parameters, senses and guidance."""
+"""What the mission knows and wants: its inputs and guidance."""
 
 from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+from flightd.config.mission import MissionConfig
 from flightd.control.flight_controller import Reference
 from flightd.core.types import HEALTHY, Demand, GridPose, Health, Phase, VehicleState
-from flightd.mission.battery.consumption import BatteryParams
 
 CEILING_MARGIN_M = 0.5
 """Nothing is flown nearer to the ceiling."""
-
-
-class LossAction(enum.StrEnum):
-    """What to do when something is lost that flying itself does not need: ground station, flight log."""
-
-    CONTINUE = "continue"
-    HOLD = "hold"
-    HOME = "home"
-    LAND = "land"
-
-
-@dataclass(frozen=True, slots=True)
-class HazardParams:
-    """When things count as wrong, and for how long that is borne; SI units, radians."""
-
-    heartbeat_land_s: float = 5.0
-    height_share: float = 0.25
-    """In flight the two agree to 0.02, and the tracker goes by the lines from 0.2 on.  A drone that climbs
-    by a range finder which reads 0.7 m too little is told wrong by 0.30 when it comes to rest at 1.6 m."""
-    heading_rad: float = math.radians(5.0)
-    disagree_s: float = 0.4
-    push_mps2: float = 0.8
-    off_m: float = 0.5
-    push_s: float = 2.0
-    headroom_m: float = 0.5
-    corridor_m: float = 0.45
-    outside_s: float = 0.2
-    latency_s: float = 0.25
-    overload_s: float = 3.0
-    brake_s: float = 2.4
-    search_s: float = 0.0
-    search_climb_m: float = 0.3
-    search_land_s: float = 1.4
-    blind_land_s: float = 2.2
-    blind_m: float = 0.5
-    record_lost: LossAction = LossAction.HOME
-
-
-@dataclass(frozen=True, slots=True)
-class MissionParams:
-    """Speeds, distances and waiting times of the mission; SI units, radians."""
-
-    height_m: float = 1.5
-    speed_mps: float = 0.8
-    accel_mps2: float = 0.5
-    climb_mps: float = 0.6
-    climb_accel_mps2: float = 0.6
-    turn_rate_radps: float = 0.6
-    turn_accel_radps2: float = 1.0
-    dwell_s: float = 2.0
-    settle_s: float = 0.5
-    arrive_m: float = 0.08
-    arrive_mps: float = 0.10
-    arrive_yaw_rad: float = math.radians(4.0)
-    height_reached_m: float = 0.15
-    view_height_m: float = 0.08
-    steer_above_m: float = 0.45
-    land_mps: float = 0.35
-    touch_mps: float = 0.20
-    blind_mps: float = 0.9
-    touch_blind_mps: float = 0.3
-    touch_below_m: float = 0.35
-    lines_hold_s: float = 0.25
-    lines_land_s: float = 4.0
-    lines_found_s: float = 1.0
-    followed_hold_s: float = 0.8
-    telemetry_hold_s: float = 0.3
-    telemetry_land_s: float = 3.0
-    arm_timeout_s: float = 60.0
-    adopt_s: float = 1.5
-    recover_s: float = 2.0
-    phase_slack_s: float = 20.0
-    phase_share: float = 2.0
-    battery_start_frac: float = 0.3
-    battery_home_frac: float = 0.2
-    battery_land_frac: float = 0.1
-    max_lead_m: float = 0.35
-    autostart: bool = True
-    integrity_min: float = 0.95
-    doubt_s: float = 0.3
-    first_look_s: float = 3.0
-    settled_s: float = 0.5
-    relocate_look_s: float = 4.0
-    relocate_s: float = 30.0
-    relocate_climb_m: float = 1.0
-    ceiling_m: float = math.inf
-    overhead_m: tuple[float, ...] = ()
-    ground_lost_s: float = 5.0
-    ground_lost: LossAction = LossAction.CONTINUE
-    battery: BatteryParams = field(default_factory=BatteryParams)
-    hazards: HazardParams = HazardParams()
 
 
 class Guide(enum.Enum):
@@ -177,7 +86,7 @@ class MissionInputs:
         """How far away a place on the map is; infinite where there is no pose."""
         return math.inf if self.pose is None else math.hypot(self.pose.x_m - to[0], self.pose.y_m - to[1])
 
-    def is_sure(self, params: MissionParams) -> bool:
+    def is_sure(self, params: MissionConfig) -> bool:
         """The drone is over the node that it is believed to be over."""
         return self.pose is not None and self.pose.integrity >= params.integrity_min
 

@@ -1,24 +1,32 @@
-"""The mission: what to do now, from what is known now.  Pure: time and data in, guidance out."""
+"""The mission: what to do now, from what is known now.  Pure: time and data in, guidance out.
+
+Which phase follows is `machine`'s to say.  This is what belongs to each change: the route, the scan and the
+reference are led along, and people are told.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from flightd.config.hazards import LossAction
+from flightd.config.schema import Config
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, Phase
 from flightd.mission.battery.swap import BatterySwap
 from flightd.mission.event_log import EventLog
 from flightd.mission.flight.phase_progress import PhaseProgress
 from flightd.mission.flight.reference import ReferenceGenerator, ReferenceTask
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.guidance import Guidance, LossAction, MissionInputs, MissionParams
+from flightd.mission.guidance import CEILING_MARGIN_M, Guidance, MissionInputs
+from flightd.mission.machine import BEGIN, COMMANDS, TABLE, Cause, State, next_state, taken_in
+from flightd.mission.orders import StandingOrders
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
+from flightd.mission.reasons import Happened, Plain, Reason, Refused, in_words
 from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
 from flightd.mission.safety.hazards import ACTIONS, Action, triggers_of
 from flightd.mission.safety.readiness import not_fresh, not_ready
-from flightd.mission.scan.scan_phase import ScanPhase
-from flightd.mission.scan.scanner import Scanner
-from flightd.mission.transition_table import TABLE, next_phase
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
+from flightd.mission.scan.shelf_scan import ShelfScan
 from flightd.mission.triggers import Trigger
 from flightd.site.site import Site
 
@@ -29,52 +37,68 @@ _DEMANDS = {
     Phase.ABORTED: Demand.DISARM,
     Phase.PILOT: Demand.HANDS_OFF,
 }
-_ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.DONE, Phase.ABORTED, Phase.PILOT}
 _NEAR_FLOOR = {Phase.TAKE_OFF, Phase.LAND}
 """Where lines come and go."""
-_OVER = (Phase.DONE, Phase.ABORTED, Phase.PILOT)
-_WAITING = (Phase.PREFLIGHT, Phase.SWAP)
-_STOPPED = (Phase.HOLD, Phase.RELOCATE, Phase.ACQUIRE)
+_HALTED = (Phase.HOLD, Phase.RELOCATE)
+_INTERRUPTED = (*_HALTED, Phase.ACQUIRE)
 """Where a leg that was interrupted goes on from."""
+_VISITED = (Trigger.DWELLED, Trigger.ROUTE_DONE)
 
 
 class Mission:
     """One flight of one plan: call `step` at a fixed rate, `drain_events` for what happened.
 
-    With a `scanner` the locations of each visited node are counted instead of a plain hover."""
+    With a `scanner` the locations of each visited node are counted instead of a plain hover; `overhead_m` are
+    the heights below the keep-outs (`Site.overhead_m`); with `autostart` (None: as configured) it waits for
+    no start command."""
 
     def __init__(
         self,
         site: Site,
         plan: FlightPlan,
         policy: HeadingPolicy,
-        params: MissionParams,
-        scanner: Scanner | None = None,
+        config: Config,
+        scanner: AnyScanner = NO_SCAN,
+        overhead_m: Sequence[float] = (),
+        *,
+        autostart: bool | None = None,
     ) -> None:
         start = site.nodes[plan.start]
-        self._params = params
+        self._config = config
         self._scanner = scanner
         self._events = EventLog()
+        self._orders = StandingOrders()
         self._route = Itinerary(site, plan, policy, self._events)
-        self._scan = ScanPhase(site, scanner, params, policy)
-        self._progress = PhaseProgress(params, self._route, self._scan)
-        self._watch = HazardMonitor(params)
-        self._relocator = Relocator(params)
+        self._scan = ShelfScan(site, scanner)
+        self._progress = PhaseProgress(config, self._route, self._scan, scanner)
+        self._watch = HazardMonitor(config)
+        self._relocator = Relocator(config.mission, site.ceiling_m - CEILING_MARGIN_M, overhead_m)
         self._steering = ReferenceGenerator(
-            params, site.ceiling_m, self._watch, self._relocator, (start.x_m, start.y_m, plan.start_yaw_rad)
+            config, site.ceiling_m, self._watch, self._relocator, (start.x_m, start.y_m, plan.start_yaw_rad)
         )
-        self._charging = BatterySwap(site, policy, params, scanner, self._route, self._watch)
-        self.phase = Phase.PREFLIGHT
-        self.reason = self._cause = ""
-        self._aborting = False
-        self._on_pad_leg = False
-        self._paused = False
+        self._charging = BatterySwap(site, policy, config, scanner, self._route, self._watch)
+        self.state = BEGIN
+        self._reason: Reason | None = None
+        self._cause: Reason | None = None
         self._leg_along_x: bool | None = None
-        self._stopped = False
         self._ground_lost = False
-        self._started = params.autostart
-        self._found_flying = False
-        self._ordered: Trigger | None = None
+        self._autostart = config.mission.autostart if autostart is None else autostart
+        self._await_start()
+
+    @property
+    def phase(self) -> Phase:
+        """What it does now."""
+        return self.state.phase
+
+    @property
+    def reason(self) -> str:
+        """Why it does that, in words; empty before the first tick."""
+        return "" if self._reason is None else in_words(self._reason)
+
+    @property
+    def airborne(self) -> bool:
+        """The mission believes the drone to fly and answers for it."""
+        return self.state.airborne
 
     @property
     def goal(self) -> Stop:
@@ -92,34 +116,27 @@ class Mission:
         return self._route.visited
 
     @property
-    def airborne(self) -> bool:
-        """The mission believes the drone to fly and answers for it."""
-        return self.phase not in _ON_GROUND
+    def remaining(self) -> tuple[str, ...]:
+        """The stops that this mission still wants to visit, in order."""
+        return self._route.remaining
 
     def drain_events(self) -> tuple[Event, ...]:
-        told = self._scanner.drain_events() if self._scanner else []
-        return (*self._events.drain(), *told)
+        return (*self._events.drain(), *self._scanner.drain_events())
 
     def command(self, command: Command, now_ns: int) -> None:
-        """Take an operator's order; it acts at the next step."""
-        kind = command.kind
+        """Take an operator's order; a landing or stop acts at the next step."""
+        kind, trigger = command.kind, COMMANDS[command.kind]
         self._events.tell(now_ns, EventLevel.INFO, "command", f"{kind.value} {command.node}".strip())
-        if kind is CommandKind.START:
-            self._started = True
-        elif kind is CommandKind.PAUSE:
-            self._paused = True
-        elif kind is CommandKind.RESUME:
-            self._paused = False
-        elif kind in {CommandKind.HOME, CommandKind.GOTO} and not self.airborne:
-            self._events.tell(
-                now_ns, EventLevel.WARNING, "command", f"{kind.value} refused: the drone does not fly"
-            )
-        elif kind is CommandKind.HOME:
-            self._go_home(now_ns, "ordered home")
+        if trigger not in taken_in(self.state):
+            self._refuse(command, now_ns)
+            return
+        self._orders.take(kind)
+        if kind is CommandKind.HOME:
+            self._go_home(trigger, Happened(trigger), now_ns)
         elif kind is CommandKind.GOTO:
             self._route.go_to(now_ns, command.node)
-        else:
-            self._ordered = Trigger.LAND_HERE if kind is CommandKind.LAND else Trigger.STOP
+        elif kind is CommandKind.START:
+            self._turn(trigger)
 
     def step(self, senses: MissionInputs) -> Guidance:
         """Advance by one tick."""
@@ -128,62 +145,67 @@ class Mission:
             self._correct(senses)
         triggers = self._triggers(senses) | doubts | self._scan.doubts(self.phase)
         self._tell_hazards(triggers, senses.now_ns)
-        phase, trigger = next_phase(self.phase, triggers)
+        _, trigger = next_state(self.state, triggers)
         if trigger is not None:
-            self._change(senses, phase, trigger)
-            self._ordered = None if trigger is self._ordered else self._ordered
+            self._begin(senses, trigger)
+            self._orders.acted_on(trigger)
         return self._guide(senses)
 
     # What has happened
 
     def _triggers(self, s: MissionInputs) -> set[Trigger]:
-        may_start = self.phase in _WAITING and self._started and not self._grounded(s)
-        found = self._progress.step(s, self.phase, may_start=may_start)
-        if self._ordered is not None:
-            found.add(self._ordered)
+        """What has happened by this tick.  Turning back acts at once."""
+        may_start = self.state.waiting and not self._grounded(s)
+        found = self._progress.step(s, self.state, may_start=may_start)
+        found |= self._orders.urgent
         found |= self._ground(s)
-        if self._paused:
+        if self._orders.paused:
             found.add(Trigger.HOLD)
-        if self._charging.step(s, self.phase, self.airborne):
-            self._turned_back()
+        self._turn_back(self._charging.step(s, self.state))
         if self._progress.timed_out(s.now_ns):
             found.add(Trigger.TIMED_OUT)
         found |= self._watch.step(s, self._situation(Trigger.HOLD in found))
         if Trigger.RECORD_LOST in found:
             found.remove(Trigger.RECORD_LOST)
-            found |= self._lost(self._params.hazards.record_lost, Trigger.RECORD_LOST, s.now_ns)
-        swaps = self._on_pad_leg and self._charging.swaps
-        found |= {Trigger.DOWN_TO_SWAP} if Trigger.DISARMED in found and swaps else set()
+            found |= self._lost(self._config.hazards.record_lost, Trigger.RECORD_LOST, s.now_ns)
+        if Trigger.DISARMED in found and self.state.on_pad:
+            found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found
+
+    def _landed(self) -> set[Trigger]:
+        """What a landing on the pad is more than its end."""
+        if self._charging.swaps:
+            return {Trigger.DOWN_TO_SWAP}
+        return {Trigger.NOT_COUNTED} if self._scanner.blind else set()
 
     def _lost(self, action: LossAction, trigger: Trigger, now_ns: int) -> set[Trigger]:
         """What the configured action makes of something lost."""
-        if self.airborne or (self.phase not in _OVER and action is not LossAction.CONTINUE):
+        if self.airborne or (not self.state.over and action is not LossAction.CONTINUE):
             self._events.hazard(now_ns, trigger, action.value)
-        if action is LossAction.HOME and self.airborne and not self._route.returning:
-            self._go_home(now_ns, trigger.value, in_need=True)
+        if action is LossAction.HOME and Trigger.HOME_IN_NEED in taken_in(self.state):
+            self._go_home(Trigger.HOME_IN_NEED, Happened(trigger), now_ns)
         return {LossAction.HOLD: {Trigger.HOLD}, LossAction.LAND: {trigger}}.get(action, set())
 
     def _tell_hazards(self, triggers: set[Trigger], now_ns: int) -> None:
         asked = triggers & ACTIONS.keys()
         if not self.airborne:  # on the ground only what decides something there is worth telling
-            asked &= TABLE[self.phase].keys()
+            asked &= taken_in(self.state)
         elif self.phase in _NEAR_FLOOR:
-            asked &= TABLE[self.phase].keys() | triggers_of(Action.REPORT, Action.HOME)
+            asked &= taken_in(self.state) | triggers_of(Action.REPORT, Action.HOME)
         for trigger in sorted(asked, key=list(Trigger).index):
             self._events.hazard(now_ns, trigger, ACTIONS[trigger].value)
 
     def _situation(self, paused: bool) -> FlightContext:
         if self.phase is Phase.FOLLOW:
             self._leg_along_x = self._leads_along_x()
-        elif self.phase not in _STOPPED:
+        elif self.phase not in _INTERRUPTED:
             self._leg_along_x = None
         at_height = self.airborne and self.phase not in _NEAR_FLOOR
         return FlightContext(self.airborne, paused, self._leg_along_x, self.phase is Phase.HOLD, at_height)
 
     def _ground(self, s: MissionInputs) -> set[Trigger]:
         """What a lost ground link asks for, by the configured action; the link's return ends a hold."""
-        action = self._params.ground_lost
+        action = self._config.ground.lost_action
         lost = self._watch.ground_lost(s)
         if lost is not self._ground_lost:
             self._ground_lost = lost
@@ -193,78 +215,135 @@ class Mission:
 
     def _adopting(self, s: MissionInputs) -> bool:
         """A vehicle found flying is given a moment to show that it obeys."""
-        return self.phase is Phase.RECOVER and self._progress.phase_s(s.now_ns) < self._params.adopt_s
+        return (
+            self.phase is Phase.RECOVER
+            and self._progress.phase_s(s.now_ns) < self._config.mission.expert.adopt_s
+        )
 
-    def _grounded(self, s: MissionInputs) -> str:
-        """Why it stays on the ground, or an empty text."""
-        silent = self._ground_lost and self._params.ground_lost is not LossAction.CONTINUE
-        stale = not_fresh(s, self._params, len(self.remaining)) if self.phase is Phase.SWAP else ""
-        return stale or not_ready(s, self._params, silent)
+    def _grounded(self, s: MissionInputs) -> Reason | None:
+        """Why it stays on the ground, None if nothing keeps it there."""
+        silent = self._ground_lost and self._config.ground.lost_action is not LossAction.CONTINUE
+        stale = not_fresh(s, self._config, len(self.remaining)) if self.phase is Phase.SWAP else None
+        return stale or not_ready(s, self._config, silent)
+
+    # Changing the intent of the phase in hand
+
+    def _turn(self, trigger: Trigger) -> None:
+        """Take what goes on in the same phase for something else."""
+        outcome = TABLE[self.state][trigger]
+        if outcome is not None:
+            self.state = outcome.state
+            self._cause = Happened(trigger) if outcome.cause is Cause.TRIGGER else self._cause
+
+    def _refuse(self, command: Command, now_ns: int) -> None:
+        """Say why an order has no effect."""
+        ordered = f"{command.kind.value} {command.node}".strip()
+        if command.kind in {CommandKind.HOME, CommandKind.GOTO} and not self.airborne:
+            text = f"{command.kind.value} refused: the drone does not fly"
+        elif command.kind is CommandKind.GOTO and self.state.returning:
+            text = f"{ordered} refused: on the way home"
+        else:
+            text = f"{ordered} refused: not in phase {self.phase.value}"
+        self._events.tell(now_ns, EventLevel.WARNING, "command", text)
+
+    def _go_home(self, trigger: Trigger, reason: Reason, now_ns: int) -> None:
+        """Fly to the home pad; in need by the shortest way, against one-way lines too."""
+        self._route.turn_home(now_ns, reason, in_need=trigger is Trigger.HOME_IN_NEED)
+        self._turn_back(trigger)
+
+    def _turn_back(self, trigger: Trigger | None) -> None:
+        """The route leads to a pad now; whoever paused the flight wants that, too."""
+        if trigger is not None:
+            self._orders.paused = False
+            self._turn(trigger)
+
+    def _await_start(self) -> None:
+        """On the ground before a flight: with autostart nobody has to order it."""
+        if self._autostart:
+            self._turn(Trigger.START)
 
     # Changing phase
 
-    def _change(self, s: MissionInputs, phase: Phase, trigger: Trigger) -> None:
-        before, self.phase = self.phase, phase
-        self._stopped |= trigger is Trigger.STOP
-        planned = (trigger is Trigger.ROUTE_DONE or before is Phase.LAND) and not self._stopped
-        if trigger in {Trigger.DWELLED, Trigger.ROUTE_DONE}:
+    def _begin(self, s: MissionInputs, trigger: Trigger) -> None:
+        """Begin the phase that a trigger leads to, with all that belongs to it."""
+        before, outcome = self.state, TABLE[self.state][trigger]
+        if outcome is None:
+            return
+        self.state = outcome.state
+        if trigger in _VISITED and not before.returning:
             self._route.note_visit(s.now_ns)
-        self._scan.changed(s, before, phase, trigger, self.goal, self._relocator.shift_m)
+        self._scan.follow(s, before.phase, self.phase, trigger, self.goal, self._relocator.shift_m)
         if trigger is Trigger.DWELLED:
             self._go_on(s)
+        self._anchor(s, trigger)
+        self._explain(s, trigger, outcome.cause)
+        level = EventLevel.WARNING if _alarming(before, self.state, trigger) else EventLevel.INFO
+        text = f"{before.phase.value} -> {self.phase.value}: {self.reason}"
+        self._events.tell(s.now_ns, level, "phase", text)
+        self._progress.begin(s, self.phase)
+        self._enter(s, trigger)
+
+    def _anchor(self, s: MissionInputs, trigger: Trigger) -> None:
+        """Where the phase that begins holds, if it holds anywhere."""
+        here = self._steering.anchor if s.pose is None else (s.pose.x_m, s.pose.y_m)
         if trigger is Trigger.ARRIVED:
             self._steering.anchor = (self.goal.x_m, self.goal.y_m)
-        if phase in {Phase.HOLD, Phase.RELOCATE} or (phase is Phase.LAND and not planned):
-            self._steering.anchor = (s.pose.x_m, s.pose.y_m) if s.pose is not None else self._steering.anchor
-        if phase is Phase.HOLD and s.localised:
+        elif self.phase is Phase.HOLD and s.localised:
             self._steering.anchor = s.warnings.line_m
-        self._on_pad_leg = phase is Phase.LAND and planned
-        unplanned = phase in {Phase.LAND, Phase.ABORTED, Phase.PILOT} and not planned
-        if phase is Phase.DONE:
-            if not self._aborting and self._scan.blind:
-                self._aborting, self._cause = True, self._scan.blind
-                self._events.tell(s.now_ns, EventLevel.ERROR, "not_counted", self._cause)
-            self.phase = Phase.ABORTED if self._aborting else Phase.DONE
-            self._cause = self._cause if self._aborting else "landed on the pad"
-        else:
-            refused = trigger is Trigger.TIMED_OUT and s.vehicle is not None and s.vehicle.refusal
-            self._cause = f"{trigger.value}: {s.vehicle.refusal}" if refused and s.vehicle else trigger.value
-        self.reason = self._cause
-        self._aborting |= unplanned
-        stopped = phase in {Phase.HOLD, Phase.RELOCATE}
-        level = EventLevel.WARNING if unplanned or stopped else EventLevel.INFO
-        self._events.tell(s.now_ns, level, "phase", f"{before.value} -> {self.phase.value}: {self.reason}")
-        self._progress.begin(s, self.phase)
-        if phase is Phase.LAND:
-            self._steering.land()
-        self._relocate(s, trigger)
-        if phase is Phase.SWAP:
-            self._steering.anchor = (self.goal.x_m, self.goal.y_m)
-            self._charging.await_battery(s.now_ns)
-            self._aborting, self._started = False, self._params.autostart
-        if phase is Phase.TAKE_OFF:
-            self._steering.take_off(s.height_m)
-        if phase is Phase.RECOVER and s.vehicle is not None:
-            # where it is, and so the way home, is not known
-            self._found_flying = self._route.returning = True
-            text = f"found flying in mode {s.vehicle.mode} at {s.height_m:.1f} m: level, then landing"
-            self._events.tell(s.now_ns, EventLevel.ERROR, "restart", text)
+        elif self.phase in _HALTED or (self.phase is Phase.LAND and not self.state.on_pad):
+            self._steering.anchor = here
+
+    def _explain(self, s: MissionInputs, trigger: Trigger, cause: Cause) -> None:
+        """Set the reason for the phase that begins."""
+        refusal = s.vehicle.refusal if s.vehicle is not None and trigger is Trigger.TIMED_OUT else ""
+        if trigger is Trigger.NOT_COUNTED and (blind := self._scanner.blind) is not None:
+            self._cause = blind
+            self._events.tell(s.now_ns, EventLevel.ERROR, "not_counted", in_words(blind))
+        elif cause is Cause.LANDED:
+            self._cause = Plain.LANDED
+        elif cause is Cause.TRIGGER:
+            happened = Happened(trigger)
+            self._cause = Refused(happened, refusal) if refusal else happened
+        self._reason = self._cause
+
+    def _enter(self, s: MissionInputs, trigger: Trigger) -> None:
+        """What the phase that begins starts with."""
+        match self.phase:
+            case Phase.TAKE_OFF:
+                self._steering.take_off(s.height_m)
+            case Phase.ACQUIRE if trigger is Trigger.POSITION_SURE:
+                self._rejoin(s)
+            case Phase.RELOCATE:
+                self._relocate(s)
+            case Phase.LAND:
+                self._steering.land()
+            case Phase.SWAP:
+                self._steering.anchor = (self.goal.x_m, self.goal.y_m)
+                self._charging.await_battery(s.now_ns)
+                self._await_start()
+            case Phase.RECOVER if s.vehicle is not None:
+                text = f"found flying in mode {s.vehicle.mode} at {s.height_m:.1f} m: level, then landing"
+                self._events.tell(s.now_ns, EventLevel.ERROR, "restart", text)
 
     def _go_on(self, s: MissionInputs) -> None:
         """To the next stop, which is the way back where the battery does not reach another one."""
-        if self._charging.look_ahead(s.now_ns):
-            self._turned_back()
-        self._route.advance(self._scan.heading_kept(s, self.goal, self._route.next_stop))
+        if not self.state.returning:
+            self._turn_back(self._charging.look_ahead(s.now_ns))
+        self._route.advance(s.pose, either_side=self._scan.is_scanned(self.goal))
 
-    def _relocate(self, s: MissionInputs, trigger: Trigger) -> None:
-        """Begin to look for the position, or go on from where it was found."""
-        if trigger is Trigger.POSITION_SURE:
-            self._rejoin(s)
-        elif self.phase is Phase.RELOCATE:
-            self._relocator.begin()
-            places = ", ".join(f"{node} {share:.0%}" for node, share in s.rivals[:5])
-            if places:
-                self._events.tell(s.now_ns, EventLevel.WARNING, "position", f"doubted, it may be {places}")
+    def _relocate(self, s: MissionInputs) -> None:
+        """Begin to look for the position."""
+        self._relocator.begin()
+        places = ", ".join(f"{node} {share:.0%}" for node, share in s.rivals[:5])
+        if places:
+            self._events.tell(s.now_ns, EventLevel.WARNING, "position", f"doubted, it may be {places}")
+
+    def _rejoin(self, s: MissionInputs) -> None:
+        """Go on from where the drone turned out to be."""
+        if s.pose is None:
+            return
+        self._route.recount(s.now_ns, self._scanner.take_due(), returning=self.state.returning)
+        self._route.rejoin(s.now_ns, s.pose)
 
     def _correct(self, s: MissionInputs) -> None:
         """The drone is not where it was believed to be: what was held in metres moves along."""
@@ -273,45 +352,26 @@ class Mission:
             return
         self._events.tell(s.now_ns, EventLevel.WARNING, "position", f"corrected: it is {s.pose.node}")
         self._steering.begin_anew()
-        if self.phase is Phase.LAND and self._on_pad_leg:  # not across the floor at landing height
-            self._on_pad_leg, self._steering.anchor = False, (s.pose.x_m, s.pose.y_m)
-            self._aborting, self.reason = True, "the position was corrected while landing"
+        if self.state.on_pad:
+            self._steering.anchor = (s.pose.x_m, s.pose.y_m)
         else:
             x, y = self._steering.anchor
             self._steering.anchor = (x + dx, y + dy)
-
-    def _rejoin(self, s: MissionInputs) -> None:
-        """Go on from where the drone turned out to be."""
-        if s.pose is None:
-            return
-        self._route.recount(s.now_ns, self._scan.take_due(self._route.visited))
-        self._route.rejoin(s.now_ns, s.pose)
-
-    @property
-    def remaining(self) -> tuple[str, ...]:
-        """The stops that this mission still wants to visit, in order."""
-        return self._route.remaining
-
-    def _go_home(self, now_ns: int, reason: str, *, in_need: bool = False) -> None:
-        """Fly to the home pad; `in_need` by the shortest way, against one-way lines too."""
-        self._route.turn_home(now_ns, reason, in_need=in_need)
-        self._paused, self._aborting = False, True
-
-    def _turned_back(self) -> None:
-        """The battery ends this flight, and the mission unless another one goes on."""
-        self._paused, self._aborting = False, not self._charging.goes_on
+        self._turn(Trigger.POSITION_CORRECTED)
 
     # What to do
 
     def _guide(self, s: MissionInputs) -> Guidance:
-        if self.phase in _WAITING:
-            self.reason = self._grounded(s) or "waiting for the start command"
+        if self.state.waiting:
+            self._reason = self._grounded(s) or Plain.AWAITS_START
         if not self.airborne:
             return self._steering.on_ground(self.phase, _DEMANDS.get(self.phase, Demand.FLY))
         guidance = self._steering.step(s, self._task(s.now_ns))
         if self.phase is Phase.LAND:
-            refused = guidance.demand is Demand.DISARM and s.vehicle is not None and s.vehicle.refusal
-            self.reason = f"{self._cause}: {s.vehicle.refusal}" if refused and s.vehicle else self._cause
+            refusal = s.vehicle.refusal if s.vehicle is not None else ""
+            self._reason = self._cause
+            if refusal and self._cause is not None and guidance.demand is Demand.DISARM:
+                self._reason = Refused(self._cause, refusal)
         return guidance
 
     def _leads_along_x(self) -> bool:
@@ -320,16 +380,16 @@ class Mission:
         return abs(goal.x_m - x_m) >= abs(goal.y_m - y_m)
 
     def _task(self, now_ns: int) -> ReferenceTask:
-        route = self._route
         # from a shelf's lowest level neither aisle's line would be seen on the way to another aisle
-        cruise = route.returning or not route.goal.visit or not self._leads_along_x()
-        return ReferenceTask(
-            phase=self.phase,
-            phase_s=self._progress.phase_s(now_ns),
-            goal=route.goal,
-            view=self._scan.view(self.phase),
-            cruise=cruise,
-            on_pad=self._on_pad_leg,
-            stopped=self._stopped,
-            unknown=self._found_flying,
-        )
+        cruise = self.state.returning or not self.goal.visit or not self._leads_along_x()
+        view = self._scan.view(self.phase)
+        return ReferenceTask(self.state, self._progress.phase_s(now_ns), self.goal, view, cruise)
+
+
+def _alarming(before: State, after: State, trigger: Trigger) -> bool:
+    """Whether a change of phase is none of those that were planned."""
+    if after.phase is Phase.LAND:
+        return not after.on_pad
+    if after.phase in {Phase.ABORTED, Phase.PILOT}:  # a landing has been told already
+        return before.phase is not Phase.LAND or (before.stopped and trigger is not Trigger.DISARMED)
+    return after.phase in _HALTED

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, TypeAlias
 
 import msgspec
 import numpy as np
 
 from flightd.core.errors import InputError
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
-from flightd.pilot import TickInput, TickOutput
 from flightd.replay.log import FlightLog, with_nan
 
 Step: TypeAlias = Callable[[TickInput], TickOutput]
@@ -58,6 +58,20 @@ class Comparison:
         return not self.missing and all(drift.largest <= tolerance for drift in self.drifts)
 
 
+def comparison_document(comparison: Comparison) -> dict[str, Any]:
+    """The comparison as JSON has it; a difference of what is no number has no `largest`."""
+    return {
+        "ticks": comparison.ticks,
+        "identical": comparison.identical,
+        "differing": comparison.differing,
+        "missing": comparison.missing,
+        "drift": [
+            asdict(drift) | {"largest": drift.largest if math.isfinite(drift.largest) else None}
+            for drift in comparison.drifts
+        ],
+    }
+
+
 def replay_decisions(log: FlightLog, step: Step) -> Comparison:
     """Give `step` (of a fresh pilot) every recorded tick and compare its outputs with the record.
 
@@ -66,7 +80,7 @@ def replay_decisions(log: FlightLog, step: Step) -> Comparison:
     ticks = [entry for entry in log.entries if entry.topic == Topic.TICK]
     recorded = {entry.stamp_ns: entry.message for entry in log.entries if entry.topic == Topic.DECISION}
     if not ticks:
-        raise InputError(f"{log.path}: holds no ticks to replay; an older version recorded it")
+        raise InputError("holds no ticks to replay: an older version recorded it", file=log.path)
     start_ns = ticks[0].stamp_ns
     found: dict[str, list[_Difference]] = {}
     differing = missing = 0

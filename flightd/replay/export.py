@@ -25,7 +25,7 @@ def export_csv(log: FlightLog, folder: Path) -> list[Path]:
 
     Columns are the fields by name, those inside others joined by a dot; `t_s` counts from the first
     message.  A line set has a row for each line and one with empty columns where nothing was seen.
-    Pictures are left out.  Texts are inert cells (`core.cells`).
+    Pictures are left out.  Texts are inert cells (`core.csv_text`).
     """
     start_ns = min((entry.stamp_ns for entry in log.entries if not _is_document(entry)), default=0)
     by_topic: dict[str, list[Entry]] = {}

@@ -140,19 +140,27 @@ class LogReader:
             return _decoder(MESSAGE_TYPES.get(topic, dict))(payload)
         except (msgspec.MsgspecError, KeyError, TypeError, ValueError) as err:
             raise InputError(
-                f"{self._path}: a message on {topic} is not what this version records ({err})"
+                f"is not what this version records ({err})", file=self._path, key=f"a message on {topic}"
             ) from None
+
+
+def check_is_log(path: Path) -> None:
+    """InputError for a file that is not there, is empty, or is no MCAP file."""
+    _opened(path).close()
 
 
 def _opened(path: Path) -> BinaryIO:
     try:
         stream = path.open("rb")
     except OSError as err:
-        raise InputError(f"{path}: cannot open the flight log: {err.strerror}") from None
-    if not MAGIC.startswith(stream.read(len(MAGIC))):
-        stream.close()
-        raise InputError(f"{path}: not a flight log (an MCAP file was expected)")
-    return stream
+        raise InputError(f"cannot open the flight log: {err.strerror}", file=path) from None
+    start = stream.read(len(MAGIC))
+    if start and MAGIC.startswith(start):
+        return stream
+    stream.close()
+    if not start:
+        raise InputError("the file is empty: nothing was recorded in it", file=path)
+    raise InputError("not a flight log (an MCAP file was expected)", file=path)
 
 
 @cache

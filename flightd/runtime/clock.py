@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
+from collections.abc import Callable
 from contextlib import AbstractContextManager
+from typing import TypeAlias
+
+Hold: TypeAlias = Callable[[], AbstractContextManager[None]]
+"""Entered while work outside the loop is awaited, for which virtual time has to stand still; whoever awaits
+such work is given one.  Real time cannot be held: there it is `contextlib.nullcontext`."""
 
 
 class LoopClock:
@@ -15,15 +20,7 @@ class LoopClock:
 
     def __init__(self, loop: asyncio.AbstractEventLoop | None = None) -> None:
         self._loop = loop or asyncio.get_running_loop()
-        holder = getattr(self._loop, "hold", None)
-        self._hold = holder or contextlib.nullcontext
 
     def now_ns(self) -> int:
         """Monotonic nanoseconds; the epoch is arbitrary but the same for all processes of one machine."""
         return round(self._loop.time() * 1e9)
-
-    def hold(self) -> AbstractContextManager[None]:
-        """While entered, work outside the loop is awaited for which *virtual* time must stand still.
-        Real time cannot be held: there it does nothing."""
-        manager: AbstractContextManager[None] = self._hold()
-        return manager

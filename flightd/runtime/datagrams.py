@@ -31,14 +31,21 @@ class Datagrams(Protocol):
     def close(self) -> None: ...
 
 
-async def open_datagrams(received: Received, failed: Failed, **place: Any) -> Datagrams:
-    """Open at `local_addr` or for `remote_addr`; OSError when that cannot be.
+class OpenDatagrams(Protocol):
+    """What opens a socket at `local_addr` or for `remote_addr`; OSError when that cannot be."""
 
-    A loop of virtual time has to see each datagram itself, and there nothing is ever busy.
-    """
+    async def __call__(self, received: Received, failed: Failed, **place: Any) -> Datagrams: ...
+
+
+async def open_datagrams(received: Received, failed: Failed, **place: Any) -> Datagrams:
+    """`OpenDatagrams` by the loop's own endpoint, on any loop: one of virtual time sees each datagram."""
     loop = asyncio.get_running_loop()
-    if getattr(loop, "counts_datagrams", False):
-        return (await loop.create_datagram_endpoint(lambda: _LoopDatagrams(received, failed), **place))[1]
+    return (await loop.create_datagram_endpoint(lambda: _LoopDatagrams(received, failed), **place))[1]
+
+
+async def open_paced_datagrams(received: Received, failed: Failed, **place: Any) -> Datagrams:
+    """`OpenDatagrams` that stands a flood, for what flies by the machine's clock."""
+    loop = asyncio.get_running_loop()
     transport, _ = await loop.create_datagram_endpoint(asyncio.DatagramProtocol, **place)
     own = transport.get_extra_info("socket").dup()
     transport.close()

@@ -73,11 +73,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     under way and nobody holds it.
 
     Who holds it and waits for something that hung would wait for ever: after `patience_s` of real time in
-    which nothing happened time goes on until the holds end, so that time-outs do their work.
+    which nothing happened time goes on until the holds end, so that time-outs do their work.  Each datagram
+    has to come and go by `create_datagram_endpoint`.
     """
-
-    counts_datagrams = True
-    """Each one has to come and go by `create_datagram_endpoint`."""
 
     def __init__(self, start_s: float = 1000.0, patience_s: float = HOLD_PATIENCE_S) -> None:
         self._now_s = start_s

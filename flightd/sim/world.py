@@ -6,15 +6,18 @@ It knows nothing of the daemon but the address that its camera reports to.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal, Protocol
 
-from flightd.core.errors import UnavailableError
+from flightd.core.errors import FlightdError, RunError, UnavailableError
+from flightd.core.extras import missing_extra
 from flightd.core.topics import Topic
 from flightd.core.types import Image
 from flightd.ports import Clock, Recorder
+from flightd.runtime.clock import Hold
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.px4 import Px4Peer
@@ -22,15 +25,16 @@ from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.floor.appearance import DEFAULT, Appearance
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe, AirframeParams
-from flightd.sim.plant.external_simulator import ExternalVehicle, Placement
+from flightd.sim.plant.battery_swapper import BatterySwapper
+from flightd.sim.plant.external_simulator import ExternalVehicle
+from flightd.sim.plant.external_truth import Placement
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.plant.pad_crew import PadCrew
-from flightd.sim.plant.wind import Draught
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.plant.wind import WindParams
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.scenario.fault_schema import Fault
-from flightd.sim.scenario.faults import Told, WorldFaults, bare_boxes
+from flightd.sim.scenario.faults import FaultListener, WorldFaults, bare_boxes
 from flightd.sim.sensors.camera import CameraPeer
 from flightd.sim.sensors.instruments import Sensors
 from flightd.sim.sensors.optics import SimCamera
@@ -45,7 +49,7 @@ class FrontSpec:
 
     address: tuple[str, int]
     camera: FrontCamera = field(default_factory=FrontCamera)
-    look: RackLook = field(default_factory=RackLook)
+    appearance: RackAppearance = field(default_factory=RackAppearance)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +71,7 @@ class WorldSpec:
     camera: SimCamera = field(default_factory=SimCamera)
     front: FrontSpec | None = None
     appearance: Appearance = DEFAULT
-    draught: Draught = field(default_factory=Draught)
+    wind: WindParams = field(default_factory=WindParams)
     battery_frac: float = 1.0
     battery_ah: float = 5.0
     swap_s: float = 0.0
@@ -92,68 +96,45 @@ class World:
     """The running peers.  `open` binds the vehicle's port, `run` lives until cancelled."""
 
     def __init__(
-        self, spec: WorldSpec, clock: Clock, recorder: Recorder, tell: Told = lambda _index, _begins: None
+        self,
+        spec: WorldSpec,
+        clock: Clock,
+        recorder: Recorder,
+        tell: FaultListener = lambda _index, _begins: None,
+        hold: Hold = nullcontext,
     ) -> None:
-        """`tell` hears of the faults that are not the world's own.  InputError for one at an unknown node."""
+        """`tell` hears of the faults that are not the world's own; time is held by `hold` while pictures are
+        being drawn.  InputError for a fault at an unknown node."""
         self._clock = clock
         self._recorder = recorder
-        start = spec.start or spec.site.home.node
-        pad = next(pad for pad in spec.site.pads if pad.node == start)
-        pad_x_m, pad_y_m = spec.site.pad_centre(pad)
-        x_m, y_m = pad_x_m + spec.start_offset_m[0], pad_y_m + spec.start_offset_m[1]
+        start = _placement(spec)
         airframe = Airframe(
             AirframeParams(battery_capacity_ah=spec.battery_ah),
-            draught=spec.draught,
+            wind=spec.wind,
             seed=spec.seed,
-            x_m=x_m,
-            y_m=y_m,
-            yaw_rad=spec.start_yaw_rad,
+            x_m=start.x_m,
+            y_m=start.y_m,
+            yaw_rad=start.yaw_rad,
             battery_frac=spec.battery_frac,
         )
         self.vehicle: VehiclePeer
         show: Callable[[Image, int], None] | None = None
         own_front: CameraPeer | None = None
         if spec.truth_url:
-            self.vehicle = ExternalVehicle(spec.truth_url, clock, Placement(x_m, y_m, spec.start_yaw_rad))
+            self.vehicle = ExternalVehicle(spec.truth_url, clock, start)
         elif spec.vehicle == "ardrone":
-            self.vehicle, show, own_front = _ardrone(spec, airframe, clock)
+            self.vehicle, show, own_front = _ardrone(spec, airframe, clock, hold)
         else:
             (port,) = spec.vehicle_ports
             peer = Px4Peer if spec.vehicle == "px4" else ArduCopterPeer
             self.vehicle = peer(clock, airframe, PeerConfig(port=port, seed=spec.seed, radio=spec.radio))
-        own = not spec.truth_url
-        self._crew = PadCrew(spec.site, airframe, spec.swap_s) if own and spec.swap_s else None
-        self._cameras = {
-            "camera": CameraPeer(
-                spec.camera,
-                partial(
-                    Renderer,
-                    spec.site,
-                    spec.camera,
-                    spec.appearance,
-                    spec.seed,
-                    bare_boxes(spec.faults, spec.site),
-                ),
-                f"camera {spec.seed}",
-                spec.camera_address,
-                self.vehicle.truth_at,
-                clock,
-                show,
-            )
-        }
+        swaps = spec.swap_s and not spec.truth_url
+        self._battery_swapper = BatterySwapper(spec.site, airframe, spec.swap_s) if swaps else None
+        self._cameras = {"camera": _down_camera(spec, self.vehicle, clock, show, hold)}
         if own_front is not None:
             self._cameras["ardrone-front-camera"] = own_front
         if spec.front is not None:
-            front = spec.front
-            self._cameras["front-camera"] = CameraPeer(
-                front.camera,
-                partial(FrontRenderer, spec.site, front.camera, front.look, spec.seed),
-                f"front camera {spec.seed}",
-                front.address,
-                self.vehicle.truth_at,
-                clock,
-            )
-
+            self._cameras["front-camera"] = _front_camera(spec, spec.front, self.vehicle, clock, hold)
         self._faults = WorldFaults(spec.faults, spec.site, self._cameras, airframe, self.vehicle, tell)
 
     async def open(self) -> tuple[str, int]:
@@ -166,18 +147,23 @@ class World:
 
     async def run(self, opened: Callable[[], None] = lambda: None) -> None:
         """Live until cancelled; `opened` is called when the vehicle can be talked to (an external one's truth
-        is known then, so that it can be drawn).  UnavailableError as for `open`."""
+        is known then, so that it can be drawn).  UnavailableError as for `open`; RunError when a peer fails:
+        the world ends with it."""
         await self.open()
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self.vehicle.run(), name="autopilot")
-            for name, camera in self._cameras.items():
-                tasks.create_task(camera.run(), name=name)
-            tasks.create_task(self._log_truth(), name="truth")
-            faults = self._faults.run(self._clock, self.vehicle.truth_at, self._recorder)
-            tasks.create_task(faults, name="faults")
-            if self._crew is not None:
-                tasks.create_task(self._crew.run(self._clock, self._at), name="crew")
-            opened()
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self.vehicle.run(), name="autopilot")
+                for name, camera in self._cameras.items():
+                    tasks.create_task(camera.run(), name=name)
+                tasks.create_task(self._log_truth(), name="truth")
+                faults = self._faults.run(self._clock, self.vehicle.truth_at, self._recorder)
+                tasks.create_task(faults, name="faults")
+                if self._battery_swapper is not None:
+                    swaps = self._battery_swapper.run(self._clock, self._at)
+                    tasks.create_task(swaps, name="battery swapper")
+                opened()
+        except ExceptionGroup as failures:
+            raise _cause(failures) from failures
 
     def _at(self, now_ns: int) -> None:
         """Bring the vehicle up to the present."""
@@ -190,8 +176,52 @@ class World:
             await asyncio.sleep(_TRUTH_PERIOD_S)
 
 
+def _placement(spec: WorldSpec) -> Placement:
+    """Where the vehicle stands at the start."""
+    start = spec.start or spec.site.home.node
+    pad = next(pad for pad in spec.site.pads if pad.node == start)
+    x_m, y_m = spec.site.pad_centre(pad)
+    return Placement(x_m + spec.start_offset_m[0], y_m + spec.start_offset_m[1], spec.start_yaw_rad)
+
+
+def _down_camera(
+    spec: WorldSpec,
+    vehicle: VehiclePeer,
+    clock: Clock,
+    show: Callable[[Image, int], None] | None,
+    hold: Hold,
+) -> CameraPeer:
+    bare = bare_boxes(spec.faults, spec.site)
+    make = partial(Renderer, spec.site, spec.camera, spec.appearance, spec.seed, bare)
+    seed, address = f"camera {spec.seed}", spec.camera_address
+    return CameraPeer(spec.camera, make, seed, address, vehicle.truth_at, clock, show, hold=hold)
+
+
+def _front_camera(
+    spec: WorldSpec, front: FrontSpec, vehicle: VehiclePeer, clock: Clock, hold: Hold
+) -> CameraPeer:
+    make = partial(FrontRenderer, spec.site, front.camera, front.appearance, spec.seed)
+    seed, name, truth_at = f"front camera {spec.seed}", "front camera", vehicle.truth_at
+    return CameraPeer(front.camera, make, seed, front.address, truth_at, clock, hold=hold, name=name)
+
+
+def _cause(failures: ExceptionGroup[Exception]) -> FlightdError:
+    """Of what a world died, as one error: what a person can do something about comes first."""
+    leaves = list(_leaves(failures))
+    told = next((leaf for leaf in leaves if isinstance(leaf, FlightdError)), None)
+    return told or RunError(f"the simulated world failed: {type(leaves[0]).__name__}: {leaves[0]}")
+
+
+def _leaves(failure: Exception) -> Iterator[Exception]:
+    if isinstance(failure, ExceptionGroup):
+        for part in failure.exceptions:
+            yield from _leaves(part)
+    else:
+        yield failure
+
+
 def _ardrone(
-    spec: WorldSpec, airframe: Airframe, clock: Clock
+    spec: WorldSpec, airframe: Airframe, clock: Clock, hold: Hold
 ) -> tuple[VehiclePeer, Callable[[Image, int], None], CameraPeer]:
     """The emulated AR.Drone, where the floor's pictures go, and its own front camera.  UnavailableError
     without its video library."""
@@ -201,12 +231,10 @@ def _ardrone(
         from flightd.sim.ardrone.server import ArDroneServer, DronePorts  # noqa: PLC0415
         from flightd.sim.ardrone.video import VideoChannel  # noqa: PLC0415
     except ModuleNotFoundError as err:
-        raise UnavailableError(
-            f"simulating an AR.Drone needs {err.name}: pip install 'flightd[ardrone]'"
-        ) from err
+        raise missing_extra("ardrone", "simulating an AR.Drone") from err
     drone = Drone(airframe, Sensors(seed=spec.seed))
     ports = DronePorts("127.0.0.1", *spec.vehicle_ports)
     server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)
-    look = spec.front.look if spec.front is not None else RackLook()
-    front = front_peer(server, spec.site, look, spec.seed, clock)
+    appearance = spec.front.appearance if spec.front is not None else RackAppearance()
+    front = front_peer(server, spec.site, appearance, spec.seed, clock, hold)
     return server, partial(server.show, camera=VideoChannel.BOTTOM), front

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from flightd.site.site import Location, Shelf, Site
 
@@ -135,3 +136,16 @@ def _shelf_distance_m(site: Site, shelf: Shelf) -> float:
 
 def _distance_m(site: Site, location: Location) -> float:
     return abs(location.y_m - site.nodes[location.node].y_m)
+
+
+def coverage_facts(reach: Coverage) -> dict[str, Any]:
+    """The coverage in numbers and lists, as JSON has it."""
+    return {
+        "read_part": round(reach.read_part, 5),
+        "px_per_module": round(reach.least_px_per_module, 3),
+        "blur_modules": round(reach.blur_modules, 3),
+        "speed_limit_mps": round(reach.speed_limit_mps, 4),
+        "unseen": list(reach.unseen),
+        "unreadable": list(reach.unreadable),
+        "problems": list(reach.problems),
+    }

@@ -236,6 +236,12 @@ class Site:
         low_m, high_m = min(ah, bh) - KEEP_OUT_CLEARANCE_M, max(ah, bh) + KEEP_OUT_CLEARANCE_M
         return not any(area.touches(ax, ay, bx, by) for area in self.between(low_m, high_m).keep_outs)
 
+    @property
+    def overhead_m(self) -> tuple[float, ...]:
+        """The heights that keep clear below each keep-out; those of one that begins on the floor are no
+        heights to fly at."""
+        return tuple(area.from_m - KEEP_OUT_CLEARANCE_M for area in self.keep_outs)
+
     def between(self, low_m: float, high_m: float) -> Site:
         """The site as it is for a drone that stays between two heights: without the keep-outs that lie
         wholly below or above."""

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.core.errors import UnavailableError
+from flightd.core.extras import missing_extra
 from flightd.core.types import Image
 
 Lines: TypeAlias = list[tuple[float, float]]
@@ -60,7 +60,7 @@ def skimage_skeleton(bgr: Image) -> Lines:
     try:
         from skimage.morphology import skeletonize
     except ImportError as err:
-        raise UnavailableError("pip install 'flightd[bench]'") from err
+        raise missing_extra("bench", "scikit-image's skeleton") from err
     thin = skeletonize(_region_grown(bgr) > 0).astype(np.uint8) * 255  # type: ignore[no-untyped-call]
     return _average(_hough(thin, min(bgr.shape[:2]) // 6), bgr.shape[1] * _CLUSTER_PX)
 

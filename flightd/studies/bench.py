@@ -25,6 +25,7 @@ from rich.table import Table
 from flightd import __version__
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Image
+from flightd.runtime.undisturbed_start import undisturbed
 from flightd.sim.dataset.generate import generate
 from flightd.studies.baselines import BASELINES
 from flightd.studies.progress_bar import track
@@ -154,7 +155,9 @@ def _all_cores(timings: Sequence[Timing], seconds: float) -> None:
     cores = os.cpu_count() or 1
     sizes = sorted({timing.size for timing in timings})
     with ProcessPoolExecutor(cores, get_context("spawn"), _start_worker, (sizes,)) as pool:
-        list(pool.map(_warm, range(4 * cores)))
+        with undisturbed():
+            started = pool.map(_warm, range(4 * cores))
+        list(started)
         for timing in track(timings, f"all {cores} cores"):
             if not timing.missing:
                 jobs = [pool.submit(_rate, timing.method, timing.size, seconds) for _ in range(cores)]

@@ -14,9 +14,9 @@ from typing import TypeAlias
 from rich.console import Console
 
 from flightd.core.errors import InputError
+from flightd.core.terminal_text import visible
 from flightd.core.types import CodeRead
-from flightd.studies.frame_files import list_files, pictures
-from flightd.studies.progress_bar import track
+from flightd.studies.frame_files import all_pictures
 from flightd.vision.shelf.code_reader import read_codes
 
 Expected: TypeAlias = Mapping[str, frozenset[str]]
@@ -56,12 +56,11 @@ class ReadVerdict:
 
 def read(paths: Sequence[Path]) -> Iterator[Page]:
     """Read every picture that `paths` mean, in order."""
-    for path in track(list_files(paths), "reading"):
-        for picture in pictures(path):
-            start = perf_counter()
-            reads = read_codes(picture.bgr)
-            ms = (perf_counter() - start) * 1e3
-            yield Page(picture.name, picture.bgr.shape[1], picture.bgr.shape[0], ms, reads)
+    for picture in all_pictures(paths, "reading"):
+        start = perf_counter()
+        reads = read_codes(picture.bgr)
+        ms = (perf_counter() - start) * 1e3
+        yield Page(picture.name, picture.bgr.shape[1], picture.bgr.shape[0], ms, reads)
 
 
 def read_expected(path: Path) -> Expected:
@@ -69,17 +68,18 @@ def read_expected(path: Path) -> Expected:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as err:
-        raise InputError(f"{path}: cannot read the labels: {err.strerror or err}") from None
+        raise InputError(f"cannot read the labels: {err.strerror or err}", file=path) from None
     except ValueError as err:
-        raise InputError(f"{path}: not JSON: {err}") from None
+        raise InputError(f"not JSON: {err}", file=path) from None
     entries = document.get("codes") if isinstance(document, dict) else None
     if not isinstance(entries, list):
-        raise InputError(f'{path}: has no list "codes"; write {{"codes": [{{"file": …, "text": …}}]}}')
+        remedy = 'write {"codes": [{"file": …, "text": …}]}'
+        raise InputError('has no list "codes"', file=path, remedy=remedy)
     texts: dict[str, set[str]] = defaultdict(set)
     for i, entry in enumerate(entries):
         file, text = (entry.get("file"), entry.get("text")) if isinstance(entry, dict) else (None, None)
         if not isinstance(file, str) or not isinstance(text, str):
-            raise InputError(f'{path}: codes[{i}]: needs "file" and "text", both strings')
+            raise InputError('needs "file" and "text", both strings', file=path, key=f"codes[{i}]")
         texts[file].add(_plain(text))
     return {file: frozenset(those) for file, those in texts.items()}
 
@@ -91,7 +91,7 @@ def compare(pages: Sequence[Page], expected: Expected) -> ReadVerdict:
     for file, texts in expected.items():
         page = told.get(file)
         if page is None:
-            raise InputError(f"{file}: is labelled, but not among the pictures")
+            raise InputError("is labelled, but not among the pictures", file=file)
         seen = {_plain(read.text) for read in page.believed}
         count += len(texts)
         read_count += len(texts & seen)
@@ -147,7 +147,7 @@ def print_page(page: Page, console: Console) -> None:
     console.print(title, style="bold", highlight=False, markup=False, soft_wrap=True)
     for read in page.believed:
         how = "checksum" if read.sure else f"{read.agreeing} reads agree"
-        line = f"  {read.symbology:<12} {_visible(read.text)}  ({how})"
+        line = f"  {read.symbology:<12} {visible(read.text)}  ({how})"
         console.print(line, highlight=False, markup=False, soft_wrap=True)
         for ai, value in read.gs1:
             console.print(f"    ({ai}) {value}", highlight=False, markup=False)
@@ -160,11 +160,6 @@ def print_page(page: Page, console: Console) -> None:
         console.print(f"  {doubtful} doubtful, not told")
 
 
-def _visible(text: str) -> str:
-    """Control characters as escapes: a terminal obeys none of what a label says."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-
-
 def print_verdict(verdict: ReadVerdict, console: Console) -> None:
     """The comparison for people."""
     share = f"{verdict.read} of {verdict.expected} codes read ({100 * verdict.read_part:.1f} %)"
@@ -173,4 +168,4 @@ def print_verdict(verdict: ReadVerdict, console: Console) -> None:
     )
     for kind, those in (("missed", verdict.missed), ("wrong", verdict.wrong)):
         for entry in those:
-            console.print(f"  {kind} {_visible(entry)}", highlight=False, markup=False, soft_wrap=True)
+            console.print(f"  {kind} {visible(entry)}", highlight=False, markup=False, soft_wrap=True)

@@ -14,9 +14,8 @@ from rich.table import Table
 
 from flightd.core.errors import InputError
 from flightd.core.types import LineSet
-from flightd.studies.frame_files import list_files, pictures
+from flightd.studies.frame_files import all_pictures
 from flightd.studies.overlay import draw, write_picture
-from flightd.studies.progress_bar import track
 from flightd.vision.lines.detector import Detector
 
 
@@ -33,19 +32,18 @@ def detect(paths: Sequence[Path], method: str, profile: str, overlay: Path | Non
     """Every picture that `paths` mean, in order; overlays are written as they are made."""
     detector = Detector(method, profile)
     names: set[str] = set()
-    for path in track(list_files(paths), "detecting"):
-        for picture in pictures(path):
-            start = perf_counter()
-            try:
-                found = detector.detect(picture.bgr)
-            except InputError as err:
-                raise InputError(f"{picture.name}: {err}") from err
-            ms = (perf_counter() - start) * 1e3
-            if overlay:
-                title = f"{method}, {detector.profile.name}: {len(found.lines)} lines, {ms:.1f} ms"
-                target = overlay / f"{_stem(picture.name, names)}.jpg"
-                write_picture(target, draw(picture.bgr, found, title))
-            yield Found(picture.name, ms, found)
+    for picture in all_pictures(paths, "detecting"):
+        start = perf_counter()
+        try:
+            found = detector.detect(picture.bgr)
+        except InputError as err:
+            raise InputError(str(err), file=picture.name) from err
+        ms = (perf_counter() - start) * 1e3
+        if overlay:
+            title = f"{method}, {detector.profile.name}: {len(found.lines)} lines, {ms:.1f} ms"
+            target = overlay / f"{_stem(picture.name, names)}.jpg"
+            write_picture(target, draw(picture.bgr, found, title))
+        yield Found(picture.name, ms, found)
 
 
 def _stem(name: str, taken: set[str]) -> str:

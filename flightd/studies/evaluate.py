@@ -111,7 +111,7 @@ def _colours(label: LabelledImage, usual: tuple[str, ...]) -> tuple[str, ...]:
 def _check_size(path: Path, bgr: Image, label: LabelledImage) -> None:
     size = (bgr.shape[1], bgr.shape[0])
     if label.width and label.height and size != (label.width, label.height):
-        raise InputError(f"{path}: is {size[0]}x{size[1]}, its label says {label.width}x{label.height}")
+        raise InputError(f"is {size[0]}x{size[1]}, its label says {label.width}x{label.height}", file=path)
 
 
 def _detect(detectors: Sequence[Detector], bgr: Image, path: Path) -> tuple[LineSet, float]:
@@ -120,7 +120,7 @@ def _detect(detectors: Sequence[Detector], bgr: Image, path: Path) -> tuple[Line
     try:
         sets = [detector.detect(bgr) for detector in detectors]
     except InputError as err:
-        raise InputError(f"{path}: {err}") from err
+        raise InputError(str(err), file=path) from err
     ms = (perf_counter() - start) * 1e3 / len(sets)
     first = sets[0]
     lines = tuple(line for found in sets for line in found.lines)

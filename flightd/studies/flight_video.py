@@ -14,6 +14,7 @@ from flightd.core.topics import RecordedFrame, Topic
 from flightd.core.types import Image, LineSet, Status
 from flightd.replay.log import LogReader, read_log
 from flightd.studies.overlay import draw
+from flightd.studies.progress_bar import track
 
 _FASTEST_FPS = 60.0
 _LONGEST_STILL = 300
@@ -28,12 +29,12 @@ def export_video(log: Path, video: Path) -> int:
     """
     stamps_ns = sorted(entry.stamp_ns for entry in LogReader(log).entries({Topic.FRAME}))
     if not stamps_ns:
-        raise InputError(f"{log}: holds no pictures; record some or export without --video")
+        raise InputError("holds no pictures", file=log, remedy="record some or export without --video")
     fps = _rate_hz(stamps_ns)
     writer: cv2.VideoWriter | None = None
     pictures = frames = 0
     try:
-        for stamp_ns, canvas in _canvases(log, stamps_ns[0]):
+        for stamp_ns, canvas in track(_canvases(log, stamps_ns[0]), "drawing", total=len(stamps_ns)):
             if writer is None:
                 writer, size = _opened(video, fps, canvas), (canvas.shape[1], canvas.shape[0])
             shown = canvas if (canvas.shape[1], canvas.shape[0]) == size else cv2.resize(canvas, size)
@@ -46,7 +47,7 @@ def export_video(log: Path, video: Path) -> int:
         if writer is not None:
             writer.release()
     if not pictures:
-        raise InputError(f"{log}: none of its pictures can be decoded")
+        raise InputError("none of its pictures can be decoded", file=log)
     return pictures
 
 
@@ -80,12 +81,12 @@ def _opened(video: Path, fps: float, canvas: Image) -> cv2.VideoWriter:
         video.parent.mkdir(parents=True, exist_ok=True)
         video.open("wb").close()  # OpenCV does not say why it cannot write
     except OSError as err:
-        raise UnavailableError(f"{video}: cannot write the video: {err.strerror}") from None
+        raise UnavailableError(f"cannot write the video: {err.strerror}", file=video) from None
     writer = cv2.VideoWriter(
         str(video), cv2.VideoWriter.fourcc(*"mp4v"), fps, (canvas.shape[1], canvas.shape[0])
     )
     if not writer.isOpened():
-        raise UnavailableError(f"{video}: this OpenCV cannot write it; name it .mp4")
+        raise UnavailableError("this OpenCV cannot write it", file=video, remedy="name it .mp4")
     return writer
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from flightd.core.errors import InputError
 from flightd.core.types import Image
+from flightd.studies.progress_bar import track
 
 IMAGE_SUFFIXES = frozenset(
     (".bmp", ".jpeg", ".jpg", ".jp2", ".pbm", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp")
@@ -38,13 +39,35 @@ def list_files(paths: Sequence[Path]) -> list[Path]:
         if path.is_dir():
             inside = sorted(p for p in path.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES | VIDEO_SUFFIXES)
             if not inside:
-                raise InputError(f"{path}: no image or video in this folder")
+                raise InputError("no image or video in this folder", file=path)
             files += inside
         elif path.exists():
             files.append(path)
         else:
-            raise InputError(f"{path}: no such file or folder")
+            raise InputError("no such file or folder", file=path)
     return files
+
+
+def all_pictures(paths: Sequence[Path], what: str) -> Iterator[NamedFrame]:
+    """Every picture of the files that `paths` mean, in order, under a progress bar called `what`.
+
+    Raises InputError as `list_files` and `pictures` do.
+    """
+    files = list_files(paths)
+    counts = [_frame_count(file) for file in files]
+    found = (picture for file in files for picture in pictures(file))
+    return track(found, what, total=sum(counts) if all(counts) else None)
+
+
+def _frame_count(path: Path) -> int:
+    """How many pictures a file holds as it says itself; 0 for a video that does not."""
+    if path.suffix.lower() not in VIDEO_SUFFIXES or not path.is_file():
+        return 1
+    capture = cv2.VideoCapture(str(path))
+    try:
+        return max(int(capture.get(cv2.CAP_PROP_FRAME_COUNT)), 0)
+    finally:
+        capture.release()
 
 
 def pictures(path: Path) -> Iterator[NamedFrame]:
@@ -65,26 +88,26 @@ def read_image(path: Path) -> Image:
     try:
         data = np.fromfile(path, np.uint8)
     except OSError as err:
-        raise InputError(f"{path}: {err.strerror}") from err
+        raise InputError(err.strerror or str(err), file=path) from err
     if data.size == 0:
-        raise InputError(f"{path}: the file is empty")
+        raise InputError("the file is empty", file=path)
     try:
         decoded = cv2.imdecode(data, cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
     except (cv2.error, MemoryError) as err:
-        raise InputError(f"{path}: cannot be decoded: too large or damaged") from err
+        raise InputError("cannot be decoded: too large or damaged", file=path) from err
     if decoded is None:
-        raise InputError(f"{path}: not an image that can be decoded (damaged, or no image at all)")
+        raise InputError("not an image that can be decoded (damaged, or no image at all)", file=path)
     if decoded.dtype == np.uint16:
         decoded = cv2.convertScaleAbs(decoded, alpha=1 / 257)
     if decoded.dtype != np.uint8:
-        raise InputError(f"{path}: pixels are {decoded.dtype}; convert the image to 8 or 16 bits")
+        raise InputError(f"pixels are {decoded.dtype}", file=path, remedy="convert the image to 8 or 16 bits")
     return np.ascontiguousarray(decoded, np.uint8)
 
 
 def _refuse_streams(path: Path) -> None:
     """A pipe or a device may never end."""
     if path.exists() and not path.is_file():
-        raise InputError(f"{path}: not a file; save the picture as one first")
+        raise InputError("not a file", file=path, remedy="save the picture as one first")
 
 
 def _frames(path: Path) -> Iterator[NamedFrame]:
@@ -100,4 +123,4 @@ def _frames(path: Path) -> Iterator[NamedFrame]:
     finally:
         capture.release()
     if number == 0:
-        raise InputError(f"{path}: no frame can be read (damaged, or a codec that is not there)")
+        raise InputError("no frame can be read (damaged, or a codec that is not there)", file=path)

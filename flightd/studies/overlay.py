@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from flightd.core.errors import InputError
+from flightd.core.errors import cannot_write
 from flightd.core.types import Image, Junction, Line, LineKind, LineSet
 from flightd.vision.training.labelled_frames import LabelledImage
 from flightd.vision.training.line_score import PictureScore
@@ -58,7 +58,7 @@ def write_picture(path: Path, canvas: Image) -> None:
         _, data = cv2.imencode(path.suffix, canvas, [cv2.IMWRITE_JPEG_QUALITY, 90])
         path.write_bytes(data.tobytes())
     except OSError as err:
-        raise InputError(f"{path}: {err.strerror}") from err
+        raise cannot_write(path, err) from err
 
 
 def _unit(canvas: Image) -> int:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import ParamSpec, TypeVar
 
 T = TypeVar("T")
+P = ParamSpec("P")
 
 
 def track(items: Sequence[T] | Iterable[T], what: str, total: int | None = None) -> Iterator[T]:
@@ -17,3 +19,21 @@ def track(items: Sequence[T] | Iterable[T], what: str, total: int | None = None)
     return iter(
         rich_track(items, what, total=total, console=console, disable=not console.is_terminal, transient=True)
     )
+
+
+@contextmanager
+def watched(call: Callable[P, T], what: str, total: int | None = None) -> Iterator[Callable[P, T]]:
+    """The same function with a bar that moves on at every call; `total` calls, None if nobody knows."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task(what, total=total)
+
+        def counted(*args: P.args, **kwargs: P.kwargs) -> T:
+            result = call(*args, **kwargs)
+            progress.advance(bar)
+            return result
+
+        yield counted

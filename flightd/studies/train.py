@@ -8,7 +8,7 @@ from pathlib import Path
 
 import cv2
 
-from flightd.core.errors import InputError
+from flightd.core.errors import InputError, cannot_write
 from flightd.core.types import Image
 from flightd.studies.frame_files import read_image
 from flightd.studies.progress_bar import track
@@ -34,13 +34,13 @@ def train_colour(datasets: Sequence[Path], colour: str, out: Path, name: str, se
     """
     labelled = [(folder / label.file, label) for folder, label in _labels(datasets)]
     if not any(_shows(label, colour) for _, label in labelled):
-        raise InputError(f"{datasets[0]}: no picture has `line_colour` {colour}; nothing to learn from")
+        raise InputError(f"no picture has `line_colour` {colour}: nothing to learn from", file=datasets[0])
     trained = train(name, colour, collect(_lessons(labelled, colour), colour, seed), seed)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         save_profile(trained.profile, out)
     except OSError as err:
-        raise InputError(f"{out}: {err.strerror}") from err
+        raise cannot_write(out, err) from err
     return trained
 
 
@@ -62,7 +62,7 @@ def _lessons(labelled: Sequence[tuple[Path, LabelledImage]], colour: str) -> Ite
         if label.mask:
             mask = cv2.cvtColor(read_image(path.parent / label.mask), cv2.COLOR_BGR2GRAY)
             if mask.shape != bgr.shape[:2]:
-                raise InputError(f"{path.parent / label.mask}: not of the size of {path.name}")
+                raise InputError(f"not of the size of {path.name}", file=path.parent / label.mask)
             teaching = teaching_from_mask(mask.astype("uint8"))
         else:
             teaching = teaching_from_label(label, bgr.shape[:2])

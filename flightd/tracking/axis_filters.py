@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flightd.config.tracking import MotionNoise
 from flightd.core.geometry import Matrix
+from flightd.core.tracks import TrackedLine
 from flightd.tracking.kalman import KalmanFilter
 
 _GATE_SIGMAS = 4.0
@@ -22,40 +24,6 @@ _UNSEEN_S = 0.1
 """An axis without a line for so long is reckoned: the gust that was last felt on it fades."""
 _BIAS_GAIN, _BIASED = 0.25, 0.6
 """Innovations whose running mean is beyond this, in sigmas, all err to one side: the wind has changed."""
-
-
-@dataclass(frozen=True, slots=True)
-class MotionNoise:
-    """What the model does not know, as densities (per square root of a second) and starting sigmas.
-
-    A disturbance is a steady part (trim, draught: its mean over `steady_s`) and a gust that fades within
-    `gust_s`.  Its density is `changed_mps2` while what is seen all errs to one side (process noise adapted
-    to the innovations: Jazwinski, Automatica 5, 1969)."""
-
-    accel_mps2: float = 0.2
-    disturbance_mps2: float = 0.15
-    changed_mps2: float = 1.0
-    drag_per_s: float = 0.25
-    start_velocity_mps: float = 0.3
-    start_disturbance_mps2: float = 0.2
-    max_disturbance_mps2: float = 1.2
-    gust_s: float = 1.2
-    steady_s: float = 10.0
-
-
-@dataclass(frozen=True, slots=True)
-class TrackedLine:
-    """One line across an axis: `offset_m` from the drone along the axis, at the time of the set.  When
-    last seen it was in view from `from_m` to `to_m` along itself, from the drone; equal where unknown."""
-
-    id: int
-    offset_m: float
-    sigma_m: float
-    width_m: float
-    seen_ns: int
-    hits: int
-    from_m: float = 0.0
-    to_m: float = 0.0
 
 
 class LineMeasurement(NamedTuple):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from flightd.core.tracks import FloorJunction
 from flightd.core.types import Junction
 from flightd.tracking.tilt_compensation import FloorView, floor_points
 
@@ -13,16 +13,6 @@ _ARM_PX = 25.0
 """How far along an arm its direction is taken."""
 _SKEW_RAD = math.radians(25.0)
 """An arm further than this from both grid axes is no arm of the grid."""
-
-
-@dataclass(frozen=True, slots=True)
-class FloorJunction:
-    """Where lines meet or one ends, from the drone in grid axes; `arms` has a bit for each grid direction
-    in which paint leaves it: +x 1, +y 2, -x 4, -y 8."""
-
-    dx_m: float
-    dy_m: float
-    arms: int
 
 
 def floor_junctions(

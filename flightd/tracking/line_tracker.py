@@ -9,25 +9,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from statistics import median
 from typing import TypeVar
 
+from flightd.config.control import TiltCompensation
+from flightd.config.tracking import TrackingConfig
 from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount, wrap_pi
+from flightd.core.tracks import FloorJunction, MarkerOffset, PadOffset, TrackedLine, TrackSet
 from flightd.core.types import Attitude, LineSet, MarkerSight, PadSight
 from flightd.tracking.attitude_history import AttitudeHistory
-from flightd.tracking.axis_filters import (
-    AxisTracker,
-    HeadingTracker,
-    LineMeasurement,
-    MotionNoise,
-    TrackedLine,
-)
-from flightd.tracking.ground_junctions import FloorJunction, floor_junctions
+from flightd.tracking.axis_filters import AxisTracker, HeadingTracker, LineMeasurement
+from flightd.tracking.ground_junctions import floor_junctions
 from flightd.tracking.tilt_compensation import (
     FloorView,
     GroundLine,
-    TiltCompensation,
     ground_lines,
     ground_point,
 )
@@ -39,80 +35,28 @@ _WIDTH_GAIN = 0.15
 _AGREEING, _DOUBTED = 0.15, 0.2
 _SAME_RAD = math.radians(3.0)
 _DISPUTE_NS, _SHOWN_NS = 600_000_000, 1_500_000_000
+_DEFAULTS = TrackingConfig()
 _Square = TypeVar("_Square", PadSight, MarkerSight)
 
 
-@dataclass(frozen=True, slots=True)
-class TrackerParams:
-    """How the down camera sees and how far to trust it; metres, radians, seconds.  A line whose width is
-    not that of the guide paint, within `width_share`, is not one."""
-
-    lens: Lens
-    mount: Mount
-    compensation: TiltCompensation = TiltCompensation.EXACT
-    sigma_tilt_rad: float = math.radians(0.3)
-    min_sigma_m: float = 0.004
-    width_m: float = 0.075
-    width_share: tuple[float, float] = (0.55, 1.7)
-    gate_m: float = 0.35
-    forget_s: float = 2.5
-    start_yaw_sigma_rad: float = math.radians(5.0)
-    noise: MotionNoise = field(default_factory=MotionNoise)
-
-
-@dataclass(frozen=True, slots=True)
-class PadOffset:
-    """A pad on the floor: its centre from the drone in grid axes, and the length of its sides."""
-
-    x_m: float
-    y_m: float
-    side_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class MarkerOffset:
-    """A floor marker: its centre from the drone in grid axes, and the length of its sides."""
-
-    id: int
-    x_m: float
-    y_m: float
-    side_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class TrackSet:
-    """The tracks at one time, in grid axes (x along the aisles, y to the right of x).
-
-    `across_x` are the lines that cross the x axis (parallel to y), offsets in x; `across_y` the others.
-    `lines_ns` is the capture time of the newest frame in which any line was taken; `junctions` and
-    `markers` are those of the newest frame, taken at `junctions_ns`; `push` is the acceleration that no
-    lean explains, as far as it is expected to last.
-    """
-
-    stamp_ns: int
-    lines_ns: int
-    yaw_rad: float
-    yaw_sigma_rad: float
-    vx_mps: float
-    vy_mps: float
-    ax_mps2: float
-    ay_mps2: float
-    across_x: tuple[TrackedLine, ...]
-    across_y: tuple[TrackedLine, ...]
-    pads: tuple[PadOffset, ...] = ()
-    pads_ns: int = 0
-    """Capture time of the frame in which the `pads` were seen."""
-    junctions: tuple[FloorJunction, ...] = ()
-    junctions_ns: int = 0
-    push_x_mps2: float = 0.0
-    push_y_mps2: float = 0.0
-    markers: tuple[MarkerOffset, ...] = ()
-
-
 class LineTracker:
-    """Feed `attitude` and `frame`, read `at`.  Before the first frame `at` gives None."""
+    """Feed `attitude` and `frame`, read `at`.  Before the first frame `at` gives None.
 
-    def __init__(self, params: TrackerParams, start_yaw_rad: float) -> None:
+    A line whose width is not that of the guide paint, `line_width_m`, within `expert.width_share`, is not
+    one."""
+
+    def __init__(
+        self,
+        lens: Lens,
+        mount: Mount,
+        line_width_m: float,
+        start_yaw_rad: float,
+        compensation: TiltCompensation = TiltCompensation.EXACT,
+        config: TrackingConfig = _DEFAULTS,
+    ) -> None:
+        params = config.expert
+        self._lens, self._mount, self._compensation = lens, mount, compensation
+        self._line_width_m = line_width_m
         self._params = params
         self._start_yaw_rad = start_yaw_rad
         self._history = AttitudeHistory()
@@ -159,8 +103,8 @@ class LineTracker:
         params = self._params
         assumed = self._history.is_assumed(lines.stamp_ns)
         sigma_tilt_rad = _ASSUMED_TILT_RAD if assumed else params.sigma_tilt_rad
-        view = FloorView(params.lens, params.mount, attitude, height_m, params.compensation, sigma_tilt_rad)
-        low, high = (share * params.width_m for share in params.width_share)
+        view = FloorView(self._lens, self._mount, attitude, height_m, self._compensation, sigma_tilt_rad)
+        low, high = (share * self._line_width_m for share in params.width_share)
         seen = ground_lines(lines.lines, view)
         on_floor = [line for line in seen if low <= line.width_m <= high]
         yaw = self._turn(on_floor, attitude)
@@ -288,7 +232,7 @@ class LineTracker:
         """The height told, unless there is none or the width of the lines contradicts it: then theirs."""
         if not lines.lines:
             return told_m
-        scale = self._params.width_m * self._params.lens.fx_px
+        scale = self._line_width_m * self._lens.fx_px
         heights_m = [scale / line.width_px for line in lines.lines if line.width_px > 0]
         if not told_m > 0 or not heights_m:
             return median(heights_m) if heights_m else told_m

@@ -7,23 +7,17 @@ H tan(pitch) from a horizontal line; it is the exact form's first-order limit.  
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from flightd.config.control import TiltCompensation
 from flightd.core.geometry import Lens, Matrix, Mount, ground_homography, level_from_body, normalise_line
 from flightd.core.types import Attitude, Line
 
 _MAX_TILT_RAD = math.radians(45.0)
-
-
-class TiltCompensation(enum.StrEnum):
-    EXACT = "exact"
-    FIRST_ORDER = "first_order"
-    NONE = "none"
 
 
 @dataclass(frozen=True, slots=True)

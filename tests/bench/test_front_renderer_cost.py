@@ -12,11 +12,11 @@ from time import thread_time
 import cv2
 import numpy as np
 
-from flightd.config.site_file import load_site
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera, front_lens
 from flightd.sim.racks.renderer import FrontRenderer
+from flightd.site.site_file import load_site
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
 FRAMES = 30
@@ -45,7 +45,7 @@ def test_a_picture_costs_a_few_conversions() -> None:
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
-        renderer = FrontRenderer(SITE, FrontCamera(lens=front_lens(1280, 720)), RackLook(), 1)
+        renderer = FrontRenderer(SITE, FrontCamera(lens=front_lens(1280, 720)), RackAppearance(), 1)
         out = np.empty((720, 1280, 3), np.uint8)
         renderer.render(before_the_shelf(0), 0, out)  # the first view's goods are not steady state
         unit_ms = cost_ms(lambda _: cv2.cvtColor(out, cv2.COLOR_BGR2HSV))

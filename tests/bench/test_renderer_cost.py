@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 import pytest
 
-from flightd.config.site_file import load_site
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import SimCamera, wide_lens
+from flightd.site.site_file import load_site
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")
 FRAMES = 120

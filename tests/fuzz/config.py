@@ -6,8 +6,8 @@ from pathlib import Path
 
 from flightd.app.build import pilot_of
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
+from flightd.site.site_file import load_site
 from tests.fuzz.drive import Target, in_one_line, main
 from tests.fuzz.mutate import spoil_text
 

@@ -21,8 +21,8 @@ from flightd.adapters.ground_link.protocol import (
     encode,
 )
 from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
-from flightd.config.site_file import load_site
 from flightd.core.types import CommandKind
+from flightd.site.site_file import load_site
 from tests.fuzz.drive import Target, main
 from tests.fuzz.mutate import spoil_text
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.sim.scenario import scenario
 from flightd.sim.scenario.scenario_files import load_scenario
+from flightd.site.site_file import load_site
 from tests.fuzz.drive import Target, in_one_line, main
 from tests.fuzz.mutate import spoil_text
 
@@ -27,10 +27,10 @@ def target(folder: Path) -> Target:
             return in_one_line(err)
         read.camera.camera()
         read.front_camera.camera()
-        read.racks.look()
-        read.floor.look()
+        read.racks.appearance()
+        read.floor.surface()
         read.floor.site(site)
-        read.wind.draught()
+        read.wind.params()
         read.vehicle.radio()
         return False
 

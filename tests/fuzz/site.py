@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flightd.config.site_file import load_site, parse_site, site_toml
 from flightd.core.errors import InputError
+from flightd.site.site_file import load_site, parse_site, site_toml
 from tests.fuzz.drive import Target, in_one_line, main
 from tests.fuzz.mutate import spoil_text
 

@@ -24,12 +24,12 @@ from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.plant.wind import Draught
+from flightd.sim.plant.wind import WindParams
 from flightd.sim.sensors.instruments import Sensors
 from tests.protocol.ardrone.bench import ANY_PORTS, settings_for
 from tests.protocol.patience import PatientLoop
 
-CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
+CALM = WindParams(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
 
 
 class Peer(Protocol):
@@ -109,7 +109,7 @@ async def mavlink_rig(
     peer_runs: bool = True,
 ) -> AsyncIterator[Rig]:
     clock = LoopClock()
-    peer = make_peer(clock, Airframe(draught=CALM), config or PeerConfig(ready_s=0.5))
+    peer = make_peer(clock, Airframe(wind=CALM), config or PeerConfig(ready_s=0.5))
     host, port = await peer.open()
     vehicle = make_vehicle(f"udpout://{host}:{port}", clock)
 
@@ -148,7 +148,7 @@ _PATIENT_PX4 = PeerConfig(ready_s=0.5, parameters={"COM_OF_LOSS_T": 6.5})
 @asynccontextmanager
 async def ardrone_rig(**settings: Any) -> AsyncIterator[Rig]:
     clock = LoopClock()
-    drone = Drone(Airframe(draught=CALM), Sensors())
+    drone = Drone(Airframe(wind=CALM), Sensors())
     async with ArDroneServer(drone, clock, ANY_PORTS) as server:
         vehicle = ArDroneVehicle(settings_for(server, **settings), clock)
 

@@ -246,7 +246,7 @@ def test_bad_input_is_one_line_and_exit_2(tmp_path: Path, doctor: Doctor) -> Non
     good = write_config(tmp_path, {"url": "udpout://127.0.0.1:9"})
     code, out, err = doctor(good, "--fix", "--json")
     assert (code, out) == (2, "")
-    assert "there is no terminal to ask on: add --yes" in err
+    assert "there is no terminal to ask on; add --yes" in err
     bad = tmp_path / "bad.toml"
     bad.write_text(good.read_text().replace("[vehicle]", "[vehicle]\nsystem_ids = 3"))
     code, out, err = doctor(bad, "--json")

@@ -14,7 +14,7 @@ import pytest
 
 from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
-from flightd.sim.ardrone.drone import BIT_COM_WATCHDOG
+from flightd.sim.ardrone.states import BIT_COM_WATCHDOG
 from flightd.sim.autopilot.autopilot import PeerConfig
 from tests.protocol.ardrone.bench import Ear, bench, make_drone, virtually
 from tests.protocol.mavlink.scripted import ScriptedAutopilot, scripted

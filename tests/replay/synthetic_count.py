@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.config.site_file import parse_site
 from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, StoredRead
 from flightd.site.site import Location, Site
+from flightd.site.site_file import parse_site
 
 RACKS_TOML = """
 [[rack]]

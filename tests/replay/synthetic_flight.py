@@ -12,8 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from flightd.adapters.recorder.recorder import McapRecorder
-from flightd.config.site_file import parse_site
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.core.topics import Document, Topic
 from flightd.core.types import (
     Attitude,
@@ -30,6 +29,7 @@ from flightd.core.types import (
 )
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.site.site import Site
+from flightd.site.site_file import parse_site
 
 SITE_TOML = (Path(__file__).parents[2] / "configs" / "site-demo.toml").read_text()
 NS = 1_000_000_000
@@ -113,7 +113,9 @@ def write_flight(
     site = parse_site(SITE_TOML, "demo")
     path = folder / "flight.mcap"
     truths: list[Kinematics] = []
-    with McapRecorder(path, lossless=True, metadata={"vehicle": "ardupilot", "site": site.name}) as recorder:
+    with McapRecorder(
+        path, when_full=wait_for_disk, metadata={"vehicle": "ardupilot", "site": site.name}
+    ) as recorder:
         recorder.record(Topic.MAP, 0, Document(SITE_TOML))  # stamps before the flight
         recorder.record(Topic.CONFIG, START_NS, Document('[vehicle]\nkind = "ardupilot"\n'))
         t_s, frames, done, sway = 0.0, 0, 0, np.zeros(2)
@@ -131,6 +133,9 @@ def write_flight(
             for step in range(round(leg.seconds / TICK_S)):
                 part = (1 - math.cos(math.pi * step * TICK_S / leg.seconds)) / 2
                 flying = leg.phase not in {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE}
+                turn = math.pi / leg.seconds
+                pace = turn / 2 * math.sin(turn * step * TICK_S)
+                vx, vy, _ = ((b - a) * pace for a, b in zip(leg.start, leg.end, strict=True))
                 sway = 0.995 * sway + rng.normal(0, 0.002, 2) * flying
                 x, y, height = (a + (b - a) * part for a, b in zip(leg.start, leg.end, strict=True))
                 x, y = x + sway[0], y + sway[1]
@@ -178,8 +183,8 @@ def write_flight(
                             yaw,
                             ex,
                             ey,
-                            0.0,
-                            0.0,
+                            vx,
+                            vy,
                             height,
                             (0.0001, 0.0, 0.0, 0.0, 0.0001, 0.0, 0.0, 0.0, 0.0001),
                             0.999,
@@ -212,7 +217,7 @@ def write_flight(
                 t_s += TICK_S
             done += leg.phase == Phase.HOVER
     if truth:
-        with McapRecorder(folder / "truth.mcap", lossless=True) as recorder:
+        with McapRecorder(folder / "truth.mcap", when_full=wait_for_disk) as recorder:
             for kinematics in truths:
                 recorder.record(Topic.TRUTH, kinematics.stamp_ns, asdict(kinematics))
     if summary:

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.app.build import pilot_of
 from flightd.config.schema import Config, load_config
-from flightd.config.site_file import load_site, site_toml
 from flightd.core.errors import InputError
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Document, Topic
 from flightd.core.types import AttitudeSetpoint, Phase
-from flightd.pilot import TickInput, TickOutput
 from flightd.replay.decision_compare import replay_decisions
 from flightd.replay.log import read_log
 from flightd.site.site import Site
+from flightd.site.site_file import load_site, site_toml
 from tests.command import Command
 from tests.sim.ideal_flight import IdealFlight
 
@@ -37,10 +37,10 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short flight by ideal sight, recorded as the daemon does."""
     path = tmp_path_factory.mktemp("flight") / "flight.mcap"
     config, site = _setting()
-    flight = IdealFlight(site, config.pilot_params(site))
+    flight = IdealFlight(site, config)
     flight.pilot = pilot_of(config, site)
     step = flight.pilot.step
-    with McapRecorder(path, lossless=True) as recorder:
+    with McapRecorder(path, when_full=wait_for_disk) as recorder:
 
         def recording(tick: TickInput) -> TickOutput:
             output = step(tick)
@@ -133,7 +133,7 @@ def test_the_command_tells_the_drift_of_another_configuration(
     config, _ = _setting()
     slower = config.control.model_copy(update={"max_tilt_deg": 2.0})
     path = tmp_path / "flight.mcap"
-    with McapRecorder(path, lossless=True) as recorder:
+    with McapRecorder(path, when_full=wait_for_disk) as recorder:
         recorder.record(
             Topic.CONFIG, 0, Document(config.model_copy(update={"control": slower}).model_dump_json())
         )
@@ -148,7 +148,7 @@ def test_the_command_tells_the_drift_of_another_configuration(
 
 def test_a_log_without_its_map_is_one_line_and_exit_2(flightd: Command, tmp_path: Path, log: Path) -> None:
     path = tmp_path / "flight.mcap"
-    with McapRecorder(path, lossless=True) as recorder:
+    with McapRecorder(path, when_full=wait_for_disk) as recorder:
         for entry in read_log(log, {Topic.CONFIG, Topic.TICK}).entries:
             recorder.record(entry.topic, entry.stamp_ns, entry.message)
     result = flightd("replay", path)

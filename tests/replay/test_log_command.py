@@ -91,3 +91,14 @@ def test_what_cannot_be_done_is_one_line_and_exit_2(
     assert (result.returncode, result.stdout) == (2, "")
     assert len(result.stderr.splitlines()) == 1
     assert told in result.stderr
+
+
+@pytest.mark.parametrize("words", [("log", "info"), ("log", "repair"), ("replay",), ("report",)])
+def test_an_empty_file_is_no_log(flightd: Command, tmp_path: Path, words: tuple[str, ...]) -> None:
+    empty = tmp_path / "flight.mcap"
+    empty.touch()
+    result = flightd(*words, empty)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr == f"flightd: {empty}: the file is empty: nothing was recorded in it\n"
+    assert sorted(tmp_path.iterdir()) == [empty], "no report of nothing"
+    assert empty.stat().st_size == 0

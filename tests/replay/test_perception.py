@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.core.topics import RecordedFrame, Topic
 from flightd.core.types import Image, Line, LineSet
 from flightd.replay.log import LogReader
@@ -24,7 +24,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("flight") / "flight.mcap"
     rng = np.random.default_rng(3)
     detector = Detector()
-    with McapRecorder(path, lossless=True) as recorder:
+    with McapRecorder(path, when_full=wait_for_disk) as recorder:
         for seq in range(1, 11):
             jpeg = picture(seen_lines(seq, seq, 0.0, rng), rng)
             decoded = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from flightd.cli.inventory_count import counted_beside
 from flightd.cli.main import app
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, LocationState, Observation
@@ -25,6 +24,7 @@ from flightd.replay.report.racks import racks_section
 from flightd.replay.report.stock import Count, count_figures, percent
 from flightd.replay.report.stocktaking import inventory_section
 from flightd.site.site import Side, Site
+from flightd.studies.counted_stock import counted_beside
 from tests.replay.synthetic_count import site_with_racks, state_of, write_count, write_stock
 from tests.replay.synthetic_flight import SITE_TOML, write_flight
 

@@ -15,14 +15,14 @@ import random
 import sys
 from dataclasses import dataclass, replace
 
+from flightd.config.localisation import LocalisationConfig
+from flightd.core.camera_view import FloorReach
+from flightd.core.tracks import FloorJunction, TrackedLine, TrackSet
 from flightd.core.types import GridPose
-from flightd.localisation.grid_localiser import GridLocaliser, LocaliserParams
+from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.sim.random_sites import random_site
 from flightd.site.painted_lines import PaintMap
 from flightd.site.site import PaintedLine, Site
-from flightd.tracking.axis_filters import TrackedLine
-from flightd.tracking.ground_junctions import FloorJunction
-from flightd.tracking.line_tracker import TrackSet
 
 STEP_S = 0.06
 SURE = 0.95
@@ -90,7 +90,7 @@ class Flight:
         *,
         start: str = "",
         believed: str = "",
-        params: LocaliserParams | None = None,
+        config: LocalisationConfig | None = None,
     ) -> None:
         self.site = site
         self._rng = random.Random(f"crossings {seed}")
@@ -104,7 +104,9 @@ class Flight:
             for (x, y), arms in zip(features.at_m, features.arms, strict=True)
         ]
         self._here = start or self._rng.choice(sorted(site.nodes))
-        self.localiser = GridLocaliser(site, believed or self._here, params)
+        self.localiser = GridLocaliser(
+            site, believed or self._here, FloorReach(), config or LocalisationConfig()
+        )
         node = site.nodes[self._here]
         self._x, self._y = node.x_m, node.y_m
         self._gust = [0.0, 0.0]

@@ -14,7 +14,8 @@ from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.keys import load_pair, load_public, make_keys
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.config.ground import GroundConfig
-from flightd.config.site_file import load_site
+from flightd.core.snapshot import Snapshot
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import (
     Attitude,
     Demand,
@@ -23,11 +24,10 @@ from flightd.core.types import (
     GridPose,
     LandedState,
     Phase,
-    Status,
     VehicleState,
 )
-from flightd.pilot import TickInput, TickOutput
 from flightd.runtime.clock import LoopClock
+from flightd.site.site_file import load_site
 
 _P = ParamSpec("_P")
 
@@ -142,10 +142,8 @@ def tell_once(
     )
     pose = GridPose(now_ns, "A2", x_m - 1.5, 0.01, 0.0, x_m, 0.01, 0.4, 0.3, 1.6, (0.0,) * 9, 0.99)
     output = TickOutput(None, Demand.FLY, phase, "arrived", "A2", 1, 12, pose, None)
-    status = Status(
-        now_ns, phase, "arrived", "A2", "A2", 1, 12, 0.8, 1.6, 300, 2, 29.0, {"detection": 5.0, "total": 71.0}
-    )
-    link.tell(status, TickInput(now_ns, vehicle=vehicle), output)
+    latency_ms = {"detection": 5.0, "total": 71.0}
+    link.tell(Snapshot(TickInput(now_ns, vehicle=vehicle), output, 1, 12, 300, 2, 29.0, latency_ms))
 
 
 def event(text: str) -> Event:

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
+from flightd.app.absent_parts import NO_CAMERA, NO_PROGRESS, keep_pose
+from flightd.app.flight import Flight
+from flightd.app.publishers import TelemetryPublishers
+from flightd.app.tick import Tick
+from flightd.config.mission import Heading
+from flightd.config.schema import Config
 from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import CodeSet
+from flightd.core.snapshot import Snapshot
+from flightd.core.tick import TickOutput
 from flightd.core.types import (
     HEALTHY,
     Attitude,
@@ -23,17 +31,25 @@ from flightd.core.types import (
     PictureCheck,
     VehicleState,
 )
-from flightd.mission.plan.flight_plan import FlightPlan, Heading, HeadingPolicy, make_plan
-from flightd.mission.scan.scanner import Scanner
-from flightd.pilot import Pilot, PilotParams, TickInput, TickOutput
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
+from flightd.pilot import Pilot
 from flightd.sim.autopilot.climb_loop import ClimbLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
+from flightd.sim.plant.battery_swapper import BatterySwapper
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.plant.pad_crew import PadCrew
-from flightd.sim.plant.wind import Draught
+from flightd.sim.plant.wind import WindParams
 from flightd.sim.sensors.instruments import Sensors
 from flightd.site.site import Site
 from tests.sim.ideal_front import IdealFront
+from tests.sim.ideal_ports import (
+    HeldSetpoint,
+    IdealCount,
+    IdealGround,
+    IdealRecorder,
+    IdealVehicle,
+    IdealVision,
+)
 from tests.sim.ideal_sight import EyeErrors, IdealEye
 
 STEP_NS = 5_000_000
@@ -83,25 +99,27 @@ class IdealFlight:
     def __init__(
         self,
         site: Site,
-        params: PilotParams,
+        config: Config,
         *,
         policy: HeadingPolicy | None = None,
         visits: tuple[str, ...] = (),
         seed: int = 1,
-        draught: Draught | None = None,
+        wind: WindParams | None = None,
         errors: EyeErrors | None = None,
         delay_ns: int = 68_000_000,
         airframe: AirframeParams | None = None,
         swap_s: float = 0.0,
-        scanner: Scanner | None = None,
+        scanner: AnyScanner = NO_SCAN,
         front: IdealFront | None = None,
         world: Site | None = None,
         carried_to: str = "",
+        observers: Sequence[Callable[[Snapshot], None]] = (),
     ) -> None:
+        self._observers = observers
         policy = policy or HeadingPolicy(Heading.ALONG)
         pad = site.home.node
         self.plan: FlightPlan = make_plan(site, visits or site.serpentine_route(), pad, pad, policy)
-        self.pilot = Pilot(site, self.plan, policy, params, scanner)
+        self.pilot = Pilot(site, self.plan, policy, config, scanner, site.overhead_m)
         self._front = front
         self._looked: deque[tuple[int, CodeSet]] = deque()
         self._exposed: deque[Kinematics] = deque()
@@ -110,9 +128,9 @@ class IdealFlight:
         x_m, y_m = world.pad_centre(world.home)
         if carried_to:
             x_m, y_m = site.nodes[carried_to].x_m, site.nodes[carried_to].y_m
-        self.airframe = Airframe(airframe, draught=draught, seed=seed, x_m=x_m, y_m=y_m)
+        self.airframe = Airframe(airframe, wind=wind, seed=seed, x_m=x_m, y_m=y_m)
         self.sensors = Sensors(seed=seed)
-        self._eye = IdealEye(world, params.tracker.lens, params.tracker.mount, errors, seed)
+        self._eye = IdealEye(world, config.camera.lens(), config.camera.mount(), errors, seed)
         self._climb = ClimbLoop()
         self._delay_ns = delay_ns
         self._armed = False
@@ -127,55 +145,60 @@ class IdealFlight:
         self.ground_silent_s = 0.0
         self.commands: list[Command] = []
         """Orders that the next tick takes."""
-        self._crew = PadCrew(site, self.airframe, swap_s) if swap_s else None
+        self._battery_swapper = BatterySwapper(site, self.airframe, swap_s) if swap_s else None
         self.counted: tuple[str, ...] = ()
         self.on_tick: Callable[[Phase, int], None] = lambda _phase, _now_ns: None
 
+    def now_ns(self) -> int:
+        """`ports.Clock`."""
+        return self._now_ns
+
+    def _composed(self, vehicle: IdealVehicle, vision: IdealVision, setpoints: HeldSetpoint) -> Flight:
+        """The daemon's own tick flies it, with these behind its ports."""
+        recorder = IdealRecorder(lambda: self.faults.health)
+        ground = IdealGround(self._take_commands, lambda: self.ground_silent_s)
+        return Flight(
+            clock=self,
+            pilot=self.pilot,
+            vehicle=vehicle,
+            setpoints=setpoints,
+            camera=NO_CAMERA,
+            front_camera=NO_CAMERA,
+            vision=vision,
+            counting=IdealCount(self._codes, self._take_counted),
+            recorder=recorder,
+            ground=ground,
+            progress=NO_PROGRESS,
+            publishers=TelemetryPublishers(self, vehicle, recorder, ground, observers=self._observers),
+            share_pose=keep_pose,
+        )
+
     def fly(self, limit_s: float = 600.0) -> Flown:
         flown = Flown()
-        late: deque[tuple[int, LineSet]] = deque()
-        attitudes: list[Attitude] = []
-        setpoint: AttitudeSetpoint | None = None
+        vehicle = IdealVehicle(self._state, self._obey)
+        vision, setpoints = IdealVision(lambda: self.faults.health), HeldSetpoint()
+        tick = Tick(self._composed(vehicle, vision, setpoints))
         frame_ns = tick_ns = self._now_ns
         seq = 0
         end_ns = self._now_ns + round(limit_s * 1e9)
         self.sensors.update(STEP_NS * 1e-9, self.airframe)
         while self._now_ns < end_ns:
             self._now_ns += STEP_NS
-            self._step(setpoint)
+            self._step(setpoints.newest)
             if self._now_ns % 10_000_000 == 0 and not self.faults.silent:
-                attitudes.append(self._attitude())
+                vehicle.samples.append(self._attitude())
             if self._now_ns >= frame_ns:
                 frame_ns += FRAME_NS
                 seq += 1
                 if not self.faults.blind:
                     due_ns = self._now_ns + self._delay_ns + self.faults.late_ns
-                    late.append((due_ns, self._see(seq)))
+                    vision.put(due_ns, self._see(seq))
             self._photograph()
             if self._now_ns >= tick_ns:
                 tick_ns += TICK_NS
-                lines = []
-                while late and late[0][0] <= self._now_ns:
-                    lines.append(late.popleft()[1])
-                if self._crew is not None:
-                    self._crew.look(self._now_ns)
-                orders, self.commands = tuple(self.commands), []
-                output = self.pilot.step(
-                    TickInput(
-                        self._now_ns,
-                        tuple(lines),
-                        self._state(),
-                        tuple(attitudes),
-                        orders,
-                        ground_silent_s=self.ground_silent_s,
-                        codes=self._codes(),
-                        counted=self._take_counted(),
-                        health=self.faults.health,
-                    )
-                )
-                attitudes = []
-                setpoint = output.setpoint
-                self._obey(output.demand)
+                if self._battery_swapper is not None:
+                    self._battery_swapper.look(self._now_ns)
+                output = tick.run(self._now_ns)
                 self.on_tick(output.phase, self._now_ns)
                 flown.outputs.append(output)
                 flown.events.extend(output.events)
@@ -199,6 +222,10 @@ class IdealFlight:
             if places:
                 seen = self._front.see(then, places, then.stamp_ns)
                 self._looked.append((self._now_ns + READING_NS, seen))
+
+    def _take_commands(self) -> list[Command]:
+        orders, self.commands = self.commands, []
+        return orders
 
     def _take_counted(self) -> tuple[str, ...]:
         counted, self.counted = self.counted, ()

@@ -22,12 +22,12 @@ from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.protocol import StatusReport
 from flightd.app.simulation.ports import free_port
 from flightd.app.simulation.world_process import run_world
-from flightd.config.site_file import load_site
 from flightd.core.topics import Topic
 from flightd.replay.log import read_log
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import SimCamera, wide_lens
 from flightd.sim.world import WorldSpec
+from flightd.site.site_file import load_site
 
 ROOT = Path(__file__).parents[2]
 SITE_FILE = ROOT / "configs" / "site-demo.toml"

@@ -6,12 +6,13 @@ import random
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from flightd.config.scan import ScanConfig
 from flightd.core.scanning import BodyPose
 from flightd.core.types import Image
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
-from flightd.mission.scan.views import ScanParams, View, ViewPlanner
+from flightd.mission.scan.views import View, ViewPlanner
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.site.site import Site
@@ -31,7 +32,7 @@ class ShelfPicture:
 def shelf_pictures(
     site: Site,
     camera: FrontCamera,
-    look: RackLook,
+    look: RackAppearance,
     seed: int,
     nodes: Sequence[str],
     parts: Sequence[float] = (1.0,),
@@ -40,7 +41,7 @@ def shelf_pictures(
     """A picture of each view of some nodes for each of the exposures; with `retakes` from all places that
     re-takes look from, too."""
     sight = FrontSight(camera.lens, camera.mount)
-    planner = ViewPlanner(site, sight, Assigner(site, sight), ScanParams(max_height_m=4.0))
+    planner = ViewPlanner(site, sight, Assigner(site, sight), ScanConfig(max_height_m=4.0))
     renderer = FrontRenderer(site, camera, look, seed)
     rng = random.Random(seed)
     stamp_ns = 0

@@ -12,11 +12,11 @@ from flightd.sim.autopilot.climb_loop import ClimbLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.truth_history import TruthHistory
-from flightd.sim.plant.wind import Draught, Wind
+from flightd.sim.plant.wind import Wind, WindParams
 from flightd.sim.sensors.instruments import SensorParams, Sensors
 
 DT_S = 0.0025
-CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
+CALM = WindParams(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
 EXACT = SensorParams(
     heading_offset_rad=0.0, tilt_bias_rad=0.0, tilt_wander_rad=0.0, baro_wander_m=0.0, climb_noise_mps=0.0
 )
@@ -54,7 +54,7 @@ def at(path: list[Kinematics], t_s: float) -> Kinematics:
 
 
 def test_a_roll_step_follows_the_measured_response() -> None:
-    airframe = Airframe(draught=CALM)
+    airframe = Airframe(wind=CALM)
     start_s = 5.0
     path = fly(
         airframe,
@@ -70,7 +70,7 @@ def test_a_roll_step_follows_the_measured_response() -> None:
 
 
 def test_the_climb_rate_settles_within_half_a_second_and_zero_holds_the_height() -> None:
-    path = fly(Airframe(draught=CALM), 10.0, lambda t: (0.0, 0.0, 0.5 if t < 4.0 else 0.0))
+    path = fly(Airframe(wind=CALM), 10.0, lambda t: (0.0, 0.0, 0.5 if t < 4.0 else 0.0))
     assert at(path, 0.5).climb_mps > 0.4
     assert at(path, 3.0).climb_mps == pytest.approx(0.5, abs=0.03)
     assert abs(at(path, 4.5).climb_mps) < 0.1
@@ -103,7 +103,7 @@ def test_tilt_accelerates_in_its_direction(roll: float, pitch: float, yaw: float
 
 
 def test_yaw_turns_to_the_target_and_a_rate_alone_only_shifts_it() -> None:
-    airframe = Airframe(draught=CALM)
+    airframe = Airframe(wind=CALM)
     airframe.height_m, airframe.on_floor = 2.0, False
     hover = airframe.params.hover_collective
     for _ in range(800):
@@ -118,7 +118,7 @@ def test_yaw_turns_to_the_target_and_a_rate_alone_only_shifts_it() -> None:
 
 
 def test_the_floor_stops_the_fall_and_rubs_off_the_speed() -> None:
-    airframe = Airframe(draught=CALM)
+    airframe = Airframe(wind=CALM)
     airframe.height_m, airframe.on_floor = 0.5, False
     airframe.vx_mps = 1.0
     for _ in range(800):
@@ -151,7 +151,7 @@ def test_the_same_seed_flies_the_same_flight_and_another_seed_does_not() -> None
 
 def test_gusts_have_the_asked_strength_whatever_the_step() -> None:
     for dt_s in (0.0025, 0.1):
-        wind = Wind(Draught(mean_x_mps=1.0, gust_rms_mps=0.3), seed=5)
+        wind = Wind(WindParams(mean_x_mps=1.0, gust_rms_mps=0.3), seed=5)
         samples = []
         for _ in range(20_000):
             wind.step(dt_s)
@@ -164,7 +164,7 @@ def test_gusts_have_the_asked_strength_whatever_the_step() -> None:
 
 
 def test_the_range_finder_counts_centimetres_along_the_body_and_drops_out() -> None:
-    airframe = Airframe(draught=CALM)
+    airframe = Airframe(wind=CALM)
     airframe.height_m, airframe.roll_rad = 2.0, math.radians(20.0)
     sensors = Sensors(SensorParams(range_dropout=0.1), seed=2)
     samples = [sensors.range_m(airframe) for _ in range(1000)]

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.types import Phase
 from flightd.sim.random_sites import random_site
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, Pad, Site
+from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -40,7 +40,7 @@ def wrong_visits(flown: Flown, site: Site) -> list[str]:
 def test_carried_one_cell_off_it_notices_flies_the_mission_and_notes_nothing_wrong(
     site: Site, stands_on: str, visits: tuple[str, ...]
 ) -> None:
-    flown = IdealFlight(site, CONFIG.pilot_params(site), visits=visits, carried_to=stands_on).fly(200)
+    flown = IdealFlight(site, CONFIG, visits=visits, carried_to=stands_on).fly(200)
     corrected = [event for event in flown.events if event.text == f"corrected: it is {stands_on}"]
     assert corrected
     assert flown.phase is Phase.DONE
@@ -49,9 +49,7 @@ def test_carried_one_cell_off_it_notices_flies_the_mission_and_notes_nothing_wro
 
 
 def test_where_cells_look_alike_it_moves_on_the_line_until_it_knows() -> None:
-    flown = IdealFlight(UNIFORM, CONFIG.pilot_params(UNIFORM), visits=("A2",), carried_to="A5", seed=2).fly(
-        200
-    )
+    flown = IdealFlight(UNIFORM, CONFIG, visits=("A2",), carried_to="A5", seed=2).fly(200)
     assert any(event.name == "position" and "doubted" in event.text for event in flown.events)
     assert wrong_visits(flown, UNIFORM) == []
     assert flown.phase is Phase.DONE

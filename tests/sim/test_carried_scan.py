@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from flightd.config.schema import load_config
-from flightd.config.site_file import parse_site
 from flightd.core.inventory import LocationState
 from flightd.core.types import Phase
-from flightd.localisation.grid_localiser import LocaliserParams
 from flightd.mission.scan.scanner import Scanner
 from flightd.site.site import Site
+from flightd.site.site_file import parse_site
 from tests.sim.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal_front import IdealFront, Label, Stock
 from tests.sim.test_carried import wrong_visits
@@ -44,7 +42,7 @@ node = "A4"
 """,
     "alike",
 )
-SURE = LocaliserParams(carried=1e-6)
+SURE = {"expert": {"carried": 1e-6}}
 """The pad is believed without a doubt, so that only the shelves can say otherwise."""
 
 
@@ -63,11 +61,11 @@ def stock(
 
 
 def fly(visits: tuple[str, ...], carried_to: str, goods: Stock) -> Flown:
-    scanner = Scanner(ALIKE, SIGHT, CONFIG.scan_params(4.0))
-    params = replace(CONFIG.pilot_params(ALIKE), localiser=SURE)
+    scanner = Scanner(ALIKE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
+    config = CONFIG.with_values(localisation=SURE)
     front = IdealFront(ALIKE, SIGHT, goods)
     flight = IdealFlight(
-        ALIKE, params, visits=visits, seed=6, scanner=scanner, front=front, carried_to=carried_to
+        ALIKE, config, visits=visits, seed=6, scanner=scanner, front=front, carried_to=carried_to
     )
     return flight.fly(300)
 

@@ -16,10 +16,12 @@ import pytest
 from flightd.app.build import detector_pool
 from flightd.app.detection.detector_pool import DetectorPool
 from flightd.app.simulation import launch as simulate
+from flightd.app.simulation.simulation import Simulation
 from flightd.config.schema import Config, load_config
-from flightd.config.site_file import load_site
-from flightd.core.types import Phase, Status
+from flightd.core.snapshot import Snapshot
+from flightd.core.types import Phase
 from flightd.sim.scenario.scenario import Scenario
+from flightd.site.site_file import load_site
 from tests.command import Command
 
 ROOT = Path(__file__).parents[2]
@@ -110,12 +112,12 @@ def test_a_taken_camera_port_is_one_line(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
-def short_flight(folder: Path, speed: float, observer: Any) -> simulate.Simulation:
+def short_flight(folder: Path, speed: float, observer: Any) -> Simulation:
     config = load_config(CONFIG)
     mission = config.mission.model_copy(update={"nodes": ("A1", "A2")})
     vision = config.vision.model_copy(update={"workers": 2})
     config = _with_sim_lens(config.model_copy(update={"mission": mission, "vision": vision}))
-    return simulate.Simulation(config, load_site(mission.site), Scenario(), 2, speed, folder, observer)
+    return Simulation(config, load_site(mission.site), Scenario(), 2, speed, folder, observer)
 
 
 def _with_sim_lens(config: Config) -> Config:
@@ -141,7 +143,7 @@ def test_detectors_killed_in_flight_are_replaced_and_the_mission_completes(
         pools.append(make(*args))
         return pools[-1]
 
-    def kill_once(status: Status) -> None:
+    def kill_once(status: Snapshot) -> None:
         if status.phase is Phase.FOLLOW and status.goal == "A2" and not pools[0].replaced:
             for pid in pools[0].pids:
                 os.kill(pid, signal.SIGKILL)

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from flightd.config.site_file import load_site
 from flightd.sim.random_sites import random_site
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, Pad, Rack, Site
+from flightd.site.site_file import load_site
 from tests.sim.crossings import SURE, Flight, Trouble, bench
 
 DEMO = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")

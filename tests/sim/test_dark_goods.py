@@ -8,19 +8,19 @@ from pathlib import Path
 
 import pytest
 
-from flightd.config.site_file import load_site
 from flightd.core.scanning import Light, Occupancy
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.stock import StockShares, StockSituation, stock
+from flightd.site.site_file import load_site
 from flightd.vision.shelf.shelf_look import read_shelf
 from tests.sim.shelf_pictures import shelf_pictures
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
 CAMERA = FrontCamera()
 SHARES = StockShares(0.4, 0.0, 0.0, 0.0, torn=0.05, too_small=0.05, missing=0.0, occluded=0.0, dark=0.5)
-LOOK = replace(RackLook(), shares=SHARES)
+LOOK = replace(RackAppearance(), shares=SHARES)
 
 
 def judged(seed: int, exposure: float) -> Counter[tuple[bool, Occupancy]]:
@@ -51,7 +51,7 @@ def test_another_exposure_makes_labels_readable_that_were_burnt_out_or_in_the_da
     exposure: float, part: float, light: Light
 ) -> None:
     glossy = StockShares(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    look = replace(RackLook(), shares=glossy, exposure=exposure)
+    look = replace(RackAppearance(), shares=glossy, exposure=exposure)
     assigner = Assigner(SITE, FrontSight(CAMERA.lens, CAMERA.mount))
     read: Counter[float] = Counter()
     lights: set[Light] = set()

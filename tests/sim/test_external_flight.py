@@ -17,7 +17,8 @@ from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import ScaledLoop
-from flightd.sim.plant.external_simulator import ExternalVehicle, Placement
+from flightd.sim.plant.external_simulator import ExternalVehicle
+from flightd.sim.plant.external_truth import Placement
 from tests.protocol.rig import Rig
 
 ROOT = Path(__file__).parents[2]

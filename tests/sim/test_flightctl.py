@@ -84,7 +84,7 @@ def test_what_cannot_be_done_is_one_line_and_an_exit_code(command: list[str], co
 
 @in_loop
 async def test_keys_from_keygen_open_a_daemon_beyond_loopback(tmp_path: Path) -> None:
-    """The whole way that the README describes, with nothing but the commands."""
+    """The whole way that the guide describes, with nothing but the commands."""
     code, out, _ = await flightctl("keygen", "ann", "--out", str(tmp_path / "mine"), "--json")
     assert code == 0
     line = json.loads(out)["client"]

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.config.site_file import load_site
 from flightd.core.distortion import undistorted
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
@@ -19,6 +18,7 @@ from flightd.sim.floor.lighting import Lighting
 from flightd.sim.floor.texture import Patch
 from flightd.sim.sensors.camera_effects import blur_kernel
 from flightd.sim.sensors.optics import wide_lens
+from flightd.site.site_file import load_site
 
 DEMO = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")
 

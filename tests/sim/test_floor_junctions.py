@@ -6,16 +6,18 @@ import math
 import random
 from pathlib import Path
 
+from flightd.config.control import TiltCompensation
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
+from flightd.core.tracks import FloorJunction
 from flightd.core.types import Attitude
 from flightd.sim.floor.appearance import DEFAULT
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import SimCamera
 from flightd.site.painted_lines import Features, PaintMap
-from flightd.tracking.ground_junctions import FloorJunction, floor_junctions
-from flightd.tracking.tilt_compensation import FloorView, TiltCompensation
+from flightd.site.site_file import load_site
+from flightd.tracking.ground_junctions import floor_junctions
+from flightd.tracking.tilt_compensation import FloorView
 from flightd.vision.lines.detector import Detector
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -9,20 +9,24 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from prometheus_client import generate_latest
 
 from flightd.adapters.metrics.metrics import MetricsBook
+from flightd.app.build import build
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.detection.detector_pool import Detection
+from flightd.app.flight_orders import configured_order
 from flightd.app.simulation.ports import free_port
 from flightd.config.schema import Config, load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError, InputError, UnavailableError
-from flightd.core.types import Command, CommandKind, Demand, Phase, Status
+from flightd.core.snapshot import Snapshot
+from flightd.core.types import Command, CommandKind, Demand, Phase
 from flightd.ports import Monitor
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.sim.autopilot.copter import CopterMode
+from flightd.site.site_file import load_site
 from tests.protocol.rig import Rig, ardupilot_rig, run_virtual
 
 ROOT = Path(__file__).parents[2]
@@ -59,21 +63,25 @@ async def died(rig: Rig) -> None:
 
 
 async def restarted(
-    rig: Rig, *monitors: Monitor, ailing: FlightdError | None = None, camera_gone: bool = True
+    rig: Rig, *monitors: Monitor, fault: FlightdError | None = None, camera_gone: bool = True
 ) -> tuple[FlightResult, list[Phase]]:
     phases: list[Phase] = []
 
-    def note(status: Status) -> None:
+    def note(status: Snapshot) -> None:
         phases.extend([status.phase] if status.phase not in phases[-1:] else [])
 
+    config = await config_of(rig, camera_gone=camera_gone)
     daemon = Daemon(
-        await config_of(rig, camera_gone=camera_gone),
-        SITE,
-        LoopClock(),
-        NoDetectors(),
-        observers=[note],
-        monitors=monitors,
-        ailing=ailing,
+        build(
+            config,
+            SITE,
+            configured_order(config),
+            clock=LoopClock(),
+            detectors=NoDetectors(),
+            observers=[note],
+            monitors=monitors,
+            startup_fault=fault,
+        )
     )
     async with asyncio.timeout(120):
         return await daemon.fly(), phases
@@ -105,7 +113,7 @@ def test_it_keeps_the_vehicle_level_reports_and_lands_it(alone_s: float) -> None
             assert rig.peer.truth().height_m < 0.15
             assert max(tilts) < math.radians(3)
             assert max(heights) < 1.9, "it never climbs away"
-            told = book.exposition().decode()
+            told = generate_latest(book.registry).decode()
             assert 'flightd_phase{phase="aborted"} 1.0' in told
             assert 'flightd_events_total{level="error",name="restart"} 1.0' in told
             assert 'flightd_events_total{level="error",name="failure"}' in told, "the camera's"
@@ -165,7 +173,7 @@ def test_an_inventory_that_cannot_be_opened_lands_a_vehicle_found_flying(tmp_pat
             await rig.take_off(1.5)
             await died(rig)
             book = MetricsBook()
-            result, phases = await restarted(rig, book, ailing=unopened(tmp_path / "inventory"))
+            result, phases = await restarted(rig, book, fault=unopened(tmp_path / "inventory"))
             assert phases[-3:] == [Phase.RECOVER, Phase.LAND, Phase.ABORTED]
             assert result.phase is Phase.ABORTED
             assert rig.peer.truth().height_m < 0.15
@@ -179,7 +187,7 @@ def test_on_the_floor_an_inventory_that_cannot_be_opened_is_an_error(tmp_path: P
             await died(rig)
             error = unopened(tmp_path / "inventory")
             with pytest.raises(type(error)) as raised:
-                await restarted(rig, ailing=error, camera_gone=False)
+                await restarted(rig, fault=error, camera_gone=False)
             assert raised.value is error
 
     run_virtual(test)
@@ -193,9 +201,16 @@ def test_a_vehicle_that_stands_armed_never_takes_off_without_its_inventory(tmp_p
             await rig.until(lambda: rig.known().armed)
             await died(rig)
             error = unopened(tmp_path / "inventory")
-            daemon = Daemon(
-                await config_of(rig, camera_gone=False), SITE, LoopClock(), NoDetectors(), ailing=error
+            config = await config_of(rig, camera_gone=False)
+            flight = build(
+                config,
+                SITE,
+                configured_order(config),
+                clock=LoopClock(),
+                detectors=NoDetectors(),
+                startup_fault=error,
             )
+            daemon = Daemon(flight)
             flying = asyncio.create_task(daemon.fly())
             await asyncio.sleep(1.0)
             assert rig.peer.armed

@@ -1,6 +1,8 @@
 """The simulated front camera as a peer: its pictures reach a daemon's camera, with the right calibration."""
 
 import asyncio
+import os
+import re
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,21 +14,23 @@ import numpy as np
 import pytest
 
 from flightd.adapters.camera.shared_memory import SharedCamera
-from flightd.app.simulation.launch import Simulation, truth_of
-from flightd.app.simulation.ports import free_port, has_front_camera
-from flightd.cli.sim import _camera_keys, _configured
+from flightd.app.simulation.ports import free_port
+from flightd.app.simulation.simulation import Simulation, truth_of
+from flightd.app.simulation.simulator_config import simulator_config
 from flightd.config.schema import Config
-from flightd.config.site_file import load_site
+from flightd.core.errors import RunError
 from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import VirtualLoop
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera, front_lens
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.scenario.scenario import FrontCameraScenario, Scenario
 from flightd.sim.sensors.camera import CameraPeer, PictureMaker
+from flightd.site.site_file import load_site
+from tests.held_time import held
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SMALL = CONFIGS / "site-racks-small.toml"
@@ -37,7 +41,7 @@ def hovering(stamp_ns: int) -> Kinematics:
 
 
 CAMERA = FrontCamera(lens=front_lens(320, 200, 250.0), fps=5.0, capture_delay_s=0.08, jitter_s=0.0)
-MAKE = partial(FrontRenderer, load_site(SMALL), CAMERA, RackLook(), 1)
+MAKE = partial(FrontRenderer, load_site(SMALL), CAMERA, RackAppearance(), 1)
 
 
 def taken(
@@ -60,7 +64,7 @@ def taken(
 
         address = f"udp://127.0.0.1:{port}"
         listener = SharedCamera(address, (320, 200), 0.08, clock, take, pytest.fail)
-        peer = CameraPeer(camera, make, "front camera 1", ("127.0.0.1", port), hovering, clock)
+        peer = CameraPeer(camera, make, "front camera 1", ("127.0.0.1", port), hovering, clock, hold=held)
         listening = asyncio.ensure_future(listener.run())
         await asyncio.sleep(0)
         running = asyncio.ensure_future(peer.run())
@@ -98,6 +102,50 @@ def test_the_camera_takes_the_exposure_it_is_asked_for_and_says_so_with_each_pic
     assert dark / usual == pytest.approx(0.4, abs=0.08)
 
 
+class Broken:
+    """Draws two pictures."""
+
+    def render(
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+    ) -> Image:
+        if seq == 2:
+            raise ValueError("a picture\nof nothing")
+        assert out is not None
+        return out
+
+
+class Dying:
+    """Its process dies before there is any picture."""
+
+    def __init__(self) -> None:
+        os._exit(3)
+
+    def render(
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+    ) -> Image:
+        raise AssertionError
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (Broken, r"picture 2: ValueError: a picture of nothing \(test_front_camera\.py:\d+\)"),
+        (Dying, "picture 0: the process died"),
+    ],
+)
+def test_a_renderer_that_fails_ends_its_camera(make: Callable[[], PictureMaker], problem: str) -> None:
+    async def main() -> None:
+        peer = CameraPeer(CAMERA, make, "seed", ("127.0.0.1", free_port()), hovering, LoopClock())
+        async with asyncio.timeout(60.0):
+            await peer.run()
+
+    with asyncio.Runner(loop_factory=VirtualLoop) as runner, pytest.raises(ExceptionGroup) as ended:
+        runner.run(main())
+    (cause,) = ended.value.exceptions
+    assert isinstance(cause, RunError)
+    assert re.fullmatch(f"the simulated camera cannot draw {problem}", str(cause))
+
+
 class Slow:
     """Takes half as long again over a picture as the camera has for one."""
 
@@ -118,14 +166,12 @@ def test_a_renderer_that_cannot_keep_up_costs_pictures_and_does_not_let_them_que
 @pytest.mark.realtime
 def test_a_camera_without_any_delay_takes_pictures() -> None:
     at_once = replace(CAMERA, capture_delay_s=0.0)
-    make = partial(FrontRenderer, load_site(SMALL), at_once, RackLook(), 1)
+    make = partial(FrontRenderer, load_site(SMALL), at_once, RackAppearance(), 1)
     assert len(taken(2.0, make=make, camera=at_once, loop=asyncio.new_event_loop)) >= 2
 
 
 def configured(site: Path, *settings: str, scenario: Scenario = Scenario()) -> Config:  # noqa: B008
-    config, _ = _configured(None, str(site), None, settings, _camera_keys(scenario))
-    assert isinstance(config, Config)
-    return config
+    return simulator_config(None, str(site), scenario, settings)[0]
 
 
 def test_the_daemon_is_given_the_simulated_cameras_calibration() -> None:
@@ -137,12 +183,11 @@ def test_the_daemon_is_given_the_simulated_cameras_calibration() -> None:
 
 
 def test_there_is_a_front_camera_where_there_are_racks_or_one_is_asked_for() -> None:
-    demo = load_site(CONFIGS / "site-large.toml")
-    small = load_site(SMALL)
-    assert has_front_camera(configured(SMALL), small)
-    assert not has_front_camera(configured(SMALL), demo)
-    assert has_front_camera(configured(SMALL, "front_camera.url=udp://127.0.0.1:5601"), demo)
-    assert not has_front_camera(configured(SMALL, "vehicle.kind=ardrone"), small)
+    bare = CONFIGS / "site-large.toml"
+    assert configured(SMALL).front_camera.is_fitted
+    assert not configured(bare).front_camera.is_fitted
+    assert configured(bare, "front_camera.url=udp://127.0.0.1:5601").front_camera.is_fitted
+    assert not configured(SMALL, "vehicle.kind=ardrone").front_camera.is_fitted
 
 
 def test_the_truth_of_a_simulation_is_that_of_its_scenario_and_seed(tmp_path: Path) -> None:

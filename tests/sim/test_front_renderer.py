@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flightd.config.site_file import load_site
 from flightd.core.camera_view import ForwardMount
 from flightd.core.geometry import Lens
 from flightd.core.types import CodeRead
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.rack_layout import faces
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.racks.stock import Condition, Label, StockPlace, StockShares, StockSituation, stock
 from flightd.site.site import Side
+from flightd.site.site_file import load_site
 from flightd.vision.shelf.code_reader import read_codes
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
-LOOK = RackLook(shares=StockShares(empty=0.15, tilted=0.15, torn=0.1, too_small=0.1, missing=0.05))
+LOOK = RackAppearance(shares=StockShares(empty=0.15, tilted=0.15, torn=0.1, too_small=0.1, missing=0.05))
 STILL = replace(LOOK, noise=0.0, flicker=0.0, motion_blur=False, soft_px=0.0, vignetting=0.0)
 CAMERA = FrontCamera()
 BARREL = Lens(1280, 800, 1000.0, 1000.0, 631.0, 405.0, (-0.12, 0.02, 0.0005, -0.0005, 0.0))

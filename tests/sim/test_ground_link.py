@@ -155,7 +155,7 @@ async def test_a_stranger_hears_nothing_on_the_status_port_either(tmp_path: Path
 
 @in_loop
 async def test_a_plain_req_socket_and_json_are_a_whole_client() -> None:
-    """What the README shows, without a line of flightd."""
+    """What the guide shows, without a line of flightd."""
     async with serving(local()) as link:
         address = address_of(link)
         with zmq.asyncio.Context() as context, context.socket(zmq.REQ) as req:

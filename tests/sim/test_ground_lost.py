@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from flightd.config.hazards import LossAction
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import Phase
-from flightd.mission.guidance import LossAction
-from flightd.pilot import TickInput, TickOutput
+from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -23,9 +22,9 @@ LOST_S = 5.0
 
 def flown(action: LossAction, silence: Callable[[int], float]) -> Flown:
     """A short flight in which `silence(ticks since it first followed a line)` gives the link's silence."""
-    params = load_config(CONFIGS / "sim.toml").pilot_params(SITE)
-    mission = replace(params.mission, ground_lost=action, ground_lost_s=LOST_S)
-    flight = IdealFlight(SITE, replace(params, mission=mission), visits=("A1", "A2", "A3"))
+    lost = {"lost_action": action, "lost_s": LOST_S}
+    config = load_config(CONFIGS / "sim.toml").with_values(ground=lost)
+    flight = IdealFlight(SITE, config, visits=("A1", "A2", "A3"))
     step: Any = flight.pilot.step
     ticks = 0
 
@@ -89,9 +88,9 @@ def test_silence_shorter_than_the_limit_is_nothing() -> None:
 
 
 def test_who_fell_silent_on_the_ground_keeps_it_there() -> None:
-    params = load_config(CONFIGS / "sim.toml").pilot_params(SITE)
-    mission = replace(params.mission, ground_lost=LossAction.HOME)
-    flight = IdealFlight(SITE, replace(params, mission=mission), visits=("A1", "A2"))
+    lost = {"lost_action": LossAction.HOME}
+    config = load_config(CONFIGS / "sim.toml").with_values(ground=lost)
+    flight = IdealFlight(SITE, config, visits=("A1", "A2"))
     flight.ground_silent_s = 60.0
     grounded = flight.fly(10.0)
     assert grounded.phase is Phase.PREFLIGHT

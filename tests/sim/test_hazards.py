@@ -14,12 +14,12 @@ from pathlib import Path
 import pytest
 
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.types import Command, CommandKind, Health, Phase
 from flightd.mission.safety.hazards import HAZARDS, PHASE_OF, Action, Hazard
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.plant.wind import Draught, Wind
+from flightd.sim.plant.wind import Wind, WindParams
 from flightd.site.corridor import Corridor
+from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -57,7 +57,7 @@ def fault(**values: object) -> Callable[[IdealFlight], None]:
 
 def blow(x_mps: float, y_mps: float) -> Callable[[IdealFlight], None]:
     def begin(flight: IdealFlight) -> None:
-        flight.airframe.wind = Wind(Draught(x_mps, y_mps, correlation_s=0.3), 7)
+        flight.airframe.wind = Wind(WindParams(x_mps, y_mps, correlation_s=0.3), 7)
 
     return begin
 
@@ -107,10 +107,10 @@ def fly(trial: Trial, seed: int) -> tuple[Flown, float]:
     """The flight and the time at which the fault began, s of its clock."""
     flight = IdealFlight(
         SITE,
-        CONFIG.pilot_params(SITE),
+        CONFIG,
         visits=VISITS,
         seed=seed,
-        draught=Draught(gust_rms_mps=trial.gust_mps),
+        wind=WindParams(gust_rms_mps=trial.gust_mps),
     )
     step, begun_ns, over = flight.pilot.step, [0], [False]
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from flightd.config.schema import load_config
-from flightd.config.site_file import parse_site
+from flightd.core.tracks import TrackSet
 from flightd.core.types import Phase
 from flightd.mission.scan.scanner import Scanner
-from flightd.tracking.line_tracker import TrackSet
+from flightd.site.site_file import parse_site
 from tests.sim.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import SIGHT
@@ -49,9 +49,9 @@ LOW_M, HIGH_M = 0.9, 2.9
 @pytest.fixture(scope="module")
 def flown() -> Flown:
     labels = {code: [Label(f"PALLET {code}")] for code in SITE.locations}
-    scanner = Scanner(SITE, SIGHT, CONFIG.scan_params(4.0))
+    scanner = Scanner(SITE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
     front = IdealFront(SITE, SIGHT, Stock(labels))
-    flight = IdealFlight(SITE, CONFIG.pilot_params(SITE), visits=NODES, seed=4, scanner=scanner, front=front)
+    flight = IdealFlight(SITE, CONFIG, visits=NODES, seed=4, scanner=scanner, front=front)
     return flight.fly(300)
 
 

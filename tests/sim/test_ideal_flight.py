@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from flightd.config.mission import Heading
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.types import Phase
-from flightd.mission.plan.flight_plan import Heading, HeadingPolicy
-from flightd.sim.plant.wind import Draught
+from flightd.mission.plan.flight_plan import HeadingPolicy
+from flightd.sim.plant.wind import WindParams
 from flightd.sim.random_sites import random_site
+from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import Flown, IdealFlight, rms_off_line
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -29,7 +30,7 @@ def landed_error(flown: Flown) -> float:
 
 @pytest.mark.parametrize("heading", list(Heading))
 def test_a_mission_visits_every_node_on_the_line_and_lands_on_the_pad(heading: Heading) -> None:
-    flight = IdealFlight(DEMO, CONFIG.pilot_params(DEMO), policy=HeadingPolicy(heading), seed=11)
+    flight = IdealFlight(DEMO, CONFIG, policy=HeadingPolicy(heading), seed=11)
     flown = flight.fly()
     assert (flown.phase, flown.reason) == (Phase.DONE, "landed on the pad")
     assert flown.visited == list(DEMO.serpentine_route())
@@ -39,14 +40,14 @@ def test_a_mission_visits_every_node_on_the_line_and_lands_on_the_pad(heading: H
 
 def test_a_random_site_is_flown_too() -> None:
     site = random_site(8)
-    flown = IdealFlight(site, CONFIG.pilot_params(site), seed=3).fly(900)
+    flown = IdealFlight(site, CONFIG, seed=3).fly(900)
     assert flown.phase is Phase.DONE
     assert flown.visited == list(site.serpentine_route())
     assert rms_off_line(flown, site) <= 0.05
 
 
 def test_lines_lost_make_it_level_hold_and_land() -> None:
-    flight = IdealFlight(DEMO, CONFIG.pilot_params(DEMO), visits=NEAR, draught=Draught(gust_rms_mps=0.0))
+    flight = IdealFlight(DEMO, CONFIG, visits=NEAR, wind=WindParams(gust_rms_mps=0.0))
     lost_ns: list[int] = []
     step = flight.pilot.step
 
@@ -78,7 +79,7 @@ def test_lines_lost_make_it_level_hold_and_land() -> None:
 
 
 def test_the_pilot_taking_over_ends_the_stream_at_once() -> None:
-    flight = IdealFlight(DEMO, CONFIG.pilot_params(DEMO), visits=NEAR)
+    flight = IdealFlight(DEMO, CONFIG, visits=NEAR)
     step = flight.pilot.step
 
     def watch(tick):  # type: ignore[no-untyped-def]

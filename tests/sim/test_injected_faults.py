@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
-from flightd.config.site_file import load_site
 from flightd.core.types import Demand
 from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.scenario.faults import WorldFaults
+from flightd.site.site_file import load_site
 from tests.protocol.rig import Rig, ardupilot_rig, px4_rig, run_virtual
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")

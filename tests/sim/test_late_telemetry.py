@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import Attitude, Phase, VehicleState
-from flightd.pilot import TickInput, TickOutput
+from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import IdealFlight
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -41,7 +41,7 @@ class LateLink:
 
 @pytest.mark.parametrize(("delay_ms", "burst_ms"), [(60, 120), (0, 200), (100, 80), (160, 20)])
 def test_the_drone_stays_on_its_line_and_lands(delay_ms: int, burst_ms: int) -> None:
-    flight = IdealFlight(SITE, CONFIG.pilot_params(SITE), visits=("A2", "A4"), seed=1)
+    flight = IdealFlight(SITE, CONFIG, visits=("A2", "A4"), seed=1)
     link, step = LateLink(delay_ms * 1_000_000, burst_ms * 1_000_000), flight.pilot.step
 
     def late(tick: TickInput) -> TickOutput:

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flightd.config.control import TiltCompensation
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.geometry import Mount
 from flightd.core.markers import MarkerDictionary, MarkerSet
 from flightd.core.types import Attitude, LineSet, Phase
@@ -20,7 +20,8 @@ from flightd.sim.floor.renderer import Renderer
 from flightd.sim.sensors.optics import SimCamera
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, Marker, Pad
-from flightd.tracking.tilt_compensation import FloorView, TiltCompensation, ground_point
+from flightd.site.site_file import load_site
+from flightd.tracking.tilt_compensation import FloorView, ground_point
 from flightd.vision.lines.detector import Detector
 from tests.sim.ideal_flight import IdealFlight
 from tests.sim.test_carried import wrong_visits
@@ -93,7 +94,7 @@ UNIFORM = lay_out(
 
 
 def test_where_cells_look_alike_a_marker_settles_where_the_drone_is() -> None:
-    flight = IdealFlight(UNIFORM, CONFIG.pilot_params(UNIFORM), visits=("A3",), carried_to="A5", seed=2)
+    flight = IdealFlight(UNIFORM, CONFIG, visits=("A3",), carried_to="A5", seed=2)
     flown = flight.fly(200)
     assert [event for event in flown.events if event.text == "corrected: it is A5"]
     assert (flown.phase, flown.visited) == (Phase.DONE, ["A3"])

@@ -9,21 +9,21 @@ from typing import Any
 import pytest
 
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
+from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import Command, CommandKind, Demand, Phase
-from flightd.pilot import TickInput, TickOutput
+from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
-PARAMS = load_config(CONFIGS / "sim.toml").pilot_params(SITE)
+CONFIG = load_config(CONFIGS / "sim.toml")
 S = 50
 """Ticks in a second."""
 
 
 def flown(orders: Mapping[int, Command]) -> Flown:
     """A short flight with orders at given ticks, counted from when it first followed a line."""
-    flight = IdealFlight(SITE, PARAMS, visits=("A1", "A2", "A3"))
+    flight = IdealFlight(SITE, CONFIG, visits=("A1", "A2", "A3"))
     step: Any = flight.pilot.step
     ticks = 0
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site, parse_site, site_toml
 from flightd.core.errors import InputError
 from flightd.core.types import Phase
 from flightd.sim.scenario.scenario import FloorScenario
 from flightd.site.site import Site
+from flightd.site.site_file import load_site, parse_site, site_toml
 from tests.sim.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal_sight import EyeErrors
 
@@ -30,9 +29,8 @@ def pushed(seed: int, reach_m: float = 0.25) -> Site:
 
 def fly(world: Site, seed: int, **others: object) -> tuple[Flown, float]:
     """The flight, and how far from the pad's true centre it landed."""
-    params = CONFIG.pilot_params(DEMO)
-    params = replace(params, mission=replace(params.mission, dwell_s=0.2))
-    flown = IdealFlight(DEMO, params, visits=("A2",), seed=seed, world=world, **others).fly(120)  # type: ignore[arg-type]
+    config = CONFIG.with_values(mission={"dwell_s": 0.2})
+    flown = IdealFlight(DEMO, config, visits=("A2",), seed=seed, world=world, **others).fly(120)  # type: ignore[arg-type]
     last, (x_m, y_m) = flown.truth[-1][1], world.pad_centre(world.home)
     return flown, math.hypot(last.x_m - x_m, last.y_m - y_m)
 
@@ -73,9 +71,8 @@ def ending(overrun_m: float) -> Site:
 def test_a_pad_without_a_mat_is_found_by_the_end_of_its_line(seed: int, overrun_m: float) -> None:
     """Wherever the line really ends, up to 0.15 m from the map."""
     world, site = ending(overrun_m), ending(0.35)
-    params = CONFIG.pilot_params(site)
-    params = replace(params, mission=replace(params.mission, dwell_s=0.2))
-    flown = IdealFlight(site, params, visits=("A2",), seed=seed, world=world).fly(120)
+    config = CONFIG.with_values(mission={"dwell_s": 0.2})
+    flown = IdealFlight(site, config, visits=("A2",), seed=seed, world=world).fly(120)
     last, (x_m, y_m) = flown.truth[-1][1], world.pad_centre(world.home)
     assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
     assert math.hypot(last.x_m - x_m, last.y_m - y_m) <= 0.10

@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightd.config.site_file import load_site
+from flightd.config.control import TiltCompensation
 from flightd.core.geometry import Mount
 from flightd.core.types import Attitude, Image, PadSight
 from flightd.sim.floor.appearance import CLEAN, DEFAULT, HARSH, Appearance
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.scenario.scenario import FloorScenario
 from flightd.sim.sensors.optics import SimCamera
-from flightd.tracking.tilt_compensation import FloorView, TiltCompensation, ground_point
+from flightd.site.site_file import load_site
+from flightd.tracking.tilt_compensation import FloorView, ground_point
 from flightd.vision.lines.detector import Detector
 from tests.sim.test_renderer import hover
 

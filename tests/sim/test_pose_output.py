@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 
 from flightd.app.simulation import launch as simulate
+from flightd.app.simulation.simulation import Simulation
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.types import Phase
 from flightd.sim.autopilot.autopilot import AutopilotPeer
 from flightd.sim.scenario.scenario import Scenario
+from flightd.site.site_file import load_site
 
 CONFIG = Path(__file__).parents[2] / "configs" / "sim.toml"
 
@@ -39,7 +40,7 @@ def test_a_flight_shares_its_pose_at_thirty_hertz_and_the_pad_while_near(
         }
     )
     site = load_site(config.mission.site)
-    result = simulate.fly(simulate.Simulation(config, site, Scenario(), 2, None, tmp_path, lambda _: None))
+    result = simulate.fly(Simulation(config, site, Scenario(), 2, None, tmp_path, lambda _: None))
     assert result.phase is Phase.DONE
     poses, targets = heard["ODOMETRY"], heard["LANDING_TARGET"]
     span_s = (poses[-1][0].time_usec - poses[0][0].time_usec) * 1e-6

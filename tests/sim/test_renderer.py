@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from flightd.config.site_file import load_site
 from flightd.core.geometry import Lens, Mount, ground_homography, heading_rotation, level_from_body
 from flightd.sim.floor.appearance import CLEAN, DEFAULT, HARSH, Appearance
 from flightd.sim.floor.renderer import Renderer
@@ -18,6 +17,7 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import SimCamera, wide_lens
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, LineColour, Pad, Site
+from flightd.site.site_file import load_site
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 DEMO = load_site(CONFIGS / "site-demo.toml")

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from flightd.config.site_file import load_site
 from flightd.core.scanning import CodeSet, Occupancy
 from flightd.mission.scan.code_assignment import Assigner, FrontSight, ShelfLook
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.stock import StockShares, StockSituation
 from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
+from flightd.site.site_file import load_site
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, picture_name
 from flightd.vision.shelf.shelf_look import read_shelf
 from tests.sim.shelf_pictures import shelf_pictures
@@ -23,7 +23,7 @@ from tests.sim.shelf_pictures import shelf_pictures
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
 CAMERA = FrontCamera()
 SIGHT = FrontSight(CAMERA.lens, CAMERA.mount)
-LOOK = replace(RackLook(), shares=StockShares(empty=0.35, occluded=0.1, missing=0.1, dark=0.0))
+LOOK = replace(RackAppearance(), shares=StockShares(empty=0.35, occluded=0.1, missing=0.1, dark=0.0))
 SEED = 4
 
 

@@ -7,9 +7,9 @@ import math
 from pathlib import Path
 
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.types import AttitudeSetpoint, Phase
-from flightd.sim.plant.wind import Draught
+from flightd.sim.plant.wind import WindParams
+from flightd.site.site_file import load_site
 from tests.sim.ideal_flight import IdealFlight
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -21,9 +21,7 @@ TRIM_RAD = math.radians(2.1)
 
 def stalled() -> list[tuple[float, AttitudeSetpoint, float]]:
     """(time since the stall began, setpoint, true speed) of each tick, until it is over."""
-    flight = IdealFlight(
-        SITE, CONFIG.pilot_params(SITE), visits=("A4",), seed=1, draught=Draught(gust_rms_mps=0.0)
-    )
+    flight = IdealFlight(SITE, CONFIG, visits=("A4",), seed=1, wind=WindParams(gust_rms_mps=0.0))
     began: list[int] = []
 
     def stall(phase: Phase, now_ns: int) -> None:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from flightd.config.schema import load_config
-from flightd.config.site_file import load_site, parse_site, site_toml
+from flightd.config.battery import BatteryConfig
+from flightd.config.schema import Config, load_config
+from flightd.core.tick import TickOutput
 from flightd.core.types import Command, CommandKind, Phase
-from flightd.mission.battery.consumption import BatteryParams
-from flightd.pilot import PilotParams, TickOutput
 from flightd.sim.plant.airframe import AirframeParams
-from flightd.sim.plant.pad_crew import PadCrew
+from flightd.sim.plant.battery_swapper import BatterySwapper
+from flightd.site.site_file import load_site, parse_site, site_toml
 from tests.sim.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -22,14 +21,13 @@ CONFIG = load_config(CONFIGS / "sim.toml")
 DEMO = load_site(CONFIGS / "site-demo.toml")
 NEAR = ("A2", "A3")
 ROW = ("A2", "A3", "A4", "A5")
-SWAPS = BatteryParams(flight_s=120.0, swap=True, swap_wait_s=120.0)
+SWAPS = BatteryConfig(flight_s=120.0, swap=True, swap_wait_s=120.0)
 SMALL = AirframeParams(battery_capacity_ah=0.4)
 """Hovers for some 100 s."""
 
 
-def params(**mission: object) -> PilotParams:
-    whole = CONFIG.pilot_params(DEMO)
-    return replace(whole, mission=replace(whole.mission, dwell_s=0.5, **mission))  # type: ignore[arg-type]
+def config(battery: BatteryConfig = CONFIG.battery, **mission: object) -> Config:
+    return CONFIG.with_values(battery=battery, mission={"dwell_s": 0.5, **mission})
 
 
 def when(flight: IdealFlight, *script: tuple[Callable[[TickOutput], bool], CommandKind, str]) -> None:
@@ -84,7 +82,7 @@ def landed_at(flown: Flown, within_m: float = 0.15) -> str:
 
 
 def test_paused_it_holds_and_resumed_it_finishes() -> None:
-    flight = IdealFlight(DEMO, params(), visits=NEAR)
+    flight = IdealFlight(DEMO, config(), visits=NEAR)
     when(flight, (following("A3"), CommandKind.PAUSE, ""), (held(3.0), CommandKind.RESUME, ""))
     flown = flight.fly()
     assert (flown.phase, flown.visited) == (Phase.DONE, [*NEAR])
@@ -94,7 +92,7 @@ def test_paused_it_holds_and_resumed_it_finishes() -> None:
 
 
 def test_ordered_to_a_node_it_goes_there_and_then_home() -> None:
-    flight = IdealFlight(DEMO, params(), visits=ROW)
+    flight = IdealFlight(DEMO, config(), visits=ROW)
     when(flight, (following("A3"), CommandKind.GOTO, "B1"))
     flown = flight.fly()
     assert (flown.phase, flown.visited) == (Phase.DONE, ["A2", "A3", "B1"])
@@ -102,7 +100,7 @@ def test_ordered_to_a_node_it_goes_there_and_then_home() -> None:
 
 
 def test_ordered_home_it_lands_there_with_the_rest_unvisited() -> None:
-    flight = IdealFlight(DEMO, params(), visits=ROW)
+    flight = IdealFlight(DEMO, config(), visits=ROW)
     when(flight, (following("A3"), CommandKind.HOME, ""))
     flown = flight.fly()
     assert (flown.phase, flown.visited, landed_at(flown)) == (Phase.ABORTED, ["A2"], "A1")
@@ -111,8 +109,8 @@ def test_ordered_home_it_lands_there_with_the_rest_unvisited() -> None:
 
 @pytest.mark.parametrize(("order", "within_m"), [(CommandKind.LAND, 0.15), (CommandKind.STOP, 0.6)])
 def test_ordered_down_it_lands_where_it_is(order: CommandKind, within_m: float) -> None:
-    """A stop goes down level and unsteered: the draught carries it."""
-    flight = IdealFlight(DEMO, params(), visits=ROW)
+    """A stop goes down level and unsteered: the wind carries it."""
+    flight = IdealFlight(DEMO, config(), visits=ROW)
     when(flight, (lambda o: o.phase is Phase.HOVER and o.goal == "A3", order, ""))
     flown = flight.fly()
     assert (flown.phase, landed_at(flown, within_m)) == (Phase.ABORTED, "A3")
@@ -123,7 +121,7 @@ def test_a_closed_line_is_flown_round_and_what_it_cuts_off_is_refused() -> None:
         f'\n[[blocked]]\nnodes = ["{a}", "{b}"]\n' for a, b in (("A3", "A4"), ("B2", "B3"), ("B3", "B4"))
     )
     site = parse_site(site_toml(DEMO) + blocks, "closed.toml")
-    flight = IdealFlight(site, params(), visits=NEAR)
+    flight = IdealFlight(site, config(), visits=NEAR)
     when(
         flight,
         (following("A2"), CommandKind.GOTO, "B3"),
@@ -141,7 +139,7 @@ def test_a_closed_line_is_flown_round_and_what_it_cuts_off_is_refused() -> None:
 def test_a_small_battery_flies_the_plan_in_sorties_with_its_reserve() -> None:
     flight = IdealFlight(
         DEMO,
-        params(battery=SWAPS, battery_home_frac=0.02, battery_land_frac=0.01),
+        config(battery=SWAPS, battery_home=0.02, battery_land=0.01),
         airframe=SMALL,
         swap_s=30.0,
     )
@@ -161,11 +159,11 @@ def test_a_small_battery_flies_the_plan_in_sorties_with_its_reserve() -> None:
     assert phases(flown).count(Phase.SWAP) == sorties - 1
     assert all("in reserve" in text for text in told(flown, "home"))
     assert not told(flown, "position"), "where it is reckoned to be while it waits is not carried on"
-    assert 0.7 * SWAPS.reserve_frac < lowest[0] < 0.35, "neither stranded nor home with half a battery"
+    assert 0.7 * SWAPS.reserve < lowest[0] < 0.35, "neither stranded nor home with half a battery"
 
 
 def test_without_swaps_the_mission_ends_on_the_pad_and_says_why() -> None:
-    flight = IdealFlight(DEMO, params(battery=replace(SWAPS, swap=False)), airframe=SMALL)
+    flight = IdealFlight(DEMO, config(battery=SWAPS.with_values(swap=False)), airframe=SMALL)
     flown = flight.fly(600)
     assert (flown.phase, landed_at(flown)) == (Phase.ABORTED, "A1")
     assert "battery at" in told(flown, "home")[0]
@@ -173,7 +171,9 @@ def test_without_swaps_the_mission_ends_on_the_pad_and_says_why() -> None:
 
 
 def test_with_nobody_to_change_the_battery_it_gives_up() -> None:
-    flight = IdealFlight(DEMO, params(battery=replace(SWAPS, swap_wait_s=10.0)), visits=ROW, airframe=SMALL)
+    flight = IdealFlight(
+        DEMO, config(battery=SWAPS.with_values(swap_wait_s=10.0)), visits=ROW, airframe=SMALL
+    )
     flight.airframe.battery_frac = 0.5
     flown = flight.fly(600)
     assert phases(flown)[-2:] == [Phase.SWAP, Phase.ABORTED]
@@ -181,7 +181,7 @@ def test_with_nobody_to_change_the_battery_it_gives_up() -> None:
 
 
 def test_after_a_swap_the_start_command_is_waited_for_unless_it_starts_by_itself() -> None:
-    flight = IdealFlight(DEMO, params(battery=SWAPS, autostart=False), visits=ROW, airframe=SMALL, swap_s=5.0)
+    flight = IdealFlight(DEMO, config(battery=SWAPS, autostart=False), visits=ROW, airframe=SMALL, swap_s=5.0)
     flight.airframe.battery_frac = 0.5
     swapped = lambda o: o.phase is Phase.SWAP and o.reason == "waiting for the start command"  # noqa: E731
     when(flight, (lambda o: True, CommandKind.START, ""), (swapped, CommandKind.START, ""))
@@ -191,29 +191,29 @@ def test_after_a_swap_the_start_command_is_waited_for_unless_it_starts_by_itself
 
 
 def test_the_plan_left_over_is_flown_by_the_next_start() -> None:
-    first = IdealFlight(DEMO, params(battery=replace(SWAPS, swap=False)), visits=ROW, airframe=SMALL)
+    first = IdealFlight(DEMO, config(battery=SWAPS.with_values(swap=False)), visits=ROW, airframe=SMALL)
     first.airframe.battery_frac = 0.5
     done = first.fly(600).visited
     rest = first.pilot.mission.remaining
-    second = IdealFlight(DEMO, params(), visits=rest).fly()
+    second = IdealFlight(DEMO, config(), visits=rest).fly()
     assert second.phase is Phase.DONE
     assert 0 < len(rest) < len(ROW)
     assert (*done, *second.visited) == ROW
 
 
-def test_the_crew_changes_the_battery_of_a_drone_that_came_back() -> None:
-    flight = IdealFlight(DEMO, params(), visits=("A2",))
+def test_the_battery_swapper_changes_the_battery_of_a_drone_that_came_back() -> None:
+    flight = IdealFlight(DEMO, config(), visits=("A2",))
     frame = flight.airframe
-    crew = PadCrew(DEMO, frame, 30.0)
+    swapper = BatterySwapper(DEMO, frame, 30.0)
     frame.battery_frac = 0.4
     for t in range(100):
-        crew.look(t * 10**9)
+        swapper.look(t * 10**9)
     assert frame.battery_frac == 0.4, "it has not flown"
     frame.on_floor = False
-    crew.look(100 * 10**9)
+    swapper.look(100 * 10**9)
     frame.on_floor = True
     for t in range(101, 130):
-        crew.look(t * 10**9)
+        swapper.look(t * 10**9)
     assert frame.battery_frac == 0.4
-    crew.look(131 * 10**9)
+    swapper.look(131 * 10**9)
     assert frame.battery_frac == 1.0

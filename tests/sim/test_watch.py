@@ -11,8 +11,8 @@ from textual.widgets import RichLog, Static
 from flightd.adapters.ground_link.client import GroundClient
 from flightd.adapters.ground_link.protocol import FloorStatus, Position, Role, Welcome
 from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
-from flightd.cli.floor_map import FloorMap, arrow
-from flightd.cli.watch import WatchApp
+from flightd.cli.watch.floor_map import FloorMap, arrow
+from flightd.cli.watch.screen import WatchApp
 from flightd.core.types import CommandKind, Phase
 from flightd.runtime.clock import LoopClock
 from tests.sim.ground_rig import SITE, address_of, event, in_loop, local, serving, telling, until

@@ -11,9 +11,10 @@ import pytest
 
 from flightd.app.simulation.world_process import run_world, watch_world
 from flightd.config.paths import shipped
-from flightd.config.site_file import load_site
 from flightd.core.errors import FlightdError, RunError, UnavailableError
-from flightd.sim.world import WorldSpec
+from flightd.sim.racks.appearance import RackAppearance
+from flightd.sim.world import FrontSpec, WorldSpec
+from flightd.site.site_file import load_site
 
 
 def death_of(spec: WorldSpec, log: Path) -> FlightdError:
@@ -46,3 +47,13 @@ def test_a_fault_of_the_world_itself_is_named(tmp_path: Path) -> None:
     death = death_of(spec, tmp_path / "truth.mcap")
     assert isinstance(death, RunError)
     assert "the simulated world failed: ValueError" in str(death)
+
+
+def test_a_camera_that_cannot_draw_ends_the_world_and_names_itself(tmp_path: Path) -> None:
+    broken = RackAppearance(shares="no shares at all")  # type: ignore[arg-type]
+    front = FrontSpec(("127.0.0.1", 9), appearance=broken)
+    spec = WorldSpec(load_site(shipped("site-racks-small.toml")), 1, ("127.0.0.1", 9), front=front)
+    death = death_of(spec, tmp_path / "truth.mcap")
+    assert isinstance(death, RunError)
+    assert str(death).startswith("the simulated front camera cannot draw picture 0: AttributeError: ")
+    assert "\n" not in str(death)

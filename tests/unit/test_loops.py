@@ -8,6 +8,7 @@ from typing import Any
 
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import ScaledLoop, VirtualLoop
+from tests.held_time import held
 
 
 def run_virtual(main: Any) -> Any:
@@ -74,7 +75,7 @@ def test_held_time_waits_for_work_outside_the_loop() -> None:
         loop, clock = asyncio.get_running_loop(), LoopClock()
         ticker = asyncio.create_task(asyncio.sleep(0.001))
         start = clock.now_ns()
-        with clock.hold():
+        with held():
             await loop.run_in_executor(None, time.sleep, 0.05)
         waited = clock.now_ns() - start
         await ticker

@@ -21,6 +21,7 @@ from flightd.core.errors import InputError, TransientError
 from flightd.core.types import Image
 from flightd.ports import Clock
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
+from flightd.runtime.undisturbed_start import undisturbed
 
 _SLOTS = 8
 _GIVING_BACK_S = 1.0
@@ -107,7 +108,8 @@ class CaptureCamera:
 
         try:
             self._asked = False
-            process.start()
+            with undisturbed():
+                process.start()
             theirs.close()
             loop.add_reader(ours.fileno(), readable)
             self._process = ours

@@ -2,6 +2,8 @@
 
 Key files are those of ZMQ's own tools (`NAME.key`, `NAME.key_secret`).  The allow-list holds a line
 `ROLE PUBLIC-KEY NAME` for each client; lines that begin with "# " are comments (a key may hold a "#").
+They are read by `zmq.auth`.  Own code writes them: pyzmq 27.3's `create_certificates` leaves the secret
+readable for everybody (mode 0644 at the usual umask) and writes over a key that is there already.
 """
 
 from __future__ import annotations

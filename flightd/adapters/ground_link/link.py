@@ -32,8 +32,8 @@ from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
 from flightd.adapters.ground_link.status_report import status_report
 from flightd.config.ground import GroundConfig
 from flightd.core.errors import TransientError, UnavailableError
-from flightd.core.types import Command, Event, Status
-from flightd.pilot import TickInput, TickOutput
+from flightd.core.snapshot import Snapshot
+from flightd.core.types import Command, Event
 from flightd.ports import Clock
 from flightd.site.site import Site
 
@@ -131,18 +131,18 @@ class ZmqGround:
                 raise
             raise TransientError(f"ground link: {failed.exceptions[0]}") from group
 
-    def tell(self, status: Status, tick: TickInput, output: TickOutput) -> None:
-        """Publish the status, made of what the daemon knows at this tick."""
-        self._give_up_pictures(tick.now_ns)
+    def tell(self, snapshot: Snapshot) -> None:
+        """Publish it."""
+        self._give_up_pictures(snapshot.stamp_ns)
         door = self._door
         link = LinkReport(
-            attending=self._desk.attending(tick.now_ns),
+            attending=self._desk.attending(snapshot.stamp_ns),
             requests=self._desk.requests,
             refused=self._desk.refused,
             denied=door.denied if door is not None else 0,
             dropped=self._dropped + (self._audit.dropped if self._audit is not None else 0),
         )
-        report = status_report(status, tick, output, self._session, self._next(STATUS_TOPIC), link)
+        report = status_report(snapshot, self._session, self._next(STATUS_TOPIC), link)
         self._desk.status = report
         self._publish(STATUS_TOPIC, encode(report))
 

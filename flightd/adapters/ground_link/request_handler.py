@@ -6,7 +6,7 @@ Nothing that a stranger can send raises; whatever has no effect is refused with 
 from __future__ import annotations
 
 from collections import OrderedDict, deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from flightd import __version__
@@ -39,6 +39,7 @@ from flightd.adapters.ground_link.protocol import (
     decode_request,
 )
 from flightd.core.types import Command, CommandKind, Phase
+from flightd.mission.machine import possible_in
 from flightd.site.site import Site
 
 _RECENT_EVENTS = 50
@@ -48,25 +49,6 @@ _ORDERS_PER_S = 20
 _ATTENDING = 64
 _TAKEN_OVER_NS = 3_000_000_000
 """Who attends but was silent for so long has been taken over from, once somebody else attends."""
-
-_FLYING = frozenset(
-    {
-        Phase.TAKE_OFF, Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.CLIMB, Phase.SCAN,
-        Phase.HOLD, Phase.RELOCATE,
-    }
-)  # fmt: skip
-_NOT_OVER = _FLYING | {Phase.PREFLIGHT, Phase.RECOVER, Phase.ARMING, Phase.LAND, Phase.SWAP}
-
-POSSIBLE: Mapping[CommandKind, frozenset[Phase]] = {
-    CommandKind.START: frozenset({Phase.PREFLIGHT, Phase.SWAP}),
-    CommandKind.PAUSE: _FLYING,
-    CommandKind.RESUME: _FLYING,
-    CommandKind.GOTO: _FLYING,
-    CommandKind.HOME: _FLYING,
-    CommandKind.LAND: _NOT_OVER,
-    CommandKind.STOP: _NOT_OVER,
-}
-"""The phases in which a command can have an effect; in the others it is refused, saying so."""
 
 _URGENT = frozenset({CommandKind.LAND, CommandKind.STOP})
 """Never held back for being too many."""
@@ -235,7 +217,7 @@ class RequestHandler:
                 Code.NODE,
                 f"no node {node!r} on site {self._floor.name}",
             ),
-            (phase not in POSSIBLE[kind], Code.PHASE, f"cannot {kind} in phase {phase}"),
+            (kind not in possible_in(phase), Code.PHASE, f"cannot {kind} in phase {phase}"),
         )
         return next(((code, text) for applies, code, text in checks if applies), (None, ""))
 

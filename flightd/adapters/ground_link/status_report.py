@@ -1,4 +1,4 @@
-"""The status report, put together from what the daemon knows at a tick."""
+"""A snapshot as the ground link tells it."""
 
 from __future__ import annotations
 
@@ -13,37 +13,36 @@ from flightd.adapters.ground_link.protocol import (
     VehicleReport,
     finite,
 )
-from flightd.core.types import GridPose, Status, VehicleState
-from flightd.pilot import TickInput, TickOutput
-from flightd.tracking.line_tracker import TrackSet
+from flightd.core.snapshot import Snapshot
+from flightd.core.tracks import TrackSet
+from flightd.core.types import GridPose, VehicleState
 
 
-def status_report(
-    status: Status, tick: TickInput, output: TickOutput, session: str, seq: int, link: LinkReport
-) -> StatusReport:
-    """`status` with position, lines and vehicle as the tick had them."""
-    tracks, vehicle = output.tracks, tick.vehicle
+def status_report(snapshot: Snapshot, session: str, seq: int, link: LinkReport) -> StatusReport:
+    """The snapshot as it goes over the link."""
+    output, vehicle = snapshot.output, snapshot.vehicle
+    tracks = output.tracks
     seen = tracks is not None and bool(tracks.lines_ns)
     return StatusReport(
         version=VERSION,
         session=session,
         seq=seq,
-        stamp_ns=status.stamp_ns,
-        phase=status.phase,
-        reason=status.reason,
-        node=status.node,
-        goal=status.goal,
-        nodes_done=status.nodes_done,
-        nodes_planned=status.nodes_planned,
-        height_m=finite(status.height_m) if output.pose is not None else None,
+        stamp_ns=snapshot.stamp_ns,
+        phase=snapshot.phase,
+        reason=snapshot.reason,
+        node=snapshot.node,
+        goal=snapshot.goal,
+        nodes_done=snapshot.nodes_done,
+        nodes_planned=snapshot.nodes_planned,
+        height_m=finite(snapshot.height_m) if output.pose is not None else None,
         position=_position(output.pose) if output.pose is not None else None,
         lines=_lines(tracks) if tracks is not None else (),
-        lines_age_s=(tick.now_ns - tracks.lines_ns) * 1e-9 if tracks is not None and seen else None,
-        vehicle=_vehicle(vehicle, tick.now_ns) if vehicle is not None else None,
-        frames=status.frames,
-        frames_dropped=status.frames_dropped,
-        fps=status.fps,
-        latency_ms={stage: round(ms, 2) for stage, ms in status.latency_ms.items()},
+        lines_age_s=(snapshot.stamp_ns - tracks.lines_ns) * 1e-9 if tracks is not None and seen else None,
+        vehicle=_vehicle(vehicle, snapshot.stamp_ns) if vehicle is not None else None,
+        frames=snapshot.frames,
+        frames_dropped=snapshot.frames_dropped,
+        fps=snapshot.fps,
+        latency_ms={stage: round(ms, 2) for stage, ms in snapshot.latency_ms.items()},
         link=link,
     )
 

@@ -1,1 +1,1 @@
-"""Prometheus metrics: what is measured (`book`) and where it can be read (`server`)."""
+"""Prometheus metrics: what is measured (`metrics`) and where it can be read (`server`)."""

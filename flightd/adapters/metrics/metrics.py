@@ -5,26 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info
 from prometheus_client.core import CounterMetricFamily
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
 from flightd import __version__
+from flightd.core.snapshot import Snapshot
 from flightd.core.types import Event, Phase
-from flightd.ports import Vitals
-
-CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
 _STAGE_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)
 _LATE_S = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 
 
 class MetricsBook:
-    """`ports.Monitor` that keeps the numbers; `exposition` is what a scrape gets."""
+    """`ports.Monitor` that keeps the numbers; a scrape reads `registry`, from a thread of its own."""
 
     def __init__(self) -> None:
-        registry = self._registry = CollectorRegistry(auto_describe=False)
+        registry = self.registry = CollectorRegistry(auto_describe=False)
         Info("flightd", "version of the daemon", registry=registry).info({"version": __version__})
         self._stages = Histogram(
             "flightd_stage_seconds",
@@ -62,31 +60,30 @@ class MetricsBook:
         self._counts = _Counts()
         registry.register(self._counts)
 
-    def tell(self, vitals: Vitals) -> None:
-        status = vitals.status
-        for late_s in vitals.tick_late_s:
+    def tell(self, snapshot: Snapshot) -> None:
+        for late_s in snapshot.tick_late_s:
             self._late.observe(max(late_s, 0.0))
-        for stages in vitals.latencies_ms:
+        for stages in snapshot.latencies_ms:
             for stage, ms in stages.items():
                 self._stages.labels(stage).observe(ms * 1e-3)
         for phase in Phase:
-            self._phase.labels(phase.value).set(phase is status.phase)
-        self._counts.take(vitals)
+            self._phase.labels(phase.value).set(phase is snapshot.phase)
+        self._counts.take(snapshot)
         values = {
-            "height_meters": status.height_m,
-            "pictures_per_second": status.fps,
-            "nodes_done": status.nodes_done,
-            "nodes_planned": status.nodes_planned,
-            "ground_silent_seconds": vitals.ground_silent_s,
+            "height_meters": snapshot.height_m,
+            "pictures_per_second": snapshot.fps,
+            "nodes_done": snapshot.nodes_done,
+            "nodes_planned": snapshot.nodes_planned,
+            "ground_silent_seconds": snapshot.ground_silent_s,
         }
-        if (vehicle := vitals.vehicle) is not None:
+        if (vehicle := snapshot.vehicle) is not None:
             values |= {
                 "armed": vehicle.armed,
                 "in_control": vehicle.in_control,
                 "battery_ratio": vehicle.battery_frac,
                 "battery_volts": vehicle.battery_v,
-                "telemetry_age_seconds": (status.stamp_ns - vehicle.attitude.stamp_ns) * 1e-9,
-                "heartbeat_age_seconds": (status.stamp_ns - vehicle.heartbeat_ns) * 1e-9,
+                "telemetry_age_seconds": (snapshot.stamp_ns - vehicle.attitude.stamp_ns) * 1e-9,
+                "heartbeat_age_seconds": (snapshot.stamp_ns - vehicle.heartbeat_ns) * 1e-9,
             }
         for name, value in values.items():
             self._gauges[name].set(value if math.isfinite(value) else math.nan)
@@ -94,29 +91,25 @@ class MetricsBook:
     def event(self, event: Event) -> None:
         self._events.labels(event.level.value, event.name).inc()
 
-    def exposition(self) -> bytes:
-        """All metrics in Prometheus' text format."""
-        return generate_latest(self._registry)
-
 
 class _Counts(Collector):
     """Counters that are kept elsewhere and only passed on."""
 
     def __init__(self) -> None:
-        self._vitals: Vitals | None = None
+        self._newest: Snapshot | None = None
 
-    def take(self, vitals: Vitals) -> None:
-        self._vitals = vitals
+    def take(self, snapshot: Snapshot) -> None:
+        self._newest = snapshot
 
     def collect(self) -> Iterable[Metric]:
-        vitals = self._vitals
-        if vitals is None:
+        snapshot = self._newest
+        if snapshot is None:
             return
-        yield _counter("flightd_pictures", "pictures delivered by the camera", {"": vitals.status.frames}, "")
-        yield _counter("flightd_dropped", "what a queue or a lost worker cost", vitals.dropped, "queue")
-        yield _counter("flightd_restarts", "processes that died and were replaced", vitals.restarts, "part")
+        yield _counter("flightd_pictures", "pictures delivered by the camera", {"": snapshot.frames}, "")
+        yield _counter("flightd_dropped", "what a queue or a lost worker cost", snapshot.dropped, "queue")
+        yield _counter("flightd_restarts", "processes that died and were replaced", snapshot.restarts, "part")
         text = "setpoints level and straight because no tick made one"
-        yield _counter("flightd_repeated_level", text, {"": vitals.repeated_level}, "")
+        yield _counter("flightd_repeated_level", text, {"": snapshot.repeated_level}, "")
 
 
 def _counter(name: str, text: str, values: Mapping[str, float], label: str) -> Metric:

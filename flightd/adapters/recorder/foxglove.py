@@ -4,6 +4,9 @@ A recorded line set is also a `foxglove.ImageAnnotations` (drawn over the pictur
 pose also a `foxglove.PoseInFrame`: our fields come first, theirs are appended by the writing process,
 so that the control task does not pay for them.  Foxglove's z is up and its y to the left: positions
 and angles are turned over from the map frame (y right, yaw clockwise).
+
+Own code: foxglove-sdk 0.30's types write protobuf alone, which leaves no room for our own fields in the same
+message, and it is 11 MB installed on aarch64 (54 MB on x86-64).
 """
 
 from __future__ import annotations

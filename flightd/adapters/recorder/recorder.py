@@ -9,11 +9,11 @@ import select
 import socket
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self, TypeAlias
 
 import msgspec
 
@@ -23,6 +23,7 @@ from flightd.adapters.recorder.writer_protocol import HEADER, PICTURE_SEQ, Defin
 from flightd.core.errors import UnavailableError
 from flightd.core.topics import RETAINED, Topic
 from flightd.core.types import Event, EventLevel
+from flightd.runtime.undisturbed_start import undisturbed
 
 QUEUE_BYTES = 8 << 20
 """What may wait for the writing process; pictures may fill half of it, so that they are lost first."""
@@ -39,13 +40,43 @@ CLOSE_S = 10.0
 _PUSH_BYTES = 16 << 10
 
 
+class Outbox(Protocol):
+    """What waits for the writing process."""
+
+    @property
+    def waiting_bytes(self) -> int: ...
+
+    def push(self) -> None:
+        """Hand over what the writing process takes now."""
+        ...
+
+    def await_writer(self, patience_s: float) -> bool:
+        """Wait until it may take more; False when it has died or takes nothing for so long."""
+        ...
+
+
+WhenFull: TypeAlias = Callable[[Outbox, int], None]
+"""What is done when no more than so many bytes may wait for a message to find room."""
+
+
+def drop_newest(outbox: Outbox, most_bytes: int) -> None:
+    """Nothing: a flight goes on, what finds the queue full is dropped and counted."""
+
+
+def wait_for_disk(outbox: Outbox, most_bytes: int) -> None:
+    """Wait until there is room: for a simulation, whose time can wait, and for tools."""
+    while outbox.waiting_bytes > max(most_bytes, 0):
+        if not outbox.await_writer(CLOSE_S):
+            return
+        outbox.push()
+
+
 class McapRecorder:
     """Writes a flight log (MCAP) through a process of its own.
 
     `record` and `image` are synchronous and take microseconds: they encode into a bounded queue that
-    goes to the writing process by a non-blocking socket.  With `lossless` false, what finds the queue
-    full is dropped and counted; with `lossless` true (a simulation, whose time can wait) they wait
-    for the disk instead.  Stamps are the caller's; wall time decides nothing.
+    goes to the writing process by a non-blocking socket; `when_full` says what becomes of a message
+    that finds it full.  Stamps are the caller's; wall time decides nothing.
 
     `run` hands over what waits, and brings the writing process back when it died: the new one goes on
     in the same file.  Without `run` the queue is handed over in larger pieces and by `close`.
@@ -57,12 +88,12 @@ class McapRecorder:
         *,
         metadata: Mapping[str, str] | None = None,
         queue_bytes: int = QUEUE_BYTES,
-        lossless: bool = False,
+        when_full: WhenFull = drop_newest,
     ) -> None:
         """Open `path` for a new log; UnavailableError if it cannot be written."""
         self._path = path
         self._queue_bytes = queue_bytes
-        self._lossless = lossless
+        self._when_full = when_full
         self._queue = bytearray()
         self._channels: dict[str, int] = {}
         self._definitions: list[bytes] = []
@@ -137,6 +168,16 @@ class McapRecorder:
         frame = _frame(Kind.PICTURE, channel, stamp_ns, PICTURE_SEQ.pack(seq) + jpeg)
         self._put(frame, self._queue_bytes // 2)
 
+    @property
+    def waiting_bytes(self) -> int:
+        """What the writing process has not taken yet."""
+        return len(self._queue)
+
+    def await_writer(self, patience_s: float) -> bool:
+        """Block until it may take more; False when it has died or takes nothing for so long."""
+        _, writable, _ = select.select([], [self._link], [], patience_s)
+        return bool(writable) and self._child.poll() is None
+
     async def run(self) -> None:
         """Hand over what waits, and bring the writing process back whenever it died, for ever.
 
@@ -144,7 +185,7 @@ class McapRecorder:
         told by `restarts`, and the flight goes on."""
         while True:
             await asyncio.sleep(PUSH_S)
-            self._push()
+            self.push()
             if self._child.poll() is not None:
                 self._restart()
                 await asyncio.sleep(RESTART_S)
@@ -189,18 +230,17 @@ class McapRecorder:
 
     def _put(self, frame: bytes, limit: int) -> None:
         if len(self._queue) + len(frame) > limit:
-            self._push()
-            if self._lossless:
-                self._await_room(limit - len(frame))
+            self.push()
+            self._when_full(self, limit - len(frame))
             if len(self._queue) + len(frame) > limit:
                 self._refused += 1
                 return
         self._accepted += 1
         self._queue += frame
         if len(self._queue) >= _PUSH_BYTES:
-            self._push()
+            self.push()
 
-    def _push(self) -> None:
+    def push(self) -> None:
         """Send what the socket takes now."""
         try:
             while self._queue:
@@ -214,13 +254,6 @@ class McapRecorder:
             while answer := self._link.recv(1 << 16):
                 self._answers += answer
         self._read_answers()
-
-    def _await_room(self, limit: int) -> None:
-        while len(self._queue) > max(limit, 0):
-            _, writable, _ = select.select([], [self._link], [], CLOSE_S)
-            if not writable or self._child.poll() is not None:
-                return
-            self._push()
 
     def _read_answers(self) -> None:
         *lines, rest = self._answers.split(b"\n")
@@ -250,7 +283,7 @@ class McapRecorder:
         self._link.setblocking(False)
         package_root = str(Path(flightd.__file__).parents[1])
         search_path = os.pathsep.join(filter(None, (package_root, os.environ.get("PYTHONPATH"))))
-        with theirs:
+        with theirs, undisturbed():
             self._child = subprocess.Popen(  # noqa: S603
                 [
                     sys.executable,

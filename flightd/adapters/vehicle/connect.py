@@ -11,39 +11,50 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing, read_key
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
+from flightd.config.control import ControlConfig
 from flightd.config.vehicle import VehicleConfig
-from flightd.control.limits import Limits
 from flightd.core.errors import InputError
+from flightd.core.extras import missing_extra
 from flightd.ports import Clock, Vehicle
+from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 
 
-def connect_vehicle(config: VehicleConfig, clock: Clock, limits: Limits | None = None) -> Vehicle:
+def connect_vehicle(
+    config: VehicleConfig,
+    clock: Clock,
+    limits: ControlConfig | None = None,
+    *,
+    url: str | None = None,
+    opener: OpenDatagrams = open_datagrams,
+) -> Vehicle:
     """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address or a
     signing key that cannot be used.
 
     `limits` are those of the setpoints: an AR.Drone's own are set to them, for it takes shares of its own.
+    `url` is where the vehicle is reached, unless that is the configuration's; `opener` opens the
+    sockets of a MAVLink one.
     """
+    url = config.url if url is None else url
     match config.kind:
         case "ardupilot":
             mode = GUIDED if config.flying_mode == "guided" else GUIDED_NOGPS
-            return ArduPilotVehicle(config.url, clock, _options(config, clock), flying_mode=mode)
+            return ArduPilotVehicle(url, clock, _options(config, clock, opener), flying_mode=mode)
         case "px4":
-            return Px4Vehicle(config.url, clock, _options(config, clock))
+            return Px4Vehicle(url, clock, _options(config, clock, opener))
         case "ardrone":
-            return ArDroneVehicle(settings_of(config.url, limits), clock)
+            return ArDroneVehicle(settings_of(url, limits), clock)
         case "mavsdk":
-            return _mavsdk_vehicle(config, clock)
+            return _mavsdk_vehicle(url, config, clock, opener)
     raise InputError(f"vehicle.kind {config.kind}: no such adapter")
 
 
-def _mavsdk_vehicle(config: VehicleConfig, clock: Clock) -> Vehicle:
+def _mavsdk_vehicle(url: str, config: VehicleConfig, clock: Clock, opener: OpenDatagrams) -> Vehicle:
     """The library is an extra, and 19 MB that nobody else has to load."""
     try:
         from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle  # noqa: PLC0415
     except ImportError as err:
-        text = f"vehicle.kind mavsdk: {err}; install the library: pip install 'flightd[mavsdk]'"
-        raise InputError(text) from err
-    return MavsdkVehicle(config.url, clock, config.system_id)
+        raise missing_extra("mavsdk", "vehicle.kind mavsdk") from err
+    return MavsdkVehicle(url, clock, config.system_id, opener)
 
 
 def signing_of(config: VehicleConfig, clock: Clock) -> Signing | None:
@@ -53,11 +64,12 @@ def signing_of(config: VehicleConfig, clock: Clock) -> Signing | None:
     return Signing(read_key(config.signing_key), clock, time.time(), config.stamp_file)
 
 
-def _options(config: VehicleConfig, clock: Clock) -> MavlinkOptions:
+def _options(config: VehicleConfig, clock: Clock, opener: OpenDatagrams) -> MavlinkOptions:
     return MavlinkOptions(
         system_id=config.system_id,
         signing=signing_of(config, clock),
         pose_form=PoseForm(config.pose_output) if config.shares_pose else None,
         raw_thrust=config.raw_thrust,
         origin_deg=config.origin_deg,
+        opener=opener,
     )

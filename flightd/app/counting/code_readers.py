@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Protocol, TypeAlias
 
 from flightd.app.detection.detector_pool import PicturePool, Work
 from flightd.core.scanning import CodeSet, Place
 from flightd.core.types import Image
 from flightd.ports import Clock
+from flightd.runtime.clock import Hold
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.runtime.latest_slot import Latest
 from flightd.vision.shelf.shelf_look import read_shelf
@@ -38,8 +40,8 @@ def _shelf_reader() -> Work[tuple[Place, ...], Reading]:
 class ReaderPool(PicturePool[tuple[Place, ...], Reading]):
     """Processes that read codes; one that dies or hangs is replaced, its picture counts as lost."""
 
-    def __init__(self, size: int, timeout_s: float, clock: Clock) -> None:
-        super().__init__(_shelf_reader, size, timeout_s, clock, "code reader")
+    def __init__(self, size: int, timeout_s: float, clock: Clock, hold: Hold = nullcontext) -> None:
+        super().__init__(_shelf_reader, size, timeout_s, clock, "code reader", hold)
 
     async def read(self, ticket: FrameTicket, places: tuple[Place, ...]) -> Reading | None:
         """Codes and places of one picture, or None when it was lost."""
@@ -52,7 +54,7 @@ class ShelfWatch:
 
     def __init__(self, readers: Readers, places: Callable[[int], tuple[Place, ...]]) -> None:
         self._readers = readers
-        self._places = places
+        self.places = places
         self._sets: list[CodeSet] = []
         self._evidence: OrderedDict[str, bytes] = OrderedDict()
         self.frames: Latest[FrameTicket] = Latest()
@@ -63,7 +65,7 @@ class ShelfWatch:
         """Read one picture after the other; as many of these may run as there are readers."""
         while True:
             ticket = await self.frames.get()
-            places = self._places(ticket.stamp_ns)
+            places = self.places(ticket.stamp_ns)
             if not places:
                 continue
             reading = await self._readers.read(ticket, places)

@@ -7,15 +7,17 @@ from typing import Any
 
 from flightd.app.counting.code_readers import Readers, ShelfWatch
 from flightd.app.counting.store_writer import StoreWriter
+from flightd.app.flight import Tasks
 from flightd.core.scanning import CodeSet, Finding, Place
-from flightd.pilot import TickOutput
+from flightd.core.tick import TickOutput
 from flightd.runtime.frame_ring import FrameTicket
 
 
 class Counting:
-    """Readers of the front camera's pictures and, if the inventory is kept, its writer.
+    """`app.flight.Count`: readers of the front camera's frames and, if the inventory is kept, its writer.
 
-    `counted` are locations that an earlier flight of this count has booked."""
+    `counted` are locations that an earlier flight of this count has booked.  Nothing is read before
+    `read_for` says what frames are wanted for."""
 
     def __init__(
         self,
@@ -24,30 +26,31 @@ class Counting:
         writer: StoreWriter | None = None,
         counted: frozenset[str] = frozenset(),
     ) -> None:
-        self._readers = readers
+        self._watch = ShelfWatch(readers, _nothing)
         self._workers = workers
         self._writer = writer
         self._counted: tuple[str, ...] = tuple(sorted(counted))
-        self._watch: ShelfWatch | None = None
         self._findings: dict[str, Finding] = {}
         self._confirmed: set[str] = set()
 
-    def begin(
-        self, places: Callable[[int], tuple[Place, ...]], on_trouble: Callable[[str], None]
-    ) -> dict[str, Coroutine[Any, Any, None]]:
-        """The tasks of a flight, by name.  `places` says what a picture exposed at a time is wanted for."""
-        self._watch = ShelfWatch(self._readers, places)
-        tasks = {f"read-{i}": self._watch.run() for i in range(self._workers)}
+    def read_for(self, places: Callable[[int], tuple[Place, ...]]) -> None:
+        """`places` says what a frame exposed at a time is wanted for."""
+        self._watch.places = places
+
+    def tasks(self, on_trouble: Callable[[str], None]) -> Tasks:
+        """What runs during a flight; what goes wrong is told to `on_trouble`."""
+        tasks: dict[str, Coroutine[Any, Any, None]] = {
+            f"read-{i}": self._watch.run() for i in range(self._workers)
+        }
         return tasks if self._writer is None else tasks | {"store": self._writer.run(on_trouble)}
 
     def frame(self, ticket: FrameTicket) -> None:
-        """A picture of the front camera."""
-        if self._watch is not None:
-            self._watch.frames.put(ticket)
+        """A frame of the front camera."""
+        self._watch.frames.put(ticket)
 
     def take(self) -> tuple[CodeSet, ...]:
         """What was read since the last tick."""
-        return self._watch.take() if self._watch is not None else ()
+        return self._watch.take()
 
     def take_counted(self) -> tuple[str, ...]:
         """The locations counted before, told once."""
@@ -58,7 +61,7 @@ class Counting:
         """Hand a tick's findings to the inventory."""
         for finding in output.findings:
             self._findings[finding.location] = finding
-            if self._writer is not None and self._watch is not None:
+            if self._writer is not None:
                 self._writer.put(finding, self._watch.evidence(finding.evidence))
         for settled in output.settled:
             if settled.confirmed:
@@ -81,3 +84,7 @@ class Counting:
             }
             for location, finding in sorted(self._findings.items())
         )
+
+
+def _nothing(_stamp_ns: int) -> tuple[Place, ...]:
+    return ()

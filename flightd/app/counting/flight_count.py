@@ -5,47 +5,21 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from contextlib import AsyncExitStack, ExitStack
+from contextlib import AsyncExitStack, ExitStack, nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.app.build import scanner_of
+from flightd.app.build import counts_shelves
 from flightd.app.counting.code_readers import ReaderPool, Readers
 from flightd.app.counting.count import Counting
 from flightd.app.counting.store_writer import StoreWriter
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import PlannedLocation
-from flightd.mission.scan.scanner import nodes_to_count
 from flightd.ports import Clock
+from flightd.runtime.clock import Hold
 from flightd.site.site import Site
-
-
-def going_on(config: Config, site: Site, folder: Path | None, *, in_air: bool = False) -> Config:
-    """The configuration of a flight that goes on with a count (`inventory.run`) in `folder`: it visits only
-    nodes with locations that are not booked yet.  InputError when there are none left, and what the store
-    raises; neither where the flight may be `in_air` already (the daemon was started anew)."""
-    run = config.inventory.run
-    if not run or folder is None or not (folder / "inventory.db").exists():
-        return config
-    try:
-        with SqliteStore(folder, create=False) as store:
-            counted = store.counted(run)
-    except (InputError, UnavailableError):
-        if not in_air:
-            raise
-        return config
-    if not counted:
-        return config
-    nodes = nodes_to_count(site, config.mission.nodes or site.serpentine_route(), counted)
-    if not nodes and in_air:
-        return config
-    if not nodes:
-        raise InputError(
-            f"inventory.run {run!r}: every location is counted; give the next count another name"
-        )
-    return config.model_copy(update={"mission": config.mission.model_copy(update={"nodes": nodes})})
 
 
 class FlightCount:
@@ -67,7 +41,7 @@ class FlightCount:
         self._run = config.inventory.run or f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         self._counted: frozenset[str] = frozenset()
         self.error: FlightdError | None = None
-        self.scans = scanner_of(config, site) is not None
+        self.scans = counts_shelves(config, site)
         if not self.scans or folder is None:
             return
         try:
@@ -89,20 +63,24 @@ class FlightCount:
         return store, counted
 
     async def begun(
-        self, clock: Clock, timed: Callable[[Readers], Readers] = lambda readers: readers
+        self,
+        clock: Clock,
+        timed: Callable[[Readers], Readers] = lambda readers: readers,
+        hold: Hold = nullcontext,
     ) -> Counting | None:
-        """The count itself for the daemon, its readers started (and put behind what `timed` makes of them);
+        """The count itself for the daemon, its readers started (and put behind what `timed` makes of them),
+        time held by `hold` while processes and disk are waited for;
         None where nothing is scanned."""
         if not self.scans:
             return None
         scan = self._scan
-        pool = self._stack.enter_context(ReaderPool(scan.workers, scan.timeout_s, clock))
+        pool = self._stack.enter_context(ReaderPool(scan.workers, scan.timeout_s, clock, hold))
         await pool.ready()
         writer = None
         if self._store is not None:
             utc_at_zero_ns = time.time_ns() - clock.now_ns()
             writer = self._stack.enter_context(
-                StoreWriter(self._store, self._run, utc_at_zero_ns, clock, _to_stderr)
+                StoreWriter(self._store, self._run, utc_at_zero_ns, clock, _to_stderr, hold)
             )
         return Counting(timed(pool), scan.workers, writer, self._counted)
 

@@ -6,12 +6,14 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from typing import Self
 
 from flightd.core.errors import UnavailableError
 from flightd.core.inventory import CountPose, Observation, StoredRead
 from flightd.core.scanning import Finding, Settled
 from flightd.ports import Clock, Store
+from flightd.runtime.clock import Hold
 
 _MOST_WAITING = 20_000
 _MOST_PICTURES = 400
@@ -26,17 +28,24 @@ class StoreWriter:
     Observations carry the name of the `run` and UTC, which is `utc_at_zero_ns` at the clock's zero.  While
     the disk refuses, everything waits and is tried again; beyond 400 waiting pictures further ones are
     left out (`pictures_dropped`), beyond 20,000 entries those too (`dropped`, told): they stand in the
-    flight log.
+    flight log.  Time is held by `hold` while the disk is written to.
     """
 
     def __init__(
-        self, store: Store, run: str, utc_at_zero_ns: int, clock: Clock, on_trouble: Callable[[str], None]
+        self,
+        store: Store,
+        run: str,
+        utc_at_zero_ns: int,
+        clock: Clock,
+        on_trouble: Callable[[str], None],
+        hold: Hold = nullcontext,
     ) -> None:
         self._store = store
         self._run = run
         self._utc_at_zero_ns = utc_at_zero_ns
         self._clock = clock
         self._on_trouble = on_trouble
+        self._hold = hold
         self._queue: deque[tuple[Finding, bytes] | Settled] = deque()
         self._arrived = asyncio.Event()
         self._pictures = 0
@@ -83,7 +92,7 @@ class StoreWriter:
         while True:
             while self._queue:
                 try:
-                    with self._clock.hold():
+                    with self._hold():
                         await loop.run_in_executor(self._thread, self._write, self._queue[0])
                 except UnavailableError as err:
                     self._tell(f"inventory: {err}; {len(self._queue)} findings wait")

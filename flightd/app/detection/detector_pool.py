@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections import Counter, OrderedDict
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, Protocol, Self, TypeAlias, TypeVar
@@ -19,6 +20,7 @@ from flightd.core.errors import InputError, TransientError, UnavailableError
 from flightd.core.types import Image, LineSet
 from flightd.ports import Clock
 from flightd.runtime.child_process import Child
+from flightd.runtime.clock import Hold
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
 
 AskT = TypeVar("AskT")
@@ -103,17 +105,25 @@ class PicturePool(Generic[AskT, FoundT]):
     """`size` worker processes behind `ask`, replaced when they die.
 
     `make` builds the work inside each worker and must be picklable.  `timeout_s` is the time after which a
-    worker counts as hung.  `name` says in messages what the workers do.
+    worker counts as hung.  `name` says in messages what the workers do; time is held by `hold`
+    until they are ready.
     """
 
     def __init__(
-        self, make: Callable[[], Work[AskT, FoundT]], size: int, timeout_s: float, clock: Clock, name: str
+        self,
+        make: Callable[[], Work[AskT, FoundT]],
+        size: int,
+        timeout_s: float,
+        clock: Clock,
+        name: str,
+        hold: Hold = nullcontext,
     ) -> None:
         self._make = partial(_Worker, make)
         self._name = name
         self._size = size
         self._timeout_s = timeout_s
         self._clock = clock
+        self._hold = hold
         self._idle: asyncio.LifoQueue[Child] = asyncio.LifoQueue()
         self._workers: set[Child] = set()
         self._open = False
@@ -147,7 +157,7 @@ class PicturePool(Generic[AskT, FoundT]):
 
     async def ready(self) -> None:
         """Wait until every worker can take a picture.  UnavailableError when they die one after another."""
-        with self._clock.hold():
+        with self._hold():
             while self._idle.qsize() < self._size:
                 if self._deaths >= _HOPELESS:
                     raise UnavailableError(f"{self._name} processes die as they start: is there memory left?")
@@ -219,8 +229,15 @@ class _DetectLines:
 class DetectorPool(PicturePool[bool, _Lines]):
     """Processes that find the lines; `make` builds the detector inside each and must be picklable."""
 
-    def __init__(self, make: Callable[[], Detect], size: int, timeout_s: float, clock: Clock) -> None:
-        super().__init__(partial(_DetectLines, make), size, timeout_s, clock, "detector")
+    def __init__(
+        self,
+        make: Callable[[], Detect],
+        size: int,
+        timeout_s: float,
+        clock: Clock,
+        hold: Hold = nullcontext,
+    ) -> None:
+        super().__init__(partial(_DetectLines, make), size, timeout_s, clock, "detector", hold)
 
     async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None:
         """Lines of one picture (and its JPEG if wanted), or None when it was lost."""

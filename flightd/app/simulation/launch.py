@@ -8,34 +8,35 @@ or a multiple of it; only then does the ground link run, whose sockets have thre
 from __future__ import annotations
 
 import asyncio
-import math
 import multiprocessing
 import signal
-from collections.abc import Callable
-from contextlib import ExitStack, nullcontext
-from dataclasses import dataclass, replace
-from pathlib import Path
+from collections.abc import Coroutine
+from contextlib import AsyncExitStack, ExitStack
+from dataclasses import replace
+from multiprocessing.connection import Connection
 from typing import Any
 
-from flightd.adapters.recorder.recorder import McapRecorder
-from flightd.app.build import detector_pool, ground_link, plan_of, start_of
+from flightd.adapters.recorder.recorder import McapRecorder, WhenFull, drop_newest, wait_for_disk
+from flightd.app.absent_parts import NO_GROUND
+from flightd.app.build import build, detector_pool, ground_link
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
+from flightd.app.flight import Flight
+from flightd.app.recording import record_setting
+from flightd.app.service import monitors
 from flightd.app.simulation.lockstep import LockstepDetectors, LockstepReaders
-from flightd.app.simulation.ports import WorldPorts, connected, free_ports, has_front_camera
-from flightd.app.simulation.process_faults import LauncherFaults, attended
+from flightd.app.simulation.ports import WorldPorts, free_ports, peers_at
+from flightd.app.simulation.process_faults import LauncherFaults, needs_ground
+from flightd.app.simulation.simulation import Simulation, world_spec
 from flightd.app.simulation.world_process import run_world, watch_world
-from flightd.config.schema import Config
-from flightd.config.site_file import site_toml
+from flightd.config.ground import GroundConfig
 from flightd.core.errors import RunError, UnavailableError
 from flightd.core.topics import Document, Topic
-from flightd.core.types import Status
-from flightd.runtime.clock import LoopClock
+from flightd.runtime.clock import Hold, LoopClock
+from flightd.runtime.datagrams import open_paced_datagrams
 from flightd.runtime.event_loops import ScaledLoop, VirtualLoop
-from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
-from flightd.sim.scenario.scenario import Scenario
-from flightd.sim.world import FrontSpec, World, WorldSpec
-from flightd.site.site import Site
+from flightd.runtime.undisturbed_start import undisturbed
+from flightd.sim.world import World
 
 DETECTION_S = 0.008
 """Modelled time of a detection in lockstep: what a companion computer needs."""
@@ -47,88 +48,81 @@ _SCAN_S = 30.0
 _PORT_TRIES = 5
 
 
-@dataclass(frozen=True, slots=True)
-class Simulation:
-    """One simulated flight to be flown; `speed` None is lockstep."""
+class FlightInterruptedError(RunError):
+    """A signal ended the flight; `result` is how it stood then, None before it began."""
 
-    config: Config
-    site: Site
-    scenario: Scenario
-    seed: int
-    speed: float | None
-    folder: Path
-    observer: Callable[[Status], None] = lambda _: None
-    truth_url: str = ""
-    """An external simulator's truth link; the configuration then says where its vehicle is flown."""
-
-    @property
-    def flight_log(self) -> Path:
-        return self.folder / "flight.mcap"
-
-    @property
-    def truth_log(self) -> Path:
-        return self.folder / "truth.mcap"
+    def __init__(self, number: signal.Signals, result: FlightResult | None) -> None:
+        phase = "before it began" if result is None else f"in phase {result.phase}"
+        super().__init__(f"interrupted by {number.name} {phase}")
+        self.signal = number
+        self.result = result
 
 
 def fly(simulation: Simulation) -> FlightResult:
-    """Fly it and leave `flight.mcap` and `truth.mcap` in the folder.  RunError when it was ended early."""
+    """Fly it and leave `flight.mcap` and `truth.mcap` in the folder.  RunError when it was ended early, of
+    these FlightInterruptedError by SIGINT or SIGTERM."""
+    ended_by: list[signal.Signals] = []
     try:
         if simulation.speed is None:
-            with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-                return runner.run(_lockstep(simulation))
+            virtual = VirtualLoop()
+            with asyncio.Runner(loop_factory=lambda: virtual) as runner:
+                return runner.run(_lockstep(simulation, virtual.hold, ended_by))
         factor = simulation.speed
         with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
-            return runner.run(_real_time(simulation, factor))
+            return runner.run(_real_time(simulation, factor, ended_by))
     except asyncio.CancelledError:
-        raise RunError("ended by a signal") from None
+        raise FlightInterruptedError(ended_by[0], None) from None
 
 
-def _end_on_sigterm() -> None:
-    """SIGTERM ends the flight as an interrupt does: everything is closed on the way out."""
-    task = asyncio.current_task()
+def _end_on_signals(ended_by: list[signal.Signals]) -> None:
+    """SIGINT and SIGTERM end this task, so that everything is closed on the way out; the first stands in
+    `ended_by` then."""
+    task, loop = asyncio.current_task(), asyncio.get_running_loop()
     assert task is not None
-    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
+
+    def end(number: signal.Signals) -> None:
+        ended_by.append(number)
+        task.cancel()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, end, number)
 
 
-async def _lockstep(simulation: Simulation) -> FlightResult:
-    _end_on_sigterm()
-    clock = LoopClock()
+async def _lockstep(simulation: Simulation, hold: Hold, ended_by: list[signal.Signals]) -> FlightResult:
+    _end_on_signals(ended_by)
+    clock, config, site = LoopClock(), simulation.config, simulation.site
     with ExitStack() as stack:
-        recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=True))
-        truth = stack.enter_context(McapRecorder(simulation.truth_log, lossless=True))
-        pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
+        recorder = stack.enter_context(_flight_recorder(simulation, clock, wait_for_disk))
+        truth = stack.enter_context(McapRecorder(simulation.truth_log, when_full=wait_for_disk))
+        pool = stack.enter_context(detector_pool(config, site, clock, hold))
         faults = LauncherFaults(simulation.scenario.fault, pool, recorder)
-        world, ports = await _opened(simulation, clock, truth, faults)
-        config = connected(simulation.config, ports)
-        count = FlightCount(config, simulation.site, simulation.folder, stack)
-        counting = await count.begun(clock, lambda readers: LockstepReaders(readers, clock, READING_S))
+        world, ports = await _opened(simulation, clock, hold, truth, faults)
+        count = FlightCount(config, site, simulation.folder, stack)
+        counting = await count.begun(clock, lambda readers: LockstepReaders(readers, READING_S, hold), hold)
         await pool.ready()
-        daemon = Daemon(
+        flight = build(
             config,
-            simulation.site,
-            clock,
-            LockstepDetectors(pool, clock, DETECTION_S),
-            recorder,
-            [simulation.observer],
+            site,
+            simulation.setting.order,
+            clock=clock,
+            detectors=LockstepDetectors(pool, clock, DETECTION_S, hold),
+            recorder=recorder,
             counting=counting,
+            observers=[simulation.observer],
+            peers=peers_at(ports, config),
+            hold=hold,
         )
-        beside = [asyncio.ensure_future(part) for part in (world.run(), faults.run())]
-        try:
-            return await _within_limit(simulation, daemon, *beside)
-        finally:
-            for part in beside:
-                part.cancel()
-            await asyncio.wait(beside)
+        return await _beside(simulation, flight, ended_by, world.run(), faults.run())
 
 
 async def _opened(
-    simulation: Simulation, clock: LoopClock, truth: McapRecorder, faults: LauncherFaults
+    simulation: Simulation, clock: LoopClock, hold: Hold, truth: McapRecorder, faults: LauncherFaults
 ) -> tuple[World, WorldPorts]:
     """A world that listens, and its ports.  A port that was free a moment ago may have been taken by
     another simulation: then others are tried."""
     for attempt in range(1, _PORT_TRIES + 1):
-        ports = free_ports(simulation.config, simulation.site)
-        world = World(_spec(simulation, ports), clock, truth, faults.tell)
+        ports = free_ports(simulation.config)
+        world = World(world_spec(simulation, ports), clock, truth, faults.tell, hold)
         try:
             await world.open()
         except UnavailableError:
@@ -139,57 +133,93 @@ async def _opened(
     raise AssertionError("unreachable")
 
 
-async def _real_time(simulation: Simulation, factor: float) -> FlightResult:
-    _end_on_sigterm()
-    clock = LoopClock()
-    ports = free_ports(simulation.config, simulation.site)
+async def _real_time(simulation: Simulation, factor: float, ended_by: list[signal.Signals]) -> FlightResult:
+    _end_on_signals(ended_by)
+    clock, config, site = LoopClock(), simulation.config, simulation.site
+    ports = free_ports(config)
+    peers = peers_at(ports, config)
+    if simulation.truth_url:
+        peers = replace(peers, vehicle=config.vehicle.url)
+    async with monitors(config.metrics, {}, journal=False) as watchers, AsyncExitStack() as stack:
+        recorder = stack.enter_context(_flight_recorder(simulation, clock, drop_newest))
+        process, pipe = _started_world(simulation, ports, factor, stack)
+        pool = stack.enter_context(detector_pool(config, site, clock))
+        counting = await FlightCount(config, site, simulation.folder, stack).begun(clock)
+        link = ground_link(_ground_settings(simulation), site, clock, counting)
+        ground = NO_GROUND if link is None else stack.enter_context(link)
+        faults = LauncherFaults(simulation.scenario.fault, pool, recorder, link)
+        await pool.ready()
+        flight = build(
+            config,
+            site,
+            simulation.setting.order,
+            clock=clock,
+            detectors=pool,
+            recorder=recorder,
+            ground=ground,
+            counting=counting,
+            monitors=watchers,
+            observers=[simulation.observer],
+            peers=peers,
+            opener=open_paced_datagrams,
+        )
+        return await _beside(
+            simulation, flight, ended_by, watch_world(process, pipe, faults.tell), faults.run()
+        )
+
+
+def _started_world(
+    simulation: Simulation, ports: WorldPorts, factor: float, stack: AsyncExitStack
+) -> tuple[Any, Connection]:
+    """The world's process and the pipe from it; it ends when the pipe closes, however this process ends."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    spec = _spec(simulation, ports)
-    process = context.Process(
-        target=run_world, args=(spec, factor, simulation.truth_log, theirs), name="world"
-    )
-    with ExitStack() as stack:
-        recorder = stack.enter_context(_flight_recorder(simulation, clock, lossless=False))
+    spec = world_spec(simulation, ports)
+    arguments = (spec, factor, simulation.truth_log, theirs)
+    process = context.Process(target=run_world, args=arguments, name="world")
+    with undisturbed():
         process.start()
-        theirs.close()
-        stack.callback(process.join, 15.0)
-        stack.callback(ours.close)  # the world ends when its pipe closes, however this process ends
-        pool = stack.enter_context(detector_pool(simulation.config, simulation.site, clock))
-        config = attended(connected(simulation.config, ports), simulation.scenario.fault)
-        if simulation.truth_url:
-            config = config.model_copy(update={"vehicle": simulation.config.vehicle})
-        counting = await FlightCount(config, simulation.site, simulation.folder, stack).begun(clock)
-        ground = stack.enter_context(ground_link(config, simulation.site, clock, counting) or nullcontext())
-        faults = LauncherFaults(simulation.scenario.fault, pool, recorder, ground)
-        await pool.ready()
-        daemon = Daemon(
-            config,
-            simulation.site,
-            clock,
-            pool,
-            recorder,
-            [simulation.observer],
-            ground,
-            counting=counting,
-        )
-        parts = watch_world(process, ours, faults.tell), faults.run()
-        beside = [asyncio.ensure_future(part) for part in parts]
-        try:
-            return await _within_limit(simulation, daemon, *beside)
-        finally:
-            for part in beside:
-                part.cancel()
-            await asyncio.wait(beside)
+    theirs.close()
+    stack.callback(process.join, 15.0)
+    stack.callback(ours.close)
+    return process, ours
+
+
+def _ground_settings(simulation: Simulation) -> GroundConfig:
+    """The configured link, or one on any free ports where a fault needs it."""
+    configured = simulation.config.ground
+    if configured.listen or not needs_ground(simulation.scenario.fault):
+        return configured
+    return GroundConfig(listen="127.0.0.1", status_port=0, command_port=0)
+
+
+async def _beside(
+    simulation: Simulation,
+    flight: Flight,
+    ended_by: list[signal.Signals],
+    *others: Coroutine[Any, Any, None],
+) -> FlightResult:
+    """The flight, with what runs beside it for as long.  FlightInterruptedError when a signal ends it."""
+    daemon, beside = Daemon(flight), [asyncio.ensure_future(part) for part in others]
+    try:
+        return await _within_limit(simulation, daemon, *beside)
+    except asyncio.CancelledError:
+        if ended_by:
+            raise FlightInterruptedError(ended_by[0], daemon.result()) from None
+        raise
+    finally:
+        for part in beside:
+            part.cancel()
+        await asyncio.wait(beside)
 
 
 async def _within_limit(
     simulation: Simulation, daemon: Daemon, *beside: asyncio.Future[None]
 ) -> FlightResult:
     """The flight, unless it takes far longer than its plan can, or what runs beside it fails."""
-    stops = plan_of(simulation.config, simulation.site).stops
+    stops = simulation.plan().stops
     limit_s = 120.0 + 60.0 * (len(stops) + 1)
-    if has_front_camera(simulation.config, simulation.site):
+    if simulation.config.front_camera.is_fitted:
         wanted = {stop.node for stop in stops if stop.visit}
         limit_s += _SCAN_S * sum(place.node in wanted for place in simulation.site.locations.values())
     flight = asyncio.ensure_future(daemon.fly())
@@ -210,52 +240,9 @@ async def _within_limit(
     raise RunError(f"the flight was not over after {limit_s:.0f} s of its own time")
 
 
-def _flight_recorder(simulation: Simulation, clock: LoopClock, lossless: bool) -> McapRecorder:
-    recorder = McapRecorder(simulation.flight_log, lossless=lossless)
+def _flight_recorder(simulation: Simulation, clock: LoopClock, when_full: WhenFull) -> McapRecorder:
+    recorder = McapRecorder(simulation.flight_log, when_full=when_full)
     now_ns = clock.now_ns()
-    recorder.record(Topic.MAP, now_ns, Document(site_toml(simulation.site)))
-    recorder.record(Topic.CONFIG, now_ns, Document(simulation.config.model_dump_json(indent=1)))
+    record_setting(recorder, now_ns, simulation.setting)
     recorder.record(Topic.SCENARIO, now_ns, Document(simulation.scenario.model_dump_json(indent=1)))
     return recorder
-
-
-def _spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
-    scenario, config = simulation.scenario, simulation.config
-    adapter = config.vehicle.kind
-    return WorldSpec(
-        site=scenario.floor.site(simulation.site),
-        seed=simulation.seed,
-        camera_address=("127.0.0.1", ports.camera),
-        vehicle="px4" if adapter == "mavsdk" else adapter,
-        vehicle_ports=ports.vehicle,
-        start=start_of(config, simulation.site),
-        start_yaw_rad=math.radians(config.mission.start_yaw_deg + scenario.vehicle.start_yaw_deg),
-        start_offset_m=scenario.vehicle.start_offset_m,
-        camera=replace(scenario.camera.camera(), mount=config.camera.mount()),
-        front=_front(simulation, ports.front_camera),
-        appearance=scenario.floor.look(),
-        draught=scenario.wind.draught(),
-        battery_frac=scenario.vehicle.battery,
-        battery_ah=scenario.vehicle.battery_ah,
-        swap_s=scenario.vehicle.swap_s,
-        radio=scenario.vehicle.radio(),
-        truth_url=simulation.truth_url,
-        faults=scenario.fault,
-    )
-
-
-def _front(simulation: Simulation, port: int | None) -> FrontSpec | None:
-    if port is None:
-        return None
-    scenario = simulation.scenario
-    camera = replace(scenario.front_camera.camera(), mount=simulation.config.front_camera.mount())
-    return FrontSpec(("127.0.0.1", port), camera, scenario.racks.look())
-
-
-def truth_of(simulation: Simulation) -> dict[str, LocationTruth]:
-    """What is really at every location of the simulated racks; empty without a front camera before them."""
-    if not has_front_camera(simulation.config, simulation.site):
-        return {}
-    scenario = simulation.scenario
-    focal_px = scenario.front_camera.camera().lens.fx_px
-    return stock_truth(simulation.site, scenario.racks.look(), focal_px, simulation.seed)

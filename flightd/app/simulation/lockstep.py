@@ -9,19 +9,22 @@ from flightd.app.counting.code_readers import Readers, Reading
 from flightd.app.detection.detector_pool import Detection, Detectors
 from flightd.core.scanning import Place
 from flightd.ports import Clock
+from flightd.runtime.clock import Hold
 from flightd.runtime.frame_ring import FrameTicket
 
 
 class LockstepDetectors:
     """Answers `latency_s` of virtual time after it was asked, whenever the process really was done.
 
-    The work goes on in parallel with virtual time; only at the end time stands still for it, if need be.
+    The work goes on in parallel with virtual time; only at the end `hold` makes time stand still for it, if
+    need be.
     """
 
-    def __init__(self, inner: Detectors, clock: Clock, latency_s: float) -> None:
+    def __init__(self, inner: Detectors, clock: Clock, latency_s: float, hold: Hold) -> None:
         self._inner = inner
         self._clock = clock
         self._latency_s = latency_s
+        self._hold = hold
 
     @property
     def replaced(self) -> int:
@@ -32,7 +35,7 @@ class LockstepDetectors:
         work = asyncio.ensure_future(self._inner.detect(ticket, with_jpeg))
         try:
             await asyncio.sleep(self._latency_s)
-            with self._clock.hold():
+            with self._hold():
                 detection = await work
         finally:
             work.cancel()
@@ -44,16 +47,16 @@ class LockstepDetectors:
 class LockstepReaders:
     """The same for the readers of codes."""
 
-    def __init__(self, inner: Readers, clock: Clock, latency_s: float) -> None:
+    def __init__(self, inner: Readers, latency_s: float, hold: Hold) -> None:
         self._inner = inner
-        self._clock = clock
         self._latency_s = latency_s
+        self._hold = hold
 
     async def read(self, ticket: FrameTicket, places: tuple[Place, ...]) -> Reading | None:
         work = asyncio.ensure_future(self._inner.read(ticket, places))
         try:
             await asyncio.sleep(self._latency_s)
-            with self._clock.hold():
+            with self._hold():
                 return await work
         finally:
             work.cancel()

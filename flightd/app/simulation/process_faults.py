@@ -47,12 +47,9 @@ def check_faults(faults: Sequence[Fault], config: Config, site: Site, *, externa
             raise InputError(f"scenario: fault {fault.kind}: no front camera; fly a --warehouse with racks")
 
 
-def attended(config: Config, faults: Sequence[Fault]) -> Config:
-    """The configuration with a ground link on any free ports, where a fault needs one."""
-    if config.ground.listen or not any(isinstance(fault, GroundSilent | GroundOrder) for fault in faults):
-        return config
-    update = {"listen": "127.0.0.1", "status_port": 0, "command_port": 0}
-    return config.model_copy(update={"ground": config.ground.model_copy(update=update)})
+def needs_ground(faults: Sequence[Fault]) -> bool:
+    """Whether a fault comes over the ground link."""
+    return any(isinstance(fault, GroundSilent | GroundOrder) for fault in faults)
 
 
 class LauncherFaults:

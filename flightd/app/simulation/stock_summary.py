@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.app.build import plan_of
-from flightd.app.simulation.launch import Simulation, truth_of
+from flightd.app.simulation.simulation import Simulation, truth_of
 from flightd.core.csv_text import inert
 from flightd.core.inventory import LocationRecord
-from flightd.inventory.formats import utc_text
+from flightd.core.utc_time import utc_text
 from flightd.sim.racks.stock_truth import score_stock
 
 _COLUMNS = (
@@ -23,7 +22,7 @@ _COLUMNS = (
 
 def inventory_csv(folder: Path) -> bytes | None:
     """One line for each location of the inventory in `folder`, several texts behind one another with
-    " | " between, all of it inert (`core.cells`); None where there is no inventory."""
+    " | " between, all of it inert (`core.csv_text`); None where there is no inventory."""
     records = _records(folder)
     if records is None:
         return None
@@ -41,7 +40,7 @@ def stock_summary(simulation: Simulation, flight_time_s: float) -> dict[str, Any
     truth, records = truth_of(simulation), _records(simulation.folder)
     if not truth or records is None:
         return {"codes_expected": 0, "codes_read": 0, "codes_wrong": 0}
-    wanted = {stop.node for stop in plan_of(simulation.config, simulation.site).stops if stop.visit}
+    wanted = {stop.node for stop in simulation.plan().stops if stop.visit}
     planned = {code for code, place in truth.items() if place.node in wanted}
     scored = score_stock(truth, records, planned).as_summary()
     hours = flight_time_s / 3600

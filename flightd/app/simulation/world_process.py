@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import Coroutine, Iterator
+from collections.abc import Coroutine
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from flightd.adapters.recorder.recorder import McapRecorder
-from flightd.core.errors import FlightdError, RunError, UnavailableError
+from flightd.core.errors import FlightdError, RunError
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import ScaledLoop
-from flightd.sim.scenario.faults import Told
+from flightd.sim.scenario.faults import FaultListener
 from flightd.sim.world import World, WorldSpec
 
 
-async def watch_world(process: Any, pipe: Connection, tell: Told) -> None:
+async def watch_world(process: Any, pipe: Connection, tell: FaultListener) -> None:
     """Pass on what the world tells; return when its process has died; raises what it died of."""
     loop, died, failed = asyncio.get_running_loop(), asyncio.Event(), list[BaseException]()
 
@@ -66,25 +66,8 @@ def run_world(spec: WorldSpec, factor: float, log: Path, pipe: Connection) -> No
     try:
         with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
             runner.run(main())
+    except FlightdError as err:
+        pipe.send(err)
     except Exception as err:
-        pipe.send(_reason(err))
-        if not isinstance(_reason(err), UnavailableError):
-            raise
-
-
-def _reason(err: Exception) -> FlightdError:
-    """The error that a person can do something about, out of an error or a group of them; a fault of the
-    world itself as a RunError."""
-    leaves = list(_leaves(err))
-    told = next((leaf for leaf in leaves if isinstance(leaf, FlightdError)), None)
-    if told is not None:
-        return UnavailableError(str(told))
-    return RunError(f"the simulated world failed: {type(leaves[0]).__name__}: {leaves[0]}")
-
-
-def _leaves(err: BaseException) -> Iterator[BaseException]:
-    if isinstance(err, BaseExceptionGroup):
-        for part in err.exceptions:
-            yield from _leaves(part)
-    else:
-        yield err
+        pipe.send(RunError(f"the simulated world failed: {type(err).__name__}: {err}"))
+        raise

@@ -7,20 +7,6 @@ of the full battery for each second in the air.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-
-
-@dataclass(frozen=True, slots=True)
-class BatteryParams:
-    """`flight_s` is the time that a full battery is believed to hover, until flights have shown better;
-    `reserve_frac` stays in it when the drone is back.  With `swap` a mission waits on the pad for a battery
-    charged to `full_frac`, up to `swap_wait_s`, and goes on."""
-
-    flight_s: float = 600.0
-    reserve_frac: float = 0.10
-    full_frac: float = 0.9
-    swap: bool = False
-    swap_wait_s: float = 1800.0
 
 
 class BatteryGauge:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from flightd.config.battery import BatteryConfig
+from flightd.config.schema import Config
 from flightd.core.errors import InputError
-from flightd.mission.battery.consumption import BatteryGauge, BatteryParams
-from flightd.mission.guidance import MissionParams
+from flightd.mission.battery.consumption import BatteryGauge
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
 from flightd.mission.plan.leg_times import Legs, Pace
-from flightd.mission.scan.scanner import Scanner
+from flightd.mission.reasons import ChargeShort
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
 
@@ -19,16 +21,16 @@ def check_battery(
     site: Site,
     plan: FlightPlan,
     policy: HeadingPolicy,
-    params: MissionParams,
-    scanner: Scanner | None = None,
+    config: Config,
+    scanner: AnyScanner = NO_SCAN,
 ) -> None:
     """InputError when a full battery does not reach one of the stops, last for what is done there, and come
     back with its reserve."""
-    sorties = Sorties(site, Legs(site, policy, Pace.of(params)), params.battery, scanner)
+    sorties = Sorties(site, Legs(site, policy, Pace.of(config.mission)), config.battery, scanner)
     far = sorties.out_of_reach([stop.node for stop in plan.stops if stop.visit])
     if far:
         raise InputError(
-            f"site {site.name}: a full battery (battery.flight_s = {params.battery.flight_s:g}) does not"
+            f"site {site.name}: a full battery (battery.flight_s = {config.battery.hover_s:g}) does not"
             f" reach {far[0]}, last for the stop there and come back with its reserve; add a charge pad, or"
             " leave the node out"
         )
@@ -47,12 +49,12 @@ class Sorties:
 
     With a `scanner` a stop lasts as long as what it has left to count there."""
 
-    def __init__(self, site: Site, legs: Legs, params: BatteryParams, scanner: Scanner | None = None) -> None:
+    def __init__(self, site: Site, legs: Legs, battery: BatteryConfig, scanner: AnyScanner = NO_SCAN) -> None:
         self._site = site
         self._legs = legs
         self._scanner = scanner
-        self._params = params
-        self._gauge = BatteryGauge(params.flight_s)
+        self._battery = battery
+        self._gauge = BatteryGauge(battery.hover_s)
         self._ways: dict[str, WayBack] = {}
         self._charge_frac = 1.0
 
@@ -75,20 +77,20 @@ class Sorties:
             self._ways[node] = min(found, key=lambda way: way.seconds)
         return self._ways[node]
 
-    def why_return(self, goal: str, left_m: float) -> str:
-        """Why the drone must turn back now, or an empty text: the charge only just suffices for the rest
+    def must_return(self, goal: str, left_m: float) -> ChargeShort | None:
+        """Why the drone must turn back now, None if it need not: the charge only just suffices for the rest
         of the leg to `goal`, `left_m`, the way back from there, and the reserve."""
         back = self.way_back(goal)
         rest_s = self._legs.pace.leg_s(left_m) if left_m > 0.0 else 0.0
-        return self._short(rest_s + back.seconds, f"the way back to {back.pad}")
+        return self._short(rest_s + back.seconds, "", back.pad)
 
-    def why_not_on(self, here: str, there: str) -> str:
-        """Why the drone should not fly on from `here` to visit `there`, or an empty text."""
+    def must_not_go_on(self, here: str, there: str) -> ChargeShort | None:
+        """Why the drone should not fly on from `here` to visit `there`, None if it may."""
         try:
             on_s = self._legs.way_s(here, there)
         except NoWayError:  # the way was left by an order: the return is watched anyway
-            return ""
-        return self._short(self._out_s(on_s, there), f"a visit to {there} and the way back")
+            return None
+        return self._short(self._out_s(on_s, there), there, self.way_back(there).pad)
 
     def out_of_reach(self, nodes: Sequence[str]) -> tuple[str, ...]:
         """The nodes that cannot be visited from any charge pad on one full battery."""
@@ -96,7 +98,7 @@ class Sorties:
         return tuple(
             node
             for node in dict.fromkeys(nodes)
-            if min(self._fresh_frac(pad, node) for pad in pads) > 1.0 - self._params.reserve_frac
+            if min(self._fresh_frac(pad, node) for pad in pads) > 1.0 - self._battery.reserve
         )
 
     def _out_s(self, on_s: float, there: str) -> float:
@@ -104,21 +106,18 @@ class Sorties:
 
     def _stop_s(self, node: str) -> float:
         pace = self._legs.pace
-        counted_s = self._scanner.stop_s(node, pace) if self._scanner is not None else 0.0
+        counted_s = self._scanner.stop_s(node, pace)
         return counted_s or pace.dwell_s
 
     def _fresh_frac(self, pad: str, node: str) -> float:
         on_s = self._legs.way_s(pad, node)
         return (self._legs.pace.take_off_s + self._out_s(on_s, node)) * self.rate_per_s
 
-    def _short(self, seconds: float, what: str) -> str:
-        needed = seconds * self.rate_per_s
-        if not self._charge_frac < needed + self._params.reserve_frac:  # NaN: no charge told, nothing known
-            return ""
-        return (
-            f"battery at {self._charge_frac:.0%}: {what} needs {needed:.0%}"
-            f" and {self._params.reserve_frac:.0%} stay in reserve"
-        )
+    def _short(self, seconds: float, node: str, pad: str) -> ChargeShort | None:
+        needed, reserve = seconds * self.rate_per_s, self._battery.reserve
+        if not self._charge_frac < needed + reserve:  # NaN: no charge reported, nothing known
+            return None
+        return ChargeShort(node, pad, self._charge_frac, needed, reserve)
 
     def _ways_back(self, node: str, *, in_need: bool) -> list[WayBack]:
         found = []

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 
+from flightd.config.schema import Config
 from flightd.core.types import Phase
 from flightd.mission.battery.sorties import Sorties
-from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.mission.guidance import MissionInputs
+from flightd.mission.machine import State
 from flightd.mission.plan.flight_plan import HeadingPolicy
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.plan.leg_times import Legs, Pace
+from flightd.mission.reasons import ChargeLow, Reason
 from flightd.mission.safety.hazard_monitor import HazardMonitor
-from flightd.mission.scan.scanner import Scanner
+from flightd.mission.scan.no_scan import AnyScanner
+from flightd.mission.triggers import Trigger
 from flightd.site.site import Site
 
 
@@ -22,55 +26,53 @@ class BatterySwap:
         self,
         site: Site,
         policy: HeadingPolicy,
-        params: MissionParams,
-        scanner: Scanner | None,
+        config: Config,
+        scanner: AnyScanner,
         itinerary: Itinerary,
         watch: HazardMonitor,
     ) -> None:
-        self._sorties = Sorties(site, Legs(site, policy, Pace.of(params)), params.battery, scanner)
-        self._swap = params.battery.swap
+        self._sorties = Sorties(site, Legs(site, policy, Pace.of(config.mission)), config.battery, scanner)
+        self._swap = config.battery.swap
         self._route = itinerary
         self._watch = watch
         self._short = False
         self._visited_before = 0
 
     @property
-    def goes_on(self) -> bool:
+    def _goes_on(self) -> bool:
         """On the way to a pad on which a battery is waited for, with stops left for it."""
         return self._short and bool(self._route.left_over)
 
     @property
     def swaps(self) -> bool:
-        """As `goes_on`, and something was done on the last battery: one that does nothing is the last."""
-        return self.goes_on and len(self._route.visited) > self._visited_before
+        """Goes on from this pad, something having been done on the last battery: one that does nothing is
+        the last."""
+        return self._goes_on and len(self._route.visited) > self._visited_before
 
-    def step(self, s: MissionInputs, phase: Phase, airborne: bool) -> bool:
-        """Turn back in time: below the fixed share, or when what is left only just brings it back.  Whether
-        it turned back with this tick."""
+    def step(self, s: MissionInputs, state: State) -> Trigger | None:
+        """Turn back in time: below the fixed share, or when what is left only just brings it back.  How it
+        turned back with this tick, None if it did not."""
         charge = math.nan if s.vehicle is None else s.vehicle.battery_frac
-        self._sorties.step(s.now_ns, charge, airborne)
-        if not airborne or self._route.returning or phase is Phase.LAND:
-            return False
+        self._sorties.step(s.now_ns, charge, state.airborne)
+        if not state.airborne or state.returning or state.phase is Phase.LAND:
+            return None
         if self._watch.battery_low(s):
-            self._go_charge(s.now_ns, f"battery low: {charge:.0%}", in_need=True)
-            return True
+            return self._go_charge(s.now_ns, ChargeLow(charge), in_need=True)
         goal = self._route.goal
-        left_m = s.distance_m((goal.x_m, goal.y_m)) if phase is Phase.FOLLOW else 0.0
-        if math.isfinite(left_m) and (reason := self._sorties.why_return(goal.node, left_m)):
-            self._go_charge(s.now_ns, reason, in_need=False)
-            return True
-        return False
+        left_m = s.distance_m((goal.x_m, goal.y_m)) if state.phase is Phase.FOLLOW else 0.0
+        if math.isfinite(left_m) and (reason := self._sorties.must_return(goal.node, left_m)):
+            return self._go_charge(s.now_ns, reason, in_need=False)
+        return None
 
-    def look_ahead(self, now_ns: int) -> bool:
-        """Turn back here rather than half-way to a stop that the battery does not reach.  Whether it did."""
+    def look_ahead(self, now_ns: int) -> Trigger | None:
+        """Turn back here rather than half-way to a stop that the battery does not reach.  How it turned
+        back, None if it did not."""
         route = self._route
-        if not route.ahead or route.returning:
-            return False
-        why = self._sorties.why_not_on(route.goal.node, route.ahead[0])
-        if why:
-            route.leave(route.ahead)
-            self._go_charge(now_ns, why, in_need=False)
-        return bool(why)
+        why = self._sorties.must_not_go_on(route.goal.node, route.ahead[0]) if route.ahead else None
+        if why is None:
+            return None
+        route.leave(route.ahead)
+        return self._go_charge(now_ns, why, in_need=False)
 
     def await_battery(self, now_ns: int) -> None:
         """Stand on the pad with the rest of the plan ahead."""
@@ -78,8 +80,9 @@ class BatterySwap:
         self._short = False
         self._route.resume_from_pad(now_ns)
 
-    def _go_charge(self, now_ns: int, reason: str, *, in_need: bool) -> None:
+    def _go_charge(self, now_ns: int, reason: Reason, *, in_need: bool) -> Trigger:
         """Fly to the charge pad that is reached soonest; with batteries swapped the rest is flown later."""
         pad = self._sorties.way_back(self._route.goal.node).pad
         self._route.turn_home(now_ns, reason, in_need=in_need, pad=pad)
         self._short = self._swap
+        return Trigger.BACK_TO_SWAP if self._goes_on else Trigger.BACK_TO_END

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import math
 
+from flightd.config.schema import Config
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Phase
-from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.mission.guidance import MissionInputs
+from flightd.mission.machine import State
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.safety.found_flying import FoundFlyingCheck
 from flightd.mission.safety.hazard_monitor import DebounceTimer
-from flightd.mission.scan.scan_phase import ScanPhase
+from flightd.mission.scan.no_scan import AnyScanner
+from flightd.mission.scan.shelf_scan import ShelfScan
 from flightd.mission.triggers import Trigger
 
 
 class PhaseProgress:
     """The phase in hand: call `begin` when it changes, then `step` at each tick."""
 
-    def __init__(self, params: MissionParams, itinerary: Itinerary, scan: ScanPhase) -> None:
-        self._params = params
+    def __init__(self, config: Config, itinerary: Itinerary, scan: ShelfScan, scanner: AnyScanner) -> None:
+        self._params = config.mission
+        self._battery = config.battery
         self._itinerary = itinerary
         self._scan = scan
-        self._first_look = FoundFlyingCheck(params)
+        self._scanner = scanner
+        self._first_look = FoundFlyingCheck(config.mission)
         self._settling = DebounceTimer()
         self._limit_s = math.inf
         self._since_ns = 0
@@ -39,11 +44,11 @@ class PhaseProgress:
     def timed_out(self, now_ns: int) -> bool:
         return self.phase_s(now_ns) > self._limit_s
 
-    def step(self, s: MissionInputs, phase: Phase, *, may_start: bool) -> set[Trigger]:
-        """The trigger by which `phase` reaches its end, if it has; on the ground it ends when the mission
+    def step(self, s: MissionInputs, state: State, *, may_start: bool) -> set[Trigger]:
+        """The trigger by which the phase reaches its end, if it has; on the ground it ends when the mission
         `may_start`."""
         p, v, goal = self._params, s.vehicle, self._itinerary.goal
-        match phase:
+        match state.phase:
             case Phase.PREFLIGHT if self._first_look.flies_already(s):
                 done, trigger = True, Trigger.FOUND_FLYING
             case Phase.RECOVER:
@@ -54,33 +59,34 @@ class PhaseProgress:
                 ready = v is not None and v.armed and v.in_control and not math.isnan(s.height_m)
                 done, trigger = ready, Trigger.ARMED
             case Phase.TAKE_OFF:
-                done, trigger = s.height_m > p.height_m - p.height_reached_m, Trigger.AT_HEIGHT
+                done, trigger = s.height_m > p.height_m - p.expert.height_reached_m, Trigger.AT_HEIGHT
             case Phase.ACQUIRE:
-                calm = s.localised and s.is_sure(p) and s.speed_mps < 2 * p.arrive_mps
+                calm = s.localised and s.is_sure(p) and s.speed_mps < 2 * p.expert.arrive_mps
                 done, trigger = self._settled(s, calm), Trigger.ACQUIRED
             case Phase.TURN:
-                turned = s.pose is not None and abs(wrap_pi(goal.yaw_rad - s.pose.yaw_rad)) < p.arrive_yaw_rad
+                turned = (
+                    s.pose is not None
+                    and abs(wrap_pi(goal.yaw_rad - s.pose.yaw_rad)) < p.expert.arrive_yaw_rad
+                )
                 done, trigger = self._settled(s, turned), Trigger.TURNED
             case Phase.FOLLOW:
-                there = s.distance_m((goal.x_m, goal.y_m)) < p.arrive_m and s.speed_mps < p.arrive_mps
+                there = s.distance_m((goal.x_m, goal.y_m)) < p.arrive_m and s.speed_mps < p.expert.arrive_mps
                 done, trigger = self._settled(s, there), Trigger.ARRIVED
             case Phase.HOVER | Phase.CLIMB | Phase.SCAN:
-                done, trigger = self._at_node(s, phase)
+                done, trigger = self._at_node(s, state.phase, state.returning)
             case _:
                 return set()
         return {trigger} if done else set()
 
-    def _at_node(self, s: MissionInputs, phase: Phase) -> tuple[bool, Trigger]:
+    def _at_node(self, s: MissionInputs, phase: Phase, returning: bool) -> tuple[bool, Trigger]:
         """Whether the dwell, the way to a view or the view is over, and what that leads to."""
-        goal, scan, returning = self._itinerary.goal, self._scan, self._itinerary.returning
+        goal, scan = self._itinerary.goal, self._scan
         due = not returning and scan.due(phase, goal)
         if phase is Phase.CLIMB:
-            view = scan.view(phase)
-            away_m = s.distance_m((view.x_m, view.y_m)) if view is not None else math.inf
-            return self._settled(s, scan.at_view(s, away_m, s.speed_mps)) or not due, Trigger.AT_VIEW
+            return self._settled(s, self._at_view(s)) or not due, Trigger.AT_VIEW
         over = Trigger.ROUTE_DONE if self._itinerary.is_last else Trigger.DWELLED
         if phase is Phase.SCAN:
-            done = not due or (s.is_sure(self._params) and scan.is_over(s.now_ns))
+            done = not due or (s.is_sure(self._params) and self._scanner.step(s.now_ns))
             more = not returning and scan.due(phase, goal)
             return done, Trigger.VIEW_DONE if more else over
         if due:
@@ -89,27 +95,51 @@ class PhaseProgress:
         dwell_s = 0.0 if dwelt else self._params.dwell_s
         return self.phase_s(s.now_ns) >= dwell_s and s.is_sure(self._params), over
 
+    def _at_view(self, s: MissionInputs) -> bool:
+        """Whether the drone is at the view, level with it and facing the shelf."""
+        p, view = self._params, self._scanner.view
+        if view is None or s.pose is None:
+            return False
+        there = s.distance_m((view.x_m, view.y_m)) < p.arrive_m and s.speed_mps < p.expert.arrive_mps
+        level = abs(s.height_m - view.height_m) < p.expert.view_height_m
+        return there and level and abs(wrap_pi(view.yaw_rad - s.pose.yaw_rad)) < p.expert.arrive_yaw_rad
+
+    def _to_view_s(self, s: MissionInputs) -> float:
+        """How long it may take to reach the view."""
+        p, view = self._params, self._scanner.view
+        rise_m = abs(view.height_m - s.height_m) if view is not None else 0.0
+        return math.pi / p.turn_rate_radps + (0.0 if math.isnan(rise_m) else rise_m / p.climb_mps)
+
     def _settled(self, s: MissionInputs, condition: bool) -> bool:
         """True once `condition` has held for the settling time."""
         return self._settling.step(condition, s.now_ns) >= self._params.settle_s and condition
 
     def _time_limit_s(self, s: MissionInputs, phase: Phase) -> float:
-        """How long the phase just begun may take: a fixed slack, and a multiple of its way's own time."""
+        """How long the phase just begun may take: a fixed slack, and a multiple of its way's own time.  A
+        pause may last as long as a full battery does; a landing lasts until the vehicle stands."""
         p, goal = self._params, self._itinerary.goal
         match phase:
             case Phase.ARMING:
-                return p.arm_timeout_s
+                return p.expert.arm_timeout_s
             case Phase.SWAP:
-                return p.battery.swap_wait_s
+                return self._battery.swap_wait_s
             case Phase.TAKE_OFF:
                 way_s = p.height_m / p.climb_mps
+            case Phase.HOVER:
+                way_s = p.dwell_s
+            case Phase.SCAN:
+                way_s = self._scanner.look_s
+            case Phase.RELOCATE:
+                way_s = p.relocate_s
+            case Phase.HOLD:
+                return self._battery.hover_s
             case Phase.TURN:
                 way_s = math.pi / p.turn_rate_radps
             case Phase.CLIMB:
-                way_s = self._scan.way_s(s)
+                way_s = self._to_view_s(s)
             case Phase.FOLLOW:
                 here_m = s.distance_m((goal.x_m, goal.y_m))
                 way_s = (0.0 if math.isinf(here_m) else here_m) / p.speed_mps
             case _:
                 way_s = 0.0
-        return p.phase_slack_s + p.phase_share * way_s
+        return p.expert.phase_slack_s + p.expert.phase_share * way_s

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from flightd.config.schema import Config
 from flightd.control.flight_controller import Reference
 from flightd.control.motion_profile import Profile
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Demand, LandedState, Phase
 from flightd.mission.flight.relocation import Relocator
 from flightd.mission.flight.touchdown import Touchdown
-from flightd.mission.guidance import Guidance, Guide, MissionInputs, MissionParams
+from flightd.mission.guidance import Guidance, Guide, MissionInputs
+from flightd.mission.machine import State
 from flightd.mission.plan.flight_plan import Stop
 from flightd.mission.safety.hazard_monitor import HazardMonitor
 from flightd.mission.scan.views import View
@@ -27,20 +29,18 @@ _HURRY = 4.0 / 3.0
 
 @dataclass(frozen=True, slots=True)
 class ReferenceTask:
-    """What the mission is at: its phase, flown for `phase_s`, the stop it is for and the view from there.
+    """What the mission is at: its state, whose phase is flown for `phase_s`, the stop it is for and the view
+    from there; `cruise` flies at the height of the plan rather than at that of the last view."""
 
-    `on_pad` lands on that stop's pad, `cruise` flies at the height of the plan rather than at that of the
-    last view; `stopped` neither steers nor brakes, `unknown` (where it is, and so where it may go) nor
-    does it disarm by itself."""
-
-    phase: Phase
+    state: State
     phase_s: float
     goal: Stop
     view: View | None
     cruise: bool
-    on_pad: bool
-    stopped: bool
-    unknown: bool
+
+    @property
+    def phase(self) -> Phase:
+        return self.state.phase
 
 
 class ReferenceGenerator:
@@ -48,29 +48,30 @@ class ReferenceGenerator:
 
     def __init__(
         self,
-        params: MissionParams,
+        config: Config,
         ceiling_m: float,
         watch: HazardMonitor,
         relocator: Relocator,
         start: tuple[float, float, float],
     ) -> None:
         """`start` is the place on the map, m, and the heading, rad, before the first flight."""
-        p = params
-        self._params = params
+        p = config.mission
+        self._params = p
+        self._hazards = config.hazards
         self._ceiling_m = ceiling_m
         self._watch = watch
         self._blind = watch.blind
         self._relocator = relocator
-        self._touchdown = Touchdown(params)
+        self._touchdown = Touchdown(p)
         self.anchor = (start[0], start[1])
         """Where it holds when no stop is flown to."""
         self._steers = False
         self._cruise_m = p.height_m
         self._x = Profile(start[0], p.speed_mps, p.accel_mps2)
         self._y = Profile(start[1], p.speed_mps, p.accel_mps2)
-        self._yaw = Profile(start[2], p.turn_rate_radps, p.turn_accel_radps2)
-        self._height = Profile(0.0, p.climb_mps, p.climb_accel_mps2)
-        self._rise = Profile(0.0, _HURRY * p.climb_mps, 2.0 * p.climb_accel_mps2)
+        self._yaw = Profile(start[2], p.turn_rate_radps, p.expert.turn_accel_radps2)
+        self._height = Profile(0.0, p.climb_mps, p.expert.climb_accel_mps2)
+        self._rise = Profile(0.0, _HURRY * p.climb_mps, 2.0 * p.expert.climb_accel_mps2)
 
     def take_off(self, height_m: float) -> None:
         """A climb begins from here."""
@@ -91,7 +92,7 @@ class ReferenceGenerator:
     def step(self, s: MissionInputs, task: ReferenceTask) -> Guidance:
         """Move the reference on by one tick."""
         demand = Demand.KEEP if task.phase is Phase.RECOVER else Demand.FLY
-        self._steers = not (task.stopped or task.unknown) and self._steer(s, task)
+        self._steers = not (task.state.stopped or task.state.adopted) and self._steer(s, task)
         if task.phase is Phase.LAND:
             climb, demand = self._descend(s, task)
         elif task.phase is Phase.RECOVER:
@@ -100,7 +101,7 @@ class ReferenceGenerator:
         elif (
             math.isnan(s.height_m)
             or s.telemetry_age_s > self._params.telemetry_hold_s
-            or abs(s.warnings.height_share - 1.0) > self._params.hazards.height_share
+            or abs(s.warnings.height_share - 1.0) > self._hazards.height_share
         ):
             self._height.reset(self._height.position)  # no climb by heights of the past
             climb = 0.0
@@ -110,13 +111,13 @@ class ReferenceGenerator:
         else:
             climb = self._climb_mps(s, task)
         guide = Guide.STEER if self._steers else Guide.BRAKE if self._may_brake(s, task) else Guide.LEVEL
-        reckoned = min(s.x_age_s, s.y_age_s) < self._params.hazards.brake_s
-        return Guidance(task.phase, guide, self._reference(climb), demand, reckoned, task.stopped)
+        reckoned = min(s.x_age_s, s.y_age_s) < self._hazards.expert.brake_s
+        return Guidance(task.phase, guide, self._reference(climb), demand, reckoned, task.state.stopped)
 
     def _climb_mps(self, s: MissionInputs, task: ReferenceTask) -> float:
         """Climb rate towards the wanted height.  A take-off that drifts where no line tells how hurries: the
         picture has to widen faster than it leaves the lines behind."""
-        rises = task.phase is Phase.TAKE_OFF and s.height_m >= self._params.steer_above_m
+        rises = task.phase is Phase.TAKE_OFF and s.height_m >= self._params.expert.steer_above_m
         if rises and not self._steers:
             self._rise.reset(self._height.position, self._height.velocity)
             self._rise.step(self._wanted_height_m(task), s.dt_s)
@@ -131,25 +132,25 @@ class ReferenceGenerator:
         p = self._params
         heard = s.telemetry_age_s <= p.telemetry_hold_s
         seen = min(s.x_age_s, s.y_age_s) <= p.lines_hold_s
-        known = (heard or seen) and s.pose is not None and not task.unknown
-        return known and not task.stopped and task.phase is not Phase.TAKE_OFF
+        known = (heard or seen) and s.pose is not None and not task.state.adopted
+        return known and not task.state.stopped and task.phase is not Phase.TAKE_OFF
 
     def _wanted_height_m(self, task: ReferenceTask) -> float:
         """Flying height; a little more in search of lines that stay lost."""
-        p, h = self._params, self._params.hazards
+        p, h = self._params, self._hazards
         if task.phase is Phase.RELOCATE:
             return self._relocator.height_m(self._height_goal_m(task))
-        if task.phase is not Phase.HOLD or self._watch.unseen_s < h.search_s:
+        if task.phase is not Phase.HOLD or self._watch.unseen_s < h.expert.search_s:
             return self._height_goal_m(task)
         highest_m = self._ceiling_m - h.headroom_m
-        return max(p.height_m, min(self._height_goal_m(task) + h.search_climb_m, highest_m))
+        return max(p.height_m, min(self._height_goal_m(task) + h.expert.search_climb_m, highest_m))
 
     def _descend(self, s: MissionInputs, task: ReferenceTask) -> tuple[float, Demand]:
         """Climb rate and demand of a landing: at rest first, unless stopped or out of sight; down until
         the vehicle says that it stands; then disarm."""
         p, v = self._params, s.vehicle
         moving = self._steers and s.speed_mps > _REST_MPS
-        if moving and not task.on_pad and task.phase_s < _SETTLE_S:
+        if moving and not task.state.on_pad and task.phase_s < _SETTLE_S:
             self._height.reset(self._height.position)
             return 0.0, Demand.FLY
         rate = self._touchdown.rate_mps(s, _target(s, task))
@@ -158,13 +159,13 @@ class ReferenceGenerator:
         self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
         deaf = s.telemetry_age_s > p.telemetry_land_s
         standing = v is not None and v.landed is LandedState.ON_GROUND and not deaf
-        by_itself = deaf or task.unknown
+        by_itself = deaf or task.state.adopted
         return -rate, Demand.DISARM if standing else Demand.LAND if by_itself else Demand.FLY
 
     def _steer(self, s: MissionInputs, task: ReferenceTask) -> bool:
         """Move the reference towards where the phase wants it; False when the floor cannot be relied on."""
         p, pose, phase = self._params, s.pose, task.phase
-        too_low = phase is Phase.TAKE_OFF and s.height_m < p.steer_above_m
+        too_low = phase is Phase.TAKE_OFF and s.height_m < p.expert.steer_above_m
         unseen_s = self._touchdown.unseen_s(s, _target(s, task))
         stale = min(s.x_age_s, s.y_age_s) > unseen_s or s.telemetry_age_s > p.telemetry_hold_s
         unknown = not (s.by_pad and phase in _BY_PAD) and (stale or not s.localised)
@@ -176,12 +177,12 @@ class ReferenceGenerator:
             self._yaw.reset(pose.yaw_rad)
         if phase is Phase.RELOCATE:
             self.anchor = self._relocator.next_look(s, self.anchor)
-        to_goal = phase in _TO_GOAL or task.on_pad
+        to_goal = phase in _TO_GOAL or task.state.on_pad
         at = _target(s, task) or ((task.goal.x_m, task.goal.y_m) if to_goal else self.anchor)
         x, y, yaw = (*at, task.goal.yaw_rad)
         if task.view is not None:
             x, y, yaw = task.view.x_m, task.view.y_m, task.view.yaw_rad
-        if math.hypot(self._x.position - pose.x_m, self._y.position - pose.y_m) < p.max_lead_m:
+        if math.hypot(self._x.position - pose.x_m, self._y.position - pose.y_m) < p.expert.max_lead_m:
             self._x.step(x, s.dt_s)
             self._y.step(y, s.dt_s)
         else:  # wait for the vehicle at rest: a speed kept here would be fed forward and hold it off
@@ -219,4 +220,4 @@ class ReferenceGenerator:
 
 def _target(s: MissionInputs, task: ReferenceTask) -> tuple[float, float] | None:
     """The pad to come down on; None while it lands on none."""
-    return (s.pad_m or (task.goal.x_m, task.goal.y_m)) if task.on_pad else None
+    return (s.pad_m or (task.goal.x_m, task.goal.y_m)) if task.state.on_pad else None

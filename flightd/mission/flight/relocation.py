@@ -7,9 +7,11 @@ was somewhere else all along: then its position jumps.  Either stops the flight 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+from flightd.config.mission import MissionConfig
 from flightd.core.types import Phase
-from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.mission.guidance import MissionInputs
 from flightd.mission.safety.hazard_monitor import DebounceTimer
 from flightd.mission.triggers import Trigger
 
@@ -22,8 +24,12 @@ class Relocator:
     """Call `step` at each tick, first of all; then `jump_m` says how far the position jumped with it, and
     `shift_m` how far in all since it was last sure for a while."""
 
-    def __init__(self, params: MissionParams) -> None:
+    def __init__(self, params: MissionConfig, ceiling_m: float, overhead_m: Sequence[float]) -> None:
+        """`ceiling_m` is how high may be flown anywhere, `overhead_m` are the heights below the
+        keep-outs."""
         self._params = params
+        self._ceiling_m = ceiling_m
+        self._overhead_m = overhead_m
         self._doubt = DebounceTimer()
         self._sure = DebounceTimer()
         self._look = DebounceTimer()
@@ -51,8 +57,8 @@ class Relocator:
         doubt_s = self._doubt.step(s.pose is not None and not sure, s.now_ns)
         sure_s = self._sure.step(sure, s.now_ns)
         if phase is not Phase.RELOCATE:
-            patience_s = p.first_look_s if phase is Phase.ACQUIRE else p.doubt_s
-            if sure_s > p.settled_s and not self._moved:
+            patience_s = p.expert.first_look_s if phase is Phase.ACQUIRE else p.expert.doubt_s
+            if sure_s > p.expert.settled_s and not self._moved:
                 self._doubted_ns = None
                 self._shift = (0.0, 0.0)
             doubted = (
@@ -61,14 +67,14 @@ class Relocator:
             return {Trigger.POSITION_DOUBTED} if doubted else set()
         self._moved = False
         self._doubted_ns = self._doubted_ns or s.now_ns
-        if sure_s > p.settled_s and phase_s > p.settled_s:
+        if sure_s > p.expert.settled_s and phase_s > p.expert.settled_s:
             return {Trigger.POSITION_SURE}
         lost = (s.now_ns - self._doubted_ns) * 1e-9 > p.relocate_s
         return {Trigger.POSITION_UNKNOWN} if lost else set()
 
     def next_look(self, s: MissionInputs, anchor: tuple[float, float]) -> tuple[float, float]:
         """Where to look from: the same place for a while, then along a way that is safe."""
-        if self._look.step(True, s.now_ns) > self._params.relocate_look_s and s.way_out is not None:
+        if self._look.step(True, s.now_ns) > self._params.expert.relocate_look_s and s.way_out is not None:
             self._look = DebounceTimer()
             return anchor[0] + s.way_out[0], anchor[1] + s.way_out[1]
         return anchor
@@ -80,9 +86,9 @@ class Relocator:
     def height_m(self, flown_m: float) -> float:
         """The height to look from: above what is flown now, more of the floor is in view.  Wherever it is, it
         stays below the ceiling and below the keep-outs that begin above what is flown now."""
-        p = self._params
-        above = (height_m for height_m in p.overhead_m if height_m >= flown_m)
-        return max(flown_m, min(flown_m + p.relocate_climb_m, p.ceiling_m, *above))
+        above = (height_m for height_m in self._overhead_m if height_m >= flown_m)
+        climbed_m = flown_m + self._params.expert.relocate_climb_m
+        return max(flown_m, min(climbed_m, self._ceiling_m, *above))
 
     def _watch_jumps(self, s: MissionInputs) -> None:
         self.jump_m = (0.0, 0.0)
@@ -95,5 +101,5 @@ class Relocator:
             if max(abs(dx), abs(dy)) > _JUMP_M + _SPEED_SHARE * self._params.speed_mps * s.dt_s:
                 self.jump_m = (dx, dy)
                 self._shift = (self._shift[0] + dx, self._shift[1] + dy)
-                self._moved = s.height_m > self._params.steer_above_m
+                self._moved = s.height_m > self._params.expert.steer_above_m
         self._last = at

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.config.mission import MissionConfig
+from flightd.mission.guidance import MissionInputs
 
 ALIGN_M = 0.85
 """From this height down neither pad nor lines are wholly in the picture for long: aim before."""
@@ -21,7 +22,7 @@ _UNSEEN_S = 1.6
 class Touchdown:
     """One planned landing: call `begin`, then `rate_mps` at each tick."""
 
-    def __init__(self, params: MissionParams) -> None:
+    def __init__(self, params: MissionConfig) -> None:
         self._params = params
         self._left_s = _AIM_S
 
@@ -42,8 +43,8 @@ class Touchdown:
             if off_m > _AIMED_M or math.hypot(s.pose.vx_mps, s.pose.vy_mps) > _AIMED_MPS:
                 self._left_s -= s.dt_s
                 return 0.0
-        slow_below_m = p.touch_below_m if target_m is None else _SLOW_OVER_PAD * p.touch_below_m
-        return p.touch_mps if height_m < slow_below_m else p.land_mps
+        slow_below_m = p.expert.touch_below_m if target_m is None else _SLOW_OVER_PAD * p.expert.touch_below_m
+        return p.expert.touch_mps if height_m < slow_below_m else p.land_mps
 
     def unseen_s(self, s: MissionInputs, target_m: tuple[float, float] | None) -> float:
         """How old the newest line may be to steer by: the usual, and more just above the pad."""

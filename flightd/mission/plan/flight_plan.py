@@ -7,24 +7,13 @@ the longer side of the down camera's picture is turned along the way.
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from flightd.config.mission import Heading
+from flightd.config.schema import Config
 from flightd.site.site import Side, Site
-
-
-class Heading(enum.StrEnum):
-    ALONG = "along"
-    SHELF = "shelf"
-
-
-class VisitOrder(enum.StrEnum):
-    """As the configuration lists the nodes (all of them: aisle by aisle), or the quickest."""
-
-    GIVEN = "given"
-    BEST = "best"
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +22,11 @@ class HeadingPolicy:
 
     heading: Heading
     long_side_ahead: bool = True
+
+    @classmethod
+    def of(cls, config: Config) -> HeadingPolicy:
+        """The mission's heading, flown with the configured down camera."""
+        return cls(config.mission.heading, config.camera.long_side_ahead)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +52,13 @@ class FlightPlan:
 
     @property
     def visits(self) -> int:
+        """Stops that are visits; a node may be visited twice."""
         return sum(stop.visit for stop in self.stops)
+
+    @property
+    def nodes(self) -> int:
+        """Nodes that are visited, each counted once."""
+        return len({stop.node for stop in self.stops if stop.visit})
 
 
 def make_plan(

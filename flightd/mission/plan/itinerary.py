@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
+from flightd.config.mission import Heading
+from flightd.core.geometry import wrap_pi
 from flightd.core.types import EventLevel, GridPose
 from flightd.mission.event_log import EventLog
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop, make_plan
+from flightd.mission.reasons import Reason, in_words
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
 
@@ -25,8 +30,6 @@ class Itinerary:
         self.stand = (plan.start, plan.start_yaw_rad)
         """The node on which the drone stands before it flies, and its heading there."""
         self.visited: list[str] = []
-        self.returning = False
-        """On the way to a pad: nothing on it is visited."""
 
     @property
     def goal(self) -> Stop:
@@ -59,14 +62,20 @@ class Itinerary:
         ahead = (stop.node for stop in self._stops[self._next :] if stop.visit)
         return self._left_over or tuple(ahead)
 
-    def advance(self, stop: Stop) -> None:
-        """Go on to the next stop, flown as `stop` says."""
+    def advance(self, pose: GridPose | None, *, either_side: bool) -> None:
+        """Go on to the next stop; backwards where that saves half a turn and `either_side` of the aisle may
+        be faced: along an aisle with the nose to the shelf, after a scan that ended facing one of them."""
+        before, stop = self.goal, self.next_stop
+        sideways = self._site.nodes[before.node].aisle == self._site.nodes[stop.node].aisle
         self._next += 1
-        self._stops[self._next] = stop
+        if not either_side or not sideways or self._policy.heading is not Heading.SHELF or pose is None:
+            return
+        if abs(wrap_pi(stop.yaw_rad - pose.yaw_rad)) > math.pi * 0.75:
+            self._stops[self._next] = replace(stop, yaw_rad=wrap_pi(stop.yaw_rad + math.pi))
 
     def note_visit(self, now_ns: int) -> None:
-        """The goal was visited, if it was a wanted one; a stop on the way home is none of them."""
-        if self.goal.visit and not self.returning:
+        """The goal was visited, if it was a wanted one."""
+        if self.goal.visit:
             self.visited.append(self.goal.node)
             self._events.tell(now_ns, EventLevel.INFO, "visited", self.goal.node)
 
@@ -74,18 +83,15 @@ class Itinerary:
         """Visit these later, on another battery."""
         self._left_over = tuple(nodes)
 
-    def turn_home(self, now_ns: int, reason: str, *, in_need: bool, pad: str | None = None) -> None:
+    def turn_home(self, now_ns: int, reason: Reason, *, in_need: bool, pad: str | None = None) -> None:
         """Fly to the home pad or another; `in_need` by the shortest way, against one-way lines too."""
         self._left_over = self.remaining
-        self.returning = True
-        self._events.tell(now_ns, EventLevel.WARNING, "home", reason)
+        self._events.tell(now_ns, EventLevel.WARNING, "home", in_words(reason))
         self._replan([], in_need=in_need, home=pad)
 
     def go_to(self, now_ns: int, node: str) -> None:
         """Fly over `node` home, as ordered; an order that cannot be followed changes nothing."""
-        if self.returning:
-            why = f"goto {node} refused: on the way home"
-        elif node not in self._site.nodes:
+        if node not in self._site.nodes:
             why = f"no node {node!r} on site {self._site.name}"
         else:
             try:
@@ -109,12 +115,13 @@ class Itinerary:
         first = Stop(node.id, node.x_m, node.y_m, way[0].yaw_rad, False)
         self._stops[self._next : self._next + 1] = [first, *way[:-1], goal]
 
-    def recount(self, now_ns: int, due: Sequence[str]) -> None:
-        """Put nodes whose count was withdrawn before what is left, near as they are; they are left for the
-        next battery where the way leads home already."""
+    def recount(self, now_ns: int, due: Sequence[str], *, returning: bool) -> None:
+        """Put visited nodes whose count was withdrawn before what is left, near as they are; they are left
+        for the next battery where the way leads home already."""
+        due = [node for node in due if node in self.visited]
         if not due:
             return
-        if not self.returning:
+        if not returning:
             nodes = [*due, *(stop.node for stop in self._stops[self._next :] if stop.visit)]
             try:
                 rest = make_plan(self._site, nodes, due[0], self._home, self._policy, self.goal.yaw_rad)
@@ -133,7 +140,6 @@ class Itinerary:
         self.stand = (pad.node, pad.yaw_rad)
         rest = make_plan(self._site, self._left_over, pad.node, self._home, self._policy, pad.yaw_rad)
         self._stops, self._next = list(rest.stops), 0
-        self.returning = False
         text = f"{len(self._left_over)} stops left; change the battery on the pad at {pad.node}"
         self._events.tell(now_ns, EventLevel.WARNING, "swap", text)
         self._left_over = ()

@@ -16,7 +16,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.mission.guidance import MissionParams
+from flightd.config.mission import MissionConfig
 from flightd.mission.plan.flight_plan import HeadingPolicy, leg_yaw
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
@@ -53,19 +53,20 @@ class Pace:
     land_s: float
 
     @classmethod
-    def of(cls, p: MissionParams) -> Pace:
+    def of(cls, p: MissionConfig) -> Pace:
+        x = p.expert
         return cls(
             p.height_m,
             p.climb_mps,
-            p.climb_accel_mps2,
+            x.climb_accel_mps2,
             p.speed_mps,
             p.accel_mps2,
             p.turn_rate_radps,
-            p.turn_accel_radps2,
+            x.turn_accel_radps2,
             p.settle_s,
             p.dwell_s,
-            profile_s(p.height_m, p.climb_mps, p.climb_accel_mps2) + p.settle_s,
-            max(p.height_m - p.touch_below_m, 0.0) / p.land_mps + p.touch_below_m / p.touch_mps,
+            profile_s(p.height_m, p.climb_mps, x.climb_accel_mps2) + p.settle_s,
+            max(p.height_m - x.touch_below_m, 0.0) / p.land_mps + x.touch_below_m / x.touch_mps,
         )
 
     def leg_s(self, metres: float) -> float:

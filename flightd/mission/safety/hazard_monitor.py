@@ -7,8 +7,9 @@ from collections import defaultdict
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from flightd.config.schema import Config
 from flightd.core.types import VehicleState
-from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.mission.guidance import MissionInputs
 from flightd.mission.safety.hazards import Action, triggers_of
 from flightd.mission.safety.view_monitor import FloorViewMonitor
 from flightd.mission.triggers import Trigger
@@ -78,13 +79,15 @@ class Counted:
 class HazardMonitor:
     """Call `step` at each tick: the triggers of all hazards that hold, and of lines found again."""
 
-    def __init__(self, params: MissionParams) -> None:
-        self._params = params
+    def __init__(self, config: Config) -> None:
+        self._params = config.mission
+        self._hazards = config.hazards
+        self._ground_lost_s = config.ground.lost_s
         self._lasting: defaultdict[Trigger, DebounceTimer] = defaultdict(DebounceTimer)
         self._trouble = DebounceTimer()
         self._detectors, self._writers, self._stamps = Counted(), Counted(), Counted(_JUMPED)
         self._seen = DebounceTimer()
-        self.blind = FloorViewMonitor(params)
+        self.blind = FloorViewMonitor(config)
         self._unseen_ns: int | None = None
         self.unseen_s = 0.0
         """For how long the lines have been lost, glimpses not counted."""
@@ -106,11 +109,11 @@ class HazardMonitor:
         return found - {Trigger.LINES_FOUND} if holding else found
 
     def ground_lost(self, s: MissionInputs) -> bool:
-        return s.ground_silent_s > self._params.ground_lost_s
+        return s.ground_silent_s > self._ground_lost_s
 
     def battery_low(self, s: MissionInputs) -> bool:
         p = self._params
-        return s.vehicle is not None and p.battery_land_frac <= s.vehicle.battery_frac < p.battery_home_frac
+        return s.vehicle is not None and p.battery_land <= s.vehicle.battery_frac < p.battery_home
 
     def _authority(self, s: MissionInputs, v: VehicleState) -> set[Trigger]:
         silent_s = max(s.telemetry_age_s, (s.now_ns - v.heartbeat_ns) * 1e-9 - _HEARTBEAT_S)
@@ -121,12 +124,12 @@ class HazardMonitor:
         return set() if v.in_control else {Trigger.PILOT_TOOK}  # silence is no pilot: a lost link is lost
 
     def _vehicle(self, s: MissionInputs, v: VehicleState) -> _Conditions:
-        p, h = self._params, self._params.hazards
+        p, h = self._params, self._hazards
         heartbeat_s = (s.now_ns - v.heartbeat_ns) * 1e-9
         jumped = self._stamps.step(v.stamps_refused, s.now_ns) or s.dt_s > _GAP_S
         return {
             Trigger.HEARTBEAT_LOST: (heartbeat_s > h.heartbeat_land_s, 0.0),
-            Trigger.BATTERY_CRITICAL: (v.battery_frac < p.battery_land_frac, 0.0),
+            Trigger.BATTERY_CRITICAL: (v.battery_frac < p.battery_land, 0.0),
             Trigger.BATTERY_LOW: (self.battery_low(s), 0.0),
             Trigger.CLOCK_JUMP: (jumped, 0.0),
         }
@@ -143,7 +146,7 @@ class HazardMonitor:
         }
 
     def _daemon(self, s: MissionInputs) -> _Conditions:
-        h, w, health = self._params.hazards, s.warnings, s.warnings.health
+        h, w, health = self._hazards, s.warnings, s.warnings.health
         slow = health.latency_p99_s > h.latency_s or w.tick_s > _TICK_S
         return {
             Trigger.OVERLOAD: (slow, h.overload_s),
@@ -161,13 +164,13 @@ class HazardMonitor:
         }
 
     def _place(self, s: MissionInputs) -> _Conditions:
-        h, w = self._params.hazards, s.warnings
+        h, w = self._hazards, s.warnings
         return {
             Trigger.HEIGHT_WRONG: (abs(w.height_share - 1.0) > h.height_share, h.disagree_s),
             Trigger.ATTITUDE_WRONG: (abs(w.heading_error_rad) > h.heading_rad, h.disagree_s),
-            Trigger.WIND: (w.push_mps2 > h.push_mps2 or w.off_m > h.off_m, h.push_s),
-            Trigger.CEILING_LEFT: (w.headroom_m < 0.0, h.outside_s),
-            Trigger.CORRIDOR_LEFT: (w.outside_m > 0.0, h.outside_s),
+            Trigger.WIND: (w.push_mps2 > h.expert.push_mps2 or w.off_m > h.expert.off_m, h.expert.push_s),
+            Trigger.CEILING_LEFT: (w.headroom_m < 0.0, h.expert.outside_s),
+            Trigger.CORRIDOR_LEFT: (w.outside_m > 0.0, h.expert.outside_s),
         }
 
     def _sight(self, s: MissionInputs, situation: FlightContext) -> set[Trigger]:
@@ -176,10 +179,10 @@ class HazardMonitor:
         p = self._params
         lost = min(s.x_age_s, s.y_age_s) > p.lines_hold_s or not s.localised
         self.blind.step(s, situation.leg_along_x)
-        borne_s = p.lines_hold_s if situation.holds else p.followed_hold_s
+        borne_s = p.lines_hold_s if situation.holds else p.expert.followed_hold_s
         lost = lost or self.blind.unseen_s > borne_s
         seen_s = self._seen.step(not lost, s.now_ns)
-        if seen_s > p.lines_found_s or not situation.at_height:
+        if seen_s > p.expert.lines_found_s or not situation.at_height:
             self._unseen_ns = None
         elif lost and self._unseen_ns is None:
             self._unseen_ns = s.now_ns

@@ -1,6 +1,6 @@
 """Every hazard in one table: how it is found, what is done, where that is flown.
 
-The transition table takes its safety rows from here, README prints it, and a test flies each row.
+The transition table takes its safety rows from here, the guide prints it, and a test flies each row.
 Keys in backticks are those of the configuration.
 """
 
@@ -58,8 +58,8 @@ class Hazard:
 _FAST = "tests/sim/test_hazards.py"
 _HOLD = "brake, hold; on when it is over; land after `mission.lines_land_s`"
 _BLIND = (
-    "brake by dead reckoning and sink to `hazards.blind_m` at once; up and on when it is over; land after"
-    " `hazards.blind_land_s`"
+    "brake by dead reckoning and sink to `hazards.expert.blind_m` at once; up and on when it is over; land"
+    " after `hazards.expert.blind_land_s`"
 )
 
 HAZARDS: tuple[Hazard, ...] = (
@@ -161,8 +161,8 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "wind",
         Trigger.WIND,
-        "a steady push of more than `hazards.push_mps2`, or off its place by `hazards.off_m`, for"
-        " `hazards.push_s`",
+        "a steady push of more than `hazards.expert.push_mps2`, or off its place by `hazards.expert.off_m`,"
+        " for `hazards.expert.push_s`",
         Action.LAND,
         "land by the lines",
         _FAST,
@@ -198,8 +198,9 @@ HAZARDS: tuple[Hazard, ...] = (
         "no line of the map newer than `mission.lines_hold_s`, the followed one older than 0.8 s, or the"
         " position too uncertain",
         Action.HOLD,
-        "brake by dead reckoning, hold; after `hazards.search_s` climb by `hazards.search_climb_m` to see"
-        " more; land after `hazards.search_land_s`, or with glimpses after `mission.lines_land_s`",
+        "brake by dead reckoning, hold; after `hazards.expert.search_s` climb by"
+        " `hazards.expert.search_climb_m` to see more; land after `hazards.expert.search_land_s`, or with"
+        " glimpses after `mission.lines_land_s`",
         _FAST,
     ),
     Hazard(
@@ -305,10 +306,7 @@ def triggers_of(*actions: Action) -> frozenset[Trigger]:
 
 
 def markdown() -> str:
-    """The table as README prints it."""
-    lines = ["| hazard | scenario | found by | action | then |", "|---|---|---|---|---|"]
-    lines += [
-        f"| {row.name.replace('_', ' ')} | `{row.name}` | {row.found_by} | {row.action} | {row.then} |"
-        for row in HAZARDS
-    ]
+    """The table as the guide prints it."""
+    lines = ["| hazard | found by | action | then |", "|---|---|---|---|"]
+    lines += [f"| `{row.name}` | {row.found_by} | {row.action} | {row.then} |" for row in HAZARDS]
     return "\n".join(lines) + "\n"

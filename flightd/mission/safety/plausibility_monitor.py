@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+from flightd.config.schema import Config
+from flightd.core.tracks import TrackSet
 from flightd.core.types import GridPose, Health
-from flightd.mission.guidance import Guidance, Guide, MissionParams, Warnings
+from flightd.mission.guidance import Guidance, Guide, Warnings
 from flightd.site.corridor import Corridor
 from flightd.site.site import Site
 from flightd.tracking.frame_monitor import FrameMonitor
-from flightd.tracking.line_tracker import LineTracker, TrackSet
+from flightd.tracking.line_tracker import LineTracker
 
 _TICK_MEMORY_S = 1.0
 _PUSH_MEMORY_S = 2.0
@@ -21,11 +23,11 @@ _KNOWN_M = 0.3
 class PlausibilityMonitor:
     """Call `step` at each tick for the warnings, `steered` with what the mission then wanted."""
 
-    def __init__(self, site: Site, params: MissionParams) -> None:
-        self._params = params
-        self._hazards = params.hazards
-        self._ceiling_m = site.ceiling_m - params.hazards.headroom_m
-        self._corridor = Corridor(site, params.hazards.corridor_m)
+    def __init__(self, site: Site, config: Config) -> None:
+        self._judged_above_m = config.mission.expert.steer_above_m
+        self._height_share = config.hazards.height_share
+        self._ceiling_m = site.ceiling_m - config.hazards.headroom_m
+        self._corridor = Corridor(site, config.hazards.corridor_m)
         self._tick_s = 0.02
         self._off_m = 0.0
         self._doubt = False
@@ -44,8 +46,8 @@ class PlausibilityMonitor:
         health: Health,
     ) -> Warnings:
         self._tick_s += min(dt_s / _TICK_MEMORY_S, 1.0) * (dt_s - self._tick_s)
-        share = tracker.height_share if height_m > self._params.steer_above_m else 1.0
-        self._doubt = abs(share - 1.0) > self._hazards.height_share
+        share = tracker.height_share if height_m > self._judged_above_m else 1.0
+        self._doubt = abs(share - 1.0) > self._height_share
         if tracks is not None and now_ns - tracks.lines_ns < _FRESH_NS:
             part = min(dt_s / _PUSH_MEMORY_S, 1.0)
             x, y = self.push_mps2

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 
-from flightd.mission.guidance import MissionInputs, MissionParams
+from flightd.config.schema import Config
+from flightd.mission.guidance import MissionInputs
 
 _FLARE_PER_S, _STAND_M = 2.0, 0.10
 """A blind descent slows down towards the floor: its rate over the height of the skids."""
@@ -18,8 +19,9 @@ _FLARE_PER_S, _STAND_M = 2.0, 0.10
 class FloorViewMonitor:
     """What is known of the view: call `step` at each tick."""
 
-    def __init__(self, params: MissionParams) -> None:
-        self._params = params
+    def __init__(self, config: Config) -> None:
+        self._params = config.mission
+        self._hazards = config.hazards.expert
         self.unseen_s = 0.0
         """Age of the newest line of the map; on a leg that of the line which is followed, for what drifts
         off that one drifts into the shelves."""
@@ -45,7 +47,7 @@ class FloorViewMonitor:
     @property
     def too_long(self) -> bool:
         """The drift can no longer be answered for."""
-        h = self._params.hazards
+        h = self._hazards
         return self._lost_s > (h.search_land_s if self.shows else h.blind_land_s)
 
     @property
@@ -58,8 +60,8 @@ class FloorViewMonitor:
         p = self._params
         if math.isnan(height_m):
             return p.land_mps
-        return min(max(_FLARE_PER_S * (height_m - _STAND_M), p.touch_blind_mps), p.blind_mps)
+        return min(max(_FLARE_PER_S * (height_m - _STAND_M), p.expert.touch_blind_mps), p.expert.blind_mps)
 
     def sink_mps(self, height_m: float) -> float:
         """Rate at which a drone that holds blind goes down to the height from which it soon stands."""
-        return self.rate_mps(height_m) if height_m > self._params.hazards.blind_m else 0.0
+        return self.rate_mps(height_m) if height_m > self._hazards.blind_m else 0.0

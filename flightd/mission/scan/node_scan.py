@@ -6,10 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from flightd.config.scan import ScanConfig
 from flightd.core.scanning import BodyPose, Finding, Light, Occupancy
 from flightd.mission.scan.code_assignment import PlacedRead, ShelfLook
 from flightd.mission.scan.location_votes import LocationVerdict, LocationVotes
-from flightd.mission.scan.views import ScanParams, View, ViewPlanner
+from flightd.mission.scan.views import View, ViewPlanner
 
 _SAME_EXPOSURE = 0.01
 
@@ -25,7 +26,7 @@ class ScanTask:
         node: str,
         views: Sequence[View],
         planner: ViewPlanner,
-        params: ScanParams,
+        params: ScanConfig,
         relights: bool = True,
     ) -> None:
         self.node = node

@@ -8,16 +8,19 @@ nothing is ever booked on a wrong location; its locations are left to count, and
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 
+from flightd.config.scan import ScanConfig
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
 from flightd.core.types import Event, EventLevel
 from flightd.mission.plan.leg_times import Pace
+from flightd.mission.reasons import NothingRead
 from flightd.mission.scan.code_assignment import Assigner, FrontSight, Sighting
 from flightd.mission.scan.node_scan import ScanTask
-from flightd.mission.scan.views import ScanParams, View, ViewPlanner, views_s
+from flightd.mission.scan.views import View, ViewPlanner, views_s
 from flightd.site.site import Site
 
 _BLIND_NODES = 3
@@ -36,12 +39,20 @@ class _Pending:
 
 
 class Scanner:
-    """The scan phase of a flight, for the mission to ask and for pictures to be given to."""
+    """The scan phase of a flight, for the mission to ask and for pictures to be given to; `highest_m` and
+    `aside_per_height` are those of `ViewPlanner`."""
 
-    def __init__(self, site: Site, sight: FrontSight, params: ScanParams) -> None:
+    def __init__(
+        self,
+        site: Site,
+        sight: FrontSight,
+        params: ScanConfig,
+        highest_m: float = math.inf,
+        aside_per_height: float = 0.35,
+    ) -> None:
         self._params = params
-        self._assigner = Assigner(site, sight, params.least_probability)
-        self._planner = ViewPlanner(site, sight, self._assigner, params)
+        self._assigner = Assigner(site, sight, params.expert.least_probability)
+        self._planner = ViewPlanner(site, sight, self._assigner, params, highest_m, aside_per_height)
         self._planned = frozenset(site.locations)
         self._done: set[str] = set()
         self._tasks: dict[str, ScanTask] = {}
@@ -63,9 +74,19 @@ class Scanner:
     # What the mission asks
 
     @property
+    def counts(self) -> bool:
+        """Whether this flight counts anything."""
+        return True
+
+    @property
     def least_integrity(self) -> float:
         """The integrity from which a place counts as certain."""
         return self._params.least_integrity
+
+    @property
+    def look_s(self) -> float:
+        """The most that one view is looked from."""
+        return self._params.view_s
 
     @property
     def view(self) -> View | None:
@@ -78,11 +99,11 @@ class Scanner:
         return self.view.exposure if self.view is not None else 1.0
 
     @property
-    def blind(self) -> str:
-        """Why the count is none, or an empty text: no picture was read at the last nodes, nor is it yet."""
+    def blind(self) -> NothingRead | None:
+        """Why the count is none, if it is: no picture was read at the last nodes, nor is it yet."""
         if not self._begun or self._begun_blind < min(_BLIND_NODES, self._begun):
-            return ""
-        return f"no picture of a shelf was read at the last {self._begun_blind} of {self._begun} scans"
+            return None
+        return NothingRead(self._begun_blind, self._begun)
 
     def wants(self, node: str) -> bool:
         """Whether locations of a node are left to count."""
@@ -169,7 +190,7 @@ class Scanner:
     def take_due(self) -> tuple[str, ...]:
         """The nodes to fly to once more, their findings having been withdrawn, in the order of their first
         visit; each at most `revisits` times in a flight."""
-        due = [node for node in self._due if self._again[node] < self._params.revisits]
+        due = [node for node in self._due if self._again[node] < self._params.expert.revisits]
         self._again.update(due)
         self._due.clear()
         return tuple(due)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flightd.config.scan import ScanConfig
 from flightd.core.camera_view import ForwardMount
 from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import BodyPose, Light
@@ -15,36 +16,6 @@ from flightd.mission.plan.leg_times import Pace
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
 from flightd.site.cells import by_node
 from flightd.site.site import Location, Side, Site
-
-
-@dataclass(frozen=True, slots=True)
-class ScanParams:
-    """How shelves are scanned; SI units, radians.
-
-    A view ends when every location in it is decided, at the latest after `view_s`; what is undecided then
-    is looked at again from `retakes` other places, up to `step_m` nearer and `aside_m` along the aisle
-    (`aside_per_height` of the height: the node's own lines must stay in the down camera's picture).  Before
-    that, where the light is the trouble, it is looked at again from the same place with the exposure times
-    `darker` or `brighter`.  A node whose findings had to be withdrawn is flown to again, at most `revisits`
-    times.
-    """
-
-    min_height_m: float = 0.7
-    max_height_m: float = math.inf
-    pictures: int = 3
-    view_s: float = 2.0
-    retakes: int = 2
-    step_m: float = 0.25
-    aside_m: float = 0.4
-    aside_per_height: float = 0.35
-    darker: float = 0.4
-    brighter: float = 2.5
-    clearance_m: float = 0.6
-    label_reach_m: float = 0.3
-    least_probability: float = 0.99
-    least_integrity: float = 0.97
-    confirm_stops: int = 2
-    revisits: int = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,13 +36,26 @@ class View:
 
 
 class ViewPlanner:
-    """The views of each node of a site, and where to look from again."""
+    """The views of each node of a site, and where to look from again.
 
-    def __init__(self, site: Site, sight: FrontSight, assigner: Assigner, params: ScanParams) -> None:
+    Nothing is looked at from above `highest_m`, nor from farther along the aisle than `aside_per_height` of
+    the height: the node's own lines must stay in the down camera's picture."""
+
+    def __init__(
+        self,
+        site: Site,
+        sight: FrontSight,
+        assigner: Assigner,
+        params: ScanConfig,
+        highest_m: float = math.inf,
+        aside_per_height: float = 0.35,
+    ) -> None:
         self._site = site
         self._sight = sight
         self._assigner = assigner
         self._params = params
+        self._highest_m = params.highest_m(highest_m)
+        self._aside_per_height = aside_per_height
         self._by_node = by_node(site.locations.values())
 
     def locations(self, node: str) -> tuple[str, ...]:
@@ -98,7 +82,7 @@ class ViewPlanner:
         """The same place with another exposure, if something of what is `left` comes out so dark or so light
         that its code may be lost; None if nothing does, or this is such a view already."""
         p = self._params
-        for light, part in ((Light.DIM, p.brighter), (Light.BURNT, p.darker)):
+        for light, part in ((Light.DIM, p.expert.brighter), (Light.BURNT, p.expert.darker)):
             if view.exposure == 1.0 and light in left.values():
                 return replace(view, locations=tuple(left), exposure=part)
         return None
@@ -125,7 +109,7 @@ class ViewPlanner:
         near = number < len(hands)
         step_m = min(p.step_m, room_m) if near else -p.step_m / 2
         height_m = self._height(label_m, abs(shelf_m - node.y_m) - step_m)
-        most_m = min(p.aside_m, p.aside_per_height * height_m)
+        most_m = min(p.aside_m, self._aside_per_height * height_m)
         aside_m = _clamp(middle_m - node.x_m + (0.0 if near else p.step_m), most_m)
         first, *_, last = self._site.aisle_nodes(view.aisle)
         x_m = min(max(node.x_m + aside_m, first.x_m), last.x_m)  # the aisle's line ends behind its end nodes
@@ -156,7 +140,8 @@ class ViewPlanner:
         return View(node, first.aisle, first.side, at.x_m, at.y_m, height_m, self._yaw(first.side), codes)
 
     def _height(self, label_m: float, distance_m: float) -> float:
-        return view_height_m(label_m, distance_m, self._sight.mount, self._params)
+        heights_m = self._params.min_height_m, self._highest_m
+        return view_height_m(label_m, distance_m, self._sight.mount, heights_m)
 
     def _yaw(self, side: Side) -> float:
         """The heading in which the camera faces a side; a side camera needs no turn."""
@@ -165,7 +150,7 @@ class ViewPlanner:
 
     def _fits(self, group: Sequence[Location], node_y_m: float) -> bool:
         """Whether all labels of a group, with room around each, are in one picture."""
-        reach_m = self._params.label_reach_m
+        reach_m = self._params.expert.label_reach_m
         distance_m = abs(group[0].y_m - node_y_m)
         low, high = group[0].height_m - reach_m, group[-1].height_m + reach_m
         height_m = self._height((low + high) / 2, distance_m)
@@ -189,11 +174,14 @@ def views_s(views: Sequence[View], pace: Pace, look_s: float) -> float:
     return total
 
 
-def view_height_m(label_m: float, distance_m: float, mount: ForwardMount, params: ScanParams) -> float:
-    """Flying height at which the camera's axis meets the shelf at the labels' height, as far as it may."""
+def view_height_m(
+    label_m: float, distance_m: float, mount: ForwardMount, heights_m: tuple[float, float]
+) -> float:
+    """Flying height at which the camera's axis meets the shelf at the labels' height, as far as it may:
+    between the lowest and the highest of `heights_m`."""
     forward_m, _, down_m = mount.offset_m
     wanted = label_m + down_m - (distance_m - forward_m) * math.tan(mount.pitch_rad)
-    return min(max(wanted, params.min_height_m), params.max_height_m)
+    return min(max(wanted, heights_m[0]), heights_m[1])
 
 
 def _clamp(value: float, limit: float) -> float:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.core.types import Phase
-from flightd.replay.report.flight import Flight
+from flightd.replay.report.flight import Array, Flight, Track
 from flightd.replay.report.markup import clock, number
 
 
@@ -59,6 +59,7 @@ def key_figures(flight: Flight) -> tuple[Figure, ...]:
         _cross_track(flight),
         _hover(flight),
         _position(flight),
+        _smoothing(flight),
         _landing(flight),
         _codes(flight.summary),
         _flight_time(flight),
@@ -130,15 +131,34 @@ def _position(flight: Flight) -> Figure | None:
     """How far the drone was from where it thought it was."""
     if flight.truth is None:
         return None
-    estimate = flight.estimate
-    x, y = flight.truth.at(estimate.t_s)
-    error = np.hypot(estimate.x_m - x, estimate.y_m - y)[flight.flying(estimate.t_s)]
-    error = error[np.isfinite(error)]
-    if not len(error):
+    error_m = _apart_m(flight, flight.estimate, flight.truth)
+    if not len(error_m):
         return None
-    return Figure(
-        "Position error", _centimetres(float(np.percentile(error, 95))), "cm", "p95, believed against true"
-    )
+    note = "p95, believed against true"
+    if isinstance(flight.smoothed, Track):
+        smoothed_m = _apart_m(flight, flight.smoothed, flight.truth)
+        if len(smoothed_m):
+            note += f"; smoothed {_centimetres(float(np.percentile(smoothed_m, 95)))} cm"
+    return Figure("Position error", _centimetres(float(np.percentile(error_m, 95))), "cm", note)
+
+
+def _smoothing(flight: Flight) -> Figure | None:
+    """How far the drone believed itself from where the whole flight says that it was."""
+    if not isinstance(flight.smoothed, Track):
+        return None
+    apart_m = _apart_m(flight, flight.estimate, flight.smoothed)
+    if not len(apart_m):
+        return None
+    rms_m = float(np.sqrt(np.mean(apart_m**2)))
+    return Figure("Live pose", _centimetres(rms_m), "cm", "RMS, believed against smoothed")
+
+
+def _apart_m(flight: Flight, track: Track, other: Track) -> Array:
+    """Horizontal distances between two tracks in flight, where both are known."""
+    x, y = other.at(track.t_s)
+    apart_m = np.hypot(track.x_m - x, track.y_m - y)[flight.flying(track.t_s)]
+    known: Array = apart_m[np.isfinite(apart_m)]
+    return known
 
 
 def _landing(flight: Flight) -> Figure | None:

@@ -12,6 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from flightd.core.errors import UnavailableError
 from flightd.core.types import Event, LineSet, Phase, Status
 from flightd.replay.log import FlightLog
 from flightd.site.site import Site
@@ -113,7 +114,8 @@ class Latency:
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """A flight as the report shows it.  `truth` and `summary` are there if their files are."""
+    """A flight as the report shows it.  `truth` and `summary` are there if their files are; `smoothed` is the
+    estimate judged afterwards, or why there is none."""
 
     log: FlightLog
     start_ns: int
@@ -124,6 +126,7 @@ class Flight:
     visits: tuple[Visit, ...]
     estimate: Track
     truth: Track | None
+    smoothed: Track | UnavailableError
     telemetry: TelemetrySeries
     setpoints: Setpoints
     latency: Latency

@@ -12,8 +12,7 @@ from typing import TypeAlias
 import msgspec
 import numpy as np
 
-from flightd.config.site_file import parse_site
-from flightd.core.errors import InputError
+from flightd.core.errors import InputError, UnavailableError
 from flightd.core.topics import FOR_PEOPLE, RETAINED, Document, Topic
 from flightd.core.types import AttitudeSetpoint, Event, GridPose, LineSet, Phase, Status, VehicleState
 from flightd.replay.log import FlightLog, read_log
@@ -29,7 +28,9 @@ from flightd.replay.report.flight import (
     Track,
     Visit,
 )
+from flightd.replay.smoothed_flight import smooth
 from flightd.site.site import Site
+from flightd.site.site_file import parse_site
 
 _SHORTEST_STOP_S = 0.2
 """A hover that the mission leaves at once is no stop."""
@@ -47,7 +48,8 @@ def load_flight(path: Path) -> Flight:
     def seconds(stamps_ns: Iterable[int]) -> Array:
         return (np.fromiter(stamps_ns, np.float64) - start_ns) / NS_PER_S
 
-    estimate = _estimate(log.messages(GridPose), seconds)
+    poses = log.messages(GridPose)
+    estimate = _estimate(poses, seconds)
     truth = _truth(truths, seconds) if truths else None
     site, map_error = _site(log)
     phases = tuple(_phase_spans(statuses, start_ns))
@@ -61,6 +63,7 @@ def load_flight(path: Path) -> Flight:
         visits=tuple(_visits(statuses, start_ns, site, estimate, truth)),
         estimate=estimate,
         truth=truth,
+        smoothed=_smoothed(poses, estimate, seconds),
         telemetry=_telemetry(log.messages(VehicleState), seconds),
         setpoints=_setpoints(log.messages(AttitudeSetpoint), seconds),
         latency=_latency(statuses, seconds),
@@ -137,6 +140,19 @@ def _estimate(poses: Sequence[GridPose], seconds: _Seconds) -> Track:
         _column(pose.height_m for pose in poses),
         _column(pose.yaw_rad for pose in poses),
     )
+
+
+def _smoothed(poses: Sequence[GridPose], estimate: Track, seconds: _Seconds) -> Track | UnavailableError:
+    """The estimate with the positions that the whole flight speaks for, or why they cannot be had."""
+    if not poses:
+        return estimate
+    try:
+        found = smooth(poses)
+    except UnavailableError as err:
+        return err
+    t_s = seconds(found.stamp_ns)
+    height_m, yaw_rad = (np.interp(t_s, estimate.t_s, of) for of in (estimate.height_m, estimate.yaw_rad))
+    return Track(t_s, found.x_m, found.y_m, height_m, yaw_rad)
 
 
 def _telemetry(states: Sequence[VehicleState], seconds: _Seconds) -> TelemetrySeries:

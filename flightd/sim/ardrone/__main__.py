@@ -15,7 +15,6 @@ from functools import partial
 from pathlib import Path
 
 from flightd.config.paths import shipped
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.runtime.clock import LoopClock
 from flightd.sim.ardrone.drone import Drone
@@ -25,11 +24,12 @@ from flightd.sim.ardrone.video import VideoChannel
 from flightd.sim.floor.appearance import DEFAULT
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.sensors.camera import CameraPeer
 from flightd.sim.sensors.instruments import Sensors
 from flightd.sim.sensors.optics import SimCamera
 from flightd.site.site import Site
+from flightd.site.site_file import load_site
 
 _NOBODY = ("127.0.0.1", 9)
 
@@ -69,7 +69,7 @@ async def _serve(site: Site, ports: DronePorts, seed: int, battery_frac: float) 
     make = partial(Renderer, site, optics, DEFAULT, seed)
     show = partial(server.show, camera=VideoChannel.BOTTOM)
     camera = CameraPeer(optics, make, f"camera {seed}", _NOBODY, server.truth_at, clock, show)
-    front = front_peer(server, site, RackLook(), seed, clock)
+    front = front_peer(server, site, RackAppearance(), seed, clock)
     async with asyncio.TaskGroup() as tasks:
         tasks.create_task(server.run(), name="drone")
         tasks.create_task(camera.run(), name="camera")

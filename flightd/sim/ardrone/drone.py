@@ -1,88 +1,47 @@
 """The drone's flight states, watchdogs and state bits: commands and time in, telemetry out; no sockets.
 
-Where the real firmware is not documented the choice made here is a field of `DroneOptions`.
+Where the real firmware is not documented the choice is a field of `DroneOptions`.
 """
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from flightd.sim.ardrone.at_commands import DroneCommand, SequenceRule, parse
 from flightd.sim.ardrone.configuration import Configuration, Ids
-from flightd.sim.ardrone.flight import FlightLoops, Wish
+from flightd.sim.ardrone.flight import FlightLoops, LoopTargets
 from flightd.sim.ardrone.navdata_writer import ALL_OPTIONS, OPTION_BYTES, NavdataReport, bootstrap, packet
+from flightd.sim.ardrone.states import (
+    AIRBORNE,
+    BIT_ALTITUDE,
+    BIT_BOOTSTRAP,
+    BIT_CAMERA,
+    BIT_COM_LOST,
+    BIT_COM_WATCHDOG,
+    BIT_COMMAND_ACK,
+    BIT_DEMO,
+    BIT_EMERGENCY,
+    BIT_FLY,
+    BIT_VBAT_LOW,
+    BITS_THREADS,
+    PCMD_PROGRESSIVE,
+    REF_EMERGENCY,
+    REF_FLY,
+    DroneOptions,
+    MajorState,
+    Stick,
+)
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.sensors.instruments import Sensors
-
-REF_FLY = 1 << 9
-REF_EMERGENCY = 1 << 8
-PCMD_PROGRESSIVE = 1
-
-BIT_FLY = 1 << 0
-BIT_ALTITUDE = 1 << 4
-BIT_COMMAND_ACK = 1 << 6
-BIT_CAMERA = 1 << 7
-BIT_DEMO = 1 << 10
-BIT_BOOTSTRAP = 1 << 11
-BIT_COM_LOST = 1 << 13
-BIT_VBAT_LOW = 1 << 15
-BIT_ANGLES = 1 << 19
-BIT_CUTOUT = 1 << 22
-BITS_THREADS = 0b11111 << 23
-BIT_COM_WATCHDOG = 1 << 30
-BIT_EMERGENCY = 1 << 31
 
 DEMO_PERIOD_NS = 1_000_000_000 // 15
 COM_WATCHDOG_NS = 50_000_000
 COM_LOST_NS = 2_000_000_000
 
 
-class MajorState(enum.IntEnum):
-    DEFAULT = 0
-    INIT = 1
-    LANDED = 2
-    FLYING = 3
-    HOVERING = 4
-    TAKE_OFF = 6
-    GO_TO_FIX = 7
-    LANDING = 8
-
-
-AIRBORNE = frozenset(
-    {MajorState.FLYING, MajorState.HOVERING, MajorState.TAKE_OFF, MajorState.GO_TO_FIX, MajorState.LANDING}
-)
-
 _FLYING_ALT_OUT_ZONE = 3
 _HOVERING_LOST_COM = 8
-
-
-@dataclass(frozen=True, slots=True)
-class DroneOptions:
-    """Choices where nothing is documented, and what differs from drone to drone."""
-
-    take_off_height_m: float = 0.9
-    spin_up_s: float = 0.8
-    take_off_climb_mps: float = 0.5
-    land_sink_mps: float = 0.4
-    low_battery_frac: float = 0.20
-    forced_landing_frac: float = 0.05
-    config_needs_clear_ack: bool = True
-    config_needs_navdata: bool = False
-    profile_switch_s: float = 0.3
-
-
-@dataclass(slots=True)
-class Stick:
-    """The newest PCMD."""
-
-    flag: int = 0
-    roll: float = 0.0
-    pitch: float = 0.0
-    gaz: float = 0.0
-    yaw: float = 0.0
 
 
 class Drone:
@@ -213,7 +172,7 @@ class Drone:
             self._booted_ns = now_ns
         self._watch(now_ns)
         self._advance(now_ns)
-        self.loops.step(dt_s, self._wish())
+        self.loops.step(dt_s, self._targets())
 
     def _watch(self, now_ns: int) -> None:
         silent_ns = now_ns - self._command_ns if self._command_ns is not None else None
@@ -267,18 +226,18 @@ class Drone:
     def _too_high(self) -> bool:
         return self.loops.height_m >= self.configuration.number("control:altitude_max") / 1000.0
 
-    def _wish(self) -> Wish:
+    def _targets(self) -> LoopTargets:
         if not self.airborne or self.emergency:
-            return Wish()
+            return LoopTargets()
         if self.major == MajorState.TAKE_OFF:
-            return Wish(motors=True, idle=not self.minor, climb_mps=self.options.take_off_climb_mps)
+            return LoopTargets(motors=True, idle=not self.minor, climb_mps=self.options.take_off_climb_mps)
         if self.major == MajorState.LANDING:
-            return Wish(motors=True, climb_mps=-self.options.land_sink_mps)
+            return LoopTargets(motors=True, climb_mps=-self.options.land_sink_mps)
         if self.major != MajorState.FLYING:
-            return Wish(motors=True)
+            return LoopTargets(motors=True)
         tilt_rad = self.configuration.number("control:euler_angle_max")
         climb_mps = self._stick.gaz * self.configuration.number("control:control_vz_max") / 1000.0
-        return Wish(
+        return LoopTargets(
             motors=True,
             hold=False,
             roll_rad=self._stick.roll * tilt_rad,

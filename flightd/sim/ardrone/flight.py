@@ -24,7 +24,7 @@ _IDLE_COLLECTIVE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class LoopTargets:
     """What the flight state wants of the loops.  `idle` only spins the rotors; `hold` brakes and keeps
     the place, `roll_rad` and `pitch_rad` are ignored then."""
 
@@ -85,31 +85,31 @@ class FlightLoops:
         """Count the heading from here, as at power-up."""
         self._yaw_zero_rad = self._sensors.yaw_rad
 
-    def step(self, dt_s: float, wish: Wish) -> None:
+    def step(self, dt_s: float, targets: LoopTargets) -> None:
         """Advance loops, airframe and sensors by `dt_s`."""
         self._estimate(dt_s)
-        if wish.motors and not wish.idle:
-            command = self._command(dt_s, wish)
+        if targets.motors and not targets.idle:
+            command = self._command(dt_s, targets)
         else:
             self._yaw_target_rad = self.yaw_rad
             self._climb_loop.reset(self.height_m)
             self._anchored = False
-            command = AirframeCommand(motors=wish.motors, collective=_IDLE_COLLECTIVE)
+            command = AirframeCommand(motors=targets.motors, collective=_IDLE_COLLECTIVE)
         self._airframe.step(dt_s, command)
         self._sensors.update(dt_s, self._airframe)
 
-    def _command(self, dt_s: float, wish: Wish) -> AirframeCommand:
-        if wish.hold:
+    def _command(self, dt_s: float, targets: LoopTargets) -> AirframeCommand:
+        if targets.hold:
             roll_rad, pitch_rad = self._hold(dt_s)
         else:
-            roll_rad, pitch_rad = wish.roll_rad, wish.pitch_rad
+            roll_rad, pitch_rad = targets.roll_rad, targets.pitch_rad
             self._anchored = False
-        behind_rad = wrap_pi(self._yaw_target_rad + wish.yaw_rate_radps * dt_s - self.yaw_rad)
+        behind_rad = wrap_pi(self._yaw_target_rad + targets.yaw_rate_radps * dt_s - self.yaw_rad)
         behind_rad = min(max(behind_rad, -_YAW_LEAD_MAX_RAD), _YAW_LEAD_MAX_RAD)
         self._yaw_target_rad = wrap_pi(self.yaw_rad + behind_rad)
         collective = self._climb_loop.step(
             dt_s,
-            wish.climb_mps,
+            targets.climb_mps,
             height_m=self.height_m,
             speed_mps=self.climb_mps,
             tilt_cos=math.cos(self.roll_rad) * math.cos(self.pitch_rad),
@@ -120,7 +120,7 @@ class FlightLoops:
             roll_rad=roll_rad - (self.roll_rad - self._airframe.roll_rad),
             pitch_rad=pitch_rad - (self.pitch_rad - self._airframe.pitch_rad),
             yaw_rad=self._airframe.yaw_rad + behind_rad,
-            yaw_rate_radps=wish.yaw_rate_radps,
+            yaw_rate_radps=targets.yaw_rate_radps,
             collective=collective,
         )
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 from functools import partial
 
 from flightd.ports import Clock
+from flightd.runtime.clock import Hold
 from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.ardrone.video import HEIGHT_PX, WIDTH_PX, VideoChannel
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera, front_lens
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.sensors.camera import CameraPeer
@@ -20,7 +22,9 @@ _FPS = 10.0
 _NOBODY = ("127.0.0.1", 9)
 
 
-def front_peer(server: ArDroneServer, site: Site, look: RackLook, seed: int, clock: Clock) -> CameraPeer:
+def front_peer(
+    server: ArDroneServer, site: Site, look: RackAppearance, seed: int, clock: Clock, hold: Hold = nullcontext
+) -> CameraPeer:
     """What the video shows while its channel is the front camera; nothing is drawn for the other one."""
     camera = FrontCamera(lens=front_lens(WIDTH_PX, HEIGHT_PX, _FOCAL_PX), fps=_FPS)
     return CameraPeer(
@@ -32,4 +36,6 @@ def front_peer(server: ArDroneServer, site: Site, look: RackLook, seed: int, clo
         clock,
         partial(server.show, camera=VideoChannel.FRONT),
         lambda: server.watched and server.channel is VideoChannel.FRONT,
+        hold,
+        "front camera",
     )

@@ -14,18 +14,14 @@ from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
 from flightd.sim.autopilot.link import Address, Channel, Message, UdpLink
 from flightd.sim.autopilot.parameters import ParameterServer
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
-from flightd.sim.autopilot.telemetry import DATA_STREAMS, Instruments
+from flightd.sim.autopilot.streams import HEARTBEAT_ID, MessageStreams, whole
+from flightd.sim.autopilot.telemetry import Instruments
 from flightd.sim.plant.airframe import Airframe, AirframeCommand
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.truth_history import TruthHistory
 from flightd.sim.sensors.instruments import SensorParams, Sensors
 
-HEARTBEAT_ID = dialect.MAVLINK_MSG_ID_HEARTBEAT
-
 _NS_PER_MS = 1_000_000
-_TICK_NS = 10 * _NS_PER_MS
-_HEARTBEAT_NS = 1_000 * _NS_PER_MS
-_TIMESYNC_NS = 10_000 * _NS_PER_MS
 _TRUTH_EVERY = 2
 _TRUTH_SAMPLES = 1000
 _CATCH_UP_NS = 2_000 * _NS_PER_MS
@@ -81,6 +77,9 @@ class AutopilotPeer(abc.ABC):
 
     landing_mode: int
 
+    refused_arming: int
+    """The MAV_RESULT of an arming that something is against."""
+
     def __init__(
         self, clock: Clock, airframe: Airframe, config: PeerConfig, parameters: ParameterServer
     ) -> None:
@@ -95,8 +94,7 @@ class AutopilotPeer(abc.ABC):
         self._config = config
         self._clock = clock
         self._now_ns = self._boot_ns = clock.now_ns()
-        self._heartbeat_due_ns = self._now_ns
-        self._timesync_due_ns = self._now_ns + _TIMESYNC_NS
+        self.streams = MessageStreams(self.link, self, self._now_ns, config.step_ns)
         self._steps = 0
         self._truth = TruthHistory(_TRUTH_SAMPLES)
         self._truth.add(airframe.kinematics(self._now_ns))
@@ -108,6 +106,8 @@ class AutopilotPeer(abc.ABC):
         """A sensor fault: the reason with which arming is refused while it is not empty."""
         self._climb_loop = ClimbLoop(ClimbGains(hover_guess=airframe.params.hover_collective))
         self._stick_yaw_rad = 0.0
+        self._idle_s = 0.0
+        self._settled_s = 0.0
 
     async def open(self) -> Address:
         """Bind the socket and greet the remotes; the address bound.  OSError when the port is taken."""
@@ -124,8 +124,9 @@ class AutopilotPeer(abc.ABC):
             while True:
                 now_ns = self._clock.now_ns()
                 self.advance(now_ns)
-                self._stream(now_ns)
-                await asyncio.sleep(max(0, self._next_due_ns(now_ns) - self._clock.now_ns()) / 1e9)
+                self._refresh(now_ns)
+                self.streams.send_due(now_ns)
+                await asyncio.sleep(max(0, self.streams.next_due_ns(now_ns) - self._clock.now_ns()) / 1e9)
         finally:
             self.link.close()
             self._address = None
@@ -191,7 +192,7 @@ class AutopilotPeer(abc.ABC):
     @property
     def up_s(self) -> float:
         """Seconds since boot by the autopilot's own clock."""
-        return self._boot_clock_ns(self._now_ns) / 1e9
+        return self.boot_clock_ns(self._now_ns) / 1e9
 
     @property
     def is_ready(self) -> bool:
@@ -204,6 +205,11 @@ class AutopilotPeer(abc.ABC):
     @abc.abstractmethod
     def _heartbeat(self) -> Message: ...
 
+    def _base_mode(self) -> int:
+        """HEARTBEAT.base_mode of what every firmware says there."""
+        base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
+        return int(base | (dialect.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0))
+
     @abc.abstractmethod
     def _command(self, command: int, params: tuple[float, ...]) -> int:
         """Obey a command of this firmware's own; the MAV_RESULT."""
@@ -214,15 +220,36 @@ class AutopilotPeer(abc.ABC):
 
     def _mode_of(self, params: tuple[float, ...]) -> int:
         """custom_mode in the parameters of DO_SET_MODE."""
-        return _whole(params[1])
+        return whole(params[1])
 
-    @abc.abstractmethod
     def _arm(self) -> int:
         """Arm if nothing is against it; the MAV_RESULT."""
+        if self.armed:
+            return int(dialect.MAV_RESULT_ACCEPTED)
+        reason = self._arming_refusal()
+        if reason:
+            self.say(dialect.MAV_SEVERITY_CRITICAL, reason)
+            return self.refused_arming
+        self.armed, self.landed = True, True
+        self._idle_s = 0.0
+        self._on_armed()
+        return int(dialect.MAV_RESULT_ACCEPTED)
 
-    @abc.abstractmethod
     def _disarm(self) -> None:
         """Stop the motors."""
+        if self.armed:
+            self.armed, self.landed = False, True
+            self._on_disarmed()
+
+    @abc.abstractmethod
+    def _arming_refusal(self) -> str:
+        """What is against arming, as the autopilot says it; an empty text for nothing."""
+
+    @abc.abstractmethod
+    def _on_armed(self) -> None: ...
+
+    @abc.abstractmethod
+    def _on_disarmed(self) -> None: ...
 
     @abc.abstractmethod
     def _setpoint(self, message: Message) -> None:
@@ -256,40 +283,22 @@ class AutopilotPeer(abc.ABC):
             collective=collective,
         )
 
-    def _boot_clock_ns(self, now_ns: int) -> int:
+    def knows(self, message_id: int) -> bool:
+        """Whether it has such a message to send."""
+        return message_id == HEARTBEAT_ID or self.instruments.knows(message_id)
+
+    def message(self, message_id: int) -> Message:
+        """The message with that id, as things are now."""
+        return self._heartbeat() if message_id == HEARTBEAT_ID else self.instruments.message(message_id)
+
+    def boot_clock_ns(self, now_ns: int) -> int:
+        """The time since boot by the autopilot's own clock."""
         elapsed_ns = now_ns - self._boot_ns
         return elapsed_ns + round(elapsed_ns * self._config.clock_ppm * 1e-6)
 
-    def _stream(self, now_ns: int) -> None:
-        self._refresh(now_ns)
-        if now_ns >= self._heartbeat_due_ns:
-            self._heartbeat_due_ns = max(self._heartbeat_due_ns + _HEARTBEAT_NS, now_ns)
-            for channel in self.link.channels.values():
-                if HEARTBEAT_ID not in channel.intervals_ns:
-                    self.link.send(channel, self._heartbeat())
-        if now_ns >= self._timesync_due_ns:
-            self._timesync_due_ns += _TIMESYNC_NS
-            self.link.broadcast(dialect.MAVLink_timesync_message(0, self._boot_clock_ns(now_ns)))
-        for channel in self.link.channels.values():
-            for message_id, due_ns in channel.due_ns.items():
-                if now_ns >= due_ns:
-                    period_ns = channel.intervals_ns[message_id]
-                    missed = (now_ns - due_ns) // period_ns
-                    channel.due_ns[message_id] = due_ns + (1 + missed) * period_ns
-                    self.link.send(channel, self._message(message_id))
-
     def _refresh(self, now_ns: int) -> None:
-        self.instruments.boot_ms = self._boot_clock_ns(now_ns) // _NS_PER_MS
+        self.instruments.boot_ms = self.boot_clock_ns(now_ns) // _NS_PER_MS
         self.instruments.healthy = self.is_ready
-
-    def _message(self, message_id: int) -> Message:
-        return self._heartbeat() if message_id == HEARTBEAT_ID else self.instruments.message(message_id)
-
-    def _next_due_ns(self, now_ns: int) -> int:
-        due_ns = now_ns + _TICK_NS
-        for channel in self.link.channels.values():
-            due_ns = min(due_ns, *channel.due_ns.values()) if channel.due_ns else due_ns
-        return max(due_ns, now_ns + self._config.step_ns)
 
     def _received(self, channel: Channel, message: Message) -> None:
         now_ns = self._clock.now_ns()
@@ -307,10 +316,10 @@ class AutopilotPeer(abc.ABC):
             case "SET_MODE":
                 self._set_mode(message.custom_mode)
             case "TIMESYNC" if message.tc1 == 0:
-                stamp_ns = self._boot_clock_ns(now_ns)
+                stamp_ns = self.boot_clock_ns(now_ns)
                 self.link.send(channel, dialect.MAVLink_timesync_message(stamp_ns, message.ts1))
             case "REQUEST_DATA_STREAM":
-                self._data_stream(channel, message, now_ns)
+                self.streams.set_data_stream(channel, message, now_ns)
             case "SETUP_SIGNING" if self.takes_keys and not self.armed:
                 self.link.sign(bytes(message.secret_key), message.initial_timestamp)
             case "PARAM_REQUEST_READ" | "PARAM_REQUEST_LIST" | "PARAM_SET":
@@ -322,9 +331,10 @@ class AutopilotPeer(abc.ABC):
         params = tuple(float(getattr(message, f"param{i}")) for i in range(1, 8))
         match message.command:
             case dialect.MAV_CMD_SET_MESSAGE_INTERVAL:
-                result = self._set_interval(channel, params[0], params[1], now_ns)
+                result = self.streams.set_interval(channel, params[0], params[1], now_ns)
             case dialect.MAV_CMD_REQUEST_MESSAGE:
-                result = self._request(channel, params[0], now_ns)
+                self._refresh(now_ns)
+                result = self.streams.send_now(channel, params[0])
             case dialect.MAV_CMD_DO_SET_MODE:
                 custom = params[0] == params[0] and int(params[0]) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
                 result = self._set_mode(self._mode_of(params)) if custom else dialect.MAV_RESULT_DENIED
@@ -335,33 +345,3 @@ class AutopilotPeer(abc.ABC):
             message.command, result, 0, 0, header.srcSystem, header.srcComponent
         )
         self.link.send(channel, ack)
-
-    def _knows(self, message_id: int) -> bool:
-        return message_id == HEARTBEAT_ID or self.instruments.knows(message_id)
-
-    def _set_interval(self, channel: Channel, message_id: float, period_us: float, now_ns: int) -> int:
-        wanted, period = _whole(message_id), _whole(period_us)
-        if not self._knows(wanted):
-            return int(dialect.MAV_RESULT_DENIED)
-        channel.stream(wanted, 0 if period <= 0 else max(period * 1000, self._config.step_ns), now_ns)
-        return int(dialect.MAV_RESULT_ACCEPTED)
-
-    def _request(self, channel: Channel, message_id: float, now_ns: int) -> int:
-        if not self._knows(_whole(message_id)):
-            return int(dialect.MAV_RESULT_FAILED)
-        self._refresh(now_ns)
-        self.link.send(channel, self._message(_whole(message_id)))
-        return int(dialect.MAV_RESULT_ACCEPTED)
-
-    def _data_stream(self, channel: Channel, message: Message, now_ns: int) -> None:
-        rate_hz = message.req_message_rate if message.start_stop else 0
-        period_ns = 1_000_000_000 // rate_hz if rate_hz else 0
-        for stream, message_ids in DATA_STREAMS.items():
-            if message.req_stream_id in {dialect.MAV_DATA_STREAM_ALL, stream}:
-                for message_id in message_ids:
-                    channel.stream(message_id, period_ns, now_ns)
-
-
-def _whole(value: float) -> int:
-    """A command parameter that means a whole number; -1 for what is none."""
-    return int(value) if abs(value) < 2**31 else -1  # NaN compares false

@@ -1,6 +1,6 @@
 """ArduCopter's semantics: modes, arming, attitude flight without position, landing, time-outs.
 
-Measured on ArduCopter 4.5.6 or read in its sources: set-points are obeyed in GUIDED_NOGPS and GUIDED
+Measured on ArduCopter 4.5.6 or read in its sources: setpoints are obeyed in GUIDED_NOGPS and GUIDED
 only and dropped in silence elsewhere; 0.5 thrust holds the height; after GUID_TIMEOUT the vehicle levels
 and holds, it does not land; on the floor with nothing asked it disarms after DISARM_DELAY.
 """
@@ -62,6 +62,7 @@ class ArduCopterPeer(AutopilotPeer):
     takes_keys = True
     pilots_mode = CopterMode.ALT_HOLD
     landing_mode = CopterMode.LAND
+    refused_arming = dialect.MAV_RESULT_FAILED
 
     def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
         config = config or PeerConfig()
@@ -69,8 +70,6 @@ class ArduCopterPeer(AutopilotPeer):
         super().__init__(clock, airframe, config, parameters)
         self.mode = CopterMode.STABILIZE
         self._target = AngleTarget()
-        self._idle_s = 0.0
-        self._settled_s = 0.0
         self._low_battery_told = False
         self._client_silent_s: float | None = None
 
@@ -127,20 +126,10 @@ class ArduCopterPeer(AutopilotPeer):
         self._disarm()
         return int(dialect.MAV_RESULT_ACCEPTED)
 
-    def _arm(self) -> int:
-        if self.armed:
-            return int(dialect.MAV_RESULT_ACCEPTED)
-        reason = self._arming_refusal()
-        if reason:
-            self.say(dialect.MAV_SEVERITY_CRITICAL, reason)
-            return int(dialect.MAV_RESULT_FAILED)
-        self.armed = True
-        self.landed = True
-        self._idle_s = 0.0
+    def _on_armed(self) -> None:
         self._climb_loop.reset(self.sensors.height_m)
         self.say(dialect.MAV_SEVERITY_INFO, "Arming motors")
         self.link.broadcast(self._heartbeat())
-        return int(dialect.MAV_RESULT_ACCEPTED)
 
     def _arming_refusal(self) -> str:
         if not self.is_ready:
@@ -155,12 +144,9 @@ class ArduCopterPeer(AutopilotPeer):
             return "PreArm: Need Position Estimate"
         return ""
 
-    def _disarm(self) -> None:
-        if self.armed:
-            self.armed = False
-            self.landed = True
-            self.say(dialect.MAV_SEVERITY_INFO, "Disarming motors")
-            self.link.broadcast(self._heartbeat())
+    def _on_disarmed(self) -> None:
+        self.say(dialect.MAV_SEVERITY_INFO, "Disarming motors")
+        self.link.broadcast(self._heartbeat())
 
     def _setpoint(self, message: Message) -> None:
         if self.mode in _GUIDED:
@@ -178,7 +164,7 @@ class ArduCopterPeer(AutopilotPeer):
         self._watch_client(dt_s)
         if not self.armed:
             return AirframeCommand()
-        roll, pitch, yaw, yaw_rate, climb_mps = self._wishes(dt_s)
+        roll, pitch, yaw, yaw_rate, climb_mps = self._targets(dt_s)
         raw = self._raw_collective()
         if raw is not None:
             climb_mps = 1.0 if raw > self.parameters["MOT_THST_HOVER"] else -1.0
@@ -191,7 +177,7 @@ class ArduCopterPeer(AutopilotPeer):
         self._detect_landing(dt_s, climb_mps, collective)
         return self._fly(roll, pitch, yaw, yaw_rate, collective)
 
-    def _wishes(self, dt_s: float) -> tuple[float, float, float, float, float]:
+    def _targets(self, dt_s: float) -> tuple[float, float, float, float, float]:
         """Roll, pitch, yaw, yaw rate and climb rate of the present mode."""
         if self.mode in _GUIDED:
             target = self._target
@@ -264,11 +250,7 @@ class ArduCopterPeer(AutopilotPeer):
             self.instruments.landed_state = LANDED_LANDING if landing else LANDED_AIR
 
     def _heartbeat(self) -> Message:
-        base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
-        if self.mode in _GUIDED:
-            base |= dialect.MAV_MODE_FLAG_GUIDED_ENABLED
-        if self.armed:
-            base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        base = self._base_mode() | (dialect.MAV_MODE_FLAG_GUIDED_ENABLED if self.mode in _GUIDED else 0)
         active = dialect.MAV_STATE_ACTIVE if self.armed and not self.landed else dialect.MAV_STATE_STANDBY
         return dialect.MAVLink_heartbeat_message(
             dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, base, self.mode, active, 3

@@ -51,6 +51,7 @@ class Px4Peer(AutopilotPeer):
 
     pilots_mode = Px4Mode.ALTCTL
     landing_mode = Px4Mode.AUTO_LAND
+    refused_arming = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 
     def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
         config = config or PeerConfig()
@@ -63,9 +64,6 @@ class Px4Peer(AutopilotPeer):
         self._thrust = 0.0
         self._setpoint_age_s = math.inf
         self._stream_s = 0.0
-        self._idle_s = 0.0
-        self._settled_s = 0.0
-        self._landed_s = 0.0
         self._has_flown = False
 
     def reboot(self) -> None:
@@ -120,18 +118,9 @@ class Px4Peer(AutopilotPeer):
             case _:
                 return int(dialect.MAV_RESULT_UNSUPPORTED)
 
-    def _arm(self) -> int:
-        if self.armed:
-            return int(dialect.MAV_RESULT_ACCEPTED)
-        reason = self._arming_refusal()
-        if reason:
-            self.say(dialect.MAV_SEVERITY_CRITICAL, reason)
-            return int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
-        self.armed, self.landed = True, True
-        self._idle_s = self._landed_s = 0.0
+    def _on_armed(self) -> None:
         self._has_flown = False
         self.say(dialect.MAV_SEVERITY_INFO, "Armed by external command")
-        return int(dialect.MAV_RESULT_ACCEPTED)
 
     def _arming_refusal(self) -> str:
         if not self.is_ready:
@@ -144,10 +133,8 @@ class Px4Peer(AutopilotPeer):
             return "Arming denied: mode not armable"
         return ""
 
-    def _disarm(self) -> None:
-        if self.armed:
-            self.armed, self.landed = False, True
-            self.say(dialect.MAV_SEVERITY_INFO, "Disarmed")
+    def _on_disarmed(self) -> None:
+        self.say(dialect.MAV_SEVERITY_INFO, "Disarmed")
 
     def _setpoint(self, message: Message) -> None:
         """Proof of life in any mode; obeyed in OFFBOARD only.  A missing thrust is none at all."""
@@ -174,12 +161,12 @@ class Px4Peer(AutopilotPeer):
             return AirframeCommand()
         if self.mode == Px4Mode.OFFBOARD and self._setpoint_age_s > self.parameters["COM_OF_LOSS_T"]:
             self._lose_offboard()
-        roll, pitch, yaw, yaw_rate, collective, down = self._wishes(dt_s)
+        roll, pitch, yaw, yaw_rate, collective, down = self._targets(dt_s)
         self._detect_landing(dt_s, collective, down=down)
         self._disarm_when_done(dt_s)
         return self._fly(roll, pitch, yaw, yaw_rate, max(collective, _IDLE_COLLECTIVE))
 
-    def _wishes(self, dt_s: float) -> tuple[float, float, float, float, float, bool]:
+    def _targets(self, dt_s: float) -> tuple[float, float, float, float, float, bool]:
         """Roll, pitch, yaw, yaw rate, collective, and whether a height loop wants to go down."""
         if self.mode == Px4Mode.OFFBOARD:
             return *self._q_target, self._yaw_rate_radps, self._thrust, False
@@ -227,10 +214,7 @@ class Px4Peer(AutopilotPeer):
         self.instruments.landed_state = LANDED_GROUND if self.landed else landing
 
     def _heartbeat(self) -> Message:
-        base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
-        if self.armed:
-            base |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
         active = dialect.MAV_STATE_ACTIVE if self.armed else dialect.MAV_STATE_STANDBY
         return dialect.MAVLink_heartbeat_message(
-            dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_PX4, base, self.mode, active, 3
+            dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_PX4, self._base_mode(), self.mode, active, 3
         )

@@ -7,12 +7,13 @@ drone really was from the simulator's.
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 
-from flightd.core.types import Event, Phase, Status
+from flightd.core.types import Event, EventLevel, Phase, Status
 from flightd.mission.plan.flight_plan import FlightPlan
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.site.site import Site
@@ -22,6 +23,8 @@ _AT_NODE_M = 0.5
 _OFF_FLOOR_M = 0.3
 _AT_STOP = {Phase.HOVER, Phase.CLIMB, Phase.SCAN}
 """A scan's views are all straight above the node."""
+_LAND_BEGINS = re.compile(r"(?!land )\w+ -> land: .*")
+"""An event of this phase is a warning where the landing is not the plan's."""
 _ON_LINES = _AT_STOP | {Phase.FOLLOW, Phase.TURN, Phase.ACQUIRE, Phase.HOLD}
 
 
@@ -58,18 +61,17 @@ def score(
     phases = _Phases(statuses)
     on_lines = [_off_line(site, t) for t in flying if phases.at(t.stamp_ns) in _ON_LINES]
     hover = _hover_errors(site, visits, truth, phases)
-    pad_m = next(site.pad_centre(pad) for pad in site.pads if pad.node == plan.home)
     landed = truth[-1] if truth and truth[-1].height_m < _OFF_FLOOR_M and flying else None
     return FlightScore(
         mission="completed" if final and final.phase is Phase.DONE else "aborted",
         reason=final.reason if final else "the daemon never spoke",
-        nodes_planned=len({stop.node for stop in plan.stops if stop.visit}),
+        nodes_planned=plan.nodes,
         nodes_visited=len({visit.text for visit in visits}),
         nodes_miscounted=len(visits) - len(right),
         cross_track_rms_m=_rounded(_rms(on_lines)),
         cross_track_max_m=_rounded(max(on_lines, default=None)),
         hover_error_p95_m=_rounded(_p95(hover)),
-        landed_error_m=_rounded(math.hypot(landed.x_m - pad_m[0], landed.y_m - pad_m[1])) if landed else None,
+        landed_error_m=_rounded(_landed_error_m(site, statuses, events, landed)) if landed else None,
         flight_time_s=_flight_time_s(truth),
         sorties=sum(
             after.phase is Phase.TAKE_OFF and before.phase is not Phase.TAKE_OFF
@@ -77,6 +79,19 @@ def score(
         ),
         min_shelf_distance_m=_rounded(min((shelf_distance_m(site, t) for t in flying), default=None)),
     )
+
+
+def _landed_error_m(
+    site: Site, statuses: Sequence[Status], events: Sequence[Event], landed: Kinematics
+) -> float | None:
+    """From the centre of the pad that it landed on by plan; None where the landing was ordered elsewhere."""
+    begun = [event for event in events if event.name == "phase" and _LAND_BEGINS.fullmatch(event.text)]
+    goal = next((status.goal for status in reversed(statuses) if status.phase is Phase.LAND), None)
+    pad = next((pad for pad in site.pads if pad.node == goal), None)
+    if pad is None or not begun or begun[-1].level is not EventLevel.INFO:
+        return None
+    x_m, y_m = site.pad_centre(pad)
+    return math.hypot(landed.x_m - x_m, landed.y_m - y_m)
 
 
 def as_summary(result: FlightScore) -> dict[str, object]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.plant.wind import Draught, Wind
+from flightd.sim.plant.wind import Wind, WindParams
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Airframe:
     def __init__(
         self,
         params: AirframeParams | None = None,
-        draught: Draught | None = None,
+        wind: WindParams | None = None,
         seed: int = 0,
         *,
         x_m: float = 0.0,
@@ -72,7 +72,7 @@ class Airframe:
         battery_frac: float = 1.0,
     ) -> None:
         self.params = params or AirframeParams()
-        self.wind = Wind(draught or Draught(), seed)
+        self.wind = Wind(wind or WindParams(), seed)
         self.x_m, self.y_m, self.height_m = x_m, y_m, self.params.rest_height_m
         self.vx_mps = self.vy_mps = self.climb_mps = 0.0
         self.roll_rad = self.pitch_rad = 0.0

@@ -6,7 +6,7 @@ _WINDOW_NS = 5_000_000_000
 _TOLERANCE = 0.15
 
 
-class PaceWatch:
+class PaceMonitor:
     """Compares the time stamps of a simulator with their arrival, five seconds at a time."""
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Moving air: a steady draught and gusts."""
+"""Moving air: a steady wind and gusts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Draught:
+class WindParams:
     """Air in a hall.  The mean blows towards +x and +y of the map frame; the gusts are a first-order
     Gauss-Markov process per axis (the longitudinal Dryden form) of the given rms and correlation time."""
 
@@ -26,26 +26,26 @@ class Draught:
 class Wind:
     """Air velocity over time: `x_mps`, `y_mps` in the map frame, `up_mps` upwards.  Same seed, same air."""
 
-    __slots__ = ("_decay", "_draught", "_dt_s", "_kick", "_rng", "_vertical", "up_mps", "x_mps", "y_mps")
+    __slots__ = ("_decay", "_dt_s", "_kick", "_params", "_rng", "_vertical", "up_mps", "x_mps", "y_mps")
 
-    def __init__(self, draught: Draught, seed: int) -> None:
-        self._draught = draught
+    def __init__(self, params: WindParams, seed: int) -> None:
+        self._params = params
         self._rng = random.Random(seed)
-        vertical, horizontal = draught.vertical_gust_rms_mps, draught.gust_rms_mps
+        vertical, horizontal = params.vertical_gust_rms_mps, params.gust_rms_mps
         self._vertical = vertical / horizontal if horizontal else 0.0
         self._dt_s = self._decay = self._kick = 0.0
-        self.x_mps = draught.mean_x_mps + self._rng.gauss(0.0, horizontal)
-        self.y_mps = draught.mean_y_mps + self._rng.gauss(0.0, horizontal)
+        self.x_mps = params.mean_x_mps + self._rng.gauss(0.0, horizontal)
+        self.y_mps = params.mean_y_mps + self._rng.gauss(0.0, horizontal)
         self.up_mps = self._rng.gauss(0.0, vertical)
 
     def step(self, dt_s: float) -> None:
         """Let `dt_s` pass; the process is exact for any step."""
         if dt_s != self._dt_s:
             self._dt_s = dt_s
-            self._decay = math.exp(-dt_s / self._draught.correlation_s)
-            self._kick = self._draught.gust_rms_mps * math.sqrt(1.0 - self._decay**2)
+            self._decay = math.exp(-dt_s / self._params.correlation_s)
+            self._kick = self._params.gust_rms_mps * math.sqrt(1.0 - self._decay**2)
         decay, kick, gauss = self._decay, self._kick, self._rng.gauss
-        mean_x, mean_y = self._draught.mean_x_mps, self._draught.mean_y_mps
+        mean_x, mean_y = self._params.mean_x_mps, self._params.mean_y_mps
         self.x_mps = mean_x + (self.x_mps - mean_x) * decay + gauss(0.0, kick)
         self.y_mps = mean_y + (self.y_mps - mean_y) * decay + gauss(0.0, kick)
         self.up_mps = self.up_mps * decay + gauss(0.0, kick * self._vertical)

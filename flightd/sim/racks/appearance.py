@@ -8,7 +8,7 @@ from flightd.sim.racks.stock import StockShares
 
 
 @dataclass(frozen=True, slots=True)
-class RackLook:
+class RackAppearance:
     """`shares` of the places; `seed` of the goods, the flight's own when None; `location_labels` hangs a
     small label with each location's code on the beam below it.  `noise` is the standard deviation in grey
     levels at mid grey, `soft_px` the sigma of the lens blur, `exposure` scales the brightness, `flicker`

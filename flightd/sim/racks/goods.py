@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from flightd.core.types import Image
 from flightd.sim.racks.label_paper import stick
+from flightd.sim.racks.panels import texels_per_m, texture_shape
 from flightd.sim.racks.stock import Goods, StockPlace
 
-TEXELS_PER_M = 1250.0
 _PALLET_M = 0.10
 _GRAIN_PX = 1024
 _UNIT = 128
@@ -34,29 +34,29 @@ class GoodsPainter:
             coarse = rng.standard_normal((_GRAIN_PX // cell_px + 2,) * 2, dtype=np.float32)
             grain += weight * cv2.resize(coarse, (_GRAIN_PX, _GRAIN_PX), interpolation=cv2.INTER_CUBIC)
         gain = np.clip(np.round((1.0 + 0.04 * grain) * _UNIT), 0, 255).astype(np.uint8)
-        # twice as large, so that every crop is one piece
+        # twice as large, so that a crop of one period is one piece wherever it begins
         self._grain: Image = np.repeat(np.tile(gain, (2, 2))[..., None], 3, axis=2)
 
     def front(self, place: StockPlace) -> Image:
-        """(H, W, 3) BGR front of a place that is not empty, the top row highest, `TEXELS_PER_M` to the
-        metre, as seen from the aisle."""
+        """(H, W, 3) BGR front of a place that is not empty, the top row highest, as seen from the aisle."""
         goods = place.goods
         assert goods is not None
         rng = np.random.default_rng([goods.looks, 0x676F6F64])
-        height, width = round(goods.height_m * TEXELS_PER_M), round(goods.width_m * TEXELS_PER_M)
+        density = texels_per_m(goods.width_m, goods.height_m)
+        height, width = texture_shape(goods.width_m, goods.height_m, density)
         stands_bare = goods.height_m <= 0.35 or (goods.dark and rng.random() < 0.5)
-        pallet = 0 if stands_bare else round(_PALLET_M * TEXELS_PER_M)
+        pallet = 0 if stands_bare else round(_PALLET_M * density)
         front = np.empty((height, width, 3), np.uint8)
         load = _dark if goods.dark else (_boxes, _boxes, _wrapped, _crates)[int(rng.integers(4))]
-        load(front[: height - pallet], rng)
+        load(front[: height - pallet], density, rng)
         if pallet:
-            _pallet(front[height - pallet :], rng)
+            _pallet(front[height - pallet :], density, rng)
         self._grained(front, rng)
-        _shade(front)
+        _shade(front, density)
         for label in place.labels:
-            x_px = (label.right_m - goods.right_m + goods.width_m / 2) * TEXELS_PER_M - 0.5
-            y_px = height - (label.height_m - place.opening.level.deck_m) * TEXELS_PER_M - 0.5
-            stick(front, label, x_px, y_px, TEXELS_PER_M, goods.looks)
+            x_px = (label.right_m - goods.right_m + goods.width_m / 2) * density - 0.5
+            y_px = height - (label.height_m - place.opening.level.deck_m) * density - 0.5
+            stick(front, label, x_px, y_px, density, goods.looks)
         return front
 
     def tone(self, goods: Goods) -> tuple[float, float, float]:
@@ -66,7 +66,7 @@ class GoodsPainter:
     def sheet(self, goods: Goods, height_m: float, width_m: float) -> Image:
         """(H, W, 3) BGR tarpaulin that hangs before covered goods, half as many texels to the metre."""
         rng = np.random.default_rng([goods.looks, 0x74617270])
-        shape = round(height_m * TEXELS_PER_M / 2), round(width_m * TEXELS_PER_M / 2)
+        shape = texture_shape(width_m, height_m, texels_per_m(width_m, height_m) / 2)
         colour = np.array(_CRATES[int(rng.integers(len(_CRATES)))]) * 0.7
         x = np.arange(shape[1])
         folds = np.zeros(shape[1])
@@ -80,11 +80,14 @@ class GoodsPainter:
     def _grained(self, picture: Image, rng: np.random.Generator) -> None:
         """Give a picture the grain of its material, in place."""
         top, left = (int(offset) for offset in rng.integers(_GRAIN_PX, size=2))
-        grain = self._grain[top : top + picture.shape[0], left : left + picture.shape[1]]
-        cv2.multiply(picture, grain, dst=picture, scale=1 / _UNIT)
+        starts = (range(0, size, _GRAIN_PX) for size in picture.shape[:2])
+        for y, x in itertools.product(*starts):  # the grain repeats over what is larger than its period
+            part = picture[y : y + _GRAIN_PX, x : x + _GRAIN_PX]
+            grain = self._grain[top : top + part.shape[0], left : left + part.shape[1]]
+            cv2.multiply(part, grain, dst=part, scale=1 / _UNIT)
 
 
-def _boxes(load: Image, rng: np.random.Generator) -> None:
+def _boxes(load: Image, density: float, rng: np.random.Generator) -> None:
     """Cardboard boxes in rows; each with its own hue, tape and print."""
     height, width = load.shape[:2]
     rows = int(rng.choice((1, 2, 2, 3)))
@@ -101,20 +104,20 @@ def _boxes(load: Image, rng: np.random.Generator) -> None:
             tone = np.array(palette[int(rng.integers(len(palette)))]) * rng.uniform(0.9, 1.08)
             box[:] = tone.astype(np.uint8)
             _print(box, tone, rng)
-            _tape(box, rng)
+            _tape(box, density, rng)
             _edges(box)
         top = below
 
 
-def _tape(box: Image, rng: np.random.Generator) -> None:
+def _tape(box: Image, density: float, rng: np.random.Generator) -> None:
     height, width = box.shape[:2]
-    half = round(0.024 * TEXELS_PER_M)
+    half = round(0.024 * density)
     if rng.random() < 0.7 and height > 6 * half:
         middle = round(height * rng.uniform(0.42, 0.58))
         _relight(box[middle - half : middle + half], 0.84, 22.0)
         _relight(box[middle : middle + 1], 0.6)  # the slit between the flaps
     elif width > 6 * half:
-        _relight(box[: round(0.07 * TEXELS_PER_M), width // 2 - half : width // 2 + half], 1.0, 18.0)
+        _relight(box[: round(0.07 * density), width // 2 - half : width // 2 + half], 1.0, 18.0)
 
 
 def _print(box: Image, tone: NDArray[np.float64], rng: np.random.Generator) -> None:
@@ -132,9 +135,9 @@ def _print(box: Image, tone: NDArray[np.float64], rng: np.random.Generator) -> N
     cv2.putText(box, name, (left + 3 * size, low), cv2.FONT_HERSHEY_DUPLEX, size / 34, ink, 2, cv2.LINE_AA)
 
 
-def _wrapped(load: Image, rng: np.random.Generator) -> None:
+def _wrapped(load: Image, density: float, rng: np.random.Generator) -> None:
     """A load in stretch film: boxes shimmer through, streaks of light run across."""
-    _boxes(load, rng)
+    _boxes(load, density, rng)
     height, width = load.shape[:2]
     film = np.full((height // 2 + 1, width // 2 + 1), 38, np.uint8)
     streak = np.empty_like(film)
@@ -148,7 +151,7 @@ def _wrapped(load: Image, rng: np.random.Generator) -> None:
     cv2.addWeighted(load, 0.72, film, 1.0, 0.0, dst=load)
 
 
-def _crates(load: Image, rng: np.random.Generator) -> None:
+def _crates(load: Image, _density: float, rng: np.random.Generator) -> None:
     """Stacked plastic crates of one colour, with ribs and handles."""
     height, width = load.shape[:2]
     rows = int(rng.choice((2, 3)))
@@ -163,25 +166,25 @@ def _crates(load: Image, rng: np.random.Generator) -> None:
         _relight(load[grip, round(width * 0.38) : round(width * 0.62)], 0.3)
 
 
-def _dark(load: Image, rng: np.random.Generator) -> None:
+def _dark(load: Image, density: float, rng: np.random.Generator) -> None:
     """Black film or black boxes: hardly any light comes back, seams and edges show barely or not at all."""
     height = load.shape[0]
     load[:] = np.round(rng.uniform(9.0, 38.0) * rng.uniform(0.92, 1.08, 3)).astype(np.uint8)
     for part in np.linspace(0.0, 1.0, int(rng.choice((1, 2, 3))), endpoint=False)[1:]:
         seam = round(part * height)
-        _relight(load[seam - 3 : seam + 3], float(rng.uniform(0.4, 1.7)))
+        _relight(load[max(seam - 3, 0) : seam + 3], float(rng.uniform(0.4, 1.7)))
     if rng.random() < 0.5:
-        _relight(load[:, : round(0.01 * TEXELS_PER_M)], float(rng.uniform(0.6, 1.6)))
+        _relight(load[:, : round(0.01 * density)], float(rng.uniform(0.6, 1.6)))
     if rng.random() < 0.25:  # a lighter foot, as of a tray that the load stands in
-        foot = round(float(rng.uniform(0.01, 0.05)) * TEXELS_PER_M)
-        load[height - foot :] = np.round(np.full(3, rng.uniform(60.0, 120.0))).astype(np.uint8)
+        foot = round(float(rng.uniform(0.01, 0.05)) * density)
+        load[max(height - foot, 0) :] = np.round(np.full(3, rng.uniform(60.0, 120.0))).astype(np.uint8)
 
 
-def _pallet(area: Image, rng: np.random.Generator) -> None:
+def _pallet(area: Image, density: float, rng: np.random.Generator) -> None:
     """A pallet from its end: deck board, three blocks, bottom board; dark between them."""
     height, width = area.shape[:2]
     wood = np.array(_WOOD) * rng.uniform(0.75, 1.05)
-    board, block = round(0.022 * TEXELS_PER_M), round(0.1 * TEXELS_PER_M)
+    board, block = round(0.022 * density), min(round(0.1 * density), width)
     area[:] = 14
     area[:board] = wood.astype(np.uint8)
     area[height - board :] = (wood * 0.8).astype(np.uint8)
@@ -197,9 +200,9 @@ def _edges(box: Image) -> None:
     _relight(box[:, -3:], 0.8)
 
 
-def _shade(picture: Image) -> None:
+def _shade(picture: Image, density: float) -> None:
     """The beam above keeps the light off the upper part of the load."""
-    reach = 0.1 * TEXELS_PER_M
+    reach = 0.1 * density
     shaded = picture[: round(4 * reach)]
     light = 1.0 - 0.22 * np.exp(-np.arange(len(shaded), dtype=np.float32) / np.float32(reach))
     shaded[:] = shaded * light[:, None, None]

@@ -39,7 +39,10 @@ def stick(texture: Image, label: Label, x_px: float, y_px: float, px_per_m: floa
     half_x = abs(c) * middle[0] + abs(s) * middle[1] + 2.0
     half_y = abs(s) * middle[0] + abs(c) * middle[1] + 2.0
     x0, y0 = max(math.floor(x_px - half_x), 0), max(math.floor(y_px - half_y), 0)
-    under = texture[y0 : math.ceil(y_px + half_y) + 1, x0 : math.ceil(x_px + half_x) + 1]
+    x1, y1 = math.ceil(x_px + half_x) + 1, math.ceil(y_px + half_y) + 1
+    under = texture[y0 : max(y1, 0), x0 : max(x1, 0)]
+    if not under.size:
+        return
     x_px, y_px = x_px - x0, y_px - y0
     place = np.array(
         [[c, -s, x_px - c * middle[0] + s * middle[1]], [s, c, y_px - s * middle[0] - c * middle[1]]]

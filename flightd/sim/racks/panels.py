@@ -17,6 +17,9 @@ _NEAREST_M = 0.05
 """What reaches nearer to the camera's plane than this is left out."""
 _LEAST_PX_PER_M = 60.0
 """Density in the picture, the coarser way, below which a panel is drawn in one tone."""
+_MOST_TEXELS_PER_M = 1250.0
+_MOST_SIDE_PX, _MOST_AREA_PX = 16_000, 12_000_000
+"""A picture has no more: OpenCV warps none with a side of 2^15, and the memory is not without end."""
 _HALF_SCALE = 0.4
 """Pixels to the texel below which the picture of half the size is drawn: no aliases from afar."""
 
@@ -44,6 +47,18 @@ class Panel:
         )
 
 
+def texels_per_m(width_m: float, height_m: float) -> float:
+    """The density of the picture of a panel of that size: 1250, and less for one of several metres."""
+    side = _MOST_SIDE_PX / max(width_m, height_m)
+    area = math.sqrt(_MOST_AREA_PX / (width_m * height_m))
+    return min(_MOST_TEXELS_PER_M, side, area)
+
+
+def texture_shape(width_m: float, height_m: float, density: float) -> tuple[int, int]:
+    """Rows and columns of a panel's picture; at least two, so that there is half of them."""
+    return max(round(height_m * density), 2), max(round(width_m * density), 2)
+
+
 @dataclass(frozen=True, slots=True)
 class Texture:
     """A panel's picture, and the same at half the size.  They have a fourth, unused channel: OpenCV warps
@@ -57,6 +72,10 @@ class Texture:
         full = cv2.cvtColor(picture, cv2.COLOR_BGR2BGRA)
         half = cv2.resize(full, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
         return cls(np.asarray(full, np.uint8), np.asarray(half, np.uint8))
+
+    @property
+    def nbytes(self) -> int:
+        return self.full.nbytes + self.half.nbytes
 
 
 class Pane:

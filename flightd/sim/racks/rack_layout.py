@@ -14,19 +14,23 @@ from flightd.site.cells import deck_spacing_m, decks_m
 from flightd.site.site import Location, Rack, Shelf, Side, Site
 
 BEAM_M = 0.10
-"""Height of a beam's face, below its deck."""
+"""Height of a beam's face, below its deck; where decks are close, of half the distance between them."""
 UPRIGHT_M = 0.08
 """Width of an upright, which stands on the line between two bays."""
 DEPTH_M = 0.9
 """From the face to the mesh at the back."""
+_LEAST_PITCH_M, _LEAST_ROOM_M = 0.15, 0.05
+"""From deck to deck where a site's labels do not say it any closer, and above the topmost deck."""
 
 
 @dataclass(frozen=True, slots=True)
 class RackLevel:
-    """One level of a face: goods stand on `deck_m`, the next beam or the rack's top is at `top_m`."""
+    """One level of a face: goods stand on `deck_m`, below which is a beam `beam_m` high; the next beam or
+    the rack's top is at `top_m`."""
 
     deck_m: float
     top_m: float
+    beam_m: float = BEAM_M
 
     @property
     def height_m(self) -> float:
@@ -114,9 +118,16 @@ def _face(shelf: Shelf, rack: Rack, here: list[Location]) -> Face:
 
 
 def rack_levels(rack: Rack, height_m: float) -> tuple[RackLevel, ...]:
-    """Decks and tops of a rack of `height_m`."""
+    """Decks and tops of a rack of `height_m`.  Where the site's own heights would put a deck on or below
+    the one before it, it stands a little above that: every level has room for goods."""
     spacing_m = deck_spacing_m(rack.levels_m, height_m)
-    decks = [max(deck_m, BEAM_M) for deck_m in decks_m(rack, height_m)]
-    tops = [deck_m - BEAM_M for deck_m in decks[1:]]
-    tops.append(max(min(decks[-1] + spacing_m - BEAM_M, height_m), rack.levels_m[-1] + 0.05))
-    return tuple(RackLevel(deck_m, top_m) for deck_m, top_m in zip(decks, tops, strict=True))
+    gaps = [above - below for below, above in itertools.pairwise(rack.levels_m)]
+    least_m = max(min([*gaps, _LEAST_PITCH_M]), 0.02)
+    decks: list[float] = []
+    for deck_m in decks_m(rack, height_m):
+        decks.append(max(deck_m, decks[-1] + least_m if decks else BEAM_M))
+    beams = [BEAM_M, *(min(BEAM_M, (above - below) / 2) for below, above in itertools.pairwise(decks))]
+    tops = [deck_m - beam_m for deck_m, beam_m in zip(decks[1:], beams[1:], strict=True)]
+    top_m = max(min(decks[-1] + spacing_m - BEAM_M, height_m), rack.levels_m[-1] + _LEAST_ROOM_M)
+    tops.append(max(top_m, decks[-1] + _LEAST_ROOM_M))
+    return tuple(itertools.starmap(RackLevel, zip(decks, tops, beams, strict=True)))

@@ -15,7 +15,7 @@ from flightd.core.geometry import Lens
 from flightd.core.types import Image
 from flightd.sim.floor.appearance import Appearance
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.panels import Pane
 from flightd.sim.racks.rack_layout import faces
@@ -39,7 +39,7 @@ class FrontRenderer:
     A picture depends on the site, the camera, the look, the seed, the pose and `seq` alone, not on what
     was rendered before.  Not for use from several threads at once."""
 
-    def __init__(self, site: Site, camera: FrontCamera, look: RackLook, seed: int = 0) -> None:
+    def __init__(self, site: Site, camera: FrontCamera, look: RackAppearance, seed: int = 0) -> None:
         self._camera = camera
         focal_px = camera.lens.fx_px
         stock_seed = seed if look.seed is None else look.seed
@@ -132,7 +132,7 @@ def _ideal_lens(lens: Lens) -> tuple[Lens, tuple[Image, Image] | None]:
     return ideal, (texels, parts)
 
 
-def _sensor_look(look: RackLook) -> Appearance:
+def _sensor_look(look: RackAppearance) -> Appearance:
     return Appearance(
         vignetting=look.vignetting, noise=look.noise, flicker=look.flicker, exposure=look.exposure
     )

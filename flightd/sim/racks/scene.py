@@ -22,8 +22,8 @@ from flightd.sim.racks.stock import Goods, StockPlace
 _REACH_M = 7.0
 """Along the aisle, what is farther is not drawn."""
 _SAME_PLANE_M = 0.05
-_KEPT = 96
-"""Pictures of goods and beams that are kept, more than one view holds; about 200 MB."""
+_KEPT, _KEPT_BYTES = 96, 500_000_000
+"""Pictures of goods and beams that are kept, more than one view holds; usually about 200 MB."""
 _BACKS = 8
 _LEAST_SLOPE = 0.15
 """Across the aisle per unit of ray: below this a picture looks along the face."""
@@ -80,6 +80,7 @@ class Racks:
         self._seed = seed
         self._painter = GoodsPainter(seed)
         self._kept: OrderedDict[Hashable, Texture] = OrderedDict()
+        self._kept_bytes = 0
         self._backs = [Texture.of(back(2.0, 1.0, seed + number)) for number in range(_BACKS)]
         self._uprights = {
             height_m: Texture.of(upright(height_m, seed)) for height_m in {f.shelf.height_m for f in faces}
@@ -119,7 +120,7 @@ class Racks:
                 if level in above:
                     for x0_m, x1_m in sight.bays():
                         pane.polygon(
-                            _flat(x0_m, x1_m, *sight.depth_m(1.0), level.deck_m - BEAM_M), _ROOF_TONE
+                            _flat(x0_m, x1_m, *sight.depth_m(1.0), level.deck_m - level.beam_m), _ROOF_TONE
                         )
 
     def draw_fronts(self, pane: Pane, sights: tuple[Sightline, ...]) -> None:
@@ -165,9 +166,11 @@ class Racks:
             for number, level in enumerate(face.levels):
                 above = [o for o in face.openings if o.level == level and x0_m < o.x_m < x1_m]
                 density = self._density(above[0].location.code) if above else None
-                make = partial(beam, above, x0_m, x1_m, face.right, density, self._seed + number)
+                make = partial(
+                    beam, above, x0_m, x1_m, level.beam_m, face.right, density, self._seed + number
+                )
                 key = (face.y_m, round(x0_m, 3), number)
-                panel = _panel(face, face.y_m, x0_m, x1_m, level.deck_m - BEAM_M, level.deck_m)
+                panel = _panel(face, face.y_m, x0_m, x1_m, level.deck_m - level.beam_m, level.deck_m)
                 pane.panel(panel, partial(self._picture, key, make), ORANGE)
         height_m, half_m = face.shelf.height_m, UPRIGHT_M / 2
         for x_m in face.uprights_m:
@@ -180,8 +183,9 @@ class Racks:
         texture = self._kept.get(key)
         if texture is None:
             texture = self._kept[key] = Texture.of(make())
-            if len(self._kept) > _KEPT:
-                self._kept.popitem(last=False)
+            self._kept_bytes += texture.nbytes
+            while len(self._kept) > 1 and (len(self._kept) > _KEPT or self._kept_bytes > _KEPT_BYTES):
+                self._kept_bytes -= self._kept.popitem(last=False)[1].nbytes
         self._kept.move_to_end(key)
         return texture
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from flightd.core.types import Image
 from flightd.sim.racks.code_symbols import Symbol, Symbology, modules
-from flightd.sim.racks.goods import TEXELS_PER_M
-from flightd.sim.racks.rack_layout import BEAM_M, UPRIGHT_M, Opening
+from flightd.sim.racks.panels import texels_per_m, texture_shape
+from flightd.sim.racks.rack_layout import UPRIGHT_M, Opening
 
 Floats: TypeAlias = NDArray[np.float32]
 
@@ -21,19 +21,21 @@ BLUE = (112.0, 62.0, 22.0)
 _LABEL_INK, _LABEL_PAPER = 24.0, 226.0
 _HOLE_PITCH_M = 0.05
 _LABEL_PX_PER_MODULE = 3.3
-_MOST_LABEL_M = BEAM_M * 0.86
+_MOST_LABEL_PART = 0.86
+"""A location's label is at most so high, in heights of its beam."""
 
 
 def upright(height_m: float, seed: int) -> Image:
     """(H, W, 3) BGR face of an upright: painted steel with two rows of slots."""
     rng = np.random.default_rng([seed, 0x75707269])
-    shape = round(height_m * TEXELS_PER_M), round(UPRIGHT_M * TEXELS_PER_M)
+    density = texels_per_m(UPRIGHT_M, height_m)
+    shape = texture_shape(UPRIGHT_M, height_m, density)
     face = np.empty((*shape, 3), np.float32)
     face[:] = BLUE
     x = np.arange(shape[1], dtype=np.float32) / np.float32(shape[1])
     face *= (0.75 + 0.5 * np.exp(-(((x - 0.3) / 0.25) ** 2)))[None, :, None]
     _scuff(face, rng, 60)
-    pitch = round(_HOLE_PITCH_M * TEXELS_PER_M)
+    pitch = max(round(_HOLE_PITCH_M * density), 2)
     for top in range(pitch // 2, shape[0] - pitch, pitch):
         for column in (0.3, 0.7):
             left = round(column * shape[1]) - 6
@@ -42,12 +44,19 @@ def upright(height_m: float, seed: int) -> Image:
 
 
 def beam(
-    openings: list[Opening], x0_m: float, x1_m: float, right: float, px_per_m: float | None, seed: int
+    openings: list[Opening],
+    x0_m: float,
+    x1_m: float,
+    beam_m: float,
+    right: float,
+    px_per_m: float | None,
+    seed: int,
 ) -> Image:
-    """(H, W, 3) BGR face of the beam between two uprights, seen from the aisle, with the labels of the
-    openings above it; `px_per_m` None leaves the labels out."""
+    """(H, W, 3) BGR face, `beam_m` high, of the beam between two uprights, seen from the aisle, with the
+    labels of the openings above it; `px_per_m` None leaves the labels out."""
     rng = np.random.default_rng([seed, round(x0_m * 1000) & 0xFFFF, len(openings)])
-    shape = round(BEAM_M * TEXELS_PER_M), round((x1_m - x0_m) * TEXELS_PER_M)
+    density = texels_per_m(x1_m - x0_m, beam_m)
+    shape = texture_shape(x1_m - x0_m, beam_m, density)
     face = np.empty((*shape, 3), np.float32)
     face[:] = ORANGE
     y = np.arange(shape[0], dtype=np.float32) / np.float32(shape[0])
@@ -55,9 +64,12 @@ def beam(
     _scuff(face, rng, 25)
     face[:4] *= 1.2
     face[-5:] *= 0.6
-    for opening in openings if px_per_m is not None else ():
+    if px_per_m is None:
+        return _picture(face)
+    for opening in openings:
         from_left_m = opening.x_m - x0_m if right > 0 else x1_m - opening.x_m
-        _stick_location(face, opening.location.code, from_left_m * TEXELS_PER_M, px_per_m or 1.0)
+        most_module_m = _LABEL_PX_PER_MODULE / px_per_m
+        _stick_location(face, opening.location.code, from_left_m * density, most_module_m, density)
     return _picture(face)
 
 
@@ -82,14 +94,14 @@ def back(width_m: float, height_m: float, seed: int) -> Image:
     return _picture(area)
 
 
-def _stick_location(face: Floats, code: str, x_px: float, px_per_m: float) -> None:
+def _stick_location(face: Floats, code: str, x_px: float, most_module_m: float, density: float) -> None:
     """The small label of one location: its code as a Data Matrix, and in plain letters beside it."""
     symbol = Symbol(Symbology.DATA_MATRIX, code)
     pattern = modules(symbol)
     quiet = symbol.symbology.quiet_modules
     rows = pattern.shape[0] + 2 * quiet
-    module_m = min(_LABEL_PX_PER_MODULE / px_per_m, _MOST_LABEL_M / rows)
-    height = round(rows * module_m * TEXELS_PER_M)
+    module_m = min(most_module_m, _MOST_LABEL_PART * face.shape[0] / density / rows)
+    height = max(round(rows * module_m * density), 1)
     padded = cv2.copyMakeBorder(pattern, quiet, quiet, quiet, quiet, cv2.BORDER_CONSTANT, value=(255.0,))
     large = cv2.resize(padded, None, fx=16, fy=16, interpolation=cv2.INTER_NEAREST)
     square = cv2.resize(large, (height, height), interpolation=cv2.INTER_AREA)

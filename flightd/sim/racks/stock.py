@@ -247,7 +247,14 @@ def _place(
         _label(symbol, condition, goods, opening, px_per_m, side, rng)
         for symbol, side in zip(symbols, (-1, 1) if several else (0,), strict=True)
     )
+    if not all(_fits(label, goods) for label in labels):  # nobody puts a label where there is no room for it
+        return StockPlace(opening, situation if covered else StockSituation.MISSING, goods, ())
     return StockPlace(opening, situation, goods, labels)
+
+
+def _fits(label: Label, goods: Goods) -> bool:
+    half_x, half_y = _half_extent(label.paper_size_m, label.turn_rad)
+    return 2 * half_x <= goods.width_m and 2 * half_y <= goods.height_m
 
 
 def _is_dark(looks: int) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flightd.core.inventory import LocationRecord, LocationState
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.stock import StockPlace, StockSituation, stock
 from flightd.site.site import Site
 
@@ -74,7 +74,7 @@ class StockScore:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
-def stock_truth(site: Site, look: RackLook, focal_px: float, seed: int) -> dict[str, LocationTruth]:
+def stock_truth(site: Site, look: RackAppearance, focal_px: float, seed: int) -> dict[str, LocationTruth]:
     """The truth of every location of the site, by its code; `seed` is the flight's."""
     places = stock(site, look.shares, focal_px, seed if look.seed is None else look.seed)
     return {code: _truth(place) for code, place in places.items()}

@@ -19,7 +19,7 @@ from flightd.sim.autopilot.radio import RadioParams
 from flightd.sim.floor.floor import Box
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.plant.wind import Draught, Wind
+from flightd.sim.plant.wind import Wind, WindParams
 from flightd.sim.scenario.fault_schema import (
     AttitudeBiased,
     BareFloor,
@@ -42,7 +42,7 @@ _LOOKS_S = 0.01
 _OFF_FLOOR_M = 0.3
 _HERE_M = 0.4
 
-Told = Callable[[int, bool], None]
+FaultListener = Callable[[int, bool], None]
 """Called with a fault's number and whether it begins or ends."""
 
 
@@ -127,7 +127,7 @@ class WorldFaults:
         cameras: Mapping[str, CameraPeer],
         airframe: Airframe,
         vehicle: object,
-        tell: Told,
+        tell: FaultListener,
     ) -> None:
         self._faults = tuple(faults)
         self._schedule = FaultSchedule(faults, site)
@@ -158,8 +158,8 @@ class WorldFaults:
             case BatteryDrop() if on:
                 self._airframe.battery_frac = fault.charge
             case WindChange():
-                draught = Draught(fault.mean_x_mps, fault.mean_y_mps, fault.gust_mps)
-                self._airframe.wind = Wind(draught, 7) if on else self._calm
+                wind = WindParams(fault.mean_x_mps, fault.mean_y_mps, fault.gust_mps)
+                self._airframe.wind = Wind(wind, 7) if on else self._calm
             case _ if isinstance(self._vehicle, AutopilotPeer):
                 _break(self._vehicle, fault, on)
 

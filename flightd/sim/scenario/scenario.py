@@ -37,7 +37,7 @@ appearance = "default"   # default, clean, harsh, dim, glossy or worn
 pad_off_m = [0.0, 0.0]   # how far the pads have been pushed from where the map has them, x and y
 
 [wind]
-mean_x_mps = 0.0         # steady draught in the map frame
+mean_x_mps = 0.0         # steady wind in the map frame
 mean_y_mps = 0.0
 gust_mps = 0.3           # root mean square of the gusts
 
@@ -70,8 +70,8 @@ from pydantic import Field, model_validator
 from flightd.config.section import Section
 from flightd.sim.autopilot.radio import RadioParams
 from flightd.sim.floor.appearance import Appearance, preset
-from flightd.sim.plant.wind import Draught
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.plant.wind import WindParams
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera, front_lens
 from flightd.sim.racks.stock import StockShares
 from flightd.sim.scenario.fault_schema import Fault
@@ -152,8 +152,8 @@ class RacksScenario(Section):
     def shares(self) -> StockShares:
         return StockShares(**{name: getattr(self, name) for name in StockShares.names()})
 
-    def look(self) -> RackLook:
-        return RackLook(
+    def appearance(self) -> RackAppearance:
+        return RackAppearance(
             shares=self.shares(),
             seed=self.seed,
             location_labels=self.location_labels,
@@ -173,17 +173,17 @@ class FloorScenario(Section):
         pads = (replace(pad, offset_m=(pad.offset_m[0] + dx_m, pad.offset_m[1] + dy_m)) for pad in site.pads)
         return replace(site, pads=tuple(pads))
 
-    def look(self) -> Appearance:
+    def surface(self) -> Appearance:
         return preset(self.appearance)
 
 
 class WindScenario(Section):
     mean_x_mps: float = Field(0.0, ge=-10, le=10)
     mean_y_mps: float = Field(0.0, ge=-10, le=10)
-    gust_mps: float = Field(Draught().gust_rms_mps, ge=0, le=10)
+    gust_mps: float = Field(WindParams().gust_rms_mps, ge=0, le=10)
 
-    def draught(self) -> Draught:
-        return Draught(self.mean_x_mps, self.mean_y_mps, self.gust_mps)
+    def params(self) -> WindParams:
+        return WindParams(self.mean_x_mps, self.mean_y_mps, self.gust_mps)
 
 
 class VehicleScenario(Section):

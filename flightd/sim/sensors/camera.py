@@ -10,18 +10,21 @@ import asyncio
 import contextlib
 import math
 import random
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, Protocol
 
 import cv2
 
-from flightd.core.errors import InputError, TransientError
+from flightd.core.errors import InputError, RunError, TransientError
 from flightd.core.geometry import Lens
 from flightd.core.types import Image
 from flightd.ports import Clock
 from flightd.runtime.child_process import Child
+from flightd.runtime.clock import Hold
 from flightd.runtime.frame_notice import FrameNotice, decode_request, encode_notice
 from flightd.runtime.frame_ring import FrameRing
 from flightd.sim.plant.kinematics import Kinematics
@@ -57,16 +60,34 @@ class PictureMaker(Protocol):
 
 
 class _RenderWorker:
-    """Inside the process: answers (kinematics, seq, slot, exposure) by rendering into the ring."""
+    """Inside the process: answers (kinematics, seq, slot, exposure) by rendering into the ring, with an empty
+    text; from the first error on with that, in words."""
 
     def __init__(self, make: Callable[[], PictureMaker], camera: Optics, ring: str) -> None:
-        self._renderer = make()
         self._ring = FrameRing.attach(ring, _slots(camera), camera.lens.width_px, camera.lens.height_px)
+        self._make = make
+        self._problem = _problem_of(self._begin)
 
-    def __call__(self, request: tuple[Kinematics, int, int, float]) -> int:
-        kinematics, seq, slot, exposure = request
+    def __call__(self, request: tuple[Kinematics, int, int, float]) -> str:
+        self._problem = self._problem or _problem_of(partial(self._render, *request))
+        return self._problem
+
+    def _begin(self) -> None:
+        self._renderer = self._make()
+
+    def _render(self, kinematics: Kinematics, seq: int, slot: int, exposure: float) -> None:
         self._renderer.render(kinematics, seq, self._ring.pixels(slot), exposure)
-        return seq
+
+
+def _problem_of(act: Callable[[], None]) -> str:
+    """What `act` died of, in one line; the error itself need not survive the way to another process."""
+    try:
+        act()
+    except Exception as err:  # noqa: BLE001 - whatever it is, the world has to hear of it
+        raised = traceback.extract_tb(err.__traceback__)[-1]
+        text = " ".join(str(err).split())
+        return f"{type(err).__name__}: {text} ({Path(raised.filename).name}:{raised.lineno})"
+    return ""
 
 
 @dataclass(slots=True)
@@ -98,7 +119,9 @@ class CameraPeer:
     `address`; or, with `show`, hands the pictures themselves to a vehicle that transmits them.
 
     `make` is called in the rendering process (it must be picklable); `seed` draws the delivery's jitter.
-    While `wanted` says no, no picture is taken."""
+    While `wanted` says no, no picture is taken.  Time is held by `hold` while one is being drawn.  A renderer
+    that fails ends it with a RunError that has the camera's `name`: a flight that goes on blind for a fault
+    of its world tells nothing."""
 
     def __init__(
         self,
@@ -110,8 +133,12 @@ class CameraPeer:
         clock: Clock,
         show: Callable[[Image, int], None] | None = None,
         wanted: Callable[[], bool] = lambda: True,
+        hold: Hold = contextlib.nullcontext,
+        name: str = "camera",
     ) -> None:
+        self._name = name
         self._wanted = wanted
+        self._hold = hold
         self._show = show
         self._camera = camera
         self._period_ns = round(1e9 / camera.fps)
@@ -136,9 +163,10 @@ class CameraPeer:
         )
         self._ring = FrameRing.create(_slots(self._camera), lens.width_px, lens.height_px)
         make = partial(self._make, self._ring.name)
-        child = Child(make, lambda _: self._ready.set(), lambda _: None)
+        # one that dies before it is ready says so when it is asked for the first picture
+        child = Child(make, lambda _: self._ready.set(), lambda _: self._ready.set())
         try:
-            with self._clock.hold():
+            with self._hold():
                 await self._ready.wait()
             async with asyncio.TaskGroup() as pictures:
                 await self._expose(child, transport, pictures)
@@ -182,7 +210,7 @@ class CameraPeer:
         rendering = asyncio.ensure_future(self._render(child, truth, seq, exposure, due_ns + self._period_ns))
         try:
             await asyncio.sleep((due_ns - self._clock.now_ns()) * 1e-9)
-            with self._clock.hold():
+            with self._hold():
                 slot = await rendering
         except TransientError:
             self.late += 1
@@ -208,12 +236,18 @@ class CameraPeer:
     async def _render(
         self, child: Child, truth: Kinematics, seq: int, exposure: float, latest_ns: int
     ) -> int:
-        """The slot of the picture.  TransientError when its turn did not come until `latest_ns`."""
+        """The slot of the picture.  TransientError when its turn did not come until `latest_ns`, RunError
+        when it cannot be drawn at all."""
         async with self._turn:
             if self._clock.now_ns() > latest_ns:  # a slow machine costs pictures; queued, they would be old
                 raise TransientError(f"picture {seq}: the renderer is behind")
             slot = self._ring.begin(seq)
-            await child.ask((truth, seq, slot, exposure))
+            try:
+                problem = await child.ask((truth, seq, slot, exposure))
+            except TransientError as err:
+                problem = str(err)
+            if problem:
+                raise RunError(f"the simulated {self._name} cannot draw picture {seq}: {problem}")
             self._spoil(self._ring.pixels(slot))
             self._newest = slot
             self._ring.publish(slot, seq, truth.stamp_ns)

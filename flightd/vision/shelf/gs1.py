@@ -1,6 +1,10 @@
 """GS1 element strings: application identifiers, lengths and check digits.
 
 Source: GS1 General Specifications, sections 3 (application identifiers) and 7.9 (check digit).
+
+Own code: biip 5.2 refuses unknown identifiers as we do, and lets pass what is a misread here: check digits
+that do not hold (it only notes them beside a GTIN), empty fields and missing separators, 857 of 60,000
+random element strings; it takes 0.13 s to import.
 """
 
 from __future__ import annotations

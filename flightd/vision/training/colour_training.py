@@ -16,7 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.core.errors import InputError, UnavailableError
+from flightd.core.errors import InputError
+from flightd.core.extras import missing_extra
 from flightd.core.types import Image
 from flightd.vision.lines.colour_profile import STRONG, TABLE_SIZE, WEAK, ColourProfile, level
 from flightd.vision.lines.sampling import grid_for, sample
@@ -212,7 +213,7 @@ def _fit(features: NDArray[np.float64], paint: NDArray[np.bool_]) -> Any:
     try:
         from sklearn.svm import SVC  # noqa: PLC0415
     except ImportError as err:
-        raise UnavailableError("training needs scikit-learn: pip install 'flightd[train]'") from err
+        raise missing_extra("train", "training a colour profile") from err
     return SVC(C=_SVM_C, gamma="scale", class_weight="balanced", cache_size=500).fit(features, paint)
 
 

@@ -13,8 +13,9 @@ from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import VirtualLoop
 from flightd.sim.ardrone.at_commands import DroneCommand, parse
-from flightd.sim.ardrone.drone import Drone, DroneOptions
+from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer, DronePorts
+from flightd.sim.ardrone.states import DroneOptions
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.sensors.instruments import SensorParams, Sensors

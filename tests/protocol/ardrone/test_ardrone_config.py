@@ -10,12 +10,12 @@ import pytest
 
 from flightd.adapters.vehicle.ardrone.configurator import parse_text, same_value, wanted_values
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, DroneCamera, profile_id, settings_of
-from flightd.control.limits import Limits
+from flightd.config.control import ControlConfig
 from flightd.core.types import Demand
 from flightd.sim.ardrone import configuration
 from flightd.sim.ardrone.at_commands import DroneCommand
 from flightd.sim.ardrone.configuration import Configuration, Ids
-from flightd.sim.ardrone.drone import DroneOptions
+from flightd.sim.ardrone.states import DroneOptions
 from tests.protocol.ardrone.bench import Bench, Ear, bench, make_drone, virtually
 
 
@@ -150,7 +150,7 @@ def test_setpoints_are_scaled_by_the_limits_which_the_drone_really_has() -> None
 
 def test_the_set_points_limits_become_the_drones_own() -> None:
     async def main() -> None:
-        limits = Limits(math.radians(10.0), 1.0, math.radians(45.0), 0.8, 0.6)
+        limits = ControlConfig(max_descend_mps=0.6)
         chosen = settings_of("ardrone://127.0.0.1", limits)
         drone = make_drone()
         names = ("tilt_max_rad", "climb_max_mps", "yaw_rate_max_radps")
@@ -169,7 +169,10 @@ def test_the_set_points_limits_become_the_drones_own() -> None:
 
 
 def test_limits_outside_the_drones_ranges_are_brought_into_them() -> None:
-    chosen = settings_of("ardrone://127.0.0.1", Limits(math.radians(30.0), 1.0, 0.1, 0.1, 3.0))
+    chosen = settings_of(
+        "ardrone://127.0.0.1",
+        ControlConfig(max_tilt_deg=30.0, max_yaw_rate_degps=5.0, max_climb_mps=0.1, max_descend_mps=3.0),
+    )
     assert (chosen.tilt_max_rad, chosen.yaw_rate_max_radps, chosen.climb_max_mps) == (0.52, 0.7, 2.0)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from flightd.sim.ardrone import configuration
-from flightd.sim.ardrone.drone import (
+from flightd.sim.ardrone.states import (
     BIT_BOOTSTRAP,
     BIT_COM_LOST,
     BIT_COM_WATCHDOG,

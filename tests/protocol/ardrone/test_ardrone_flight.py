@@ -12,8 +12,8 @@ from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.runtime.clock import LoopClock
 from flightd.sim.ardrone.at_commands import DroneCommand
-from flightd.sim.ardrone.drone import BIT_CUTOUT, DroneOptions, MajorState
 from flightd.sim.ardrone.server import ArDroneServer
+from flightd.sim.ardrone.states import BIT_CUTOUT, DroneOptions, MajorState
 from flightd.sim.sensors.instruments import SensorParams
 from tests.protocol.ardrone.bench import ANY_PORTS, Ear, bench, ended, make_drone, settings_for, virtually
 

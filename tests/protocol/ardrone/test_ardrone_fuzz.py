@@ -20,8 +20,8 @@ from flightd.adapters.vehicle.ardrone.pave import PaveFrame, PaveParser
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
 from flightd.sim.ardrone.at_commands import parse
-from flightd.sim.ardrone.drone import DroneOptions
 from flightd.sim.ardrone.navdata_writer import ALL_OPTIONS, OPTION_BYTES, NavdataReport, packet
+from flightd.sim.ardrone.states import DroneOptions
 from tests.protocol.ardrone import golden
 from tests.protocol.ardrone.bench import make_drone
 

@@ -11,8 +11,8 @@ import pytest
 
 from flightd.adapters.vehicle.ardrone.settings import DroneCamera
 from flightd.core.types import Demand
-from flightd.sim.ardrone.drone import MajorState
 from flightd.sim.ardrone.navdata_writer import NavdataReport, packet
+from flightd.sim.ardrone.states import MajorState
 from flightd.sim.autopilot.radio import RadioParams
 from tests.protocol.ardrone.bench import Ear, bench, make_drone, virtually
 

@@ -13,7 +13,8 @@ import pytest
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.vehicle.ardrone.settings import settings_of
 from flightd.adapters.vehicle.connect import connect_vehicle
-from flightd.config.schema import CameraConfig, load_table, parse_config
+from flightd.config.camera import CameraConfig
+from flightd.config.schema import load_table, parse_config
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import InputError
 from flightd.sim.ardrone.__main__ import main
@@ -58,7 +59,7 @@ def test_a_wrong_url_is_named_with_its_remedy(url: str) -> None:
 
 def test_the_drones_camera_needs_the_drone() -> None:
     clock = StillClock()
-    plane = connect_vehicle(VehicleConfig(kind="ardupilot"), clock)  # type: ignore[arg-type]
+    plane = connect_vehicle(VehicleConfig(kind="ardupilot"), clock)
     with pytest.raises(InputError, match=r'needs vehicle\.kind = "ardrone"'):
         connect_camera(CameraConfig(url="ardrone:"), clock, lambda _: None, plane)  # type: ignore[arg-type]
 

@@ -18,7 +18,6 @@ from flightd.adapters.vehicle.ardrone.pave import FrameType, PaveFrame, PavePars
 from flightd.adapters.vehicle.ardrone.settings import DroneCamera
 from flightd.adapters.vehicle.ardrone.video import MAX_BACKLOG, Backlog, DecodedFrame, Decoder, VideoStream
 from flightd.config.paths import shipped
-from flightd.config.site_file import load_site
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
@@ -26,7 +25,9 @@ from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from flightd.sim.ardrone.front_camera import front_peer
 from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.ardrone.video import Encoder, Packer, VideoChannel, is_idr
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
+from flightd.site.site_file import load_site
+from tests.held_time import held
 from tests.protocol.ardrone import golden
 from tests.protocol.ardrone.bench import ANY_PORTS, bench, ended, make_drone, virtually
 
@@ -71,7 +72,7 @@ async def watching(header_bytes: int = 64, latency_s: float = 0.0) -> AsyncItera
     clock = LoopClock()
     async with ArDroneServer(make_drone(), clock, ANY_PORTS, video_header_bytes=header_bytes) as server:
         pictures: list[DecodedFrame] = []
-        stream = VideoStream((server.ports.host, server.ports.video), latency_s, clock, pictures.append)
+        stream = VideoStream((server.ports.host, server.ports.video), latency_s, clock, pictures.append, held)
         task = asyncio.create_task(stream.run())
         try:
             yield Watching(server, stream, pictures, clock)
@@ -152,7 +153,7 @@ def test_video_that_is_not_there_yet_is_asked_for_again() -> None:
         pictures: list[DecodedFrame] = []
         async with ArDroneServer(make_drone(), clock, ANY_PORTS) as server:
             ports = server.ports
-        stream = VideoStream((ports.host, ports.video), 0.0, clock, pictures.append)
+        stream = VideoStream((ports.host, ports.video), 0.0, clock, pictures.append, held)
         task = asyncio.create_task(stream.run())
         await asyncio.sleep(5.0)
         async with ArDroneServer(make_drone(), clock, ports) as server:
@@ -327,8 +328,8 @@ def test_the_front_channel_shows_the_racks_and_the_bottom_one_the_floor() -> Non
     async def main() -> None:
         async with bench() as b:
             taken: list[FrameTicket] = []
-            camera = ArDroneCamera(b.vehicle, 0.0, b.clock, dict.fromkeys(DroneCamera, taken.append))
-            front = front_peer(b.server, site, RackLook(), 1, b.clock)
+            camera = ArDroneCamera(b.vehicle, 0.0, b.clock, dict.fromkeys(DroneCamera, taken.append), held)
+            front = front_peer(b.server, site, RackAppearance(), 1, b.clock, held)
             tasks = [asyncio.create_task(part.run()) for part in (camera, front)]
             await b.configured()
             floor = bars(0, (60, 220, 60))

@@ -16,15 +16,15 @@ from flightd.runtime.event_loops import VirtualLoop
 from flightd.sim.autopilot.autopilot import PeerConfig, Sticks
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.plant.airframe import Airframe
-from flightd.sim.plant.wind import Draught
+from flightd.sim.plant.wind import WindParams
 from tests.protocol.mavlink.raw_client import RawClient
 
-CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
+CALM = WindParams(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
 
 
 @asynccontextmanager
 async def pair(config: PeerConfig | None = None) -> AsyncIterator[tuple[ArduCopterPeer, RawClient]]:
-    peer = ArduCopterPeer(LoopClock(), Airframe(draught=CALM), config or PeerConfig(ready_s=0.0))
+    peer = ArduCopterPeer(LoopClock(), Airframe(wind=CALM), config or PeerConfig(ready_s=0.0))
     client = await RawClient.connect(await peer.open())
     async with asyncio.TaskGroup() as tasks:
         serving = tasks.create_task(peer.run())

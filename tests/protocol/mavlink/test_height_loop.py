@@ -43,7 +43,7 @@ def fly_loop(
 
 @pytest.mark.parametrize("blind", [False, True])
 def test_touch_down_is_felt_with_and_without_a_range_finder(blind: bool) -> None:
-    airframe = Airframe(draught=CALM)
+    airframe = Airframe(wind=CALM)
     path = fly_loop(HeightLoop(), airframe, [(0.5, 4.0), (0.0, 2.0), (-0.4, 9.0)], blind=blind)
     assert max(height for _, height in path) > 1.0
     last_thrust = max(i for i, (thrust, _) in enumerate(path) if thrust > 0.0)
@@ -52,14 +52,14 @@ def test_touch_down_is_felt_with_and_without_a_range_finder(blind: bool) -> None
 
 
 def test_slow_sinking_and_hovering_near_the_floor_are_no_touch_down() -> None:
-    airframe = Airframe(draught=CALM)
+    airframe = Airframe(wind=CALM)
     path = fly_loop(HeightLoop(), airframe, [(0.3, 3.0), (-0.06, 4.0), (0.0, 5.0)])
     assert min(thrust for thrust, _ in path[-300:]) > 0.2
     assert path[-1][1] > 0.3
 
 
 def test_without_a_climb_rate_the_hover_thrust_is_kept() -> None:
-    loop, airframe = HeightLoop(), Airframe(draught=CALM)
+    loop, airframe = HeightLoop(), Airframe(wind=CALM)
     fly_loop(loop, airframe, [(0.4, 3.0), (0.0, 2.0)])
     thrust = loop.step(
         6_000_000_000, 0.5, climb_mps=math.nan, height_m=math.nan, tilt_cos=1.0, armed=True, on_floor=False
@@ -95,7 +95,7 @@ def test_a_waiting_vehicle_gets_no_thrust() -> None:
 
 @pytest.mark.parametrize("blind", [False, True])
 def test_an_autopilot_that_says_it_stands_cannot_have_the_thrust_cut_in_the_air(blind: bool) -> None:
-    airframe = Airframe(draught=CALM)
+    airframe = Airframe(wind=CALM)
     wishes = [(0.5, 4.0), (0.0, 3.0), (-0.3, 2.0), (0.0, 2.0)]
     path = fly_loop(HeightLoop(), airframe, wishes, blind=blind, liar=True)
     assert min(thrust for thrust, height in path if height > 0.5) > 0.1
@@ -103,7 +103,7 @@ def test_an_autopilot_that_says_it_stands_cannot_have_the_thrust_cut_in_the_air(
 
 
 def test_told_that_it_stands_on_something_higher_it_cuts_the_thrust() -> None:
-    loop, airframe = HeightLoop(), Airframe(draught=CALM)
+    loop, airframe = HeightLoop(), Airframe(wind=CALM)
     fly_loop(loop, airframe, [(0.4, 2.0)])
     ways = {}
     for told in (False, True):
@@ -135,7 +135,7 @@ def test_taken_over_in_the_air_it_does_not_begin_on_the_floor_whatever_is_said(
 
 
 def test_a_disarmed_vehicle_gets_no_thrust_however_it_was_left() -> None:
-    loop, airframe = HeightLoop(), Airframe(draught=CALM)
+    loop, airframe = HeightLoop(), Airframe(wind=CALM)
     fly_loop(loop, airframe, [(0.4, 2.0)])
     for wanted_mps in (0.0, 0.5):
         thrust = loop.step(

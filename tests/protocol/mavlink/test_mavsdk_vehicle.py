@@ -22,7 +22,7 @@ from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavsdk.gate import FRESH_NS, SetpointGate, message_id
 from flightd.adapters.vehicle.mavsdk.library import whole_fields
-from flightd.adapters.vehicle.mavsdk.telemetry import Readings
+from flightd.adapters.vehicle.mavsdk.telemetry import MavsdkTelemetry
 from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
 from flightd.app.simulation.ports import free_port
 from flightd.config.vehicle import VehicleConfig
@@ -148,7 +148,7 @@ def test_the_library_repeats_no_change_of_mode_once_we_let_go() -> None:
 
 
 def test_a_landed_state_is_believed_for_a_second() -> None:
-    readings = Readings(ClockSync())
+    readings = MavsdkTelemetry(ClockSync())
     readings.take_landed(SdkLanded.ON_GROUND, 5)
     assert readings.landed(5 + 10**9) is LandedState.ON_GROUND
     assert readings.landed(6 + 10**9) is LandedState.UNKNOWN
@@ -157,7 +157,7 @@ def test_a_landed_state_is_believed_for_a_second() -> None:
 def test_whatever_the_library_hands_over_nothing_raises_and_nothing_absurd_is_believed() -> None:
     rng = random.Random(11)
     odd = [math.nan, math.inf, -math.inf, 1e30, -1.0, 0.0, 0.7, 90.0, 270.0, 2**63, -(2**40), 255, 3]
-    readings = Readings(ClockSync())
+    readings = MavsdkTelemetry(ClockSync())
     for now_ns in range(0, 20_000 * 1_000_000, 1_000_000):
 
         def some(*names: str) -> Any:

@@ -26,7 +26,7 @@ HOVER = 0.34
 @asynccontextmanager
 async def pair(**parameters: float) -> AsyncIterator[tuple[Px4Peer, RawClient]]:
     config = PeerConfig(ready_s=0.0, parameters=parameters)
-    peer = Px4Peer(LoopClock(), Airframe(draught=CALM), config)
+    peer = Px4Peer(LoopClock(), Airframe(wind=CALM), config)
     client = await RawClient.connect(await peer.open())
     serving = asyncio.create_task(peer.run())
     await asyncio.sleep(0.05)

@@ -23,7 +23,7 @@ from flightd.adapters.vehicle.mavlink.link.transport import SerialTransport, Tcp
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.datagrams import PacedDatagrams
+from flightd.runtime.datagrams import PacedDatagrams, open_paced_datagrams
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.plant.airframe import Airframe
@@ -250,7 +250,7 @@ def test_a_stalled_tcp_line_drops_what_is_new_instead_of_piling_it_up() -> None:
 
 def test_a_stalled_network_drops_datagrams_instead_of_piling_them_up() -> None:
     async def test() -> None:
-        line = UdpTransport(parse_endpoint("udpout://127.0.0.1:9"))
+        line = UdpTransport(parse_endpoint("udpout://127.0.0.1:9"), open_paced_datagrams)
         await line.open()
         assert isinstance(line._open, PacedDatagrams)
         standing: Any = StandingSocket(line._open.socket)

@@ -13,7 +13,7 @@ import pytest
 from flightd.adapters.camera.capture import CaptureCamera, parse_source
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.camera.shared_memory import SharedCamera
-from flightd.config.schema import CameraConfig
+from flightd.config.camera import CameraConfig
 from flightd.core.errors import InputError, TransientError, UnavailableError
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import VirtualLoop

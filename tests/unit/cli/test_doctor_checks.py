@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flightd.config.schema import CameraConfig, Config, RecorderConfig, load_config
-from flightd.config.site_file import load_site
+from flightd.config.camera import CameraConfig
+from flightd.config.recorder import RecorderConfig
+from flightd.config.schema import Config, load_config
 from flightd.doctor.calibration import check_calibration
 from flightd.doctor.camera import Pictures, check_latency, check_vision, judge_camera
 from flightd.doctor.check import Check, CheckLevel
 from flightd.doctor.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
+from flightd.site.site_file import load_site
 from flightd.vision.lines.detector import Detector
 
 CONFIGS = Path(__file__).parents[3] / "configs"

@@ -18,13 +18,15 @@ from typer.testing import CliRunner
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.build import flown_between_m
-from flightd.app.counting.flight_count import going_on
+from flightd.app.flight_orders import configured_order, going_on
 from flightd.cli.main import app
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, StoredRead
-from flightd.inventory.formats import as_csv, as_epcis, as_xlsx
+from flightd.inventory.export.csv_table import as_csv
+from flightd.inventory.export.epcis import as_epcis
+from flightd.inventory.export.xlsx import as_xlsx
+from flightd.site.site_file import load_site
 
 RUNNER = CliRunner()
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -235,13 +237,13 @@ def test_bad_stock_files_are_refused(counted: Path, tmp_path: Path, text: str, w
 def test_a_count_with_nothing_left_is_refused_on_the_ground_and_never_in_the_air(tmp_path: Path) -> None:
     site = load_site(CONFIGS / "site-racks.toml")
     config = load_config(CONFIGS / "sim.toml")
-    config = config.model_copy(update={"inventory": config.inventory.model_copy(update={"run": "monday"})})
+    order = configured_order(config)
     with SqliteStore(tmp_path) as store:
         for number, code in enumerate(site.locations):
             store.commit(Observation("monday", code, number, LocationState.EMPTY, 0.9))
     with pytest.raises(InputError, match="every location is counted"):
-        going_on(config, site, tmp_path)
-    assert going_on(config, site, tmp_path, in_air=True) is config
+        going_on(order, "monday", site, tmp_path)
+    assert going_on(order, "monday", site, tmp_path, in_air=True) is order
 
 
 def test_the_heights_flown_between_hold_the_views_of_a_tilted_front_camera() -> None:
@@ -265,6 +267,13 @@ def test_bad_arguments_are_refused(counted: Path, tmp_path: Path) -> None:
     assert "holds no inventory" in error_of("show", tmp_path / "nowhere")
     assert "knows no location 'Q'" in error_of("show", counted, "--location", "Q")
     assert "--format pdf" in error_of("export", counted, "--format", "pdf")
+    assert "choose one of .csv (csv), .xlsx (xlsx), .json (json), .jsonld (epcis)" in error_of(
+        "export", counted, "--out", tmp_path / "stock.pdf"
+    )
+    assert not (tmp_path / "stock.pdf").exists()
+    said = error_of("export", counted, "--out", tmp_path / "stock.json", "--format", "epcis")
+    assert "its ending says json, --format says epcis" in said
+    assert said.endswith("name the file stock.jsonld")
     assert "give both" in error_of("compare", counted, stock, "--recount", tmp_path / "r.toml")
     elsewhere = tmp_path / "deep" / "r.toml"
     config = CONFIGS / "sim.toml"

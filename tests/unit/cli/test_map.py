@@ -6,8 +6,8 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from flightd.config.site_file import load_site, site_toml
 from flightd.sim.random_sites import random_site
+from flightd.site.site_file import load_site, site_toml
 from tests.command import Command
 
 DEMO = Path(__file__).parents[3] / "configs" / "site-demo.toml"

@@ -6,23 +6,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flightd.config.control import PidGains
 from flightd.control.motion_profile import Profile
-from flightd.control.pid import Pid, PidGains
+from flightd.control.pid import Pid
 
-GAINS = PidGains(kp=2.0, ki=1.0, kd=1.0, integral_limit=0.5, output_limit=1.0)
+GAINS = PidGains(kp=2.0, ki=1.0, kd=1.0)
+INTEGRAL_LIMIT, OUTPUT_LIMIT = 0.5, 1.0
 finite = st.floats(-1e3, 1e3)
 
 
 @given(st.lists(st.tuples(finite, finite, st.floats(1e-3, 0.1)), max_size=50))
 def test_output_and_integral_never_exceed_their_limits(steps: list[tuple[float, float, float]]) -> None:
-    pid = Pid(GAINS)
+    pid = Pid(GAINS, INTEGRAL_LIMIT, OUTPUT_LIMIT)
     for error, rate, dt in steps:
-        assert abs(pid.step(error, rate, dt)) <= GAINS.output_limit
-        assert abs(pid.integral) <= GAINS.integral_limit
+        assert abs(pid.step(error, rate, dt)) <= OUTPUT_LIMIT
+        assert abs(pid.integral) <= INTEGRAL_LIMIT
 
 
 def test_the_integral_takes_a_steady_disturbance_out() -> None:
-    pid, position, velocity = Pid(GAINS), 0.0, 0.0
+    pid, position, velocity = Pid(GAINS, INTEGRAL_LIMIT, OUTPUT_LIMIT), 0.0, 0.0
     for _ in range(4000):
         push = pid.step(-position, velocity, 0.01) + 0.3
         velocity += push * 0.01
@@ -32,14 +34,14 @@ def test_the_integral_takes_a_steady_disturbance_out() -> None:
 
 
 def test_the_integral_does_not_wind_up_while_the_output_is_saturated() -> None:
-    pid = Pid(GAINS)
+    pid = Pid(GAINS, INTEGRAL_LIMIT, OUTPUT_LIMIT)
     for _ in range(1000):
         pid.step(10.0, 0.0, 0.01)
     assert pid.integral == 0.0
 
 
 def test_a_jump_of_the_set_point_does_not_kick_through_the_derivative() -> None:
-    pid = Pid(PidGains(kp=0.1, ki=0.0, kd=5.0, integral_limit=0.0, output_limit=10.0))
+    pid = Pid(PidGains(kp=0.1, ki=0.0, kd=5.0), integral_limit=0.0, output_limit=10.0)
     assert pid.step(1.0, 0.0, 0.01) == pytest.approx(0.1)
 
 

@@ -8,11 +8,13 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.control.limits import Limiter, Limits, Surroundings, outward
+from flightd.config.control import ControlConfig, ControlExpert
+from flightd.control.limits import Limiter, Surroundings, outward
 from flightd.core.geometry import GRAVITY_MPS2
 from flightd.core.types import AttitudeSetpoint
 
-LIMITS = Limits(math.radians(10), math.radians(60), math.radians(45), 0.8, 0.6, 9.0, 3.0, 0.4)
+EXPERT = ControlExpert(max_jerk_mps3=9.0, max_yaw_accel_degps2=math.degrees(3.0))
+LIMITS = ControlConfig(max_descend_mps=0.6, expert=EXPERT)
 STEP_NS = 20_000_000
 finite = st.floats(-100, 100)
 wish = st.tuples(finite, finite, finite, finite, st.integers(0, 200))
@@ -41,18 +43,18 @@ def test_nothing_beyond_the_limits_reaches_the_wire(
 ) -> None:
     for last, out in pairwise(stream(wanted, around)):
         dt_s = min((out.stamp_ns - last.stamp_ns) * 1e-9, 0.1)
-        assert max(abs(out.roll_rad), abs(out.pitch_rad)) <= LIMITS.tilt_rad + 1e-9
-        assert abs(out.yaw_rate_radps) <= LIMITS.yaw_rate_radps
-        assert -LIMITS.descend_mps <= out.climb_mps <= LIMITS.climb_mps
-        swing = LIMITS.tilt_rate_radps * dt_s + 1e-9
+        assert max(abs(out.roll_rad), abs(out.pitch_rad)) <= LIMITS.max_tilt_rad + 1e-9
+        assert abs(out.yaw_rate_radps) <= LIMITS.max_yaw_rate_radps
+        assert -LIMITS.max_descend_mps <= out.climb_mps <= LIMITS.max_climb_mps
+        swing = EXPERT.max_tilt_rate_radps * dt_s + 1e-9
         assert abs(out.roll_rad - last.roll_rad) <= swing
         assert abs(out.pitch_rad - last.pitch_rad) <= swing
-        assert abs(out.yaw_rate_radps - last.yaw_rate_radps) <= LIMITS.yaw_accel_radps2 * dt_s + 1e-9
+        assert abs(out.yaw_rate_radps - last.yaw_rate_radps) <= EXPERT.max_yaw_accel_radps2 * dt_s + 1e-9
         change = GRAVITY_MPS2 * math.hypot(
             math.tan(out.roll_rad) - math.tan(last.roll_rad),
             math.tan(out.pitch_rad) - math.tan(last.pitch_rad),
         )
-        assert change <= LIMITS.jerk_mps3 * dt_s + 1e-9
+        assert change <= EXPERT.max_jerk_mps3 * dt_s + 1e-9
 
 
 @given(wishes, wishes, direction)

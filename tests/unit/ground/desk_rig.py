@@ -18,8 +18,8 @@ from flightd.adapters.ground_link.protocol import (
     StatusReport,
 )
 from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
-from flightd.config.site_file import load_site
 from flightd.core.types import Phase
+from flightd.site.site_file import load_site
 
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
 OPERATOR = Peer("ann", Role.OPERATOR, b"1", "127.0.0.1")

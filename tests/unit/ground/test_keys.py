@@ -10,7 +10,7 @@ import pytest
 import zmq
 import zmq.auth
 
-from flightd.adapters.ground_link.keys import Client, load_clients, load_pair, load_public, make_keys
+from flightd.adapters.ground_link.keys import Client, KeyPair, load_clients, load_pair, load_public, make_keys
 from flightd.adapters.ground_link.protocol import Role
 from flightd.config.ground import GroundConfig, is_loopback
 from flightd.config.schema import load_config
@@ -119,3 +119,21 @@ def test_key_files_are_found_beside_the_configuration(tmp_path: Path) -> None:
 
 def test_without_a_word_the_link_is_off() -> None:
     assert load_config(ROOT / "configs" / "sim.toml").ground.listen == ""
+
+
+def test_key_files_of_an_earlier_version_are_still_read(tmp_path: Path) -> None:
+    public, secret = (half.decode() for half in zmq.curve_keypair())
+    halves = f'    public-key = "{public}"\n    secret-key = "{secret}"\n'
+    file = tmp_path / "old.key_secret"
+    file.write_text(f'metadata\n    name = "old"\ncurve\n{halves}')
+    file.chmod(0o600)
+    assert load_pair(file) == KeyPair(public, secret)
+
+
+def test_new_keys_leave_nothing_else_behind_and_no_file_is_written_over(tmp_path: Path) -> None:
+    (tmp_path / "desk.key_secret").write_text("precious")
+    with pytest.raises(InputError, match=r"desk\.key_secret: there already"):
+        make_keys(tmp_path, "desk")
+    assert (tmp_path / "desk.key_secret").read_text() == "precious"
+    make_keys(tmp_path, "wall")
+    assert {path.name for path in tmp_path.iterdir()} == {"desk.key_secret", "wall.key", "wall.key_secret"}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flightd.core.camera_view import FloorReach
+from flightd.core.tracks import TrackedLine, TrackSet
 from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.sim.random_sites import random_site
-from flightd.tracking.axis_filters import TrackedLine
-from flightd.tracking.line_tracker import TrackSet
 
 SITE = random_site(3)
 A1, A2 = SITE.nodes["A1"], SITE.nodes["A2"]
@@ -26,14 +26,14 @@ def tracks(
 
 
 def test_the_position_is_that_of_the_lines() -> None:
-    localiser = GridLocaliser(SITE, "A1")
+    localiser = GridLocaliser(SITE, "A1", FloorReach())
     pose = localiser.step(tracks(1, [line(0, -0.05)], [line(0, 0.03)]), 1.6)
     assert (pose.node, round(pose.along_m, 3), round(pose.across_m, 3)) == ("A1", 0.05, -0.03)
     assert pose.integrity < 0.95, "so far the pad is all that tells A1 from its like"
 
 
 def test_flying_to_the_next_node_changes_the_node_and_nothing_jumps() -> None:
-    localiser, gap = GridLocaliser(SITE, "A1"), A2.x_m - A1.x_m
+    localiser, gap = GridLocaliser(SITE, "A1", FloorReach()), A2.x_m - A1.x_m
     x, last = 0.0, 0.0
     for tick in range(1, 200):
         x = min(tick * 0.02 * 0.8, gap)
@@ -46,7 +46,7 @@ def test_flying_to_the_next_node_changes_the_node_and_nothing_jumps() -> None:
 
 
 def test_a_false_line_between_two_nodes_is_not_matched() -> None:
-    localiser, gap = GridLocaliser(SITE, "A1"), A2.x_m - A1.x_m
+    localiser, gap = GridLocaliser(SITE, "A1", FloorReach()), A2.x_m - A1.x_m
     localiser.step(tracks(1, [line(0, 0.0)], [line(0, 0.0)]), 1.6)
     for tick in range(2, 50):
         pose = localiser.step(
@@ -57,7 +57,7 @@ def test_a_false_line_between_two_nodes_is_not_matched() -> None:
 
 def test_a_missed_cross_line_does_not_shift_the_node_count() -> None:
     """A2's own line is never seen; A3's must be taken for A3's."""
-    localiser = GridLocaliser(SITE, "A1")
+    localiser = GridLocaliser(SITE, "A1", FloorReach())
     a3 = SITE.nodes["A3"]
     for tick in range(1, 400):
         x = min(tick * 0.02 * 0.8, a3.x_m - A1.x_m)
@@ -69,7 +69,7 @@ def test_a_missed_cross_line_does_not_shift_the_node_count() -> None:
 
 
 def test_without_lines_the_doubt_grows() -> None:
-    localiser = GridLocaliser(SITE, "A1")
+    localiser = GridLocaliser(SITE, "A1", FloorReach())
     first = localiser.step(tracks(1, [line(0, 0.0)], [line(0, 0.0)]), 1.6)
     later = localiser.step(tracks(501, [], []), 1.6)
     assert later.integrity < 0.7 * first.integrity
@@ -77,7 +77,7 @@ def test_without_lines_the_doubt_grows() -> None:
 
 
 def test_after_a_long_gap_a_line_between_two_is_held_for_either_until_the_next_one_tells() -> None:
-    localiser, gap = GridLocaliser(SITE, "A1"), A2.x_m - A1.x_m
+    localiser, gap = GridLocaliser(SITE, "A1", FloorReach()), A2.x_m - A1.x_m
     localiser.step(tracks(1, [line(0, 0.0)], [line(0, 0.0)]), 1.6)
     localiser.step(tracks(401, [], [line(0, 0.0)]), 1.6)
     shift = 0.45 * gap  # it drifted back, unseen, by nearly half a cell
@@ -88,7 +88,7 @@ def test_after_a_long_gap_a_line_between_two_is_held_for_either_until_the_next_o
 
 
 def test_what_the_lines_ahead_look_like_makes_it_sure() -> None:
-    localiser, gap = GridLocaliser(SITE, "A1"), A2.x_m - A1.x_m
+    localiser, gap = GridLocaliser(SITE, "A1", FloorReach()), A2.x_m - A1.x_m
     for tick in range(1, 150):
         x = min(tick * 0.02 * 0.8, gap)
         seen = [line(i, at - x) for i, at in ((0, 0.0), (1, gap)) if abs(at - x) < 0.9]

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from flightd.config.site_file import load_site
+from flightd.core.tracks import FloorJunction, TrackSet
 from flightd.core.types import GridPose
 from flightd.localisation.pad_finder import PadFinder
 from flightd.site.painted_lines import nearest_end
 from flightd.site.site import PadSign
-from flightd.tracking.ground_junctions import FloorJunction
-from flightd.tracking.line_tracker import TrackSet
+from flightd.site.site_file import load_site
 
 DEMO = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
 SITE = replace(DEMO, pads=(replace(DEMO.home, sign=PadSign.LINE_END, offset_m=(-0.4, 0.0)),))

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from flightd.config.site_file import parse_site
+from flightd.config.localisation import LocalisationConfig, LocalisationExpert
+from flightd.core.camera_view import FloorReach
 from flightd.core.markers import MarkerDictionary
+from flightd.core.tracks import MarkerOffset, PadOffset, TrackedLine, TrackSet
 from flightd.core.types import GridPose
-from flightd.localisation.grid_localiser import GridLocaliser, LocaliserParams
+from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.localisation.position_fixes import FixBook
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, Marker, Pad, Site
-from flightd.tracking.axis_filters import TrackedLine
-from flightd.tracking.line_tracker import MarkerOffset, PadOffset, TrackSet
+from flightd.site.site_file import parse_site
 
 TICK_NS = 20_000_000
 HEIGHT_M = 1.2
-SURE = LocaliserParams(carried=1e-6)
+SURE = LocalisationConfig(expert=LocalisationExpert(carried=1e-6))
 """So that the start node is believed at once, wrongly in these tests."""
 RACKS = parse_site(
     """
@@ -52,9 +53,9 @@ class Hover:
         site: Site,
         markers: tuple[MarkerOffset, ...] = (),
         pads: tuple[PadOffset, ...] = (),
-        params: LocaliserParams = SURE,
+        params: LocalisationConfig = SURE,
     ) -> None:
-        self.localiser = GridLocaliser(site, "A3", params)
+        self.localiser = GridLocaliser(site, "A3", FloorReach(), params)
         self.markers = markers
         self.pads = pads
         self.tick = 0
@@ -121,7 +122,7 @@ def test_what_is_no_marker_of_the_map_says_nothing() -> None:
 
 
 def test_among_nodes_that_look_alike_the_pads_mat_tells_where_a_flight_starts() -> None:
-    doubts = LocaliserParams()
+    doubts = LocalisationConfig()
     assert Hover(RACKS, params=doubts).look(50).integrity < 0.95
     on_it = Hover(RACKS, pads=(PadOffset(0.1, -0.05, 0.5),), params=doubts).look(50)
     assert (on_it.node, on_it.integrity > 0.98) == ("A3", True)
@@ -139,7 +140,7 @@ def test_a_square_that_is_seen_once_beside_the_mat_says_nothing() -> None:
 
 
 def test_no_mat_of_the_map_says_nothing_and_one_at_another_node_makes_doubt() -> None:
-    doubts = LocaliserParams()
+    doubts = LocalisationConfig()
     without = Hover(RACKS, params=doubts).look(50).integrity
     larger = Hover(RACKS, pads=(PadOffset(0.1, 0.0, 0.9),), params=doubts).look(50)
     assert larger.integrity == without

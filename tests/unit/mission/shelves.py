@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from flightd.config.front_camera import FrontCameraConfig
-from flightd.config.site_file import parse_site
 from flightd.core.scanning import BodyPose, CodeSet, Light, Occupancy, PlaceLook
 from flightd.core.types import CodeRead
 from flightd.mission.scan.code_assignment import FrontSight
+from flightd.site.site_file import parse_site
 
 SITE = parse_site(
     """

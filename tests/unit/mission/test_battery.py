@@ -10,20 +10,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightd.config.site_file import load_site
+from flightd.config.battery import BatteryConfig
+from flightd.config.mission import Heading
+from flightd.config.scan import ScanConfig
 from flightd.core.errors import InputError
-from flightd.mission.battery.consumption import BatteryGauge, BatteryParams
+from flightd.mission.battery.consumption import BatteryGauge
 from flightd.mission.battery.sorties import Sorties, check_battery
-from flightd.mission.guidance import MissionParams
-from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
 from flightd.mission.plan.leg_times import Legs, Pace
+from flightd.mission.reasons import in_words
 from flightd.mission.scan.scanner import Scanner
-from flightd.mission.scan.views import ScanParams
+from flightd.site.site_file import load_site
 from tests.unit.mission import shelves
+from tests.unit.mission.configured import configured
 
 LARGE = load_site(Path(__file__).parents[3] / "configs" / "site-large.toml")
 POLICY = HeadingPolicy(Heading.ALONG)
-LEGS = Legs(LARGE, POLICY, Pace.of(MissionParams()))
+LEGS = Legs(LARGE, POLICY, Pace.of(configured().mission))
 S = 10**9
 
 
@@ -52,7 +55,7 @@ def test_a_gauge_that_says_nothing_leaves_the_belief() -> None:
 
 
 def sorties(flight_s: float = 600.0) -> Sorties:
-    return Sorties(LARGE, LEGS, BatteryParams(flight_s=flight_s, reserve_frac=0.1))
+    return Sorties(LARGE, LEGS, BatteryConfig(flight_s=flight_s, reserve=0.1))
 
 
 def test_it_turns_back_just_when_the_way_home_needs_what_is_left() -> None:
@@ -61,48 +64,50 @@ def test_it_turns_back_just_when_the_way_home_needs_what_is_left() -> None:
     for charge, turns in ((needed + 0.005, False), (needed - 0.005, True), (math.nan, False)):
         watch = sorties()
         watch.step(0, charge, True)
-        assert bool(watch.why_return("J10", 0.0)) is turns
+        assert (watch.must_return("J10", 0.0) is not None) is turns
     watch = sorties()
     watch.step(0, needed + 0.005, True)
-    assert "the way back to A1" in watch.why_return("J10", 8.0), "the rest of the leg counts"
+    short = watch.must_return("J10", 8.0)
+    assert short is not None, "the rest of the leg counts"
+    assert "the way back to A1" in in_words(short)
 
 
 def test_the_nearest_charge_pad_is_chosen() -> None:
     pad = replace(LARGE.pads[0], id="dock", node="J10", start=False)
     two = replace(LARGE, pads=(*LARGE.pads, pad))
-    watch = Sorties(two, Legs(two, POLICY, LEGS.pace), BatteryParams())
+    watch = Sorties(two, Legs(two, POLICY, LEGS.pace), BatteryConfig())
     assert watch.way_back("I9").pad == "J10"
     assert watch.way_back("B2").pad == "A1"
 
 
 def test_what_no_full_battery_reaches_is_refused_before_the_flight() -> None:
     plan = make_plan(LARGE, ["A2", "J10"], "A1", "A1", POLICY)
-    check_battery(LARGE, plan, POLICY, MissionParams())
-    weak = MissionParams(battery=BatteryParams(flight_s=90.0))
+    check_battery(LARGE, plan, POLICY, configured())
+    weak = configured(battery=BatteryConfig(flight_s=90.0))
     with pytest.raises(InputError, match=r"battery\.flight_s = 90\) does not reach J10"):
         check_battery(LARGE, plan, POLICY, weak)
 
 
 def test_what_is_left_to_count_at_a_stop_counts_as_flying_time() -> None:
-    params = MissionParams()
+    params = configured().mission
     legs = Legs(shelves.SITE, POLICY, Pace.of(params))
-    scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanParams(max_height_m=4.0))
-    battery = BatteryParams(flight_s=600.0, reserve_frac=0.1)
+    scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanConfig(max_height_m=4.0))
+    battery = BatteryConfig(flight_s=600.0, reserve=0.1)
     counting = Sorties(shelves.SITE, legs, battery, scanner)
     scan_s = scanner.stop_s("A3", legs.pace)
-    assert scan_s > 2 * len(shelves.SITE.racks[0].levels_m) * ScanParams().view_s
+    assert scan_s > 2 * len(shelves.SITE.racks[0].levels_m) * ScanConfig().view_s
     needed = 0.1 + (legs.way_s("A2", "A3") + scan_s + counting.way_back("A3").seconds) / 600.0
     for charge, short in ((needed + 0.002, False), (needed - 0.002, True)):
         counting.step(0, charge, False)
-        assert bool(counting.why_not_on("A2", "A3")) is short
+        assert (counting.must_not_go_on("A2", "A3") is not None) is short
     scanner.skip(shelves.SITE.locations)
-    assert not counting.why_not_on("A2", "A3"), "nothing left: a plain stop"
+    assert counting.must_not_go_on("A2", "A3") is None, "nothing left: a plain stop"
 
 
 def test_a_count_that_no_battery_lasts_for_is_refused_before_the_flight() -> None:
-    site, params = shelves.SITE, MissionParams(battery=BatteryParams(flight_s=70.0))
+    site, params = shelves.SITE, configured(battery=BatteryConfig(flight_s=70.0))
     plan = make_plan(site, ["A2"], "A1", "A1", POLICY)
     check_battery(site, plan, POLICY, params)
-    scanner = Scanner(site, shelves.SIGHT, ScanParams(max_height_m=4.0, view_s=20.0))
+    scanner = Scanner(site, shelves.SIGHT, ScanConfig(max_height_m=4.0, view_s=20.0))
     with pytest.raises(InputError, match="does not reach A2, last for the stop there"):
         check_battery(site, plan, POLICY, params, scanner)

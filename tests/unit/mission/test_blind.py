@@ -8,10 +8,12 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.mission.guidance import ALL_WELL, MissionInputs, MissionParams
+from flightd.mission.guidance import ALL_WELL, MissionInputs
 from flightd.mission.safety.view_monitor import FloorViewMonitor
+from tests.unit.mission.configured import configured
 
-PARAMS = MissionParams()
+PARAMS = configured()
+EXPERT = PARAMS.mission.expert
 
 
 def senses(x_age_s: float, y_age_s: float, picture_age_s: float = 0.0) -> MissionInputs:
@@ -35,7 +37,7 @@ def test_a_camera_that_shows_nothing_makes_it_sink_and_pictures_without_lines_do
     blind.step(senses(0.5, 0.5, picture_age_s=0.5), leg_along_x=True)
     assert blind.is_blind
     assert blind.sink_mps(1.6) > 0.0
-    assert blind.sink_mps(PARAMS.hazards.blind_m) == 0.0
+    assert blind.sink_mps(PARAMS.hazards.expert.blind_m) == 0.0
     blind.step(senses(0.5, 0.5), leg_along_x=True)
     assert not blind.is_blind
 
@@ -49,7 +51,7 @@ def over(blind: FloorViewMonitor, seconds: float, leg_along_x: bool, telemetry_a
 
 
 def test_on_a_leg_only_the_line_that_is_followed_keeps_it_in_the_air() -> None:
-    seconds = PARAMS.hazards.search_land_s + 0.2
+    seconds = PARAMS.hazards.expert.search_land_s + 0.2
     assert over(FloorViewMonitor(PARAMS), seconds, leg_along_x=True)
     assert not over(FloorViewMonitor(PARAMS), seconds, leg_along_x=False)
 
@@ -62,6 +64,6 @@ def test_lost_telemetry_is_not_taken_for_a_lost_view() -> None:
 def test_a_blind_descent_never_stops_and_is_gentle_at_the_floor(a_m: float, b_m: float) -> None:
     blind = FloorViewMonitor(PARAMS)
     low, high = sorted((a_m, b_m))
-    assert PARAMS.touch_blind_mps <= blind.rate_mps(low) <= blind.rate_mps(high) <= PARAMS.blind_mps
-    assert blind.rate_mps(0.1) == PARAMS.touch_blind_mps
-    assert blind.rate_mps(math.nan) == PARAMS.land_mps
+    assert EXPERT.touch_blind_mps <= blind.rate_mps(low) <= blind.rate_mps(high) <= EXPERT.blind_mps
+    assert blind.rate_mps(0.1) == EXPERT.touch_blind_mps
+    assert blind.rate_mps(math.nan) == PARAMS.mission.land_mps

@@ -3,113 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
+from flightd.config.battery import BatteryConfig
+from flightd.config.scan import ScanConfig
 from flightd.core.types import (
-    Attitude,
-    Command,
     CommandKind,
     Demand,
-    GridPose,
     LandedState,
     Phase,
-    VehicleState,
 )
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.guidance import Guidance, Guide, MissionInputs, MissionParams
-from flightd.mission.mission import Mission
-from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.guidance import Guide
+from flightd.mission.machine import Intent, State
 from flightd.mission.scan.scanner import Scanner
-from flightd.mission.scan.views import ScanParams
-from flightd.sim.random_sites import random_site
-from flightd.site.site import Site
 from tests.unit.mission import shelves
-
-SITE = random_site(3)
-POLICY = HeadingPolicy(Heading.ALONG)
-TICK_NS = 20_000_000
-
-
-class Flight:
-    """Feeds a mission with senses: by default all is well and the drone is wherever the mission wants."""
-
-    def __init__(
-        self, params: MissionParams | None = None, site: Site = SITE, scanner: Scanner | None = None
-    ) -> None:
-        home = site.home.node
-        plan = make_plan(site, site.serpentine_route(), home, home, POLICY)
-        self.mission = Mission(site, plan, POLICY, params or MissionParams(dwell_s=1.0), scanner)
-        self.site = site
-        self.integrity = 1.0
-        self.now_ns = 10**12
-        self.guidance: Guidance | None = None
-        state = VehicleState(
-            Attitude(0, 0, 0, 0),
-            0.1,
-            0,
-            0.0,
-            "GUIDED_NOGPS",
-            True,
-            False,
-            LandedState.ON_GROUND,
-            0.9,
-            12.0,
-            0,
-        )
-        self.senses = MissionInputs(0, 0.02, None, True, 0.1, True, 0.0, 0.0, 0.0, state)
-
-    @property
-    def phase(self) -> Phase:
-        return self.mission.phase
-
-    def set(self, **changes: object) -> None:
-        vehicle = {k: v for k, v in changes.items() if k in VehicleState.__slots__ and k != "height_m"}
-        other = {k: v for k, v in changes.items() if k not in vehicle}
-        assert self.senses.vehicle is not None
-        state = replace(self.senses.vehicle, **vehicle)  # type: ignore[arg-type]
-        self.senses = replace(self.senses, vehicle=state, **other)  # type: ignore[arg-type]
-
-    def run(self, seconds: float, until: Callable[[], bool] = lambda: False, follow: bool = True) -> None:
-        for _ in range(round(seconds / 0.02)):
-            self.now_ns += TICK_NS
-            g = self.guidance
-            if follow and g is not None and g.guide is not Guide.NONE:
-                height = 0.1 + (0.0 if math.isnan(g.reference.height_m) else g.reference.height_m)
-                if not math.isnan(self.senses.height_m):
-                    self.senses = replace(self.senses, height_m=height)
-                r = g.reference
-                node = self.site.nearest(r.x_m, r.y_m)
-                pose = GridPose(
-                    self.now_ns,
-                    node.id,
-                    0,
-                    0,
-                    r.yaw_rad,
-                    r.x_m,
-                    r.y_m,
-                    r.vx_mps,
-                    r.vy_mps,
-                    height,
-                    (0.0,) * 9,
-                    self.integrity,
-                )
-                self.senses = replace(self.senses, pose=pose)
-            if g is not None and g.demand is Demand.FLY:
-                self.set(armed=True)
-            self.set(heartbeat_ns=self.now_ns - round(self.senses.telemetry_age_s * 1e9))
-            self.guidance = self.mission.step(replace(self.senses, now_ns=self.now_ns))
-            if until():
-                return
-
-    def to(self, phase: Phase, within_s: float = 60.0) -> None:
-        self.run(within_s, lambda: self.phase is phase)
-        assert self.phase is phase, self.mission.reason
-
-    def order(self, kind: CommandKind, node: str = "") -> None:
-        self.mission.command(Command("1", kind, node), self.now_ns)
+from tests.unit.mission.configured import configured
+from tests.unit.mission.driven import SITE, TICK_NS, Flight
 
 
 def test_a_flight_where_all_is_well_visits_everything() -> None:
@@ -125,8 +37,55 @@ def test_a_flight_where_all_is_well_visits_everything() -> None:
     assert flight.mission.visited == list(SITE.serpentine_route())
 
 
+def test_a_correction_over_the_pad_is_the_reason_for_the_end_that_it_makes() -> None:
+    flight = Flight()
+    flight.to(Phase.LAND, 600)
+    pose = flight.senses.pose
+    assert pose is not None
+    flight.set(pose=replace(pose, x_m=pose.x_m + 2.0))
+    flight.run(0.1, follow=False)
+    assert flight.phase is Phase.LAND
+    assert flight.mission.reason == "the position was corrected while landing"
+    flight.set(landed=LandedState.ON_GROUND, armed=False)
+    flight.run(0.1, follow=False)
+    assert flight.mission.state == State(Phase.ABORTED, Intent.END)
+    assert flight.mission.reason == "the position was corrected while landing"
+
+
+@pytest.mark.parametrize("orders", [("stop", "land"), ("land", "stop")])
+def test_a_stop_stands_whatever_else_is_ordered_at_the_same_tick(orders: tuple[str, str]) -> None:
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    for order in orders:
+        flight.order(CommandKind(order))
+    flight.run(0.02)
+    assert flight.mission.state == State(Phase.LAND, Intent.STOP)
+    assert flight.guidance is not None
+    assert flight.guidance.at_once
+
+
+def test_a_stop_as_it_comes_to_stand_on_the_pad_ends_the_mission() -> None:
+    flight = Flight()
+    flight.to(Phase.LAND, 600)
+    flight.order(CommandKind.STOP)
+    flight.set(landed=LandedState.ON_GROUND, armed=False)
+    flight.run(0.1, follow=False)
+    assert (flight.phase, flight.mission.reason) == (Phase.ABORTED, "stop ordered")
+
+
+def test_a_pause_lasts_no_longer_than_a_full_battery() -> None:
+    """Whatever the vehicle says of its charge."""
+    flight = Flight(configured(BatteryConfig(flight_s=200.0), dwell_s=1.0))
+    flight.to(Phase.FOLLOW)
+    flight.order(CommandKind.PAUSE)
+    flight.run(199.0)
+    assert flight.phase is Phase.HOLD
+    flight.run(2.0)
+    assert (flight.phase, flight.mission.reason) == (Phase.LAND, "the phase took too long")
+
+
 def test_on_the_ground_only_a_hazard_that_decides_something_is_told() -> None:
-    flight = Flight(MissionParams(autostart=False))
+    flight = Flight(configured(autostart=False))
     flight.set(localised=False, x_age_s=60.0, y_age_s=60.0)
     flight.run(2.0)
     assert not [event for event in flight.mission.drain_events() if event.name == "hazard"]
@@ -145,7 +104,7 @@ def test_on_the_ground_only_a_hazard_that_decides_something_is_told() -> None:
 
 
 def test_a_position_lost_between_two_flights_does_not_shift_the_second_one() -> None:
-    relocator = Relocator(MissionParams())
+    relocator = Relocator(configured().mission, math.inf, ())
     flight = Flight()
     flight.to(Phase.FOLLOW)
     sure = flight.senses
@@ -239,7 +198,7 @@ def test_lines_that_only_flicker_end_in_a_landing() -> None:
 
 
 def test_a_view_lost_at_height_is_borne_as_long_as_any_however_long_the_climb_saw_no_line() -> None:
-    flight = Flight(MissionParams(climb_mps=0.2))
+    flight = Flight(configured(climb_mps=0.2))
     flight.set(x_age_s=60.0, y_age_s=60.0)
     flight.to(Phase.TAKE_OFF)
     flight.run(60.0, lambda: flight.senses.height_m > 1.35)
@@ -264,14 +223,14 @@ def test_on_a_leg_other_lines_do_not_stand_in_for_the_one_followed() -> None:
 
 def test_a_long_leg_is_given_its_time() -> None:
     """Ten times as long as the slack that every phase has."""
-    flight = Flight(MissionParams(dwell_s=0.0, speed_mps=0.1, accel_mps2=0.5, phase_slack_s=3.0))
+    flight = Flight(configured(dwell_s=0.0, speed_mps=0.1, accel_mps2=0.5, expert={"phase_slack_s": 3.0}))
     flight.to(Phase.LAND, 1200)
     assert flight.mission.reason == "route done"
 
 
 @pytest.mark.parametrize("kind", [CommandKind.STOP, CommandKind.LAND])
 def test_an_order_to_end_before_the_start_never_arms(kind: CommandKind) -> None:
-    flight = Flight(MissionParams(autostart=False))
+    flight = Flight(configured(autostart=False))
     flight.run(0.2)
     flight.order(kind)
     flight.order(CommandKind.START)
@@ -285,7 +244,7 @@ def test_an_order_to_end_before_the_start_never_arms(kind: CommandKind) -> None:
 
 
 def test_low_battery_flies_home_even_when_paused_and_without_dwelling() -> None:
-    flight = Flight(MissionParams(dwell_s=500.0))
+    flight = Flight(configured(dwell_s=500.0))
     flight.to(Phase.FOLLOW)
     flight.order(CommandKind.PAUSE)
     flight.run(2.0)
@@ -297,7 +256,7 @@ def test_low_battery_flies_home_even_when_paused_and_without_dwelling() -> None:
 
 
 def test_home_is_refused_on_the_floor() -> None:
-    flight = Flight(MissionParams(autostart=False))
+    flight = Flight(configured(autostart=False))
     flight.run(0.1)
     flight.order(CommandKind.HOME)
     flight.order(CommandKind.START)
@@ -306,8 +265,8 @@ def test_home_is_refused_on_the_floor() -> None:
 
 
 def test_a_moment_of_doubt_as_a_view_ends_does_not_hold_the_scan_for_ever() -> None:
-    scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanParams(max_height_m=4.0, view_s=2.0, retakes=0))
-    flight = Flight(MissionParams(view_height_m=0.15), shelves.SITE, scanner)
+    scanner = Scanner(shelves.SITE, shelves.SIGHT, ScanConfig(max_height_m=4.0, view_s=2.0, retakes=0))
+    flight = Flight(configured(expert={"view_height_m": 0.15}), shelves.SITE, scanner)
     flight.to(Phase.SCAN)
     first = scanner.view
     flight.run(1.9)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flightd.core.types import Attitude, LandedState, VehicleState
-from flightd.mission.guidance import ALL_WELL, MissionInputs, MissionParams
+from flightd.mission.guidance import ALL_WELL, MissionInputs
+from flightd.mission.reasons import in_words
 from flightd.mission.safety.readiness import not_ready
+from tests.unit.mission.configured import configured
 
-PARAMS = MissionParams()
+PARAMS = configured()
 VEHICLE = VehicleState(
     attitude=Attitude(10**9, 0.0, 0.0, 0.0),
     height_m=0.1,
@@ -37,6 +39,8 @@ READY = MissionInputs(
 
 
 def test_late_pictures_keep_it_on_the_ground() -> None:
-    assert not not_ready(READY, PARAMS, ground_silent=False)
+    assert not_ready(READY, PARAMS, ground_silent=False) is None
     late = replace(READY, warnings=replace(ALL_WELL, picture_age_s=PARAMS.hazards.latency_s + 0.05))
-    assert "pictures are more than 250 ms old" in not_ready(late, PARAMS, ground_silent=False)
+    reason = not_ready(late, PARAMS, ground_silent=False)
+    assert reason is not None
+    assert "pictures are more than 250 ms old" in in_words(reason)

@@ -7,10 +7,11 @@ import math
 import pytest
 
 from flightd.core.types import Command, CommandKind, Demand, LandedState, Phase
-from flightd.mission.guidance import Guide, MissionParams
-from tests.unit.mission.test_mission import Flight
+from flightd.mission.guidance import Guide
+from tests.unit.mission.configured import configured
+from tests.unit.mission.driven import Flight
 
-PARAMS = MissionParams(dwell_s=1.0, recover_s=3.0, autostart=True)
+PARAMS = configured(dwell_s=1.0, recover_s=3.0, autostart=True)
 
 
 def found_flying(**changes: object) -> Flight:
@@ -108,7 +109,7 @@ def test_without_a_height_it_does_not_climb_or_sink() -> None:
 
 
 def test_one_that_takes_off_while_we_wait_is_somebody_elses() -> None:
-    flight = Flight(MissionParams(autostart=False))
+    flight = Flight(configured(autostart=False))
     flight.run(1.0)
     flight.set(armed=True, landed=LandedState.IN_AIR, height_m=1.5, in_control=False, mode="ALT_HOLD")
     flight.run(5.0, follow=False)

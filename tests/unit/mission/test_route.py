@@ -10,16 +10,17 @@ import time
 import numpy as np
 import pytest
 
-from flightd.mission.guidance import MissionParams
-from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.config.mission import Heading
+from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
 from flightd.mission.plan.leg_times import Legs, Pace
 from flightd.mission.plan.route_optimiser import best_order
 from flightd.sim.random_sites import random_site
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, Pad, Site
 from flightd.site.ways import NoWayError, OneWay
+from tests.unit.mission.configured import configured
 
-PACE = Pace.of(MissionParams())
+PACE = Pace.of(configured().mission)
 
 
 def hall(aisles: int, nodes: int, one_way: bool = False) -> Site:
@@ -120,7 +121,7 @@ def test_a_stop_behind_closed_lines_is_refused() -> None:
 def test_times_of_the_legs_are_those_that_the_profile_needs() -> None:
     site = hall(2, 4)
     legs = Legs(site, HeadingPolicy(Heading.ALONG), PACE)
-    p = MissionParams()
+    p = configured().mission
     ramp_s = p.speed_mps / p.accel_mps2
     straight_s = 4.5 / p.speed_mps + ramp_s + p.settle_s
     travel = legs.travel(["AA1", "AA4", "AB4"])

@@ -8,24 +8,27 @@ from dataclasses import replace
 
 import pytest
 
+from flightd.config.scan import ScanConfig
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, Finding, Light, Occupancy
 from flightd.core.types import CodeRead
 from flightd.mission.scan.scanner import Scanner, nodes_to_count
-from flightd.mission.scan.views import ScanParams, View
+from flightd.mission.scan.views import View
 from flightd.site.racks import code_form
 from flightd.site.ways import KeepOut
 from tests.unit.mission.shelves import SIGHT, SITE, picture, pose, read
 
-PARAMS = ScanParams(max_height_m=4.0, aside_per_height=0.4)
+PARAMS = ScanConfig(max_height_m=4.0)
+EXPERT = PARAMS.expert
+ASIDE_PER_HEIGHT = 0.4
 STEP_NS = 250_000_000
 
 
 class Hover:
     """A scan of A2: answers each picture of the present view until the node is over."""
 
-    def __init__(self, params: ScanParams = PARAMS) -> None:
-        self.scanner = Scanner(SITE, SIGHT, params)
+    def __init__(self, params: ScanConfig = PARAMS) -> None:
+        self.scanner = Scanner(SITE, SIGHT, params, aside_per_height=ASIDE_PER_HEIGHT)
         self.scanner.arrive("A2", 1.0, -math.pi / 2)
         self.now_ns = 10**9
         self.seq = 0
@@ -142,7 +145,7 @@ def test_one_read_without_a_checksum_is_never_believed() -> None:
 
 
 def test_two_texts_of_one_label_cancel_each_other() -> None:
-    hover = Hover(replace(PARAMS, retakes=0))
+    hover = Hover(PARAMS.with_values(retakes=0))
     code = LOCATIONS[0]
     hover.at_view()
     for text in ("ONE", "ONE", "TWO", "TWO"):
@@ -168,7 +171,7 @@ def test_the_undecided_is_looked_at_again_from_nearer_and_then_given_up() -> Non
 
 
 def test_a_view_without_pictures_times_out() -> None:
-    hover = Hover(replace(PARAMS, retakes=0))
+    hover = Hover(PARAMS.with_values(retakes=0))
     hover.at_view()
     assert not hover.scanner.step(hover.now_ns + round(0.9 * PARAMS.view_s * 1e9))
     assert hover.scanner.step(hover.now_ns + round(1.1 * PARAMS.view_s * 1e9))
@@ -212,7 +215,7 @@ def counted_at(scanner: Scanner, node: str = "A2") -> None:
 
 
 def test_findings_stay_pending_until_two_more_nodes_are_reached_without_a_doubt() -> None:
-    scanner = Scanner(SITE, SIGHT, PARAMS)
+    scanner = Scanner(SITE, SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
     counted_at(scanner)
     found, settled = scanner.drain()
     assert {f.location for f in found} == set(LOCATIONS)
@@ -227,14 +230,14 @@ def test_findings_stay_pending_until_two_more_nodes_are_reached_without_a_doubt(
 
 
 def test_coming_home_proves_everything() -> None:
-    scanner = Scanner(SITE, SIGHT, PARAMS)
+    scanner = Scanner(SITE, SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
     counted_at(scanner)
     scanner.home(certain=True)
     assert [s.confirmed for s in scanner.drain()[1]] == [True]
 
 
 def test_a_contradicting_location_label_withdraws_what_is_pending() -> None:
-    scanner = Scanner(SITE, SIGHT, PARAMS)
+    scanner = Scanner(SITE, SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
     counted_at(scanner)
     scanner.drain()
     scanner.arrive("A3", 1.0, -math.pi / 2)
@@ -252,7 +255,7 @@ def test_a_contradicting_location_label_withdraws_what_is_pending() -> None:
 
 
 def test_a_code_that_may_be_its_own_is_no_empty_place() -> None:
-    hover = Hover(replace(PARAMS, retakes=0))
+    hover = Hover(PARAMS.with_values(retakes=0))
     code = LOCATIONS[0]
     hover.at_view()
     border = hover.scanner._assigner.cells[code].x0_m
@@ -283,7 +286,7 @@ def test_an_agreeing_location_label_proves_its_node_at_once() -> None:
 def test_a_count_that_goes_on_visits_only_what_is_left() -> None:
     counted = {place.code for place in SITE.locations.values() if place.node != "A3"}
     assert nodes_to_count(SITE, ("A1", "A2", "A3", "A4"), counted) == ("A3",)
-    scanner = Scanner(SITE, SIGHT, PARAMS)
+    scanner = Scanner(SITE, SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
     scanner.skip(counted)
     assert not scanner.wants("A2")
     assert scanner.wants("A3")
@@ -291,7 +294,7 @@ def test_a_count_that_goes_on_visits_only_what_is_left() -> None:
 
 @pytest.mark.parametrize("offset_m", [-0.3, 0.0, 0.3])
 def test_a_re_take_at_the_end_of_an_aisle_stays_over_its_line(offset_m: float) -> None:
-    scanner = Scanner(SITE, SIGHT, PARAMS)
+    scanner = Scanner(SITE, SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
     scanner.arrive("A1", 1.0, -math.pi / 2)
     view = scanner.view
     assert view is not None
@@ -304,7 +307,7 @@ def test_re_takes_stay_clear_of_keep_outs() -> None:
     node = SITE.nodes["A2"]
 
     def retakes(*areas: KeepOut) -> list[View]:
-        scanner = Scanner(replace(SITE, keep_outs=areas), SIGHT, PARAMS)
+        scanner = Scanner(replace(SITE, keep_outs=areas), SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
         scanner.arrive("A2", 1.0, -math.pi / 2)
         found, view = [], scanner.view
         while view is not None and (view := scanner._planner.retake(view, view.locations)) is not None:
@@ -342,7 +345,7 @@ def test_a_location_label_is_told_to_the_localiser_with_its_way_from_the_drone()
 
 
 def test_a_doubt_alone_keeps_what_is_pending_but_proves_nothing_meanwhile() -> None:
-    scanner = Scanner(SITE, SIGHT, PARAMS)
+    scanner = Scanner(SITE, SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
     counted_at(scanner)
     scanner.drain()
     scanner.doubt()
@@ -357,21 +360,21 @@ def test_a_doubt_alone_keeps_what_is_pending_but_proves_nothing_meanwhile() -> N
 
 
 def test_a_node_whose_findings_were_withdrawn_is_due_again_but_not_for_ever() -> None:
-    scanner = Scanner(SITE, SIGHT, PARAMS)
+    scanner = Scanner(SITE, SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
     due = []
-    for _ in range(PARAMS.revisits + 1):
+    for _ in range(EXPERT.revisits + 1):
         counted_at(scanner)
         scanner.doubt()
         scanner.withdraw(1, "elsewhere")
         scanner.trust()
         due.append(scanner.take_due())
         assert scanner.wants("A2")
-    assert due == [("A2",)] * PARAMS.revisits + [()]
+    assert due == [("A2",)] * EXPERT.revisits + [()]
 
 
 @pytest.mark.parametrize(("pictures", "state"), [(1, LocationState.UNREADABLE), (2, LocationState.EMPTY)])
 def test_one_picture_never_makes_a_place_empty(pictures: int, state: LocationState) -> None:
-    hover = Hover(replace(PARAMS, retakes=0))
+    hover = Hover(PARAMS.with_values(retakes=0))
     view = hover.at_view()
     code = view.locations[0]
     for _ in range(pictures):
@@ -383,7 +386,7 @@ def test_one_picture_never_makes_a_place_empty(pictures: int, state: LocationSta
 
 
 def test_a_location_label_that_the_map_lacks_is_no_stock() -> None:
-    hover = Hover(replace(PARAMS, retakes=0))
+    hover = Hover(PARAMS.with_values(retakes=0))
     code = LOCATIONS[0]
     hover.run(GOODS, {code: ("AL-77-1-2",)})
     assert hover.found[code].state is LocationState.UNREADABLE
@@ -407,7 +410,7 @@ def too_dark(wanted: float) -> tuple[float, Light]:
     return wanted, Light.FAIR if wanted > 1.6 else Light.DIM
 
 
-@pytest.mark.parametrize(("camera", "part"), [(too_bright, PARAMS.darker), (too_dark, PARAMS.brighter)])
+@pytest.mark.parametrize(("camera", "part"), [(too_bright, EXPERT.darker), (too_dark, EXPERT.brighter)])
 def test_what_is_lit_wrongly_is_looked_at_from_the_same_place_with_another_exposure(
     camera: Callable[[float], tuple[float, Light]], part: float
 ) -> None:
@@ -458,7 +461,7 @@ def test_a_place_is_empty_after_looks_in_a_row_unless_goods_were_ever_seen() -> 
 
 
 def test_a_single_doubtful_look_leaves_a_place_empty_that_no_picture_shows_whole() -> None:
-    hover = Hover(replace(PARAMS, retakes=0))
+    hover = Hover(PARAMS.with_values(retakes=0))
     codes = hover.scanner._planner.locations("A2")
     while hover.scanner.view is not None:
         hover.at_view()

@@ -13,7 +13,7 @@ import pytest
 from flightd.adapters.recorder import archive as archive_module
 from flightd.adapters.recorder.archive import FlightArchive
 from flightd.adapters.recorder.mcap_file import McapFile, is_whole
-from flightd.cli.run import kept_room
+from flightd.app.run import room_kept
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.replay.log import read_log
 
@@ -174,7 +174,7 @@ def test_trouble_with_the_archive_is_told_at_once_and_the_flight_goes_on(
             told.append(str(err))
             heard.set()
 
-        async with kept_room(archive, hear), asyncio.timeout(10.0):
+        async with room_kept(archive, hear), asyncio.timeout(10.0):
             await heard.wait()
 
     asyncio.run(flight(OSError(5, "Input/output error")))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.adapters.recorder.schemas import schema_of
 from flightd.core.errors import UnavailableError
 from flightd.core.topics import Document, RecordedFrame, Topic
@@ -148,7 +148,7 @@ def test_a_log_that_another_recorder_writes_is_not_taken_from_it(tmp_path: Path)
     path = tmp_path / "flight.mcap"
     with McapRecorder(path) as recorder:
         recorder.record(Topic.POSE, 2, POSE)
-        recorder._push()
+        recorder.push()
         _wait_for(path, 1)
         with pytest.raises(UnavailableError, match="another process is writing"):
             McapRecorder(path)
@@ -157,7 +157,7 @@ def test_a_log_that_another_recorder_writes_is_not_taken_from_it(tmp_path: Path)
 
 def test_nothing_is_lost_in_a_clean_close_under_load(tmp_path: Path) -> None:
     count = 20_000
-    with McapRecorder(tmp_path / "flight.mcap", queue_bytes=1 << 16, lossless=True) as recorder:
+    with McapRecorder(tmp_path / "flight.mcap", queue_bytes=1 << 16, when_full=wait_for_disk) as recorder:
         for index in range(count):
             recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index, 0.01))
     assert (recorder.written, recorder.dropped) == (count, 0)
@@ -259,7 +259,7 @@ def test_the_log_is_finished_when_the_daemon_is_killed(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
     recorder = McapRecorder(path)
     recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
-    recorder._push()
+    recorder.push()
     recorder._link.close()  # what the kernel does to a killed process
     recorder._child.wait(30)
     log = read_log(path)
@@ -271,7 +271,7 @@ def test_a_stop_of_the_service_does_not_stop_the_writer(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
     with McapRecorder(path) as recorder:
         recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
-        recorder._push()
+        recorder.push()
         _wait_for(path, 1)
         for name in (signal.SIGTERM, signal.SIGINT):
             os.kill(recorder._child.pid, name)
@@ -290,7 +290,7 @@ def test_a_full_disk_costs_messages_and_is_told(tmp_path: Path, monkeypatch: pyt
 
     monkeypatch.setattr(subprocess, "Popen", limited)
     noise = np.random.default_rng(1)
-    with McapRecorder(tmp_path / "flight.mcap", lossless=True) as recorder:
+    with McapRecorder(tmp_path / "flight.mcap", when_full=wait_for_disk) as recorder:
         for seq in range(100):
             recorder.image(Topic.FRAME, seq, seq, noise.bytes(40_000))
     assert recorder.written + recorder.dropped == 100

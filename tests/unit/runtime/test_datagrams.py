@@ -13,11 +13,24 @@ from typing import Any
 import pytest
 
 from flightd.runtime.batched_reader import PacedReader
-from flightd.runtime.datagrams import Datagrams, PacedDatagrams, is_stalled, open_datagrams
+from flightd.runtime.datagrams import (
+    Datagrams,
+    OpenDatagrams,
+    PacedDatagrams,
+    is_stalled,
+    open_datagrams,
+    open_paced_datagrams,
+)
 from flightd.runtime.event_loops import VirtualLoop
 
 REAL: Callable[[], asyncio.AbstractEventLoop] = asyncio.new_event_loop
 LOOPS = pytest.mark.parametrize("make_loop", [REAL, VirtualLoop], ids=["real", "virtual"])
+
+
+def opener_here() -> OpenDatagrams:
+    """What a flight on the running loop opens its sockets with."""
+    virtual = isinstance(asyncio.get_running_loop(), VirtualLoop)
+    return open_datagrams if virtual else open_paced_datagrams
 
 
 class Ear:
@@ -28,7 +41,7 @@ class Ear:
         self.errors: list[OSError] = []
 
     async def open(self, **place: Any) -> Datagrams:
-        return await open_datagrams(lambda data, _: self.heard.append(data), self.errors.append, **place)
+        return await opener_here()(lambda data, _: self.heard.append(data), self.errors.append, **place)
 
 
 def run(make_loop: Callable[[], asyncio.AbstractEventLoop], test: Callable[[], Any]) -> None:
@@ -92,7 +105,7 @@ def test_a_socket_closed_by_what_it_brought_is_left_alone() -> None:
             ear.heard.append(data)
             listening[0].close()
 
-        listening.append(await open_datagrams(take, ear.errors.append, local_addr=("127.0.0.1", 0)))
+        listening.append(await open_paced_datagrams(take, ear.errors.append, local_addr=("127.0.0.1", 0)))
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as caller:
             for data in (b"first", b"second"):
                 caller.sendto(data, listening[0].socket.getsockname())

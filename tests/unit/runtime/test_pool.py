@@ -18,6 +18,7 @@ from flightd.core.types import Image, LineSet
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import VirtualLoop
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
+from tests.held_time import held
 
 
 class MeanDetector:
@@ -133,9 +134,9 @@ def test_in_lockstep_a_detector_that_hangs_costs_one_picture() -> None:
     async def main() -> list[bool]:
         ring, clock = FrameRing.create(4, 64, 36), LoopClock()
         try:
-            with DetectorPool(partial(MeanDetector), 1, 0.3, clock) as pool:
+            with DetectorPool(partial(MeanDetector), 1, 0.3, clock, held) as pool:
                 await pool.ready()
-                detectors = LockstepDetectors(pool, clock, 0.045)
+                detectors = LockstepDetectors(pool, clock, 0.045, held)
                 found = [await detectors.detect(ticket(ring, seq, 7)) for seq in (1, 13, 20, 21)]
                 return [detection is not None for detection in found]
         finally:

@@ -15,6 +15,7 @@ from flightd.core.scanning import Finding, Settled
 from flightd.core.types import CodeRead
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import VirtualLoop
+from tests.held_time import held
 
 READ = CodeRead("QR Code", "PALLET", ((0.0, 0.0),) * 4, True, 2, 1.0)
 
@@ -59,7 +60,7 @@ class StubbornStore:
 
 async def write(store: StubbornStore, troubles: list[str], seconds: float) -> StoreWriter:
     """Findings 0 to 9 with pictures, 0 to 4 confirmed, 5 withdrawn; run the writer for some time."""
-    with StoreWriter(store, "run", 10**18, LoopClock(), troubles.append) as writer:
+    with StoreWriter(store, "run", 10**18, LoopClock(), troubles.append, held) as writer:
         for number in range(10):
             writer.put(finding(number), b"picture %d" % number)
         writer.settle(Settled(tuple(f"A-{n}" for n in range(5)), confirmed=True))

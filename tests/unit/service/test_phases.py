@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from flightd.adapters.ground_link.request_handler import POSSIBLE
 from flightd.core.types import CommandKind, Phase
+from flightd.mission.machine import possible_in
 from flightd.replay.report.charts import PHASE_TONE
 
 
@@ -12,5 +12,4 @@ def test_the_report_has_a_colour_for_every_phase() -> None:
 
 
 def test_a_vehicle_that_was_found_flying_can_be_landed_from_the_ground_and_nothing_else() -> None:
-    possible = {kind for kind, phases in POSSIBLE.items() if Phase.RECOVER in phases}
-    assert possible == {CommandKind.LAND, CommandKind.STOP}
+    assert possible_in(Phase.RECOVER) == {CommandKind.LAND, CommandKind.STOP}

@@ -100,6 +100,18 @@ def test_the_install_script_refuses_what_it_does_not_know(words: list[str]) -> N
     assert result.stderr.splitlines()[-1].startswith("install.sh: ")
 
 
+@pytest.mark.parametrize("extras", ["nosuch", "ardrone,nosuch", "dev", "*"])
+def test_the_install_script_refuses_an_extra_that_is_not_there(extras: str, tmp_path: Path) -> None:
+    command = [str(SYSTEMD / "install.sh"), "--extras", extras, "--root", str(tmp_path)]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout) == (2, "")
+    (line,) = result.stderr.splitlines()
+    assert line.startswith(f"install.sh: --extras {extras.rpartition(',')[2]}: unknown; choose among ")
+    for known in ("ardrone", "ground", "mavsdk", "xlsx"):
+        assert known in line
+    assert not any(tmp_path.iterdir())
+
+
 def test_every_rule_for_udev_compares_before_it_sets() -> None:
     lines = [
         line for line in (SYSTEMD / "99-flightd.rules").read_text().splitlines() if line[:1] not in {"", "#"}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from flightd.core.types import Attitude, LandedState, Phase, Status, VehicleState
-from flightd.ports import Vitals
+from flightd.core.snapshot import Snapshot
+from flightd.core.tick import TickInput, TickOutput
+from flightd.core.types import Attitude, Demand, GridPose, LandedState, Phase, VehicleState
 
 MS = 1_000_000
 START_NS = 10**12
@@ -26,12 +27,17 @@ def vitals(
     late_s: tuple[float, ...] = (0.001,),
     latencies_ms: tuple[dict[str, float], ...] = (),
     dropped: dict[str, int] | None = None,
-) -> Vitals:
-    status = Status(now_ns, phase, reason, "A2", "A3", 1, 12, 0.81, 1.6, 300, 2, fps, {"total": 71.4})
-    return Vitals(
-        status=status,
-        vehicle=None if heard_ns is None else vehicle(heard_ns),
-        ground_silent_s=0.0,
+) -> Snapshot:
+    pose = GridPose(now_ns, "A2", 0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.6, (0.0,) * 9, 0.99)
+    return Snapshot(
+        TickInput(now_ns, vehicle=None if heard_ns is None else vehicle(heard_ns)),
+        TickOutput(None, Demand.FLY, phase, reason, "A3", 1, 12, pose, None),
+        nodes_done=1,
+        nodes_planned=12,
+        frames=300,
+        frames_dropped=2,
+        fps=fps,
+        latency_ms={"total": 71.4},
         tick_late_s=late_s,
         latencies_ms=latencies_ms,
         dropped=dropped or {"camera": 0, "detection": 2},

@@ -7,17 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.recorder.recorder import McapRecorder
-from flightd.app.simulation.launch import Simulation, _spec
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.app.simulation.ports import free_ports
+from flightd.app.simulation.simulation import Simulation, world_spec
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import VirtualLoop
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.scenario.scenario_files import load_scenario
 from flightd.sim.world import World
+from flightd.site.site_file import load_site
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 
@@ -29,8 +29,8 @@ def test_the_drone_stands_where_the_scenario_carried_it(tmp_path: Path) -> None:
     simulation = Simulation(config, site, load_scenario(file), 1, None, tmp_path)
 
     async def start() -> Kinematics:
-        with McapRecorder(tmp_path / "truth.mcap", lossless=True) as recorder:
-            spec = _spec(simulation, free_ports(config, site))
+        with McapRecorder(tmp_path / "truth.mcap", when_full=wait_for_disk) as recorder:
+            spec = world_spec(simulation, free_ports(config))
             return World(spec, LoopClock(), recorder).vehicle.truth()
 
     loop = VirtualLoop()

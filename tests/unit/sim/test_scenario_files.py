@@ -10,13 +10,13 @@ import pytest
 
 from flightd.app.simulation.process_faults import check_faults
 from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.mission.safety.hazards import HAZARDS
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.scenario.fault_schema import BareFloor, CameraFault
 from flightd.sim.scenario.faults import FaultSchedule, bare_boxes
 from flightd.sim.scenario.scenario_files import load_scenario, load_scenarios, shipped_scenarios
+from flightd.site.site_file import load_site
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")

@@ -8,16 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from flightd.config.site_file import load_site
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
-from flightd.sim.racks.appearance import RackLook
+from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.code_symbols import Symbol, Symbology
 from flightd.sim.racks.rack_layout import BEAM_M, faces, rack_levels
 from flightd.sim.racks.stock import Condition, StockPlace, StockShares, StockSituation, stock
 from flightd.sim.racks.stock_truth import LocationTruth, score_stock, stock_truth, write_truth
 from flightd.sim.scenario.scenario_files import load_scenario
 from flightd.site.site import Rack
+from flightd.site.site_file import load_site
 
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-racks.toml")
 FOCAL_PX = 1000.0
@@ -30,7 +30,7 @@ def places() -> dict[str, StockPlace]:
 
 @cache
 def truth() -> dict[str, LocationTruth]:
-    return stock_truth(SITE, RackLook(), FOCAL_PX, 1)
+    return stock_truth(SITE, RackAppearance(), FOCAL_PX, 1)
 
 
 def record(code: str, state: LocationState, *texts: str) -> LocationRecord:
@@ -124,12 +124,12 @@ def test_a_scenario_sets_shares_and_camera(tmp_path: Path) -> None:
     file = tmp_path / "half.toml"
     file.write_text("[racks]\nempty = 0.5\nseed = 4\n[front_camera]\nwidth_px = 640\n")
     scenario = load_scenario(file)
-    assert scenario.racks.look() == RackLook(replace(StockShares(), empty=0.5), seed=4)
+    assert scenario.racks.appearance() == RackAppearance(replace(StockShares(), empty=0.5), seed=4)
     assert scenario.front_camera.camera().lens.centre_px == (319.5, 399.5)
 
 
 def test_the_racks_own_seed_keeps_the_stock_whatever_the_flights_seed_is() -> None:
-    look = RackLook(seed=4)
+    look = RackAppearance(seed=4)
     assert stock_truth(SITE, look, FOCAL_PX, 1) == stock_truth(SITE, look, FOCAL_PX, 2)
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flightd.config.site_file import load_site
 from flightd.site.ambiguity import alike
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, Pad, Site
+from flightd.site.site_file import load_site
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 

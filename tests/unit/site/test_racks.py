@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.config.site_file import load_site, parse_site, site_toml
 from flightd.core.errors import InputError
 from flightd.site.coverage import FrontView, check_coverage
 from flightd.site.site import Side, Site
+from flightd.site.site_file import load_site, parse_site, site_toml
 
 DEMO = Path(__file__).parents[3] / "configs" / "site-demo.toml"
 

@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightd.config.site_file import parse_site, site_toml
+from flightd.config.mission import Heading
 from flightd.core.errors import InputError
-from flightd.mission.plan.flight_plan import Heading, HeadingPolicy, make_plan
+from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
 from flightd.site.layout import LayoutError, lay_out
 from flightd.site.site import Aisle, Pad, Site
+from flightd.site.site_file import parse_site, site_toml
 from flightd.site.ways import KeepOut, NoWayError, OneWay
 
 POLICY = HeadingPolicy(Heading.ALONG)

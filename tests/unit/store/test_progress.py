@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from pathlib import Path
 
 import pytest
 
 from flightd.adapters.store.progress import LeftOver, NothingLeftError, ProgressFile, load_left_over
 from flightd.app.build import plan_of
-from flightd.app.resume import resumed as take_up
-from flightd.config.schema import load_config
-from flightd.config.site_file import load_site
+from flightd.app.flight_orders import configured_order, resumed
+from flightd.config.schema import Config, load_config
 from flightd.core.errors import InputError, TransientError
+from flightd.core.flight_order import FlightOrder
+from flightd.site.site_file import load_site
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 DEMO = load_site(CONFIGS / "site-demo.toml")
@@ -76,14 +78,18 @@ def test_what_is_left_over_takes_the_place_of_the_configured_nodes(tmp_path: Pat
     config = load_config(CONFIGS / "sim.toml")
     path = tmp_path / "progress.json"
     with pytest.raises(InputError, match=r"mission\.progress names no file"):
-        take_up(config, path, DEMO, ordered=True)
+        taken_up(config, path, wanted=True)
     mission = config.mission.model_copy(update={"progress": path, "resume": True})
     config = config.model_copy(update={"mission": mission})
-    assert take_up(config, path, DEMO, ordered=False).mission.nodes == ()
+    assert taken_up(config, path, wanted=False).nodes == ()
     with pytest.raises(InputError, match="nothing to resume"):
-        take_up(config, path, DEMO, ordered=True)
+        taken_up(config, path, wanted=True)
     asyncio.run(kept(path, ("A3", "B1")))
-    resumed = take_up(config, path, DEMO, ordered=False).mission
-    assert (resumed.nodes, resumed.pad) == (("A3", "B1"), "home")
-    assert resumed.start_yaw_deg == pytest.approx(171.9, abs=0.1)
-    assert plan_of(config.model_copy(update={"mission": resumed}), DEMO).stops[0].visit
+    order = taken_up(config, path, wanted=False)
+    assert (order.nodes, order.pad) == (("A3", "B1"), "home")
+    assert math.degrees(order.start_yaw_rad) == pytest.approx(171.9, abs=0.1)
+    assert plan_of(config, DEMO, order).stops[0].visit
+
+
+def taken_up(config: Config, path: Path, *, wanted: bool) -> FlightOrder:
+    return resumed(configured_order(config), config, path, DEMO, wanted=wanted)

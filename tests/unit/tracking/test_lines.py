@@ -7,12 +7,13 @@ import random
 
 import pytest
 
+from flightd.config.tracking import MotionNoise, TrackingConfig, TrackingExpert
 from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount
 from flightd.core.types import Attitude, Line, LineSet
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.random_sites import random_site
-from flightd.tracking.axis_filters import AxisTracker, LineMeasurement, MotionNoise
-from flightd.tracking.line_tracker import LineTracker, TrackerParams
+from flightd.tracking.axis_filters import AxisTracker, LineMeasurement
+from flightd.tracking.line_tracker import LineTracker
 from tests.sim.ideal_sight import EyeErrors, IdealEye
 
 LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)
@@ -27,8 +28,9 @@ def flown(
 ) -> tuple[LineTracker, Kinematics, int]:
     """A drone that accelerates along the first aisle by a constant pitch, without drag; its pictures
     come late, its own yaw is off by `yaw_offset_rad`."""
-    params = TrackerParams(LENS, Mount(), width_m=SITE.line_width_m, noise=MotionNoise(drag_per_s=0.0))
-    tracker, eye = LineTracker(params, 0.0), IdealEye(SITE, LENS, Mount(), EyeErrors(0.1, 0.0002), 1)
+    no_drag = TrackingConfig(expert=TrackingExpert(noise=MotionNoise(drag_per_s=0.0)))
+    tracker = LineTracker(LENS, Mount(), SITE.line_width_m, 0.0, config=no_drag)
+    eye = IdealEye(SITE, LENS, Mount(), EyeErrors(0.1, 0.0002), 1)
     accel = GRAVITY_MPS2 * math.tan(tilt_rad)
     start = SITE.nodes["A1"]
     waiting: list[tuple[int, LineSet]] = []
@@ -92,7 +94,7 @@ def test_a_frame_older_than_the_last_or_without_attitude_is_refused() -> None:
 
 
 def test_a_line_of_another_width_is_not_paint() -> None:
-    tracker = LineTracker(TrackerParams(LENS, Mount(), width_m=0.075), 0.0)
+    tracker = LineTracker(LENS, Mount(), 0.075, 0.0)
     for i in range(1, 10):
         tracker.attitude(Attitude(i * FRAME_NS, 0.0, 0.0, 0.0))
         wide = Line(0.0, 0.0, 60.0, -180.0, 180.0, 1.0, 0.1, 0.001)

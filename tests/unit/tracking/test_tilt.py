@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightd.config.control import TiltCompensation
 from flightd.core.geometry import Lens, Mount
 from flightd.core.types import Attitude
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.random_sites import random_site
 from flightd.site.site import PaintedLine, Site
-from flightd.tracking.tilt_compensation import FloorView, GroundLine, TiltCompensation, ground_lines
+from flightd.tracking.tilt_compensation import FloorView, GroundLine, ground_lines
 from tests.sim.ideal_sight import EyeErrors, IdealEye
 
 LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 
 from flightd.adapters.vehicle.ardrone.settings import DroneCamera
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.ardrone.video import DecodedFrame, VideoStream
 from flightd.ports import Clock
+from flightd.runtime.clock import Hold
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
 
 SLOTS = 8
@@ -27,12 +29,14 @@ class ArDroneCamera:
         latency_s: float,
         clock: Clock,
         on_frame: dict[DroneCamera, Callable[[FrameTicket], None]],
+        hold: Hold = nullcontext,
     ) -> None:
         self._vehicle = vehicle
         self._on_frame = on_frame
         self._address = vehicle.video_address
         self._clock = clock
         self._latency_s = latency_s
+        self._hold = hold
         self._ring: FrameRing | None = None
         self._seq = 0
         self.unassigned = 0
@@ -49,7 +53,7 @@ class ArDroneCamera:
         """Receive until cancelled; the shared memory lives as long.  Raises `UnavailableError` when
         PyAV is missing."""
         try:
-            await VideoStream(self._address, self._latency_s, self._clock, self._show).run()
+            await VideoStream(self._address, self._latency_s, self._clock, self._show, self._hold).run()
         finally:
             if self._ring is not None:
                 self._ring.close()

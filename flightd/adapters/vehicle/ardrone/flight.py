@@ -24,8 +24,19 @@ from __future__ import annotations
 from flightd.adapters.vehicle.ardrone import at
 from flightd.adapters.vehicle.ardrone.at import AtCommand
 from flightd.adapters.vehicle.ardrone.navdata import DroneState, Major
+from flightd.adapters.vehicle.ardrone.refusal import (
+    DisarmInFlight,
+    Emergency,
+    LandedByItself,
+    LinkLost,
+    NoNavdata,
+    NotConfigured,
+    StaysLanded,
+    Unattended,
+)
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
+from flightd.adapters.vehicle.refusal import Refusal
 from flightd.core.types import AttitudeSetpoint, Demand
 
 _TRIM_REPEATS = 3
@@ -77,7 +88,7 @@ class FlightLogic:
         self._hushed = False
         self._stood = False
         self._alone_since_ns: int | None = None
-        self._over = ""
+        self._over: Refusal | None = None
 
     # what others say
 
@@ -88,7 +99,7 @@ class FlightLogic:
         self._hushed = demand is Demand.HANDS_OFF and self._telemetry.airborne
         self.demand = demand
         self._flew = self._sinking = self._stood = False
-        self._over = ""
+        self._over = None
         self._asked_ns = self._press_ns = self._setpoint = self._alone_since_ns = None
 
     def forget_drone(self) -> None:
@@ -127,26 +138,25 @@ class FlightLogic:
             and not telemetry.state & (DroneState.EMERGENCY | DroneState.COM_LOST)
         )
 
-    def refusal(self, now_ns: int) -> str:
-        """Why the drone does not do what is demanded, or an empty text."""
+    def refusal(self, now_ns: int) -> Refusal | None:
+        """Why the drone does not do what is demanded; None where it does."""
         if not self.heard:
-            return "no navdata from the drone"
-        if self._telemetry.emergency:
-            return f"emergency: {self._telemetry.emergency}"
+            return NoNavdata()
+        if (emergency := self._telemetry.emergency) is not None:
+            return emergency
         if self.demand is Demand.DISARM and self._fly(now_ns):
-            return "disarming in the air would drop the drone: land first"
-        if self._over or self.demand is not Demand.FLY:
+            return DisarmInFlight()
+        if self._over is not None or self.demand is not Demand.FLY:
             return self._over
         return self._take_off_refusal(now_ns)
 
-    def _take_off_refusal(self, now_ns: int) -> str:
+    def _take_off_refusal(self, now_ns: int) -> Refusal | None:
         if not self.configured:
-            return "the drone is still being configured"
+            return NotConfigured()
         waited_s = 0.0 if self._asked_ns is None else (now_ns - self._asked_ns) / 1e9
         if self._telemetry.airborne or waited_s <= self._settings.take_off_patience_s:
-            return ""
-        battery = f"battery at {self._telemetry.battery_percent} %"
-        return f"the drone stays landed and does not say why; {battery} (below about 20 % it refuses)"
+            return None
+        return StaysLanded(self._telemetry.battery_percent)
 
     # what goes out
 
@@ -186,11 +196,11 @@ class FlightLogic:
         if low and setpoint is not None:
             self._sinking |= setpoint.climb_mps < -_DESCENT_MPS
         if telemetry.state & DroneState.EMERGENCY:
-            self._over = f"emergency in flight: {telemetry.emergency}"
+            self._over = Emergency(telemetry.state, in_flight=True)
         elif silent_s > self._settings.link_lost_s:
-            self._over = f"no navdata for {self._settings.link_lost_s:g} s in flight: landing"
+            self._over = LinkLost(self._settings.link_lost_s)
         elif not self._sinking and telemetry.major in (Major.LANDING, Major.LANDED):
-            self._over = f"the drone landed by itself, battery at {telemetry.battery_percent} %"
+            self._over = LandedByItself(telemetry.battery_percent)
 
     def _watch(self, now_ns: int) -> None:
         """Of a drone that is to be left alone: whether another flies it, or nobody does any more."""
@@ -201,7 +211,7 @@ class FlightLogic:
         elif self._alone_since_ns is None:
             self._alone_since_ns = now_ns
         elif now_ns - self._alone_since_ns >= self._settings.unattended_s * 1e9:
-            self._over = f"found flying, nothing demanded for {self._settings.unattended_s:g} s: landing"
+            self._over = Unattended(self._settings.unattended_s)
 
     def _may_take_off(self, now_ns: int) -> bool:
         telemetry = self._telemetry

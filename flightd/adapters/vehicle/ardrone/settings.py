@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
-from flightd.control.limits import Limits
+from flightd.config.control import ControlConfig
 from flightd.core.errors import InputError
 
 _TILT_RAD, _CLIMB_MPS, _YAW_RATE_RADPS = (0.0, 0.52), (0.2, 2.0), (0.7, 6.11)
@@ -85,7 +85,7 @@ class ArDroneSettings:
                 raise ValueError(f"{name} = {value} outside {low}..{high}")
 
 
-def settings_of(url: str, limits: Limits | None = None) -> ArDroneSettings:
+def settings_of(url: str, limits: ControlConfig | None = None) -> ArDroneSettings:
     """Settings for `ardrone://HOST`, with `?at=5556&navdata=5554&video=5555&control=5559&full=1` where they
     differ from the drone's own ports and short navdata; the drone's limits after `limits`, as near as its
     ranges allow.
@@ -107,9 +107,9 @@ def settings_of(url: str, limits: Limits | None = None) -> ArDroneSettings:
         chosen |= {
             name: min(max(value, least), most)
             for name, value, (least, most) in (
-                ("tilt_max_rad", limits.tilt_rad, _TILT_RAD),
-                ("climb_max_mps", max(limits.climb_mps, limits.descend_mps), _CLIMB_MPS),
-                ("yaw_rate_max_radps", limits.yaw_rate_radps, _YAW_RATE_RADPS),
+                ("tilt_max_rad", limits.max_tilt_rad, _TILT_RAD),
+                ("climb_max_mps", max(limits.max_climb_mps, limits.max_descend_mps), _CLIMB_MPS),
+                ("yaw_rate_max_radps", limits.max_yaw_rate_radps, _YAW_RATE_RADPS),
             )
         }
     return ArDroneSettings(host=parts.hostname, full_navdata=given.get("full") == "1", **chosen)

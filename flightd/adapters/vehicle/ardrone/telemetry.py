@@ -7,6 +7,7 @@ from collections import deque
 
 from flightd.adapters.vehicle.ardrone.clock_counters import WrappingCounter
 from flightd.adapters.vehicle.ardrone.navdata import Demo, DroneState, Major, Navdata
+from flightd.adapters.vehicle.ardrone.refusal import Emergency
 from flightd.core.types import Attitude
 from flightd.tracking.clock_offset import DeviceClock
 
@@ -19,15 +20,6 @@ _MAX_ATTITUDES = 1000
 _CLIMB_LAG_S = 0.2
 _JUMP_M = 0.5
 _JUMP_PATIENCE_NS = 300_000_000
-
-EMERGENCIES = {
-    DroneState.CUTOUT: "cut-out, a propeller was blocked",
-    DroneState.ANGLES_OUT_OF_RANGE: "tilted too far",
-    DroneState.MOTORS: "motor problem",
-    DroneState.SOFTWARE_FAULT: "software fault",
-    DroneState.VBAT_LOW: "battery low",
-    DroneState.USER_EMERGENCY_LANDING: "emergency landing by the user",
-}
 
 
 class NavdataTelemetry:
@@ -66,12 +58,9 @@ class NavdataTelemetry:
         return self.demo.battery_percent if self.demo is not None else 0
 
     @property
-    def emergency(self) -> str:
-        """Why the motors are cut, or an empty text."""
-        if not self.state & DroneState.EMERGENCY:
-            return ""
-        causes = [text for bit, text in EMERGENCIES.items() if self.state & bit]
-        return ", ".join(causes) or "cause not told"
+    def emergency(self) -> Emergency | None:
+        """The motors are cut: why; None where they are not."""
+        return Emergency(self.state) if self.state & DroneState.EMERGENCY else None
 
     def observe(self, packet: Navdata, now_ns: int) -> None:
         """Take one packet that arrived now."""

@@ -13,6 +13,7 @@ from flightd.adapters.vehicle.ardrone.link import Link
 from flightd.adapters.vehicle.ardrone.navdata import DroneState, Major, Navdata
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, DroneCamera
 from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
+from flightd.adapters.vehicle.refusal import words
 from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, LandedState, VehicleState
 from flightd.ports import Clock
 
@@ -95,7 +96,7 @@ class ArDroneVehicle:
             battery_frac=demo.battery_percent / 100.0,
             battery_v=telemetry.battery_v,
             heartbeat_ns=telemetry.arrival_ns,
-            refusal=self._flight.refusal(now_ns),
+            refusal=words(self._flight.refusal(now_ns)),
         )
 
     def attitudes(self) -> list[Attitude]:

@@ -16,9 +16,10 @@ from typing import Any
 
 from flightd.adapters.vehicle.ardrone.clock_counters import WrappingCounter
 from flightd.adapters.vehicle.ardrone.pave import CODEC_H264, Control, FrameType, PaveFrame, PaveParser
-from flightd.core.errors import UnavailableError
+from flightd.core.extras import missing_extra
 from flightd.core.types import Image
 from flightd.ports import Clock
+from flightd.runtime.clock import Hold
 from flightd.tracking.clock_offset import DeviceClock
 
 _log = logging.getLogger(__name__)
@@ -89,9 +90,7 @@ class Decoder:
         try:
             import av  # noqa: PLC0415 - an optional extra
         except ImportError as error:
-            raise UnavailableError(
-                "the AR.Drone's video needs PyAV: pip install 'flightd[ardrone]'"
-            ) from error
+            raise missing_extra("ardrone", "the AR.Drone's video") from error
         self._av: Any = av
         self._context: Any = None
         self.restart()
@@ -122,17 +121,23 @@ class Decoder:
 
 class VideoStream:
     """Hands every picture, the newest when several wait, to `show`; runs until cancelled.  `latency_s` is
-    the least delay from mid-exposure to arrival.
+    the least delay from mid-exposure to arrival; time is held by `hold` while a picture is decoded.
 
     Counts: `pictures` shown, `dropped` frames never decoded, `broken` batches, `connections` made.
     """
 
     def __init__(
-        self, address: tuple[str, int], latency_s: float, clock: Clock, show: Callable[[DecodedFrame], None]
+        self,
+        address: tuple[str, int],
+        latency_s: float,
+        clock: Clock,
+        show: Callable[[DecodedFrame], None],
+        hold: Hold = contextlib.nullcontext,
     ) -> None:
         self._address = address
         self._clock = clock
         self._show = show
+        self._hold = hold
         self._backlog = Backlog()
         self._arrived = asyncio.Event()
         self._decoder = Decoder()
@@ -192,7 +197,7 @@ class VideoStream:
             if not batch:
                 continue
             try:
-                with self._clock.hold():
+                with self._hold():
                     bgr = await loop.run_in_executor(
                         worker, self._decoder.newest, [frame.payload for frame, _ in batch]
                     )

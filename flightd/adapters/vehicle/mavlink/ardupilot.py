@@ -8,9 +8,11 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link.codec import Message
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.refusal import ParameterUnread, ThrustMismatch
 from flightd.adapters.vehicle.mavlink.services.estimator_origin import Origin
 from flightd.adapters.vehicle.mavlink.setpoint import climb_thrust
 from flightd.adapters.vehicle.mavlink.vehicle import DEFAULTS, MavlinkOptions, MavlinkVehicle
+from flightd.adapters.vehicle.refusal import Refusal
 from flightd.core.types import AttitudeSetpoint
 from flightd.ports import Clock
 
@@ -65,17 +67,16 @@ class ArduPilotVehicle(MavlinkVehicle):
     def mode_params(self, custom_mode: int) -> tuple[float, ...]:
         return float(dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(custom_mode)
 
-    def not_fit(self) -> str:
+    def not_fit(self) -> Refusal | None:
         problem = super().not_fit()
-        if problem:
+        if problem is not None:
             return problem
         raw = self._thrust_is_raw()
         if raw is None:
-            return "GUID_OPTIONS not read yet"
+            return ParameterUnread(_GUID_OPTIONS[0])
         if self._raw_thrust is not None and raw is not self._raw_thrust:
-            state = "set" if raw else "not set"
-            return f"bit 3 of GUID_OPTIONS is {state}, against vehicle.raw_thrust: see flightd doctor"
-        return ""
+            return ThrustMismatch(raw)
+        return None
 
     def _serve(self, tasks: asyncio.TaskGroup) -> None:
         super()._serve(tasks)

@@ -12,7 +12,9 @@ from typing import Protocol
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.authority import Authority
+from flightd.adapters.vehicle.mavlink.refusal import CommandRefused, ExplainedRefusal, TakenOver
 from flightd.adapters.vehicle.mavlink.services.commands import Answer
+from flightd.adapters.vehicle.refusal import Refusal
 from flightd.core.types import Attitude, Demand, LandedState
 from flightd.ports import Clock
 
@@ -48,10 +50,12 @@ class FirmwareRules(Protocol):
 
     def mode_params(self, custom_mode: int) -> tuple[float, ...]: ...
 
-    def not_fit(self) -> str: ...
+    def not_fit(self) -> Refusal | None:
+        """Why the vehicle must not be flown by us; None where it may."""
+        ...
 
-    def no_way_down(self) -> str:
-        """Why the vehicle would stay in the air if this computer died, or an empty text."""
+    def no_way_down(self) -> Refusal | None:
+        """Why the vehicle would stay in the air if this computer died; None where it would land."""
         ...
 
     def sinks_unmeasured(self) -> bool:
@@ -105,7 +109,7 @@ class ModeArmingManager:
         self._reasons: deque[tuple[int, str]] = deque(maxlen=4)
         self._demand = Demand.STANDBY
         self._was_armed = False
-        self._refused = ""
+        self._refused: Refusal | None = None
         self._refused_ns = 0
         self._wake = asyncio.Event()
         self._unheard_since_ns = self._unheard_ns = self._unheard_orders = 0
@@ -177,12 +181,13 @@ class ModeArmingManager:
         return not self._telemetry.armed or says is LandedState.ON_GROUND
 
     @property
-    def refusal(self) -> str:
-        """What was refused and the autopilot's own words at that time."""
+    def refusal(self) -> Refusal | None:
+        """What was refused and the autopilot's own words at that time; None where nothing was."""
         if self._authority.taken:
-            return "the pilot or a failsafe changed the mode"
+            return TakenOver()
         said = [text for at_ns, text in self._reasons if abs(at_ns - self._refused_ns) < _REASON_NS]
-        return f"{self._refused} ({said[-1]})" if self._refused and said else self._refused
+        refused = self._refused
+        return ExplainedRefusal(refused, said[-1]) if refused is not None and said else refused
 
     # What happens
 
@@ -195,7 +200,7 @@ class ModeArmingManager:
         if demand is Demand.FLY:
             self._was_armed = False
         self._demand = demand
-        self._refused = ""
+        self._refused = None
         self._wake.set()
 
     def heartbeat(self, now_ns: int) -> None:
@@ -246,16 +251,16 @@ class ModeArmingManager:
         self._unheard_since_ns = self._unheard_orders = 0
         firmware, held, armed = self._firmware, self._authority.held, self._telemetry.armed
         takes_over = demand is Demand.FLY or (demand is Demand.KEEP and held is None)
-        problem = firmware.not_fit() if takes_over else ""
+        problem = firmware.not_fit() if takes_over else None
         if demand is Demand.FLY and not armed:  # one that flies already is looked after all the same
             problem = problem or firmware.no_way_down()
         match demand:
-            case Demand.FLY | Demand.KEEP if problem:
+            case Demand.FLY | Demand.KEEP if problem is not None:
                 self._refuse(problem)
             case Demand.KEEP if (
                 held is None and armed and self._telemetry.custom_mode == firmware.flying_mode
             ):
-                self._refused = ""
+                self._refused = None
                 self._authority.ask(firmware.flying_mode, firmware.flying_mode)
             case Demand.FLY if held != firmware.flying_mode:
                 await self._ask_mode(firmware.flying_mode)
@@ -315,12 +320,12 @@ class ModeArmingManager:
 
     def _note(self, what: str, answer: Answer) -> None:
         if answer.accepted:
-            self._refused = ""
+            self._refused = None
         else:
-            self._refuse(f"{what}: {answer}")
+            self._refuse(CommandRefused(what, answer))
 
-    def _refuse(self, text: str) -> None:
-        self._refused = text
+    def _refuse(self, refusal: Refusal) -> None:
+        self._refused = refusal
         self._refused_ns = self._clock.now_ns()
 
     def _still(self, demand: Demand) -> bool:

@@ -76,7 +76,7 @@ _ARDUPILOT: tuple[Rule, ...] = (
         ("GUID_OPTIONS",),
         lambda value: not int(value) & ~(1 | 8),
         "0, or 8 for raw thrust",
-        "the other bits change what set-points mean",
+        "the other bits change what setpoints mean",
     ),
     Rule(
         ("DISARM_DELAY",), _within(2, 30), "2 to 30 s", "an armed vehicle on the pad must disarm itself", 10
@@ -198,7 +198,7 @@ _PX4: tuple[Rule, ...] = (
         "an armed vehicle on the pad must disarm itself",
         10,
     ),
-    Rule(("MAV_FWDEXTSP",), _one_of(1), "1", "without it set-points are not passed on", 1),
+    Rule(("MAV_FWDEXTSP",), _one_of(1), "1", "without it setpoints are not passed on", 1),
     Rule(("COM_ARM_WO_GPS",), lambda value: value != 0, "1 or 2", "there is no GPS in the hall", 1),
     Rule(("EKF2_GPS_CTRL",), _one_of(0), "0", "indoors a GPS reports nonsense", 0),
     Rule(
@@ -211,7 +211,7 @@ _PX4: tuple[Rule, ...] = (
     Rule(("MPC_THR_HOVER",), _within(0.1, 0.8), "0.1 to 0.8", "the first guess of the hover thrust"),
 )
 
-_GUID_OPTIONS = "the thrust of our set-points would be taken for something else (vehicle.raw_thrust)"
+_GUID_OPTIONS = "the thrust of our setpoints would be taken for something else (vehicle.raw_thrust)"
 _POSE = "the grid pose that is shared (vehicle.pose_output) is in the map's frame, its yaw too"
 
 _ARDUPILOT_GUIDED = (

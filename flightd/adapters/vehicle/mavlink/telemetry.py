@@ -9,16 +9,14 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link.codec import Message
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.newest_readings import NewestReadings
 from flightd.core.types import Attitude, LandedState, VehicleState
 
-_ATTITUDES_MAX = 512
 _HEIGHTS_MAX = 64
 _NS_PER_MS = 1_000_000
 _STAMP_AGE_MAX_NS = 500_000_000
 _AHEAD_NS = 50_000_000
-_RANGE_STALE_NS = 500_000_000
 _CLIMB_STALE_NS = 1_000_000_000
-_LANDED_STALE_NS = 1_000_000_000
 _REBOOT_MS = 1_000
 _SLOPE_MS, _SLOPE_GAP_MS = 250, 500
 _NO_CELL_MV = 65535
@@ -32,49 +30,17 @@ _LANDED = {
 }
 
 
-class MavlinkTelemetry:
+class MavlinkTelemetry(NewestReadings):
     """The newest readings of one autopilot.  Values that are not finite or make no sense are not taken."""
 
+    climb_stale_ns = _CLIMB_STALE_NS
+
     def __init__(self, sync: ClockSync) -> None:
-        self._sync = sync
-        self._attitude: Attitude | None = None
-        self._attitudes: deque[Attitude] = deque(maxlen=_ATTITUDES_MAX)
+        super().__init__(sync)
         self._boot_ms = 0
-        self._range_m = math.nan
-        self._range_ns = 0
-        self._climb_mps = math.nan
-        self._climb_ns = 0
         self._heights: deque[tuple[int, int]] = deque(maxlen=_HEIGHTS_MAX)
-        self._landed = LandedState.UNKNOWN
-        self._landed_ns = 0
-        self._battery_frac = math.nan
-        self._battery_v = math.nan
-        self.heartbeat_ns = 0
         self._stamps_refused = 0
         self.custom_mode: int | None = None
-        self.armed = False
-
-    @property
-    def attitude(self) -> Attitude | None:
-        """The newest attitude."""
-        return self._attitude
-
-    @property
-    def yaw_rad(self) -> float | None:
-        """The newest measured heading."""
-        return None if self._attitude is None else self._attitude.yaw_rad
-
-    def landed(self, now_ns: int) -> LandedState:
-        """Whether it stands or flies; unknown when the autopilot has not said so for a second."""
-        return self._landed if now_ns - self._landed_ns <= _LANDED_STALE_NS else LandedState.UNKNOWN
-
-    def height_m(self, now_ns: int) -> float:
-        """Height above the floor below, NaN when the range finder has fallen silent."""
-        return self._range_m if now_ns - self._range_ns <= _RANGE_STALE_NS else math.nan
-
-    def climb_mps(self, now_ns: int) -> float:
-        """Climb rate, NaN when it is not told."""
-        return self._climb_mps if now_ns - self._climb_ns <= _CLIMB_STALE_NS else math.nan
 
     def take(self, message: Message, now_ns: int) -> bool:
         """Fold one message in; True when it shows that the autopilot has rebooted."""
@@ -105,32 +71,10 @@ class MavlinkTelemetry:
                 pass
         return False
 
-    def attitudes(self) -> list[Attitude]:
-        """The attitude samples since the last call, oldest first."""
-        samples = list(self._attitudes)
-        self._attitudes.clear()
-        return samples
-
     def state(self, now_ns: int, mode: str, *, in_control: bool, refusal: str) -> VehicleState | None:
         """Everything at one glance; None until heartbeat and attitude were heard."""
-        attitude = self._attitude
-        if attitude is None or not self.heartbeat_ns:
-            return None
-        return VehicleState(
-            attitude=attitude,
-            height_m=self.height_m(now_ns),
-            height_stamp_ns=self._range_ns,
-            climb_mps=self.climb_mps(now_ns),
-            mode=mode,
-            in_control=in_control,
-            armed=self.armed,
-            landed=self.landed(now_ns),
-            battery_frac=self._battery_frac,
-            battery_v=self._battery_v,
-            heartbeat_ns=self.heartbeat_ns,
-            refusal=refusal,
-            stamps_refused=self._stamps_refused,
-        )
+        refused = self._stamps_refused
+        return self._state(now_ns, mode, in_control=in_control, refusal=refusal, stamps_refused=refused)
 
     def _take_attitude(self, message: Message, now_ns: int) -> bool:
         angles = (message.roll, message.pitch, message.yaw)
@@ -141,7 +85,7 @@ class MavlinkTelemetry:
         self._boot_ms = boot_ms
         if rebooted:
             self._sync.reset()
-        stamp_ns = self._stamp(boot_ms, now_ns)
+        stamp_ns = self._stamp(boot_ms * _NS_PER_MS, now_ns)
         self._stamps_refused += rebooted or self._is_senseless(boot_ms, now_ns)
         last_ns = stamp_ns - 1 if self._attitude is None or rebooted else self._attitude.stamp_ns
         if stamp_ns >= last_ns:
@@ -155,11 +99,7 @@ class MavlinkTelemetry:
         centimetres = message.current_distance
         if not max(message.min_distance, 1) <= centimetres <= message.max_distance:
             return
-        tilt_cos = 1.0
-        if self._attitude is not None:
-            tilt_cos = math.cos(self._attitude.roll_rad) * math.cos(self._attitude.pitch_rad)
-        self._range_m = centimetres / 100.0 * max(tilt_cos, 0.0)
-        self._range_ns = self._stamp(message.time_boot_ms, now_ns)
+        self._set_range(centimetres / 100.0, self._stamp(message.time_boot_ms * _NS_PER_MS, now_ns))
 
     def _take_global_position(self, message: Message, now_ns: int) -> None:
         """Climb from the velocity; ArduPilot sends all zeros when it estimates none, and then the
@@ -188,11 +128,3 @@ class MavlinkTelemetry:
         """By the clocks as they were compared, a stamp long past or yet to come."""
         ours_ns = self._sync.to_ours(boot_ms * _NS_PER_MS)
         return ours_ns is not None and not -_STAMP_AGE_MAX_NS <= ours_ns - now_ns <= _AHEAD_NS
-
-    def _stamp(self, boot_ms: int, now_ns: int) -> int:
-        """Our time of an autopilot stamp; the arrival while the clocks are not yet compared or when the
-        stamp makes no sense (some messages carry 0)."""
-        ours_ns = self._sync.to_ours(boot_ms * _NS_PER_MS)
-        if ours_ns is None or not now_ns - _STAMP_AGE_MAX_NS <= ours_ns <= now_ns:
-            return now_ns
-        return ours_ns

@@ -19,6 +19,7 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
+from flightd.adapters.vehicle.mavlink.refusal import NoWayDown, ParameterUnread, WrongFirmware
 from flightd.adapters.vehicle.mavlink.required_parameters import judge, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
@@ -29,6 +30,7 @@ from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavlink.telemetry import MavlinkTelemetry
+from flightd.adapters.vehicle.refusal import Refusal, words
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -39,6 +41,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.ports import Clock
+from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 
 _LOG = logging.getLogger(__name__)
 
@@ -69,6 +72,8 @@ class MavlinkOptions:
     pose_form: PoseForm | None = None
     raw_thrust: bool | None = None
     origin_deg: tuple[float, float] = (51.4778, 0.0)
+    opener: OpenDatagrams = open_datagrams
+    """What opens its UDP socket."""
 
 
 DEFAULTS = MavlinkOptions()
@@ -101,7 +106,7 @@ class MavlinkVehicle(abc.ABC):
         self._sync = ClockSync()
         self._telemetry = MavlinkTelemetry(self._sync)
         self._pose_output = None if options.pose_form is None else PoseOutput(options.pose_form)
-        transport = make_transport(parse_endpoint(url))
+        transport = make_transport(parse_endpoint(url), options.opener)
         codec = Codec(system_id, signing=options.signing)
         self.link = MavlinkLink(transport, codec, clock, system_id, self._received)
         self._commander = Commander(self.link, system_id)
@@ -142,7 +147,7 @@ class MavlinkVehicle(abc.ABC):
             now_ns,
             "" if mode is None else self.mode_name(mode),
             in_control=self._pursuit.in_control,
-            refusal=self._pursuit.refusal,
+            refusal=words(self._pursuit.refusal),
         )
 
     def attitudes(self) -> list[Attitude]:
@@ -194,15 +199,15 @@ class MavlinkVehicle(abc.ABC):
     def mode_params(self, custom_mode: int) -> tuple[float, ...]:
         """Parameters of DO_SET_MODE."""
 
-    def no_way_down(self) -> str:
-        """Why the vehicle would stay in the air if this computer died, or an empty text."""
+    def no_way_down(self) -> Refusal | None:
+        """Why the vehicle would stay in the air if this computer died; None where it would land."""
         for rule in self._way_down:
             found = self.parameters.get(rule.names)
             if found is None:
-                return f"{rule.names[0]} not read yet"
+                return ParameterUnread(rule.names[0])
             if finding := judge(rule, found):
-                return f"{finding} (flightd doctor --fix sets it)"
-        return ""
+                return NoWayDown(finding)
+        return None
 
     def sinks_unmeasured(self) -> bool:
         """Whether the autopilot itself keeps a setpoint's climb rate; not where our own height loop does."""
@@ -212,11 +217,12 @@ class MavlinkVehicle(abc.ABC):
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         """The thrust field for a setpoint's climb rate."""
 
-    def not_fit(self) -> str:
-        """Why the vehicle must not be flown by us, or an empty text."""
-        if self.link.firmware is not None and self.link.firmware is not self.firmware:
-            return f"the autopilot is {self.link.firmware.name}, the configuration says {self.firmware.name}"
-        return ""
+    def not_fit(self) -> Refusal | None:
+        """Why the vehicle must not be flown by us; None where it may."""
+        found = self.link.firmware
+        if found is not None and found is not self.firmware:
+            return WrongFirmware(found.name, self.firmware.name)
+        return None
 
     def _serve(self, tasks: asyncio.TaskGroup) -> None:
         """Start what runs beside the demand loop."""
@@ -275,10 +281,10 @@ class MavlinkVehicle(abc.ABC):
         while True:
             await asyncio.sleep(_BEATS_CHECK_S)
             now_ns = self._clock.now_ns()
-            problem = "" if self._pursuit.is_silent else too_slow(self._beats.rate_hz(now_ns))
-            if problem:
+            problem = None if self._pursuit.is_silent else too_slow(self._beats.rate_hz(now_ns))
+            if problem is not None:
                 _LOG.warning("%s", problem)
-                self.notify(Event(now_ns, EventLevel.WARNING, "heartbeat_rate", problem))
+                self.notify(Event(now_ns, EventLevel.WARNING, "heartbeat_rate", str(problem)))
                 return
 
     async def _compare_clocks(self) -> None:

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from typing import Any
 
 from mavsdk.plugins.telemetry import FlightMode
 from mavsdk.plugins.telemetry import LandedState as SdkLanded
 
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.newest_readings import NewestReadings
 from flightd.core.types import Attitude, LandedState, VehicleState
 
-_ATTITUDES_MAX = 512
-_STALE_NS = 500_000_000
-_LANDED_STALE_NS = 1_000_000_000
-_STAMP_AGE_MAX_NS = 500_000_000
+_CLIMB_STALE_NS = 500_000_000
 _REBOOT_US = 1_000_000
 _DOWN_DEG = 270.0
 
@@ -28,62 +25,24 @@ _LANDED = {
 }
 
 
-class Readings:
+class MavsdkTelemetry(NewestReadings):
     """The newest that the library told of one autopilot.  What is not finite is not taken.
 
     The library stamps attitudes alone, in the autopilot's boot time; everything else is as old as its
     arrival.
     """
 
+    climb_stale_ns = _CLIMB_STALE_NS
+
     def __init__(self, sync: ClockSync) -> None:
-        self._sync = sync
-        self._attitude: Attitude | None = None
-        self._attitudes: deque[Attitude] = deque(maxlen=_ATTITUDES_MAX)
+        super().__init__(sync)
         self._boot_us = 0
-        self._range_m = math.nan
-        self._range_ns = 0
-        self._climb_mps = math.nan
-        self._climb_ns = 0
-        self._battery_frac = math.nan
-        self._battery_v = math.nan
-        self._landed = LandedState.UNKNOWN
-        self._landed_ns = 0
-        self.armed = False
         self.mode: FlightMode | None = None
-        self.heartbeat_ns = 0
-
-    @property
-    def attitude(self) -> Attitude | None:
-        """The newest attitude."""
-        return self._attitude
-
-    @property
-    def yaw_rad(self) -> float | None:
-        """The newest measured heading."""
-        return None if self._attitude is None else self._attitude.yaw_rad
 
     @property
     def custom_mode(self) -> int | None:
         """The flight mode as a number; the library does not pass PX4's own on."""
         return None if self.mode is None else int(self.mode)
-
-    def height_m(self, now_ns: int) -> float:
-        """Height above the floor below, NaN when the range finder has fallen silent."""
-        return self._range_m if now_ns - self._range_ns <= _STALE_NS else math.nan
-
-    def climb_mps(self, now_ns: int) -> float:
-        """Climb rate, NaN when it is not told."""
-        return self._climb_mps if now_ns - self._climb_ns <= _STALE_NS else math.nan
-
-    def landed(self, now_ns: int) -> LandedState:
-        """Whether it stands or flies; unknown when the autopilot has not said so for a second."""
-        return self._landed if now_ns - self._landed_ns <= _LANDED_STALE_NS else LandedState.UNKNOWN
-
-    def attitudes(self) -> list[Attitude]:
-        """The attitude samples since the last call, oldest first."""
-        samples = list(self._attitudes)
-        self._attitudes.clear()
-        return samples
 
     def take_mode(self, mode: int, now_ns: int) -> None:
         """The library passes the flight mode on with every HEARTBEAT; one it has no name for is unknown."""
@@ -98,7 +57,7 @@ class Readings:
         rebooted = boot_us + _REBOOT_US < self._boot_us
         if rebooted:
             self._sync.reset()
-        stamp_ns = self._stamp(boot_us, now_ns)
+        stamp_ns = self._stamp(boot_us * 1000, now_ns)
         in_order = rebooted or boot_us > self._boot_us
         self._boot_us = boot_us
         if self._attitude is not None and not rebooted:
@@ -114,10 +73,7 @@ class Readings:
         least_m = max(sensor.minimum_distance_m, 0.01)
         if not looks_down or not least_m <= distance_m <= sensor.maximum_distance_m:
             return
-        tilt_cos = 1.0
-        if self._attitude is not None:
-            tilt_cos = math.cos(self._attitude.roll_rad) * math.cos(self._attitude.pitch_rad)
-        self._range_m, self._range_ns = distance_m * max(tilt_cos, 0.0), now_ns
+        self._set_range(distance_m, now_ns)
 
     def take_velocity(self, motion: Any, now_ns: int) -> None:
         """A PositionVelocityNed, of which only the vertical speed is known without GPS."""
@@ -142,25 +98,5 @@ class Readings:
 
     def state(self, now_ns: int, *, in_control: bool, refusal: str) -> VehicleState | None:
         """Everything at one glance; None until heartbeat and attitude were heard."""
-        if self._attitude is None or self.mode is None:
-            return None
-        return VehicleState(
-            attitude=self._attitude,
-            height_m=self.height_m(now_ns),
-            height_stamp_ns=self._range_ns,
-            climb_mps=self.climb_mps(now_ns),
-            mode=self.mode.name,
-            in_control=in_control,
-            armed=self.armed,
-            landed=self.landed(now_ns),
-            battery_frac=self._battery_frac,
-            battery_v=self._battery_v,
-            heartbeat_ns=self.heartbeat_ns,
-            refusal=refusal,
-        )
-
-    def _stamp(self, boot_us: int, now_ns: int) -> int:
-        """Our time of a moment of the autopilot's; the arrival while the clocks are not compared."""
-        stamp_ns = self._sync.to_ours(boot_us * 1000)
-        plausible = stamp_ns is not None and 0 <= now_ns - stamp_ns <= _STAMP_AGE_MAX_NS
-        return stamp_ns if stamp_ns is not None and plausible else now_ns
+        mode = "" if self.mode is None else self.mode.name
+        return self._state(now_ns, mode, in_control=in_control, refusal=refusal)

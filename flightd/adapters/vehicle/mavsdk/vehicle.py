@@ -26,6 +26,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
+from flightd.adapters.vehicle.mavlink.refusal import BeyondLibrary, WrongSystemId
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
@@ -33,7 +34,8 @@ from flightd.adapters.vehicle.mavsdk.commands import SdkCommander
 from flightd.adapters.vehicle.mavsdk.connection import MavsdkConnection
 from flightd.adapters.vehicle.mavsdk.gate import SetpointGate
 from flightd.adapters.vehicle.mavsdk.library import Library, Plugins, whole_fields
-from flightd.adapters.vehicle.mavsdk.telemetry import Readings
+from flightd.adapters.vehicle.mavsdk.telemetry import MavsdkTelemetry
+from flightd.adapters.vehicle.refusal import Refusal, words
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -43,6 +45,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.ports import Clock
+from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 from flightd.runtime.latest_slot import Latest
 
 _LOG = logging.getLogger(__name__)
@@ -88,13 +91,15 @@ class MavsdkVehicle:
     prime_s = 1.3
     """PX4 wants setpoints for more than a second before it enters OFFBOARD."""
 
-    def __init__(self, url: str, clock: Clock, system_id: int = 1) -> None:
+    def __init__(
+        self, url: str, clock: Clock, system_id: int = 1, opener: OpenDatagrams = open_datagrams
+    ) -> None:
         self._clock = clock
         self._system_id = system_id
         self._sync = ClockSync()
-        self._readings = Readings(self._sync)
+        self._readings = MavsdkTelemetry(self._sync)
         self.gate = SetpointGate()
-        self._line = MavsdkConnection(make_transport(parse_endpoint(url)), self.gate, clock)
+        self._line = MavsdkConnection(make_transport(parse_endpoint(url), opener), self.gate, clock)
         self._commander = SdkCommander()
         self._pursuit = ModeArmingManager(self, self._commander, self._readings, clock)
         self._steering = SetpointShaper(self._pursuit, self._readings)
@@ -102,7 +107,7 @@ class MavsdkVehicle:
         self._texts: deque[tuple[StatusTextType, str]] = deque(maxlen=_TEXTS_MAX)
         self._text_waits = asyncio.Event()
         self._sent_ns = 0
-        self._unfit = ""
+        self._unfit: Refusal | None = None
 
     # The port
 
@@ -141,7 +146,7 @@ class MavsdkVehicle:
     def state(self) -> VehicleState | None:
         pursuit = self._pursuit
         return self._readings.state(
-            self._clock.now_ns(), in_control=pursuit.in_control, refusal=pursuit.refusal
+            self._clock.now_ns(), in_control=pursuit.in_control, refusal=words(pursuit.refusal)
         )
 
     def attitudes(self) -> list[Attitude]:
@@ -182,13 +187,13 @@ class MavsdkVehicle:
         """The mode, for the commander to choose the library's call."""
         return (float(custom_mode),)
 
-    def not_fit(self) -> str:
-        """Why the vehicle must not be flown by us, or an empty text."""
+    def not_fit(self) -> Refusal | None:
+        """Why the vehicle must not be flown by us; None where it may."""
         return self._unfit
 
-    def no_way_down(self) -> str:
+    def no_way_down(self) -> Refusal | None:
         """The library tells no parameters: `flightd doctor` looks at them."""
-        return ""
+        return None
 
     def sinks_unmeasured(self) -> bool:
         """PX4 takes raw thrust, which our own height loop makes of measured climb rates."""
@@ -198,11 +203,11 @@ class MavsdkVehicle:
 
     async def _look_at(self, plugins: Plugins) -> None:
         found, kind = await plugins.system.get_system_id(), await plugins.system.autopilot_type()
-        self._unfit = ""
+        self._unfit = None
         if found != self._system_id:
-            self._unfit = f"the vehicle's system id is {found}, the configuration says {self._system_id}"
+            self._unfit = WrongSystemId(found, self._system_id)
         elif kind != Autopilot.PX4:
-            self._unfit = f"the autopilot is {Autopilot(kind).name}: MAVSDK flies PX4 only, use vehicle.kind"
+            self._unfit = BeyondLibrary(Autopilot(kind).name)
 
     def _listen(self, tasks: asyncio.TaskGroup, library: Library, plugins: Plugins) -> None:
         telemetry, readings = plugins.telemetry, self._readings

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Callable
 from enum import Enum
 
@@ -11,19 +10,15 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser, Message
 from flightd.adapters.vehicle.mavlink.link.endpoint import Endpoint
+from flightd.adapters.vehicle.mavlink.link.reconnection import Reconnection
 from flightd.adapters.vehicle.mavlink.link.transport import Source, Transport
 from flightd.ports import Clock
 
-_LOG = logging.getLogger(__name__)
-
 _HEARTBEAT_S = 0.5
-_BACKOFF_S = (0.5, 1.0, 2.0, 5.0)
 _PARSERS_MAX = 16
 _LATE_MAX, _LATE_RUN_MAX = 64, 16
 _STATES = frozenset({"HEARTBEAT", "EXTENDED_SYS_STATE"})
 """Messages of which only the newest counts and which carry no time stamp of their own."""
-_PEER_SILENT_NS = 3_000_000_000
-"""After this long another address may take over as the autopilot's."""
 
 
 class Firmware(Enum):
@@ -57,10 +52,9 @@ class MavlinkLink:
         self._system_id = system_id
         self._on_message = on_message
         self._parsers: dict[Source, FrameParser] = {}
-        self._lost = asyncio.Event()
+        self._reconnection = Reconnection(transport)
         self._sequence = 0
         self._late = 0
-        self._heard_ns = -2 * _PEER_SILENT_NS
         self.system_status = dialect.MAV_STATE_STANDBY
         self.may_beat: Callable[[], bool] = lambda: True
         """Whether our HEARTBEAT goes out: without it the autopilot's failsafe for a lost companion acts."""
@@ -70,7 +64,6 @@ class MavlinkLink:
         """What no line could take."""
         self.received = 0
         transport.received = self._received
-        transport.lost = self._lost.set
 
     @property
     def endpoint(self) -> Endpoint:
@@ -78,32 +71,13 @@ class MavlinkLink:
 
     async def run(self) -> None:
         """Hold the connection until cancelled.  UnavailableError when it can never work (port in use)."""
-        attempt = 0
-        try:
-            while True:
-                try:
-                    await self._transport.open()
-                except OSError as err:
-                    wait_s = _BACKOFF_S[min(attempt, len(_BACKOFF_S) - 1)]
-                    if attempt == 0:
-                        _LOG.warning("%s: %s; trying again", self.endpoint, err.strerror or err)
-                    attempt += 1
-                    await asyncio.sleep(wait_s)
-                    continue
-                attempt = 0
-                self._lost.clear()
-                await self._beat()
-                _LOG.warning("%s: connection lost; trying again", self.endpoint)
-                self._transport.close()
-                self._parsers.clear()
-                await asyncio.sleep(_BACKOFF_S[0])
-        finally:
-            self._transport.close()
+        await self._reconnection.run(self._beat)
 
     async def _beat(self) -> None:
         """Our HEARTBEAT twice a second while the connection stands: a failsafe of two seconds on the
         autopilot's side bears three lost ones."""
-        while not self._lost.is_set():
+        lost = self._reconnection.lost
+        while not lost.is_set():
             if self.may_beat():
                 self.send(
                     dialect.MAVLink_heartbeat_message(
@@ -117,9 +91,10 @@ class MavlinkLink:
                 )
             try:
                 async with asyncio.timeout(_HEARTBEAT_S):
-                    await self._lost.wait()
+                    await lost.wait()
             except TimeoutError:
                 continue
+        self._parsers.clear()
 
     def send(self, message: Message) -> bool:
         """Pack and hand over one message; False when the line could not take it."""
@@ -160,10 +135,7 @@ class MavlinkLink:
             firmware = _FIRMWARES.get(message.autopilot)
             if firmware is None or message.type == dialect.MAV_TYPE_GCS:
                 return
-            if source != self._transport.peer and now_ns - self._heard_ns > _PEER_SILENT_NS:
-                self._transport.peer = source
-            if source == self._transport.peer:
-                self._heard_ns = now_ns
+            if self._reconnection.is_peer(source, now_ns):
                 self.firmware = firmware
         if source != self._transport.peer or self._is_late(message):
             return

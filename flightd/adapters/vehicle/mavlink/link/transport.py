@@ -1,4 +1,9 @@
-"""UDP, TCP and serial lines behind one small interface, on asyncio alone."""
+"""UDP, TCP and serial lines behind one small interface, on asyncio alone.
+
+Own code for serial lines too: pyserial-asyncio-fast 0.16 wakes the loop 412 times a second at 500 frames
+where `PacedReader` does 72 times, 19 ms of processor a second against 9 (tools/bench_serial.py); it keeps
+what the line does not take, and setpoints that are late are better dropped.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +21,7 @@ from typing import Any, TypeAlias
 from flightd.adapters.vehicle.mavlink.link.endpoint import Endpoint, EndpointKind
 from flightd.core.errors import InputError, UnavailableError
 from flightd.runtime.batched_reader import PacedReader
-from flightd.runtime.datagrams import Datagrams, open_datagrams
+from flightd.runtime.datagrams import Datagrams, OpenDatagrams, open_datagrams
 
 Source: TypeAlias = tuple[str, int] | None
 """Address a datagram came from; None on a stream."""
@@ -67,8 +72,9 @@ class UdpTransport(Transport):
 
     datagrams = True
 
-    def __init__(self, endpoint: Endpoint) -> None:
+    def __init__(self, endpoint: Endpoint, opener: OpenDatagrams = open_datagrams) -> None:
         super().__init__(endpoint)
+        self._opener = opener
         self._open: Datagrams | None = None
 
     async def open(self) -> None:
@@ -76,7 +82,7 @@ class UdpTransport(Transport):
         listening = self.endpoint.kind is EndpointKind.UDP_IN
         place: dict[str, Any] = {"local_addr": address} if listening else {"remote_addr": address}
         try:
-            self._open = await open_datagrams(self._take, self._failed, **place)
+            self._open = await self._opener(self._take, self._failed, **place)
         except OSError as err:
             if err.errno == errno.EADDRINUSE:
                 text = f"{self.endpoint}: the port is in use: stop the other program or choose another port"
@@ -246,12 +252,13 @@ class SerialTransport(Transport):
         self.lost()
 
 
-def make_transport(endpoint: Endpoint) -> Transport:
-    """The transport for an endpoint; InputError for a baud rate that this machine cannot set."""
+def make_transport(endpoint: Endpoint, opener: OpenDatagrams = open_datagrams) -> Transport:
+    """The transport for an endpoint; `opener` opens a UDP one.  InputError for a baud rate that this machine
+    cannot set."""
     match endpoint.kind:
         case EndpointKind.TCP:
             return TcpTransport(endpoint)
         case EndpointKind.SERIAL:
             return SerialTransport(endpoint)
         case _:
-            return UdpTransport(endpoint)
+            return UdpTransport(endpoint, opener)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import dataclass
 
 BEATS_HZ = 20.0
 """What is asked for; an autopilot may deny it and go on at 1 Hz."""
@@ -39,11 +40,23 @@ class Beats:
         return sum(now_ns - at_ns <= self._window_ns for at_ns in self._arrivals_ns) / self._window_ns * 1e9
 
 
-def too_slow(rate_hz: float) -> str:
-    """What a measured rate means to the pilot, or an empty text when it is as it should be."""
-    if not rate_hz < _TOLERANCE * BEATS_MIN_HZ:
-        return ""
-    late = "not at all" if rate_hz == 0.0 else f"up to {1.0 / rate_hz:.1f} s late"
-    return (
-        f"{rate_hz:.1f} heartbeats a second instead of {BEATS_HZ:g}: a take-over by the pilot is seen {late}"
-    )
+@dataclass(frozen=True, slots=True)
+class SlowHeartbeat:
+    """What a rate means to the pilot: his take-over is seen by a heartbeat alone."""
+
+    rate_hz: float
+
+    @property
+    def seen_after_s(self) -> float:
+        """How late a take-over may be seen; infinite where no heartbeat comes."""
+        return math.inf if self.rate_hz == 0.0 else 1.0 / self.rate_hz
+
+    def __str__(self) -> str:
+        late = f"up to {self.seen_after_s:.1f} s late" if math.isfinite(self.seen_after_s) else "not at all"
+        told = f"{self.rate_hz:.1f} heartbeats a second instead of {BEATS_HZ:g}"
+        return f"{told}: a take-over by the pilot is seen {late}"
+
+
+def too_slow(rate_hz: float) -> SlowHeartbeat | None:
+    """A measured rate that is not as it should be; None where it is, or is not known yet (NaN)."""
+    return SlowHeartbeat(rate_hz) if rate_hz < _TOLERANCE * BEATS_MIN_HZ else None

@@ -1,0 +1,98 @@
+"""Why a MAVLink autopilot is not flown, or does not do what it was asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
+from flightd.adapters.vehicle.mavlink.services.commands import Answer
+from flightd.adapters.vehicle.refusal import Refusal
+
+
+@dataclass(frozen=True, slots=True)
+class WrongFirmware(Refusal):
+    """Names as configuration and documents have them."""
+
+    found: str
+    configured: str
+
+    def __str__(self) -> str:
+        return f"the autopilot is {self.found}, the configuration says {self.configured}"
+
+
+@dataclass(frozen=True, slots=True)
+class WrongSystemId(Refusal):
+    found: int
+    configured: int
+
+    def __str__(self) -> str:
+        return f"the vehicle's system id is {self.found}, the configuration says {self.configured}"
+
+
+@dataclass(frozen=True, slots=True)
+class BeyondLibrary(Refusal):
+    """MAVSDK flies one firmware here, and this is another."""
+
+    found: str
+
+    def __str__(self) -> str:
+        return f"the autopilot is {self.found}: MAVSDK flies PX4 only, use vehicle.kind"
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterUnread(Refusal):
+    name: str
+
+    def __str__(self) -> str:
+        return f"{self.name} not read yet"
+
+
+@dataclass(frozen=True, slots=True)
+class NoWayDown(Refusal):
+    """A parameter by which the vehicle would stay in the air if this computer died."""
+
+    finding: ParameterFinding
+
+    def __str__(self) -> str:
+        return f"{self.finding} (flightd doctor --fix sets it)"
+
+
+@dataclass(frozen=True, slots=True)
+class ThrustMismatch(Refusal):
+    """What the autopilot takes the thrust field for is not what the configuration says it does."""
+
+    raw: bool
+
+    def __str__(self) -> str:
+        state = "set" if self.raw else "not set"
+        return f"bit 3 of GUID_OPTIONS is {state}, against vehicle.raw_thrust: see flightd doctor"
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRefused(Refusal):
+    """The autopilot's answer to a command."""
+
+    command: str
+    answer: Answer
+
+    def __str__(self) -> str:
+        return f"{self.command}: {self.answer}"
+
+
+@dataclass(frozen=True, slots=True)
+class ExplainedRefusal(Refusal):
+    """A refusal with what the autopilot said at that time."""
+
+    refusal: Refusal
+    said: str
+
+    def __str__(self) -> str:
+        return f"{self.refusal} ({self.said})"
+
+
+@dataclass(frozen=True, slots=True)
+class TakenOver(Refusal):
+    """The vehicle is in a mode that we did not ask for."""
+
+    def __str__(self) -> str:
+        return "the pilot or a failsafe changed the mode"

@@ -1,0 +1,98 @@
+"""The newest readings of one autopilot, whoever carries its telemetry."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.core.types import Attitude, LandedState, VehicleState
+
+_ATTITUDES_MAX = 512
+_STAMP_AGE_MAX_NS = 500_000_000
+_RANGE_STALE_NS = 500_000_000
+_LANDED_STALE_NS = 1_000_000_000
+
+
+class NewestReadings:
+    """What was told last, with its time, and when it is too old to be used.  What is not finite or makes no
+    sense is not taken; a subclass takes what its own carrier tells."""
+
+    climb_stale_ns: int
+
+    def __init__(self, sync: ClockSync) -> None:
+        self._sync = sync
+        self._attitude: Attitude | None = None
+        self._attitudes: deque[Attitude] = deque(maxlen=_ATTITUDES_MAX)
+        self._range_m, self._range_ns = math.nan, 0
+        self._climb_mps, self._climb_ns = math.nan, 0
+        self._landed, self._landed_ns = LandedState.UNKNOWN, 0
+        self._battery_frac = math.nan
+        self._battery_v = math.nan
+        self.heartbeat_ns = 0
+        self.armed = False
+
+    @property
+    def attitude(self) -> Attitude | None:
+        """The newest attitude."""
+        return self._attitude
+
+    @property
+    def yaw_rad(self) -> float | None:
+        """The newest measured heading."""
+        return None if self._attitude is None else self._attitude.yaw_rad
+
+    def attitudes(self) -> list[Attitude]:
+        """The attitude samples since the last call, oldest first."""
+        samples = list(self._attitudes)
+        self._attitudes.clear()
+        return samples
+
+    def height_m(self, now_ns: int) -> float:
+        """Height above the floor below, NaN when the range finder has fallen silent."""
+        return self._range_m if now_ns - self._range_ns <= _RANGE_STALE_NS else math.nan
+
+    def climb_mps(self, now_ns: int) -> float:
+        """Climb rate, NaN when it is not told."""
+        return self._climb_mps if now_ns - self._climb_ns <= self.climb_stale_ns else math.nan
+
+    def landed(self, now_ns: int) -> LandedState:
+        """Whether it stands or flies; unknown when the autopilot has not said so for a second."""
+        return self._landed if now_ns - self._landed_ns <= _LANDED_STALE_NS else LandedState.UNKNOWN
+
+    def _state(
+        self, now_ns: int, mode: str, *, in_control: bool, refusal: str, stamps_refused: int = 0
+    ) -> VehicleState | None:
+        """Everything at one glance; None until heartbeat and attitude were heard."""
+        if self._attitude is None or not self.heartbeat_ns:
+            return None
+        return VehicleState(
+            attitude=self._attitude,
+            height_m=self.height_m(now_ns),
+            height_stamp_ns=self._range_ns,
+            climb_mps=self.climb_mps(now_ns),
+            mode=mode,
+            in_control=in_control,
+            armed=self.armed,
+            landed=self.landed(now_ns),
+            battery_frac=self._battery_frac,
+            battery_v=self._battery_v,
+            heartbeat_ns=self.heartbeat_ns,
+            refusal=refusal,
+            stamps_refused=stamps_refused,
+        )
+
+    def _set_range(self, distance_m: float, stamp_ns: int) -> None:
+        """Take a distance along the body's z axis: the height is what the tilt leaves of it."""
+        tilt_cos = 1.0
+        if self._attitude is not None:
+            tilt_cos = math.cos(self._attitude.roll_rad) * math.cos(self._attitude.pitch_rad)
+        self._range_m, self._range_ns = distance_m * max(tilt_cos, 0.0), stamp_ns
+
+    def _stamp(self, boot_ns: int, now_ns: int) -> int:
+        """Our time of an autopilot's stamp; the arrival while the clocks are not yet compared or when the
+        stamp makes no sense (some messages carry 0)."""
+        ours_ns = self._sync.to_ours(boot_ns)
+        if ours_ns is None or not now_ns - _STAMP_AGE_MAX_NS <= ours_ns <= now_ns:
+            return now_ns
+        return ours_ns

@@ -1,0 +1,109 @@
+"""Parts that a flight can do without: they do nothing, so that nobody has to ask whether they are there."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from flightd.adapters.store.progress import LeftOver
+from flightd.app.flight import Tasks
+from flightd.core.scanning import CodeSet
+from flightd.core.snapshot import Snapshot
+from flightd.core.tick import TickOutput
+from flightd.core.types import Command, Event, GridPose
+
+
+async def _idle() -> None:
+    """Until cancelled."""
+    await asyncio.get_running_loop().create_future()
+
+
+class NoRecorder:
+    """`ports.Recorder` that keeps nothing."""
+
+    dropped = 0
+    restarts = 0
+    error = ""
+
+    async def run(self) -> None:
+        await _idle()
+
+    def record(self, topic: str, stamp_ns: int, message: object) -> None:
+        pass
+
+    def image(self, topic: str, stamp_ns: int, seq: int, jpeg: bytes) -> None:
+        pass
+
+
+class NoGround:
+    """`ports.Ground` without anybody on it."""
+
+    async def run(self) -> None:
+        await _idle()
+
+    def tell(self, snapshot: Snapshot) -> None:
+        pass
+
+    def event(self, event: Event) -> None:
+        pass
+
+    def take_commands(self) -> list[Command]:
+        return []
+
+    def silent_s(self, now_ns: int) -> float:  # noqa: ARG002 - the port names it
+        return 0.0
+
+    def picture_due(self, stamp_ns: int) -> bool:  # noqa: ARG002 - the port names it
+        return False
+
+    def picture(self, seq: int, stamp_ns: int, jpeg: bytes) -> None:
+        pass
+
+
+class NoCamera:
+    """`ports.Camera` that is not fitted."""
+
+    frames = 0
+
+    def expose(self, part: float) -> None:
+        pass
+
+    async def run(self) -> None:
+        await _idle()
+
+
+class NoCounting:
+    """A flight that counts no shelves."""
+
+    def tasks(self, on_trouble: Callable[[str], None]) -> Tasks:  # noqa: ARG002 - as `app.flight.Count`
+        return {}
+
+    def take(self) -> tuple[CodeSet, ...]:
+        return ()
+
+    def take_counted(self) -> tuple[str, ...]:
+        return ()
+
+    def keep(self, output: TickOutput) -> None:
+        pass
+
+
+class NoProgress:
+    """Nobody asks for the stops left over."""
+
+    async def run(self) -> None:
+        await _idle()
+
+    def put(self, left: LeftOver) -> None:
+        pass
+
+
+def keep_pose(pose: GridPose) -> None:
+    """A vehicle whose estimator cannot use the pose is not given it."""
+
+
+NO_RECORDER = NoRecorder()
+NO_GROUND = NoGround()
+NO_CAMERA = NoCamera()
+NO_COUNTING = NoCounting()
+NO_PROGRESS = NoProgress()

@@ -1,0 +1,132 @@
+"""A flight, put together: every part that `app.build` composed and `app.daemon` runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeAlias
+
+from flightd.adapters.store.progress import LeftOver
+from flightd.app.publishers import TelemetryPublishers
+from flightd.core.errors import FlightdError
+from flightd.core.scanning import CodeSet
+from flightd.core.tick import TickOutput
+from flightd.core.types import AttitudeSetpoint, GridPose, LineSet
+from flightd.pilot import Pilot
+from flightd.ports import Camera, Clock, Ground, Recorder, Vehicle
+
+Tasks: TypeAlias = Mapping[str, Coroutine[Any, Any, None]]
+"""What runs beside the tick until it is cancelled, by name."""
+
+
+class Vision(Protocol):
+    """Lines of the down camera's frames, and how fast they come."""
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """Frames that never became lines, by where they were lost."""
+        ...
+
+    @property
+    def replaced(self) -> int:
+        """Detector processes that died or hung and were replaced."""
+        ...
+
+    @property
+    def fps(self) -> float:
+        """Frames flown by in the last second."""
+        ...
+
+    @property
+    def latency_ms(self) -> Mapping[str, float]:
+        """The stages of the newest frame flown by."""
+        ...
+
+    def tasks(self) -> Tasks: ...
+
+    def fresh(self, now_ns: int) -> tuple[LineSet, ...]:
+        """Lines since the last tick, in the order of their frames."""
+        ...
+
+    def latency_p99_s(self, now_ns: int) -> float:
+        """From exposure to the wire over the last second; 0 without a frame flown by."""
+        ...
+
+    def drain_latencies_ms(self) -> tuple[Mapping[str, float], ...]:
+        """The stages of each frame flown by since the last call."""
+        ...
+
+    def latency_quantiles_ms(self) -> dict[str, float]:
+        """p50 and p99 of the whole way, over the flight."""
+        ...
+
+    def not_flying(self) -> None:
+        """No setpoint goes out: frames on their way to one count for nothing."""
+        ...
+
+
+class SetpointSink(Protocol):
+    """What sends setpoints at their own rate."""
+
+    @property
+    def stale(self) -> int:
+        """Setpoints that went out level because no tick made one."""
+        ...
+
+    def set(self, setpoint: AttitudeSetpoint | None) -> None: ...
+
+    async def run(self) -> None: ...
+
+    def interval_quantiles_ms(self) -> dict[str, float]:
+        """Between setpoints on the wire: p50, p99 and the longest."""
+        ...
+
+
+class Count(Protocol):
+    """The count of the shelves: codes on the way in, findings on the way out."""
+
+    def tasks(self, on_trouble: Callable[[str], None]) -> Tasks: ...
+
+    def take(self) -> tuple[CodeSet, ...]:
+        """What was read since the last tick."""
+        ...
+
+    def take_counted(self) -> tuple[str, ...]:
+        """The locations that an earlier flight of this count has booked, told once."""
+        ...
+
+    def keep(self, output: TickOutput) -> None:
+        """Hand a tick's findings to the inventory."""
+        ...
+
+
+class Progress(Protocol):
+    """Keeps which stops are still to be made."""
+
+    async def run(self) -> None: ...
+
+    def put(self, left: LeftOver) -> None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """Everything composed; nothing runs yet.
+
+    `share_pose` gives the vehicle's own estimator the pose, where it can use it.  `startup_fault` is what
+    the daemon should not fly with: on the ground it ends with that; a vehicle that it finds flying is looked
+    after all the same."""
+
+    clock: Clock
+    pilot: Pilot
+    vehicle: Vehicle
+    setpoints: SetpointSink
+    camera: Camera
+    front_camera: Camera
+    vision: Vision
+    counting: Count
+    recorder: Recorder
+    ground: Ground
+    progress: Progress
+    publishers: TelemetryPublishers
+    share_pose: Callable[[GridPose], None]
+    startup_fault: FlightdError | None = None

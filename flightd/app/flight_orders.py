@@ -1,0 +1,78 @@
+"""What the next flight is ordered to do: what its configuration says, or what an earlier one left over."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+
+from flightd.adapters.store.progress import NothingLeftError, load_left_over
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.config.mission import VisitOrder
+from flightd.config.schema import Config
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.flight_order import FlightOrder
+from flightd.core.geometry import wrap_pi
+from flightd.mission.scan.scanner import nodes_to_count
+from flightd.site.site import Site
+
+
+def configured_order(config: Config) -> FlightOrder:
+    """The order that the configuration gives to every flight."""
+    mission = config.mission
+    return FlightOrder(
+        nodes=mission.nodes,
+        best_order=mission.order is VisitOrder.BEST,
+        pad=mission.pad,
+        start_yaw_rad=mission.start_yaw_rad,
+        autostart=mission.autostart,
+    )
+
+
+def resumed(order: FlightOrder, config: Config, path: Path, site: Site, *, wanted: bool) -> FlightOrder:
+    """The order with the stops left over by the last flight in place of its own, if `wanted` or configured
+    in the file `path`.  InputError when nothing can be resumed that is wanted."""
+    kept = config.mission.progress
+    if wanted and kept is None:
+        raise InputError(f"config {path}: mission.progress names no file, so that nothing can be resumed")
+    if kept is None or not (wanted or config.mission.resume):
+        return order
+    try:
+        left = load_left_over(kept, site)
+    except NothingLeftError:
+        if wanted:
+            raise
+        return order  # the last flight was finished: a new one begins
+    return replace(
+        order,
+        nodes=left.remaining,
+        best_order=False,
+        pad=next((pad.id for pad in site.pads if pad.node == left.stand), None),
+        start_yaw_rad=wrap_pi(left.yaw_rad),
+    )
+
+
+def going_on(
+    order: FlightOrder, run: str, site: Site, folder: Path | None, *, in_air: bool = False
+) -> FlightOrder:
+    """The order of a flight that goes on with the count `run` (empty: none) in `folder`: it visits only nodes
+    with locations that are not booked yet.  InputError when there are none left, and what the store raises;
+    neither where the flight may be `in_air` already (the daemon was started anew)."""
+    if not run or folder is None or not (folder / "inventory.db").exists():
+        return order
+    counted: Collection[str]
+    try:
+        with SqliteStore(folder, create=False) as store:
+            counted = store.counted(run)
+    except (InputError, UnavailableError):
+        if not in_air:
+            raise
+        return order
+    if not counted:
+        return order
+    nodes = nodes_to_count(site, order.nodes or site.serpentine_route(), counted)
+    if nodes:
+        return replace(order, nodes=nodes)
+    if in_air:
+        return order
+    raise InputError(f"inventory.run {run!r}: every location is counted; give the next count another name")

@@ -1,0 +1,149 @@
+"""A flight of a real vehicle, as `flightd run` flies it: everything opened, built, flown and closed again."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from flightd.adapters.recorder.archive import FlightArchive
+from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.app import service
+from flightd.app.absent_parts import NO_GROUND, NO_RECORDER
+from flightd.app.build import build, detector_pool, ground_link
+from flightd.app.counting.flight_count import FlightCount
+from flightd.app.daemon import Daemon, FlightResult
+from flightd.app.flight_orders import configured_order, going_on, resumed
+from flightd.app.recording import FlightSetting, record_setting
+from flightd.config.schema import Config
+from flightd.core.errors import InputError, TransientError
+from flightd.core.snapshot import Snapshot
+from flightd.ports import Recorder
+from flightd.runtime.clock import LoopClock
+from flightd.runtime.datagrams import open_paced_datagrams
+from flightd.runtime.supervisor import restarted
+from flightd.site.site_file import load_site
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What is to be flown.  `started_anew`: the service manager started the daemon again by itself, so that
+    its vehicle may be in the air; `journal`: stderr goes to the journal."""
+
+    setting: FlightSetting
+    started_anew: bool = False
+    journal: bool = False
+
+
+def prepare(config: Config, path: Path, *, resume: bool) -> Run:
+    """What to fly by the configuration of the file `path`; `resume`: what the last flight left over.
+    InputError where nobody could start the flight, or where there is nothing left to fly."""
+    if not config.mission.autostart and not config.ground.listen:
+        raise InputError(
+            f"config {path}: nobody can start this flight: set ground.listen so that flightctl can, or"
+            " mission.autostart = true"
+        )
+    site = load_site(config.mission.site)
+    anew = service.was_started_before(os.environ)
+    order = resumed(configured_order(config), config, path, site, wanted=resume)
+    order = going_on(order, config.inventory.run, site, config.inventory.folder, in_air=anew)
+    if anew:  # it looks after what flies, and never starts a flight by itself
+        order = replace(order, autostart=False)
+    journal = service.logs_to_journal(os.environ)
+    service.note_start(os.environ)
+    return Run(FlightSetting(config, site, order), anew, journal)
+
+
+async def run_until_signal(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult | signal.Signals:
+    """The flight's result, or the signal that ended it."""
+    flight = asyncio.ensure_future(_fly(run, observer))
+    loop = asyncio.get_running_loop()
+    came: list[signal.Signals] = []
+
+    def end(number: signal.Signals) -> None:
+        came.append(number)
+        flight.cancel()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, end, number)
+    await asyncio.wait([flight])
+    return came[0] if flight.cancelled() and came else flight.result()
+
+
+async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
+    config, site, clock = run.setting.config, run.setting.site, LoopClock()
+    watchers = service.monitors(config.metrics, os.environ, journal=run.journal)
+    async with watchers as monitors, AsyncExitStack() as stack:
+        count = FlightCount(config, site, config.inventory.folder, stack, in_air=run.started_anew)
+        pool = stack.enter_context(detector_pool(config, site, clock))
+        archive = _archive(config)
+        recorder: Recorder = NO_RECORDER
+        if archive is not None:
+            recorder = stack.enter_context(_recorder(run.setting, archive, clock.now_ns()))
+        counting = await count.begun(clock)
+        link = ground_link(config.ground, site, clock, counting)
+        ground = NO_GROUND if link is None else stack.enter_context(link)
+        await pool.ready()
+        flight = build(
+            config,
+            site,
+            run.setting.order,
+            clock=clock,
+            detectors=pool,
+            recorder=recorder,
+            ground=ground,
+            counting=counting,
+            monitors=monitors,
+            observers=[observer],
+            keep_progress=True,
+            opener=open_paced_datagrams,
+            startup_fault=count.error,
+        )
+        daemon = Daemon(flight)
+        async with room_kept(archive, daemon.failed):
+            return await daemon.fly()
+
+
+@asynccontextmanager
+async def room_kept(
+    archive: FlightArchive | None, failed: Callable[[TransientError], None]
+) -> AsyncIterator[None]:
+    """Keep room for the flight's log meanwhile; whatever goes wrong with that is told to `failed` at once
+    and never ends the flight."""
+    if archive is None:
+        yield
+        return
+
+    def ended(task: asyncio.Future[None]) -> None:
+        if not task.cancelled() and (err := task.exception()) is not None:
+            failed(TransientError(f"the archive of flights is not looked after any more: {err!r}"))
+
+    keeping = asyncio.ensure_future(restarted(archive.run, failed))
+    keeping.add_done_callback(ended)
+    try:
+        yield
+    finally:
+        keeping.cancel()
+        await asyncio.wait([keeping])
+
+
+def _archive(config: Config) -> FlightArchive | None:
+    """All recorded flights, where they are recorded."""
+    settings = config.recorder
+    if settings.folder is None:
+        return None
+    return FlightArchive(settings.folder, round(settings.quota_gb * 1e9), round(settings.reserve_gb * 1e9))
+
+
+def _recorder(setting: FlightSetting, archive: FlightArchive, now_ns: int) -> McapRecorder:
+    """The recorder of this flight, with what it is flown by."""
+    started = datetime.now(UTC)
+    metadata = {"started": f"{started:%Y-%m-%d %H:%M:%S} UTC", "vehicle": setting.config.vehicle.kind}
+    recorder = McapRecorder(archive.begin(started), metadata=metadata)
+    record_setting(recorder, now_ns, setting)
+    return recorder

@@ -1,0 +1,98 @@
+"""One simulated flight to be flown: its setting, its world, and what is true in it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from flightd.app.build import plan_of, start_of
+from flightd.app.flight_orders import configured_order
+from flightd.app.recording import FlightSetting
+from flightd.app.simulation.ports import WorldPorts
+from flightd.config.schema import Config
+from flightd.core.flight_order import FlightOrder
+from flightd.core.snapshot import Snapshot
+from flightd.mission.plan.flight_plan import FlightPlan
+from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
+from flightd.sim.scenario.scenario import Scenario
+from flightd.sim.world import FrontSpec, WorldSpec
+from flightd.site.site import Site
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """One simulated flight to be flown; `speed` None is lockstep."""
+
+    config: Config
+    site: Site
+    scenario: Scenario
+    seed: int
+    speed: float | None
+    folder: Path
+    observer: Callable[[Snapshot], None] = lambda _: None
+    truth_url: str = ""
+    """An external simulator's truth link; the configuration says where its vehicle is flown."""
+    order: FlightOrder | None = None
+    """What this flight is to do; None: what the configuration says."""
+
+    @property
+    def flight_log(self) -> Path:
+        return self.folder / "flight.mcap"
+
+    @property
+    def truth_log(self) -> Path:
+        return self.folder / "truth.mcap"
+
+    @property
+    def setting(self) -> FlightSetting:
+        """What it is flown by."""
+        return FlightSetting(self.config, self.site, self.order or configured_order(self.config))
+
+    def plan(self) -> FlightPlan:
+        """The plan of the flight at its start."""
+        return plan_of(self.config, self.site, self.setting.order)
+
+
+def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
+    """The world that it is flown in, its peers at `ports`."""
+    scenario, config = simulation.scenario, simulation.config
+    adapter, order = config.vehicle.kind, simulation.setting.order
+    return WorldSpec(
+        site=scenario.floor.site(simulation.site),
+        seed=simulation.seed,
+        camera_address=("127.0.0.1", ports.camera),
+        vehicle="px4" if adapter == "mavsdk" else adapter,
+        vehicle_ports=ports.vehicle,
+        start=start_of(order, simulation.site),
+        start_yaw_rad=order.start_yaw_rad + math.radians(scenario.vehicle.start_yaw_deg),
+        start_offset_m=scenario.vehicle.start_offset_m,
+        camera=replace(scenario.camera.camera(), mount=config.camera.mount()),
+        front=_front(simulation, ports.front_camera),
+        appearance=scenario.floor.surface(),
+        wind=scenario.wind.params(),
+        battery_frac=scenario.vehicle.battery,
+        battery_ah=scenario.vehicle.battery_ah,
+        swap_s=scenario.vehicle.swap_s,
+        radio=scenario.vehicle.radio(),
+        truth_url=simulation.truth_url,
+        faults=scenario.fault,
+    )
+
+
+def _front(simulation: Simulation, port: int | None) -> FrontSpec | None:
+    if port is None:
+        return None
+    scenario = simulation.scenario
+    camera = replace(scenario.front_camera.camera(), mount=simulation.config.front_camera.mount())
+    return FrontSpec(("127.0.0.1", port), camera, scenario.racks.appearance())
+
+
+def truth_of(simulation: Simulation) -> dict[str, LocationTruth]:
+    """What is really at every location of the simulated racks; empty without a front camera before them."""
+    if not simulation.config.front_camera.is_fitted:
+        return {}
+    scenario = simulation.scenario
+    focal_px = scenario.front_camera.camera().lens.fx_px
+    return stock_truth(simulation.site, scenario.racks.appearance(), focal_px, simulation.seed)

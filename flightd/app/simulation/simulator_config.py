@@ -1,0 +1,124 @@
+"""The simulator's configuration: its file, with settings laid over it before it is checked."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
+
+from pydantic import BaseModel
+
+from flightd.config.paths import shipped
+from flightd.config.schema import Config, load_table, parse_config
+from flightd.core.errors import InputError
+from flightd.sim.random_sites import random_site
+from flightd.sim.scenario.scenario import Scenario
+from flightd.site.site import Site
+from flightd.site.site_file import load_site
+
+_FRONT_CAMERA_URL = "udp://127.0.0.1:5601"
+"""That there is a front camera; where it is reached is each simulation's own."""
+
+
+def simulator_config(
+    path: Path | None,
+    warehouse: str | None,
+    scenario: Scenario,
+    settings: Sequence[str] = (),
+    vehicle: str | None = None,
+    vehicle_url: str = "",
+) -> tuple[Config, Site]:
+    """Configuration and site: the file (None: the shipped one) with the simulated cameras' keys, which hold
+    unless one of the `settings` (KEY=VALUE) says otherwise, and with a front camera where there are racks.
+    InputError names the file, the key or the option, and the remedy."""
+    path = path or shipped("sim.toml")
+    table = load_table(path)
+    for key, value in _camera_keys(scenario).items():
+        _lay(table, key, value)
+    if vehicle is not None:
+        _lay(table, "vehicle.kind", vehicle)
+    if vehicle_url:
+        _lay(table, "vehicle.url", vehicle_url)
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        if not equals:
+            raise InputError(f"--set {setting}: expected KEY=VALUE, for example mission.heading=shelf")
+        _lay(table, key, _value(key, text))
+    config = parse_config(table, path)
+    site = _site(config, warehouse)
+    # an AR.Drone carries no second computer to see the racks with
+    if site.locations and config.vehicle.kind != "ardrone" and not config.front_camera.is_fitted:
+        _lay(table, "front_camera.url", _FRONT_CAMERA_URL)
+        config = parse_config(table, path)
+    return config, site
+
+
+def _site(config: Config, warehouse: str | None) -> Site:
+    """The wanted site: a file, random:SEED, or the configuration's own."""
+    if warehouse and warehouse.startswith("random:"):
+        number = warehouse.removeprefix("random:")
+        if not number.isdigit():
+            raise InputError(f"--warehouse {warehouse}: expected random:SEED, for example random:7")
+        return random_site(int(number))
+    return load_site(Path(warehouse) if warehouse else config.mission.site)
+
+
+def _lay(table: dict[str, Any], key: str, value: object) -> None:
+    *sections, name = key.split(".")
+    for section in sections:
+        table = table.setdefault(section, {})
+        if not isinstance(table, dict):
+            raise InputError(f"--set {key}: {section} is not a section")
+    table[name] = value
+
+
+def _value(key: str, text: str) -> object:
+    """A TOML value; a bare word is text, or a list of it where the key holds a list of texts."""
+    try:
+        return tomllib.loads(f"v = {text}")["v"]
+    except tomllib.TOMLDecodeError:
+        return [text] if _is_list_of_texts(key) else text
+
+
+def _is_list_of_texts(key: str) -> bool:
+    """Whether the key of the configuration holds a list of any number of texts."""
+    section: Any = Config
+    for name in key.split("."):
+        fields = section.model_fields if _is_section(section) else {}
+        if name not in fields:
+            return False
+        section = fields[name].annotation
+    kinds = get_args(section) if get_origin(section) in {Union, UnionType} else (section,)
+    return any(get_origin(kind) is tuple and get_args(kind) == (str, ...) for kind in kinds)
+
+
+def _is_section(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)
+
+
+def _camera_keys(scenario: Scenario) -> dict[str, Any]:
+    """The calibration of the simulated cameras, as a configuration has it."""
+    down, front = scenario.camera.camera(), scenario.front_camera.camera()
+    return {
+        **_calibration("camera", down),
+        **_calibration("front_camera", front),
+        "front_camera.exposure_s": front.exposure_s,
+        "front_camera.fps": front.fps,
+    }
+
+
+def _calibration(section: str, camera: Any) -> dict[str, Any]:
+    lens = camera.lens
+    keys = {
+        "width_px": lens.width_px,
+        "height_px": lens.height_px,
+        "fx_px": lens.fx_px,
+        "fy_px": lens.fy_px,
+        "cx_px": lens.cx_px,
+        "cy_px": lens.cy_px,
+        "distortion": lens.distortion,
+        "latency_s": camera.capture_delay_s,
+    }
+    return {f"{section}.{key}": value for key, value in keys.items()}

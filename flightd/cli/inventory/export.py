@@ -1,0 +1,55 @@
+"""`flightd inventory export`: the inventory for other programs."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from flightd.cli.inventory.records import Folder
+from flightd.core.errors import InputError, cannot_write
+
+
+def register(app: typer.Typer) -> None:
+    """Hang the command under `app`."""
+    app.command("export")(export)
+
+
+def export(
+    folder: Folder,
+    out: Annotated[Path, typer.Option(metavar="F", help="File to write; - is stdout.")] = Path("-"),
+    kind: Annotated[
+        str | None,
+        typer.Option("--format", help="csv, xlsx, json or epcis. Default: by the file's ending, else csv."),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print what was written as one JSON document.")
+    ] = False,
+) -> None:
+    """Write the inventory for other programs: CSV, XLSX (extra `xlsx`), JSON, EPCIS 2.0 (.jsonld).
+
+    \b
+    Examples:
+      flightd inventory export out/inventory --out stock.xlsx
+      flightd inventory export out/inventory --format epcis --out stock.jsonld
+      flightd inventory export out/inventory | column -s, -t
+    """
+    from flightd.adapters.store.sqlite import SqliteStore
+    from flightd.inventory.export.formats import STDOUT, chosen_format
+
+    chosen = chosen_format(kind, out)
+    if as_json and out == STDOUT:
+        raise InputError("says what was written to a file", key="--json", remedy="add --out F")
+    with SqliteStore(folder, create=False) as store:
+        data = chosen.write(store.locations())
+    if out == STDOUT:
+        sys.stdout.buffer.write(data)
+        return
+    try:
+        out.write_bytes(data)
+    except OSError as err:
+        raise cannot_write(out, err) from None
+    print(json.dumps({"written": str(out), "bytes": len(data)}) if as_json else out)

@@ -1,0 +1,42 @@
+"""`flightd inventory merge`: the counts of several flights as one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from flightd.cli.inventory.records import Folder, states_line
+from flightd.cli.options import AsJson
+
+
+def register(app: typer.Typer) -> None:
+    """Hang the command under `app`."""
+    app.command("merge")(merge)
+
+
+def merge(
+    folder: Folder,
+    others: Annotated[list[Path], typer.Argument(metavar="OTHER…", help="Inventories to take in.")],
+    as_json: AsJson = False,
+) -> None:
+    """Take other inventories (another drone's, an earlier flight's) into FOLDER; again changes nothing.
+
+    \b
+    Examples:
+      flightd inventory merge out/inventory flight-2/inventory
+    """
+    from flightd.adapters.store.sqlite import SqliteStore
+
+    taken = 0
+    with SqliteStore(folder) as store:
+        for other in others:
+            with SqliteStore(other, create=False) as source:
+                taken += store.merge(source)
+        records = store.locations()
+    if as_json:
+        print(json.dumps({"new_observations": taken, "locations": len(records)}))
+        return
+    print(f"{taken} new looks; {states_line(records)}")

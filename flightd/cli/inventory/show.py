@@ -1,0 +1,74 @@
+"""`flightd inventory show`: what stands where."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from flightd.cli.inventory.records import Folder, print_records, states_line
+from flightd.cli.options import AsJson
+from flightd.core.errors import InputError
+from flightd.core.terminal_text import visible
+
+if TYPE_CHECKING:
+    from flightd.core.inventory import LocationRecord, Observation
+
+
+def register(app: typer.Typer) -> None:
+    """Hang the command under `app`."""
+    app.command("show")(show)
+
+
+def show(
+    folder: Folder,
+    location: Annotated[
+        str | None, typer.Option(metavar="CODE", help="Every look at this one location.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Show the state of every location, or the history of one.
+
+    \b
+    Examples:
+      flightd inventory show out/inventory
+      flightd inventory show out/inventory --location A-03-2-1
+    """
+    from flightd.adapters.store.sqlite import SqliteStore
+
+    with SqliteStore(folder, create=False) as store:
+        records = store.locations()
+        if location is None:
+            _show_records(records, as_json)
+            return
+        if all(record.code != location for record in records):
+            raise InputError(f"knows no location {location!r}", file=folder)
+        _show_history(location, store.history(location), as_json)
+
+
+def _show_records(records: Sequence[LocationRecord], as_json: bool) -> None:
+    from flightd.inventory.export.json_document import location_json
+
+    if as_json:
+        states = Counter(record.state.value for record in records)
+        document = {"states": dict(states), "locations": [location_json(record) for record in records]}
+        print(json.dumps(document, indent=1, ensure_ascii=False))
+        return
+    print_records(records)
+    print(states_line(records))
+
+
+def _show_history(location: str, looks: Sequence[Observation], as_json: bool) -> None:
+    from flightd.core.utc_time import utc_text
+    from flightd.inventory.export.json_document import observation_json
+
+    if as_json:
+        document = {"location": location, "observations": [observation_json(seen) for seen in looks]}
+        print(json.dumps(document, indent=1, ensure_ascii=False))
+        return
+    for seen in looks:
+        texts = ", ".join(visible(read.text) for read in seen.reads)
+        print(f"{utc_text(seen.utc_ns)}  {seen.state:<11} {seen.confidence:.2f}  {texts}".rstrip())

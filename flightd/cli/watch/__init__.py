@@ -1,0 +1,1 @@
+"""`flightctl watch`: the flight on a full screen of the terminal."""

@@ -1,0 +1,62 @@
+"""The section of the configuration on the tracks of the lines on the floor."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, TypeAlias
+
+from pydantic import Field
+
+from flightd.config.section import Section, unit
+
+_WidthShare: TypeAlias = Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)]
+
+
+class MotionNoise(Section):
+    """What the motion model does not know, as densities (per square root of a second) and first sigmas.
+
+    A disturbance is a steady part (trim, draught: its mean over `steady_s`) and a gust that fades within
+    `gust_s`.  Its density is `changed_mps2` while what is seen all errs to one side (process noise adapted
+    to the innovations: Jazwinski, Automatica 5, 1969)."""
+
+    accel_mps2: float = Field(0.2, gt=0, le=5, description="density of the acceleration")
+    disturbance_mps2: float = Field(0.15, gt=0, le=5, description="density of the disturbance")
+    changed_mps2: float = Field(1.0, gt=0, le=10, description="the same while all lines err to one side")
+    drag_per_s: float = Field(0.25, ge=0, le=5, description="loss of speed by drag")
+    start_velocity_mps: float = Field(0.3, gt=0, le=5, description="sigma of the velocity at first")
+    start_disturbance_mps2: float = Field(0.2, gt=0, le=5, description="sigma of the disturbance at first")
+    max_disturbance_mps2: float = Field(1.2, gt=0, le=10, description="largest disturbance believed")
+    gust_s: float = Field(1.2, gt=0, le=60, description="time within which a gust fades")
+    steady_s: float = Field(10.0, gt=0, le=600, description="time over which the steady part is averaged")
+
+
+class TrackingExpert(Section):
+    """How far the down camera's lines are trusted."""
+
+    sigma_tilt_deg: float = Field(0.3, gt=0, le=10, description="sigma of the measured roll and pitch")
+    min_sigma_m: float = Field(0.004, gt=0, le=0.1, description="least sigma of a line's offset")
+    width_share: tuple[_WidthShare, _WidthShare] = Field(
+        (0.55, 1.7),
+        description="least and largest width of a guide line against the site's line_width_m",
+        json_schema_extra=unit("share"),
+    )
+    gate_m: float = Field(0.35, gt=0, le=2, description="farthest from its track that a line is taken for it")
+    forget_s: float = Field(2.5, gt=0, le=60, description="a track not seen for so long is given up")
+    start_yaw_sigma_deg: float = Field(
+        5.0, gt=0, le=45, description="sigma of the heading on the pad, and after a compass is contradicted"
+    )
+    noise: MotionNoise = MotionNoise()
+
+    @property
+    def sigma_tilt_rad(self) -> float:
+        return math.radians(self.sigma_tilt_deg)
+
+    @property
+    def start_yaw_sigma_rad(self) -> float:
+        return math.radians(self.start_yaw_sigma_deg)
+
+
+class TrackingConfig(Section):
+    """How lines are followed from frame to frame."""
+
+    expert: TrackingExpert = TrackingExpert()

@@ -1,0 +1,18 @@
+"""What one flight is to do, which its configuration does not say of every flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class FlightOrder:
+    """The `nodes` to visit, as listed or (`best_order`) in the quickest order; none: every node, aisle by
+    aisle.  The drone stands on `pad` at first (None: the home pad), heading `start_yaw_rad`, clockwise from
+    the aisles.  `autostart`: it does not wait for the start command."""
+
+    nodes: tuple[str, ...] = ()
+    best_order: bool = False
+    pad: str | None = None
+    start_yaw_rad: float = 0.0
+    autostart: bool = False

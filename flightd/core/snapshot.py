@@ -1,0 +1,94 @@
+"""The daemon at one tick, as everybody is told of it: recorder, ground stations, monitors, the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from flightd.core.tick import TickInput, TickOutput
+from flightd.core.types import Phase, Status, VehicleState
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """What the pilot was given and what it answered at one tick, and how the daemon itself does.
+
+    `nodes_done` of the `nodes_planned` were visited, each counted once.  `frames` were delivered so far,
+    `frames_dropped` of them never became lines, `fps` became lines in the last second.  `latency_ms` are the
+    newest frame's stages: capture, transport, detection, track, wire (each from its predecessor), and total
+    (mid-exposure to setpoint on the wire).  `tick_late_s` is how late each tick came and `latencies_ms` the
+    stages of each frame flown by, both since the last that was told.  The others count since the start:
+    `dropped` what a full queue or a lost worker cost, `restarts` what died and was brought back, each by the
+    part's name; `repeated_level` the setpoints that went out because no tick made one.
+    """
+
+    tick: TickInput
+    output: TickOutput
+    nodes_done: int = 0
+    nodes_planned: int = 0
+    frames: int = 0
+    frames_dropped: int = 0
+    fps: float = 0.0
+    latency_ms: Mapping[str, float] = field(default_factory=dict)
+    tick_late_s: tuple[float, ...] = ()
+    latencies_ms: tuple[Mapping[str, float], ...] = ()
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    restarts: Mapping[str, int] = field(default_factory=dict)
+    repeated_level: int = 0
+
+    @property
+    def stamp_ns(self) -> int:
+        return self.tick.now_ns
+
+    @property
+    def phase(self) -> Phase:
+        return self.output.phase
+
+    @property
+    def reason(self) -> str:
+        return self.output.reason
+
+    @property
+    def node(self) -> str:
+        """The nearest node, empty before it is known."""
+        return self.output.pose.node if self.output.pose else ""
+
+    @property
+    def goal(self) -> str:
+        return self.output.goal
+
+    @property
+    def vehicle(self) -> VehicleState | None:
+        return self.tick.vehicle
+
+    @property
+    def battery_frac(self) -> float:
+        """Charge, 0 to 1; 0 before the vehicle was heard."""
+        return self.tick.vehicle.battery_frac if self.tick.vehicle else 0.0
+
+    @property
+    def height_m(self) -> float:
+        """Above the floor; 0 before it is known."""
+        return self.output.pose.height_m if self.output.pose else 0.0
+
+    @property
+    def ground_silent_s(self) -> float:
+        return self.tick.ground_silent_s
+
+    def status(self) -> Status:
+        """The snapshot as the flight log keeps it."""
+        return Status(
+            stamp_ns=self.stamp_ns,
+            phase=self.phase,
+            reason=self.reason,
+            node=self.node,
+            goal=self.goal,
+            nodes_done=self.nodes_done,
+            nodes_planned=self.nodes_planned,
+            battery_frac=self.battery_frac,
+            height_m=self.height_m,
+            frames=self.frames,
+            frames_dropped=self.frames_dropped,
+            fps=self.fps,
+            latency_ms=dict(self.latency_ms),
+        )

@@ -1,0 +1,62 @@
+"""One control tick: what the pilot is given and what it answers, all that a replay needs of a flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from flightd.core.scanning import CodeSet, Finding, Settled
+from flightd.core.tracks import TrackSet
+from flightd.core.types import (
+    HEALTHY,
+    Attitude,
+    AttitudeSetpoint,
+    Command,
+    Demand,
+    Event,
+    GridPose,
+    Health,
+    LineSet,
+    Phase,
+    VehicleState,
+)
+
+TICK_S = 0.02
+"""Period of the control tick."""
+
+
+@dataclass(frozen=True, slots=True)
+class TickInput:
+    """What arrived since the last tick, oldest first.  `vehicle` is the newest state, None until there
+    is one; `ground_silent_s` the time since an attending ground station was heard, 0 if none attends;
+    `counted` names locations that an earlier flight of the same count has booked."""
+
+    now_ns: int
+    lines: tuple[LineSet, ...] = ()
+    vehicle: VehicleState | None = None
+    attitudes: tuple[Attitude, ...] = ()
+    commands: tuple[Command, ...] = ()
+    ground_silent_s: float = 0.0
+    codes: tuple[CodeSet, ...] = ()
+    counted: tuple[str, ...] = ()
+    health: Health = HEALTHY
+
+
+@dataclass(frozen=True, slots=True)
+class TickOutput:
+    """What goes out.  `setpoint` is None when nothing may be sent (hands off, or not flying).
+
+    `visited` and `planned` count visits: a node to which the route comes twice counts twice.  `findings` are
+    pending until a later `settled` names their locations."""
+
+    setpoint: AttitudeSetpoint | None
+    demand: Demand
+    phase: Phase
+    reason: str
+    goal: str
+    visited: int
+    planned: int
+    pose: GridPose | None
+    tracks: TrackSet | None
+    events: tuple[Event, ...] = field(default=())
+    findings: tuple[Finding, ...] = ()
+    settled: tuple[Settled, ...] = ()

@@ -1,0 +1,79 @@
+"""What the tracker knows of the floor at one time: lines, junctions, pads and markers, from the drone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class TrackedLine:
+    """One line across an axis: `offset_m` from the drone along the axis, at the time of the set.  When
+    last seen it was in view from `from_m` to `to_m` along itself, from the drone; equal where unknown."""
+
+    id: int
+    offset_m: float
+    sigma_m: float
+    width_m: float
+    seen_ns: int
+    hits: int
+    from_m: float = 0.0
+    to_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class FloorJunction:
+    """Where lines meet or one ends, from the drone in grid axes; `arms` has a bit for each grid direction
+    in which paint leaves it: +x 1, +y 2, -x 4, -y 8."""
+
+    dx_m: float
+    dy_m: float
+    arms: int
+
+
+@dataclass(frozen=True, slots=True)
+class PadOffset:
+    """A pad on the floor: its centre from the drone in grid axes, and the length of its sides."""
+
+    x_m: float
+    y_m: float
+    side_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerOffset:
+    """A floor marker: its centre from the drone in grid axes, and the length of its sides."""
+
+    id: int
+    x_m: float
+    y_m: float
+    side_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrackSet:
+    """The tracks at one time, in grid axes (x along the aisles, y to the right of x).
+
+    `across_x` are the lines that cross the x axis (parallel to y), offsets in x; `across_y` the others.
+    `lines_ns` is the capture time of the newest frame in which any line was taken; `junctions` and
+    `markers` are those of the newest frame, taken at `junctions_ns`; `push` is the acceleration that no
+    lean explains, as far as it is expected to last.
+    """
+
+    stamp_ns: int
+    lines_ns: int
+    yaw_rad: float
+    yaw_sigma_rad: float
+    vx_mps: float
+    vy_mps: float
+    ax_mps2: float
+    ay_mps2: float
+    across_x: tuple[TrackedLine, ...]
+    across_y: tuple[TrackedLine, ...]
+    pads: tuple[PadOffset, ...] = ()
+    pads_ns: int = 0
+    """Capture time of the frame in which the `pads` were seen."""
+    junctions: tuple[FloorJunction, ...] = ()
+    junctions_ns: int = 0
+    push_x_mps2: float = 0.0
+    push_y_mps2: float = 0.0
+    markers: tuple[MarkerOffset, ...] = ()

@@ -1,0 +1,136 @@
+"""Everything that is looked at before a flight, in one go.  Nothing moves."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
+from flightd.adapters.vehicle.connect import connect_vehicle
+from flightd.adapters.vehicle.mavlink.examination import ExaminationReport
+from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
+from flightd.config.schema import Config
+from flightd.doctor import camera, machine, vehicle
+from flightd.doctor.calibration import check_calibration
+from flightd.doctor.check import Check, CheckLevel, ok
+from flightd.doctor.ground import GroundListener, check_ground
+from flightd.doctor.vehicle import Autopilot
+from flightd.ports import Clock
+from flightd.site.site import Site
+from flightd.vision.lines.detector import Detector
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What is examined, composed as for a flight: `path` is the configuration's file, `nodes` so many are
+    planned, `ground` the link that would listen (None: none is configured).  Whoever composes it has found
+    configuration and site sound."""
+
+    config: Config
+    site: Site
+    path: Path
+    nodes: int
+    detector: Detector
+    ground: GroundListener | None
+    clock: Clock
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """Everything that was looked at; `report` and `fixed` are those of a MAVLink autopilot."""
+
+    checks: Sequence[Check]
+    report: ExaminationReport | None = None
+    fixed: tuple[str, ...] = ()
+
+    @property
+    def errors(self) -> int:
+        """How many checks say that it is not fit to fly."""
+        return sum(check.level is CheckLevel.ERROR for check in self.checks)
+
+    @property
+    def mendable(self) -> list[ParameterFinding]:
+        """The wrong parameters for which a better value is known; none while the vehicle is armed."""
+        if self.report is None or self.report.armed:
+            return []
+        return [found for found in self.report.findings if found.better is not None]
+
+    def document(self, path: Path) -> dict[str, Any]:
+        """As JSON has it; `path` is the configuration's file."""
+        report = self.report
+        return {
+            "config": str(path),
+            "fit": self.errors == 0,
+            "checks": [asdict(check) for check in self.checks],
+            "autopilot": report
+            and {
+                "firmware": report.firmware.name.lower(),
+                "version": report.version,
+                "armed": report.armed,
+                "unread": report.unread,
+            },
+            "parameters": [asdict(finding) for finding in report.findings] if report else [],
+            "fixed": self.fixed,
+        }
+
+
+async def examine(subject: Subject) -> Diagnosis:
+    """Computer, camera, ground link and vehicle: some ten seconds.  InputError for wrong addresses, keys."""
+    config = subject.config
+    checks = [
+        *_check_machine(subject),
+        *check_calibration(config.camera, subject.site, config.mission.height_m),
+    ]
+    autopilot = Autopilot(())
+    if config.vehicle.kind == "ardrone":
+        found, pictures = await _examine_ardrone(config, subject.clock)
+        checks += found
+    else:
+        pictures = await camera.watch(config, subject.clock, None)
+        autopilot = await vehicle.examine(config.vehicle, subject.clock)
+    checks += check_ground(config.ground, subject.ground)
+    checks += camera.judge_camera(config, pictures)
+    checks += camera.check_vision(config, subject.detector, pictures.picture)
+    checks += camera.check_latency(config, subject.detector, pictures)
+    return Diagnosis([*checks, *autopilot.checks], autopilot.report)
+
+
+async def examine_quickly(subject: Subject) -> Diagnosis:
+    """What can be known without waiting for anything."""
+    return Diagnosis([*_check_machine(subject), *check_ground(subject.config.ground, subject.ground)])
+
+
+async def fix_parameters(found: Diagnosis, config: Config, agreed: Sequence[str], clock: Clock) -> Diagnosis:
+    """Write the better values of the parameters `agreed` on by name; the diagnosis with what is known now."""
+    autopilot = await vehicle.examine(config.vehicle, clock, agreed)
+    rest = [check for check in found.checks if check.name not in {"vehicle", "parameter"}]
+    return Diagnosis([*rest, *autopilot.checks], autopilot.report, autopilot.fixed)
+
+
+def _check_machine(subject: Subject) -> list[Check]:
+    config, site = subject.config, subject.site
+    text = (
+        f"{subject.path}: site {site.name}, {subject.nodes} nodes to visit at {config.mission.height_m:g} m"
+    )
+    return [
+        ok("config", text),
+        machine.check_clock(),
+        machine.check_disk(config.recorder),
+        *machine.check_processor(config.vision.workers),
+    ]
+
+
+async def _examine_ardrone(config: Config, clock: Clock) -> tuple[list[Check], camera.Pictures]:
+    """An AR.Drone is asked while its adapter runs: its camera comes over the same link."""
+    drone = connect_vehicle(config.vehicle, clock, config.control)
+    assert isinstance(drone, ArDroneVehicle)
+    flying = asyncio.ensure_future(drone.run())
+    try:
+        checks = await vehicle.examine_ardrone(drone, config)
+        return checks, await camera.watch(config, clock, drone)
+    finally:
+        flying.cancel()
+        await asyncio.wait([flying])

@@ -1,0 +1,1 @@
+"""The inventory out to other programs: one module a format."""

@@ -1,0 +1,35 @@
+"""The inventory as rows of a table, for the formats that are tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from flightd.core.inventory import LocationRecord, StoredRead
+from flightd.core.utc_time import utc_text
+
+COLUMNS: Final = (
+    "location", "state", "text", "symbology", "gs1", "confidence", "utc", "run", "node", "x_m", "y_m",
+    "height_m", "evidence",
+)  # fmt: skip
+
+
+def rows_of(records: Sequence[LocationRecord]) -> list[list[str | float]]:
+    """One row for each code at a location, one without code for the others."""
+    rows: list[list[str | float]] = []
+    for record in records:
+        seen = record.observation
+        reads: Sequence[StoredRead | None] = (seen.reads if seen else ()) or (None,)
+        pose = seen.pose if seen else None
+        told = {read.text if read else "": read for read in reads}
+        for text, read in told.items():
+            gs1 = "".join(f"({ai}){value}" for ai, value in read.gs1) if read else ""
+            rows.append(
+                [
+                    record.code, record.state.value, text, read.symbology if read else "", gs1,
+                    seen.confidence if seen else "", utc_text(seen.utc_ns) if seen else "",
+                    seen.run if seen else "", record.node, pose.x_m if pose else "",
+                    pose.y_m if pose else "", pose.height_m if pose else "", seen.evidence if seen else "",
+                ]
+            )  # fmt: skip
+    return rows

@@ -1,0 +1,125 @@
+"""Why a mission does what it does, or does not: values with fields, and their words in one place.  Pure."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from flightd.mission.triggers import Trigger
+
+
+class Plain(enum.Enum):
+    """Reasons that need no figures."""
+
+    AWAITS_START = "waiting for the start command"
+    LANDED = "landed on the pad"
+    NO_TELEMETRY = "no telemetry from the vehicle"
+    ARMED_ALREADY = "the vehicle is armed already: disarm it first"
+    NO_HEIGHT = "no height from the vehicle's range finder"
+    NO_CHARGE = "no battery level from the vehicle"
+    NO_PICTURE = "no picture from the down camera"
+    GROUND_SILENT = "the ground station that attends this flight fell silent"
+
+
+@dataclass(frozen=True, slots=True)
+class Happened:
+    """What has just happened, as the machine knows it."""
+
+    trigger: Trigger
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """As `why`, and the vehicle says what it refuses."""
+
+    why: Reason
+    refusal: str
+
+
+@dataclass(frozen=True, slots=True)
+class StartChargeLow:
+    """Too little charge to start."""
+
+    charge_frac: float
+    needed_frac: float
+
+
+@dataclass(frozen=True, slots=True)
+class LatePictures:
+    """Pictures are looked at later than they may be."""
+
+    limit_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class AwaitsBattery:
+    """On the pad with stops left, for a battery that is full enough."""
+
+    stops_left: int
+    charge_frac: float
+    full_frac: float
+
+
+@dataclass(frozen=True, slots=True)
+class ChargeLow:
+    """Below the charge at which it flies home, whatever the way."""
+
+    charge_frac: float
+
+
+@dataclass(frozen=True, slots=True)
+class ChargeShort:
+    """The charge does not last for a visit to `node` (empty: none) and the way back to `pad`."""
+
+    node: str
+    pad: str
+    charge_frac: float
+    needed_frac: float
+    reserve_frac: float
+
+
+@dataclass(frozen=True, slots=True)
+class NothingRead:
+    """No picture of a shelf was read in the last `blind` of `scans`."""
+
+    blind: int
+    scans: int
+
+
+Reason: TypeAlias = (
+    Plain
+    | Happened
+    | Refused
+    | StartChargeLow
+    | LatePictures
+    | AwaitsBattery
+    | ChargeLow
+    | ChargeShort
+    | NothingRead
+)
+
+
+def in_words(reason: Reason) -> str:
+    """What people are told, in status, events and logs."""
+    match reason:
+        case Plain():
+            text = reason.value
+        case Happened(trigger):
+            text = trigger.value
+        case Refused(why, refusal):
+            text = f"{in_words(why)}: {refusal}"
+        case StartChargeLow(charge, needed):
+            text = f"battery at {charge:.0%}, {needed:.0%} needed to start"
+        case LatePictures(limit_s):
+            text = f"pictures are more than {limit_s * 1e3:.0f} ms old when they have been looked at"
+        case AwaitsBattery(stops, charge, full):
+            text = f"{stops} stops left: waiting for a battery at {full:.0%}, it is at {charge:.0%}"
+        case ChargeLow(charge):
+            text = f"battery low: {charge:.0%}"
+        case ChargeShort(node, pad, charge, needed, reserve):
+            what = f"a visit to {node} and the way back" if node else f"the way back to {pad}"
+            text = f"battery at {charge:.0%}: {what} needs {needed:.0%} and {reserve:.0%} stay in reserve"
+        case NothingRead(blind, scans):
+            text = f"no picture of a shelf was read at the last {blind} of {scans} scans"
+    return text

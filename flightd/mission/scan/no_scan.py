@@ -1,0 +1,83 @@
+"""A flight that counts nothing: what a scanner answers when there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TypeAlias
+
+from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
+from flightd.core.types import Event
+from flightd.mission.plan.leg_times import Pace
+from flightd.mission.scan.code_assignment import Sighting
+from flightd.mission.scan.scanner import Scanner
+
+
+class NoScan:
+    """A `Scanner` for which there is never anything to scan; it keeps no state."""
+
+    counts = False
+    least_integrity = 0.0
+    look_s = 0.0
+    view = None
+    exposure = 1.0
+    blind = None
+    doubted = False
+    looking = False
+
+    def wants(self, _node: str) -> bool:
+        return False
+
+    def stop_s(self, _node: str, _pace: Pace) -> float:
+        return 0.0
+
+    def skip(self, locations: Iterable[str]) -> None:
+        """Nothing is counted anyway."""
+
+    def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:
+        """Nothing begins."""
+
+    def begin(self, now_ns: int) -> None:
+        """Nothing begins."""
+
+    def step(self, _now_ns: int) -> bool:
+        return True
+
+    def leave(self) -> None:
+        """Nothing is left."""
+
+    def reached(self, node: str, certain: bool) -> None:
+        """Nothing is proven."""
+
+    def home(self, certain: bool) -> None:
+        """Nothing is proven."""
+
+    def doubt(self) -> None:
+        """Nothing is kept back."""
+
+    def withdraw(self, now_ns: int, reason: str) -> None:
+        """Nothing is taken back."""
+
+    def trust(self) -> None:
+        """Nothing was doubted."""
+
+    def take_due(self) -> tuple[str, ...]:
+        return ()
+
+    def places(self, _pose: BodyPose) -> tuple[Place, ...]:
+        return ()
+
+    def take(self, codes: CodeSet, pose: BodyPose) -> None:
+        """No picture is looked at."""
+
+    def drain(self) -> tuple[tuple[Finding, ...], tuple[Settled, ...]]:
+        return (), ()
+
+    def drain_events(self) -> list[Event]:
+        return []
+
+    def drain_sightings(self) -> tuple[Sighting, ...]:
+        return ()
+
+
+AnyScanner: TypeAlias = Scanner | NoScan
+NO_SCAN = NoScan()

@@ -1,0 +1,85 @@
+"""The scan along the phases of a mission: where it is due, and what each change of phase means for it."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from flightd.core.types import Phase
+from flightd.mission.guidance import MissionInputs
+from flightd.mission.plan.flight_plan import Stop
+from flightd.mission.scan.no_scan import AnyScanner
+from flightd.mission.scan.views import View
+from flightd.mission.triggers import Trigger
+from flightd.site.site import Site
+
+_TO_VIEW = (Phase.CLIMB, Phase.SCAN)
+_ENDS = (Phase.LAND, Phase.DONE, Phase.ABORTED, Phase.PILOT)
+_SAME_SHARE = 0.5
+"""A position that is corrected by less than this part of the way to the nearest other place is the same."""
+_OVER = (Trigger.DWELLED, Trigger.ROUTE_DONE)
+
+
+class ShelfScan:
+    """Leads a scanner through a flight: `follow` at each change of phase."""
+
+    def __init__(self, site: Site, scanner: AnyScanner) -> None:
+        self._scanner = scanner
+        self._scanned = ""
+        self._apart_m = _least_apart_m(site)
+
+    def view(self, phase: Phase) -> View | None:
+        """Where to look from, None in phases that do not scan."""
+        return self._scanner.view if phase in _TO_VIEW else None
+
+    def doubts(self, phase: Phase) -> set[Trigger]:
+        """What a shelf that contradicts the place asks for, until the place is sure again."""
+        doubted = self._scanner.doubted and phase is not Phase.RELOCATE
+        return {Trigger.POSITION_DOUBTED} if doubted else set()
+
+    def due(self, phase: Phase, stop: Stop) -> bool:
+        """Whether there is anything (left) to scan at the stop that is hovered at."""
+        if not stop.visit:
+            return False
+        if phase in _TO_VIEW:
+            return self._scanner.view is not None
+        return self._scanner.wants(stop.node) and not self.is_scanned(stop)
+
+    def is_scanned(self, stop: Stop) -> bool:
+        """Whether the hover at this stop follows its scan."""
+        return stop.node == self._scanned
+
+    def follow(
+        self, s: MissionInputs, before: Phase, phase: Phase, trigger: Trigger, stop: Stop, shift_m: float
+    ) -> None:
+        """A phase has changed at (or on the way to) `stop`; `shift_m` is how far off the position was that
+        was doubted."""
+        scanner = self._scanner
+        certain = s.pose is not None and s.localised and s.pose.integrity >= scanner.least_integrity
+        if trigger is Trigger.POSITION_DOUBTED:
+            scanner.doubt()
+        elif trigger is Trigger.POSITION_SURE:
+            if shift_m >= _SAME_SHARE * self._apart_m:
+                scanner.withdraw(s.now_ns, f"the position was {shift_m:.2f} m off")
+            scanner.trust()
+        elif phase in _ENDS and scanner.doubted:
+            scanner.withdraw(s.now_ns, "the position was not found again")
+        elif trigger is Trigger.ARRIVED:
+            scanner.reached(stop.node, certain)
+            self._scanned = ""
+        elif trigger is Trigger.SCAN_DUE and s.pose is not None:
+            scanner.arrive(stop.node, s.height_m, s.pose.yaw_rad)
+        elif trigger is Trigger.AT_VIEW:
+            scanner.begin(s.now_ns)
+        elif before in _TO_VIEW and phase not in _TO_VIEW:
+            scanner.leave()
+            self._scanned = stop.node if trigger in _OVER else ""
+        if trigger is Trigger.ROUTE_DONE:
+            scanner.home(certain)
+
+
+def _least_apart_m(site: Site) -> float:
+    """The distance between the two neighbouring nodes or lines of a site that are nearest to each other."""
+    rows = sorted({aisle.y_m for aisle in site.aisles})
+    along = (spacing_m for aisle in site.aisles for spacing_m in aisle.spacing_m)
+    return min((*along, *(b - a for a, b in pairwise(rows))), default=math.inf)

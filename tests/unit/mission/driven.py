@@ -1,0 +1,112 @@
+"""A mission that is fed by hand: by default all is well and the drone is wherever it is led."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from flightd.config.mission import Heading
+from flightd.config.schema import Config
+from flightd.core.types import (
+    Attitude,
+    Command,
+    CommandKind,
+    Demand,
+    GridPose,
+    LandedState,
+    Phase,
+    VehicleState,
+)
+from flightd.mission.guidance import Guidance, Guide, MissionInputs
+from flightd.mission.mission import Mission
+from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
+from flightd.sim.random_sites import random_site
+from flightd.site.site import Site
+from tests.unit.mission.configured import configured
+
+SITE = random_site(3)
+POLICY = HeadingPolicy(Heading.ALONG)
+TICK_NS = 20_000_000
+
+
+class Flight:
+    """Feeds a mission with senses: by default all is well and the drone is wherever the mission wants."""
+
+    def __init__(
+        self, params: Config | None = None, site: Site = SITE, scanner: AnyScanner = NO_SCAN
+    ) -> None:
+        home = site.home.node
+        plan = make_plan(site, site.serpentine_route(), home, home, POLICY)
+        self.mission = Mission(site, plan, POLICY, params or configured(dwell_s=1.0), scanner)
+        self.site = site
+        self.integrity = 1.0
+        self.heartbeat_s = 0.0
+        self.now_ns = 10**12
+        self.guidance: Guidance | None = None
+        state = VehicleState(
+            Attitude(0, 0, 0, 0),
+            0.1,
+            0,
+            0.0,
+            "GUIDED_NOGPS",
+            True,
+            False,
+            LandedState.ON_GROUND,
+            0.9,
+            12.0,
+            0,
+        )
+        self.senses = MissionInputs(0, 0.02, None, True, 0.1, True, 0.0, 0.0, 0.0, state)
+
+    @property
+    def phase(self) -> Phase:
+        return self.mission.phase
+
+    def set(self, **changes: object) -> None:
+        vehicle = {k: v for k, v in changes.items() if k in VehicleState.__slots__ and k != "height_m"}
+        other = {k: v for k, v in changes.items() if k not in vehicle}
+        assert self.senses.vehicle is not None
+        state = replace(self.senses.vehicle, **vehicle)  # type: ignore[arg-type]
+        self.senses = replace(self.senses, vehicle=state, **other)  # type: ignore[arg-type]
+
+    def run(self, seconds: float, until: Callable[[], bool] = lambda: False, follow: bool = True) -> None:
+        for _ in range(round(seconds / 0.02)):
+            self.now_ns += TICK_NS
+            g = self.guidance
+            if follow and g is not None and g.guide is not Guide.NONE:
+                height = 0.1 + (0.0 if math.isnan(g.reference.height_m) else g.reference.height_m)
+                if not math.isnan(self.senses.height_m):
+                    self.senses = replace(self.senses, height_m=height)
+                r = g.reference
+                node = self.site.nearest(r.x_m, r.y_m)
+                pose = GridPose(
+                    self.now_ns,
+                    node.id,
+                    0,
+                    0,
+                    r.yaw_rad,
+                    r.x_m,
+                    r.y_m,
+                    r.vx_mps,
+                    r.vy_mps,
+                    height,
+                    (0.0,) * 9,
+                    self.integrity,
+                )
+                self.senses = replace(self.senses, pose=pose)
+            if follow and g is not None and g.demand is Demand.FLY:
+                self.set(armed=True)
+            heard_s = self.senses.telemetry_age_s + self.heartbeat_s
+            self.set(heartbeat_ns=self.now_ns - round(heard_s * 1e9))
+            self.guidance = self.mission.step(replace(self.senses, now_ns=self.now_ns))
+            if until():
+                return
+
+    def to(self, phase: Phase, within_s: float = 60.0) -> None:
+        self.run(within_s, lambda: self.phase is phase)
+        assert self.phase is phase, self.mission.reason
+
+    def order(self, kind: CommandKind, node: str = "") -> None:
+        self.mission.command(Command("1", kind, node), self.now_ns)

@@ -1,0 +1,134 @@
+"""Every trigger in every state, through a mission that is fed by hand: the table is what happens."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightd.core.types import CommandKind, LandedState, Phase
+from flightd.mission.machine import COMMANDS, STATES, TABLE, Cause, Intent, State
+from flightd.mission.triggers import Trigger
+from tests.unit.mission.driven import Flight
+from tests.unit.mission.states import PARAMS, STIMULI, Stimulus, fresh
+
+_AT_NODE = (Phase.HOVER, Phase.CLIMB, Phase.SCAN)
+_BACK = (Intent.RETURN, Intent.HOME)
+_SLOW = (Trigger.HEIGHT_LOST, Trigger.TIMED_OUT, Trigger.POSITION_DOUBTED)
+SHADOWED = {
+    # on the way back nothing is done at a node: it goes on before anything that takes time
+    *((State(phase, intent), trigger) for phase in _AT_NODE for intent in _BACK for trigger in _SLOW),
+    # the search for the position has a limit of its own, which is shorter
+    *((State(Phase.RELOCATE, intent), Trigger.TIMED_OUT) for intent in (Intent.VISIT, *_BACK)),
+    # no shelf is scanned at the last stop, which is the pad's
+    *((State(Phase.SCAN, intent), Trigger.ROUTE_DONE) for intent in (Intent.VISIT, *_BACK)),
+    # there is another stop, another view; the states of a landing were reached through these
+    *((State(Phase.HOVER, intent), Trigger.ROUTE_DONE) for intent in (Intent.VISIT, *_BACK)),
+    (State(Phase.SCAN, Intent.VISIT), Trigger.DWELLED),
+}
+"""What another trigger comes before in these flights."""
+_ON_PAD = {
+    (State(Phase.LAND, Intent.RETURN), Trigger.NOT_COUNTED),
+    (State(Phase.LAND, Intent.RETURN), Trigger.DISARMED),
+    (State(Phase.LAND, Intent.HOME), Trigger.DOWN_TO_SWAP),
+}
+"""Landings that depend on what was done before: each has its own test below."""
+_ORDERS = {trigger: kind for kind, trigger in COMMANDS.items()}
+
+
+def ids(state: State) -> str:
+    return f"{state.phase}-{state.intent.name.lower()}"
+
+
+def flight_for(state: State, trigger: Trigger) -> Flight:
+    """A flight in a state, configured so that the trigger may happen to it."""
+    stimulus = STIMULI[trigger]
+    again = state.intent is Intent.RETURN or state.phase is Phase.SWAP  # which takes another battery
+    params = PARAMS if again and not stimulus.params.battery.swap else stimulus.params
+    return fresh(state, params, state.phase in stimulus.scanning and not state.adopted)
+
+
+def what_follows(flight: Flight, stimulus: Stimulus) -> tuple[State, str]:
+    """The first state that follows a stimulus, and the reason given; the same and none if nothing does."""
+    before = flight.mission.state
+    flight.mission.drain_events()
+    for tick in range(round(stimulus.within_s / 0.02)):
+        if tick == 0 or stimulus.hold:
+            stimulus.act(flight)
+        if flight.mission.state == before:
+            flight.run(0.02, follow=stimulus.follow)
+        begun = [event.text for event in flight.mission.drain_events() if event.name == "phase"]
+        if begun or flight.mission.state != before:
+            return flight.mission.state, begun[0].split(": ", 1)[1] if begun else ""
+    return before, ""
+
+
+def is_as_the_table_says(state: State, trigger: Trigger) -> bool:
+    flight, outcome = flight_for(state, trigger), TABLE[state][trigger]
+    if outcome is not None and not outcome.begins and trigger in _ORDERS:
+        STIMULI[trigger].act(flight)
+        refused = [event for event in flight.mission.drain_events() if "refused" in event.text]
+        return flight.mission.state == outcome.state and not refused
+    after, reason = what_follows(flight, STIMULI[trigger])
+    if outcome is None:
+        return reason != trigger.value
+    if trigger is Trigger.NOT_COUNTED:
+        return after == outcome.state and reason.startswith("no picture of a shelf")
+    named = outcome.begins and outcome.cause is Cause.TRIGGER
+    return after == outcome.state and (not named or reason == trigger.value)
+
+
+@pytest.mark.parametrize("state", STATES, ids=ids)
+def test_what_happens_is_what_the_table_says(state: State) -> None:
+    wrong = [
+        trigger
+        for trigger in Trigger
+        if (state, trigger) not in SHADOWED | _ON_PAD and not is_as_the_table_says(state, trigger)
+    ]
+    assert not wrong
+
+
+@pytest.mark.parametrize("state", STATES, ids=ids)
+@pytest.mark.parametrize("kind", list(CommandKind))
+def test_a_command_that_is_not_possible_is_refused_and_changes_nothing(
+    state: State, kind: CommandKind
+) -> None:
+    flight = fresh(state)
+    flight.mission.drain_events()
+    flight.order(kind, "A3" if kind is CommandKind.GOTO else "")
+    refused = any("refused" in event.text for event in flight.mission.drain_events())
+    assert refused is (TABLE[state][COMMANDS[kind]] is None)
+    assert flight.mission.state == state or not refused
+
+
+def down(flight: Flight) -> str:
+    """It stands on the pad that it was led to and disarms; the state then."""
+    flight.to(Phase.LAND, 120.0)
+    flight.set(landed=LandedState.ON_GROUND, armed=False)
+    flight.run(0.02, follow=False)
+    return ids(flight.mission.state)
+
+
+def test_ordered_home_on_the_way_to_a_fresh_battery_it_still_goes_on_with_it() -> None:
+    flight = fresh(State(Phase.LAND, Intent.RETURN))
+    assert down(flight) == "swap-wait"
+    flight = fresh(State(Phase.FOLLOW, Intent.VISIT))
+    flight.to(Phase.HOVER)
+    flight.to(Phase.FOLLOW)
+    flight.set(battery_frac=0.15)
+    flight.run(0.02)
+    flight.order(CommandKind.HOME)
+    assert ids(flight.mission.state) == "follow-home"
+    assert down(flight) == "swap-wait"
+
+
+def test_a_battery_on_which_nothing_was_visited_is_the_last() -> None:
+    flight = fresh(State(Phase.TAKE_OFF, Intent.RETURN))
+    assert down(flight) == "done-end"
+    assert flight.mission.reason == "landed on the pad"
+
+
+def test_nothing_counted_on_the_last_battery_is_no_completed_mission() -> None:
+    flight = fresh(State(Phase.CLIMB, Intent.RETURN))
+    assert not flight.mission.visited
+    flight.set(battery_frac=0.15)
+    assert down(flight) == "aborted-end"
+    assert flight.mission.reason.startswith("no picture of a shelf")

@@ -1,0 +1,118 @@
+"""Write the parts of the guide and of the README that are made from the code.
+
+A part stands between `<!-- made: NAME -->` and `<!-- end: NAME -->`; what stands between is replaced.  The
+picture of the layers is made from the contract in pyproject.toml.
+
+python -m tools.write_guide            # write them
+python -m tools.write_guide --check    # exit 1 and name the pages that are stale
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from flightd.adapters.ground_link import protocol_text
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.required_parameters import Job, Rule, rules_for
+from flightd.config.schema import Config
+from flightd.guide import pages
+from flightd.mission.safety import hazards
+from flightd.site.site_file import SiteFile
+from tools import reference_tables
+from tools.command_help import help_pages
+from tools.layer_picture import layers, picture
+
+ROOT = Path(__file__).parent.parent
+LAYERS = pages.FOLDER / "pictures" / "layers.svg"
+_PART = re.compile(r"(<!-- made: (\S+) -->\n).*?(<!-- end: \2 -->)", re.DOTALL)
+
+
+def _commands() -> str:
+    return "\n".join(help_pages(ROOT / "pyproject.toml"))
+
+
+def _parameters(firmware: Firmware) -> str:
+    rules = [(rule, "") for rule in rules_for(firmware, Job())]
+    usual = {rule for rule, _ in rules}
+    for key, job in (
+        ('flying_mode = "guided"', Job(guided=True)),
+        ("raw_thrust = true", Job(raw_thrust=True)),
+        ("raw_thrust = false", Job(raw_thrust=False)),
+        ("pose_output", Job(shares_pose=True)),
+        ("landing_target", Job(landing_target=True)),
+    ):
+        rules += [(rule, key) for rule in rules_for(firmware, job) if not _is_in(rule, usual)]
+    lines = ["| parameter | must be | `--fix` sets | only with | why |", "|---|---|---|---|---|"]
+    for rule, key in rules:
+        names = " or ".join(f"`{name}`" for name in rule.names)
+        better = "" if rule.better is None else f"{rule.better:g}"
+        only = f"`{key}`" if key else ""
+        lines.append(f"| {names} | {rule.expected} | {better} | {only} | {rule.reason} |")
+    return "\n".join(lines) + "\n"
+
+
+def _is_in(rule: Rule, usual: set[Rule]) -> bool:
+    return any((rule.names, rule.expected) == (other.names, other.expected) for other in usual)
+
+
+def _page_list(prefix: str) -> str:
+    lines = ["| page | what is in it |", "|---|---|"]
+    lines += [f"| [{page.title}]({prefix}{page.topic}.md) | {page.summary} |" for page in pages.pages()]
+    return "\n".join(lines) + "\n"
+
+
+PARTS: Mapping[str, Callable[[], str]] = {
+    "configuration": lambda: reference_tables.markdown(Config),
+    "site-file": lambda: reference_tables.markdown(SiteFile),
+    "commands": _commands,
+    "protocol": protocol_text.markdown,
+    "hazards": hazards.markdown,
+    "parameters-ardupilot": lambda: _parameters(Firmware.ARDUPILOT),
+    "parameters-px4": lambda: _parameters(Firmware.PX4),
+    "pages": lambda: _page_list(""),
+    "readme-pages": lambda: _page_list("flightd/guide/"),
+}
+"""Every part by its name, and what makes it."""
+
+
+def guide_files() -> list[Path]:
+    """The README and every page."""
+    return [ROOT / "README.md", *sorted(pages.FOLDER.glob("*.md"))]
+
+
+def written(text: str) -> str:
+    """The page as it should be."""
+    return _PART.sub(lambda part: f"{part[1]}\n{PARTS[part[2]]()}\n{part[3]}", text)
+
+
+def stale() -> dict[Path, str]:
+    """Files whose made parts differ from the code, and how they should be."""
+    wanted = {path: written(path.read_text(encoding="utf-8")) for path in guide_files()}
+    wanted[LAYERS] = picture(layers(ROOT / "pyproject.toml"))
+    return {
+        path: text
+        for path, text in wanted.items()
+        if not path.exists() or path.read_text(encoding="utf-8") != text
+    }
+
+
+def _main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--check", action="store_true", help="write nothing; exit 1 when a page is stale")
+    check = parser.parse_args().check
+    found = stale()
+    for path, text in found.items():
+        print(f"{path.relative_to(ROOT)}: {'stale' if check else 'written'}")
+        if not check:
+            path.write_text(text, encoding="utf-8")
+    return 1 if check and found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main())
