@@ -93,8 +93,8 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.TELEMETRY_LOST,
         "newest attitude older than `mission.telemetry_land_s`",
         Action.LAND,
-        "down by setpoints, braked by the pictures, where the autopilot keeps their climb rate; then, or else at"
-        " once, its own landing is ordered unheard, again and again; given up 60 s later",
+        "down by setpoints, braked by the pictures, where the autopilot keeps their climb rate; then, or else"
+        " at once, its own landing is ordered unheard, again and again; given up 60 s later",
         _FAST,
     ),
     Hazard(

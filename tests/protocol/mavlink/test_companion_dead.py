@@ -1,4 +1,4 @@
-"""A vehicle whose companion computer dies in the air is landed by its autopilot; without that nothing is armed."""
+"""A vehicle whose companion dies in the air is landed by its autopilot; one that would not is not armed."""
 
 from __future__ import annotations
 
