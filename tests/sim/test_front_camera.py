@@ -135,11 +135,13 @@ class Dying:
 )
 def test_a_renderer_that_fails_ends_its_camera(make: Callable[[], PictureMaker], problem: str) -> None:
     async def main() -> None:
-        peer = CameraPeer(CAMERA, make, "seed", ("127.0.0.1", free_port()), hovering, LoopClock())
+        address = "127.0.0.1", free_port()
+        peer = CameraPeer(CAMERA, make, "seed", address, hovering, LoopClock(), hold=loop.hold)
         async with asyncio.timeout(60.0):
             await peer.run()
 
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner, pytest.raises(ExceptionGroup) as ended:
+    loop = VirtualLoop()
+    with asyncio.Runner(loop_factory=lambda: loop) as runner, pytest.raises(ExceptionGroup) as ended:
         runner.run(main())
     (cause,) = ended.value.exceptions
     assert isinstance(cause, RunError)
