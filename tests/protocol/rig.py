@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -16,7 +16,6 @@ from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.ports import Vehicle
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.autopilot.autopilot import PeerConfig
@@ -27,7 +26,6 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import Draught
 from flightd.sim.sensors.instruments import Sensors
 from tests.protocol.ardrone.bench import ANY_PORTS, settings_for
-from tests.protocol.patience import PatientLoop
 
 CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
 
@@ -178,29 +176,5 @@ RIGS: dict[str, Callable[[], Any]] = {
 """Every adapter that keeps the contract."""
 
 
-_HURRY = 2.0
-
 REAL_TIME = frozenset({"mavsdk"})
 """Those whose library keeps its own clock."""
-
-
-def run_virtual(test: Callable[[], Awaitable[Any]]) -> Any:
-    """Run an async test in virtual time; no task may be left behind."""
-    return _run(test, VirtualLoop)
-
-
-def run_real(test: Callable[[], Awaitable[Any]]) -> Any:
-    """Run an async test by the clock of the machine, on which a library's threads live; our side of the
-    link and the vehicle's hurry a little.  No task may be left behind."""
-    return _run(test, lambda: PatientLoop(_HURRY))
-
-
-def _run(test: Callable[[], Awaitable[Any]], make_loop: Callable[[], asyncio.AbstractEventLoop]) -> Any:
-    async def main() -> Any:
-        result = await test()
-        left = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
-        assert not left, left
-        return result
-
-    with asyncio.Runner(loop_factory=make_loop) as runner:
-        return runner.run(main())

@@ -16,9 +16,10 @@ from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
 from flightd.sim.ardrone.drone import BIT_COM_WATCHDOG
 from flightd.sim.autopilot.autopilot import PeerConfig
-from tests.protocol.ardrone.bench import Ear, bench, make_drone, virtually
+from tests.protocol.ardrone.bench import Ear, bench, make_drone
 from tests.protocol.mavlink.scripted import ScriptedAutopilot, scripted
-from tests.protocol.rig import Rig, ardupilot_rig, px4_rig, run_virtual
+from tests.protocol.rig import Rig, ardupilot_rig, px4_rig
+from tests.rigs.event_loops import virtual
 
 BOTH = {"ardupilot": ardupilot_rig, "px4": px4_rig}
 _PATIENT_PX4 = PeerConfig(ready_s=0.5, parameters={"COM_OF_LOSS_T": 6.5})
@@ -31,7 +32,7 @@ def on_rig(request: pytest.FixtureRequest) -> Callable[[Any], Any]:
             async with BOTH[request.param]() as rig:
                 return await test(rig)
 
-        return run_virtual(main)
+        return virtual(main())
 
     return run
 
@@ -110,7 +111,7 @@ def test_a_daemon_that_died_in_the_air_and_comes_back_takes_the_flight_over(
             running.cancel()
             await asyncio.wait([running])
 
-    run_virtual(test)
+    virtual(test())
 
 
 async def _nothing() -> None:
@@ -152,7 +153,7 @@ def test_every_answer_but_acceptance_is_told_and_tried_again(
             assert state is not None
             assert (state.in_control, state.armed, state.refusal) == (True, True, "")
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_the_ardrones_command_watchdog_is_reset_at_once() -> None:
@@ -172,4 +173,4 @@ def test_the_ardrones_command_watchdog_is_reset_at_once() -> None:
             assert ear.named("COMWDG")
             assert b.state.in_control
 
-    virtually(main)
+    virtual(main())

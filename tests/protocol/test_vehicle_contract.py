@@ -12,7 +12,9 @@ import pytest
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, LandedState
 from flightd.runtime.clock import LoopClock
-from tests.protocol.rig import REAL_TIME, RIGS, Rig, run_real, run_virtual
+from tests.protocol.rig import REAL_TIME, RIGS, Rig
+from tests.rigs.event_loops import virtual
+from tests.rigs.patient_loop import patient
 
 
 @pytest.fixture(params=list(RIGS))
@@ -24,7 +26,7 @@ def on_rig(request: pytest.FixtureRequest) -> Callable[[Any], Any]:
             async with RIGS[request.param]() as rig:
                 return await test(rig)
 
-        return (run_real if request.param in REAL_TIME else run_virtual)(main)
+        return (patient if request.param in REAL_TIME else virtual)(main())
 
     return run
 

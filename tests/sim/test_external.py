@@ -16,7 +16,7 @@ from flightd.runtime.clock import LoopClock
 from flightd.sim.plant.external_simulator import ExternalVehicle, Placement, TruthReader
 from flightd.sim.plant.kinematics import Kinematics
 from tests.command import Command
-from tests.protocol.rig import run_virtual
+from tests.rigs.event_loops import virtual
 
 LAT0, LON0, ALT0 = -35.363262, 149.165237, 584.0
 HEADING0 = math.radians(353.0)
@@ -184,7 +184,7 @@ def test_the_link_is_opened_followed_and_found_again() -> None:
         await server.wait_closed()
         await asyncio.sleep(0.01)
 
-    run_virtual(test)
+    virtual(test())
 
 
 class UdpSitl(asyncio.DatagramProtocol):
@@ -236,7 +236,7 @@ def test_a_simulator_on_udp_is_heard_and_told_the_distance_to_our_floor() -> Non
         transport.close()
         await asyncio.sleep(0.01)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_what_a_stalled_simulator_does_not_read_is_not_piled_up() -> None:
@@ -259,7 +259,7 @@ def test_what_a_stalled_simulator_does_not_read_is_not_piled_up() -> None:
         await server.wait_closed()
         await asyncio.sleep(0.01)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_between_samples_the_motion_goes_on_for_a_moment() -> None:
@@ -286,7 +286,7 @@ def test_between_samples_the_motion_goes_on_for_a_moment() -> None:
         await server.wait_closed()
         await asyncio.sleep(0.01)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_simulator_that_is_not_there_is_told_in_one_line() -> None:
@@ -295,7 +295,7 @@ def test_a_simulator_that_is_not_there_is_told_in_one_line() -> None:
         with pytest.raises(UnavailableError, match="--truth-url"):
             await vehicle.open()
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(
@@ -306,7 +306,7 @@ def test_a_wrong_address_names_the_right_form(url: str) -> None:
         with pytest.raises(InputError, match="tcp:HOST:PORT"):
             ExternalVehicle(url, LoopClock(), PAD)
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,9 @@ import pytest
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import ScaledLoop
 from flightd.sim.plant.external_simulator import ExternalVehicle, Placement
 from tests.protocol.rig import Rig
+from tests.rigs.event_loops import real
 
 ROOT = Path(__file__).parents[2]
 SHORT = 'mission.nodes=["A1", "A2"]'
@@ -112,8 +112,7 @@ def test_a_simulator_that_runs_at_another_speed_is_flown_in_its_own_time(
 
     with simulator(kind, speed) as options:
         addresses = options[3], options[5]
-        with asyncio.Runner(loop_factory=lambda: ScaledLoop(speed)) as runner:
-            runner.run(main(*addresses))
+        real(main(*addresses), speed)
     assert not [record for record in caplog.records if "times as fast" in record.message]
 
 

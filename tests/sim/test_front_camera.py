@@ -2,11 +2,12 @@
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,6 @@ from flightd.app.simulation.simulator_config import simulator_config
 from flightd.config.schema import Config
 from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackLook
@@ -28,6 +28,7 @@ from flightd.sim.scenario.scenario import FrontCameraScenario, Scenario
 from flightd.sim.sensors.camera import CameraPeer, PictureMaker
 from flightd.site.site_file import load_site
 from tests.held_time import held
+from tests.rigs.event_loops import real, virtual
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SMALL = CONFIGS / "site-racks-small.toml"
@@ -46,7 +47,7 @@ def taken(
     expose: tuple[float, ...] = (),
     make: Callable[[], PictureMaker] = MAKE,
     camera: FrontCamera = CAMERA,
-    loop: Callable[[], asyncio.AbstractEventLoop] = VirtualLoop,
+    run: Callable[[Coroutine[Any, Any, None]], None] = virtual,
 ) -> list[tuple[FrameTicket, int, Image]]:
     """What a daemon's camera hears of the simulated one: each picture's ticket, arrival and pixels.  Each of
     the exposures is asked for in turn, for an equal part of the time."""
@@ -71,10 +72,9 @@ def taken(
         for task in (running, listening):
             task.cancel()
         await asyncio.wait([running, listening])
-        assert loop is not VirtualLoop or peer.late == 0
+        assert run is not virtual or peer.late == 0
 
-    with asyncio.Runner(loop_factory=loop) as runner:
-        runner.run(main())
+    run(main())
     return found
 
 
@@ -112,7 +112,7 @@ class Slow:
 
 @pytest.mark.realtime
 def test_a_renderer_that_cannot_keep_up_costs_pictures_and_does_not_let_them_queue() -> None:
-    numbers = [ticket.seq for ticket, *_ in taken(5.0, make=Slow, loop=asyncio.new_event_loop)]
+    numbers = [ticket.seq for ticket, *_ in taken(5.0, make=Slow, run=real)]
     assert numbers[-1] - numbers[0] >= 1.2 * (len(numbers) - 1) > 0
 
 
@@ -120,7 +120,7 @@ def test_a_renderer_that_cannot_keep_up_costs_pictures_and_does_not_let_them_que
 def test_a_camera_without_any_delay_takes_pictures() -> None:
     at_once = replace(CAMERA, capture_delay_s=0.0)
     make = partial(FrontRenderer, load_site(SMALL), at_once, RackLook(), 1)
-    assert len(taken(2.0, make=make, camera=at_once, loop=asyncio.new_event_loop)) >= 2
+    assert len(taken(2.0, make=make, camera=at_once, run=real)) >= 2
 
 
 def configured(site: Path, *settings: str, scenario: Scenario = Scenario()) -> Config:  # noqa: B008

@@ -13,7 +13,7 @@ import pytest
 from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.protocol import StatusReport
 from flightd.core.types import CommandKind, Phase
-from tests.sim.ground_rig import in_loop
+from tests.rigs.event_loops import in_real_time
 
 ROOT = Path(__file__).parents[2]
 SPEED = "0.5"
@@ -26,7 +26,7 @@ def free_tcp_port() -> int:
 
 
 @pytest.mark.realtime
-@in_loop
+@in_real_time
 async def test_a_flight_is_started_watched_and_landed_from_the_ground(tmp_path: Path) -> None:
     address = Address("127.0.0.1", free_tcp_port(), free_tcp_port())
     settings = {

@@ -23,13 +23,13 @@ from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.types import CommandKind, Phase
 from flightd.runtime.clock import LoopClock
 from flightd.site.site import Aisle, Edge, Node
+from tests.rigs.event_loops import in_real_time
 from tests.sim.ground_rig import (
     SITE,
     Keyring,
     address_of,
     connected,
     event,
-    in_loop,
     local,
     serving,
     tell_once,
@@ -40,7 +40,7 @@ from tests.sim.ground_rig import (
 EXAMPLE = Path(__file__).parents[2] / "tools" / "ground_client.py"
 
 
-@in_loop
+@in_real_time
 async def test_an_operator_is_told_what_happens_and_commands() -> None:
     async with serving(local()) as link, GroundClient(address_of(link)) as client:
         welcome = await client.hello()
@@ -81,7 +81,7 @@ async def _until_event(client: GroundClient) -> Any:
             return
 
 
-@in_loop
+@in_real_time
 async def test_published_messages_are_numbered_without_a_gap() -> None:
     async with serving(local()) as link, GroundClient(address_of(link)) as client:
         await connected(client, link)
@@ -95,7 +95,7 @@ async def test_published_messages_are_numbered_without_a_gap() -> None:
         assert numbers == list(range(numbers[0], numbers[0] + 20))
 
 
-@in_loop
+@in_real_time
 async def test_beyond_loopback_only_listed_keys_come_in_and_the_key_is_the_role(tmp_path: Path) -> None:
     ring = Keyring.make(tmp_path)
     async with serving(ring.config()) as link:
@@ -127,7 +127,7 @@ async def test_beyond_loopback_only_listed_keys_come_in_and_the_key_is_the_role(
     assert lines[0]["address"] == "127.0.0.1"
 
 
-@in_loop
+@in_real_time
 async def test_a_stranger_hears_nothing_on_the_status_port_either(tmp_path: Path) -> None:
     ring = Keyring.make(tmp_path)
     async with (
@@ -153,7 +153,7 @@ async def test_a_stranger_hears_nothing_on_the_status_port_either(tmp_path: Path
         assert heard == []
 
 
-@in_loop
+@in_real_time
 async def test_a_plain_req_socket_and_json_are_a_whole_client() -> None:
     """What the README shows, without a line of flightd."""
     async with serving(local()) as link:
@@ -172,7 +172,7 @@ async def test_a_plain_req_socket_and_json_are_a_whole_client() -> None:
         }
 
 
-@in_loop
+@in_real_time
 async def test_the_example_client_shows_events_and_sends_a_tired_drone_home() -> None:
     async with serving(local()) as link:
         process = await asyncio.create_subprocess_exec(
@@ -202,7 +202,7 @@ async def test_the_example_client_shows_events_and_sends_a_tired_drone_home() ->
         assert "warning test look out\n" in told
 
 
-@in_loop
+@in_real_time
 async def test_pictures_come_on_request_at_a_capped_rate() -> None:
     async with serving(local(picture_fps=2.0)) as link:
         assert not link.picture_due(10**9), "nobody asked"
@@ -218,7 +218,7 @@ async def test_pictures_come_on_request_at_a_capped_rate() -> None:
             assert not link.picture_due(10**11), "each request gets one"
 
 
-@in_loop
+@in_real_time
 async def test_no_picture_is_said_so_and_not_waited_for_for_ever() -> None:
     async with serving(local()) as link, GroundClient(address_of(link)) as client:
         async with asyncio.TaskGroup() as tasks:
@@ -234,7 +234,7 @@ async def _refusal(client: GroundClient) -> str:
     return str(refused.value)
 
 
-@in_loop
+@in_real_time
 async def test_junk_frames_of_every_shape_leave_the_link_whole() -> None:
     random_ = random.Random(4)
     async with serving(local()) as link:
@@ -255,7 +255,7 @@ async def test_junk_frames_of_every_shape_leave_the_link_whole() -> None:
         assert link._desk.refused == 500
 
 
-@in_loop
+@in_real_time
 async def test_what_is_not_zmq_and_what_is_too_long_only_loses_its_own_connection() -> None:
     async with serving(local()) as link:
         address = address_of(link)
@@ -274,7 +274,7 @@ async def test_what_is_not_zmq_and_what_is_too_long_only_loses_its_own_connectio
         assert len(link.take_commands()) == 1
 
 
-@in_loop
+@in_real_time
 async def test_a_flood_does_not_keep_the_stop_waiting_nor_the_loop() -> None:
     """Judged by ratios and counts: between two requests of the flood the loop gets its turn."""
     async with serving(local()) as link:
@@ -304,7 +304,7 @@ async def test_a_flood_does_not_keep_the_stop_waiting_nor_the_loop() -> None:
         assert turns * 10 > 3000
 
 
-@in_loop
+@in_real_time
 async def test_expensive_requests_leave_the_loop_most_of_its_time() -> None:
     """A hello on a map of 10,000 nodes takes milliseconds to answer; the flight does not wait for many."""
     aisles = [Aisle(f"R{i}", 0.0, 3.0 * i, (1.5,) * 99) for i in range(100)]
@@ -342,7 +342,7 @@ async def test_expensive_requests_leave_the_loop_most_of_its_time() -> None:
         assert share < 0.35
 
 
-@in_loop
+@in_real_time
 async def test_a_taken_port_is_named_and_nothing_is_left_open() -> None:
     with ZmqGround(local(), SITE, LoopClock()) as first:
         port = address_of(first).command_port
@@ -351,7 +351,7 @@ async def test_a_taken_port_is_named_and_nothing_is_left_open() -> None:
             ZmqGround(taken, SITE, LoopClock()).__enter__()
 
 
-@in_loop
+@in_real_time
 async def test_nobody_there_is_said_so() -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

@@ -14,6 +14,7 @@ from flightd.config.paths import shipped
 from flightd.core.errors import FlightdError, RunError, UnavailableError
 from flightd.sim.world import WorldSpec
 from flightd.site.site_file import load_site
+from tests.rigs.event_loops import real
 
 
 def death_of(spec: WorldSpec, log: Path) -> FlightdError:
@@ -27,7 +28,7 @@ def death_of(spec: WorldSpec, log: Path) -> FlightdError:
             await watch_world(process, ours, lambda _index, _begins: None)
 
     with pytest.raises(FlightdError) as told:
-        asyncio.run(main())
+        real(main())
     return told.value
 
 

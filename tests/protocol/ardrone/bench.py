@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any, TypeVar
 
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from flightd.sim.ardrone.at_commands import DroneCommand, parse
 from flightd.sim.ardrone.drone import Drone, DroneOptions
 from flightd.sim.ardrone.server import ArDroneServer, DronePorts
@@ -22,19 +21,6 @@ from flightd.sim.sensors.instruments import SensorParams, Sensors
 T = TypeVar("T")
 
 ANY_PORTS = DronePorts(at=0, navdata=0, video=0, control=0)
-
-
-def virtually(main: Callable[[], Coroutine[Any, Any, T]]) -> T:
-    """Run in virtual time; tasks that outlive `main` fail the test."""
-
-    async def watched() -> T:
-        result = await main()
-        lingering = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
-        assert not lingering, lingering
-        return result
-
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-        return runner.run(watched())
 
 
 def make_drone(

@@ -14,7 +14,8 @@ from flightd.core.types import Demand
 from flightd.sim.ardrone.drone import MajorState
 from flightd.sim.ardrone.navdata_writer import NavdataReport, packet
 from flightd.sim.autopilot.radio import RadioParams
-from tests.protocol.ardrone.bench import Ear, bench, make_drone, virtually
+from tests.protocol.ardrone.bench import Ear, bench, make_drone
+from tests.rigs.event_loops import virtual
 
 MS = 1_000_000
 
@@ -33,7 +34,7 @@ def test_commands_keep_the_rhythm_with_and_without_setpoints() -> None:
             assert max(gaps) <= 31 * MS
             assert min(gaps) >= 19 * MS
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_setpoint_goes_out_at_once() -> None:
@@ -49,7 +50,7 @@ def test_a_setpoint_goes_out_at_once() -> None:
             sent = [at_ns for at_ns, command in ear.commands if command.name == "PCMD" and command.integer(0)]
             assert sent[0] == asked_ns
 
-    virtually(main)
+    virtual(main())
 
 
 def test_the_numbers_begin_at_one_and_never_fall_back() -> None:
@@ -66,7 +67,7 @@ def test_the_numbers_begin_at_one_and_never_fall_back() -> None:
         assert numbers == sorted(numbers)
         assert drone.ignored_commands == 0
 
-    virtually(main)
+    virtual(main())
 
 
 def test_the_first_command_of_all_is_number_one() -> None:
@@ -77,7 +78,7 @@ def test_the_first_command_of_all_is_number_one() -> None:
             await asyncio.sleep(0.1)
         assert ear.commands[0][1].sequence == 1
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_short_radio_gap_is_survived_in_the_air() -> None:
@@ -93,7 +94,7 @@ def test_a_short_radio_gap_is_survived_in_the_air() -> None:
             await b.steer(0.5, climb_mps=0.2)
             assert (b.state.mode, b.state.refusal) == ("flying", "")
 
-    virtually(main)
+    virtual(main())
 
 
 def test_setpoints_stop_at_the_drone_before_a_lost_link_ends() -> None:
@@ -112,7 +113,7 @@ def test_setpoints_stop_at_the_drone_before_a_lost_link_ends() -> None:
             await b.until(lambda: drone.major == MajorState.LANDING, limit_s=2.0)
             assert "no navdata for 2 s" in b.state.refusal
 
-    virtually(main)
+    virtual(main())
 
 
 def test_after_a_long_gap_the_drone_stays_down_until_flight_is_demanded_anew() -> None:
@@ -132,7 +133,7 @@ def test_after_a_long_gap_the_drone_stays_down_until_flight_is_demanded_anew() -
             b.vehicle.demand(Demand.FLY)
             await b.until(lambda: b.state.mode == "hovering")
 
-    virtually(main)
+    virtual(main())
 
 
 @pytest.mark.parametrize("demand", [Demand.STANDBY, Demand.DISARM, Demand.HANDS_OFF, Demand.LAND])
@@ -148,7 +149,7 @@ def test_what_was_only_being_watched_is_not_sent_up_again_after_a_long_gap(deman
             await asyncio.sleep(5.0)
             assert drone.major == MajorState.LANDED
 
-    virtually(main)
+    virtual(main())
 
 
 def test_flight_demanded_into_a_dead_radio_does_not_start_when_it_returns_unasked() -> None:
@@ -175,7 +176,7 @@ def test_flight_demanded_into_a_dead_radio_does_not_start_when_it_returns_unaske
             assert not any(b",290718208" in datagram for datagram in sent)
             assert ear.named("FTRIM") == []
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_rebooted_drone_is_configured_again_and_flies() -> None:
@@ -193,7 +194,7 @@ def test_a_rebooted_drone_is_configured_again_and_flies() -> None:
             await b.hovering()
             assert ear.named("FTRIM")
 
-    virtually(main)
+    virtual(main())
 
 
 def test_an_adapter_that_starts_anew_is_obeyed_at_once() -> None:
@@ -207,7 +208,7 @@ def test_an_adapter_that_starts_anew_is_obeyed_at_once() -> None:
             await asyncio.sleep(0.2)
             assert 1 <= drone.last_sequence < before
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_second_client_that_ran_ahead_is_overcome_by_starting_at_one() -> None:
@@ -221,7 +222,7 @@ def test_a_second_client_that_ran_ahead_is_overcome_by_starting_at_one() -> None
             await b.until(lambda: drone.last_sequence < 100, limit_s=1.0)  # before the drone gives us up
             await b.hovering()
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_bad_radio_delays_and_does_not_stop_a_flight() -> None:
@@ -235,7 +236,7 @@ def test_a_bad_radio_delays_and_does_not_stop_a_flight() -> None:
             await b.steer(10.0, climb_mps=-0.3, while_=lambda: b.state.armed)
             assert (b.drone.major, b.drone.emergency) == (MajorState.LANDED, False)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_the_drone_may_boot_long_after_the_daemon() -> None:
@@ -247,7 +248,7 @@ def test_the_drone_may_boot_long_after_the_daemon() -> None:
             b.server.radio = True
             await b.hovering()
 
-    virtually(main)
+    virtual(main())
 
 
 def test_damaged_and_foreign_navdata_costs_nothing() -> None:
@@ -269,7 +270,7 @@ def test_damaged_and_foreign_navdata_costs_nothing() -> None:
             assert b.vehicle._link.bad_packets == 200
             assert b.state.battery_frac == 1.0
 
-    virtually(main)
+    virtual(main())
 
 
 def test_navdata_that_was_overtaken_is_not_taken() -> None:
@@ -285,7 +286,7 @@ def test_navdata_that_was_overtaken_is_not_taken() -> None:
                 assert (b.state.battery_frac, b.state.mode) == (1.0, "landed")
             assert b.vehicle._link.stale_packets == 20
 
-    virtually(main)
+    virtual(main())
 
 
 def test_no_network_is_not_the_end() -> None:
@@ -306,7 +307,7 @@ def test_no_network_is_not_the_end() -> None:
             loop.create_datagram_endpoint = working  # type: ignore[method-assign]
             await b.hovering()
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_camera_asked_for_during_a_gap_is_switched_when_the_drone_is_back() -> None:
@@ -322,4 +323,4 @@ def test_a_camera_asked_for_during_a_gap_is_switched_when_the_drone_is_back() ->
             await b.until(lambda: b.vehicle.camera_since_ns is not None)
             assert int(b.server.channel) == DroneCamera.FRONT
 
-    virtually(main)
+    virtual(main())

@@ -20,7 +20,7 @@ from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.plant.airframe import Airframe
-from tests.protocol.rig import run_virtual
+from tests.rigs.event_loops import virtual
 
 
 @asynccontextmanager
@@ -53,7 +53,7 @@ def test_the_factory_settings_of_arducopter_are_named_and_mended() -> None:
             assert peer.parameters["GUID_TIMEOUT"] == 0.5
             assert (await examination.report()).findings == ()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_px4s_whole_numbers_are_read_and_written_as_bytes() -> None:
@@ -67,7 +67,7 @@ def test_px4s_whole_numbers_are_read_and_written_as_bytes() -> None:
             assert left.name == "COM_RCL_EXCEPT"  # a person must say whether there is RC
             assert peer.parameters["COM_OBL_RC_ACT"] == 4
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_sticks_that_px4_ignores_are_named_and_left_to_a_person() -> None:
@@ -78,7 +78,7 @@ def test_sticks_that_px4_ignores_are_named_and_left_to_a_person() -> None:
             assert await examination.fix([finding]) == [finding]
             assert peer.parameters["COM_RC_IN_MODE"] == 4
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_the_rate_of_heartbeats_is_measured_and_a_slow_one_is_named() -> None:
@@ -93,7 +93,7 @@ def test_the_rate_of_heartbeats_is_measured_and_a_slow_one_is_named() -> None:
             assert report.heartbeat_hz == pytest.approx(1.0)
             assert "seen up to 1.0 s late" in too_slow(report.heartbeat_hz)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_an_armed_vehicle_is_left_alone() -> None:
@@ -106,7 +106,7 @@ def test_an_armed_vehicle_is_left_alone() -> None:
             assert len(await examination.fix(report.findings)) == len(report.findings)
             assert peer.parameters["GUID_TIMEOUT"] == 3
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_value_that_does_not_stay_is_still_found() -> None:
@@ -117,7 +117,7 @@ def test_a_value_that_does_not_stay_is_still_found() -> None:
             (left,) = await examination.fix(report.findings)
             assert left.name == "GUID_TIMEOUT"
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_silence_is_told_in_one_line() -> None:
@@ -126,7 +126,7 @@ def test_silence_is_told_in_one_line() -> None:
             async with Examination("udpout://127.0.0.1:9", LoopClock()).connected():
                 pytest.fail("nobody is there")
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize("firmware", list(Firmware))

@@ -27,7 +27,8 @@ from tests.protocol.mavlink.scripted import (
     known,
     scripted,
 )
-from tests.protocol.rig import ardupilot_rig, run_virtual
+from tests.protocol.rig import ardupilot_rig
+from tests.rigs.event_loops import virtual
 
 
 def test_rates_that_a_ground_station_overwrote_are_asked_for_again() -> None:
@@ -46,7 +47,7 @@ def test_rates_that_a_ground_station_overwrote_are_asked_for_again() -> None:
             await asyncio.sleep(1.0)
             assert len(rig.vehicle.attitudes()) == pytest.approx(50, abs=3)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_denied_stream_is_not_asked_for_all_the_time() -> None:
@@ -57,7 +58,7 @@ def test_a_denied_stream_is_not_asked_for_all_the_time() -> None:
             await asyncio.sleep(20.0)
             assert len(autopilot.commands(INTERVAL)) < 12
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_rebooted_autopilot_is_heard_again_with_its_new_clock() -> None:
@@ -74,7 +75,7 @@ def test_a_rebooted_autopilot_is_heard_again_with_its_new_clock() -> None:
             assert 0 <= now_ns - samples[-1].stamp_ns < 0.05e9
             await rig.take_off()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_an_overtaken_heartbeat_is_no_take_over() -> None:
@@ -94,7 +95,7 @@ def test_an_overtaken_heartbeat_is_no_take_over() -> None:
             await asyncio.sleep(0.1)
             assert not known(vehicle).in_control
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_poor_radio_is_flown_through() -> None:
@@ -116,7 +117,7 @@ def test_a_poor_radio_is_flown_through() -> None:
             rig.take_over()
             assert await rig.until(lambda: not rig.known().in_control, 1.0) < 0.3
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_either_side_may_start_first() -> None:
@@ -133,7 +134,7 @@ def test_either_side_may_start_first() -> None:
             serving.cancel()
             await asyncio.gather(serving, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())
 
 
 # Poses
@@ -158,7 +159,7 @@ def test_the_grid_pose_is_shared_at_thirty_hertz_if_so_chosen() -> None:
                 assert len(autopilot.all("ODOMETRY")) == pytest.approx(expected, abs=3)
                 assert len(autopilot.all("LANDING_TARGET")) == pytest.approx(targets, abs=3)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_an_estimator_that_gets_our_pose_gets_an_origin_until_it_reports_one() -> None:
@@ -181,7 +182,7 @@ def test_an_estimator_that_gets_our_pose_gets_an_origin_until_it_reports_one() -
                 await asyncio.sleep(3.0)
                 assert len(autopilot.all("SET_GPS_GLOBAL_ORIGIN")) > known
 
-    run_virtual(test)
+    virtual(test())
 
 
 # Texts
@@ -200,7 +201,7 @@ def test_events_are_shown_as_texts_long_ones_in_chunks() -> None:
             assert texts[1].id > 0
             assert "".join(t.text for t in texts[1:]) == "long: " + "x" * 100
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_reason_in_chunks_is_told_whole() -> None:
@@ -219,7 +220,7 @@ def test_a_reason_in_chunks_is_told_whole() -> None:
             await asyncio.sleep(2.0)
             assert known(vehicle).refusal == "arming: failed (PreArm: " + "y" * 42 + "z" * 10 + ")"
 
-    run_virtual(test)
+    virtual(test())
 
 
 @given(st.text("ab", max_size=300))
@@ -261,4 +262,4 @@ def test_heartbeats_too_rare_to_see_a_take_over_in_time_are_told_once() -> None:
                 await asyncio.wait([beating])
             assert len(texts) == told
 
-    run_virtual(test)
+    virtual(test())

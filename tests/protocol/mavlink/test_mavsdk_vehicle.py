@@ -36,7 +36,9 @@ from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.link import Message
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
 from flightd.sim.plant.airframe import Airframe
-from tests.protocol.rig import Rig, mavlink_rig, mavsdk_rig, run_real
+from tests.protocol.rig import Rig, mavlink_rig, mavsdk_rig
+from tests.rigs.event_loops import real, run_in
+from tests.rigs.patient_loop import patient
 
 
 class _CountingPx4(Px4Peer):
@@ -96,7 +98,7 @@ def test_frames_that_no_line_takes_are_counted_and_those_held_back_are_not() -> 
         vehicle._line.send(_packed(_TARGET))
         assert (vehicle.dropped, vehicle.gate.held_back) == (1, 1)
 
-    asyncio.run(test())
+    real(test())
 
 
 _SET_MODE = dialect.MAVLink_command_long_message(1, 1, 176, 1, 1, 6, 0, 0, 0, 0, 0)
@@ -144,7 +146,7 @@ def test_the_library_repeats_no_change_of_mode_once_we_let_go() -> None:
             assert isinstance(rig.vehicle, MavsdkVehicle)
             assert rig.vehicle.gate.held_back > 0
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_landed_state_is_believed_for_a_second() -> None:
@@ -214,7 +216,7 @@ def test_a_tick_that_died_in_the_air_is_not_flown_on_and_px4s_own_failsafe_acts(
             assert abs(rig.peer.truth().roll_rad) < 0.02
             assert not rig.known().in_control
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_loop_that_hangs_sends_nothing_though_the_librarys_threads_live() -> None:
@@ -236,8 +238,7 @@ def test_a_loop_that_hangs_sends_nothing_though_the_librarys_threads_live() -> N
             serving.cancel()
             await asyncio.wait([serving])
 
-    with asyncio.Runner(loop_factory=lambda: ScaledLoop(1.0)) as runner:
-        runner.run(test())
+    real(test())
 
 
 class _Companion:
@@ -258,8 +259,7 @@ class _Companion:
         self._thread.join()
 
     def _live(self) -> None:
-        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-            runner.run(self._fly())
+        run_in(lambda: self._loop, self._fly())
 
     async def _fly(self) -> None:
         vehicle = MavsdkVehicle(self._url, LoopClock())
@@ -283,7 +283,7 @@ def test_arducopter_is_refused_with_the_reason() -> None:
             assert rig.peer.mode == CopterMode.STABILIZE
             assert not rig.known().armed
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_refused_arming_is_told_with_the_autopilots_words_and_tried_again() -> None:
@@ -297,7 +297,7 @@ def test_a_refused_arming_is_told_with_the_autopilots_words_and_tried_again() ->
             await rig.until(lambda: rig.known().armed)
             assert rig.known().refusal == ""
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_rebooted_autopilot_is_asked_for_its_streams_again_and_its_new_clock_is_taken() -> None:
@@ -318,7 +318,7 @@ def test_a_rebooted_autopilot_is_asked_for_its_streams_again_and_its_new_clock_i
             assert [sample.stamp_ns for sample in seen] == sorted({sample.stamp_ns for sample in seen})
             assert 0 <= LoopClock().now_ns() - seen[-1].stamp_ns < 100_000_000
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_companion_that_boots_first_finds_the_autopilot_later() -> None:
@@ -331,7 +331,7 @@ def test_a_companion_that_boots_first_finds_the_autopilot_later() -> None:
             serving.cancel()
             await asyncio.wait([serving])
 
-    run_real(test)
+    patient(test())
 
 
 def test_without_any_autopilot_it_ends_at_once_and_quietly(caplog: pytest.LogCaptureFixture) -> None:
@@ -346,7 +346,7 @@ def test_without_any_autopilot_it_ends_at_once_and_quietly(caplog: pytest.LogCap
         assert time.monotonic() - started_s < 1.0
         assert vehicle.state() is None
 
-    run_real(test)
+    patient(test())
     assert not [record for record in caplog.records if record.levelname == "ERROR"]
 
 
@@ -362,7 +362,7 @@ def test_with_the_link_gone_it_still_ends() -> None:
             rig.cut(False)
             await rig.until(lambda: rig.peer.mode != Px4Mode.OFFBOARD)  # its own failsafe
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_port_in_use_is_told_at_once() -> None:
@@ -375,7 +375,7 @@ def test_a_port_in_use_is_told_at_once() -> None:
         taken.close()
         await asyncio.sleep(0.05)
 
-    run_real(test)
+    patient(test())
 
 
 def test_without_the_library_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -389,4 +389,4 @@ def test_without_the_library_one_line_says_what_to_install(monkeypatch: pytest.M
         with pytest.raises(InputError, match=r"pip install 'flightd\[mavsdk\]'"):
             connect_vehicle(config, LoopClock())
 
-    asyncio.run(test())
+    real(test())

@@ -27,7 +27,8 @@ from flightd.runtime.datagrams import PacedDatagrams, open_paced_datagrams
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.plant.airframe import Airframe
-from tests.protocol.rig import Rig, run_virtual
+from tests.protocol.rig import Rig
+from tests.rigs.event_loops import real, virtual
 
 _TIOCGEXCL = 0x80045440
 """Whether a terminal refuses to be opened once more; `termios` leaves it out."""
@@ -89,7 +90,7 @@ def test_a_baud_rate_that_does_not_exist_is_bad_input() -> None:
         with pytest.raises(InputError, match="baud"):
             ArduPilotVehicle("serial:///dev/ttyAMA0:12345", LoopClock())
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_port_in_use_is_told_in_one_line() -> None:
@@ -101,7 +102,7 @@ def test_a_port_in_use_is_told_in_one_line() -> None:
                 await vehicle.run()
             assert "\n" not in str(caught.value)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_what_is_no_serial_device_is_told() -> None:
@@ -109,7 +110,7 @@ def test_what_is_no_serial_device_is_told() -> None:
         with pytest.raises(UnavailableError, match="not a serial device"):
             await ArduPilotVehicle("serial:///dev/null:57600", LoopClock()).run()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def free_port(kind: int = socket.SOCK_DGRAM) -> int:
@@ -132,7 +133,7 @@ def test_a_listening_vehicle_answers_the_autopilot_that_calls() -> None:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_while_the_autopilot_speaks_no_other_address_can_replace_it() -> None:
@@ -155,7 +156,7 @@ def test_while_the_autopilot_speaks_no_other_address_can_replace_it() -> None:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())
 
 
 class StreamAutopilot(asyncio.Protocol):
@@ -227,7 +228,7 @@ def test_tcp_waits_for_the_other_side_and_comes_back_after_a_loss() -> None:
             server.close()
             await server.wait_closed()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_stalled_tcp_line_drops_what_is_new_instead_of_piling_it_up() -> None:
@@ -245,7 +246,7 @@ def test_a_stalled_tcp_line_drops_what_is_new_instead_of_piling_it_up() -> None:
             server.close()
             await server.wait_closed()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_stalled_network_drops_datagrams_instead_of_piling_them_up() -> None:
@@ -263,7 +264,7 @@ def test_a_stalled_network_drops_datagrams_instead_of_piling_them_up() -> None:
         assert standing.sent == [b"newest"]
         line.close()
 
-    asyncio.run(test())
+    real(test())
 
 
 def test_a_called_socket_of_another_network_is_opened_anew() -> None:
@@ -283,7 +284,7 @@ def test_a_called_socket_of_another_network_is_opened_anew() -> None:
             assert bool(losses) is opened_anew, (url, number)
             line.close()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_tcp_port_that_never_answers_is_called_again_soon() -> None:
@@ -306,7 +307,7 @@ def test_a_tcp_port_that_never_answers_is_called_again_soon() -> None:
             for caller in waiting:
                 caller.close()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_serial_line_is_opened_raw_heard_and_found_again_after_a_loss(tmp_path: Path) -> None:
@@ -343,7 +344,7 @@ def test_a_serial_line_is_opened_raw_heard_and_found_again_after_a_loss(tmp_path
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(
@@ -368,7 +369,7 @@ def test_a_serial_line_that_goes_away_while_it_is_opened_is_tried_again(
         os.close(slave)
         os.close(master)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def is_exclusive(fd: int) -> bool:
@@ -396,7 +397,7 @@ def test_a_serial_line_that_another_program_has_is_waited_for_and_then_had_alone
         for fd in (late, slave, master):
             os.close(fd)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_demand_before_the_link_is_worked_on_when_it_comes() -> None:
@@ -414,4 +415,4 @@ def test_a_demand_before_the_link_is_worked_on_when_it_comes() -> None:
             task.cancel()
         await asyncio.gather(running, serving, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())

@@ -16,6 +16,7 @@ from flightd.adapters.recorder.mcap_file import McapFile, is_whole
 from flightd.app.run import room_kept
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.replay.log import read_log
+from tests.rigs.event_loops import real
 
 STARTED = datetime(2026, 3, 1, 12, 0, 5, tzinfo=UTC)
 MEGABYTE = 1 << 20
@@ -144,7 +145,7 @@ def test_beside_a_flight_it_mends_and_makes_room(tmp_path: Path, monkeypatch: py
         await asyncio.wait([running])
 
     monkeypatch.setattr(archive_module, "ROOM_S", 0.05)
-    asyncio.run(fly())
+    real(fly())
     assert archive.flights() == [current.parent]
 
 
@@ -177,8 +178,8 @@ def test_trouble_with_the_archive_is_told_at_once_and_the_flight_goes_on(
         async with room_kept(archive, hear), asyncio.timeout(10.0):
             await heard.wait()
 
-    asyncio.run(flight(OSError(5, "Input/output error")))
+    real(flight(OSError(5, "Input/output error")))
     assert "cannot make room" in told[0]
     assert "Input/output error" in told[0]
-    asyncio.run(flight(ZeroDivisionError("a fault")))
+    real(flight(ZeroDivisionError("a fault")))
     assert "not looked after any more" in told[0]

@@ -38,6 +38,7 @@ from flightd.core.types import (
 )
 from flightd.ports import Recorder
 from flightd.replay.log import read_log
+from tests.rigs.event_loops import real
 
 LINE = Line(12.5, 0.1, 31.0, -170.0, 180.0, 0.93, 0.12, 0.0011, 1e-5)
 LINES = LineSet(
@@ -231,7 +232,7 @@ def test_the_log_is_readable_after_kill_9_and_goes_on_in_the_same_file(tmp_path:
         recorder.close()
         return recorder
 
-    recorder = asyncio.run(fly())
+    recorder = real(fly())
     log = read_log(path)
     assert log.damage == ""
     assert [setpoint.stamp_ns for setpoint in log.messages(AttitudeSetpoint)] == list(range(200))
@@ -380,7 +381,7 @@ def test_run_hands_over_what_waits_without_further_messages(tmp_path: Path) -> N
             with pytest.raises(asyncio.CancelledError):
                 await running
 
-    asyncio.run(fly())
+    real(fly())
 
 
 def test_close_can_be_called_twice(tmp_path: Path) -> None:

@@ -16,9 +16,9 @@ from flightd.app.simulation.lockstep import LockstepDetectors
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.core.types import Image, LineSet
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from tests.held_time import held
+from tests.rigs.event_loops import real, virtual
 
 
 class MeanDetector:
@@ -57,7 +57,7 @@ def test_pictures_reach_the_workers_through_shared_memory() -> None:
         finally:
             ring.close()
 
-    assert asyncio.run(main()) == ["0", "10", "20", "30"]
+    assert real(main()) == ["0", "10", "20", "30"]
 
 
 @pytest.mark.parametrize(("seq", "why"), [(13, "hung"), (14, "died"), (15, "nothing")])
@@ -72,7 +72,7 @@ def test_a_worker_that_fails_costs_one_picture_and_is_replaced(seq: int, why: st
         finally:
             ring.close()
 
-    answers, pool = asyncio.run(main())
+    answers, pool = real(main())
     assert answers[0] is None
     assert None not in answers[1:]
     assert pool.lost.total() == 1
@@ -93,7 +93,7 @@ def test_idle_workers_killed_from_outside_are_replaced() -> None:
         finally:
             ring.close()
 
-    detection, workers = asyncio.run(main())
+    detection, workers = real(main())
     assert detection is not None
     assert workers == 2
 
@@ -109,7 +109,7 @@ def test_a_picture_that_was_overwritten_is_lost_never_mistaken() -> None:
         finally:
             ring.close()
 
-    assert asyncio.run(main()) is None
+    assert real(main()) is None
 
 
 def test_the_ring_refuses_foreign_names_and_slots() -> None:
@@ -142,5 +142,4 @@ def test_in_lockstep_a_detector_that_hangs_costs_one_picture() -> None:
         finally:
             ring.close()
 
-    with asyncio.Runner(loop_factory=lambda: VirtualLoop(patience_s=3.0)) as runner:
-        assert runner.run(main()) == [True, False, True, True]
+    assert virtual(main(), patience_s=3.0) == [True, False, True, True]

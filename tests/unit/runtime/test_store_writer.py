@@ -14,8 +14,8 @@ from flightd.core.inventory import LocationRecord, LocationState, Observation, P
 from flightd.core.scanning import Finding, Settled
 from flightd.core.types import CodeRead
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from tests.held_time import held
+from tests.rigs.event_loops import real, virtual
 
 READ = CodeRead("QR Code", "PALLET", ((0.0, 0.0),) * 4, True, 2, 1.0)
 
@@ -75,8 +75,7 @@ async def write(store: StubbornStore, troubles: list[str], seconds: float) -> St
 def run(folder: Path, refusals: int, seconds: float) -> tuple[list[LocationRecord], list[str], StoreWriter]:
     troubles: list[str] = []
     with SqliteStore(folder) as store:
-        with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-            writer = runner.run(write(StubbornStore(store, refusals), troubles, seconds))
+        writer = virtual(write(StubbornStore(store, refusals), troubles, seconds))
         return store.locations(), troubles, writer
 
 
@@ -118,4 +117,4 @@ def test_the_writer_never_holds_up_the_loop(tmp_path: Path) -> None:
         return ticks
 
     with SqliteStore(tmp_path) as store:
-        assert asyncio.run(main(StubbornStore(store, 0, wait_s=0.05))) > 5
+        assert real(main(StubbornStore(store, 0, wait_s=0.05))) > 5

@@ -6,11 +6,23 @@ import asyncio
 import math
 import selectors
 import time
-from typing import Any
+from collections.abc import Coroutine
+from typing import Any, TypeVar
 
 from flightd.runtime.event_loops import _Selector
+from tests.rigs.event_loops import run_in
+
+_T = TypeVar("_T")
 
 _PAUSE_S = 0.02
+
+_HURRY = 2.0
+"""How many times as fast as the machine's clock our side of a link and the vehicle live."""
+
+
+def patient(main: Coroutine[Any, Any, _T]) -> _T:
+    """What `main` returns, run by the clock of the machine, on which a library's threads live."""
+    return run_in(lambda: PatientLoop(_HURRY), main)
 
 
 class PatientLoop(asyncio.SelectorEventLoop):
