@@ -26,6 +26,7 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import Draught
 from flightd.sim.sensors.instruments import Sensors
 from tests.protocol.ardrone.bench import ANY_PORTS, settings_for
+from tests.rigs.waiting import until
 
 CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
 
@@ -67,12 +68,7 @@ class Rig:
 
     async def until(self, condition: Callable[[], bool], within_s: float = 10.0) -> float:
         """Seconds until the condition held; fails when it does not in time."""
-        loop = asyncio.get_running_loop()
-        start_s = loop.time()
-        while not condition():
-            assert loop.time() - start_s < within_s, "waited too long"
-            await asyncio.sleep(0.005)
-        return loop.time() - start_s
+        return await until(condition, within_s)
 
     async def stream(self, duration_s: float, hz: float = 50.0, **setpoint: float) -> list[bool]:
         """Send one setpoint at a steady rate; what each `send` said."""

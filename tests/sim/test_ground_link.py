@@ -24,6 +24,7 @@ from flightd.core.types import CommandKind, Phase
 from flightd.runtime.clock import LoopClock
 from flightd.site.site import Aisle, Edge, Node
 from tests.rigs.event_loops import in_real_time
+from tests.rigs.waiting import until
 from tests.sim.ground_rig import (
     SITE,
     Keyring,
@@ -34,7 +35,6 @@ from tests.sim.ground_rig import (
     serving,
     tell_once,
     telling,
-    until,
 )
 
 EXAMPLE = Path(__file__).parents[2] / "tools" / "ground_client.py"

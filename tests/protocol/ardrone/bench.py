@@ -17,6 +17,7 @@ from flightd.sim.ardrone.server import ArDroneServer, DronePorts
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.sensors.instruments import SensorParams, Sensors
+from tests.rigs.waiting import until
 
 T = TypeVar("T")
 
@@ -65,12 +66,7 @@ class Bench:
 
     async def until(self, condition: Callable[[], Any], limit_s: float = 20.0) -> float:
         """Wait for the condition; the seconds it took.  Fails when it takes longer than `limit_s`."""
-        start_ns = self.clock.now_ns()
-        while not condition():
-            waited_s = (self.clock.now_ns() - start_ns) / 1e9
-            assert waited_s < limit_s, f"not within {limit_s} s"
-            await asyncio.sleep(0.005)
-        return (self.clock.now_ns() - start_ns) / 1e9
+        return await until(condition, limit_s)
 
     async def steer(
         self,

@@ -228,7 +228,7 @@ def test_a_loop_that_hangs_sends_nothing_though_the_librarys_threads_live() -> N
         try:
             async with asyncio.timeout(20.0):
                 await peer.streaming.wait()
-            companion.hang(1.5)
+            companion.hang()
             await asyncio.sleep(0.1)
             arrived = peer.setpoints
             await asyncio.sleep(1.0)
@@ -248,13 +248,15 @@ class _Companion:
         self._url = url
         self._loop = ScaledLoop(1.0)
         self._over = asyncio.Event()
+        self._released = threading.Event()
         self._thread = threading.Thread(target=self._live, name="companion")
         self._thread.start()
 
-    def hang(self, duration_s: float) -> None:
-        self._loop.call_soon_threadsafe(time.sleep, duration_s)
+    def hang(self) -> None:
+        self._loop.call_soon_threadsafe(self._released.wait, 30.0)
 
     def end(self) -> None:
+        self._released.set()
         self._loop.call_soon_threadsafe(self._over.set)
         self._thread.join()
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import time
 from functools import partial
 
 import numpy as np
@@ -19,6 +18,7 @@ from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from tests.held_time import held
 from tests.rigs.event_loops import real, virtual
+from tests.rigs.waiting import until
 
 
 class MeanDetector:
@@ -26,7 +26,7 @@ class MeanDetector:
 
     def detect(self, bgr: Image, seq: int = 0, stamp_ns: int = 0) -> LineSet:
         if seq == 13:
-            time.sleep(60)
+            signal.pause()
         if seq == 14:
             os.kill(os.getpid(), signal.SIGKILL)
         if seq == 15:
@@ -87,8 +87,7 @@ def test_idle_workers_killed_from_outside_are_replaced() -> None:
                 await pool.ready()
                 for pid in pool.pids:
                     os.kill(pid, signal.SIGKILL)
-                while pool.replaced < 2:  # noqa: ASYNC110 - the pool has no event for it
-                    await asyncio.sleep(0.01)
+                await until(lambda: pool.replaced >= 2)
                 return await pool.detect(ticket(ring, 1, 5)), len(pool.pids)
         finally:
             ring.close()
