@@ -68,5 +68,5 @@ def _described(context: dict[str, Any]) -> str:
 
 def _transports(loop: asyncio.AbstractEventLoop) -> dict[int, str]:
     """What the loop watches: file descriptor -> whose it is."""
-    selector = loop._selector  # type: ignore[attr-defined]
+    selector = loop._selector  # type: ignore[attr-defined]  # noqa: SLF001 - asyncio tells nobody what it watches
     return {fd: repr(key.data) for fd, key in selector.get_map().items()}

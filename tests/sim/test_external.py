@@ -250,10 +250,9 @@ def test_what_a_stalled_simulator_does_not_read_is_not_piled_up() -> None:
         await opening
         Sitl.connections[0].transport.pause_reading()
         for _ in range(100_000):  # far more than the sockets hold
-            vehicle._ask()
-        waiting = vehicle._transport.get_write_buffer_size()
-        assert 0 < waiting < 5000
-        await vehicle._let_go()
+            vehicle.ask_streams()
+        assert 0 < vehicle.unsent_bytes < 5000
+        await vehicle.close()
         Sitl.connections[0].transport.abort()
         server.close()
         await server.wait_closed()

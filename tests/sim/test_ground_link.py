@@ -8,6 +8,7 @@ import random
 import socket
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -209,7 +210,7 @@ async def test_pictures_come_on_request_at_a_capped_rate() -> None:
         async with GroundClient(address_of(link)) as one, GroundClient(address_of(link)) as two:
             async with asyncio.TaskGroup() as tasks:
                 asked = [tasks.create_task(client.picture()) for client in (one, two)]
-                await until(lambda: len(link._waiting) == 2)
+                await until(lambda: link.pictures_wanted == 2)
                 assert link.picture_due(10**10)
                 assert not link.picture_due(10**10 + 10**8), "twice a second at most"
                 link.picture(7, 10**10, b"jpeg")
@@ -223,8 +224,8 @@ async def test_no_picture_is_said_so_and_not_waited_for_for_ever() -> None:
     async with serving(local()) as link, GroundClient(address_of(link)) as client:
         async with asyncio.TaskGroup() as tasks:
             refused = tasks.create_task(_refusal(client))
-            await until(lambda: bool(link._waiting))
-            link._give_up_pictures(LoopClock().now_ns() + 4 * 10**9)
+            await until(lambda: link.pictures_wanted)
+            link.give_up_pictures(LoopClock().now_ns() + 4 * 10**9)
         assert "delivers no picture" in refused.result()
 
 
@@ -252,7 +253,7 @@ async def test_junk_frames_of_every_shape_leave_the_link_whole() -> None:
         async with GroundClient(address) as client:
             await client.order(CommandKind.START)
         assert len(link.take_commands()) == 1
-        assert link._desk.refused == 500
+        assert link.refused == 500
 
 
 @in_real_time
@@ -268,7 +269,7 @@ async def test_what_is_not_zmq_and_what_is_too_long_only_loses_its_own_connectio
             await dealer.send(b'{"version": 1, "id": "' + b"x" * 100_000)
             async with GroundClient(address) as client:
                 await client.hello()
-            assert link._desk.requests >= 1
+            assert link.requests >= 1
         async with GroundClient(address) as client:
             await client.order(CommandKind.START)
         assert len(link.take_commands()) == 1
@@ -297,11 +298,22 @@ async def test_a_flood_does_not_keep_the_stop_waiting_nor_the_loop() -> None:
                     await flood.send(b"junk")
                 async with GroundClient(address, timeout_s=20.0) as client:
                     await client.order(CommandKind.STOP)
-                assert link._desk.requests < 3000, "the stop overtook the flood"
+                assert link.requests < 3000, "the stop overtook the flood"
                 assert [command.kind for command in link.take_commands()] == [CommandKind.STOP]
-                await until(lambda: link._desk.requests > 3000)
+                await until(lambda: link.requests > 3000)
                 counting.cancel()
         assert turns * 10 > 3000
+
+
+class _TimedGround(ZmqGround):
+    """Counts the seconds for which requests keep the loop."""
+
+    busy_s = 0.0
+
+    def _take(self, frames: Sequence[zmq.Frame]) -> None:
+        began_s = time.monotonic()
+        super()._take(frames)
+        self.busy_s += time.monotonic() - began_s
 
 
 @in_real_time
@@ -315,17 +327,7 @@ async def test_expensive_requests_leave_the_loop_most_of_its_time() -> None:
         for k in range(100)
     }
     big = replace(SITE, aisles=tuple(aisles), crosses=tuple(crosses), nodes=nodes)
-    with ZmqGround(local(), big, LoopClock()) as link:
-        busy_s = 0.0
-        take = link._take
-
-        def timed(frames: Any) -> None:
-            nonlocal busy_s
-            began_s = time.monotonic()
-            take(frames)
-            busy_s += time.monotonic() - began_s
-
-        link._take = timed  # type: ignore[method-assign]
+    with _TimedGround(local(), big, LoopClock()) as link:
         address = address_of(link)
         with zmq.asyncio.Context() as context, context.socket(zmq.DEALER) as flood:
             flood.linger = 0
@@ -334,10 +336,10 @@ async def test_expensive_requests_leave_the_loop_most_of_its_time() -> None:
                 serving_ = tasks.create_task(link.run())
                 for i in range(60):
                     await flood.send_json({"version": 1, "id": f"request-{i}", "op": "hello"})
-                await until(lambda: link._desk.requests >= 10)
-                began_s, busy_before_s, before = time.monotonic(), busy_s, link._desk.requests
-                await until(lambda: link._desk.requests >= before + 30)
-                share = (busy_s - busy_before_s) / (time.monotonic() - began_s)
+                await until(lambda: link.requests >= 10)
+                began_s, busy_before_s, before = time.monotonic(), link.busy_s, link.requests
+                await until(lambda: link.requests >= before + 30)
+                share = (link.busy_s - busy_before_s) / (time.monotonic() - began_s)
                 serving_.cancel()
         assert share < 0.35
 

@@ -89,7 +89,7 @@ class AutopilotPeer(abc.ABC):
         self.instruments = Instruments(airframe, self.sensors)
         self.parameters = parameters
         self.link = UdpLink(
-            config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self._received, config.signing_key, config.seed
+            config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self.received, config.signing_key, config.seed
         )
         self.link.down.params = self.link.up.params = config.radio
         self._config = config
@@ -127,8 +127,17 @@ class AutopilotPeer(abc.ABC):
                 self._stream(now_ns)
                 await asyncio.sleep(max(0, self._next_due_ns(now_ns) - self._clock.now_ns()) / 1e9)
         finally:
-            self.link.close()
-            self._address = None
+            self.close()
+
+    def close(self) -> None:
+        """Free the socket; `open` binds it again."""
+        self.link.close()
+        self._address = None
+
+    @property
+    def address(self) -> Address | None:
+        """Where it listens; None while it does not."""
+        return self._address
 
     def advance(self, now_ns: int) -> None:
         """Step the vehicle up to `now_ns`."""
@@ -288,7 +297,8 @@ class AutopilotPeer(abc.ABC):
             due_ns = min(due_ns, *channel.due_ns.values()) if channel.due_ns else due_ns
         return max(due_ns, now_ns + self._config.step_ns)
 
-    def _received(self, channel: Channel, message: Message) -> None:
+    def received(self, channel: Channel, message: Message) -> None:
+        """Take a message that came in by `channel`."""
         now_ns = self._clock.now_ns()
         self.advance(now_ns)
         target = getattr(message, "target_system", 0)

@@ -56,13 +56,13 @@ def test_the_next_config_waits_until_the_acknowledge_bit_is_cleared() -> None:
     async def main() -> None:
         drone = make_drone()
         configs: list[tuple[str | None, bool]] = []
-        obey = drone._config
 
-        def config(command: DroneCommand, named: Ids | None, now_ns: int) -> None:
-            configs.append((command.text(0), drone._ack))
-            obey(command, named, now_ns)
+        def note(command: DroneCommand) -> bool:
+            if command.name == "CONFIG":
+                configs.append((command.text(0), drone.acknowledges))
+            return False
 
-        drone._config = config  # type: ignore[method-assign]
+        Ear(drone, lose=note)
         async with bench(drone) as b:
             await b.configured()
         firsts = [new for old, new in itertools.pairwise(configs) if new[0] != old[0]]
@@ -111,7 +111,7 @@ def test_lost_config_and_control_datagrams_are_repeated() -> None:
 def test_a_stale_acknowledge_bit_delays_but_does_not_stop() -> None:
     async def main() -> None:
         drone = make_drone(DroneOptions(config_needs_clear_ack=False))
-        drone._ctrl = lambda mode: None  # type: ignore[method-assign]
+        Ear(drone, lose=lambda command: command.name == "CTRL")
         async with bench(drone) as b:
             b.vehicle.demand(Demand.STANDBY)
             await b.until(lambda: b.vehicle.camera_since_ns is not None, limit_s=120.0)

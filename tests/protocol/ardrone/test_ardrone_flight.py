@@ -8,6 +8,7 @@ import math
 
 import pytest
 
+from flightd.adapters.vehicle.ardrone.navdata import DroneState
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.runtime.clock import LoopClock
@@ -160,8 +161,7 @@ def test_with_a_deaf_sonar_the_height_is_unknown_and_a_descent_becomes_a_landing
     async def main() -> None:
         async with bench() as b:
             await b.hovering()
-            state = b.drone._state
-            b.drone._state = lambda now_ns: state(now_ns) | 1 << 21  # type: ignore[method-assign]
+            b.drone.warnings |= DroneState.ULTRASOUND
             await b.steer(0.3)
             assert math.isnan(b.state.height_m)
             await b.steer(0.3, climb_mps=-0.3)
@@ -216,7 +216,7 @@ def test_an_adapter_that_starts_beside_a_flying_drone_does_not_land_it() -> None
         drone = make_drone()
         async with bench(drone) as b:
             await b.hovering()
-            b.vehicle._release = nothing  # type: ignore[method-assign]
+            b.server.radio = False  # killed, it says nothing more
         async with bench(drone) as b:
             b.vehicle.demand(Demand.STANDBY)
             await asyncio.sleep(6.0)

@@ -159,7 +159,7 @@ def test_one_parser_per_stream_finds_every_whole_frame_again() -> None:
             frames += parser.feed(run[:size])
             run = run[size:]
         found += bool(frames) and frames[-1].payload == bytes(last[last[6] + 256 * last[7] :])
-        assert len(parser._buffer) <= 1 << 21
+        assert parser.waiting_bytes <= 1 << 21
     assert found == sent
     assert len(expected) == len(short)
 
@@ -177,7 +177,7 @@ def test_any_bytes_go_through_the_video_parser(chunks: list[bytes]) -> None:
     parser = PaveParser()
     for chunk in chunks:
         parser.feed(chunk)
-    assert len(parser._buffer) + parser.skipped_bytes <= sum(map(len, chunks))
+    assert parser.waiting_bytes + parser.skipped_bytes <= sum(map(len, chunks))
 
 
 def test_the_at_port_survives_anything_and_good_commands_count() -> None:

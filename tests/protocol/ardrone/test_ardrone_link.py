@@ -5,13 +5,12 @@ from __future__ import annotations
 import asyncio
 import itertools
 import random
-from typing import Any
 
 import pytest
 
 from flightd.adapters.vehicle.ardrone.settings import DroneCamera
 from flightd.core.types import Demand
-from flightd.sim.ardrone.drone import MajorState
+from flightd.sim.ardrone.drone import REF_FLY, MajorState
 from flightd.sim.ardrone.navdata_writer import NavdataReport, packet
 from flightd.sim.autopilot.radio import RadioParams
 from tests.protocol.ardrone.bench import Ear, bench, make_drone
@@ -105,7 +104,6 @@ def test_setpoints_stop_at_the_drone_before_a_lost_link_ends() -> None:
             await b.hovering()
             await b.steer(0.5, pitch_rad=-0.05)
             drone.streaming = False  # the way down is dead, the way up is not
-            b.server._wake = lambda *_: None  # type: ignore[method-assign]
             drone.wake = lambda: None  # type: ignore[method-assign]
             await b.steer(1.0, pitch_rad=-0.05)
             assert ear.named("PCMD")[-1].integer(0) == 0, "hover: flying blind"
@@ -128,8 +126,7 @@ def test_after_a_long_gap_the_drone_stays_down_until_flight_is_demanded_anew() -
             await asyncio.sleep(8.0)
             assert drone.major == MajorState.LANDED
             assert not b.state.in_control
-            b.vehicle.demand(Demand.STANDBY)
-            await b.until(lambda: b.vehicle._flight.configured)
+            await b.configured()
             b.vehicle.demand(Demand.FLY)
             await b.until(lambda: b.state.mode == "hovering")
 
@@ -155,25 +152,18 @@ def test_what_was_only_being_watched_is_not_sent_up_again_after_a_long_gap(deman
 def test_flight_demanded_into_a_dead_radio_does_not_start_when_it_returns_unasked() -> None:
     async def main() -> None:
         drone = make_drone()
-        ear = Ear(drone)
+        dead = False
+        ear = Ear(drone, lose=lambda _command: dead)
         async with bench(drone) as b:
             await b.configured()
-            b.server.radio = False
+            dead, drone.streaming = True, False
+            drone.wake = lambda: None  # type: ignore[method-assign]
             await asyncio.sleep(1.0)
-            sent: list[Any] = []
-            at = b.vehicle._link._at
-            assert at is not None
-            send = at.sendto
-
-            def note(data: Any, addr: Any = None) -> None:
-                sent.append(data)
-                send(data, addr)
-
-            at.sendto = note  # type: ignore[method-assign]
+            ear.commands.clear()
             b.vehicle.demand(Demand.FLY)
             await asyncio.sleep(1.0)
-            assert sent
-            assert not any(b",290718208" in datagram for datagram in sent)
+            assert ear.named("REF"), "it speaks, and none of it asks for flight"
+            assert all(bits & REF_FLY == 0 for bits in (c.integer(0) or 0 for c in ear.named("REF")))
             assert ear.named("FTRIM") == []
 
     virtual(main())
@@ -257,17 +247,15 @@ def test_damaged_and_foreign_navdata_costs_nothing() -> None:
             await b.configured()
             rng = random.Random(3)
             good = packet(NavdataReport(state=0x0F800490, sequence=10, major=2, battery_percent=50), (0,))
-            navdata, client = b.server._navdata, b.server._client
-            assert navdata is not None
             b.vehicle.attitudes()
             for _ in range(200):
                 damaged = bytearray(good)
                 for _ in range(rng.randrange(1, 5)):
                     damaged[rng.randrange(len(damaged))] ^= 1 << rng.randrange(8)
-                navdata.sendto(bytes(damaged[: rng.randrange(1, 173)]), client)
+                b.server.send_navdata(bytes(damaged[: rng.randrange(1, 173)]))
                 await asyncio.sleep(0.005)
             assert 14 <= len(b.vehicle.attitudes()) <= 16
-            assert b.vehicle._link.bad_packets == 200
+            assert b.vehicle.bad_packets == 200
             assert b.state.battery_frac == 1.0
 
     virtual(main())
@@ -277,14 +265,12 @@ def test_navdata_that_was_overtaken_is_not_taken() -> None:
     async def main() -> None:
         async with bench() as b:
             await b.configured()
-            navdata, client = b.server._navdata, b.server._client
-            assert navdata is not None
             old = packet(NavdataReport(state=0x0F800490, sequence=3, major=3, battery_percent=5), (0,))
             for _ in range(20):
-                navdata.sendto(old, client)
+                b.server.send_navdata(old)
                 await asyncio.sleep(0.01)
                 assert (b.state.battery_frac, b.state.mode) == (1.0, "landed")
-            assert b.vehicle._link.stale_packets == 20
+            assert b.vehicle.stale_packets == 20
 
     virtual(main())
 

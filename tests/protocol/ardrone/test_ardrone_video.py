@@ -171,8 +171,9 @@ def test_frames_lost_at_the_drone_are_waited_out() -> None:
     async def main() -> None:
         async with watching() as w:
             await w.show(35)
-            (stream,) = w.server._watchers.values()
-            stream.frame(bars(w.shown), 0, room=False)  # the drone's queue was full: this one is never sent
+            w.server.congested = True
+            await w.show(1)
+            w.server.congested = False
             shown_before = w.shown
             await w.show(30)
             after = [
@@ -189,8 +190,7 @@ def test_undecodable_data_restarts_at_the_next_whole_picture() -> None:
     async def main() -> None:
         async with watching() as w:
             await w.show(35)
-            for writer in w.server._watchers:
-                writer.write(Packer(first_number=1 << 20).pack([b"\x65" + bytes(range(1, 200))], 0))
+            w.server.send_video(Packer(first_number=1 << 20).pack([b"\x65" + bytes(range(1, 200))], 0))
             await w.show(40)
             assert w.stream.broken == 1
             assert [number_of(picture.bgr) for picture in w.pictures[-10:]] == [

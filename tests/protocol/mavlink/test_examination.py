@@ -7,8 +7,10 @@ import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.examination import Examination
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
@@ -81,14 +83,20 @@ def test_sticks_that_px4_ignores_are_named_and_left_to_a_person() -> None:
     virtual(test())
 
 
+class _DeniesRates(ArduCopterPeer):
+    """Firmware that changes no message's interval."""
+
+    def _set_interval(self, *_: Any) -> int:
+        return int(dialect.MAV_RESULT_DENIED)
+
+
 def test_the_rate_of_heartbeats_is_measured_and_a_slow_one_is_named() -> None:
     async def test() -> None:
         async with examined(ArduCopterPeer) as (_, examination):
             report = await examination.report()
             assert report.heartbeat_hz == pytest.approx(20.0, abs=2.0)
             assert too_slow(report.heartbeat_hz) == ""
-        async with examined(ArduCopterPeer) as (peer, examination):
-            peer._set_interval = lambda *_: 2  # type: ignore[method-assign]  # firmware that denies it
+        async with examined(_DeniesRates) as (_, examination):
             report = await examination.report()
             assert report.heartbeat_hz == pytest.approx(1.0)
             assert "seen up to 1.0 s late" in too_slow(report.heartbeat_hz)

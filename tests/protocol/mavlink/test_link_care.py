@@ -15,6 +15,7 @@ from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.services.statustext import TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
+from flightd.app.simulation.ports import free_port
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Demand, Event, EventLevel, GridPose
 from flightd.sim.autopilot.autopilot import PeerConfig
@@ -86,9 +87,9 @@ def test_an_overtaken_heartbeat_is_no_take_over() -> None:
             await asyncio.sleep(2.0)
             (channel,) = autopilot.link.channels.values()
             old = dialect.MAVLink_heartbeat_message(2, 3, 129, ALT_HOLD, 4, 3)
-            channel._packer.seq = (channel._packer.seq - 3) % 256
-            autopilot.say(old)
-            channel._packer.seq = (channel._packer.seq + 2) % 256
+            overtaken = channel.pack(old, 0)
+            autopilot.beat()
+            autopilot.link.transmit(overtaken, channel.address)
             await asyncio.sleep(0.5)
             assert known(vehicle).in_control
             autopilot.say(old)  # the same, but new
@@ -122,13 +123,11 @@ def test_a_poor_radio_is_flown_through() -> None:
 
 def test_either_side_may_start_first() -> None:
     async def test() -> None:
-        async with ardupilot_rig(peer_runs=False) as rig:
-            rig.peer.link.close()  # nobody listens: the kernel answers with ICMP
+        config = PeerConfig(ready_s=0.5, port=free_port())
+        async with ardupilot_rig(config, peer_runs=False) as rig:
+            rig.peer.close()  # nobody listens: the kernel answers with ICMP
             await asyncio.sleep(5.0)
             assert rig.vehicle.state() is None
-            address = rig.peer._address
-            rig.peer._address = None
-            rig.peer._config = PeerConfig(ready_s=0.5, port=address[1])
             serving = asyncio.create_task(rig.peer.run())
             await rig.take_off(1.0)
             serving.cancel()

@@ -19,7 +19,10 @@ from mavsdk.plugins.telemetry import LandedState as SdkLanded
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.connect import connect_vehicle
+from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
+from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.mavsdk.connection import MavsdkConnection
 from flightd.adapters.vehicle.mavsdk.gate import FRESH_NS, SetpointGate, message_id
 from flightd.adapters.vehicle.mavsdk.library import whole_fields
 from flightd.adapters.vehicle.mavsdk.telemetry import Readings
@@ -33,7 +36,7 @@ from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import ScaledLoop
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
-from flightd.sim.autopilot.link import Message
+from flightd.sim.autopilot.link import Channel, Message
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
 from flightd.sim.plant.airframe import Airframe
 from tests.protocol.rig import Rig, mavlink_rig, mavsdk_rig
@@ -55,6 +58,20 @@ class _CountingPx4(Px4Peer):
         self.setpoints += 1
         if self.mode == Px4Mode.OFFBOARD:
             self.streaming.set()
+
+
+class _DeafToModes(Px4Peer):
+    """Neither obeys nor answers a change of mode."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.passed_over: list[Message] = []
+
+    def received(self, channel: Channel, message: Message) -> None:
+        if message.get_type() == "COMMAND_LONG" and message.command == 176:
+            self.passed_over.append(message)
+        else:
+            super().received(channel, message)
 
 
 def _packed(message: Message, *, v1: bool = False) -> bytes:
@@ -92,11 +109,14 @@ def test_the_gate_takes_any_bytes_and_holds_back_only_whole_frames(frame: bytes,
 
 def test_frames_that_no_line_takes_are_counted_and_those_held_back_are_not() -> None:
     async def test() -> None:
-        vehicle = MavsdkVehicle("tcp:127.0.0.1:9", LoopClock())  # not open
+        clock, gate = LoopClock(), SetpointGate()
+        line = MavsdkConnection(make_transport(parse_endpoint("tcp:127.0.0.1:9")), gate, clock)  # not open
+        line.send(_packed(_COMMAND))
+        line.send(_packed(_TARGET))
+        assert (line.dropped, gate.held_back) == (1, 1)
+        vehicle = MavsdkVehicle("tcp:127.0.0.1:9", clock)
         assert isinstance(vehicle, CountsDrops)
-        vehicle._line.send(_packed(_COMMAND))
-        vehicle._line.send(_packed(_TARGET))
-        assert (vehicle.dropped, vehicle.gate.held_back) == (1, 1)
+        assert vehicle.dropped == 0
 
     real(test())
 
@@ -125,17 +145,9 @@ def test_the_gate_passes_changes_of_mode_and_arming_only_while_we_command(v1: bo
 
 def test_the_library_repeats_no_change_of_mode_once_we_let_go() -> None:
     async def test() -> None:
-        async with mavsdk_rig() as rig:
+        async with mavlink_rig(_DeafToModes, MavsdkVehicle, Px4Mode.ALTCTL) as rig:
             await rig.until(lambda: rig.vehicle.state() is not None)
-            heard = []
-
-            def deaf(channel: Any, message: Message, now_ns: int) -> None:
-                if message.command == 176:
-                    heard.append(message)  # neither obeyed nor answered
-                else:
-                    answer(channel, message, now_ns)
-
-            answer, rig.peer._answer = rig.peer._answer, deaf
+            heard = rig.peer.passed_over
             rig.vehicle.demand(Demand.FLY)
             await rig.until(lambda: bool(heard))
             rig.vehicle.demand(Demand.HANDS_OFF)

@@ -20,14 +20,14 @@ def test_it_streams_before_offboard_and_only_on_demand() -> None:
     async def test() -> None:
         async with px4_rig() as rig:
             await asyncio.sleep(3.0)
-            assert rig.peer._stream_s == 0.0
+            assert rig.peer.stream_s == 0.0
             rig.vehicle.demand(Demand.FLY)
             took_s = await rig.until(lambda: rig.known().armed)
             assert 1.2 < took_s < 3.0
             assert rig.known().mode == "OFFBOARD"
             rig.vehicle.demand(Demand.STANDBY)
             await asyncio.sleep(1.0)
-            assert rig.peer._stream_s == 0.0
+            assert rig.peer.stream_s == 0.0
 
     virtual(test())
 
@@ -39,7 +39,7 @@ def test_the_idle_stream_carries_no_thrust_and_never_keeps_a_flight_alive() -> N
             rig.vehicle.demand(Demand.FLY)
             await rig.until(lambda: rig.known().armed)
             await asyncio.sleep(3.0)
-            assert rig.peer._thrust == 0.0
+            assert rig.peer.thrust == 0.0
             assert rig.known().in_control
             await rig.take_off(1.0)
             await asyncio.sleep(1.5)  # the mission is dead
@@ -125,7 +125,7 @@ def test_thrust_is_cut_after_touch_down_so_that_it_reports_landed() -> None:
                 await rig.stream(0.1, climb_mps=-0.3)
             await rig.stream(2.0, climb_mps=-0.3)
             assert rig.known().landed is LandedState.ON_GROUND
-            assert rig.peer._thrust == 0.0
+            assert rig.peer.thrust == 0.0
             assert rig.peer.airframe.touchdown_mps < 0.5
 
     virtual(test())
@@ -136,7 +136,7 @@ def test_setpoints_are_refused_while_not_ours() -> None:
         async with px4_rig() as rig:
             await asyncio.sleep(2.0)
             assert rig.vehicle.send(AttitudeSetpoint(0, climb_mps=1.0)) is False
-            assert rig.peer._thrust == 0.0
+            assert rig.peer.thrust == 0.0
 
     virtual(test())
 

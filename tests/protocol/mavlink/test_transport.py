@@ -8,7 +8,7 @@ import fcntl
 import os
 import socket
 import termios
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,13 @@ from flightd.adapters.vehicle.mavlink.link.transport import SerialTransport, Tcp
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.datagrams import PacedDatagrams, open_paced_datagrams
+from flightd.runtime.datagrams import (
+    Datagrams,
+    OpenDatagrams,
+    PacedDatagrams,
+    open_datagrams,
+    open_paced_datagrams,
+)
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.plant.airframe import Airframe
@@ -249,13 +255,30 @@ def test_a_stalled_tcp_line_drops_what_is_new_instead_of_piling_it_up() -> None:
     virtual(test())
 
 
+class NotedOpener:
+    """Keeps each socket that `opener` opens, with what is told of its errors."""
+
+    def __init__(self, opener: OpenDatagrams) -> None:
+        self._opener = opener
+        self.opened: list[tuple[Datagrams, Callable[[OSError], None]]] = []
+
+    async def __call__(
+        self, received: Callable[[bytes, Any], None], failed: Callable[[OSError], None], **place: Any
+    ) -> Datagrams:
+        endpoint = await self._opener(received, failed, **place)
+        self.opened.append((endpoint, failed))
+        return endpoint
+
+
 def test_a_stalled_network_drops_datagrams_instead_of_piling_them_up() -> None:
     async def test() -> None:
-        line = UdpTransport(parse_endpoint("udpout://127.0.0.1:9"), open_paced_datagrams)
+        opener = NotedOpener(open_paced_datagrams)
+        line = UdpTransport(parse_endpoint("udpout://127.0.0.1:9"), opener)
         await line.open()
-        assert isinstance(line._open, PacedDatagrams)
-        standing: Any = StandingSocket(line._open.socket)
-        line._open.socket = standing
+        ((endpoint, _),) = opener.opened
+        assert isinstance(endpoint, PacedDatagrams)
+        standing: Any = StandingSocket(endpoint.socket)
+        endpoint.socket = standing
         assert [line.send(b"old") for _ in range(20)] == [False] * 20
         await asyncio.sleep(0.02)
         standing.runs = True
@@ -269,6 +292,7 @@ def test_a_stalled_network_drops_datagrams_instead_of_piling_them_up() -> None:
 
 def test_a_called_socket_of_another_network_is_opened_anew() -> None:
     async def test() -> None:
+        opener = NotedOpener(open_datagrams)
         for url, number, opened_anew in (
             ("udpout://127.0.0.1:9", errno.EINVAL, True),
             ("udpout://127.0.0.1:9", errno.ENETUNREACH, True),
@@ -276,11 +300,13 @@ def test_a_called_socket_of_another_network_is_opened_anew() -> None:
             ("udpin://127.0.0.1:0", errno.ENETUNREACH, False),
         ):
             kind, _, place = url.partition("://")
-            line = UdpTransport(Endpoint(EndpointKind(kind), "127.0.0.1", int(place.rpartition(":")[2])))
+            endpoint = Endpoint(EndpointKind(kind), "127.0.0.1", int(place.rpartition(":")[2]))
+            line = UdpTransport(endpoint, opener)
             losses: list[int] = []
             line.lost = lambda losses=losses: losses.append(1)  # type: ignore[misc]
             await line.open()
-            line._failed(OSError(number, "no way out"))
+            _, failed = opener.opened[-1]
+            failed(OSError(number, "no way out"))
             assert bool(losses) is opened_anew, (url, number)
             line.close()
 
