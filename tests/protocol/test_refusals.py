@@ -15,10 +15,10 @@ import pytest
 from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import PeerConfig
-from tests.protocol.ardrone.bench import Ear, bench, make_drone
-from tests.protocol.mavlink.scripted import ScriptedAutopilot, scripted
-from tests.protocol.rig import Rig, ardupilot_rig, px4_rig
+from tests.protocol.mavlink.scripted_autopilot import ScriptedAutopilot, scripted
+from tests.rigs.ardrone import Ear, bench, make_drone
 from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import Rig, ardupilot_rig, px4_rig
 
 BOTH = {"ardupilot": ardupilot_rig, "px4": px4_rig}
 _PATIENT_PX4 = PeerConfig(ready_s=0.5, parameters={"COM_OF_LOSS_T": 6.5})

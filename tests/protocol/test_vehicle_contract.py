@@ -12,9 +12,9 @@ import pytest
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, LandedState
 from flightd.runtime.clock import LoopClock
-from tests.protocol.rig import REAL_TIME, RIGS, Rig
 from tests.rigs.event_loops import virtual
 from tests.rigs.patient_loop import patient
+from tests.rigs.vehicles import REAL_TIME, RIGS, Rig
 
 
 @pytest.fixture(params=list(RIGS))

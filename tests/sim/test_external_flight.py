@@ -17,8 +17,8 @@ from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
 from flightd.runtime.clock import LoopClock
 from flightd.sim.plant.external_simulator import ExternalVehicle, Placement
-from tests.protocol.rig import Rig
 from tests.rigs.event_loops import real
+from tests.rigs.vehicles import Rig
 
 ROOT = Path(__file__).parents[2]
 SHORT = 'mission.nodes=["A1", "A2"]'
@@ -57,7 +57,7 @@ def is_sound(summary: dict[str, Any]) -> bool:
 @contextmanager
 def simulator(kind: str, speed: float = 1.0) -> Iterator[list[str]]:
     """Another simulator, so many times as fast as the clock; the options that fly in it."""
-    command = [sys.executable, "-m", "tests.sim.sitl_stand_in", kind, "--speed", str(speed)]
+    command = [sys.executable, "-m", "tests.rigs.simulator_process", kind, "--speed", str(speed)]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, cwd=ROOT, stdin=pipe, stdout=pipe, text=True) as process:
         assert process.stdout is not None

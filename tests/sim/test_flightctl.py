@@ -12,8 +12,8 @@ import pytest
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.core.types import CommandKind, Phase
 from tests.rigs.event_loops import in_real_time, real
+from tests.rigs.ground_link import Keyring, address_of, local, serving, tell_once
 from tests.rigs.waiting import until
-from tests.sim.ground_rig import Keyring, address_of, local, serving, tell_once
 
 ROOT = Path(__file__).parents[2]
 

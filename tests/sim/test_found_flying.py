@@ -27,8 +27,8 @@ from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.sim.autopilot.copter import CopterMode
 from flightd.site.site_file import load_site
-from tests.protocol.rig import Rig, ardupilot_rig
 from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import Rig, ardupilot_rig
 
 ROOT = Path(__file__).parents[2]
 SITE = load_site(ROOT / "configs" / "site-demo.toml")

@@ -25,8 +25,7 @@ from flightd.core.types import CommandKind, Phase
 from flightd.runtime.clock import LoopClock
 from flightd.site.site import Aisle, Edge, Node
 from tests.rigs.event_loops import in_real_time
-from tests.rigs.waiting import until
-from tests.sim.ground_rig import (
+from tests.rigs.ground_link import (
     SITE,
     Keyring,
     address_of,
@@ -37,6 +36,7 @@ from tests.sim.ground_rig import (
     tell_once,
     telling,
 )
+from tests.rigs.waiting import until
 
 EXAMPLE = Path(__file__).parents[2] / "tools" / "ground_client.py"
 

@@ -15,8 +15,8 @@ from flightd.core.types import Demand
 from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.scenario.faults import WorldFaults
 from flightd.site.site_file import load_site
-from tests.protocol.rig import Rig, ardupilot_rig, px4_rig
 from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import Rig, ardupilot_rig, px4_rig
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")
 BOTH = {"ardupilot": ardupilot_rig, "px4": px4_rig}

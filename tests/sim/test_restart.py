@@ -18,7 +18,7 @@ from flightd.core.topics import Topic
 from flightd.core.types import Event, Phase
 from flightd.replay.log import read_log
 from tests.rigs.event_loops import in_real_time
-from tests.sim.service_rig import ServiceRig
+from tests.rigs.service import ServiceRig
 
 _UP = {Phase.ACQUIRE, Phase.TURN, Phase.FOLLOW, Phase.HOVER, Phase.HOLD}
 _GUIDED_TIMEOUT_S = 3.0

@@ -16,8 +16,8 @@ from flightd.cli.watch import WatchApp
 from flightd.core.types import CommandKind, Phase
 from flightd.runtime.clock import LoopClock
 from tests.rigs.event_loops import in_real_time
+from tests.rigs.ground_link import SITE, address_of, event, local, serving, telling
 from tests.rigs.waiting import until
-from tests.sim.ground_rig import SITE, address_of, event, local, serving, telling
 
 
 def floor() -> FloorStatus:

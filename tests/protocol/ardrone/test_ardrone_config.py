@@ -16,7 +16,7 @@ from flightd.sim.ardrone import configuration
 from flightd.sim.ardrone.at_commands import DroneCommand
 from flightd.sim.ardrone.configuration import Configuration, Ids
 from flightd.sim.ardrone.drone import DroneOptions
-from tests.protocol.ardrone.bench import Bench, Ear, bench, make_drone
+from tests.rigs.ardrone import Bench, Ear, bench, make_drone
 from tests.rigs.event_loops import virtual
 
 

@@ -24,8 +24,8 @@ from flightd.sim.ardrone.drone import (
     MajorState,
 )
 from tests.protocol.ardrone import golden
-from tests.protocol.ardrone.bench import make_drone
-from tests.protocol.ardrone.raw_drone import RawClient, raw_drone
+from tests.protocol.ardrone.raw_client import RawClient, raw_drone
+from tests.rigs.ardrone import make_drone
 from tests.rigs.event_loops import virtual
 
 FLY, LAND, PRESS = "REF,290718208", "REF,290717696", "REF,290717952"

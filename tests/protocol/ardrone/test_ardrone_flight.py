@@ -16,7 +16,7 @@ from flightd.sim.ardrone.at_commands import DroneCommand
 from flightd.sim.ardrone.drone import BIT_CUTOUT, DroneOptions, MajorState
 from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.sensors.instruments import SensorParams
-from tests.protocol.ardrone.bench import ANY_PORTS, Ear, bench, ended, make_drone, settings_for
+from tests.rigs.ardrone import ANY_PORTS, Ear, bench, ended, make_drone, settings_for
 from tests.rigs.event_loops import virtual
 
 

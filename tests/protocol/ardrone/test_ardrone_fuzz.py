@@ -23,7 +23,7 @@ from flightd.sim.ardrone.at_commands import parse
 from flightd.sim.ardrone.drone import DroneOptions
 from flightd.sim.ardrone.navdata_writer import ALL_OPTIONS, OPTION_BYTES, NavdataReport, packet
 from tests.protocol.ardrone import golden
-from tests.protocol.ardrone.bench import make_drone
+from tests.rigs.ardrone import make_drone
 
 CASES = int(os.environ.get("FLIGHTD_FUZZ", "20000"))
 MS = 1_000_000

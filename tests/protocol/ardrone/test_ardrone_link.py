@@ -13,7 +13,7 @@ from flightd.core.types import Demand
 from flightd.sim.ardrone.drone import REF_FLY, MajorState
 from flightd.sim.ardrone.navdata_writer import NavdataReport, packet
 from flightd.sim.autopilot.radio import RadioParams
-from tests.protocol.ardrone.bench import Ear, bench, make_drone
+from tests.rigs.ardrone import Ear, bench, make_drone
 from tests.rigs.event_loops import virtual
 
 MS = 1_000_000

@@ -29,7 +29,7 @@ from flightd.sim.racks.appearance import RackLook
 from flightd.site.site_file import load_site
 from tests.held_time import held
 from tests.protocol.ardrone import golden
-from tests.protocol.ardrone.bench import ANY_PORTS, bench, ended, make_drone
+from tests.rigs.ardrone import ANY_PORTS, bench, ended, make_drone
 from tests.rigs.event_loops import virtual
 
 FRAMES = PaveParser().feed(golden.pave_68())

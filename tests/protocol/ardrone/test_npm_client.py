@@ -15,7 +15,7 @@ import pytest
 
 from flightd.runtime.clock import LoopClock
 from flightd.sim.ardrone.server import ArDroneServer
-from tests.protocol.ardrone.bench import ANY_PORTS, ended, make_drone
+from tests.rigs.ardrone import ANY_PORTS, ended, make_drone
 from tests.rigs.event_loops import real
 
 MODULES = os.environ.get("ARDRONE_NODE_MODULES", "")

@@ -15,11 +15,9 @@ from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import PeerConfig, Sticks
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.plant.airframe import Airframe
-from flightd.sim.plant.wind import Draught
 from tests.protocol.mavlink.raw_client import RawClient
 from tests.rigs.event_loops import virtual
-
-CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
+from tests.rigs.vehicles import CALM
 
 
 @asynccontextmanager

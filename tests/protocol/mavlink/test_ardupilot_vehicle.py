@@ -15,7 +15,7 @@ from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.plant.airframe import Airframe
-from tests.protocol.mavlink.scripted import (
+from tests.protocol.mavlink.scripted_autopilot import (
     ALT_HOLD,
     ARM,
     GUIDED_NOGPS,
@@ -27,8 +27,8 @@ from tests.protocol.mavlink.scripted import (
     known,
     scripted,
 )
-from tests.protocol.rig import Rig, ardupilot_rig
 from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import Rig, ardupilot_rig
 
 # What we are and ask
 

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.core.types import Demand
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import CopterMode
-from tests.protocol.mavlink.scripted import (
+from tests.protocol.mavlink.scripted_autopilot import (
     ARM,
     LAND,
     SET_MODE,
@@ -18,8 +18,8 @@ from tests.protocol.mavlink.scripted import (
     known,
     scripted,
 )
-from tests.protocol.rig import ardupilot_rig
 from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import ardupilot_rig
 
 
 def test_an_unanswered_command_is_repeated_with_rising_confirmation() -> None:

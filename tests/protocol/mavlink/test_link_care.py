@@ -15,12 +15,11 @@ from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.services.statustext import TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
-from flightd.app.simulation.ports import free_port
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Demand, Event, EventLevel, GridPose
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.radio import RadioParams
-from tests.protocol.mavlink.scripted import (
+from tests.protocol.mavlink.scripted_autopilot import (
     ALT_HOLD,
     ARM,
     INTERVAL,
@@ -28,8 +27,9 @@ from tests.protocol.mavlink.scripted import (
     known,
     scripted,
 )
-from tests.protocol.rig import ardupilot_rig
 from tests.rigs.event_loops import virtual
+from tests.rigs.free_ports import free_port
+from tests.rigs.vehicles import ardupilot_rig
 
 
 def test_rates_that_a_ground_station_overwrote_are_asked_for_again() -> None:

@@ -27,7 +27,6 @@ from flightd.adapters.vehicle.mavsdk.gate import FRESH_NS, SetpointGate, message
 from flightd.adapters.vehicle.mavsdk.library import whole_fields
 from flightd.adapters.vehicle.mavsdk.telemetry import Readings
 from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
-from flightd.app.simulation.ports import free_port
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import Attitude, Demand, LandedState
@@ -39,9 +38,10 @@ from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.link import Channel, Message
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
 from flightd.sim.plant.airframe import Airframe
-from tests.protocol.rig import Rig, mavlink_rig, mavsdk_rig
 from tests.rigs.event_loops import real, run_in
+from tests.rigs.free_ports import free_port
 from tests.rigs.patient_loop import patient
+from tests.rigs.vehicles import Rig, mavlink_rig, mavsdk_rig
 
 
 class _CountingPx4(Px4Peer):

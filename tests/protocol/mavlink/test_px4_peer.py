@@ -17,8 +17,8 @@ from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
 from flightd.sim.plant.airframe import Airframe
 from tests.protocol.mavlink.raw_client import RawClient
-from tests.protocol.rig import CALM
 from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import CALM
 
 SET_MODE, ARM = 176, 400
 HOVER = 0.34

@@ -12,8 +12,8 @@ from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Mode
 from flightd.sim.plant.airframe import AirframeParams
-from tests.protocol.rig import px4_rig
 from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import px4_rig
 
 
 def test_it_streams_before_offboard_and_only_on_demand() -> None:

@@ -25,8 +25,8 @@ from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.plant.airframe import Airframe
 from tests.protocol.mavlink.test_codec import StoppedClock
-from tests.protocol.rig import Rig
 from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import Rig
 
 KEY = bytes(range(32))
 NOW_UNIX_S = 1_795_000_000.0

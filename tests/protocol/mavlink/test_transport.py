@@ -33,8 +33,9 @@ from flightd.runtime.datagrams import (
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.plant.airframe import Airframe
-from tests.protocol.rig import Rig
 from tests.rigs.event_loops import real, virtual
+from tests.rigs.free_ports import free_port
+from tests.rigs.vehicles import Rig
 
 _TIOCGEXCL = 0x80045440
 """Whether a terminal refuses to be opened once more; `termios` leaves it out."""
@@ -117,13 +118,6 @@ def test_what_is_no_serial_device_is_told() -> None:
             await ArduPilotVehicle("serial:///dev/null:57600", LoopClock()).run()
 
     virtual(test())
-
-
-def free_port(kind: int = socket.SOCK_DGRAM) -> int:
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def test_a_listening_vehicle_answers_the_autopilot_that_calls() -> None:

@@ -19,12 +19,7 @@ from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_notice import FrameNotice, encode_notice
 from flightd.runtime.frame_ring import FrameTicket
 from tests.rigs.event_loops import real, virtual
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+from tests.rigs.free_ports import free_port
 
 
 def notice(seq: int, device_ns: int, width: int = 64) -> bytes:

@@ -25,7 +25,7 @@ from flightd.sim.plant.airframe import Airframe
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import Draught
 from flightd.sim.sensors.instruments import Sensors
-from tests.protocol.ardrone.bench import ANY_PORTS, settings_for
+from tests.rigs.ardrone import ANY_PORTS, settings_for
 from tests.rigs.waiting import until
 
 CALM = Draught(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
@@ -93,6 +93,15 @@ class Rig:
         await self.stream(2.0)
 
 
+async def _ended(tasks: list[asyncio.Task[None]]) -> None:
+    """Cancel and await; what one of them died of fails the test."""
+    for task in tasks:
+        task.cancel()
+    results = await asyncio.gather(*tasks, return_exceptions=True)
+    failures = [result for result in results if isinstance(result, Exception)]
+    assert not failures, failures
+
+
 @asynccontextmanager
 async def mavlink_rig(
     make_peer: type[ArduCopterPeer | Px4Peer],
@@ -121,11 +130,7 @@ async def mavlink_rig(
     try:
         yield rig
     finally:
-        for task in tasks:
-            task.cancel()
-        results = await asyncio.gather(*tasks, return_exceptions=True)
-        failures = [r for r in results if isinstance(r, Exception)]
-        assert not failures, failures
+        await _ended(tasks)
 
 
 ardupilot_rig = partial(mavlink_rig, ArduCopterPeer, ArduPilotVehicle, CopterMode.ALT_HOLD)
@@ -154,11 +159,7 @@ async def ardrone_rig(**settings: Any) -> AsyncIterator[Rig]:
         try:
             yield rig
         finally:
-            for task in tasks:
-                task.cancel()
-            results = await asyncio.gather(*tasks, return_exceptions=True)
-            failures = [r for r in results if isinstance(r, Exception)]
-            assert not failures, failures
+            await _ended(tasks)
 
 
 RIGS: dict[str, Callable[[], Any]] = {

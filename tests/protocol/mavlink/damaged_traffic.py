@@ -1,4 +1,4 @@
-"""Damaged MAVLink traffic.  `python -m tests.protocol.mavlink.damage 1000000` runs as many cases."""
+"""Damaged MAVLink traffic.  `python -m tests.protocol.mavlink.damaged_traffic 1000000` runs as many cases."""
 
 from __future__ import annotations
 
