@@ -285,6 +285,9 @@ def test_an_event_is_shown_and_never_fails(on_rig: Any) -> None:
         rig.vehicle.notify(Event(0, EventLevel.INFO, "early", "before any link"))
         await asyncio.sleep(1.0)
         rig.vehicle.notify(Event(0, EventLevel.ERROR, "long", "ä" * 500))
-        await asyncio.sleep(0.1)
+        await asyncio.sleep(0.2)
+        texts = rig.texts()
+        assert texts is None or any(text.startswith("long: ") for text in texts)
+        assert LoopClock().now_ns() - rig.known().heartbeat_ns < 0.2e9, "the link goes on"
 
     on_rig(test)

@@ -59,6 +59,8 @@ class Rig:
     """A radio gap after which the vehicle still obeys."""
     has_pilot: bool = True
     """Whether someone besides us can command it: an AR.Drone has one client only."""
+    texts: Callable[[], list[str] | None] = lambda: None
+    """What the vehicle was given to show; None where it shows nothing."""
     flying_task: asyncio.Task[None] | None = None
 
     def known(self) -> VehicleState:
@@ -122,7 +124,7 @@ async def mavlink_rig(
     def cut(apart: bool) -> None:
         peer.link.muted = apart
 
-    rig = Rig(vehicle, peer, take_over, cut)
+    rig = Rig(vehicle, peer, take_over, cut, texts=lambda: list(peer.texts))
     tasks = [asyncio.create_task(vehicle.run(), name="vehicle")]
     if peer_runs:
         tasks.append(asyncio.create_task(peer.run(), name="peer"))

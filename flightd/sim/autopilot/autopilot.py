@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 import asyncio
 import math
+from collections import deque
 from dataclasses import dataclass, field
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -28,6 +29,7 @@ _HEARTBEAT_NS = 1_000 * _NS_PER_MS
 _TIMESYNC_NS = 10_000 * _NS_PER_MS
 _TRUTH_EVERY = 2
 _TRUTH_SAMPLES = 1000
+_TEXTS_KEPT = 50
 _CATCH_UP_NS = 2_000 * _NS_PER_MS
 """A process that slept longer than this goes on from now instead of simulating what it missed."""
 
@@ -106,6 +108,8 @@ class AutopilotPeer(abc.ABC):
         self.sticks = Sticks()
         self.arming_block = ""
         """A sensor fault: the reason with which arming is refused while it is not empty."""
+        self.texts: deque[str] = deque(maxlen=_TEXTS_KEPT)
+        """What others gave it to show, newest last."""
         self._climb_loop = ClimbLoop(ClimbGains(hover_guess=airframe.params.hover_collective))
         self._stick_yaw_rad = 0.0
 
@@ -316,6 +320,8 @@ class AutopilotPeer(abc.ABC):
                 self.link.send(channel, dialect.MAVLink_timesync_message(stamp_ns, message.ts1))
             case "REQUEST_DATA_STREAM":
                 self._data_stream(channel, message, now_ns)
+            case "STATUSTEXT":
+                self.texts.append(message.text)
             case "SETUP_SIGNING" if self.takes_keys and not self.armed:
                 self.link.sign(bytes(message.secret_key), message.initial_timestamp)
             case "PARAM_REQUEST_READ" | "PARAM_REQUEST_LIST" | "PARAM_SET":

@@ -446,5 +446,8 @@ def test_the_options_of_a_strict_drone_change_nothing() -> None:
     async def main() -> None:
         async with bench(make_drone(DroneOptions(config_needs_navdata=True))) as b:
             await b.hovering()
+            assert b.state.in_control
+            await b.steer(3.0, climb_mps=0.3)
+            assert b.state.height_m > 1.5
 
     virtual(main())

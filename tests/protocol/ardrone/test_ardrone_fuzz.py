@@ -215,6 +215,8 @@ def test_any_datagram_goes_through_the_at_port(data: bytes) -> None:
     drone = make_drone()
     drone.command(data, 0)
     drone.step(5 * MS, 0.005)
+    drone.command(b"AT*COMWDG=1\r", 10 * MS)
+    assert drone.last_sequence == 1, "it still obeys"
 
 
 @given(st.binary(max_size=2000))

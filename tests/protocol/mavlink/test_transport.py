@@ -129,6 +129,8 @@ def test_a_listening_vehicle_answers_the_autopilot_that_calls() -> None:
         tasks = [asyncio.create_task(vehicle.run()), asyncio.create_task(peer.run())]
         rig = Rig(vehicle, peer, lambda: None, lambda apart: None)
         await rig.take_off(1.0)
+        assert rig.known().in_control
+        assert peer.truth().height_m > 0.9
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
