@@ -9,7 +9,7 @@ import time
 from collections.abc import Coroutine
 from typing import Any, TypeVar
 
-from flightd.runtime.event_loops import _Selector
+from flightd.runtime.event_loops import PacedSelector
 from tests.rigs.event_loops import run_in
 
 _T = TypeVar("_T")
@@ -35,7 +35,7 @@ class PatientLoop(asyncio.SelectorEventLoop):
     def __init__(self, factor: float = 1.0) -> None:
         self._factor = factor
         self._now_s = self._real_s = time.monotonic()
-        super().__init__(_Selector(self._patient_wait))
+        super().__init__(PacedSelector(self._patient_wait))
 
     def time(self) -> float:
         return self._now_s + self._passed(_PAUSE_S)
