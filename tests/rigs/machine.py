@@ -166,4 +166,5 @@ def _measure(root: int) -> Load:
 
 
 if __name__ == "__main__":
-    print(json.dumps(asdict(_measure(int(sys.argv[1])))), flush=True)
+    with contextlib.suppress(BrokenPipeError):  # whoever asked was killed
+        print(json.dumps(asdict(_measure(int(sys.argv[1])))), flush=True)

@@ -112,13 +112,13 @@ class Slow:
         return out
 
 
-@pytest.mark.realtime
+@pytest.mark.realtime(cores=0.5)
 def test_a_renderer_that_cannot_keep_up_costs_pictures_and_does_not_let_them_queue() -> None:
     numbers = [ticket.seq for ticket, *_ in taken(5.0, make=Slow, run=real)]
     assert numbers[-1] - numbers[0] >= 1.2 * (len(numbers) - 1) > 0
 
 
-@pytest.mark.realtime
+@pytest.mark.realtime(cores=0.5)
 def test_a_camera_without_any_delay_takes_pictures() -> None:
     at_once = replace(CAMERA, capture_delay_s=0.0)
     make = partial(FrontRenderer, load_site(SMALL), at_once, RackLook(), 1)
