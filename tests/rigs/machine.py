@@ -39,7 +39,7 @@ class Needs:
                 f"too busy: others took {load.taken_cores:.1f} of {load.cores} processors, "
                 f"{self.cores:g} have to be free"
             )
-        if load.pause_s > self.pause_s:
+        if load.pause_s > self.pause_s and load.used_cores < 0.9 * load.cores:
             return f"too busy: the machine paused for {load.pause_s:.2f} s, {self.pause_s:g} s may be"
         return ""
 
