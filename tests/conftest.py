@@ -1,16 +1,61 @@
-"""For all tests: Hypothesis repeats its examples, and no test depends on the machine's speed."""
+"""For all tests: Hypothesis repeats its examples, and no test depends on the machine's speed.
+
+Those marked `realtime` do depend on it: see `tests.rigs.machine`."""
 
 from __future__ import annotations
+
+import os
+from collections.abc import Generator
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.command import Command
+from tests.rigs.machine import Meter, Needs, Patience
 
 settings.register_profile(
     "flightd", deadline=None, derandomize=True, database=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("flightd")
+
+_IN_CI = os.environ.get("CI", "") == "true"
+_PATIENCE = pytest.StashKey[Patience]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addini(
+        "realtime_patience_s",
+        "how long all tests that fly by the clock wait together for a quiet machine",
+        default="120" if _IN_CI else "10",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[_PATIENCE] = Patience(float(config.getini("realtime_patience_s")))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
+    """A test that flies by the clock is skipped on a machine too busy for it; in CI it flies all the same.
+    When it fails, that counts unless others took meanwhile what it needs."""
+    marker = item.get_closest_marker("realtime")
+    if marker is None:
+        return (yield)
+    needs = Needs(**marker.kwargs)
+    missing = item.config.stash[_PATIENCE].wait_for(needs)
+    if missing and not _IN_CI:
+        pytest.skip(missing)
+    meter = Meter()
+    try:
+        with meter.running():
+            return (yield)
+    except (Exception, pytest.fail.Exception) as failure:
+        if missing := needs.missing(meter.load):
+            said = str(failure).partition("\n")[0]
+            pytest.skip(f"{missing}; it failed by {type(failure).__name__}: {said}")
+        raise
+    finally:
+        item.user_properties.append(("machine", str(meter.load)))
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ _STRAGGLER_WAIT_S = 0.5
 """Real time after which a datagram counts as dropped (its receiver's buffer was full)."""
 
 
-class _Selector(selectors.BaseSelector):
+class PacedSelector(selectors.BaseSelector):
     """Passes everything to the real selector, but lets its loop decide what waiting means."""
 
     def __init__(self, wait: Callable[[selectors.BaseSelector, float | None], list[Any]]) -> None:
@@ -59,7 +59,7 @@ class ScaledLoop(asyncio.SelectorEventLoop):
         if not factor > 0:
             raise ValueError(f"time factor {factor} is not positive")
         self._factor = factor
-        super().__init__(_Selector(self._scaled_wait))
+        super().__init__(PacedSelector(self._scaled_wait))
 
     def time(self) -> float:
         return time.monotonic() * self._factor
@@ -85,7 +85,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self._in_flight: Counter[int] = Counter()  # local port -> datagrams sent to it, not yet received
         self._ports: dict[int, int] = {}  # local port -> fd
         self.lost_datagrams = 0
-        super().__init__(_Selector(self._virtual_wait))
+        super().__init__(PacedSelector(self._virtual_wait))
 
     def time(self) -> float:
         return self._now_s

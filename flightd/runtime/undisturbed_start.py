@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
@@ -10,7 +11,7 @@ from multiprocessing import resource_tracker
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """While entered, this thread's SIGINT waits, and a process started from it is born with it blocked.
+    """While entered, SIGINT waits, and a process started from this thread is born with it blocked.
 
     A terminal sends Ctrl-C to the whole group; a child that is still importing would die of it with a
     traceback of its own.  Ending the child is its parent's task.
@@ -18,6 +19,23 @@ def undisturbed() -> Iterator[None]:
     resource_tracker.ensure_running()  # begun later it would let SIGINT through again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        yield
+        with _put_off():
+            yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _put_off() -> Iterator[None]:
+    """Another thread may take the signal, whose handler then runs in the main one: it runs at the end."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if came:
+            signal.raise_signal(signal.SIGINT)

@@ -28,6 +28,7 @@ from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.plant.airframe import Airframe
+from tests.rigs.event_loops import real
 
 pytestmark = pytest.mark.slow  # the command has its own loop: real time
 
@@ -53,7 +54,7 @@ def serving(make_peer: Callable[..., AutopilotPeer], **options: Any) -> Iterator
         running.cancel()
         await asyncio.wait([running])
 
-    thread = threading.Thread(target=lambda: asyncio.run(serve()))
+    thread = threading.Thread(target=lambda: real(serve()))
     thread.start()
     try:
         assert started.wait(10.0)

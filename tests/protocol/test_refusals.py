@@ -14,11 +14,11 @@ import pytest
 
 from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
-from flightd.sim.ardrone.states import BIT_COM_WATCHDOG
 from flightd.sim.autopilot.autopilot import PeerConfig
-from tests.protocol.ardrone.bench import Ear, bench, make_drone, virtually
-from tests.protocol.mavlink.scripted import ScriptedAutopilot, scripted
-from tests.protocol.rig import Rig, ardupilot_rig, px4_rig, run_virtual
+from tests.protocol.mavlink.scripted_autopilot import ScriptedAutopilot, scripted
+from tests.rigs.ardrone import Ear, bench, make_drone
+from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import Rig, ardupilot_rig, px4_rig
 
 BOTH = {"ardupilot": ardupilot_rig, "px4": px4_rig}
 _PATIENT_PX4 = PeerConfig(ready_s=0.5, parameters={"COM_OF_LOSS_T": 6.5})
@@ -31,7 +31,7 @@ def on_rig(request: pytest.FixtureRequest) -> Callable[[Any], Any]:
             async with BOTH[request.param]() as rig:
                 return await test(rig)
 
-        return run_virtual(main)
+        return virtual(main())
 
     return run
 
@@ -90,10 +90,11 @@ def test_a_daemon_that_died_in_the_air_and_comes_back_takes_the_flight_over(
     async def test() -> None:
         async with make_rig() as rig:
             await rig.take_off(1.5)
-            rig.vehicle._pursuit.hand_back = _nothing  # it was killed: it says nothing more
+            rig.cut(True)  # it was killed: it says nothing more
             rig.flying_task.cancel()
             await asyncio.wait([rig.flying_task])
-            address = rig.peer._address
+            rig.cut(False)
+            address = rig.peer.address
             second = type(rig.vehicle)(f"udpout://{address[0]}:{address[1]}", LoopClock())
             running = asyncio.create_task(second.run())
             mode = rig.peer.mode
@@ -110,11 +111,7 @@ def test_a_daemon_that_died_in_the_air_and_comes_back_takes_the_flight_over(
             running.cancel()
             await asyncio.wait([running])
 
-    run_virtual(test)
-
-
-async def _nothing() -> None:
-    """In place of the last words."""
+    virtual(test())
 
 
 @pytest.mark.parametrize(
@@ -152,7 +149,7 @@ def test_every_answer_but_acceptance_is_told_and_tried_again(
             assert state is not None
             assert (state.in_control, state.armed, state.refusal) == (True, True, "")
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_the_ardrones_command_watchdog_is_reset_at_once() -> None:
@@ -165,11 +162,11 @@ def test_the_ardrones_command_watchdog_is_reset_at_once() -> None:
             drone.command = (  # type: ignore[method-assign]
                 lambda datagram, now_ns: None if lost[0] else command(datagram, now_ns)
             )
-            await b.until(lambda: b.vehicle._telemetry.state & BIT_COM_WATCHDOG)
+            await asyncio.sleep(0.2)  # its watchdog takes 50 ms
             lost[0] = False
             ear.commands.clear()
-            await b.until(lambda: not b.vehicle._telemetry.state & BIT_COM_WATCHDOG, limit_s=0.3)
-            assert ear.named("COMWDG")
+            await b.until(lambda: ear.named("COMWDG"), limit_s=0.3)
+            await asyncio.sleep(0.2)
             assert b.state.in_control
 
-    virtually(main)
+    virtual(main())

@@ -12,7 +12,9 @@ import pytest
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, LandedState
 from flightd.runtime.clock import LoopClock
-from tests.protocol.rig import REAL_TIME, RIGS, Rig, run_real, run_virtual
+from tests.rigs.event_loops import virtual
+from tests.rigs.patient_loop import patient
+from tests.rigs.vehicles import REAL_TIME, RIGS, Rig
 
 
 @pytest.fixture(params=list(RIGS))
@@ -24,7 +26,7 @@ def on_rig(request: pytest.FixtureRequest) -> Callable[[Any], Any]:
             async with RIGS[request.param]() as rig:
                 return await test(rig)
 
-        return (run_real if request.param in REAL_TIME else run_virtual)(main)
+        return (patient if request.param in REAL_TIME else virtual)(main())
 
     return run
 
@@ -85,46 +87,45 @@ def test_flying_takes_control_arms_and_takes_off(on_rig: Any) -> None:
     on_rig(test)
 
 
-@pytest.mark.parametrize(("roll_deg", "pitch_deg"), [(6.0, 0.0), (0.0, -6.0), (-4.0, 4.0)])
-def test_tilt_is_obeyed_with_its_sign(on_rig: Any, roll_deg: float, pitch_deg: float) -> None:
+def test_tilt_is_obeyed_with_its_sign(on_rig: Any) -> None:
     async def test(rig: Rig) -> None:
         await rig.take_off()
-        await rig.stream(0.8, roll_rad=math.radians(roll_deg), pitch_rad=math.radians(pitch_deg))
-        truth = rig.peer.truth()
-        assert math.degrees(truth.roll_rad) == pytest.approx(roll_deg, abs=0.7)
-        assert math.degrees(truth.pitch_rad) == pytest.approx(pitch_deg, abs=0.7)
-        told = rig.known().attitude
-        assert math.degrees(told.roll_rad) == pytest.approx(roll_deg, abs=0.7)
-        assert math.degrees(told.pitch_rad) == pytest.approx(pitch_deg, abs=0.7)
+        for roll_deg, pitch_deg in ((6.0, 0.0), (0.0, -6.0), (-4.0, 4.0)):
+            await rig.stream(0.8, roll_rad=math.radians(roll_deg), pitch_rad=math.radians(pitch_deg))
+            truth, told = rig.peer.truth(), rig.known().attitude
+            assert math.degrees(truth.roll_rad) == pytest.approx(roll_deg, abs=0.7)
+            assert math.degrees(truth.pitch_rad) == pytest.approx(pitch_deg, abs=0.7)
+            assert math.degrees(told.roll_rad) == pytest.approx(roll_deg, abs=0.7)
+            assert math.degrees(told.pitch_rad) == pytest.approx(pitch_deg, abs=0.7)
 
     on_rig(test)
 
 
-@pytest.mark.parametrize("climb_mps", [0.4, -0.3])
-def test_the_climb_rate_is_obeyed_with_its_sign(on_rig: Any, climb_mps: float) -> None:
+def test_the_climb_rate_is_obeyed_with_its_sign(on_rig: Any) -> None:
     async def test(rig: Rig) -> None:
         await rig.take_off(2.0)
-        await rig.stream(1.0, climb_mps=climb_mps)
-        start_m = rig.peer.truth().height_m
-        await rig.stream(2.0, climb_mps=climb_mps)
-        assert (rig.peer.truth().height_m - start_m) / 2.0 == pytest.approx(climb_mps, abs=0.06)
-        assert rig.known().climb_mps == pytest.approx(climb_mps, abs=0.1)
+        for climb_mps in (0.4, -0.3):
+            await rig.stream(1.0, climb_mps=climb_mps)
+            start_m = rig.peer.truth().height_m
+            await rig.stream(2.0, climb_mps=climb_mps)
+            assert (rig.peer.truth().height_m - start_m) / 2.0 == pytest.approx(climb_mps, abs=0.06)
+            assert rig.known().climb_mps == pytest.approx(climb_mps, abs=0.1)
 
     on_rig(test)
 
 
-@pytest.mark.parametrize("rate_deg", [20.0, -20.0])
-def test_the_yaw_rate_turns_clockwise_and_zero_holds_the_heading(on_rig: Any, rate_deg: float) -> None:
+def test_the_yaw_rate_turns_clockwise_and_zero_holds_the_heading(on_rig: Any) -> None:
     async def test(rig: Rig) -> None:
         await rig.take_off()
-        start = rig.peer.truth().yaw_rad
-        await rig.stream(4.0, yaw_rate_radps=math.radians(rate_deg))
-        turned = wrap_pi(rig.peer.truth().yaw_rad - start)
-        assert math.degrees(turned) == pytest.approx(4.0 * rate_deg, abs=4.0)
-        await rig.stream(1.0)
-        held = rig.peer.truth().yaw_rad
-        await rig.stream(4.0)
-        assert math.degrees(wrap_pi(rig.peer.truth().yaw_rad - held)) == pytest.approx(0.0, abs=1.0)
+        for rate_deg in (20.0, -20.0):
+            start = rig.peer.truth().yaw_rad
+            await rig.stream(4.0, yaw_rate_radps=math.radians(rate_deg))
+            turned = wrap_pi(rig.peer.truth().yaw_rad - start)
+            assert math.degrees(turned) == pytest.approx(4.0 * rate_deg, abs=4.0)
+            await rig.stream(1.0)
+            held = rig.peer.truth().yaw_rad
+            await rig.stream(2.0)
+            assert math.degrees(wrap_pi(rig.peer.truth().yaw_rad - held)) == pytest.approx(0.0, abs=1.0)
 
     on_rig(test)
 
@@ -280,9 +281,15 @@ def test_cancelling_in_the_air_hands_over_to_a_landing_soon(on_rig: Any) -> None
 
 def test_an_event_is_shown_and_never_fails(on_rig: Any) -> None:
     async def test(rig: Rig) -> None:
+        def shown() -> bool:
+            texts = rig.texts()
+            return texts is None or any(text.startswith("long: ") for text in texts)
+
         rig.vehicle.notify(Event(0, EventLevel.INFO, "early", "before any link"))
-        await asyncio.sleep(1.0)
+        await rig.until(lambda: rig.vehicle.state() is not None)
         rig.vehicle.notify(Event(0, EventLevel.ERROR, "long", "ä" * 500))
-        await asyncio.sleep(0.1)
+        await rig.until(shown)
+        heard_ns = rig.known().heartbeat_ns
+        await rig.until(lambda: rig.known().heartbeat_ns > heard_ns)  # the link goes on
 
     on_rig(test)

@@ -14,9 +14,9 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.truth_history import TruthHistory
 from flightd.sim.plant.wind import Wind, WindParams
 from flightd.sim.sensors.instruments import SensorParams, Sensors
+from tests.rigs.vehicles import CALM
 
 DT_S = 0.0025
-CALM = WindParams(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
 EXACT = SensorParams(
     heading_offset_rad=0.0, tilt_bias_rad=0.0, tilt_wander_rad=0.0, baro_wander_m=0.0, climb_noise_mps=0.0
 )

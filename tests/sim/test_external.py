@@ -17,7 +17,7 @@ from flightd.sim.plant.external_simulator import ExternalVehicle
 from flightd.sim.plant.external_truth import Placement, TruthReader
 from flightd.sim.plant.kinematics import Kinematics
 from tests.command import Command
-from tests.protocol.rig import run_virtual
+from tests.rigs.event_loops import virtual
 
 LAT0, LON0, ALT0 = -35.363262, 149.165237, 584.0
 HEADING0 = math.radians(353.0)
@@ -185,7 +185,7 @@ def test_the_link_is_opened_followed_and_found_again() -> None:
         await server.wait_closed()
         await asyncio.sleep(0.01)
 
-    run_virtual(test)
+    virtual(test())
 
 
 class UdpSitl(asyncio.DatagramProtocol):
@@ -237,7 +237,7 @@ def test_a_simulator_on_udp_is_heard_and_told_the_distance_to_our_floor() -> Non
         transport.close()
         await asyncio.sleep(0.01)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_what_a_stalled_simulator_does_not_read_is_not_piled_up() -> None:
@@ -251,16 +251,15 @@ def test_what_a_stalled_simulator_does_not_read_is_not_piled_up() -> None:
         await opening
         Sitl.connections[0].transport.pause_reading()
         for _ in range(100_000):  # far more than the sockets hold
-            vehicle._ask()
-        waiting = vehicle._transport.get_write_buffer_size()
-        assert 0 < waiting < 5000
-        await vehicle._let_go()
+            vehicle.ask_streams()
+        assert 0 < vehicle.unsent_bytes < 5000
+        await vehicle.close()
         Sitl.connections[0].transport.abort()
         server.close()
         await server.wait_closed()
         await asyncio.sleep(0.01)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_between_samples_the_motion_goes_on_for_a_moment() -> None:
@@ -287,7 +286,7 @@ def test_between_samples_the_motion_goes_on_for_a_moment() -> None:
         await server.wait_closed()
         await asyncio.sleep(0.01)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_simulator_that_is_not_there_is_told_in_one_line() -> None:
@@ -296,7 +295,7 @@ def test_a_simulator_that_is_not_there_is_told_in_one_line() -> None:
         with pytest.raises(UnavailableError, match="--truth-url"):
             await vehicle.open()
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(
@@ -307,7 +306,7 @@ def test_a_wrong_address_names_the_right_form(url: str) -> None:
         with pytest.raises(InputError, match="tcp:HOST:PORT"):
             ExternalVehicle(url, LoopClock(), PAD)
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(

@@ -16,10 +16,10 @@ import pytest
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import ScaledLoop
 from flightd.sim.plant.external_simulator import ExternalVehicle
 from flightd.sim.plant.external_truth import Placement
-from tests.protocol.rig import Rig
+from tests.rigs.event_loops import real
+from tests.rigs.vehicles import Rig
 
 ROOT = Path(__file__).parents[2]
 SHORT = 'mission.nodes=["A1", "A2"]'
@@ -58,7 +58,7 @@ def is_sound(summary: dict[str, Any]) -> bool:
 @contextmanager
 def simulator(kind: str, speed: float = 1.0) -> Iterator[list[str]]:
     """Another simulator, so many times as fast as the clock; the options that fly in it."""
-    command = [sys.executable, "-m", "tests.sim.sitl_stand_in", kind, "--speed", str(speed)]
+    command = [sys.executable, "-m", "tests.rigs.simulator_process", kind, "--speed", str(speed)]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, cwd=ROOT, stdin=pipe, stdout=pipe, text=True) as process:
         assert process.stdout is not None
@@ -113,8 +113,7 @@ def test_a_simulator_that_runs_at_another_speed_is_flown_in_its_own_time(
 
     with simulator(kind, speed) as options:
         addresses = options[3], options[5]
-        with asyncio.Runner(loop_factory=lambda: ScaledLoop(speed)) as runner:
-            runner.run(main(*addresses))
+        real(main(*addresses), speed)
     assert not [record for record in caplog.records if "times as fast" in record.message]
 
 

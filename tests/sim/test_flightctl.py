@@ -11,7 +11,9 @@ import pytest
 
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.core.types import CommandKind, Phase
-from tests.sim.ground_rig import Keyring, address_of, in_loop, local, serving, tell_once, until
+from tests.rigs.event_loops import in_real_time, real
+from tests.rigs.ground_link import Keyring, address_of, local, serving, tell_once
+from tests.rigs.waiting import until
 
 ROOT = Path(__file__).parents[2]
 
@@ -38,7 +40,7 @@ def at(link: ZmqGround) -> tuple[str, ...]:
     return (*ports, "--timeout", "20")
 
 
-@in_loop
+@in_real_time
 async def test_status_and_commands() -> None:
     async with serving(local()) as link:
         code, out, err = await flightctl(*at(link), "status")
@@ -79,10 +81,10 @@ def test_what_cannot_be_done_is_one_line_and_an_exit_code(command: list[str], co
             assert "Traceback" not in err
             assert link.take_commands() == []
 
-    asyncio.run(run())
+    real(run())
 
 
-@in_loop
+@in_real_time
 async def test_keys_from_keygen_open_a_daemon_beyond_loopback(tmp_path: Path) -> None:
     """The whole way that the guide describes, with nothing but the commands."""
     code, out, _ = await flightctl("keygen", "ann", "--out", str(tmp_path / "mine"), "--json")
@@ -103,7 +105,7 @@ async def test_keys_from_keygen_open_a_daemon_beyond_loopback(tmp_path: Path) ->
     assert '"client":"ann"' in (tmp_path / "audit.jsonl").read_text()
 
 
-@in_loop
+@in_real_time
 async def test_a_picture_is_written_to_a_file(tmp_path: Path) -> None:
     async with serving(local()) as link, asyncio.TaskGroup() as tasks:
         asked = tasks.create_task(flightctl(*at(link), "picture", str(tmp_path / "now.jpg")))
@@ -113,7 +115,7 @@ async def test_a_picture_is_written_to_a_file(tmp_path: Path) -> None:
         assert (tmp_path / "now.jpg").read_bytes() == b"\xff\xd8 a picture"
 
 
-@in_loop
+@in_real_time
 async def test_nobody_listening_is_one_line() -> None:
     async with serving(local()) as link:
         where = at(link)
@@ -122,7 +124,7 @@ async def test_nobody_listening_is_one_line() -> None:
     assert "nobody listens" in err
 
 
-@in_loop
+@in_real_time
 async def test_the_protocol_is_printed_for_writers_of_clients() -> None:
     code, out, _ = await flightctl("protocol")
     assert code == 0

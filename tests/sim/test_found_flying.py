@@ -27,7 +27,8 @@ from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.sim.autopilot.copter import CopterMode
 from flightd.site.site_file import load_site
-from tests.protocol.rig import Rig, ardupilot_rig, run_virtual
+from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import Rig, ardupilot_rig
 
 ROOT = Path(__file__).parents[2]
 SITE = load_site(ROOT / "configs" / "site-demo.toml")
@@ -119,7 +120,7 @@ def test_it_keeps_the_vehicle_level_reports_and_lands_it(alone_s: float) -> None
             assert 'flightd_events_total{level="error",name="failure"}' in told, "the camera's"
             assert 'flightd_dropped_total{queue="vehicle"}' in told
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_vehicle_that_the_pilot_has_is_left_alone() -> None:
@@ -138,7 +139,7 @@ def test_a_vehicle_that_the_pilot_has_is_left_alone() -> None:
                 await daemon
             assert rig.peer.armed, "handing back takes nothing from the pilot"
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_on_the_floor_a_camera_that_is_gone_is_an_error() -> None:
@@ -149,7 +150,7 @@ def test_on_the_floor_a_camera_that_is_gone_is_an_error() -> None:
                 await restarted(rig)
             assert not rig.peer.armed
 
-    run_virtual(test)
+    virtual(test())
 
 
 def unopened(folder: Path) -> FlightdError:
@@ -178,7 +179,7 @@ def test_an_inventory_that_cannot_be_opened_lands_a_vehicle_found_flying(tmp_pat
             assert result.phase is Phase.ABORTED
             assert rig.peer.truth().height_m < 0.15
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_on_the_floor_an_inventory_that_cannot_be_opened_is_an_error(tmp_path: Path) -> None:
@@ -190,7 +191,7 @@ def test_on_the_floor_an_inventory_that_cannot_be_opened_is_an_error(tmp_path: P
                 await restarted(rig, fault=error, camera_gone=False)
             assert raised.value is error
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_vehicle_that_stands_armed_never_takes_off_without_its_inventory(tmp_path: Path) -> None:
@@ -223,4 +224,4 @@ def test_a_vehicle_that_stands_armed_never_takes_off_without_its_inventory(tmp_p
             assert not rig.peer.armed
             assert rig.peer.truth().height_m < 0.15
 
-    run_virtual(test)
+    virtual(test())

@@ -4,11 +4,12 @@ import asyncio
 import os
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,6 @@ from flightd.config.schema import Config
 from flightd.core.errors import RunError
 from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackAppearance
@@ -30,7 +30,8 @@ from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.scenario.scenario import FrontCameraScenario, Scenario
 from flightd.sim.sensors.camera import CameraPeer, PictureMaker
 from flightd.site.site_file import load_site
-from tests.held_time import held
+from tests.rigs.event_loops import real, virtual
+from tests.rigs.held_time import held
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SMALL = CONFIGS / "site-racks-small.toml"
@@ -49,7 +50,7 @@ def taken(
     expose: tuple[float, ...] = (),
     make: Callable[[], PictureMaker] = MAKE,
     camera: FrontCamera = CAMERA,
-    loop: Callable[[], asyncio.AbstractEventLoop] = VirtualLoop,
+    run: Callable[[Coroutine[Any, Any, None]], None] = virtual,
 ) -> list[tuple[FrameTicket, int, Image]]:
     """What a daemon's camera hears of the simulated one: each picture's ticket, arrival and pixels.  Each of
     the exposures is asked for in turn, for an equal part of the time."""
@@ -74,10 +75,9 @@ def taken(
         for task in (running, listening):
             task.cancel()
         await asyncio.wait([running, listening])
-        assert loop is not VirtualLoop or peer.late == 0
+        assert run is not virtual or peer.late == 0
 
-    with asyncio.Runner(loop_factory=loop) as runner:
-        runner.run(main())
+    run(main())
     return found
 
 
@@ -135,12 +135,13 @@ class Dying:
 )
 def test_a_renderer_that_fails_ends_its_camera(make: Callable[[], PictureMaker], problem: str) -> None:
     async def main() -> None:
-        peer = CameraPeer(CAMERA, make, "seed", ("127.0.0.1", free_port()), hovering, LoopClock())
+        address = "127.0.0.1", free_port()
+        peer = CameraPeer(CAMERA, make, "seed", address, hovering, LoopClock(), hold=held)
         async with asyncio.timeout(60.0):
             await peer.run()
 
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner, pytest.raises(ExceptionGroup) as ended:
-        runner.run(main())
+    with pytest.raises(ExceptionGroup) as ended:
+        virtual(main())
     (cause,) = ended.value.exceptions
     assert isinstance(cause, RunError)
     assert re.fullmatch(f"the simulated camera cannot draw {problem}", str(cause))
@@ -152,22 +153,24 @@ class Slow:
     def render(
         self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
     ) -> Image:
-        time.sleep(1.5 / CAMERA.fps)
+        until_s = time.monotonic() + 1.5 / CAMERA.fps
+        while time.monotonic() < until_s:
+            pass
         assert out is not None
         return out
 
 
-@pytest.mark.realtime
+@pytest.mark.realtime(cores=0.5)
 def test_a_renderer_that_cannot_keep_up_costs_pictures_and_does_not_let_them_queue() -> None:
-    numbers = [ticket.seq for ticket, *_ in taken(5.0, make=Slow, loop=asyncio.new_event_loop)]
+    numbers = [ticket.seq for ticket, *_ in taken(5.0, make=Slow, run=real)]
     assert numbers[-1] - numbers[0] >= 1.2 * (len(numbers) - 1) > 0
 
 
-@pytest.mark.realtime
+@pytest.mark.realtime(cores=0.5)
 def test_a_camera_without_any_delay_takes_pictures() -> None:
     at_once = replace(CAMERA, capture_delay_s=0.0)
     make = partial(FrontRenderer, load_site(SMALL), at_once, RackAppearance(), 1)
-    assert len(taken(2.0, make=make, camera=at_once, loop=asyncio.new_event_loop)) >= 2
+    assert len(taken(2.0, make=make, camera=at_once, run=real)) >= 2
 
 
 def configured(site: Path, *settings: str, scenario: Scenario = Scenario()) -> Config:  # noqa: B008

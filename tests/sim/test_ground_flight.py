@@ -13,22 +13,18 @@ import pytest
 from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.protocol import StatusReport
 from flightd.core.types import CommandKind, Phase
-from tests.sim.ground_rig import in_loop
+from tests.rigs.event_loops import in_real_time
+from tests.rigs.free_ports import free_ports
 
 ROOT = Path(__file__).parents[2]
 SPEED = "0.5"
 
 
-def free_tcp_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.mark.realtime
-@in_loop
+@in_real_time
 async def test_a_flight_is_started_watched_and_landed_from_the_ground(tmp_path: Path) -> None:
-    address = Address("127.0.0.1", free_tcp_port(), free_tcp_port())
+    status_port, command_port = free_ports(2, socket.SOCK_STREAM)
+    address = Address("127.0.0.1", status_port, command_port)
     settings = {
         "ground.listen": "127.0.0.1",
         "ground.status_port": str(address.status_port),

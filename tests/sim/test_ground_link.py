@@ -8,6 +8,7 @@ import random
 import socket
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,24 +24,24 @@ from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.types import CommandKind, Phase
 from flightd.runtime.clock import LoopClock
 from flightd.site.site import Aisle, Edge, Node
-from tests.sim.ground_rig import (
+from tests.rigs.event_loops import in_real_time
+from tests.rigs.ground_link import (
     SITE,
     Keyring,
     address_of,
     connected,
     event,
-    in_loop,
     local,
     serving,
     tell_once,
     telling,
-    until,
 )
+from tests.rigs.waiting import until
 
 EXAMPLE = Path(__file__).parents[2] / "tools" / "ground_client.py"
 
 
-@in_loop
+@in_real_time
 async def test_an_operator_is_told_what_happens_and_commands() -> None:
     async with serving(local()) as link, GroundClient(address_of(link)) as client:
         welcome = await client.hello()
@@ -81,7 +82,7 @@ async def _until_event(client: GroundClient) -> Any:
             return
 
 
-@in_loop
+@in_real_time
 async def test_published_messages_are_numbered_without_a_gap() -> None:
     async with serving(local()) as link, GroundClient(address_of(link)) as client:
         await connected(client, link)
@@ -95,7 +96,7 @@ async def test_published_messages_are_numbered_without_a_gap() -> None:
         assert numbers == list(range(numbers[0], numbers[0] + 20))
 
 
-@in_loop
+@in_real_time
 async def test_beyond_loopback_only_listed_keys_come_in_and_the_key_is_the_role(tmp_path: Path) -> None:
     ring = Keyring.make(tmp_path)
     async with serving(ring.config()) as link:
@@ -127,7 +128,7 @@ async def test_beyond_loopback_only_listed_keys_come_in_and_the_key_is_the_role(
     assert lines[0]["address"] == "127.0.0.1"
 
 
-@in_loop
+@in_real_time
 async def test_a_stranger_hears_nothing_on_the_status_port_either(tmp_path: Path) -> None:
     ring = Keyring.make(tmp_path)
     async with (
@@ -153,7 +154,7 @@ async def test_a_stranger_hears_nothing_on_the_status_port_either(tmp_path: Path
         assert heard == []
 
 
-@in_loop
+@in_real_time
 async def test_a_plain_req_socket_and_json_are_a_whole_client() -> None:
     """What the guide shows, without a line of flightd."""
     async with serving(local()) as link:
@@ -172,7 +173,7 @@ async def test_a_plain_req_socket_and_json_are_a_whole_client() -> None:
         }
 
 
-@in_loop
+@in_real_time
 async def test_the_example_client_shows_events_and_sends_a_tired_drone_home() -> None:
     async with serving(local()) as link:
         process = await asyncio.create_subprocess_exec(
@@ -202,14 +203,14 @@ async def test_the_example_client_shows_events_and_sends_a_tired_drone_home() ->
         assert "warning test look out\n" in told
 
 
-@in_loop
+@in_real_time
 async def test_pictures_come_on_request_at_a_capped_rate() -> None:
     async with serving(local(picture_fps=2.0)) as link:
         assert not link.picture_due(10**9), "nobody asked"
         async with GroundClient(address_of(link)) as one, GroundClient(address_of(link)) as two:
             async with asyncio.TaskGroup() as tasks:
                 asked = [tasks.create_task(client.picture()) for client in (one, two)]
-                await until(lambda: len(link._waiting) == 2)
+                await until(lambda: link.pictures_wanted == 2)
                 assert link.picture_due(10**10)
                 assert not link.picture_due(10**10 + 10**8), "twice a second at most"
                 link.picture(7, 10**10, b"jpeg")
@@ -218,13 +219,13 @@ async def test_pictures_come_on_request_at_a_capped_rate() -> None:
             assert not link.picture_due(10**11), "each request gets one"
 
 
-@in_loop
+@in_real_time
 async def test_no_picture_is_said_so_and_not_waited_for_for_ever() -> None:
     async with serving(local()) as link, GroundClient(address_of(link)) as client:
         async with asyncio.TaskGroup() as tasks:
             refused = tasks.create_task(_refusal(client))
-            await until(lambda: bool(link._waiting))
-            link._give_up_pictures(LoopClock().now_ns() + 4 * 10**9)
+            await until(lambda: link.pictures_wanted)
+            link.give_up_pictures(LoopClock().now_ns() + 4 * 10**9)
         assert "delivers no picture" in refused.result()
 
 
@@ -234,7 +235,7 @@ async def _refusal(client: GroundClient) -> str:
     return str(refused.value)
 
 
-@in_loop
+@in_real_time
 async def test_junk_frames_of_every_shape_leave_the_link_whole() -> None:
     random_ = random.Random(4)
     async with serving(local()) as link:
@@ -252,10 +253,10 @@ async def test_junk_frames_of_every_shape_leave_the_link_whole() -> None:
         async with GroundClient(address) as client:
             await client.order(CommandKind.START)
         assert len(link.take_commands()) == 1
-        assert link._desk.refused == 500
+        assert link.refused == 500
 
 
-@in_loop
+@in_real_time
 async def test_what_is_not_zmq_and_what_is_too_long_only_loses_its_own_connection() -> None:
     async with serving(local()) as link:
         address = address_of(link)
@@ -268,13 +269,13 @@ async def test_what_is_not_zmq_and_what_is_too_long_only_loses_its_own_connectio
             await dealer.send(b'{"version": 1, "id": "' + b"x" * 100_000)
             async with GroundClient(address) as client:
                 await client.hello()
-            assert link._desk.requests >= 1
+            assert link.requests >= 1
         async with GroundClient(address) as client:
             await client.order(CommandKind.START)
         assert len(link.take_commands()) == 1
 
 
-@in_loop
+@in_real_time
 async def test_a_flood_does_not_keep_the_stop_waiting_nor_the_loop() -> None:
     """Judged by ratios and counts: between two requests of the flood the loop gets its turn."""
     async with serving(local()) as link:
@@ -297,14 +298,25 @@ async def test_a_flood_does_not_keep_the_stop_waiting_nor_the_loop() -> None:
                     await flood.send(b"junk")
                 async with GroundClient(address, timeout_s=20.0) as client:
                     await client.order(CommandKind.STOP)
-                assert link._desk.requests < 3000, "the stop overtook the flood"
+                assert link.requests < 3000, "the stop overtook the flood"
                 assert [command.kind for command in link.take_commands()] == [CommandKind.STOP]
-                await until(lambda: link._desk.requests > 3000)
+                await until(lambda: link.requests > 3000)
                 counting.cancel()
         assert turns * 10 > 3000
 
 
-@in_loop
+class _TimedGround(ZmqGround):
+    """Counts the seconds for which requests keep the loop."""
+
+    busy_s = 0.0
+
+    def _take(self, frames: Sequence[zmq.Frame]) -> None:
+        began_s = time.monotonic()
+        super()._take(frames)
+        self.busy_s += time.monotonic() - began_s
+
+
+@in_real_time
 async def test_expensive_requests_leave_the_loop_most_of_its_time() -> None:
     """A hello on a map of 10,000 nodes takes milliseconds to answer; the flight does not wait for many."""
     aisles = [Aisle(f"R{i}", 0.0, 3.0 * i, (1.5,) * 99) for i in range(100)]
@@ -315,17 +327,7 @@ async def test_expensive_requests_leave_the_loop_most_of_its_time() -> None:
         for k in range(100)
     }
     big = replace(SITE, aisles=tuple(aisles), crosses=tuple(crosses), nodes=nodes)
-    with ZmqGround(local(), big, LoopClock()) as link:
-        busy_s = 0.0
-        take = link._take
-
-        def timed(frames: Any) -> None:
-            nonlocal busy_s
-            began_s = time.monotonic()
-            take(frames)
-            busy_s += time.monotonic() - began_s
-
-        link._take = timed  # type: ignore[method-assign]
+    with _TimedGround(local(), big, LoopClock()) as link:
         address = address_of(link)
         with zmq.asyncio.Context() as context, context.socket(zmq.DEALER) as flood:
             flood.linger = 0
@@ -334,15 +336,15 @@ async def test_expensive_requests_leave_the_loop_most_of_its_time() -> None:
                 serving_ = tasks.create_task(link.run())
                 for i in range(60):
                     await flood.send_json({"version": 1, "id": f"request-{i}", "op": "hello"})
-                await until(lambda: link._desk.requests >= 10)
-                began_s, busy_before_s, before = time.monotonic(), busy_s, link._desk.requests
-                await until(lambda: link._desk.requests >= before + 30)
-                share = (busy_s - busy_before_s) / (time.monotonic() - began_s)
+                await until(lambda: link.requests >= 10)
+                began_s, busy_before_s, before = time.monotonic(), link.busy_s, link.requests
+                await until(lambda: link.requests >= before + 30)
+                share = (link.busy_s - busy_before_s) / (time.monotonic() - began_s)
                 serving_.cancel()
         assert share < 0.35
 
 
-@in_loop
+@in_real_time
 async def test_a_taken_port_is_named_and_nothing_is_left_open() -> None:
     with ZmqGround(local(), SITE, LoopClock()) as first:
         port = address_of(first).command_port
@@ -351,7 +353,7 @@ async def test_a_taken_port_is_named_and_nothing_is_left_open() -> None:
             ZmqGround(taken, SITE, LoopClock()).__enter__()
 
 
-@in_loop
+@in_real_time
 async def test_nobody_there_is_said_so() -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

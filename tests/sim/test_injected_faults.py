@@ -15,7 +15,8 @@ from flightd.core.types import Demand
 from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.scenario.faults import WorldFaults
 from flightd.site.site_file import load_site
-from tests.protocol.rig import Rig, ardupilot_rig, px4_rig, run_virtual
+from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import Rig, ardupilot_rig, px4_rig
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")
 BOTH = {"ardupilot": ardupilot_rig, "px4": px4_rig}
@@ -42,7 +43,7 @@ def in_flight(
 
                 await test(rig, turn)
 
-        run_virtual(main)
+        virtual(main())
 
     return run
 

@@ -24,14 +24,14 @@ def test_a_flight_shares_its_pose_at_thirty_hertz_and_the_pad_while_near(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     heard: dict[str, list[tuple[Any, Any]]] = {"ODOMETRY": [], "LANDING_TARGET": []}
-    receive = AutopilotPeer._received
+    receive = AutopilotPeer.received
 
     def listen(self: AutopilotPeer, channel: Any, message: Any) -> None:
         if message.get_type() in heard and self.armed:
             heard[message.get_type()].append((message, self.truth()))
         receive(self, channel, message)
 
-    monkeypatch.setattr(AutopilotPeer, "_received", listen)
+    monkeypatch.setattr(AutopilotPeer, "received", listen)
     config = load_config(CONFIG)
     config = config.model_copy(
         update={

@@ -17,8 +17,8 @@ from flightd.adapters.recorder.mcap_file import is_whole
 from flightd.core.topics import Topic
 from flightd.core.types import Event, Phase
 from flightd.replay.log import read_log
-from tests.sim.ground_rig import in_loop
-from tests.sim.service_rig import ServiceRig
+from tests.rigs.event_loops import in_real_time
+from tests.rigs.service import ServiceRig
 
 _UP = {Phase.ACQUIRE, Phase.TURN, Phase.FOLLOW, Phase.HOVER, Phase.HOLD}
 _GUIDED_TIMEOUT_S = 3.0
@@ -26,7 +26,7 @@ _GUIDED_TIMEOUT_S = 3.0
 
 
 @pytest.mark.realtime
-@in_loop
+@in_real_time
 async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp_path: Path) -> None:
     rig = ServiceRig(tmp_path, ("A3",))
     with rig.world():
@@ -77,7 +77,7 @@ async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp
 
 
 @pytest.mark.realtime
-@in_loop
+@in_real_time
 async def test_every_child_may_be_killed_in_flight(tmp_path: Path) -> None:
     rig = ServiceRig(tmp_path, ("A2",))
     with rig.world():

@@ -15,7 +15,9 @@ from flightd.cli.watch.floor_map import FloorMap, arrow
 from flightd.cli.watch.screen import WatchApp
 from flightd.core.types import CommandKind, Phase
 from flightd.runtime.clock import LoopClock
-from tests.sim.ground_rig import SITE, address_of, event, in_loop, local, serving, telling, until
+from tests.rigs.event_loops import in_real_time
+from tests.rigs.ground_link import SITE, address_of, event, local, serving, telling
+from tests.rigs.waiting import until
 
 
 def floor() -> FloorStatus:
@@ -35,7 +37,7 @@ def text_of(app: WatchApp, name: str) -> str:
     )
 
 
-@in_loop
+@in_real_time
 async def test_the_screen_shows_map_state_and_events_and_its_keys_command() -> None:
     async with serving(local()) as link, GroundClient(address_of(link), timeout_s=20) as client:
         app = WatchApp(client, await client.hello())
@@ -62,7 +64,7 @@ async def test_the_screen_shows_map_state_and_events_and_its_keys_command() -> N
         assert link.silent_s(LoopClock().now_ns() + 10**10) == 0.0, "it took its leave"
 
 
-@in_loop
+@in_real_time
 async def test_a_refused_order_and_silence_are_shown() -> None:
     async with serving(local()) as link, GroundClient(address_of(link), timeout_s=20) as client:
         app = WatchApp(client, await client.hello(), attend=False)
@@ -74,7 +76,7 @@ async def test_a_refused_order_and_silence_are_shown() -> None:
             await until(lambda: "SILENT" in text_of(app, "#title"))
 
 
-@in_loop
+@in_real_time
 async def test_a_daemon_started_anew_is_met_again() -> None:
     async with serving(local()) as first:
         address = address_of(first)

@@ -15,6 +15,7 @@ from flightd.core.errors import FlightdError, RunError, UnavailableError
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.world import FrontSpec, WorldSpec
 from flightd.site.site_file import load_site
+from tests.rigs.event_loops import real
 
 
 def death_of(spec: WorldSpec, log: Path) -> FlightdError:
@@ -28,7 +29,7 @@ def death_of(spec: WorldSpec, log: Path) -> FlightdError:
             await watch_world(process, ours, lambda _index, _begins: None)
 
     with pytest.raises(FlightdError) as told:
-        asyncio.run(main())
+        real(main())
     return told.value
 
 

@@ -159,7 +159,7 @@ def _capture(source: Source, ring_name: str, conn: Connection) -> None:
     ring = FrameRing.attach(ring_name, _SLOTS, source.width_px, source.height_px)
     over = "cannot be opened, or gives no picture"
     try:
-        with contextlib.closing(_pictures(source, conn)) as pictures:
+        with contextlib.closing(pictures_of(source, conn)) as pictures:
             for seq, (picture, exposure) in enumerate(pictures):
                 over = "no more pictures"
                 grabbed_ns = time.monotonic_ns()
@@ -177,7 +177,7 @@ def _capture(source: Source, ring_name: str, conn: Connection) -> None:
         return
 
 
-def _pictures(source: Source, conn: Connection) -> Generator[tuple[Image, float], None, None]:
+def pictures_of(source: Source, conn: Connection) -> Generator[tuple[Image, float], None, None]:
     """Pictures and the part of the usual exposure that each was taken with, as `conn` asks for."""
     if source.kind is SourceKind.FOLDER:
         paths = sorted(path for path in source.path.iterdir() if path.suffix.lower() in _PICTURES)

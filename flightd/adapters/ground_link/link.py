@@ -133,7 +133,7 @@ class ZmqGround:
 
     def tell(self, snapshot: Snapshot) -> None:
         """Publish it."""
-        self._give_up_pictures(snapshot.stamp_ns)
+        self.give_up_pictures(snapshot.stamp_ns)
         door = self._door
         link = LinkReport(
             attending=self._desk.attending(snapshot.stamp_ns),
@@ -165,6 +165,21 @@ class ZmqGround:
 
     def silent_s(self, now_ns: int) -> float:
         return self._desk.silent_ns(now_ns) * 1e-9
+
+    @property
+    def requests(self) -> int:
+        """Requests heard so far, junk among them."""
+        return self._desk.requests
+
+    @property
+    def refused(self) -> int:
+        """Requests that were refused so far."""
+        return self._desk.refused
+
+    @property
+    def pictures_wanted(self) -> int:
+        """Requests that wait for a picture."""
+        return len(self._waiting)
 
     def picture_due(self, stamp_ns: int) -> bool:
         """Somebody waits for a picture, and one exposed then does not exceed the rate."""
@@ -259,7 +274,8 @@ class ZmqGround:
         except zmq.ZMQError:
             self._dropped += 1
 
-    def _give_up_pictures(self, now_ns: int) -> None:
+    def give_up_pictures(self, now_ns: int) -> None:
+        """Refuse the requests for a picture that no camera answered in time."""
         while self._waiting and now_ns - self._waiting[0][2] > _PICTURE_NS:
             head, request, _ = self._waiting.popleft()
             text = "the down camera delivers no picture"

@@ -47,7 +47,8 @@ _HOVERING_LOST_COM = 8
 class Drone:
     """One AR.Drone 2.0.  `command` takes datagrams of the AT port, `step` lets time pass, `navdata` gives
     the packet that is due.  `faults` are state bits that a test or scenario forces (a cut-out, angles out
-    of range): they raise an emergency and keep it up for as long as they stand."""
+    of range): they raise an emergency and keep it up for as long as they stand; `warnings` are such bits
+    that raise none (a deaf sonar)."""
 
     def __init__(self, airframe: Airframe, sensors: Sensors, options: DroneOptions | None = None) -> None:
         self.airframe = airframe
@@ -56,6 +57,7 @@ class Drone:
         self.loops = FlightLoops(airframe, sensors)
         self.send_configuration: Callable[[bytes], None] = lambda _text: None
         self.faults = 0
+        self.warnings = 0
         self.ignored_commands = 0
         self._boot()
 
@@ -87,6 +89,11 @@ class Drone:
     @property
     def airborne(self) -> bool:
         return self.major in AIRBORNE
+
+    @property
+    def acknowledges(self) -> bool:
+        """Whether the acknowledge bit of the last configuration command still stands."""
+        return self._ack
 
     @property
     def last_sequence(self) -> int:
@@ -289,7 +296,7 @@ class Drone:
             BIT_EMERGENCY: self.emergency,
         }
         standing = BIT_ALTITUDE | BIT_CAMERA | BITS_THREADS
-        return standing | self.faults | sum(bit for bit, raised in flags.items() if raised)
+        return standing | self.faults | self.warnings | sum(bit for bit, raised in flags.items() if raised)
 
     def _report(self, now_ns: int, state: int) -> NavdataReport:
         loops = self.loops

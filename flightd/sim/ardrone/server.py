@@ -42,7 +42,7 @@ class ArDroneServer:
     sockets early (`ports` tells which), and `close`, or leaving `async with`, frees them.
 
     `radio` False loses everything in both directions, as out of range;
-    `air` is what the radio does to datagrams otherwise, each way.
+    `air` is what the radio does to datagrams otherwise, each way; `congested` True loses pictures.
     Pictures come from outside: `show` takes one of either camera and streams that which `channel` names.
     """
 
@@ -59,6 +59,7 @@ class ArDroneServer:
         self.drone = drone
         self.ports = ports or DronePorts()
         self.radio = True
+        self.congested = False
         self._up, self._down = Radio(air, seed), Radio(air, seed + 1)
         self._clock = clock
         self._now_ns = clock.now_ns()
@@ -158,7 +159,7 @@ class ArDroneServer:
             self._truth.add(self.airframe.kinematics(self._now_ns))
             packet = self.drone.navdata(self._now_ns)
             if packet is not None and self._client is not None and self._navdata is not None and self.radio:
-                self._down.carry(partial(self._transmit, packet))
+                self._down.carry(partial(self.send_navdata, packet))
 
     def truth(self) -> Kinematics:
         """The true motion now."""
@@ -183,12 +184,18 @@ class ArDroneServer:
             return
         timestamp_ms = (self._clock.now_ns() if stamp_ns is None else stamp_ns) // 1_000_000
         for writer, stream in list(self._watchers.items()):
-            room = writer.transport.get_write_buffer_size() <= _VIDEO_BACKLOG_BYTES
-            data = stream.frame(bgr, timestamp_ms, room=room)
+            full = self.congested or writer.transport.get_write_buffer_size() > _VIDEO_BACKLOG_BYTES
+            data = stream.frame(bgr, timestamp_ms, room=not full)
             if data and not writer.is_closing():
                 writer.write(data)
 
-    def _transmit(self, packet: bytes) -> None:
+    def send_video(self, data: bytes) -> None:
+        """Put these bytes, pictures or not, into the streams of all who watch."""
+        for writer in self._watchers:
+            writer.write(data)
+
+    def send_navdata(self, packet: bytes) -> None:
+        """Send one packet of telemetry, sound or not, to the client."""
         if self._client is not None and self._navdata is not None:
             self._navdata.sendto(packet, self._client)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 import asyncio
 import math
+from collections import deque
 from dataclasses import dataclass, field
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -24,6 +25,7 @@ from flightd.sim.sensors.instruments import SensorParams, Sensors
 _NS_PER_MS = 1_000_000
 _TRUTH_EVERY = 2
 _TRUTH_SAMPLES = 1000
+_TEXTS_KEPT = 50
 _CATCH_UP_NS = 2_000 * _NS_PER_MS
 """A process that slept longer than this goes on from now instead of simulating what it missed."""
 
@@ -88,7 +90,7 @@ class AutopilotPeer(abc.ABC):
         self.instruments = Instruments(airframe, self.sensors)
         self.parameters = parameters
         self.link = UdpLink(
-            config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self._received, config.signing_key, config.seed
+            config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self.received, config.signing_key, config.seed
         )
         self.link.down.params = self.link.up.params = config.radio
         self._config = config
@@ -104,6 +106,8 @@ class AutopilotPeer(abc.ABC):
         self.sticks = Sticks()
         self.arming_block = ""
         """A sensor fault: the reason with which arming is refused while it is not empty."""
+        self.texts: deque[str] = deque(maxlen=_TEXTS_KEPT)
+        """What others gave it to show, newest last."""
         self._climb_loop = ClimbLoop(ClimbGains(hover_guess=airframe.params.hover_collective))
         self._stick_yaw_rad = 0.0
         self._idle_s = 0.0
@@ -128,8 +132,17 @@ class AutopilotPeer(abc.ABC):
                 self.streams.send_due(now_ns)
                 await asyncio.sleep(max(0, self.streams.next_due_ns(now_ns) - self._clock.now_ns()) / 1e9)
         finally:
-            self.link.close()
-            self._address = None
+            self.close()
+
+    def close(self) -> None:
+        """Free the socket; `open` binds it again."""
+        self.link.close()
+        self._address = None
+
+    @property
+    def address(self) -> Address | None:
+        """Where it listens; None while it does not."""
+        return self._address
 
     def advance(self, now_ns: int) -> None:
         """Step the vehicle up to `now_ns`."""
@@ -300,7 +313,8 @@ class AutopilotPeer(abc.ABC):
         self.instruments.boot_ms = self.boot_clock_ns(now_ns) // _NS_PER_MS
         self.instruments.healthy = self.is_ready
 
-    def _received(self, channel: Channel, message: Message) -> None:
+    def received(self, channel: Channel, message: Message) -> None:
+        """Take a message that came in by `channel`."""
         now_ns = self._clock.now_ns()
         self.advance(now_ns)
         target = getattr(message, "target_system", 0)
@@ -320,6 +334,8 @@ class AutopilotPeer(abc.ABC):
                 self.link.send(channel, dialect.MAVLink_timesync_message(stamp_ns, message.ts1))
             case "REQUEST_DATA_STREAM":
                 self.streams.set_data_stream(channel, message, now_ns)
+            case "STATUSTEXT":
+                self.texts.append(message.text)
             case "SETUP_SIGNING" if self.takes_keys and not self.armed:
                 self.link.sign(bytes(message.secret_key), message.initial_timestamp)
             case "PARAM_REQUEST_READ" | "PARAM_REQUEST_LIST" | "PARAM_SET":

@@ -112,13 +112,14 @@ class UdpLink(asyncio.DatagramProtocol):
     def send(self, channel: Channel, message: Message) -> None:
         if self._transport is not None and not self.muted and message.get_msgId() not in self.withheld:
             frame = channel.pack(message, self._parser.signing.timestamp)
-            self.down.carry(lambda: self._out(frame, channel.address))
+            self.down.carry(lambda: self.transmit(frame, channel.address))
 
     def broadcast(self, message: Message) -> None:
         for channel in self.channels.values():
             self.send(channel, message)
 
-    def _out(self, frame: bytes, address: Address) -> None:
+    def transmit(self, frame: bytes, address: Address) -> None:
+        """Put one packed frame on the wire."""
         if self._transport is not None and not self.muted:
             self._transport.sendto(frame, address)
 

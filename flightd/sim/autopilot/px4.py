@@ -66,6 +66,16 @@ class Px4Peer(AutopilotPeer):
         self._stream_s = 0.0
         self._has_flown = False
 
+    @property
+    def thrust(self) -> float:
+        """Of the newest setpoint, 0 to 1."""
+        return self._thrust
+
+    @property
+    def stream_s(self) -> float:
+        """How long setpoints have come without a gap."""
+        return self._stream_s
+
     def reboot(self) -> None:
         super().reboot()
         self._disarm()

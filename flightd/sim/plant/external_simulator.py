@@ -81,7 +81,7 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
             async with asyncio.timeout(self._patience_s):
                 await self._first.wait()
         except TimeoutError:
-            await self._let_go()
+            await self.close()
             text = "no simulator tells its true state there: start it, and check the port"
             raise UnavailableError(f"--truth-url {self._url}: {text}") from None
         return self._host, self._port
@@ -93,7 +93,7 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
         try:
             await self._line
         finally:
-            await self._let_go()
+            await self.close()
 
     def truth(self) -> Kinematics:
         """The true motion now."""
@@ -117,7 +117,13 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
             yaw_rad=wrap_pi(newest.yaw_rad + newest.yaw_rate_radps * ahead_s),
         )
 
-    async def _let_go(self) -> None:
+    @property
+    def unsent_bytes(self) -> int:
+        """What the simulator has not read yet."""
+        return 0 if self._transport is None else int(self._transport.get_write_buffer_size())
+
+    async def close(self) -> None:
+        """Give the connection up; `open` makes it anew."""
         if self._line is not None:
             self._line.cancel()
             await asyncio.gather(self._line, return_exceptions=True)
@@ -134,7 +140,7 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
                 except OSError:
                     await asyncio.sleep(_ASK_S / 2)
                     continue
-            self._ask()
+            self.ask_streams()
             for _ in range(round(_ASK_S / _RANGE_S)):
                 self._tell_range()
                 await asyncio.sleep(_RANGE_S)
@@ -161,7 +167,7 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
                 dialect.MAVLink_distance_sensor_message(boot_ms, *limits_cm, distance_cm, kind, 1, down, 0)
             )
 
-    def _ask(self) -> None:
+    def ask_streams(self) -> None:
         """A heartbeat, and the rates (a rebooted simulator has forgotten them)."""
         self._send(
             dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
@@ -172,7 +178,7 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
             self._send(dialect.MAVLink_command_long_message(1, 1, command, 0, *params))
 
     def _send(self, message: Message) -> None:
-        if self._transport is None or self._transport.get_write_buffer_size() > _WAITING_MAX:
+        if self._transport is None or self.unsent_bytes > _WAITING_MAX:
             return
         frame = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256

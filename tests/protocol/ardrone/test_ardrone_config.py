@@ -16,7 +16,8 @@ from flightd.sim.ardrone import configuration
 from flightd.sim.ardrone.at_commands import DroneCommand
 from flightd.sim.ardrone.configuration import Configuration, Ids
 from flightd.sim.ardrone.states import DroneOptions
-from tests.protocol.ardrone.bench import Bench, Ear, bench, make_drone, virtually
+from tests.rigs.ardrone import Bench, Ear, bench, make_drone
+from tests.rigs.event_loops import virtual
 
 
 def in_force(b: Bench) -> dict[str, str]:
@@ -33,7 +34,7 @@ def test_every_wanted_key_is_in_force_afterwards_also_the_profiled_ones() -> Non
             assert values["custom:session_id"] == profile_id("flightd session")
             assert values["general:navdata_demo"] == "TRUE"
 
-    virtually(main)
+    virtual(main())
 
 
 def test_config_ids_stand_right_before_each_profiled_config() -> None:
@@ -48,27 +49,27 @@ def test_config_ids_stand_right_before_each_profiled_config() -> None:
             profiled = command.name == "CONFIG" and command.text(0) in wanted_values(ArDroneSettings())
             assert not profiled or (before.name, before.sequence) == ("CONFIG_IDS", command.sequence - 1)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_the_next_config_waits_until_the_acknowledge_bit_is_cleared() -> None:
     async def main() -> None:
         drone = make_drone()
         configs: list[tuple[str | None, bool]] = []
-        obey = drone._config
 
-        def config(command: DroneCommand, named: Ids | None, now_ns: int) -> None:
-            configs.append((command.text(0), drone._ack))
-            obey(command, named, now_ns)
+        def note(command: DroneCommand) -> bool:
+            if command.name == "CONFIG":
+                configs.append((command.text(0), drone.acknowledges))
+            return False
 
-        drone._config = config  # type: ignore[method-assign]
+        Ear(drone, lose=note)
         async with bench(drone) as b:
             await b.configured()
         firsts = [new for old, new in itertools.pairwise(configs) if new[0] != old[0]]
         assert {"custom:profile_id", "control:altitude_max", "video:bitrate"} <= {key for key, _ in firsts}
         assert [key for key, acknowledged in firsts if acknowledged] == []
 
-    virtually(main)
+    virtual(main())
 
 
 def test_nothing_is_configured_before_the_first_navdata() -> None:
@@ -84,7 +85,7 @@ def test_nothing_is_configured_before_the_first_navdata() -> None:
             assert first.text(0) == "general:navdata_demo"
             assert in_force(b)["general:navdata_demo"] == "TRUE"
 
-    virtually(main)
+    virtual(main())
 
 
 def test_lost_config_and_control_datagrams_are_repeated() -> None:
@@ -104,20 +105,20 @@ def test_lost_config_and_control_datagrams_are_repeated() -> None:
             values = in_force(b)
             assert all(same_value(values[k], v) for k, v in wanted_values(ArDroneSettings()).items())
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_stale_acknowledge_bit_delays_but_does_not_stop() -> None:
     async def main() -> None:
         drone = make_drone(DroneOptions(config_needs_clear_ack=False))
-        drone._ctrl = lambda mode: None  # type: ignore[method-assign]
+        Ear(drone, lose=lambda command: command.name == "CTRL")
         async with bench(drone) as b:
             b.vehicle.demand(Demand.STANDBY)
             await b.until(lambda: b.vehicle.camera_since_ns is not None, limit_s=120.0)
             values = in_force(b)
             assert all(same_value(values[k], v) for k, v in wanted_values(ArDroneSettings()).items())
 
-    virtually(main)
+    virtual(main())
 
 
 def test_without_the_configuration_port_everything_is_written_blind() -> None:
@@ -129,7 +130,7 @@ def test_without_the_configuration_port_everything_is_written_blind() -> None:
             await b.until(lambda: b.vehicle.camera_since_ns is not None, limit_s=60.0)
             assert drone.configuration.number("control:euler_angle_max") == pytest.approx(0.1)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_setpoints_are_scaled_by_the_limits_which_the_drone_really_has() -> None:
@@ -145,7 +146,7 @@ def test_setpoints_are_scaled_by_the_limits_which_the_drone_really_has() -> None
             assert drone.configuration.number("control:euler_angle_max") == pytest.approx(0.20944)
             assert drone.airframe.pitch_rad == pytest.approx(-0.1, abs=0.012)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_the_set_points_limits_become_the_drones_own() -> None:
@@ -165,7 +166,7 @@ def test_the_set_points_limits_become_the_drones_own() -> None:
             await b.steer(1.0, roll_rad=math.radians(20.0))
             assert drone.airframe.roll_rad == pytest.approx(math.radians(10.0), abs=0.015)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_limits_outside_the_drones_ranges_are_brought_into_them() -> None:
@@ -187,7 +188,7 @@ def test_a_configured_drone_is_not_written_to_again() -> None:
             written = {command.text(0) for command in ear.named("CONFIG")}
             assert written == {"general:navdata_demo", "general:navdata_options", "video:video_channel"}
 
-    virtually(main)
+    virtual(main())
 
 
 def test_the_camera_is_switched_and_known_to_be_switched_only_after_settling() -> None:
@@ -201,7 +202,7 @@ def test_the_camera_is_switched_and_known_to_be_switched_only_after_settling() -
             ahead_ns = (b.vehicle.camera_since_ns or 0) - b.clock.now_ns()
             assert 290_000_000 <= ahead_ns <= 300_000_000
 
-    virtually(main)
+    virtual(main())
 
 
 def test_settings_outside_the_drones_ranges_are_refused() -> None:

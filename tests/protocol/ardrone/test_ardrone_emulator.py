@@ -24,8 +24,9 @@ from flightd.sim.ardrone.states import (
     MajorState,
 )
 from tests.protocol.ardrone import golden
-from tests.protocol.ardrone.bench import make_drone, virtually
-from tests.protocol.ardrone.raw_drone import RawClient, raw_drone
+from tests.protocol.ardrone.raw_client import RawClient, raw_drone
+from tests.rigs.ardrone import make_drone
+from tests.rigs.event_loops import virtual
 
 FLY, LAND, PRESS = "REF,290718208", "REF,290717696", "REF,290717952"
 HOVER = "PCMD,0,0,0,0,0"
@@ -62,7 +63,7 @@ def test_bootstrap_packets_have_24_bytes_and_number_one_until_configured() -> No
             assert 14 <= len(numbers) <= 16
             assert {len(packet) for _, packet in client.packets} == {500}
 
-    virtually(main)
+    virtual(main())
 
 
 def test_full_navdata_comes_two_hundred_times_a_second_with_all_options() -> None:
@@ -77,7 +78,7 @@ def test_full_navdata_comes_two_hundred_times_a_second_with_all_options() -> Non
             assert len(client.newest) == 2120
             assert not client.state & BIT_DEMO
 
-    virtually(main)
+    virtual(main())
 
 
 def test_only_larger_numbers_are_obeyed_and_one_starts_afresh() -> None:
@@ -98,7 +99,7 @@ def test_only_larger_numbers_are_obeyed_and_one_starts_afresh() -> None:
                 assert drone.last_sequence == last
             assert drone.major == MajorState.LANDED
 
-    virtually(main)
+    virtual(main())
 
 
 @pytest.mark.parametrize(
@@ -128,7 +129,7 @@ def test_what_is_no_command_is_passed_over(datagram: bytes) -> None:
             await asyncio.sleep(0.01)
             assert client.server.drone.last_sequence == 7
 
-    virtually(main)
+    virtual(main())
 
 
 def test_unknown_commands_count_as_traffic_and_do_nothing() -> None:
@@ -141,7 +142,7 @@ def test_unknown_commands_count_as_traffic_and_do_nothing() -> None:
             assert not client.state & BIT_COM_WATCHDOG
             assert client.server.drone.major == MajorState.LANDED
 
-    virtually(main)
+    virtual(main())
 
 
 @pytest.mark.parametrize("fly", ["REF,512", FLY])
@@ -169,7 +170,7 @@ def test_take_off_and_landing_pass_through_their_states(fly: str) -> None:
             assert drone.airframe.touchdown_mps < 0.6
             assert not client.state & BIT_FLY
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_weak_battery_refuses_without_a_word() -> None:
@@ -181,7 +182,7 @@ def test_a_weak_battery_refuses_without_a_word() -> None:
             assert client.state & BIT_VBAT_LOW
             assert not client.state & BIT_EMERGENCY
 
-    virtually(main)
+    virtual(main())
 
 
 def test_bit_eight_acts_on_its_rising_edge_only() -> None:
@@ -200,7 +201,7 @@ def test_bit_eight_acts_on_its_rising_edge_only() -> None:
             assert not client.state & BIT_EMERGENCY
             assert drone.airframe.height_m == pytest.approx(0.1)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_lasting_fault_comes_back_after_clearing() -> None:
@@ -215,7 +216,7 @@ def test_a_lasting_fault_comes_back_after_clearing() -> None:
             await client.keep_saying(0.2, PRESS)
             assert drone.emergency
 
-    virtually(main)
+    virtual(main())
 
 
 def test_the_watchdogs_rise_after_50_ms_and_two_seconds() -> None:
@@ -242,7 +243,7 @@ def test_the_watchdogs_rise_after_50_ms_and_two_seconds() -> None:
             assert not await client.next_state() & BIT_COM_LOST
             assert client.server.drone.last_sequence == 5
 
-    virtually(main)
+    virtual(main())
 
 
 def test_without_commands_it_keeps_the_last_tilt_and_then_lands() -> None:
@@ -258,7 +259,7 @@ def test_without_commands_it_keeps_the_last_tilt_and_then_lands() -> None:
             assert drone.major == MajorState.LANDED
             assert drone.airframe.on_floor
 
-    virtually(main)
+    virtual(main())
 
 
 def test_pcmd_means_fractions_of_the_configured_limits() -> None:
@@ -276,7 +277,7 @@ def test_pcmd_means_fractions_of_the_configured_limits() -> None:
             assert abs(air.vx_mps) + abs(air.vy_mps) < 0.3
             assert demo_fields(client.newest)[8] == 0.0, "vz is never filled"
 
-    virtually(main)
+    virtual(main())
 
 
 def test_altitude_max_and_flying_mode_hold_it_back() -> None:
@@ -291,7 +292,7 @@ def test_altitude_max_and_flying_mode_hold_it_back() -> None:
             await client.keep_saying(1.0, FLY, "PCMD,1,1056964608,0,0,0")
             assert abs(air.roll_rad) < 0.08
 
-    virtually(main)
+    virtual(main())
 
 
 def test_config_is_acknowledged_and_ignored_until_the_bit_is_cleared() -> None:
@@ -312,7 +313,7 @@ def test_config_is_acknowledged_and_ignored_until_the_bit_is_cleared() -> None:
             client.say("CTRL,0,0", 'CONFIG,"no:such_key","1"')
             assert await client.next_state() & BIT_COMMAND_ACK, "wrong keys are acknowledged too"
 
-    virtually(main)
+    virtual(main())
 
 
 def test_profiled_writes_need_config_ids_in_the_same_breath() -> None:
@@ -339,7 +340,7 @@ def test_profiled_writes_need_config_ids_in_the_same_breath() -> None:
                 await asyncio.sleep(0.02)
                 assert stored.text("video:video_codec") == value
 
-    virtually(main)
+    virtual(main())
 
 
 def test_all_values_are_sent_over_tcp_with_a_closing_nul() -> None:
@@ -358,7 +359,7 @@ def test_all_values_are_sent_over_tcp_with_a_closing_nul() -> None:
             assert (await reader.readuntil(b"\0")).startswith(b"[applis]\n")
             writer.close()
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_reboot_counts_everything_from_the_start() -> None:
@@ -376,7 +377,7 @@ def test_a_reboot_counts_everything_from_the_start() -> None:
             assert client.sequence == 1
             assert client.server.drone.configuration.flag("general:navdata_demo"), "the configuration stays"
 
-    virtually(main)
+    virtual(main())
 
 
 @pytest.mark.parametrize("kind", ["ack", "noack"])
@@ -404,4 +405,4 @@ def test_the_recorded_sessions_of_the_npm_client_are_obeyed(kind: str) -> None:
             # Without its CTRL 5 the acknowledge bit still stands, and the second CONFIG is lost.
             assert client.server.channel == (1 if kind == "ack" else 0)
 
-    virtually(main)
+    virtual(main())

@@ -8,6 +8,7 @@ import math
 
 import pytest
 
+from flightd.adapters.vehicle.ardrone.navdata import DroneState
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.runtime.clock import LoopClock
@@ -15,7 +16,8 @@ from flightd.sim.ardrone.at_commands import DroneCommand
 from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.ardrone.states import BIT_CUTOUT, DroneOptions, MajorState
 from flightd.sim.sensors.instruments import SensorParams
-from tests.protocol.ardrone.bench import ANY_PORTS, Ear, bench, ended, make_drone, settings_for, virtually
+from tests.rigs.ardrone import ANY_PORTS, Ear, bench, ended, make_drone, settings_for
+from tests.rigs.event_loops import virtual
 
 
 def ref_bits(commands: list[DroneCommand]) -> list[int]:
@@ -39,7 +41,7 @@ def test_take_off_trims_once_on_the_ground_then_orders_until_the_drone_lifts() -
             assert (b.state.armed, b.state.in_control, b.state.landed) == (True, True, LandedState.IN_AIR)
             assert b.state.height_m == pytest.approx(drone.airframe.height_m, abs=0.05)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_flat_trim_takes_the_bias_out_of_a_crooked_drone() -> None:
@@ -52,7 +54,7 @@ def test_flat_trim_takes_the_bias_out_of_a_crooked_drone() -> None:
             assert abs(b.state.attitude.roll_rad - drone.airframe.roll_rad) < math.radians(0.1)
             assert abs(b.state.attitude.pitch_rad - drone.airframe.pitch_rad) < math.radians(0.1)
 
-    virtually(main)
+    virtual(main())
 
 
 @pytest.mark.parametrize(
@@ -77,7 +79,7 @@ def test_each_axis_moves_the_way_its_sign_says(wish: dict[str, float], moves: tu
             assert all(b.sent)
             assert sign * getattr(b.drone.airframe, name) > 0.25
 
-    virtually(main)
+    virtual(main())
 
 
 def test_tilt_climb_and_turn_come_out_in_si_units() -> None:
@@ -91,7 +93,7 @@ def test_tilt_climb_and_turn_come_out_in_si_units() -> None:
             assert air.climb_mps == pytest.approx(0.3, abs=0.1)
             assert b.state.climb_mps == pytest.approx(air.climb_mps, abs=0.1)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_tilt_beyond_the_drones_limit_is_clamped() -> None:
@@ -101,7 +103,7 @@ def test_tilt_beyond_the_drones_limit_is_clamped() -> None:
             await b.steer(1.0, roll_rad=0.5)
             assert b.drone.airframe.roll_rad == pytest.approx(0.1, abs=0.015)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_late_setpoints_turn_into_hover_and_the_drone_brakes() -> None:
@@ -115,7 +117,7 @@ def test_late_setpoints_turn_into_hover_and_the_drone_brakes() -> None:
             await b.until(lambda: b.state.mode == "hovering")
             assert math.hypot(b.drone.airframe.vx_mps, b.drone.airframe.vy_mps) < 0.25
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_setpoint_without_any_motion_holds_the_place() -> None:
@@ -125,7 +127,7 @@ def test_a_setpoint_without_any_motion_holds_the_place() -> None:
             await b.steer(1.0)
             assert b.drone.major == MajorState.HOVERING
 
-    virtually(main)
+    virtual(main())
 
 
 def test_setpoints_are_refused_while_the_vehicle_is_not_ours() -> None:
@@ -137,7 +139,7 @@ def test_setpoints_are_refused_while_the_vehicle_is_not_ours() -> None:
                 b.vehicle.demand(demand)
                 assert not b.vehicle.send(AttitudeSetpoint(b.clock.now_ns(), climb_mps=0.5))
 
-    virtually(main)
+    virtual(main())
 
 
 def test_sinking_low_becomes_the_drones_own_landing() -> None:
@@ -152,21 +154,20 @@ def test_sinking_low_becomes_the_drones_own_landing() -> None:
             await b.steer(3.0, climb_mps=0.5)
             assert b.drone.major == MajorState.LANDED, "a finished landing does not start again by itself"
 
-    virtually(main)
+    virtual(main())
 
 
 def test_with_a_deaf_sonar_the_height_is_unknown_and_a_descent_becomes_a_landing() -> None:
     async def main() -> None:
         async with bench() as b:
             await b.hovering()
-            state = b.drone._state
-            b.drone._state = lambda now_ns: state(now_ns) | 1 << 21  # type: ignore[method-assign]
+            b.drone.warnings |= DroneState.ULTRASOUND
             await b.steer(0.3)
             assert math.isnan(b.state.height_m)
             await b.steer(0.3, climb_mps=-0.3)
             assert b.drone.major == MajorState.LANDING
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_sonar_echo_of_something_else_is_passed_over() -> None:
@@ -180,7 +181,7 @@ def test_a_sonar_echo_of_something_else_is_passed_over() -> None:
             await asyncio.sleep(0.4)
             assert b.state.height_m > before_m + 1.0, "what persists is believed"
 
-    virtually(main)
+    virtual(main())
 
 
 def test_landing_never_cuts_the_motors() -> None:
@@ -195,7 +196,7 @@ def test_landing_never_cuts_the_motors() -> None:
             assert drone.airframe.touchdown_mps < 0.7
             assert all(bits & 0x100 == 0 for bits in ref_bits(ear.named("REF")))
 
-    virtually(main)
+    virtual(main())
 
 
 def test_standby_leaves_a_flying_drone_in_the_air() -> None:
@@ -207,7 +208,7 @@ def test_standby_leaves_a_flying_drone_in_the_air() -> None:
             await asyncio.sleep(3.0)
             assert drone.major == MajorState.HOVERING
 
-    virtually(main)
+    virtual(main())
 
 
 def test_an_adapter_that_starts_beside_a_flying_drone_does_not_land_it() -> None:
@@ -215,7 +216,7 @@ def test_an_adapter_that_starts_beside_a_flying_drone_does_not_land_it() -> None
         drone = make_drone()
         async with bench(drone) as b:
             await b.hovering()
-            b.vehicle._release = nothing  # type: ignore[method-assign]
+            b.server.radio = False  # killed, it says nothing more
         async with bench(drone) as b:
             b.vehicle.demand(Demand.STANDBY)
             await asyncio.sleep(6.0)
@@ -224,7 +225,7 @@ def test_an_adapter_that_starts_beside_a_flying_drone_does_not_land_it() -> None
     async def nothing() -> None:
         """The first daemon was killed: it says nothing more."""
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_weak_battery_refuses_in_silence_and_the_adapter_says_so() -> None:
@@ -239,7 +240,7 @@ def test_a_weak_battery_refuses_in_silence_and_the_adapter_says_so() -> None:
             await b.until(lambda: b.state.mode == "hovering")
             assert b.state.refusal == ""
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_drone_that_lands_by_itself_is_not_sent_up_again() -> None:
@@ -257,7 +258,7 @@ def test_a_drone_that_lands_by_itself_is_not_sent_up_again() -> None:
             b.vehicle.demand(Demand.FLY)
             await b.until(lambda: b.state.mode == "hovering")
 
-    virtually(main)
+    virtual(main())
 
 
 def test_an_emergency_in_flight_is_told_and_not_cleared_by_itself() -> None:
@@ -272,7 +273,7 @@ def test_an_emergency_in_flight_is_told_and_not_cleared_by_itself() -> None:
             await asyncio.sleep(3.0)
             assert b.drone.emergency
 
-    virtually(main)
+    virtual(main())
 
 
 def test_an_emergency_from_before_is_cleared_when_flight_is_demanded() -> None:
@@ -291,7 +292,7 @@ def test_an_emergency_from_before_is_cleared_when_flight_is_demanded() -> None:
             edges = sum(1 for a, c in itertools.pairwise(pressed) if c and not a)
             assert edges + bool(pressed[0]) == 1, "each further edge would cut the motors"
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_lasting_fault_is_pressed_again_and_told() -> None:
@@ -311,7 +312,7 @@ def test_a_lasting_fault_is_pressed_again_and_told() -> None:
             drone.faults = 0
             await b.until(lambda: b.state.mode == "hovering")
 
-    virtually(main)
+    virtual(main())
 
 
 def test_hands_off_in_the_air_hovers_once_and_falls_silent() -> None:
@@ -331,7 +332,7 @@ def test_hands_off_in_the_air_hovers_once_and_falls_silent() -> None:
             await asyncio.sleep(1.5)
             assert drone.major == MajorState.LANDING, "nobody took over: it lands itself"
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_drone_found_flying_that_nobody_asks_for_is_held_then_landed() -> None:
@@ -360,7 +361,7 @@ def test_a_drone_found_flying_that_nobody_asks_for_is_held_then_landed() -> None
             await ended(running)
             await ended(serving)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_what_another_pilot_starts_in_hands_off_is_not_interfered_with() -> None:
@@ -379,7 +380,7 @@ def test_what_another_pilot_starts_in_hands_off_is_not_interfered_with() -> None
             assert drone.major == MajorState.HOVERING
             assert ear.named("REF", "PCMD") == []
 
-    virtually(main)
+    virtual(main())
 
 
 def test_another_pilot_takes_over_unhindered() -> None:
@@ -398,7 +399,7 @@ def test_another_pilot_takes_over_unhindered() -> None:
             assert drone.major == MajorState.HOVERING
             assert drone.last_sequence == 398
 
-    virtually(main)
+    virtual(main())
 
 
 def test_cancelled_in_flight_the_adapter_orders_a_landing() -> None:
@@ -411,7 +412,7 @@ def test_cancelled_in_flight_the_adapter_orders_a_landing() -> None:
         assert ref_bits(ear.named("REF"))[-3:] == [0, 0, 0]
         assert drone.major == MajorState.LANDING
 
-    virtually(main)
+    virtual(main())
 
 
 def test_full_navdata_gives_two_hundred_attitudes_a_second() -> None:
@@ -426,7 +427,7 @@ def test_full_navdata_gives_two_hundred_attitudes_a_second() -> None:
             assert max(gaps) <= 10_000_000
             assert b.state.battery_v == pytest.approx(b.drone.airframe.battery_v, abs=0.01)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_demo_navdata_is_stamped_by_the_drones_clock_less_the_latency() -> None:
@@ -438,12 +439,15 @@ def test_demo_navdata_is_stamped_by_the_drones_clock_less_the_latency() -> None:
             age_ns = b.state.heartbeat_ns - b.state.attitude.stamp_ns
             assert 20_000_000 <= age_ns < 21_000_000
 
-    virtually(main)
+    virtual(main())
 
 
 def test_the_options_of_a_strict_drone_change_nothing() -> None:
     async def main() -> None:
         async with bench(make_drone(DroneOptions(config_needs_navdata=True))) as b:
             await b.hovering()
+            assert b.state.in_control
+            await b.steer(3.0, climb_mps=0.3)
+            assert b.state.height_m > 1.5
 
-    virtually(main)
+    virtual(main())

@@ -23,7 +23,7 @@ from flightd.sim.ardrone.at_commands import parse
 from flightd.sim.ardrone.navdata_writer import ALL_OPTIONS, OPTION_BYTES, NavdataReport, packet
 from flightd.sim.ardrone.states import DroneOptions
 from tests.protocol.ardrone import golden
-from tests.protocol.ardrone.bench import make_drone
+from tests.rigs.ardrone import make_drone
 
 CASES = int(os.environ.get("FLIGHTD_FUZZ", "20000"))
 MS = 1_000_000
@@ -159,7 +159,7 @@ def test_one_parser_per_stream_finds_every_whole_frame_again() -> None:
             frames += parser.feed(run[:size])
             run = run[size:]
         found += bool(frames) and frames[-1].payload == bytes(last[last[6] + 256 * last[7] :])
-        assert len(parser._buffer) <= 1 << 21
+        assert parser.waiting_bytes <= 1 << 21
     assert found == sent
     assert len(expected) == len(short)
 
@@ -177,7 +177,7 @@ def test_any_bytes_go_through_the_video_parser(chunks: list[bytes]) -> None:
     parser = PaveParser()
     for chunk in chunks:
         parser.feed(chunk)
-    assert len(parser._buffer) + parser.skipped_bytes <= sum(map(len, chunks))
+    assert parser.waiting_bytes + parser.skipped_bytes <= sum(map(len, chunks))
 
 
 def test_the_at_port_survives_anything_and_good_commands_count() -> None:
@@ -215,6 +215,8 @@ def test_any_datagram_goes_through_the_at_port(data: bytes) -> None:
     drone = make_drone()
     drone.command(data, 0)
     drone.step(5 * MS, 0.005)
+    drone.command(b"AT*COMWDG=1\r", 10 * MS)
+    assert drone.last_sequence == 1, "it still obeys"
 
 
 @given(st.binary(max_size=2000))

@@ -5,16 +5,16 @@ from __future__ import annotations
 import asyncio
 import itertools
 import random
-from typing import Any
 
 import pytest
 
 from flightd.adapters.vehicle.ardrone.settings import DroneCamera
 from flightd.core.types import Demand
 from flightd.sim.ardrone.navdata_writer import NavdataReport, packet
-from flightd.sim.ardrone.states import MajorState
+from flightd.sim.ardrone.states import REF_FLY, MajorState
 from flightd.sim.autopilot.radio import RadioParams
-from tests.protocol.ardrone.bench import Ear, bench, make_drone, virtually
+from tests.rigs.ardrone import Ear, bench, make_drone
+from tests.rigs.event_loops import virtual
 
 MS = 1_000_000
 
@@ -33,7 +33,7 @@ def test_commands_keep_the_rhythm_with_and_without_setpoints() -> None:
             assert max(gaps) <= 31 * MS
             assert min(gaps) >= 19 * MS
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_setpoint_goes_out_at_once() -> None:
@@ -49,7 +49,7 @@ def test_a_setpoint_goes_out_at_once() -> None:
             sent = [at_ns for at_ns, command in ear.commands if command.name == "PCMD" and command.integer(0)]
             assert sent[0] == asked_ns
 
-    virtually(main)
+    virtual(main())
 
 
 def test_the_numbers_begin_at_one_and_never_fall_back() -> None:
@@ -66,7 +66,7 @@ def test_the_numbers_begin_at_one_and_never_fall_back() -> None:
         assert numbers == sorted(numbers)
         assert drone.ignored_commands == 0
 
-    virtually(main)
+    virtual(main())
 
 
 def test_the_first_command_of_all_is_number_one() -> None:
@@ -77,7 +77,7 @@ def test_the_first_command_of_all_is_number_one() -> None:
             await asyncio.sleep(0.1)
         assert ear.commands[0][1].sequence == 1
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_short_radio_gap_is_survived_in_the_air() -> None:
@@ -93,7 +93,7 @@ def test_a_short_radio_gap_is_survived_in_the_air() -> None:
             await b.steer(0.5, climb_mps=0.2)
             assert (b.state.mode, b.state.refusal) == ("flying", "")
 
-    virtually(main)
+    virtual(main())
 
 
 def test_setpoints_stop_at_the_drone_before_a_lost_link_ends() -> None:
@@ -104,7 +104,6 @@ def test_setpoints_stop_at_the_drone_before_a_lost_link_ends() -> None:
             await b.hovering()
             await b.steer(0.5, pitch_rad=-0.05)
             drone.streaming = False  # the way down is dead, the way up is not
-            b.server._wake = lambda *_: None  # type: ignore[method-assign]
             drone.wake = lambda: None  # type: ignore[method-assign]
             await b.steer(1.0, pitch_rad=-0.05)
             assert ear.named("PCMD")[-1].integer(0) == 0, "hover: flying blind"
@@ -112,7 +111,7 @@ def test_setpoints_stop_at_the_drone_before_a_lost_link_ends() -> None:
             await b.until(lambda: drone.major == MajorState.LANDING, limit_s=2.0)
             assert "no navdata for 2 s" in b.state.refusal
 
-    virtually(main)
+    virtual(main())
 
 
 def test_after_a_long_gap_the_drone_stays_down_until_flight_is_demanded_anew() -> None:
@@ -127,12 +126,11 @@ def test_after_a_long_gap_the_drone_stays_down_until_flight_is_demanded_anew() -
             await asyncio.sleep(8.0)
             assert drone.major == MajorState.LANDED
             assert not b.state.in_control
-            b.vehicle.demand(Demand.STANDBY)
-            await b.until(lambda: b.vehicle._flight.configured)
+            await b.configured()
             b.vehicle.demand(Demand.FLY)
             await b.until(lambda: b.state.mode == "hovering")
 
-    virtually(main)
+    virtual(main())
 
 
 @pytest.mark.parametrize("demand", [Demand.STANDBY, Demand.DISARM, Demand.HANDS_OFF, Demand.LAND])
@@ -148,34 +146,27 @@ def test_what_was_only_being_watched_is_not_sent_up_again_after_a_long_gap(deman
             await asyncio.sleep(5.0)
             assert drone.major == MajorState.LANDED
 
-    virtually(main)
+    virtual(main())
 
 
 def test_flight_demanded_into_a_dead_radio_does_not_start_when_it_returns_unasked() -> None:
     async def main() -> None:
         drone = make_drone()
-        ear = Ear(drone)
+        dead = False
+        ear = Ear(drone, lose=lambda _command: dead)
         async with bench(drone) as b:
             await b.configured()
-            b.server.radio = False
+            dead, drone.streaming = True, False
+            drone.wake = lambda: None  # type: ignore[method-assign]
             await asyncio.sleep(1.0)
-            sent: list[Any] = []
-            at = b.vehicle._link._at
-            assert at is not None
-            send = at.sendto
-
-            def note(data: Any, addr: Any = None) -> None:
-                sent.append(data)
-                send(data, addr)
-
-            at.sendto = note  # type: ignore[method-assign]
+            ear.commands.clear()
             b.vehicle.demand(Demand.FLY)
             await asyncio.sleep(1.0)
-            assert sent
-            assert not any(b",290718208" in datagram for datagram in sent)
+            assert ear.named("REF"), "it speaks, and none of it asks for flight"
+            assert all(bits & REF_FLY == 0 for bits in (c.integer(0) or 0 for c in ear.named("REF")))
             assert ear.named("FTRIM") == []
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_rebooted_drone_is_configured_again_and_flies() -> None:
@@ -193,7 +184,7 @@ def test_a_rebooted_drone_is_configured_again_and_flies() -> None:
             await b.hovering()
             assert ear.named("FTRIM")
 
-    virtually(main)
+    virtual(main())
 
 
 def test_an_adapter_that_starts_anew_is_obeyed_at_once() -> None:
@@ -207,7 +198,7 @@ def test_an_adapter_that_starts_anew_is_obeyed_at_once() -> None:
             await asyncio.sleep(0.2)
             assert 1 <= drone.last_sequence < before
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_second_client_that_ran_ahead_is_overcome_by_starting_at_one() -> None:
@@ -221,7 +212,7 @@ def test_a_second_client_that_ran_ahead_is_overcome_by_starting_at_one() -> None
             await b.until(lambda: drone.last_sequence < 100, limit_s=1.0)  # before the drone gives us up
             await b.hovering()
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_bad_radio_delays_and_does_not_stop_a_flight() -> None:
@@ -235,7 +226,7 @@ def test_a_bad_radio_delays_and_does_not_stop_a_flight() -> None:
             await b.steer(10.0, climb_mps=-0.3, while_=lambda: b.state.armed)
             assert (b.drone.major, b.drone.emergency) == (MajorState.LANDED, False)
 
-    virtually(main)
+    virtual(main())
 
 
 def test_the_drone_may_boot_long_after_the_daemon() -> None:
@@ -247,7 +238,7 @@ def test_the_drone_may_boot_long_after_the_daemon() -> None:
             b.server.radio = True
             await b.hovering()
 
-    virtually(main)
+    virtual(main())
 
 
 def test_damaged_and_foreign_navdata_costs_nothing() -> None:
@@ -256,36 +247,32 @@ def test_damaged_and_foreign_navdata_costs_nothing() -> None:
             await b.configured()
             rng = random.Random(3)
             good = packet(NavdataReport(state=0x0F800490, sequence=10, major=2, battery_percent=50), (0,))
-            navdata, client = b.server._navdata, b.server._client
-            assert navdata is not None
             b.vehicle.attitudes()
             for _ in range(200):
                 damaged = bytearray(good)
                 for _ in range(rng.randrange(1, 5)):
                     damaged[rng.randrange(len(damaged))] ^= 1 << rng.randrange(8)
-                navdata.sendto(bytes(damaged[: rng.randrange(1, 173)]), client)
+                b.server.send_navdata(bytes(damaged[: rng.randrange(1, 173)]))
                 await asyncio.sleep(0.005)
             assert 14 <= len(b.vehicle.attitudes()) <= 16
-            assert b.vehicle._link.bad_packets == 200
+            assert b.vehicle.bad_packets == 200
             assert b.state.battery_frac == 1.0
 
-    virtually(main)
+    virtual(main())
 
 
 def test_navdata_that_was_overtaken_is_not_taken() -> None:
     async def main() -> None:
         async with bench() as b:
             await b.configured()
-            navdata, client = b.server._navdata, b.server._client
-            assert navdata is not None
             old = packet(NavdataReport(state=0x0F800490, sequence=3, major=3, battery_percent=5), (0,))
             for _ in range(20):
-                navdata.sendto(old, client)
+                b.server.send_navdata(old)
                 await asyncio.sleep(0.01)
                 assert (b.state.battery_frac, b.state.mode) == (1.0, "landed")
-            assert b.vehicle._link.stale_packets == 20
+            assert b.vehicle.stale_packets == 20
 
-    virtually(main)
+    virtual(main())
 
 
 def test_no_network_is_not_the_end() -> None:
@@ -306,7 +293,7 @@ def test_no_network_is_not_the_end() -> None:
             loop.create_datagram_endpoint = working  # type: ignore[method-assign]
             await b.hovering()
 
-    virtually(main)
+    virtual(main())
 
 
 def test_a_camera_asked_for_during_a_gap_is_switched_when_the_drone_is_back() -> None:
@@ -322,4 +309,4 @@ def test_a_camera_asked_for_during_a_gap_is_switched_when_the_drone_is_back() ->
             await b.until(lambda: b.vehicle.camera_since_ns is not None)
             assert int(b.server.channel) == DroneCamera.FRONT
 
-    virtually(main)
+    virtual(main())

@@ -15,7 +15,8 @@ import pytest
 
 from flightd.runtime.clock import LoopClock
 from flightd.sim.ardrone.server import ArDroneServer
-from tests.protocol.ardrone.bench import ANY_PORTS, ended, make_drone
+from tests.rigs.ardrone import ANY_PORTS, ended, make_drone
+from tests.rigs.event_loops import real
 
 MODULES = os.environ.get("ARDRONE_NODE_MODULES", "")
 SCRIPT = Path(__file__).with_name("npm_flight.js")
@@ -61,7 +62,7 @@ def test_the_npm_client_flies_it() -> None:
             assert server.channel == 1
             return out.decode().splitlines()
 
-    said = asyncio.run(main())
+    said = real(main())
     flight = [
         line for line in said if line.partition(" ")[0] not in ("idr", "config", "first-frame", "hovering")
     ]

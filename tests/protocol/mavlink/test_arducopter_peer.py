@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -12,14 +12,12 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from flightd.sim.autopilot.autopilot import PeerConfig, Sticks
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.plant.airframe import Airframe
-from flightd.sim.plant.wind import WindParams
 from tests.protocol.mavlink.raw_client import RawClient
-
-CALM = WindParams(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
+from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import CALM
 
 
 @asynccontextmanager
@@ -34,14 +32,6 @@ async def pair(config: PeerConfig | None = None) -> AsyncIterator[tuple[ArduCopt
         finally:
             serving.cancel()
             client.close()
-
-
-def run(test: Callable[[], Awaitable[Any]]) -> Any:
-    async def main() -> Any:
-        return await test()
-
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-        return runner.run(main())
 
 
 def armed(peer: ArduCopterPeer) -> bool:
@@ -70,7 +60,7 @@ def test_only_the_heartbeat_comes_unasked() -> None:
             assert (beat.type, beat.autopilot, beat.custom_mode) == (2, 3, 0)
             assert beat.base_mode & 129 == 1
 
-    run(test)
+    virtual(test())
 
 
 def test_messages_come_at_the_asked_interval_and_stop() -> None:
@@ -96,7 +86,7 @@ def test_messages_come_at_the_asked_interval_and_stop() -> None:
             assert client.last("AUTOPILOT_VERSION").flight_sw_version >> 16 == 0x0405
             assert await client.command(512, 9999) == 4
 
-    run(test)
+    virtual(test())
 
 
 def test_a_ground_stations_stream_request_overwrites_the_rate() -> None:
@@ -109,7 +99,7 @@ def test_a_ground_stations_stream_request_overwrites_the_rate() -> None:
             await asyncio.sleep(2.0)
             assert len(client.all("ATTITUDE")) == pytest.approx(8, abs=1)
 
-    run(test)
+    virtual(test())
 
 
 def test_the_boot_clock_is_its_own_and_timesync_tells_it_both_ways() -> None:
@@ -124,7 +114,7 @@ def test_the_boot_clock_is_its_own_and_timesync_tells_it_both_ways() -> None:
             assert answers[0].ts1 == 4711
             assert answers[0].tc1 / 1e9 == pytest.approx(10.55 * 1.0001, abs=0.002)
 
-    run(test)
+    virtual(test())
 
 
 def test_arming_is_refused_with_the_reason_until_the_sensors_have_settled() -> None:
@@ -144,7 +134,7 @@ def test_arming_is_refused_with_the_reason_until_the_sensors_have_settled() -> N
             await asyncio.sleep(0.01)
             assert client.last("HEARTBEAT").base_mode & 128
 
-    run(test)
+    virtual(test())
 
 
 def test_guided_is_acknowledged_on_the_floor_but_not_armed_without_a_position() -> None:
@@ -156,7 +146,7 @@ def test_guided_is_acknowledged_on_the_floor_but_not_armed_without_a_position() 
             assert await client.command(176, 1, 99) == 4
             assert await client.command(176, 0, 20) == 2  # param1 does not say custom mode
 
-    run(test)
+    virtual(test())
 
 
 def test_commands_of_others_are_ignored_and_unknown_ones_unsupported() -> None:
@@ -169,7 +159,7 @@ def test_commands_of_others_are_ignored_and_unknown_ones_unsupported() -> None:
             assert await client.command(400, math.nan) == 2
             assert armed(peer)
 
-    run(test)
+    virtual(test())
 
 
 def test_half_thrust_on_the_floor_disarms_after_the_delay_and_more_takes_off() -> None:
@@ -187,7 +177,7 @@ def test_half_thrust_on_the_floor_disarms_after_the_delay_and_more_takes_off() -
             assert await client.command(400, 0) == 4  # no disarming in the air
             assert armed(peer)
 
-    run(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(("thrust", "climb_mps"), [(0.6, 0.5), (0.4, -0.3), (0.5, 0.0), (0.45, -0.15)])
@@ -200,7 +190,7 @@ def test_thrust_is_a_climb_rate(thrust: float, climb_mps: float) -> None:
             await client.fly(2.0, yaw_rad=yaw, thrust=thrust)
             assert (peer.truth().height_m - start_m) / 2.0 == pytest.approx(climb_mps, abs=0.06)
 
-    run(test)
+    virtual(test())
 
 
 def test_with_the_thrust_option_thrust_is_collective() -> None:
@@ -214,7 +204,7 @@ def test_with_the_thrust_option_thrust_is_collective() -> None:
             await asyncio.sleep(6.0)  # time-out falls back to holding the height
             assert abs(peer.truth().climb_mps) < 0.1
 
-    run(test)
+    virtual(test())
 
 
 def test_roll_turns_level_only_after_the_time_out_and_nothing_lands() -> None:
@@ -231,7 +221,7 @@ def test_roll_turns_level_only_after_the_time_out_and_nothing_lands() -> None:
             assert armed(peer)
             assert peer.truth().height_m == pytest.approx(height_m, abs=0.1)
 
-    run(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(
@@ -248,7 +238,7 @@ def test_these_setpoints_are_dropped_in_silence(setpoint: dict[str, Any]) -> Non
             assert math.degrees(peer.truth().roll_rad) == pytest.approx(0, abs=0.6)
             assert {m.get_type() for _, m in client.heard} <= {"HEARTBEAT", "ATTITUDE", "TIMESYNC"}
 
-    run(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize("setpoint", [{}, {"mask": 0}, {"norm": 1.0004}, {"component": 9}])
@@ -259,7 +249,7 @@ def test_these_setpoints_are_obeyed(setpoint: dict[str, Any]) -> None:
             await client.fly(1.0, yaw_rad=yaw, roll_deg=8, **setpoint)
             assert math.degrees(peer.truth().roll_rad) == pytest.approx(8, abs=0.6)
 
-    run(test)
+    virtual(test())
 
 
 def test_the_largest_angle_is_not_enforced() -> None:
@@ -269,7 +259,7 @@ def test_the_largest_angle_is_not_enforced() -> None:
             await client.fly(0.8, yaw_rad=yaw, roll_deg=60)
             assert math.degrees(peer.truth().roll_rad) == pytest.approx(60, abs=2)
 
-    run(test)
+    virtual(test())
 
 
 def test_yaw_in_the_quaternion_is_obeyed_and_rates_turn_it_between_messages() -> None:
@@ -282,7 +272,7 @@ def test_yaw_in_the_quaternion_is_obeyed_and_rates_turn_it_between_messages() ->
             await asyncio.sleep(2.0)  # no message: it goes on turning
             assert client.last("ATTITUDE").yaw == pytest.approx(yaw + 0.5 + 0.6, abs=0.05)
 
-    run(test)
+    virtual(test())
 
 
 def test_sinking_lands_and_disarms_by_the_delay_and_land_mode_at_once() -> None:
@@ -308,7 +298,7 @@ def test_sinking_lands_and_disarms_by_the_delay_and_land_mode_at_once() -> None:
             assert await client.command(400, 1) == 4  # LAND is not armable
             assert "LAND mode not armable" in client.last("STATUSTEXT").text
 
-    run(test)
+    virtual(test())
 
 
 def test_setpoints_are_dropped_in_other_modes_and_the_pilot_flies() -> None:
@@ -325,7 +315,7 @@ def test_setpoints_are_dropped_in_other_modes_and_the_pilot_flies() -> None:
             assert not peer.pilot_mode(CopterMode.LOITER)  # needs a position
             assert peer.mode == CopterMode.ALT_HOLD
 
-    run(test)
+    virtual(test())
 
 
 def test_parameters_are_read_listed_and_set() -> None:
@@ -349,7 +339,7 @@ def test_parameters_are_read_listed_and_set() -> None:
             await asyncio.sleep(1.5)
             assert math.degrees(peer.truth().roll_rad) == pytest.approx(0, abs=0.7)
 
-    run(test)
+    virtual(test())
 
 
 def test_a_reboot_forgets_streams_and_starts_the_clock_anew() -> None:
@@ -368,7 +358,7 @@ def test_a_reboot_forgets_streams_and_starts_the_clock_anew() -> None:
             await asyncio.sleep(0.2)
             assert client.last("ATTITUDE").time_boot_ms < 1500
 
-    run(test)
+    virtual(test())
 
 
 def test_a_low_battery_is_told_once_and_lands_if_so_set() -> None:
@@ -382,7 +372,7 @@ def test_a_low_battery_is_told_once_and_lands_if_so_set() -> None:
             texts = [t.text for t in client.all("STATUSTEXT") if "is low" in t.text]
             assert len(texts) == 1
 
-    run(test)
+    virtual(test())
 
 
 def test_truth_is_the_same_whoever_asks_and_however_often() -> None:
@@ -397,8 +387,8 @@ def test_truth_is_the_same_whoever_asks_and_however_often() -> None:
             stamp = LoopClock().now_ns() - 33_333_333
             return peer.truth_at(stamp)
 
-    first = run(lambda: flight(False))
-    assert first == run(lambda: flight(True))
+    first = virtual(flight(False))
+    assert first == virtual(flight(True))
     assert first.height_m > 0.5
 
 
@@ -414,4 +404,4 @@ def test_garbage_makes_no_channel_and_stops_nothing() -> None:
             assert await client.command(176, 1, 20) == 0
             transport.close()
 
-    run(test)
+    virtual(test())

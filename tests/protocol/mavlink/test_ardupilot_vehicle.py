@@ -15,7 +15,7 @@ from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.plant.airframe import Airframe
-from tests.protocol.mavlink.scripted import (
+from tests.protocol.mavlink.scripted_autopilot import (
     ALT_HOLD,
     ARM,
     GUIDED_NOGPS,
@@ -27,7 +27,8 @@ from tests.protocol.mavlink.scripted import (
     known,
     scripted,
 )
-from tests.protocol.rig import Rig, ardupilot_rig, run_virtual
+from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import Rig, ardupilot_rig
 
 # What we are and ask
 
@@ -42,7 +43,7 @@ def test_we_are_an_onboard_computer_and_beat_twice_a_second() -> None:
                 (18, 8, 1, 191)
             }
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_message_intervals_are_asked_for_and_nothing_else_is_commanded() -> None:
@@ -54,7 +55,7 @@ def test_message_intervals_are_asked_for_and_nothing_else_is_commanded() -> None
             assert asked[30] == 20_000
             assert {m.command for m in autopilot.all("COMMAND_LONG")} == {INTERVAL}
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_timesync_is_asked_and_answered() -> None:
@@ -67,7 +68,7 @@ def test_timesync_is_asked_and_answered() -> None:
             assert answers[0].tc1 == pytest.approx(asyncio.get_running_loop().time() * 1e9 - 0.5e9, abs=1e6)
             assert len([m for m in autopilot.all("TIMESYNC") if m.tc1 == 0]) > 5
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_setpoints_carry_unit_quaternions_all_rates_and_the_climb_as_thrust() -> None:
@@ -90,7 +91,7 @@ def test_setpoints_carry_unit_quaternions_all_rates_and_the_climb_as_thrust() ->
                 yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
                 assert yaw == pytest.approx(1.0, abs=0.01)  # the vehicle's own heading
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(
@@ -112,7 +113,7 @@ def test_climb_is_scaled_by_the_autopilots_speeds(parameters: dict[str, float], 
             await asyncio.sleep(0.1)
             assert autopilot.all("SET_ATTITUDE_TARGET")[-1].thrust == pytest.approx(thrust)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_before_the_meaning_of_thrust_is_known_it_is_not_flown() -> None:
@@ -127,7 +128,7 @@ def test_before_the_meaning_of_thrust_is_known_it_is_not_flown() -> None:
             assert not autopilot.commands(SET_MODE)
             assert not vehicle.send(AttitudeSetpoint(0))
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(("options", "wanted"), [(0, True), (8, False), (1, True)])
@@ -143,7 +144,7 @@ def test_thrust_that_means_something_else_than_configured_is_not_flown(options: 
                 assert refused is (configured is not None)
                 assert bool(autopilot.commands(ARM)) is not refused
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_vehicle_found_flying_is_not_steered_before_the_meaning_of_thrust_is_known() -> None:
@@ -162,7 +163,7 @@ def test_a_vehicle_found_flying_is_not_steered_before_the_meaning_of_thrust_is_k
             assert (known(vehicle).in_control, known(vehicle).refusal) == (True, "")
             assert vehicle.send(AttitudeSetpoint(0))
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_clock_that_leaps_back_in_the_air_does_not_change_what_thrust_means() -> None:
@@ -175,7 +176,7 @@ def test_a_clock_that_leaps_back_in_the_air_does_not_change_what_thrust_means() 
             assert all(await rig.stream(3.0))
             assert rig.peer.truth().height_m == pytest.approx(height_m, abs=0.15)
 
-    run_virtual(test)
+    virtual(test())
 
 
 # Whom we believe
@@ -193,7 +194,7 @@ def test_others_are_not_the_autopilot() -> None:
             await asyncio.sleep(2.0)
             assert vehicle.state() is None
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_another_firmware_is_recognised_and_not_flown() -> None:
@@ -206,7 +207,7 @@ def test_another_firmware_is_recognised_and_not_flown() -> None:
             assert known(vehicle).refusal == "the autopilot is PX4, the configuration says ARDUPILOT"
             assert not autopilot.commands(SET_MODE)
 
-    run_virtual(test)
+    virtual(test())
 
 
 # Modes and the pilot
@@ -232,7 +233,7 @@ def test_guided_flies_a_vehicle_that_knows_its_position_and_no_other(has_positio
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_landing_mode_is_ours_but_takes_no_setpoints() -> None:
@@ -250,7 +251,7 @@ def test_landing_mode_is_ours_but_takes_no_setpoints() -> None:
             assert autopilot.mode == GUIDED_NOGPS
             assert vehicle.send(AttitudeSetpoint(0))
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_landing_that_is_acknowledged_but_never_shown_is_asked_for_again() -> None:
@@ -270,7 +271,7 @@ def test_a_landing_that_is_acknowledged_but_never_shown_is_asked_for_again() -> 
             assert autopilot.mode == LAND
             assert known(vehicle).in_control
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_no_retry_follows_when_the_pilot_takes_over_meanwhile() -> None:
@@ -289,7 +290,7 @@ def test_no_retry_follows_when_the_pilot_takes_over_meanwhile() -> None:
             assert len(autopilot.commands(SET_MODE)) == 1
             assert not known(vehicle).in_control
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_late_heartbeat_of_the_mode_before_is_no_take_over_but_any_other_is() -> None:
@@ -307,7 +308,7 @@ def test_a_late_heartbeat_of_the_mode_before_is_no_take_over_but_any_other_is() 
                 await asyncio.sleep(1.0)
                 assert known(vehicle).in_control is ours
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_an_accepted_mode_that_never_shows_is_not_held_for_long() -> None:
@@ -320,7 +321,7 @@ def test_an_accepted_mode_that_never_shows_is_not_held_for_long() -> None:
             assert not known(vehicle).in_control
             assert not vehicle.send(AttitudeSetpoint(0))
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(("distance_cm", "disarms"), [(10, True), (150, False), (None, False)])
@@ -342,7 +343,7 @@ def test_leaving_it_disarms_only_what_the_range_finder_too_has_on_the_floor(
         assert [m.param1 for m in autopilot.commands(ARM)] == ([1, 0] if disarms else [1])
         assert (autopilot.commands(SET_MODE)[-1].param2 == LAND) is not disarms
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_failsafe_of_the_autopilot_counts_as_a_take_over() -> None:
@@ -354,4 +355,4 @@ def test_a_failsafe_of_the_autopilot_counts_as_a_take_over() -> None:
             assert rig.known().mode == "LAND"
             assert not any(await rig.stream(1.0))
 
-    run_virtual(test)
+    virtual(test())

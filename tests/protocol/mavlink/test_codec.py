@@ -19,7 +19,7 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing, read_key
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavlink.telemetry import MavlinkTelemetry
 from flightd.core.errors import InputError
-from tests.protocol.mavlink.damage import GOLDEN, frames, hammer
+from tests.protocol.mavlink.damaged_traffic import GOLDEN, frames, hammer
 
 KEY = bytes(range(32))
 GOLDEN_STAMP = 10**12

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.core.types import Demand
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import CopterMode
-from tests.protocol.mavlink.scripted import (
+from tests.protocol.mavlink.scripted_autopilot import (
     ARM,
     LAND,
     SET_MODE,
@@ -18,7 +18,8 @@ from tests.protocol.mavlink.scripted import (
     known,
     scripted,
 )
-from tests.protocol.rig import ardupilot_rig, run_virtual
+from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import ardupilot_rig
 
 
 def test_an_unanswered_command_is_repeated_with_rising_confirmation() -> None:
@@ -31,7 +32,7 @@ def test_an_unanswered_command_is_repeated_with_rising_confirmation() -> None:
             assert [m.confirmation for m in autopilot.commands(SET_MODE)] == [0, 1, 2]
             assert known(vehicle).in_control
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_dead_command_channel_is_told_and_tried_again_for_ever() -> None:
@@ -48,7 +49,7 @@ def test_a_dead_command_channel_is_told_and_tried_again_for_ever() -> None:
             assert known(vehicle).armed
             assert known(vehicle).refusal == ""
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_in_progress_is_waited_for_and_strange_results_are_refusals() -> None:
@@ -77,7 +78,7 @@ def test_in_progress_is_waited_for_and_strange_results_are_refusals() -> None:
             await asyncio.sleep(1.0)
             assert known(vehicle).refusal == "mode GUIDED_NOGPS: result 42"
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_command_that_stays_in_progress_is_given_up_and_never_holds_back_a_landing() -> None:
@@ -105,7 +106,7 @@ def test_a_command_that_stays_in_progress_is_given_up_and_never_holds_back_a_lan
             await asyncio.sleep(0.2)
             assert autopilot.mode == LAND
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_another_clients_acknowledgement_is_not_ours() -> None:
@@ -120,7 +121,7 @@ def test_another_clients_acknowledgement_is_not_ours() -> None:
             await asyncio.sleep(2.0)
             assert not known(vehicle).in_control
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_arming_is_retried_with_the_autopilots_reason_until_it_is_ready() -> None:
@@ -135,7 +136,7 @@ def test_arming_is_retried_with_the_autopilots_reason_until_it_is_ready() -> Non
             assert 14.0 < await rig.until(lambda: rig.known().armed, 30.0) < 19.0
             assert rig.known().refusal == ""
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_disarm_demand_on_the_floor_never_disarms_the_pilot() -> None:
@@ -151,4 +152,4 @@ def test_a_disarm_demand_on_the_floor_never_disarms_the_pilot() -> None:
             await asyncio.sleep(5.0)
             assert rig.known().armed
 
-    run_virtual(test)
+    virtual(test())

@@ -7,20 +7,24 @@ import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.examination import Examination
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.required_parameters import RULES, judge
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import too_slow
 from flightd.core.errors import UnavailableError
+from flightd.ports import Clock
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.px4 import Px4Peer
+from flightd.sim.autopilot.streams import MessageStreams
 from flightd.sim.plant.airframe import Airframe
-from tests.protocol.rig import run_virtual
+from tests.rigs.event_loops import virtual
 
 
 @asynccontextmanager
@@ -53,7 +57,7 @@ def test_the_factory_settings_of_arducopter_are_named_and_mended() -> None:
             assert peer.parameters["GUID_TIMEOUT"] == 0.5
             assert (await examination.report()).findings == ()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_px4s_whole_numbers_are_read_and_written_as_bytes() -> None:
@@ -67,7 +71,7 @@ def test_px4s_whole_numbers_are_read_and_written_as_bytes() -> None:
             assert left.name == "COM_RCL_EXCEPT"  # a person must say whether there is RC
             assert peer.parameters["COM_OBL_RC_ACT"] == 4
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_sticks_that_px4_ignores_are_named_and_left_to_a_person() -> None:
@@ -78,7 +82,21 @@ def test_sticks_that_px4_ignores_are_named_and_left_to_a_person() -> None:
             assert await examination.fix([finding]) == [finding]
             assert peer.parameters["COM_RC_IN_MODE"] == 4
 
-    run_virtual(test)
+    virtual(test())
+
+
+class _FixedRates(MessageStreams):
+    def set_interval(self, *_: Any) -> int:
+        return int(dialect.MAV_RESULT_DENIED)
+
+
+class _DeniesRates(ArduCopterPeer):
+    """Firmware that changes no message's interval."""
+
+    def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
+        config = config or PeerConfig()
+        super().__init__(clock, airframe, config)
+        self.streams = _FixedRates(self.link, self, clock.now_ns(), config.step_ns)
 
 
 def test_the_rate_of_heartbeats_is_measured_and_a_slow_one_is_named() -> None:
@@ -87,13 +105,12 @@ def test_the_rate_of_heartbeats_is_measured_and_a_slow_one_is_named() -> None:
             report = await examination.report()
             assert report.heartbeat_hz == pytest.approx(20.0, abs=2.0)
             assert too_slow(report.heartbeat_hz) is None
-        async with examined(ArduCopterPeer) as (peer, examination):
-            peer.streams.set_interval = lambda *_: 2  # type: ignore[method-assign]  # firmware that denies it
+        async with examined(_DeniesRates) as (_, examination):
             report = await examination.report()
             assert report.heartbeat_hz == pytest.approx(1.0)
             assert "seen up to 1.0 s late" in str(too_slow(report.heartbeat_hz))
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_an_armed_vehicle_is_left_alone() -> None:
@@ -106,7 +123,7 @@ def test_an_armed_vehicle_is_left_alone() -> None:
             assert len(await examination.fix(report.findings)) == len(report.findings)
             assert peer.parameters["GUID_TIMEOUT"] == 3
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_value_that_does_not_stay_is_still_found() -> None:
@@ -117,7 +134,7 @@ def test_a_value_that_does_not_stay_is_still_found() -> None:
             (left,) = await examination.fix(report.findings)
             assert left.name == "GUID_TIMEOUT"
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_silence_is_told_in_one_line() -> None:
@@ -126,7 +143,7 @@ def test_silence_is_told_in_one_line() -> None:
             async with Examination("udpout://127.0.0.1:9", LoopClock()).connected():
                 pytest.fail("nobody is there")
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize("firmware", list(Firmware))

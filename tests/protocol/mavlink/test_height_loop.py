@@ -8,7 +8,7 @@ import pytest
 
 from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand
-from tests.protocol.rig import CALM
+from tests.rigs.vehicles import CALM
 
 
 def fly_loop(

@@ -19,7 +19,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.core.types import Demand, Event, EventLevel, GridPose
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.radio import RadioParams
-from tests.protocol.mavlink.scripted import (
+from tests.protocol.mavlink.scripted_autopilot import (
     ALT_HOLD,
     ARM,
     INTERVAL,
@@ -27,7 +27,9 @@ from tests.protocol.mavlink.scripted import (
     known,
     scripted,
 )
-from tests.protocol.rig import ardupilot_rig, run_virtual
+from tests.rigs.event_loops import virtual
+from tests.rigs.free_ports import free_port
+from tests.rigs.vehicles import ardupilot_rig
 
 
 def test_rates_that_a_ground_station_overwrote_are_asked_for_again() -> None:
@@ -46,7 +48,7 @@ def test_rates_that_a_ground_station_overwrote_are_asked_for_again() -> None:
             await asyncio.sleep(1.0)
             assert len(rig.vehicle.attitudes()) == pytest.approx(50, abs=3)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_denied_stream_is_not_asked_for_all_the_time() -> None:
@@ -57,7 +59,7 @@ def test_a_denied_stream_is_not_asked_for_all_the_time() -> None:
             await asyncio.sleep(20.0)
             assert len(autopilot.commands(INTERVAL)) < 12
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_rebooted_autopilot_is_heard_again_with_its_new_clock() -> None:
@@ -74,7 +76,7 @@ def test_a_rebooted_autopilot_is_heard_again_with_its_new_clock() -> None:
             assert 0 <= now_ns - samples[-1].stamp_ns < 0.05e9
             await rig.take_off()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_an_overtaken_heartbeat_is_no_take_over() -> None:
@@ -85,16 +87,16 @@ def test_an_overtaken_heartbeat_is_no_take_over() -> None:
             await asyncio.sleep(2.0)
             (channel,) = autopilot.link.channels.values()
             old = dialect.MAVLink_heartbeat_message(2, 3, 129, ALT_HOLD, 4, 3)
-            channel._packer.seq = (channel._packer.seq - 3) % 256
-            autopilot.say(old)
-            channel._packer.seq = (channel._packer.seq + 2) % 256
+            overtaken = channel.pack(old, 0)
+            autopilot.beat()
+            autopilot.link.transmit(overtaken, channel.address)
             await asyncio.sleep(0.5)
             assert known(vehicle).in_control
             autopilot.say(old)  # the same, but new
             await asyncio.sleep(0.1)
             assert not known(vehicle).in_control
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_poor_radio_is_flown_through() -> None:
@@ -116,24 +118,22 @@ def test_a_poor_radio_is_flown_through() -> None:
             rig.take_over()
             assert await rig.until(lambda: not rig.known().in_control, 1.0) < 0.3
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_either_side_may_start_first() -> None:
     async def test() -> None:
-        async with ardupilot_rig(peer_runs=False) as rig:
-            rig.peer.link.close()  # nobody listens: the kernel answers with ICMP
+        config = PeerConfig(ready_s=0.5, port=free_port())
+        async with ardupilot_rig(config, peer_runs=False) as rig:
+            rig.peer.close()  # nobody listens: the kernel answers with ICMP
             await asyncio.sleep(5.0)
             assert rig.vehicle.state() is None
-            address = rig.peer._address
-            rig.peer._address = None
-            rig.peer._config = PeerConfig(ready_s=0.5, port=address[1])
             serving = asyncio.create_task(rig.peer.run())
             await rig.take_off(1.0)
             serving.cancel()
             await asyncio.gather(serving, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())
 
 
 # Poses
@@ -158,7 +158,7 @@ def test_the_grid_pose_is_shared_at_thirty_hertz_if_so_chosen() -> None:
                 assert len(autopilot.all("ODOMETRY")) == pytest.approx(expected, abs=3)
                 assert len(autopilot.all("LANDING_TARGET")) == pytest.approx(targets, abs=3)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_an_estimator_that_gets_our_pose_gets_an_origin_until_it_reports_one() -> None:
@@ -181,7 +181,7 @@ def test_an_estimator_that_gets_our_pose_gets_an_origin_until_it_reports_one() -
                 await asyncio.sleep(3.0)
                 assert len(autopilot.all("SET_GPS_GLOBAL_ORIGIN")) > known
 
-    run_virtual(test)
+    virtual(test())
 
 
 # Texts
@@ -200,7 +200,7 @@ def test_events_are_shown_as_texts_long_ones_in_chunks() -> None:
             assert texts[1].id > 0
             assert "".join(t.text for t in texts[1:]) == "long: " + "x" * 100
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_reason_in_chunks_is_told_whole() -> None:
@@ -219,7 +219,7 @@ def test_a_reason_in_chunks_is_told_whole() -> None:
             await asyncio.sleep(2.0)
             assert known(vehicle).refusal == "arming: failed (PreArm: " + "y" * 42 + "z" * 10 + ")"
 
-    run_virtual(test)
+    virtual(test())
 
 
 @given(st.text("ab", max_size=300))
@@ -261,4 +261,4 @@ def test_heartbeats_too_rare_to_see_a_take_over_in_time_are_told_once() -> None:
                 await asyncio.wait([beating])
             assert len(texts) == told
 
-    run_virtual(test)
+    virtual(test())

@@ -19,12 +19,14 @@ from mavsdk.plugins.telemetry import LandedState as SdkLanded
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.connect import connect_vehicle
+from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
+from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.mavsdk.connection import MavsdkConnection
 from flightd.adapters.vehicle.mavsdk.gate import FRESH_NS, SetpointGate, message_id
 from flightd.adapters.vehicle.mavsdk.library import whole_fields
 from flightd.adapters.vehicle.mavsdk.telemetry import MavsdkTelemetry
 from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
-from flightd.app.simulation.ports import free_port
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import Attitude, Demand, LandedState
@@ -33,10 +35,13 @@ from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import ScaledLoop
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
-from flightd.sim.autopilot.link import Message
+from flightd.sim.autopilot.link import Channel, Message
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
 from flightd.sim.plant.airframe import Airframe
-from tests.protocol.rig import Rig, mavlink_rig, mavsdk_rig, run_real
+from tests.rigs.event_loops import real, run_in
+from tests.rigs.free_ports import free_port
+from tests.rigs.patient_loop import patient
+from tests.rigs.vehicles import Rig, mavlink_rig, mavsdk_rig
 
 
 class _CountingPx4(Px4Peer):
@@ -53,6 +58,20 @@ class _CountingPx4(Px4Peer):
         self.setpoints += 1
         if self.mode == Px4Mode.OFFBOARD:
             self.streaming.set()
+
+
+class _DeafToModes(Px4Peer):
+    """Neither obeys nor answers a change of mode."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.passed_over: list[Message] = []
+
+    def received(self, channel: Channel, message: Message) -> None:
+        if message.get_type() == "COMMAND_LONG" and message.command == 176:
+            self.passed_over.append(message)
+        else:
+            super().received(channel, message)
 
 
 def _packed(message: Message, *, v1: bool = False) -> bytes:
@@ -90,13 +109,16 @@ def test_the_gate_takes_any_bytes_and_holds_back_only_whole_frames(frame: bytes,
 
 def test_frames_that_no_line_takes_are_counted_and_those_held_back_are_not() -> None:
     async def test() -> None:
-        vehicle = MavsdkVehicle("tcp:127.0.0.1:9", LoopClock())  # not open
+        clock, gate = LoopClock(), SetpointGate()
+        line = MavsdkConnection(make_transport(parse_endpoint("tcp:127.0.0.1:9")), gate, clock)  # not open
+        line.send(_packed(_COMMAND))
+        line.send(_packed(_TARGET))
+        assert (line.dropped, gate.held_back) == (1, 1)
+        vehicle = MavsdkVehicle("tcp:127.0.0.1:9", clock)
         assert isinstance(vehicle, CountsDrops)
-        vehicle._line.send(_packed(_COMMAND))
-        vehicle._line.send(_packed(_TARGET))
-        assert (vehicle.dropped, vehicle.gate.held_back) == (1, 1)
+        assert vehicle.dropped == 0
 
-    asyncio.run(test())
+    real(test())
 
 
 _SET_MODE = dialect.MAVLink_command_long_message(1, 1, 176, 1, 1, 6, 0, 0, 0, 0, 0)
@@ -123,17 +145,9 @@ def test_the_gate_passes_changes_of_mode_and_arming_only_while_we_command(v1: bo
 
 def test_the_library_repeats_no_change_of_mode_once_we_let_go() -> None:
     async def test() -> None:
-        async with mavsdk_rig() as rig:
+        async with mavlink_rig(_DeafToModes, MavsdkVehicle, Px4Mode.ALTCTL) as rig:
             await rig.until(lambda: rig.vehicle.state() is not None)
-            heard = []
-
-            def deaf(channel: Any, message: Message, now_ns: int) -> None:
-                if message.command == 176:
-                    heard.append(message)  # neither obeyed nor answered
-                else:
-                    answer(channel, message, now_ns)
-
-            answer, rig.peer._answer = rig.peer._answer, deaf
+            heard = rig.peer.passed_over
             rig.vehicle.demand(Demand.FLY)
             await rig.until(lambda: bool(heard))
             rig.vehicle.demand(Demand.HANDS_OFF)
@@ -144,7 +158,7 @@ def test_the_library_repeats_no_change_of_mode_once_we_let_go() -> None:
             assert isinstance(rig.vehicle, MavsdkVehicle)
             assert rig.vehicle.gate.held_back > 0
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_landed_state_is_believed_for_a_second() -> None:
@@ -214,7 +228,7 @@ def test_a_tick_that_died_in_the_air_is_not_flown_on_and_px4s_own_failsafe_acts(
             assert abs(rig.peer.truth().roll_rad) < 0.02
             assert not rig.known().in_control
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_loop_that_hangs_sends_nothing_though_the_librarys_threads_live() -> None:
@@ -226,7 +240,7 @@ def test_a_loop_that_hangs_sends_nothing_though_the_librarys_threads_live() -> N
         try:
             async with asyncio.timeout(20.0):
                 await peer.streaming.wait()
-            companion.hang(1.5)
+            companion.hang()
             await asyncio.sleep(0.1)
             arrived = peer.setpoints
             await asyncio.sleep(1.0)
@@ -236,8 +250,7 @@ def test_a_loop_that_hangs_sends_nothing_though_the_librarys_threads_live() -> N
             serving.cancel()
             await asyncio.wait([serving])
 
-    with asyncio.Runner(loop_factory=lambda: ScaledLoop(1.0)) as runner:
-        runner.run(test())
+    real(test())
 
 
 class _Companion:
@@ -247,19 +260,20 @@ class _Companion:
         self._url = url
         self._loop = ScaledLoop(1.0)
         self._over = asyncio.Event()
+        self._released = threading.Event()
         self._thread = threading.Thread(target=self._live, name="companion")
         self._thread.start()
 
-    def hang(self, duration_s: float) -> None:
-        self._loop.call_soon_threadsafe(time.sleep, duration_s)
+    def hang(self) -> None:
+        self._loop.call_soon_threadsafe(self._released.wait, 30.0)
 
     def end(self) -> None:
+        self._released.set()
         self._loop.call_soon_threadsafe(self._over.set)
         self._thread.join()
 
     def _live(self) -> None:
-        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-            runner.run(self._fly())
+        run_in(lambda: self._loop, self._fly())
 
     async def _fly(self) -> None:
         vehicle = MavsdkVehicle(self._url, LoopClock())
@@ -283,7 +297,7 @@ def test_arducopter_is_refused_with_the_reason() -> None:
             assert rig.peer.mode == CopterMode.STABILIZE
             assert not rig.known().armed
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_refused_arming_is_told_with_the_autopilots_words_and_tried_again() -> None:
@@ -297,7 +311,7 @@ def test_a_refused_arming_is_told_with_the_autopilots_words_and_tried_again() ->
             await rig.until(lambda: rig.known().armed)
             assert rig.known().refusal == ""
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_rebooted_autopilot_is_asked_for_its_streams_again_and_its_new_clock_is_taken() -> None:
@@ -318,7 +332,7 @@ def test_a_rebooted_autopilot_is_asked_for_its_streams_again_and_its_new_clock_i
             assert [sample.stamp_ns for sample in seen] == sorted({sample.stamp_ns for sample in seen})
             assert 0 <= LoopClock().now_ns() - seen[-1].stamp_ns < 100_000_000
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_companion_that_boots_first_finds_the_autopilot_later() -> None:
@@ -331,7 +345,7 @@ def test_a_companion_that_boots_first_finds_the_autopilot_later() -> None:
             serving.cancel()
             await asyncio.wait([serving])
 
-    run_real(test)
+    patient(test())
 
 
 def test_without_any_autopilot_it_ends_at_once_and_quietly(caplog: pytest.LogCaptureFixture) -> None:
@@ -346,7 +360,7 @@ def test_without_any_autopilot_it_ends_at_once_and_quietly(caplog: pytest.LogCap
         assert time.monotonic() - started_s < 1.0
         assert vehicle.state() is None
 
-    run_real(test)
+    patient(test())
     assert not [record for record in caplog.records if record.levelname == "ERROR"]
 
 
@@ -362,7 +376,7 @@ def test_with_the_link_gone_it_still_ends() -> None:
             rig.cut(False)
             await rig.until(lambda: rig.peer.mode != Px4Mode.OFFBOARD)  # its own failsafe
 
-    run_real(test)
+    patient(test())
 
 
 def test_a_port_in_use_is_told_at_once() -> None:
@@ -375,7 +389,7 @@ def test_a_port_in_use_is_told_at_once() -> None:
         taken.close()
         await asyncio.sleep(0.05)
 
-    run_real(test)
+    patient(test())
 
 
 def test_without_the_library_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -389,4 +403,4 @@ def test_without_the_library_one_line_says_what_to_install(monkeypatch: pytest.M
         with pytest.raises(InputError, match=r"pip install 'flightd\[mavsdk\]'"):
             connect_vehicle(config, LoopClock())
 
-    asyncio.run(test())
+    real(test())

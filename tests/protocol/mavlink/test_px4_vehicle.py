@@ -12,23 +12,24 @@ from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Mode
 from flightd.sim.plant.airframe import AirframeParams
-from tests.protocol.rig import px4_rig, run_virtual
+from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import px4_rig
 
 
 def test_it_streams_before_offboard_and_only_on_demand() -> None:
     async def test() -> None:
         async with px4_rig() as rig:
             await asyncio.sleep(3.0)
-            assert rig.peer._stream_s == 0.0
+            assert rig.peer.stream_s == 0.0
             rig.vehicle.demand(Demand.FLY)
             took_s = await rig.until(lambda: rig.known().armed)
             assert 1.2 < took_s < 3.0
             assert rig.known().mode == "OFFBOARD"
             rig.vehicle.demand(Demand.STANDBY)
             await asyncio.sleep(1.0)
-            assert rig.peer._stream_s == 0.0
+            assert rig.peer.stream_s == 0.0
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_the_idle_stream_carries_no_thrust_and_never_keeps_a_flight_alive() -> None:
@@ -38,7 +39,7 @@ def test_the_idle_stream_carries_no_thrust_and_never_keeps_a_flight_alive() -> N
             rig.vehicle.demand(Demand.FLY)
             await rig.until(lambda: rig.known().armed)
             await asyncio.sleep(3.0)
-            assert rig.peer._thrust == 0.0
+            assert rig.peer.thrust == 0.0
             assert rig.known().in_control
             await rig.take_off(1.0)
             await asyncio.sleep(1.5)  # the mission is dead
@@ -48,7 +49,7 @@ def test_the_idle_stream_carries_no_thrust_and_never_keeps_a_flight_alive() -> N
             assert rig.peer.truth().height_m == pytest.approx(0.1, abs=0.01)
             assert not rig.known().armed
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_the_failsafe_of_a_lost_link_is_a_take_over() -> None:
@@ -63,7 +64,7 @@ def test_the_failsafe_of_a_lost_link_is_a_take_over() -> None:
             assert not rig.known().in_control
             assert not any(await rig.stream(1.0, climb_mps=0.5))
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_arming_refusals_carry_px4s_words() -> None:
@@ -77,7 +78,7 @@ def test_arming_refusals_carry_px4s_words() -> None:
             )
             await rig.until(lambda: rig.known().armed)
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize("hover", [0.22, 0.34, 0.6])
@@ -99,7 +100,7 @@ def test_the_hover_thrust_is_found_whatever_the_airframe(hover: float) -> None:
             await rig.stream(10.0)
             assert rig.peer.truth().height_m == pytest.approx(height_m, abs=0.15)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_the_hover_thrust_that_was_found_is_not_lost_to_a_parameter_that_comes_late() -> None:
@@ -113,7 +114,7 @@ def test_the_hover_thrust_that_was_found_is_not_lost_to_a_parameter_that_comes_l
                 await rig.stream(0.1)
                 assert abs(rig.peer.truth().climb_mps) < 0.2
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_thrust_is_cut_after_touch_down_so_that_it_reports_landed() -> None:
@@ -124,10 +125,10 @@ def test_thrust_is_cut_after_touch_down_so_that_it_reports_landed() -> None:
                 await rig.stream(0.1, climb_mps=-0.3)
             await rig.stream(2.0, climb_mps=-0.3)
             assert rig.known().landed is LandedState.ON_GROUND
-            assert rig.peer._thrust == 0.0
+            assert rig.peer.thrust == 0.0
             assert rig.peer.airframe.touchdown_mps < 0.5
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_setpoints_are_refused_while_not_ours() -> None:
@@ -135,9 +136,9 @@ def test_setpoints_are_refused_while_not_ours() -> None:
         async with px4_rig() as rig:
             await asyncio.sleep(2.0)
             assert rig.vehicle.send(AttitudeSetpoint(0, climb_mps=1.0)) is False
-            assert rig.peer._thrust == 0.0
+            assert rig.peer.thrust == 0.0
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize("told", ["nothing more", "that it stands"])
@@ -166,4 +167,4 @@ def test_a_flight_whose_landed_state_stays_that_of_the_floor_is_not_dropped(told
             await rig.stream(1.0, climb_mps=-0.3)
             assert rig.peer.truth().height_m > 1.0
 
-    run_virtual(test)
+    virtual(test())

@@ -25,7 +25,8 @@ from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.plant.airframe import Airframe
 from tests.protocol.mavlink.test_codec import StoppedClock
-from tests.protocol.rig import Rig, run_virtual
+from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import Rig
 
 KEY = bytes(range(32))
 NOW_UNIX_S = 1_795_000_000.0
@@ -56,7 +57,7 @@ def test_a_key_that_was_given_signs_the_flight_and_locks_others_out() -> None:
         with pytest.raises(UnavailableError):  # an unsigned link takes no other key any more
             await give_key(url, bytes(32), clock, NOW_UNIX_S)
 
-    run_virtual(lambda: with_peer(ArduCopterPeer, flight))
+    virtual(with_peer(ArduCopterPeer, flight))
 
 
 def test_an_examination_without_the_key_says_that_one_is_needed() -> None:
@@ -68,14 +69,14 @@ def test_an_examination_without_the_key_says_that_one_is_needed() -> None:
             with pytest.raises(UnavailableError, match=r"signs its messages.*vehicle\.signing_key"):
                 await examination.report()
 
-    run_virtual(lambda: with_peer(ArduCopterPeer, test))
+    virtual(with_peer(ArduCopterPeer, test))
 
 
 def test_an_autopilot_that_does_not_sign_is_not_said_to() -> None:
     async def test(_peer: AutopilotPeer, url: str, clock: LoopClock) -> None:
         assert not await give_key(url, KEY, clock, NOW_UNIX_S)
 
-    run_virtual(lambda: with_peer(Px4Peer, test))
+    virtual(with_peer(Px4Peer, test))
 
 
 def test_an_armed_vehicle_and_a_silent_one_get_no_key() -> None:
@@ -89,7 +90,7 @@ def test_an_armed_vehicle_and_a_silent_one_get_no_key() -> None:
         with pytest.raises(UnavailableError, match="no ArduPilot or PX4"):
             await give_key(url, KEY, clock, NOW_UNIX_S)
 
-    run_virtual(lambda: with_peer(ArduCopterPeer, test))
+    virtual(with_peer(ArduCopterPeer, test))
 
 
 @pytest.mark.parametrize(
@@ -142,4 +143,4 @@ def test_the_flight_over_a_signed_link() -> None:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())

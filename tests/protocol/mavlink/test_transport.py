@@ -8,7 +8,7 @@ import fcntl
 import os
 import socket
 import termios
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -23,11 +23,19 @@ from flightd.adapters.vehicle.mavlink.link.transport import SerialTransport, Tcp
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.datagrams import PacedDatagrams, open_paced_datagrams
+from flightd.runtime.datagrams import (
+    Datagrams,
+    OpenDatagrams,
+    PacedDatagrams,
+    open_datagrams,
+    open_paced_datagrams,
+)
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.plant.airframe import Airframe
-from tests.protocol.rig import Rig, run_virtual
+from tests.rigs.event_loops import real, virtual
+from tests.rigs.free_ports import free_port
+from tests.rigs.vehicles import Rig
 
 _TIOCGEXCL = 0x80045440
 """Whether a terminal refuses to be opened once more; `termios` leaves it out."""
@@ -89,7 +97,7 @@ def test_a_baud_rate_that_does_not_exist_is_bad_input() -> None:
         with pytest.raises(InputError, match="baud"):
             ArduPilotVehicle("serial:///dev/ttyAMA0:12345", LoopClock())
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_port_in_use_is_told_in_one_line() -> None:
@@ -101,7 +109,7 @@ def test_a_port_in_use_is_told_in_one_line() -> None:
                 await vehicle.run()
             assert "\n" not in str(caught.value)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_what_is_no_serial_device_is_told() -> None:
@@ -109,14 +117,7 @@ def test_what_is_no_serial_device_is_told() -> None:
         with pytest.raises(UnavailableError, match="not a serial device"):
             await ArduPilotVehicle("serial:///dev/null:57600", LoopClock()).run()
 
-    run_virtual(test)
-
-
-def free_port(kind: int = socket.SOCK_DGRAM) -> int:
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+    virtual(test())
 
 
 def test_a_listening_vehicle_answers_the_autopilot_that_calls() -> None:
@@ -128,11 +129,13 @@ def test_a_listening_vehicle_answers_the_autopilot_that_calls() -> None:
         tasks = [asyncio.create_task(vehicle.run()), asyncio.create_task(peer.run())]
         rig = Rig(vehicle, peer, lambda: None, lambda apart: None)
         await rig.take_off(1.0)
+        assert rig.known().in_control
+        assert peer.truth().height_m > 0.9
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_while_the_autopilot_speaks_no_other_address_can_replace_it() -> None:
@@ -155,7 +158,7 @@ def test_while_the_autopilot_speaks_no_other_address_can_replace_it() -> None:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())
 
 
 class StreamAutopilot(asyncio.Protocol):
@@ -227,7 +230,7 @@ def test_tcp_waits_for_the_other_side_and_comes_back_after_a_loss() -> None:
             server.close()
             await server.wait_closed()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_stalled_tcp_line_drops_what_is_new_instead_of_piling_it_up() -> None:
@@ -245,16 +248,33 @@ def test_a_stalled_tcp_line_drops_what_is_new_instead_of_piling_it_up() -> None:
             server.close()
             await server.wait_closed()
 
-    run_virtual(test)
+    virtual(test())
+
+
+class NotedOpener:
+    """Keeps each socket that `opener` opens, with what is told of its errors."""
+
+    def __init__(self, opener: OpenDatagrams) -> None:
+        self._opener = opener
+        self.opened: list[tuple[Datagrams, Callable[[OSError], None]]] = []
+
+    async def __call__(
+        self, received: Callable[[bytes, Any], None], failed: Callable[[OSError], None], **place: Any
+    ) -> Datagrams:
+        endpoint = await self._opener(received, failed, **place)
+        self.opened.append((endpoint, failed))
+        return endpoint
 
 
 def test_a_stalled_network_drops_datagrams_instead_of_piling_them_up() -> None:
     async def test() -> None:
-        line = UdpTransport(parse_endpoint("udpout://127.0.0.1:9"), open_paced_datagrams)
+        opener = NotedOpener(open_paced_datagrams)
+        line = UdpTransport(parse_endpoint("udpout://127.0.0.1:9"), opener)
         await line.open()
-        assert isinstance(line._open, PacedDatagrams)
-        standing: Any = StandingSocket(line._open.socket)
-        line._open.socket = standing
+        ((endpoint, _),) = opener.opened
+        assert isinstance(endpoint, PacedDatagrams)
+        standing: Any = StandingSocket(endpoint.socket)
+        endpoint.socket = standing
         assert [line.send(b"old") for _ in range(20)] == [False] * 20
         await asyncio.sleep(0.02)
         standing.runs = True
@@ -263,11 +283,12 @@ def test_a_stalled_network_drops_datagrams_instead_of_piling_them_up() -> None:
         assert standing.sent == [b"newest"]
         line.close()
 
-    asyncio.run(test())
+    real(test())
 
 
 def test_a_called_socket_of_another_network_is_opened_anew() -> None:
     async def test() -> None:
+        opener = NotedOpener(open_datagrams)
         for url, number, opened_anew in (
             ("udpout://127.0.0.1:9", errno.EINVAL, True),
             ("udpout://127.0.0.1:9", errno.ENETUNREACH, True),
@@ -275,15 +296,17 @@ def test_a_called_socket_of_another_network_is_opened_anew() -> None:
             ("udpin://127.0.0.1:0", errno.ENETUNREACH, False),
         ):
             kind, _, place = url.partition("://")
-            line = UdpTransport(Endpoint(EndpointKind(kind), "127.0.0.1", int(place.rpartition(":")[2])))
+            endpoint = Endpoint(EndpointKind(kind), "127.0.0.1", int(place.rpartition(":")[2]))
+            line = UdpTransport(endpoint, opener)
             losses: list[int] = []
             line.lost = lambda losses=losses: losses.append(1)  # type: ignore[misc]
             await line.open()
-            line._failed(OSError(number, "no way out"))
+            _, failed = opener.opened[-1]
+            failed(OSError(number, "no way out"))
             assert bool(losses) is opened_anew, (url, number)
             line.close()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_tcp_port_that_never_answers_is_called_again_soon() -> None:
@@ -306,7 +329,7 @@ def test_a_tcp_port_that_never_answers_is_called_again_soon() -> None:
             for caller in waiting:
                 caller.close()
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_serial_line_is_opened_raw_heard_and_found_again_after_a_loss(tmp_path: Path) -> None:
@@ -343,7 +366,7 @@ def test_a_serial_line_is_opened_raw_heard_and_found_again_after_a_loss(tmp_path
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(
@@ -368,7 +391,7 @@ def test_a_serial_line_that_goes_away_while_it_is_opened_is_tried_again(
         os.close(slave)
         os.close(master)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def is_exclusive(fd: int) -> bool:
@@ -396,7 +419,7 @@ def test_a_serial_line_that_another_program_has_is_waited_for_and_then_had_alone
         for fd in (late, slave, master):
             os.close(fd)
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_demand_before_the_link_is_worked_on_when_it_comes() -> None:
@@ -414,4 +437,4 @@ def test_a_demand_before_the_link_is_worked_on_when_it_comes() -> None:
             task.cancel()
         await asyncio.gather(running, serving, return_exceptions=True)
 
-    run_virtual(test)
+    virtual(test())

@@ -16,15 +16,10 @@ from flightd.adapters.camera.shared_memory import SharedCamera
 from flightd.config.camera import CameraConfig
 from flightd.core.errors import InputError, TransientError, UnavailableError
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from flightd.runtime.frame_notice import FrameNotice, encode_notice
 from flightd.runtime.frame_ring import FrameTicket
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+from tests.rigs.event_loops import real, virtual
+from tests.rigs.free_ports import free_port
 
 
 def notice(seq: int, device_ns: int, width: int = 64) -> bytes:
@@ -52,11 +47,11 @@ def test_notices_become_tickets_in_our_time_and_junk_is_counted() -> None:
             sender.sendto(notice(seq, clock.now_ns() + 10**15))
         await asyncio.sleep(0.01)
         running.cancel()
+        await asyncio.wait([running])
         sender.close()
         return tickets, camera
 
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-        tickets, camera = runner.run(main())
+    tickets, camera = virtual(main())
     assert [t.seq for t in tickets] == [0, 1, 2]
     assert camera.rejected == 5
     assert len(troubles) == 1, "told once, not for every datagram"
@@ -72,7 +67,7 @@ def test_a_port_in_use_is_said_in_one_line() -> None:
             await SharedCamera(url, (64, 36), 0.0, LoopClock(), lambda _: None, print).run()
 
     with pytest.raises(UnavailableError, match="in use; is another flightd running"):
-        asyncio.run(main())
+        real(main())
 
 
 @pytest.mark.parametrize(
@@ -83,7 +78,7 @@ def test_a_wrong_address_is_refused_before_anything_opens(url: str) -> None:
         connect_camera(CameraConfig(url=url), LoopClock(), lambda _: None, print)
 
     with pytest.raises(InputError, match=r"camera\.url"):
-        asyncio.run(main())
+        real(main())
 
 
 def write_pictures(folder: Path, count: int) -> None:
@@ -101,7 +96,7 @@ def test_a_folder_is_played_in_order_and_its_end_is_told(tmp_path: Path) -> None
         await CaptureCamera(source, 0.01, LoopClock(), tickets.append).run()
 
     with pytest.raises(TransientError, match="no more pictures"):
-        asyncio.run(main())
+        real(main())
     assert [t.seq for t in tickets] == [0, 1, 2, 3]
     assert all(t.stamp_ns < t.arrival_ns - 9_000_000 for t in tickets)
 
@@ -114,4 +109,4 @@ def test_pictures_of_another_size_are_refused_by_name(tmp_path: Path) -> None:
         await CaptureCamera(source, 0.0, LoopClock(), lambda _: None).run()
 
     with pytest.raises(TransientError, match="pictures are 64x36, the configuration says 640x360"):
-        asyncio.run(main())
+        real(main())

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from flightd.adapters.camera.capture import Source, SourceKind, _pictures
+from flightd.adapters.camera.capture import Source, SourceKind, pictures_of
 from flightd.adapters.camera.exposure import DeviceExposure
 
 AUTOMATIC = 3.0
@@ -78,7 +78,9 @@ def test_a_device_is_left_with_the_exposure_that_it_was_found_with(
     device = Device(200.0)
     monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
     ours, theirs = multiprocessing.Pipe()
-    with closing(_pictures(Source(SourceKind.DEVICE, Path("/dev/video0"), 64, 36, 30.0), theirs)) as pictures:
+    with closing(
+        pictures_of(Source(SourceKind.DEVICE, Path("/dev/video0"), 64, 36, 30.0), theirs)
+    ) as pictures:
         next(pictures)
         before = dict(device.values)
         ours.send(0.4)

@@ -15,7 +15,7 @@ from flightd.config.schema import Config, parse_config
 from flightd.core.errors import InputError
 from flightd.ports import PoseTaker
 from flightd.runtime.clock import LoopClock
-from tests.protocol.rig import run_virtual
+from tests.rigs.event_loops import virtual
 
 
 def parsed(folder: Path, **vehicle: Any) -> Config:
@@ -77,7 +77,7 @@ def test_the_adapter_gets_mode_key_and_outputs(tmp_path: Path) -> None:
         assert vehicle.flying_mode == GUIDED
         assert (tmp_path / "mavlink.key.stamp").exists()  # stamps are claimed before the first is used
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_missing_key_is_told_before_anything_opens(tmp_path: Path) -> None:
@@ -85,4 +85,4 @@ def test_a_missing_key_is_told_before_anything_opens(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=r"gone.key.*flightd keygen"):
             connect_vehicle(parsed(tmp_path, signing_key="gone.key").vehicle, LoopClock())
 
-    run_virtual(test)
+    virtual(test())

@@ -2,8 +2,6 @@ from __future__ import annotations
 
 import asyncio
 import shutil
-import time
-from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +14,8 @@ from flightd.adapters.recorder.mcap_file import McapFile, is_whole
 from flightd.app.run import room_kept
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.replay.log import read_log
+from tests.rigs.event_loops import real
+from tests.rigs.waiting import until
 
 STARTED = datetime(2026, 3, 1, 12, 0, 5, tzinfo=UTC)
 MEGABYTE = 1 << 20
@@ -88,14 +88,20 @@ def test_a_short_disk_costs_old_flights_too(tmp_path: Path, monkeypatch: pytest.
     assert archive.make_room() == folders[:2]
 
 
-def test_logs_that_were_cut_off_are_mended_at_the_next_start(tmp_path: Path) -> None:
-    archive = FlightArchive(tmp_path, 100 * MEGABYTE)
-    log = archive.begin(STARTED)
-    file = McapFile.create(log)
+def _write_cut_off(log: Path) -> None:
+    """As a log with one message is when its writer was killed."""
+    file = McapFile.create(log.with_suffix(".whole"))
     file.add_channel(1, "/a", "A", "{}")
     file.add_message(1, 1, b"{}")
     file.flush()
-    file._stream.close()
+    shutil.copyfile(log.with_suffix(".whole"), log)
+    file.close()
+
+
+def test_logs_that_were_cut_off_are_mended_at_the_next_start(tmp_path: Path) -> None:
+    archive = FlightArchive(tmp_path, 100 * MEGABYTE)
+    log = archive.begin(STARTED)
+    _write_cut_off(log)
     (archive.begin(STARTED)).write_bytes(b"not a log")
     later = FlightArchive(tmp_path, 100 * MEGABYTE)
     assert read_log(log).damage
@@ -117,34 +123,24 @@ def test_a_log_that_is_still_being_written_is_left_alone(tmp_path: Path) -> None
     assert len(read_log(log).entries) == 2
 
 
-def _wait_until(condition: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline_s
-        time.sleep(0.01)
-
-
 def test_beside_a_flight_it_mends_and_makes_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     broken = FlightArchive(tmp_path, 100 * MEGABYTE).begin(STARTED)
-    file = McapFile.create(broken)
-    file.add_channel(1, "/a", "A", "{}")
-    file.flush()
-    file._stream.close()
+    _write_cut_off(broken)
     archive = FlightArchive(tmp_path, 5 * MEGABYTE)
     current = archive.begin(STARTED)
 
     async def fly() -> None:
         running = asyncio.ensure_future(archive.run())
-        await asyncio.to_thread(_wait_until, lambda: is_whole(broken))
+        await until(lambda: is_whole(broken))
         for _ in range(7):  # the flight fills the disk
             with current.open("ab") as stream:
                 stream.write(b"x" * MEGABYTE)
-        await asyncio.to_thread(_wait_until, lambda: not broken.parent.exists())
+        await until(lambda: not broken.parent.exists())
         running.cancel()
         await asyncio.wait([running])
 
     monkeypatch.setattr(archive_module, "ROOM_S", 0.05)
-    asyncio.run(fly())
+    real(fly())
     assert archive.flights() == [current.parent]
 
 
@@ -177,8 +173,8 @@ def test_trouble_with_the_archive_is_told_at_once_and_the_flight_goes_on(
         async with room_kept(archive, hear), asyncio.timeout(10.0):
             await heard.wait()
 
-    asyncio.run(flight(OSError(5, "Input/output error")))
+    real(flight(OSError(5, "Input/output error")))
     assert "cannot make room" in told[0]
     assert "Input/output error" in told[0]
-    asyncio.run(flight(ZeroDivisionError("a fault")))
+    real(flight(ZeroDivisionError("a fault")))
     assert "not looked after any more" in told[0]

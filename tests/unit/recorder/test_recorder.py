@@ -6,15 +6,15 @@ import json
 import math
 import os
 import signal
-import socket
 import subprocess
-import time
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from flightd.adapters.recorder.mcap_file import is_whole
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.adapters.recorder.schemas import schema_of
 from flightd.core.errors import UnavailableError
@@ -38,7 +38,10 @@ from flightd.core.types import (
 )
 from flightd.ports import Recorder
 from flightd.replay.log import read_log
+from tests.rigs.event_loops import real
+from tests.rigs.waiting import until
 
+ROOT = Path(__file__).parents[3]
 LINE = Line(12.5, 0.1, 31.0, -170.0, 180.0, 0.93, 0.12, 0.0011, 1e-5)
 LINES = LineSet(
     7,
@@ -149,7 +152,7 @@ def test_a_log_that_another_recorder_writes_is_not_taken_from_it(tmp_path: Path)
     with McapRecorder(path) as recorder:
         recorder.record(Topic.POSE, 2, POSE)
         recorder.push()
-        _wait_for(path, 1)
+        real(_readable(path, 1))
         with pytest.raises(UnavailableError, match="another process is writing"):
             McapRecorder(path)
     assert len(read_log(path).entries) == 1
@@ -168,13 +171,13 @@ def test_nothing_is_lost_in_a_clean_close_under_load(tmp_path: Path) -> None:
 def test_a_full_queue_drops_and_counts_instead_of_waiting(tmp_path: Path) -> None:
     recorder = McapRecorder(tmp_path / "flight.mcap", queue_bytes=100_000)
     recorder.record(Topic.SETPOINT, 0, AttitudeSetpoint(0))
-    os.kill(recorder._child.pid, signal.SIGSTOP)
+    os.kill(recorder.pid, signal.SIGSTOP)
     for index in range(1, 20_000):
         recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index, 0.01))
     dropped = recorder.dropped
     assert dropped > 1_000
-    assert len(recorder._queue) <= 100_000
-    os.kill(recorder._child.pid, signal.SIGCONT)
+    assert recorder.waiting_bytes <= 100_000
+    os.kill(recorder.pid, signal.SIGCONT)
     recorder.close()
     assert recorder.dropped == dropped
     assert recorder.written == 20_000 - dropped
@@ -185,31 +188,21 @@ def test_a_full_queue_drops_and_counts_instead_of_waiting(tmp_path: Path) -> Non
 
 def test_pictures_are_lost_before_decisions(tmp_path: Path) -> None:
     recorder = McapRecorder(tmp_path / "flight.mcap", queue_bytes=1_000_000)
-    os.kill(recorder._child.pid, signal.SIGSTOP)
+    os.kill(recorder.pid, signal.SIGSTOP)
     for seq in range(50):
         recorder.image(Topic.FRAME, seq, seq, b"x" * 50_000)
     for index in range(1_000):
         recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
-    os.kill(recorder._child.pid, signal.SIGCONT)
+    os.kill(recorder.pid, signal.SIGCONT)
     recorder.close()
     log = read_log(tmp_path / "flight.mcap")
     assert len(log.messages(AttitudeSetpoint)) == 1_000
     assert 0 < len(log.messages(RecordedFrame)) < 50
 
 
-def _wait_for(path: Path, count: int) -> None:
+async def _readable(path: Path, count: int) -> None:
     """Until `count` messages can be read from a file that is still being written."""
-    deadline_s = time.monotonic() + 30
-    while len(read_log(path).entries) < count:
-        assert time.monotonic() < deadline_s
-        time.sleep(0.05)
-
-
-def _wait_for_restart(recorder: McapRecorder) -> None:
-    deadline_s = time.monotonic() + 30
-    while not recorder.restarts:
-        assert time.monotonic() < deadline_s
-        time.sleep(0.01)
+    await until(lambda: len(read_log(path).entries) >= count)
 
 
 def test_the_log_is_readable_after_kill_9_and_goes_on_in_the_same_file(tmp_path: Path) -> None:
@@ -221,9 +214,9 @@ def test_the_log_is_readable_after_kill_9_and_goes_on_in_the_same_file(tmp_path:
         for index in range(100):
             recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
         running = asyncio.create_task(recorder.run())
-        await asyncio.to_thread(_wait_for, path, 101)
-        recorder._child.kill()
-        await asyncio.to_thread(_wait_for_restart, recorder)
+        await _readable(path, 101)
+        os.kill(recorder.pid, signal.SIGKILL)
+        await until(lambda: recorder.restarts)
         for index in range(100, 200):
             recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
         running.cancel()
@@ -231,7 +224,7 @@ def test_the_log_is_readable_after_kill_9_and_goes_on_in_the_same_file(tmp_path:
         recorder.close()
         return recorder
 
-    recorder = asyncio.run(fly())
+    recorder = real(fly())
     log = read_log(path)
     assert log.damage == ""
     assert [setpoint.stamp_ns for setpoint in log.messages(AttitudeSetpoint)] == list(range(200))
@@ -244,24 +237,36 @@ def test_the_log_is_readable_after_kill_9_and_goes_on_in_the_same_file(tmp_path:
 
 def test_what_died_with_the_writer_is_counted_as_dropped(tmp_path: Path) -> None:
     recorder = McapRecorder(tmp_path / "flight.mcap")
-    os.kill(recorder._child.pid, signal.SIGSTOP)
+    os.kill(recorder.pid, signal.SIGSTOP)
     for index in range(10):
         recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
-    recorder._child.kill()
-    recorder._child.wait()
+    os.kill(recorder.pid, signal.SIGKILL)
+    os.waitid(os.P_PID, recorder.pid, os.WEXITED | os.WNOWAIT)
     recorder.close()
     assert recorder.dropped == 10
     (told,) = read_log(tmp_path / "flight.mcap").entries
     assert told.topic == Topic.EVENT
 
 
+KILLED_DAEMON = """
+import os, signal, sys
+from pathlib import Path
+from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.core.topics import Topic
+from flightd.core.types import AttitudeSetpoint
+
+recorder = McapRecorder(Path(sys.argv[1]))
+recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
+recorder.push()
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
 def test_the_log_is_finished_when_the_daemon_is_killed(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
-    recorder = McapRecorder(path)
-    recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
-    recorder.push()
-    recorder._link.close()  # what the kernel does to a killed process
-    recorder._child.wait(30)
+    killed = subprocess.run([sys.executable, "-c", KILLED_DAEMON, str(path)], cwd=ROOT, check=False)
+    assert killed.returncode == -signal.SIGKILL
+    real(until(lambda: is_whole(path)))
     log = read_log(path)
     assert log.damage == ""
     assert len(log.entries) == 1
@@ -272,9 +277,9 @@ def test_a_stop_of_the_service_does_not_stop_the_writer(tmp_path: Path) -> None:
     with McapRecorder(path) as recorder:
         recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
         recorder.push()
-        _wait_for(path, 1)
+        real(_readable(path, 1))
         for name in (signal.SIGTERM, signal.SIGINT):
-            os.kill(recorder._child.pid, name)
+            os.kill(recorder.pid, name)
         recorder.record(Topic.SETPOINT, 2, AttitudeSetpoint(2))
     assert recorder.written == 2
     assert recorder.restarts == 0
@@ -375,16 +380,19 @@ def test_run_hands_over_what_waits_without_further_messages(tmp_path: Path) -> N
         with McapRecorder(path) as recorder:
             recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
             running = asyncio.create_task(recorder.run())
-            await asyncio.to_thread(_wait_for, path, 1)
+            await _readable(path, 1)
             running.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await running
 
-    asyncio.run(fly())
+    real(fly())
 
 
 def test_close_can_be_called_twice(tmp_path: Path) -> None:
     recorder = McapRecorder(tmp_path / "flight.mcap")
-    recorder.close()
-    recorder.close()
-    assert isinstance(recorder._link, socket.socket)
+    recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
+    for _ in range(2):
+        recorder.close()
+        assert (recorder.written, recorder.dropped, recorder.restarts) == (1, 0, 0)
+    log = read_log(tmp_path / "flight.mcap")
+    assert (len(log.entries), log.damage) == (1, "")

@@ -6,7 +6,7 @@ import asyncio
 import itertools
 import os
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +22,13 @@ from flightd.runtime.datagrams import (
     open_paced_datagrams,
 )
 from flightd.runtime.event_loops import VirtualLoop
-
-REAL: Callable[[], asyncio.AbstractEventLoop] = asyncio.new_event_loop
-LOOPS = pytest.mark.parametrize("make_loop", [REAL, VirtualLoop], ids=["real", "virtual"])
+from tests.rigs.event_loops import real, virtual
 
 
 def opener_here() -> OpenDatagrams:
     """What a flight on the running loop opens its sockets with."""
-    virtual = isinstance(asyncio.get_running_loop(), VirtualLoop)
-    return open_datagrams if virtual else open_paced_datagrams
+    jumps = isinstance(asyncio.get_running_loop(), VirtualLoop)
+    return open_datagrams if jumps else open_paced_datagrams
 
 
 class Ear:
@@ -44,13 +42,8 @@ class Ear:
         return await opener_here()(lambda data, _: self.heard.append(data), self.errors.append, **place)
 
 
-def run(make_loop: Callable[[], asyncio.AbstractEventLoop], test: Callable[[], Any]) -> None:
-    with asyncio.Runner(loop_factory=make_loop) as runner:
-        runner.run(test())
-
-
-@LOOPS
-def test_a_flood_arrives_whole_and_in_order(make_loop: Callable[[], asyncio.AbstractEventLoop]) -> None:
+@pytest.mark.parametrize("run", [real, virtual])
+def test_a_flood_arrives_whole_and_in_order(run: Callable[[Coroutine[Any, Any, None]], None]) -> None:
     async def test() -> None:
         ear, mouth = Ear(), Ear()
         listening = await ear.open(local_addr=("127.0.0.1", 0))
@@ -71,7 +64,7 @@ def test_a_flood_arrives_whole_and_in_order(make_loop: Callable[[], asyncio.Abst
             assert not endpoint.send(b"too late")
         await asyncio.sleep(0.01)
 
-    run(make_loop, test)
+    run(test())
 
 
 def test_a_port_that_refuses_is_told_and_outlived() -> None:
@@ -93,7 +86,7 @@ def test_a_port_that_refuses_is_told_and_outlived() -> None:
         assert (data, ear.heard) == (b"hello", [b"and you"])
         calling.close()
 
-    run(REAL, test)
+    real(test())
 
 
 def test_a_socket_closed_by_what_it_brought_is_left_alone() -> None:
@@ -113,7 +106,7 @@ def test_a_socket_closed_by_what_it_brought_is_left_alone() -> None:
         assert ear.heard == [b"first"]
         assert ear.errors == []
 
-    run(REAL, test)
+    real(test())
 
 
 def test_a_busy_line_is_read_in_batches_and_a_quiet_one_at_once() -> None:
@@ -161,7 +154,7 @@ def test_a_busy_line_is_read_in_batches_and_a_quiet_one_at_once() -> None:
         os.close(out)
         os.close(into)
 
-    run(VirtualLoop, test)
+    virtual(test())
 
 
 def test_a_busy_line_is_read_on_after_a_message_whose_taking_failed() -> None:
@@ -187,7 +180,7 @@ def test_a_busy_line_is_read_on_after_a_message_whose_taking_failed() -> None:
         line.close()
         there.close()
 
-    run(VirtualLoop, test)
+    virtual(test())
 
 
 def test_what_does_not_block_is_never_waited_for() -> None:
@@ -201,7 +194,7 @@ def test_what_does_not_block_is_never_waited_for() -> None:
         line.close()
         there.close()
 
-    run(REAL, test)
+    real(test())
 
 
 def test_an_endpoint_of_asyncios_that_holds_a_datagram_back_is_stalled(tmp_path: Path) -> None:
@@ -226,4 +219,4 @@ def test_an_endpoint_of_asyncios_that_holds_a_datagram_back_is_stalled(tmp_path:
         transport.abort()
         there.close()
 
-    run(REAL, test)
+    real(test())

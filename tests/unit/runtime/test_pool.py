@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import time
 from functools import partial
 
 import numpy as np
@@ -16,9 +15,10 @@ from flightd.app.simulation.lockstep import LockstepDetectors
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.core.types import Image, LineSet
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
-from tests.held_time import held
+from tests.rigs.event_loops import real, virtual
+from tests.rigs.held_time import held
+from tests.rigs.waiting import until
 
 
 class MeanDetector:
@@ -26,7 +26,7 @@ class MeanDetector:
 
     def detect(self, bgr: Image, seq: int = 0, stamp_ns: int = 0) -> LineSet:
         if seq == 13:
-            time.sleep(60)
+            signal.pause()
         if seq == 14:
             os.kill(os.getpid(), signal.SIGKILL)
         if seq == 15:
@@ -57,7 +57,7 @@ def test_pictures_reach_the_workers_through_shared_memory() -> None:
         finally:
             ring.close()
 
-    assert asyncio.run(main()) == ["0", "10", "20", "30"]
+    assert real(main()) == ["0", "10", "20", "30"]
 
 
 @pytest.mark.parametrize(("seq", "why"), [(13, "hung"), (14, "died"), (15, "nothing")])
@@ -72,7 +72,7 @@ def test_a_worker_that_fails_costs_one_picture_and_is_replaced(seq: int, why: st
         finally:
             ring.close()
 
-    answers, pool = asyncio.run(main())
+    answers, pool = real(main())
     assert answers[0] is None
     assert None not in answers[1:]
     assert pool.lost.total() == 1
@@ -87,13 +87,12 @@ def test_idle_workers_killed_from_outside_are_replaced() -> None:
                 await pool.ready()
                 for pid in pool.pids:
                     os.kill(pid, signal.SIGKILL)
-                while pool.replaced < 2:  # noqa: ASYNC110 - the pool has no event for it
-                    await asyncio.sleep(0.01)
+                await until(lambda: pool.replaced >= 2)
                 return await pool.detect(ticket(ring, 1, 5)), len(pool.pids)
         finally:
             ring.close()
 
-    detection, workers = asyncio.run(main())
+    detection, workers = real(main())
     assert detection is not None
     assert workers == 2
 
@@ -109,7 +108,7 @@ def test_a_picture_that_was_overwritten_is_lost_never_mistaken() -> None:
         finally:
             ring.close()
 
-    assert asyncio.run(main()) is None
+    assert real(main()) is None
 
 
 def test_the_ring_refuses_foreign_names_and_slots() -> None:
@@ -142,5 +141,4 @@ def test_in_lockstep_a_detector_that_hangs_costs_one_picture() -> None:
         finally:
             ring.close()
 
-    with asyncio.Runner(loop_factory=lambda: VirtualLoop(patience_s=3.0)) as runner:
-        assert runner.run(main()) == [True, False, True, True]
+    assert virtual(main(), patience_s=3.0) == [True, False, True, True]

@@ -8,7 +8,7 @@ import itertools
 from flightd.app.setpoint_pump import SetpointPump
 from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, VehicleState
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
+from tests.rigs.event_loops import virtual
 
 MS = 1_000_000
 
@@ -52,16 +52,12 @@ async def pumped(
         pump.set(None)
     await asyncio.sleep(watch_s)
     running.cancel()
+    await asyncio.wait([running])
     return [(at - start, setpoint) for at, setpoint in wire.sent]
 
 
-def run(main: object) -> list[tuple[int, AttitudeSetpoint]]:
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-        return runner.run(main)  # type: ignore[arg-type]
-
-
 def test_a_dead_maker_of_set_points_leaves_level_and_hold_on_the_wire() -> None:
-    sent = run(pumped(0.2, 1.0))
+    sent = virtual(pumped(0.2, 1.0))
     gaps = [b[0] - a[0] for a, b in itertools.pairwise(sent)]
     assert max(gaps) <= 30 * MS
     late = [s for at, s in sent if at > (200 + 150 + 30) * MS]
@@ -70,10 +66,10 @@ def test_a_dead_maker_of_set_points_leaves_level_and_hold_on_the_wire() -> None:
 
 
 def test_a_fresh_set_point_leaves_at_once() -> None:
-    sent = run(pumped(1.0, 0.0))
+    sent = virtual(pumped(1.0, 0.0))
     assert all(at == setpoint.stamp_ns - sent[0][1].stamp_ns + sent[0][0] for at, setpoint in sent)
 
 
 def test_hands_off_means_silence() -> None:
-    sent = run(pumped(0.2, 1.0, silence=True))
+    sent = virtual(pumped(0.2, 1.0, silence=True))
     assert max(at for at, _ in sent) <= 200 * MS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import time
+import threading
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -14,8 +14,9 @@ from flightd.core.inventory import LocationRecord, LocationState, Observation, P
 from flightd.core.scanning import Finding, Settled
 from flightd.core.types import CodeRead
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
-from tests.held_time import held
+from tests.rigs.event_loops import real, virtual
+from tests.rigs.held_time import held
+from tests.rigs.waiting import until
 
 READ = CodeRead("QR Code", "PALLET", ((0.0, 0.0),) * 4, True, 2, 1.0)
 
@@ -25,12 +26,13 @@ def finding(number: int) -> Finding:
 
 
 class StubbornStore:
-    """A store whose disk refuses the first `refusals` writes, and takes `wait_s` for each other."""
+    """A store whose disk refuses the first `refusals` writes, and writes nothing until it `runs`."""
 
-    def __init__(self, store: SqliteStore, refusals: int, wait_s: float = 0.0) -> None:
+    def __init__(self, store: SqliteStore, refusals: int = 0) -> None:
         self._store = store
         self._refusals = refusals
-        self._wait_s = wait_s
+        self.runs = threading.Event()
+        self.runs.set()
 
     def plan(self, locations: Iterable[PlannedLocation]) -> None:
         self._store.plan(locations)
@@ -39,7 +41,7 @@ class StubbornStore:
         return self._store.keep_evidence(jpeg)
 
     def commit(self, observation: Observation, confirmed: bool = True) -> None:
-        time.sleep(self._wait_s)
+        assert self.runs.wait(30.0), "the disk never came back"
         if self._refusals:
             self._refusals -= 1
             raise UnavailableError("disk full")
@@ -75,8 +77,7 @@ async def write(store: StubbornStore, troubles: list[str], seconds: float) -> St
 def run(folder: Path, refusals: int, seconds: float) -> tuple[list[LocationRecord], list[str], StoreWriter]:
     troubles: list[str] = []
     with SqliteStore(folder) as store:
-        with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-            writer = runner.run(write(StubbornStore(store, refusals), troubles, seconds))
+        writer = virtual(write(StubbornStore(store, refusals), troubles, seconds))
         return store.locations(), troubles, writer
 
 
@@ -104,18 +105,19 @@ def test_what_is_left_when_the_flight_ends_is_written_on_the_way_out(tmp_path: P
 
 
 def test_the_writer_never_holds_up_the_loop(tmp_path: Path) -> None:
-    async def main(store: StubbornStore) -> int:
-        ticks = 0
+    async def main(store: StubbornStore) -> None:
+        store.runs.clear()
         with StoreWriter(store, "run", 0, LoopClock(), lambda _: None) as writer:
             running = asyncio.ensure_future(writer.run(lambda _: None))
             for number in range(5):
                 writer.put(finding(number), b"")
-            while writer.waiting:
-                ticks += 1
-                await asyncio.sleep(0.002)
+            for _ in range(10):
+                await asyncio.sleep(0.01)
+            assert writer.waiting == 5, "the disk is stuck, the loop goes on"
+            store.runs.set()
+            await until(lambda: not writer.waiting)
             running.cancel()
             await asyncio.wait([running])
-        return ticks
 
     with SqliteStore(tmp_path) as store:
-        assert asyncio.run(main(StubbornStore(store, 0, wait_s=0.05))) > 5
+        real(main(StubbornStore(store)))

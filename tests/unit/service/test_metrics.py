@@ -19,6 +19,7 @@ from flightd.adapters.metrics.server import MetricsServer
 from flightd.config.metrics import MetricsConfig
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Event, EventLevel, Phase
+from tests.rigs.event_loops import real
 from tests.unit.service.vitals import START_NS, vitals
 
 
@@ -81,7 +82,7 @@ def serve(test: Callable[[MetricsServer], Awaitable[None]], patience_s: float = 
         with pytest.raises(ConnectionRefusedError):
             await ask(server, b"GET /metrics HTTP/1.1\r\n\r\n")
 
-    asyncio.run(main())
+    real(main())
 
 
 async def ask(server: MetricsServer, request: bytes) -> bytes:

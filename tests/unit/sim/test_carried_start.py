@@ -13,11 +13,11 @@ from flightd.app.simulation.simulation import Simulation, world_spec
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.scenario.scenario_files import load_scenario
 from flightd.sim.world import World
 from flightd.site.site_file import load_site
+from tests.rigs.event_loops import virtual
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 
@@ -33,11 +33,7 @@ def test_the_drone_stands_where_the_scenario_carried_it(tmp_path: Path) -> None:
             spec = world_spec(simulation, free_ports(config))
             return World(spec, LoopClock(), recorder).vehicle.truth()
 
-    loop = VirtualLoop()
-    try:
-        truth = loop.run_until_complete(start())
-    finally:
-        loop.close()
+    truth = virtual(start())
     pad_x_m, pad_y_m = site.pad_centre(site.home)
     assert (truth.x_m - pad_x_m, truth.y_m - pad_y_m) == pytest.approx((1.5, -0.2))
     assert math.degrees(truth.yaw_rad) == pytest.approx(config.mission.start_yaw_deg + 10.0)

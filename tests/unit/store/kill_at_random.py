@@ -12,11 +12,9 @@ from __future__ import annotations
 import json
 import os
 import random
-import select
 import signal
 import sqlite3
 import sys
-import time
 from pathlib import Path
 
 from flightd.adapters.store.sqlite import SqliteStore
@@ -31,7 +29,14 @@ def look(number: int, run: str = "kill", evidence: str = "") -> Observation:
     return Observation(run, location, 10**18 + number, LocationState.READ, 0.9, (read,), pose, evidence)
 
 
-def _write_until_killed(folder: Path, first: int, told: int) -> None:
+def _die_in(seconds: float) -> None:
+    """Ask the kernel to kill this process: it hears nothing of the alarm."""
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+
+
+def _write_until_killed(folder: Path, first: int, told: int, opening_s: float, writing_s: float) -> None:
+    """Write for ever; the end comes `opening_s` from now, or `writing_s` after a first commit was told."""
+    _die_in(opening_s)
     store = SqliteStore(folder)
     number = first
     while True:
@@ -40,6 +45,8 @@ def _write_until_killed(folder: Path, first: int, told: int) -> None:
         store.commit(seen, confirmed=False)
         store.settle(seen.run, [seen.location], confirmed=True)
         os.write(told, f"{seen.id} {evidence}\n".encode())
+        if number == first:
+            _die_in(writing_s)
         number += 1
 
 
@@ -49,16 +56,14 @@ def main() -> None:
     told: dict[str, str] = {}
     lost = unsound = 0
     for round_number in range(kills):
+        opening_s = 60.0 if round_number % 4 else rng.uniform(0.0005, 0.06)
+        writing_s = rng.uniform(0.0005, 0.06)
         read_end, write_end = os.pipe()
         child = os.fork()
         if child == 0:
             os.close(read_end)
-            _write_until_killed(folder, 1_000_000 * round_number, write_end)
+            _write_until_killed(folder, 1_000_000 * round_number, write_end, opening_s, writing_s)
         os.close(write_end)
-        if round_number % 4:
-            select.select([read_end], [], [])  # writing has begun: kill amid commits, else amid opening
-        time.sleep(rng.uniform(0.0, 0.06))
-        os.kill(child, signal.SIGKILL)
         with os.fdopen(read_end) as pipe:
             lines = pipe.read().splitlines()
         os.waitpid(child, 0)

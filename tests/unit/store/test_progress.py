@@ -15,6 +15,7 @@ from flightd.config.schema import Config, load_config
 from flightd.core.errors import InputError, TransientError
 from flightd.core.flight_order import FlightOrder
 from flightd.site.site_file import load_site
+from tests.rigs.event_loops import real
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 DEMO = load_site(CONFIGS / "site-demo.toml")
@@ -37,7 +38,7 @@ def test_the_newest_state_is_on_disk_however_it_ends(tmp_path: Path) -> None:
     path = tmp_path / "state" / "progress.json"
     states = (("A2", "A3", "B1"), ("A3", "B1"), ("B1",))
     for count, last in enumerate(states, start=1):
-        asyncio.run(kept(path, *states[:count]))
+        real(kept(path, *states[:count]))
         assert load_left_over(path, DEMO) == LeftOver(last, "A1", 3.0)
     assert [file.name for file in path.parent.iterdir()] == ["progress.json"]
 
@@ -46,14 +47,14 @@ def test_a_finished_plan_leaves_nothing_to_resume(tmp_path: Path) -> None:
     path = tmp_path / "progress.json"
     with pytest.raises(NothingLeftError, match="nothing to resume"):
         load_left_over(path, DEMO)
-    asyncio.run(kept(path, ("A2",), ()))
+    real(kept(path, ("A2",), ()))
     with pytest.raises(NothingLeftError, match="every stop was made"):
         load_left_over(path, DEMO)
 
 
 def test_another_sites_progress_and_rubbish_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "progress.json"
-    asyncio.run(kept(path, ("A2",)))
+    real(kept(path, ("A2",)))
     with pytest.raises(InputError, match="progress on site demo, not on large"):
         load_left_over(path, LARGE)
     for rubbish in ("{", "[]", '{"site": "demo"}', '{"site": "demo", "remaining": ["Z9"]}'):
@@ -71,7 +72,7 @@ def test_a_disk_that_refuses_is_trouble_not_the_end(tmp_path: Path) -> None:
         await file.run()
 
     with pytest.raises(TransientError, match="progress"):
-        asyncio.run(run())
+        real(run())
 
 
 def test_what_is_left_over_takes_the_place_of_the_configured_nodes(tmp_path: Path) -> None:
@@ -84,7 +85,7 @@ def test_what_is_left_over_takes_the_place_of_the_configured_nodes(tmp_path: Pat
     assert taken_up(config, path, wanted=False).nodes == ()
     with pytest.raises(InputError, match="nothing to resume"):
         taken_up(config, path, wanted=True)
-    asyncio.run(kept(path, ("A3", "B1")))
+    real(kept(path, ("A3", "B1")))
     order = taken_up(config, path, wanted=False)
     assert (order.nodes, order.pad) == (("A3", "B1"), "home")
     assert math.degrees(order.start_yaw_rad) == pytest.approx(171.9, abs=0.1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import resource
 import shutil
 import sqlite3
 import subprocess
@@ -163,9 +164,13 @@ def test_a_disk_that_refuses_is_said_so(tmp_path: Path) -> None:
     with pytest.raises(UnavailableError):
         SqliteStore(tmp_path / "file" / "store")
     with SqliteStore(tmp_path / "store") as store:
-        store._db.execute("PRAGMA query_only = ON")
-        with pytest.raises(UnavailableError, match="cannot be written"):
-            store.commit(look(1))
+        most = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, most[1]))  # stands for the disk that is full
+        try:
+            with pytest.raises(UnavailableError, match="cannot be written"):
+                store.commit(look(1))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, most)
 
 
 @pytest.mark.parametrize(

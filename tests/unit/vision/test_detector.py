@@ -323,7 +323,9 @@ def test_a_lens_model_that_folds_ends_nothing(method: str, focal_px: float) -> N
     lens = Lens(640, 360, focal_px, focal_px, 320.0, 180.0, (-0.44, 0.25, 0.0, 0.0, -0.09))
     for seed in range(4):
         bands = [Band(250.0 - 60 * seed, 0.3 * seed, 20.0), Band(-100.0, 1.4, 12.0), Band(150.0, 1.6, 9.0)]
-        Detector(method, lens=lens).detect(draw(bands, seed=seed))
+        seen = Detector(method, lens=lens).detect(draw(bands, seed=seed))
+        assert (seen.width_px, seen.height_px) == (640, 360)
+        assert all(math.isfinite(value) for line in seen.lines for value in (line.rho_px, line.sigma_rho_px))
 
 
 def test_the_stages_are_timed_when_a_clock_is_given() -> None:

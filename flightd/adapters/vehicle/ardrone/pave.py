@@ -110,6 +110,11 @@ class PaveParser:
         self._kept = 0
         self.skipped_bytes = 0
 
+    @property
+    def waiting_bytes(self) -> int:
+        """What may yet become a frame."""
+        return len(self._buffer)
+
     def feed(self, chunk: bytes) -> list[PaveFrame]:
         self._buffer += chunk
         frames: list[PaveFrame] = []

@@ -126,6 +126,16 @@ class ArDroneVehicle:
         """Groups of commands that the network could not take."""
         return self._link.dropped
 
+    @property
+    def bad_packets(self) -> int:
+        """Packets of telemetry that were damaged or not the drone's."""
+        return self._link.bad_packets
+
+    @property
+    def stale_packets(self) -> int:
+        """Packets of telemetry that a newer one had overtaken."""
+        return self._link.stale_packets
+
     # Camera
 
     def select_camera(self, camera: DroneCamera) -> None:

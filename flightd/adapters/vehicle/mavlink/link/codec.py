@@ -79,6 +79,11 @@ class FrameParser:
         self._codec = codec
         self._pending = bytearray()
 
+    @property
+    def pending_bytes(self) -> int:
+        """What of a stream waits for the rest of its frame."""
+        return len(self._pending)
+
     def datagram(self, data: bytes) -> list[Message]:
         """The messages of one datagram, which holds whole frames; nothing is kept for the next."""
         messages, _ = self._scan(bytearray(data), whole=True)

@@ -11,7 +11,7 @@ from typing import Any
 from flightd.runtime.clock import LoopClock
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer
-from tests.protocol.ardrone.bench import ANY_PORTS, ended, make_drone
+from tests.rigs.ardrone import ANY_PORTS, ended, make_drone
 
 
 class RawClient(asyncio.DatagramProtocol):

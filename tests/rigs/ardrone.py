@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any, TypeVar
 
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from flightd.sim.ardrone.at_commands import DroneCommand, parse
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer, DronePorts
@@ -19,23 +18,11 @@ from flightd.sim.ardrone.states import DroneOptions
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.sensors.instruments import SensorParams, Sensors
+from tests.rigs.waiting import until
 
 T = TypeVar("T")
 
 ANY_PORTS = DronePorts(at=0, navdata=0, video=0, control=0)
-
-
-def virtually(main: Callable[[], Coroutine[Any, Any, T]]) -> T:
-    """Run in virtual time; tasks that outlive `main` fail the test."""
-
-    async def watched() -> T:
-        result = await main()
-        lingering = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
-        assert not lingering, lingering
-        return result
-
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-        return runner.run(watched())
 
 
 def make_drone(
@@ -80,12 +67,7 @@ class Bench:
 
     async def until(self, condition: Callable[[], Any], limit_s: float = 20.0) -> float:
         """Wait for the condition; the seconds it took.  Fails when it takes longer than `limit_s`."""
-        start_ns = self.clock.now_ns()
-        while not condition():
-            waited_s = (self.clock.now_ns() - start_ns) / 1e9
-            assert waited_s < limit_s, f"not within {limit_s} s"
-            await asyncio.sleep(0.005)
-        return (self.clock.now_ns() - start_ns) / 1e9
+        return await until(condition, limit_s)
 
     async def steer(
         self,

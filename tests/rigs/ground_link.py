@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import functools
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ParamSpec
+from typing import Any
 
 from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.keys import load_pair, load_public, make_keys
@@ -28,19 +27,6 @@ from flightd.core.types import (
 )
 from flightd.runtime.clock import LoopClock
 from flightd.site.site_file import load_site
-
-_P = ParamSpec("_P")
-
-
-def in_loop(test: Callable[_P, Coroutine[Any, Any, None]]) -> Callable[_P, None]:
-    """Run a test in an event loop of its own."""
-
-    @functools.wraps(test)
-    def run(*args: _P.args, **kwargs: _P.kwargs) -> None:
-        asyncio.run(test(*args, **kwargs))
-
-    return run
-
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")
 
@@ -113,13 +99,6 @@ async def connected(client: GroundClient, link: ZmqGround) -> None:
     async with asyncio.timeout(20), telling(link):
         async for _ in client.published():
             return
-
-
-async def until(condition: Callable[[], bool]) -> None:
-    """Let others run until the condition holds."""
-    async with asyncio.timeout(30):
-        while not condition():  # noqa: ASYNC110 - what is waited for knows nothing of events
-            await asyncio.sleep(0.005)
 
 
 def tell_once(

@@ -20,7 +20,6 @@ from typing import Any
 
 from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.protocol import StatusReport
-from flightd.app.simulation.ports import free_port
 from flightd.app.simulation.world_process import run_world
 from flightd.core.topics import Topic
 from flightd.replay.log import read_log
@@ -28,6 +27,7 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import SimCamera, wide_lens
 from flightd.sim.world import WorldSpec
 from flightd.site.site_file import load_site
+from tests.rigs.free_ports import free_ports
 
 ROOT = Path(__file__).parents[2]
 SITE_FILE = ROOT / "configs" / "site-demo.toml"
@@ -41,8 +41,8 @@ class ServiceRig:
     def __init__(self, folder: Path, nodes: tuple[str, ...]) -> None:
         self.folder = folder
         self.flights = folder / "flights"
-        self.ports = [free_port() for _ in range(2)]
-        status_port, command_port = _free_tcp_ports(2)
+        self.ports = free_ports(2)
+        status_port, command_port = free_ports(2, socket.SOCK_STREAM)
         self.address = Address("127.0.0.1", status_port, command_port)
         self.said: list[dict[str, str]] = []
         self._manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -174,14 +174,6 @@ def _fields(value: Any) -> dict[str, Any]:
 def _turned(mount: Any) -> Any:
     """The picture's long side along the nose, as in the shipped configuration of the simulator."""
     return mount.__class__(**_fields(mount) | {"yaw_rad": 1.5707963267948966})
-
-
-def _free_tcp_ports(count: int) -> list[int]:
-    with contextlib.ExitStack() as stack:
-        sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
-        for probe in sockets:
-            probe.bind(("127.0.0.1", 0))
-        return [int(probe.getsockname()[1]) for probe in sockets]
 
 
 def _processes() -> list[int]:

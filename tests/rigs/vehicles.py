@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -16,7 +16,6 @@ from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.ports import Vehicle
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.event_loops import VirtualLoop
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer
 from flightd.sim.autopilot.autopilot import PeerConfig
@@ -26,8 +25,8 @@ from flightd.sim.plant.airframe import Airframe
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.sensors.instruments import Sensors
-from tests.protocol.ardrone.bench import ANY_PORTS, settings_for
-from tests.protocol.patience import PatientLoop
+from tests.rigs.ardrone import ANY_PORTS, settings_for
+from tests.rigs.waiting import until
 
 CALM = WindParams(gust_rms_mps=0.0, vertical_gust_rms_mps=0.0)
 
@@ -60,6 +59,8 @@ class Rig:
     """A radio gap after which the vehicle still obeys."""
     has_pilot: bool = True
     """Whether someone besides us can command it: an AR.Drone has one client only."""
+    texts: Callable[[], list[str] | None] = lambda: None
+    """What the vehicle was given to show; None where it shows nothing."""
     flying_task: asyncio.Task[None] | None = None
 
     def known(self) -> VehicleState:
@@ -69,12 +70,7 @@ class Rig:
 
     async def until(self, condition: Callable[[], bool], within_s: float = 10.0) -> float:
         """Seconds until the condition held; fails when it does not in time."""
-        loop = asyncio.get_running_loop()
-        start_s = loop.time()
-        while not condition():
-            assert loop.time() - start_s < within_s, "waited too long"
-            await asyncio.sleep(0.005)
-        return loop.time() - start_s
+        return await until(condition, within_s)
 
     async def stream(self, duration_s: float, hz: float = 50.0, **setpoint: float) -> list[bool]:
         """Send one setpoint at a steady rate; what each `send` said."""
@@ -99,6 +95,15 @@ class Rig:
         await self.stream(2.0)
 
 
+async def _ended(tasks: list[asyncio.Task[None]]) -> None:
+    """Cancel and await; what one of them died of fails the test."""
+    for task in tasks:
+        task.cancel()
+    results = await asyncio.gather(*tasks, return_exceptions=True)
+    failures = [result for result in results if isinstance(result, Exception)]
+    assert not failures, failures
+
+
 @asynccontextmanager
 async def mavlink_rig(
     make_peer: type[ArduCopterPeer | Px4Peer],
@@ -119,7 +124,7 @@ async def mavlink_rig(
     def cut(apart: bool) -> None:
         peer.link.muted = apart
 
-    rig = Rig(vehicle, peer, take_over, cut)
+    rig = Rig(vehicle, peer, take_over, cut, texts=lambda: list(peer.texts))
     tasks = [asyncio.create_task(vehicle.run(), name="vehicle")]
     if peer_runs:
         tasks.append(asyncio.create_task(peer.run(), name="peer"))
@@ -127,11 +132,7 @@ async def mavlink_rig(
     try:
         yield rig
     finally:
-        for task in tasks:
-            task.cancel()
-        results = await asyncio.gather(*tasks, return_exceptions=True)
-        failures = [r for r in results if isinstance(r, Exception)]
-        assert not failures, failures
+        await _ended(tasks)
 
 
 ardupilot_rig = partial(mavlink_rig, ArduCopterPeer, ArduPilotVehicle, CopterMode.ALT_HOLD)
@@ -162,11 +163,7 @@ async def ardrone_rig(**settings: Any) -> AsyncIterator[Rig]:
         try:
             yield rig
         finally:
-            for task in tasks:
-                task.cancel()
-            results = await asyncio.gather(*tasks, return_exceptions=True)
-            failures = [r for r in results if isinstance(r, Exception)]
-            assert not failures, failures
+            await _ended(tasks)
 
 
 RIGS: dict[str, Callable[[], Any]] = {
@@ -180,29 +177,5 @@ RIGS: dict[str, Callable[[], Any]] = {
 """Every adapter that keeps the contract."""
 
 
-_HURRY = 2.0
-
 REAL_TIME = frozenset({"mavsdk"})
 """Those whose library keeps its own clock."""
-
-
-def run_virtual(test: Callable[[], Awaitable[Any]]) -> Any:
-    """Run an async test in virtual time; no task may be left behind."""
-    return _run(test, VirtualLoop)
-
-
-def run_real(test: Callable[[], Awaitable[Any]]) -> Any:
-    """Run an async test by the clock of the machine, on which a library's threads live; our side of the
-    link and the vehicle's hurry a little.  No task may be left behind."""
-    return _run(test, lambda: PatientLoop(_HURRY))
-
-
-def _run(test: Callable[[], Awaitable[Any]], make_loop: Callable[[], asyncio.AbstractEventLoop]) -> Any:
-    async def main() -> Any:
-        result = await test()
-        left = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
-        assert not left, left
-        return result
-
-    with asyncio.Runner(loop_factory=make_loop) as runner:
-        return runner.run(main())

@@ -1,4 +1,4 @@
-"""Damaged MAVLink traffic.  `python -m tests.protocol.mavlink.damage 1000000` runs as many cases."""
+"""Damaged MAVLink traffic.  `python -m tests.protocol.mavlink.damaged_traffic 1000000` runs as many cases."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def hammer(cases: int, seed: int = 1) -> None:
         packets.datagram(noise)
         assert len(packets.datagram(probe)) == 1
         streamed += sum(m.get_type() == "ATTITUDE" for m in stream.stream(noise + probe))
-        assert len(stream._pending) < 300
+        assert stream.pending_bytes < 300
     streamed += sum(m.get_type() == "ATTITUDE" for m in stream.stream(bytes(600)))
     assert 0 <= cases - streamed <= cases // 10_000
 

@@ -6,11 +6,23 @@ import asyncio
 import math
 import selectors
 import time
-from typing import Any
+from collections.abc import Coroutine
+from typing import Any, TypeVar
 
-from flightd.runtime.event_loops import _Selector
+from flightd.runtime.event_loops import PacedSelector
+from tests.rigs.event_loops import run_in
+
+_T = TypeVar("_T")
 
 _PAUSE_S = 0.02
+
+_HURRY = 2.0
+"""How many times as fast as the machine's clock our side of a link and the vehicle live."""
+
+
+def patient(main: Coroutine[Any, Any, _T]) -> _T:
+    """What `main` returns, run by the clock of the machine, on which a library's threads live."""
+    return run_in(lambda: PatientLoop(_HURRY), main)
 
 
 class PatientLoop(asyncio.SelectorEventLoop):
@@ -23,7 +35,7 @@ class PatientLoop(asyncio.SelectorEventLoop):
     def __init__(self, factor: float = 1.0) -> None:
         self._factor = factor
         self._now_s = self._real_s = time.monotonic()
-        super().__init__(_Selector(self._patient_wait))
+        super().__init__(PacedSelector(self._patient_wait))
 
     def time(self) -> float:
         return self._now_s + self._passed(_PAUSE_S)

@@ -1,0 +1,39 @@
+"""A Ctrl-C at the terminal reaches the whole group: children that are still starting leave it alone."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from flightd.runtime.undisturbed_start import undisturbed
+
+BLOCKED = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
+
+
+def blocked_in_a_child() -> str:
+    return subprocess.run(
+        [sys.executable, "-c", BLOCKED], capture_output=True, text=True, timeout=60, check=True
+    ).stdout.strip()
+
+
+def test_a_child_is_born_with_the_interrupt_blocked_and_the_parent_is_as_before() -> None:
+    with undisturbed():
+        assert blocked_in_a_child() == "True"
+    assert blocked_in_a_child() == "False"
+
+
+def test_an_interrupt_meanwhile_comes_when_the_start_is_done() -> None:
+    done = False
+
+    def start() -> None:
+        nonlocal done
+        with undisturbed():
+            signal.raise_signal(signal.SIGINT)
+            done = True
+
+    with pytest.raises(KeyboardInterrupt):
+        start()
+    assert done
