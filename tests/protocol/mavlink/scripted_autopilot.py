@@ -27,6 +27,10 @@ def known(vehicle: Any) -> VehicleState:
     return VehicleState(**{name: getattr(state, name) for name in VehicleState.__slots__})
 
 
+WAY_DOWN: dict[str, float] = {"FS_GCS_ENABLE": 5, "FS_GCS_TIMEOUT": 2, "SYSID_MYGCS": 1}
+"""Without these nothing is armed."""
+
+
 class ScriptedAutopilot:
     """Acknowledges what `results` says (by command id), everything else as accepted; None is silence."""
 
@@ -38,9 +42,7 @@ class ScriptedAutopilot:
             "GUID_OPTIONS": 0,
             "WPNAV_SPEED_UP": 250,
             "WPNAV_SPEED_DN": 150,
-            "FS_GCS_ENABLE": 5,
-            "FS_GCS_TIMEOUT": 2,
-            "SYSID_MYGCS": 1,
+            **WAY_DOWN,
         }
         self.mode, self.armed, self.autopilot, self.kind = 0, False, ARDUPILOT, 2
         self.obeys = True

@@ -23,6 +23,7 @@ from tests.protocol.mavlink.scripted_autopilot import (
     LAND,
     PX4,
     SET_MODE,
+    WAY_DOWN,
     ScriptedAutopilot,
     known,
     scripted,
@@ -33,12 +34,12 @@ from tests.rigs.vehicles import Rig, ardupilot_rig
 # What we are and ask
 
 
-def test_we_are_an_onboard_computer_and_beat_twice_a_second() -> None:
+def test_we_are_an_onboard_computer_and_beat_four_times_a_second() -> None:
     async def test() -> None:
         async with scripted() as (autopilot, _):
             await asyncio.sleep(10.0)
             beats = autopilot.all("HEARTBEAT")
-            assert 20 <= len(beats) <= 24
+            assert 40 <= len(beats) <= 48
             assert {(b.type, b.autopilot, b.get_srcSystem(), b.get_srcComponent()) for b in beats} == {
                 (18, 8, 1, 191)
             }
@@ -105,7 +106,7 @@ def test_setpoints_carry_unit_quaternions_all_rates_and_the_climb_as_thrust() ->
 def test_climb_is_scaled_by_the_autopilots_speeds(parameters: dict[str, float], thrust: float) -> None:
     async def test() -> None:
         autopilot = ScriptedAutopilot()
-        autopilot.parameters = parameters
+        autopilot.parameters = WAY_DOWN | parameters
         async with scripted(autopilot) as (_, vehicle):
             vehicle.demand(Demand.FLY)
             await asyncio.sleep(8.0)
@@ -136,7 +137,7 @@ def test_thrust_that_means_something_else_than_configured_is_not_flown(options: 
     async def test() -> None:
         for configured in (wanted, None):
             autopilot = ScriptedAutopilot()
-            autopilot.parameters = {"GUID_OPTIONS": options}
+            autopilot.parameters = WAY_DOWN | {"GUID_OPTIONS": options}
             async with scripted(autopilot, raw_thrust=configured) as (_, vehicle):
                 vehicle.demand(Demand.FLY)
                 await asyncio.sleep(3.0)
@@ -158,7 +159,7 @@ def test_a_vehicle_found_flying_is_not_steered_before_the_meaning_of_thrust_is_k
             assert not known(vehicle).in_control
             assert not vehicle.send(AttitudeSetpoint(0))
             await asyncio.sleep(10.0)  # however often an answer is lost
-            autopilot.parameters = {"GUID_OPTIONS": 8}
+            autopilot.parameters = WAY_DOWN | {"GUID_OPTIONS": 8}
             await asyncio.sleep(0.6)
             assert (known(vehicle).in_control, known(vehicle).refusal) == (True, "")
             assert vehicle.send(AttitudeSetpoint(0))

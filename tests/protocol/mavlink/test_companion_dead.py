@@ -10,7 +10,8 @@ import pytest
 
 from flightd.core.types import Demand
 from flightd.sim.autopilot.autopilot import PeerConfig
-from tests.protocol.rig import ardupilot_rig, px4_rig, run_virtual
+from tests.rigs.event_loops import virtual
+from tests.rigs.vehicles import ardupilot_rig, px4_rig
 
 
 @pytest.mark.parametrize("make", [ardupilot_rig, px4_rig], ids=["ardupilot", "px4"])
@@ -22,7 +23,7 @@ def test_it_lands_and_disarms_by_itself(make: Callable[[], Any]) -> None:
             await rig.until(lambda: not rig.peer.armed, 15.0)
             assert rig.peer.truth().height_m < 0.15
 
-    run_virtual(test)
+    virtual(test())
 
 
 @pytest.mark.parametrize(
@@ -47,4 +48,4 @@ def test_nothing_is_armed_that_would_stay_in_the_air(
             assert name in rig.known().refusal
             assert "flightd doctor --fix" in rig.known().refusal
 
-    run_virtual(test)
+    virtual(test())

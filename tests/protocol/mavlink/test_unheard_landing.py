@@ -14,18 +14,20 @@ from flightd.core.types import Demand
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import CopterMode
 from flightd.sim.autopilot.radio import RadioParams
-from tests.protocol.mavlink.scripted import LAND, SET_MODE, scripted
-from tests.protocol.rig import Rig, ardupilot_rig, mavsdk_rig, px4_rig, run_real, run_virtual
+from tests.protocol.mavlink.scripted_autopilot import LAND, SET_MODE, scripted
+from tests.rigs.event_loops import virtual
+from tests.rigs.patient_loop import patient
+from tests.rigs.vehicles import Rig, ardupilot_rig, mavsdk_rig, px4_rig
 
 _RAW = PeerConfig(ready_s=0.5, parameters={"GUID_OPTIONS": 8})
 _DEAF = RadioParams(loss=1.0)
 
 
-async def _fly_unheard(rig: Rig, limit_s: float) -> float:
+async def _fly_unheard(rig: Rig, limit_s: float, up: RadioParams | None = None) -> float:
     """Take off, lose the downlink for good, and demand the landing 3 s later as the mission does; the time
-    from then until the vehicle has disarmed."""
+    from then until the vehicle has disarmed.  `up` is what becomes of the uplink."""
     await rig.take_off()
-    rig.peer.link.down.params = _DEAF
+    rig.peer.link.down.params, rig.peer.link.up.params = _DEAF, up or rig.peer.link.up.params
     await rig.stream(3.0)
     rig.vehicle.demand(Demand.LAND)
     loop = asyncio.get_running_loop()
@@ -45,7 +47,7 @@ def test_it_lands_and_disarms_though_nobody_hears_it(make: Callable[[], Any]) ->
         async with make() as rig:
             assert await _fly_unheard(rig, 17.0) < 17.0
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_mavsdk_lands_it_too() -> None:
@@ -53,16 +55,15 @@ def test_mavsdk_lands_it_too() -> None:
         async with mavsdk_rig() as rig:
             await _fly_unheard(rig, 17.0)
 
-    run_real(test)
+    patient(test())
 
 
 def test_an_uplink_that_loses_half_of_all_still_brings_it_down() -> None:
     async def test() -> None:
         async with ardupilot_rig(_RAW) as rig:
-            rig.peer.link.up.params = RadioParams(loss=0.5)
-            await _fly_unheard(rig, 30.0)
+            await _fly_unheard(rig, 30.0, up=RadioParams(loss=0.5))
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_the_landing_is_ordered_again_and_again_ever_more_rarely() -> None:
@@ -83,7 +84,7 @@ def test_the_landing_is_ordered_again_and_again_ever_more_rarely() -> None:
             await asyncio.sleep(10.0)
             assert 1 <= len(autopilot.commands(SET_MODE)) <= 3
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_heard_again_in_the_landing_mode_it_is_still_ours() -> None:
@@ -99,13 +100,13 @@ def test_heard_again_in_the_landing_mode_it_is_still_ours() -> None:
             await rig.until(lambda: rig.known().mode == "LAND", 3.0)
             assert rig.known().in_control
 
-    run_virtual(test)
+    virtual(test())
 
 
 def test_a_pilot_who_took_it_unheard_keeps_it_between_the_orders() -> None:
     async def test() -> None:
         async with ardupilot_rig(_RAW) as rig:
-            await rig.take_off()
+            await rig.take_off(3.0)
             rig.peer.link.down.params = _DEAF
             await rig.stream(3.2)
             rig.vehicle.demand(Demand.LAND)
@@ -114,4 +115,4 @@ def test_a_pilot_who_took_it_unheard_keeps_it_between_the_orders() -> None:
             await rig.stream(1.0)
             assert rig.peer.mode == CopterMode.ALT_HOLD
 
-    run_virtual(test)
+    virtual(test())

@@ -32,6 +32,6 @@ def test_a_row_names_only_keys_that_exist(row: Hazard) -> None:
 def test_the_mission_answers_every_hazard_that_asks_for_something() -> None:
     answered = {trigger for state in STATES for trigger in taken_in(state)}
     below = {Action.REPORT, Action.HOME}
-    silent = {row.trigger for row in HAZARDS if row.action not in below} - answered
+    silent = {row.trigger for row in HAZARDS if row.trigger and row.action not in below} - answered
     assert silent == set()
     assert Trigger.LINES_LOST in answered

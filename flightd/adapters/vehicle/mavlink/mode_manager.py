@@ -142,12 +142,6 @@ class ModeArmingManager:
         return self.lands_unheard and flying and self._firmware.sinks_unmeasured()
 
     @property
-    def lets_failsafe_act(self) -> bool:
-        """Whether nothing that was ordered unheard has helped so far: then the autopilot's own failsafe for
-        a companion that fell silent is the way down."""
-        return self.lands_unheard and self._unheard_orders >= _UNHEARD_ORDERS
-
-    @property
     def in_control(self) -> bool:
         """Whether the vehicle is in a mode that we asked for."""
         return self._authority.held is not None and not self.is_silent

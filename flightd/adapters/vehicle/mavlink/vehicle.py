@@ -112,7 +112,6 @@ class MavlinkVehicle(abc.ABC):
         self._commander = Commander(self.link, system_id)
         self._pursuit = ModeArmingManager(self, self._commander, self._telemetry, clock)
         self._steering = SetpointShaper(self._pursuit, self._telemetry)
-        self.link.may_beat = lambda: not self._pursuit.lets_failsafe_act
         self.streams = StreamKeeper(self._commander, clock, self.rates_hz)
         self.parameters = Parameters(self.link, system_id, bytewise=self.firmware is Firmware.PX4)
         self._texts = TextAssembler()

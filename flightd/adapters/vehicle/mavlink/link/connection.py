@@ -14,7 +14,7 @@ from flightd.adapters.vehicle.mavlink.link.reconnection import Reconnection
 from flightd.adapters.vehicle.mavlink.link.transport import Source, Transport
 from flightd.ports import Clock
 
-_HEARTBEAT_S = 0.5
+_HEARTBEAT_S = 0.25
 _PARSERS_MAX = 16
 _LATE_MAX, _LATE_RUN_MAX = 64, 16
 _STATES = frozenset({"HEARTBEAT", "EXTENDED_SYS_STATE"})
@@ -56,8 +56,6 @@ class MavlinkLink:
         self._sequence = 0
         self._late = 0
         self.system_status = dialect.MAV_STATE_STANDBY
-        self.may_beat: Callable[[], bool] = lambda: True
-        """Whether our HEARTBEAT goes out: without it the autopilot's failsafe for a lost companion acts."""
         self.firmware: Firmware | None = None
         self.sent = 0
         self.dropped = 0
@@ -74,21 +72,20 @@ class MavlinkLink:
         await self._reconnection.run(self._beat)
 
     async def _beat(self) -> None:
-        """Our HEARTBEAT twice a second while the connection stands: a failsafe of two seconds on the
-        autopilot's side bears three lost ones."""
+        """Our HEARTBEAT four times a second while the connection stands: a failsafe of two seconds on the
+        autopilot's side bears seven lost ones."""
         lost = self._reconnection.lost
         while not lost.is_set():
-            if self.may_beat():
-                self.send(
-                    dialect.MAVLink_heartbeat_message(
-                        dialect.MAV_TYPE_ONBOARD_CONTROLLER,
-                        dialect.MAV_AUTOPILOT_INVALID,
-                        0,
-                        0,
-                        self.system_status,
-                        3,
-                    )
+            self.send(
+                dialect.MAVLink_heartbeat_message(
+                    dialect.MAV_TYPE_ONBOARD_CONTROLLER,
+                    dialect.MAV_AUTOPILOT_INVALID,
+                    0,
+                    0,
+                    self.system_status,
+                    3,
                 )
+            )
             try:
                 async with asyncio.timeout(_HEARTBEAT_S):
                     await lost.wait()
