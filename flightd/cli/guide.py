@@ -34,10 +34,11 @@ def guide(
     """Print a page of the guide, list its pages, or search it.  Needs no network.
 
     \b
-    flightd guide
-    flightd guide first-flight
-    flightd guide --search "range finder"
-    flightd guide --json
+    Examples:
+      flightd guide
+      flightd guide first-flight
+      flightd guide --search "range finder"
+      flightd guide --json
     """
     from flightd.guide import pages
 

@@ -32,6 +32,7 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightd doctor": ("--config", "none.toml"),
     "flightd report": ("empty.mcap",),
     "flightd replay": ("empty.mcap",),
+    "flightd guide": ("no-such-page",),
     "flightd keygen": ("--mavlink", "none/m.key"),
     "flightd log info": ("empty.mcap",),
     "flightd log export": ("empty.mcap", "--csv", "tables"),

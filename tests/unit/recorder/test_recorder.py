@@ -202,7 +202,7 @@ def test_pictures_are_lost_before_decisions(tmp_path: Path) -> None:
 
 async def _readable(path: Path, count: int) -> None:
     """Until `count` messages can be read from a file that is still being written."""
-    await until(lambda: len(read_log(path).entries) >= count)
+    await until(lambda: path.stat().st_size > 0 and len(read_log(path).entries) >= count)
 
 
 def test_the_log_is_readable_after_kill_9_and_goes_on_in_the_same_file(tmp_path: Path) -> None:
