@@ -21,6 +21,7 @@ from flightd.core.types import (
     AttitudeSetpoint,
     GridPose,
     Phase,
+    VehicleState,
 )
 from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.localisation.pad_finder import PadFinder
@@ -35,6 +36,7 @@ from flightd.tracking.attitude_extrapolation import AttitudeExtrapolation
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.height_history import HeightHistory
 from flightd.tracking.line_tracker import LineTracker
+from flightd.tracking.stuck_height import StuckHeight
 
 _FRAMES_ARRIVE_S = 0.5
 _TOUCHDOWN_S = 2.0
@@ -166,6 +168,7 @@ class Pilot:
         self._localiser = GridLocaliser(self._site, node, view, self._config.localisation)
         self._past = PoseHistory(self._scanner.least_integrity)
         self._pads = PadFinder(self._site)
+        self._stuck = StuckHeight()
 
     def _take(self, tick: TickInput) -> None:
         """Telemetry first: a frame needs the attitude and height of its exposure.
@@ -186,10 +189,19 @@ class Pilot:
             self._tracker.assume(assumed)
         if tick.vehicle is not None:
             v = tick.vehicle
-            self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
+            if not self._stuck.found:
+                self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
+            self._mind_height(tick.now_ns, v)
         for lines in tick.lines:
             if self._pictures.take(lines) and armed:
                 self._tracker.frame(lines, self._heights.at(lines.stamp_ns))
+
+    def _mind_height(self, now_ns: int, vehicle: VehicleState) -> None:
+        """Forget the heights of a range finder that is found to be stuck: then the lines' width tells."""
+        if not self._armed or self._asked is None or self._stuck.found:
+            return
+        if self._stuck.step(now_ns, vehicle.height_m, vehicle.climb_mps, self._asked.climb_mps):
+            self._heights = HeightHistory()
 
     def _senses(
         self, tick: TickInput, dt_s: float, pose: GridPose | None, height_m: float, tracks: TrackSet | None
@@ -216,7 +228,15 @@ class Pilot:
             rivals=tuple(self._localiser.rivals()) if doubted else (),
             way_out=self._localiser.way_out() if seeking else None,
             warnings=self._caution.step(
-                now_ns, dt_s, pose, height_m, tracks, self._tracker, self._pictures, tick.health
+                now_ns,
+                dt_s,
+                pose,
+                height_m,
+                tracks,
+                self._tracker,
+                self._pictures,
+                tick.health,
+                self._stuck.found,
             ),
         )
 

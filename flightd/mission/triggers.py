@@ -16,6 +16,7 @@ class Trigger(enum.Enum):
     VANISHED = "the vehicle stayed silent"
     TELEMETRY_LOST = "vehicle telemetry lost"
     HEARTBEAT_LOST = "heartbeat lost"
+    HEIGHT_STUCK = "the height does not follow the climb"
     HEIGHT_LOST = "height lost"
     CEILING_LEFT = "too near the ceiling"
     ATTITUDE_WRONG = "attitude disagrees with the picture"

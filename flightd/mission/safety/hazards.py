@@ -124,6 +124,15 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "height_stuck",
+        Trigger.HEIGHT_STUCK,
+        "the height stands still while the autopilot tells of 0.4 m of climb within 1.5 s, or 3 m of it were"
+        " commanded",
+        Action.LAND,
+        "the height is not believed again in this flight: no climb; down by the lines",
+        _FAST,
+    ),
+    Hazard(
         "height_wrong",
         Trigger.HEIGHT_WRONG,
         "width of the seen lines against the map's by more than `hazards.height_share` for"

@@ -44,6 +44,7 @@ class PlausibilityMonitor:
         tracker: LineTracker,
         pictures: FrameMonitor,
         health: Health,
+        height_stuck: bool = False,
     ) -> Warnings:
         self._tick_s += min(dt_s / _TICK_MEMORY_S, 1.0) * (dt_s - self._tick_s)
         share = tracker.height_share if height_m > self._judged_above_m else 1.0
@@ -64,6 +65,7 @@ class PlausibilityMonitor:
             blank_s=pictures.blank_s(now_ns),
             heading_error_rad=tracker.heading_error_rad,
             height_share=share,
+            height_stuck=height_stuck,
             push_mps2=math.hypot(*self.push_mps2),
             off_m=self._off_m,
             headroom_m=self._ceiling_m - height_m,

@@ -115,6 +115,14 @@ class HeightLost(_Fault):
     kind: Literal["height_lost"]
 
 
+class HeightStuck(_Fault):
+    """Something hangs in the range finder's beam: it reads that, whatever the height."""
+
+    by_vehicle = True
+    kind: Literal["height_stuck"]
+    reading_m: float = Field(0.1, ge=0.05, le=8)
+
+
 class BatteryDrop(_Fault):
     by_airframe = True
     kind: Literal["battery"]
@@ -197,6 +205,7 @@ Fault: TypeAlias = Annotated[
     | AttitudeBiased
     | HeightBiased
     | HeightLost
+    | HeightStuck
     | BatteryDrop
     | WindChange
     | VehicleFault

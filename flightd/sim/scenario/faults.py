@@ -31,6 +31,7 @@ from flightd.sim.scenario.fault_schema import (
     Fault,
     HeightBiased,
     HeightLost,
+    HeightStuck,
     LinkFault,
     VehicleFault,
     WindChange,
@@ -200,6 +201,8 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
             wrong.range_m = fault.offset_m if on else 0.0
         case HeightLost():
             wrong.range_lost = on
+        case HeightStuck():
+            wrong.range_stuck_m = fault.reading_m if on else None
         case ClockJump():
             vehicle.jump_clock(round(fault.jump_s * 1e9) * (1 if on else -1))
         case VehicleFault(kind="pilot"):

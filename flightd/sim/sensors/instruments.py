@@ -41,6 +41,8 @@ class SensorFault:
     yaw_rad: float = 0.0
     range_m: float = 0.0
     range_lost: bool = False
+    range_stuck_m: float | None = None
+    """What the range finder reads whatever is below it; None: it measures."""
 
 
 class Sensors:
@@ -96,6 +98,8 @@ class Sensors:
     def range_m(self, airframe: Airframe) -> float:
         """One range finder sample along the body's z axis, quantised; 0 when nothing came back."""
         p = self.params
+        if self.fault.range_stuck_m is not None:
+            return self.fault.range_stuck_m
         tilt_cos = airframe.tilt_cos
         if tilt_cos < 0.3 or self._rng.random() < p.range_dropout or self.fault.range_lost:
             return 0.0

@@ -260,6 +260,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.VANISHED: sensed(61.0, telemetry_age_s=70.0),
     Trigger.TELEMETRY_LOST: sensed(telemetry_age_s=0.4),
     Trigger.HEARTBEAT_LOST: Stimulus(_beat_lost),
+    Trigger.HEIGHT_STUCK: warned(height_stuck=True),
     Trigger.HEIGHT_LOST: sensed(height_m=math.nan),
     Trigger.CEILING_LEFT: warned(headroom_m=-1.0),
     Trigger.ATTITUDE_WRONG: warned(heading_error_rad=1.0),
