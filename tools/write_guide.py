@@ -20,7 +20,7 @@ from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, Rule, rules_for
 from flightd.config.schema import Config
 from flightd.guide import pages
-from flightd.mission.safety import hazards
+from flightd.mission.safety import hazard_table
 from flightd.site.site_file import SiteFile
 from tools import reference_tables
 from tools.command_help import help_pages
@@ -70,7 +70,7 @@ PARTS: Mapping[str, Callable[[], str]] = {
     "site-file": lambda: reference_tables.markdown(SiteFile),
     "commands": _commands,
     "protocol": protocol_text.markdown,
-    "hazards": hazards.markdown,
+    "hazards": hazard_table.markdown,
     "parameters-ardupilot": lambda: _parameters(Firmware.ARDUPILOT),
     "parameters-px4": lambda: _parameters(Firmware.PX4),
     "pages": lambda: _page_list(""),

@@ -14,7 +14,7 @@ from flightd.app.simulation.scenario_sweep import Prepare, SweptFlight, fly_ever
 from flightd.app.simulation.simulation import Simulation
 from flightd.cli.flight_progress import FlightProgress
 from flightd.core.errors import RunError
-from flightd.mission.safety.hazards import HAZARDS
+from flightd.mission.safety.hazard_table import HAZARDS
 
 _HEADINGS = ("hazard", "found after", "action", "phases", "outcome", "shelf", "off line", "as it should")
 

@@ -14,7 +14,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from flightd.core.types import CommandKind, Phase
-from flightd.mission.safety.hazards import ACTIONS, PHASE_OF, Action, triggers_of
+from flightd.mission.safety.hazard_table import ACTIONS, PHASE_OF, Action, triggers_of
 from flightd.mission.triggers import Trigger
 
 

@@ -23,7 +23,7 @@ from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.reasons import Happened, Plain, Reason, Refused, in_words
 from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
-from flightd.mission.safety.hazards import ACTIONS, Action, triggers_of
+from flightd.mission.safety.hazard_table import ACTIONS, Action, triggers_of
 from flightd.mission.safety.readiness import not_fresh, not_ready
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.shelf_scan import ShelfScan

@@ -9,7 +9,8 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk
 
 from flightd.adapters.recorder.mcap_chunk import pack
-from flightd.adapters.recorder.mcap_file import McapFile, is_whole, repair
+from flightd.adapters.recorder.mcap_file import McapFile
+from flightd.adapters.recorder.mcap_repair import is_whole, repair
 from flightd.adapters.recorder.schemas import encode, picture_schema, schema_of
 from flightd.core.errors import InputError
 from flightd.core.topics import Document, Topic

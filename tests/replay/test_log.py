@@ -7,7 +7,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from flightd.adapters.recorder.mcap_file import McapFile, repair
+from flightd.adapters.recorder.mcap_file import McapFile
+from flightd.adapters.recorder.mcap_repair import repair
 from flightd.adapters.recorder.schemas import encode
 from flightd.core.errors import InputError
 from flightd.core.topics import Document, Topic

@@ -71,6 +71,7 @@ class Faults:
     silent: bool = False
     heartless: bool = False
     rangeless: bool = False
+    stuck_m: float | None = None
     yaw_rad: float = 0.0
     height_m: float = 0.0
     battery: float | None = None
@@ -297,7 +298,9 @@ class IdealFlight:
             return self._told
         on_floor = self.airframe.on_floor
         if not faults.rangeless:
-            self._range = (round(self.airframe.height_m + faults.height_m, 2), self._now_ns)
+            measured_m = self.airframe.height_m + faults.height_m
+            read_m = measured_m if faults.stuck_m is None else faults.stuck_m
+            self._range = (round(read_m, 2), self._now_ns)
         if not faults.heartless:
             self._beat_ns = self._now_ns
         battery = self.airframe.battery_frac if faults.battery is None else faults.battery

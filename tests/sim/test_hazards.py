@@ -15,7 +15,7 @@ import pytest
 
 from flightd.config.schema import load_config
 from flightd.core.types import Command, CommandKind, Health, Phase
-from flightd.mission.safety.hazards import HAZARDS, PHASE_OF, Action, Hazard
+from flightd.mission.safety.hazard_table import HAZARDS, PHASE_OF, Action, Hazard
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import Wind, WindParams
 from flightd.site.corridor import Corridor

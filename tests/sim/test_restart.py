@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.recorder.mcap_file import is_whole
+from flightd.adapters.recorder.mcap_repair import is_whole
 from flightd.core.topics import Topic
 from flightd.core.types import Event, Phase
 from flightd.replay.log import read_log

@@ -12,7 +12,7 @@ from flightd.ports import Clock
 from flightd.runtime.datagrams import is_stalled
 from flightd.runtime.frame_notice import ExposureRequest, decode_notice, encode_request
 from flightd.runtime.frame_ring import FrameTicket
-from flightd.tracking.clock_offset import DeviceClock
+from flightd.tracking.device_clock import DeviceClock
 
 _TELL_NS = 5_000_000_000
 

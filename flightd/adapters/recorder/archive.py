@@ -9,7 +9,7 @@ from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
-from flightd.adapters.recorder.mcap_file import is_whole, repair
+from flightd.adapters.recorder.mcap_repair import is_whole, repair
 from flightd.core.errors import InputError, TransientError, UnavailableError
 
 LOG_NAME = "flight.mcap"

@@ -14,7 +14,7 @@ from flightd.core.errors import RunError
 from flightd.core.snapshot import Snapshot
 from flightd.core.topics import Topic
 from flightd.core.types import Event, Status
-from flightd.mission.safety.hazards import HAZARDS
+from flightd.mission.safety.hazard_table import HAZARDS
 from flightd.replay.log import read_log
 from flightd.sim.judge.verdict import ScenarioVerdict, judge
 from flightd.sim.scenario.scenario import Scenario

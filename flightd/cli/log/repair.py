@@ -28,7 +28,7 @@ def repair(
     Examples:
       flightd log repair /var/lib/flightd/flights/*/flight.mcap
     """
-    from flightd.adapters.recorder.mcap_file import repair as make_whole
+    from flightd.adapters.recorder.mcap_repair import repair as make_whole
     from flightd.replay.log import check_is_log
 
     for log in logs:

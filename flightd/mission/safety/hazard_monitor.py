@@ -10,7 +10,7 @@ from typing import TypeAlias
 from flightd.config.schema import Config
 from flightd.core.types import VehicleState
 from flightd.mission.guidance import MissionInputs
-from flightd.mission.safety.hazards import Action, triggers_of
+from flightd.mission.safety.hazard_table import Action, triggers_of
 from flightd.mission.safety.view_monitor import FloorViewMonitor
 from flightd.mission.triggers import Trigger
 

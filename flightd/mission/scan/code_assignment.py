@@ -17,8 +17,8 @@ from flightd.core.camera_view import CameraView, ForwardMount, Viewpoint
 from flightd.core.geometry import Lens, Matrix
 from flightd.core.scanning import BodyPose, CodeSet, Place, PlaceLook, Quad
 from flightd.core.types import CodeRead
-from flightd.site.cells import Cell, cells_of
 from flightd.site.racks import code_form
+from flightd.site.shelf_cells import Cell, cells_of
 from flightd.site.site import Side, Site
 
 _DEPTH_SIGMA_M = 0.05

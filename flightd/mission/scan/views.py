@@ -14,7 +14,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import BodyPose, Light
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
-from flightd.site.cells import by_node
+from flightd.site.shelf_cells import by_node
 from flightd.site.site import Location, Side, Site
 
 

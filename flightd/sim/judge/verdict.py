@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from flightd.core.types import Event, Phase, Status
-from flightd.mission.safety.hazards import PHASE_OF, Hazard
+from flightd.mission.safety.hazard_table import PHASE_OF, Hazard
 from flightd.sim.judge.flight_score import shelf_distance_m
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.scenario.scenario import Expectation

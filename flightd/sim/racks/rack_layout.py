@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from flightd.site.cells import deck_spacing_m, decks_m
+from flightd.site.shelf_cells import deck_spacing_m, decks_m
 from flightd.site.site import Location, Rack, Shelf, Side, Site
 
 BEAM_M = 0.10

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from flightd.core.scanning import CodeSet
 from flightd.core.types import CodeRead
 from flightd.mission.scan.code_assignment import Assigner
-from flightd.site.cells import cells_of
+from flightd.site.shelf_cells import cells_of
 from flightd.site.site import Location, Side
 from tests.unit.mission.shelves import SIGHT, SITE, picture, pose, read
 

@@ -9,7 +9,7 @@ import pytest
 
 from flightd.config.reference import rows
 from flightd.mission.machine import STATES, taken_in
-from flightd.mission.safety.hazards import HAZARDS, Action, Hazard
+from flightd.mission.safety.hazard_table import HAZARDS, Action, Hazard
 from flightd.mission.triggers import Trigger
 
 ROOT = Path(__file__).parents[3]

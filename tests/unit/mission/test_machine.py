@@ -21,7 +21,7 @@ from flightd.mission.machine import (
     possible_commands,
     possible_in,
 )
-from flightd.mission.safety.hazards import Action, triggers_of
+from flightd.mission.safety.hazard_table import Action, triggers_of
 from flightd.mission.triggers import Trigger
 
 AIRBORNE = [state for state in STATES if state.airborne]

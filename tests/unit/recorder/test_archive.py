@@ -10,7 +10,8 @@ import pytest
 
 from flightd.adapters.recorder import archive as archive_module
 from flightd.adapters.recorder.archive import FlightArchive
-from flightd.adapters.recorder.mcap_file import McapFile, is_whole
+from flightd.adapters.recorder.mcap_file import McapFile
+from flightd.adapters.recorder.mcap_repair import is_whole
 from flightd.app.run import room_kept
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.replay.log import read_log

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 from flightd.adapters.recorder import mcap_file
-from flightd.adapters.recorder.mcap_file import McapFile, repair
+from flightd.adapters.recorder.mcap_file import McapFile
+from flightd.adapters.recorder.mcap_repair import repair
 from flightd.core.errors import InputError
 from flightd.replay.log import read_log
 

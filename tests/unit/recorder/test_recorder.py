@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flightd.adapters.recorder.mcap_file import is_whole
+from flightd.adapters.recorder.mcap_repair import is_whole
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.adapters.recorder.schemas import schema_of
 from flightd.core.errors import UnavailableError

@@ -11,7 +11,7 @@ import pytest
 from flightd.app.simulation.process_faults import check_faults
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
-from flightd.mission.safety.hazards import HAZARDS
+from flightd.mission.safety.hazard_table import HAZARDS
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.scenario.fault_schema import BareFloor, CameraFault
 from flightd.sim.scenario.faults import FaultSchedule, bare_boxes

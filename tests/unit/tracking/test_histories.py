@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from flightd.core.types import Attitude
 from flightd.tracking.attitude_history import AttitudeHistory
-from flightd.tracking.clock_offset import DeviceClock
+from flightd.tracking.device_clock import DeviceClock
 from flightd.tracking.height_history import HeightHistory
 
 

@@ -9,7 +9,7 @@ from flightd.adapters.vehicle.ardrone.clock_counters import WrappingCounter
 from flightd.adapters.vehicle.ardrone.navdata import Demo, DroneState, Major, Navdata
 from flightd.adapters.vehicle.ardrone.refusal import Emergency
 from flightd.core.types import Attitude
-from flightd.tracking.clock_offset import DeviceClock
+from flightd.tracking.device_clock import DeviceClock
 
 CLOCK_WRAP_US = 2048 * 1_000_000
 AIRBORNE = frozenset(

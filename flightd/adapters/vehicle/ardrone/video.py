@@ -20,7 +20,7 @@ from flightd.core.extras import missing_extra
 from flightd.core.types import Image
 from flightd.ports import Clock
 from flightd.runtime.clock import Hold
-from flightd.tracking.clock_offset import DeviceClock
+from flightd.tracking.device_clock import DeviceClock
 
 _log = logging.getLogger(__name__)
 

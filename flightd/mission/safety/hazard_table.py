@@ -130,7 +130,7 @@ HAZARDS: tuple[Hazard, ...] = (
         " commanded",
         Action.LAND,
         "the height is not believed again in this flight: no climb; down by the lines",
-        _FAST,
+        "tests/sim/test_stuck_height.py",
     ),
     Hazard(
         "height_wrong",
