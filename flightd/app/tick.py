@@ -90,4 +90,5 @@ class Tick:
             dropped=dropped,
             restarts={"detector": vision.replaced, "recorder": flight.recorder.restarts},
             repeated_level=flight.setpoints.stale,
+            possible=pilot.mission.possible_commands,
         )

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from flightd.core.tick import TickInput, TickOutput
-from flightd.core.types import Phase, Status, VehicleState
+from flightd.core.types import CommandKind, Phase, Status, VehicleState
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,8 @@ class Snapshot:
     (mid-exposure to setpoint on the wire).  `tick_late_s` is how late each tick came and `latencies_ms` the
     stages of each frame flown by, both since the last that was told.  The others count since the start:
     `dropped` what a full queue or a lost worker cost, `restarts` what died and was brought back, each by the
-    part's name; `repeated_level` the setpoints that went out because no tick made one.
+    part's name; `repeated_level` the setpoints that went out because no tick made one.  `possible` are the
+    operator's commands that the mission takes now.
     """
 
     tick: TickInput
@@ -35,6 +36,7 @@ class Snapshot:
     dropped: Mapping[str, int] = field(default_factory=dict)
     restarts: Mapping[str, int] = field(default_factory=dict)
     repeated_level: int = 0
+    possible: frozenset[CommandKind] = frozenset()
 
     @property
     def stamp_ns(self) -> int:

@@ -17,7 +17,16 @@ from flightd.mission.flight.phase_progress import PhaseProgress
 from flightd.mission.flight.reference import ReferenceGenerator, ReferenceTask
 from flightd.mission.flight.relocation import Relocator
 from flightd.mission.guidance import CEILING_MARGIN_M, Guidance, MissionInputs
-from flightd.mission.machine import BEGIN, COMMANDS, TABLE, Cause, State, next_state, taken_in
+from flightd.mission.machine import (
+    BEGIN,
+    COMMANDS,
+    TABLE,
+    Cause,
+    State,
+    next_state,
+    possible_commands,
+    taken_in,
+)
 from flightd.mission.orders import StandingOrders
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
@@ -119,6 +128,11 @@ class Mission:
     def remaining(self) -> tuple[str, ...]:
         """The stops that this mission still wants to visit, in order."""
         return self._route.remaining
+
+    @property
+    def possible_commands(self) -> frozenset[CommandKind]:
+        """What an operator may order now."""
+        return possible_commands(self.state)
 
     def drain_events(self) -> tuple[Event, ...]:
         return (*self._events.drain(), *self._scanner.drain_events())

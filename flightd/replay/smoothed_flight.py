@@ -20,7 +20,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.core.errors import UnavailableError
+from flightd.core.extras import missing_extra
 from flightd.core.types import GridPose
 
 Array: TypeAlias = NDArray[np.float64]
@@ -64,7 +64,7 @@ def smooth(poses: Sequence[GridPose]) -> SmoothedFlight:
     try:
         from filterpy.kalman import rts_smoother  # noqa: PLC0415 - of an extra, and slow to import
     except ImportError:
-        raise UnavailableError("smoothing needs filterpy: pip install 'flightd[smooth]'") from None
+        raise missing_extra("smooth", "the smoothed track") from None
     chosen = _usable(poses)
     states = np.array([(p.x_m, p.vx_mps, p.y_m, p.vy_mps) for p in chosen], np.float64).reshape(-1, 4, 1)
     spreads = np.array([_spread(p) for p in chosen], np.float64).reshape(-1, 4, 4)

@@ -127,10 +127,10 @@ def test_without_the_library_the_report_says_so_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "filterpy.kalman", None)
-    with pytest.raises(UnavailableError, match="flightd\\[smooth\\]"):
+    with pytest.raises(UnavailableError, match="extra smooth"):
         smooth([pose(1, 0.0)])
     log = write_flight(tmp_path)
     assert "Live pose" not in {figure.label for figure in key_figures(load_flight(log))}
     page = render(load_flight(log))
-    assert "no smoothed track: smoothing needs filterpy" in page
+    assert "the smoothed track needs what is not installed (extra smooth)" in page
     assert "flown smoothed" not in page

@@ -144,6 +144,7 @@ class ZmqGround:
         )
         report = status_report(snapshot, self._session, self._next(STATUS_TOPIC), link)
         self._desk.status = report
+        self._desk.possible = snapshot.possible
         self._publish(STATUS_TOPIC, encode(report))
 
     def event(self, event: Event) -> None:

@@ -39,7 +39,7 @@ from flightd.adapters.ground_link.protocol import (
     decode_request,
 )
 from flightd.core.types import Command, CommandKind, Phase
-from flightd.mission.machine import possible_in
+from flightd.mission.machine import BEGIN, possible_commands
 from flightd.site.site import Site
 
 _RECENT_EVENTS = 50
@@ -87,6 +87,8 @@ class RequestHandler:
         self._heard_ns: dict[tuple[str, bytes], int] = {}
         self.events: deque[EventReport] = deque(maxlen=_RECENT_EVENTS)
         self.status: StatusReport | None = None
+        self.possible = possible_commands(BEGIN)
+        """The commands that the mission takes now."""
         self.requests = 0
         self.refused = 0
 
@@ -217,7 +219,7 @@ class RequestHandler:
                 Code.NODE,
                 f"no node {node!r} on site {self._floor.name}",
             ),
-            (kind not in possible_in(phase), Code.PHASE, f"cannot {kind} in phase {phase}"),
+            (kind not in self.possible, Code.PHASE, f"cannot {kind} in phase {phase}"),
         )
         return next(((code, text) for applies, code, text in checks if applies), (None, ""))
 

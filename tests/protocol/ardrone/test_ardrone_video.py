@@ -365,7 +365,7 @@ def test_the_front_channel_shows_the_racks_and_the_bottom_one_the_floor() -> Non
 
 def test_without_pyav_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(UnavailableError, match=r"pip install 'flightd\[ardrone\]'"):
+    with pytest.raises(UnavailableError, match=r"extra ardrone.* -m pip install 'av"):
         Decoder()
 
 

@@ -28,7 +28,7 @@ from flightd.adapters.vehicle.mavsdk.library import whole_fields
 from flightd.adapters.vehicle.mavsdk.telemetry import MavsdkTelemetry
 from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
 from flightd.config.vehicle import VehicleConfig
-from flightd.core.errors import InputError, UnavailableError
+from flightd.core.errors import UnavailableError
 from flightd.core.types import Attitude, Demand, LandedState
 from flightd.ports import CountsDrops
 from flightd.runtime.clock import LoopClock
@@ -400,7 +400,7 @@ def test_without_the_library_one_line_says_what_to_install(monkeypatch: pytest.M
     config = VehicleConfig(kind="mavsdk", url="udpout://127.0.0.1:14550")
 
     async def test() -> None:
-        with pytest.raises(InputError, match=r"pip install 'flightd\[mavsdk\]'"):
+        with pytest.raises(UnavailableError, match=r"extra mavsdk.* -m pip install 'mavsdk"):
             connect_vehicle(config, LoopClock())
 
     real(test())

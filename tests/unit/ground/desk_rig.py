@@ -19,6 +19,7 @@ from flightd.adapters.ground_link.protocol import (
 )
 from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
 from flightd.core.types import Phase
+from flightd.mission.machine import possible_in
 from flightd.site.site_file import load_site
 
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
@@ -67,6 +68,7 @@ class DeskRig:
         self.audit: list[AuditEntry] = []
         self.desk = RequestHandler(SITE, SESSION, self.audit.append, **more)
         self.desk.status = report(phase)
+        self.desk.possible = possible_in(phase)
         self.now_ns = 100 * S
 
     def hand(self, request: bytes, peer: Peer = OPERATOR) -> Answer | AskPicture:
