@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from flightd.config.scan import ScanConfig
-from flightd.core.scanning import BodyPose, Finding, Light, Occupancy
+from flightd.core.scanning import Finding, Light, Occupancy
 from flightd.mission.scan.code_assignment import PlacedRead, ShelfLook
-from flightd.mission.scan.location_votes import LocationVerdict, LocationVotes
+from flightd.mission.scan.location_votes import LocationVotes
 from flightd.mission.scan.views import View, ViewPlanner
 
 _SAME_EXPOSURE = 0.01
@@ -35,7 +35,7 @@ class ScanTask:
         self._planner = planner
         self._params = params
         self._open: dict[str, LocationVotes] = {
-            code: LocationVotes(params.pictures) for view in views for code in view.locations
+            code: LocationVotes(code, node, params.pictures) for view in views for code in view.locations
         }
         self._begun_ns: int | None = None
         self._relit = False
@@ -94,7 +94,7 @@ class ScanTask:
         if self._begun_ns is None:
             return False
         left = self._left(view)
-        waiting = any(not self._open[code].told for code in left)
+        waiting = any(not self._open[code].exhausted for code in left)
         if waiting and (now_ns - self._begun_ns) * 1e-9 < self._params.view_s:
             return False
         self._begun_ns = None
@@ -132,25 +132,7 @@ class ScanTask:
         return tuple(code for code in view.locations if code in self._open)
 
     def _settle(self, code: str, final: bool) -> None:
-        verdict = self._open[code].verdict(final)
-        if verdict is not None:
+        finding = self._open[code].finding(final)
+        if finding is not None:
             del self._open[code]
-            self._findings.append(_finding(code, self.node, verdict))
-
-
-def _finding(location: str, node: str, verdict: LocationVerdict) -> Finding:
-    """A verdict as a message, with the time and place of its last look."""
-    pose: BodyPose = verdict.pose
-    return Finding(
-        stamp_ns=pose.stamp_ns,
-        location=location,
-        state=verdict.state,
-        confidence=round(verdict.confidence, 4),
-        reads=verdict.reads,
-        evidence=verdict.evidence,
-        node=node,
-        x_m=pose.x_m,
-        y_m=pose.y_m,
-        height_m=pose.height_m,
-        yaw_rad=pose.yaw_rad,
-    )
+            self._findings.append(finding)
