@@ -15,7 +15,7 @@ import numpy as np
 
 from flightd.core.camera_view import CameraView, ForwardMount, Viewpoint
 from flightd.core.geometry import Lens, Matrix
-from flightd.core.scanning import BodyPose, CodeSet, Place, PlaceLook, Quad
+from flightd.core.scanning import BodyPose, CodeSet, Place, Quad
 from flightd.core.types import CodeRead
 from flightd.site.cells import Cell, cells_of
 from flightd.site.racks import code_form
@@ -76,16 +76,14 @@ class Sighting:
 
 @dataclass(frozen=True, slots=True)
 class ShelfLook:
-    """One picture, sorted by location; `strangers` are location codes that the map lacks, `exposure` is as in
-    `CodeSet`."""
+    """What was read in one picture taken at `pose`, sorted by location; `strangers` are location codes that
+    the map lacks."""
 
-    frame_seq: int
+    codes: CodeSet
     pose: BodyPose
     reads: tuple[PlacedRead, ...]
-    places: tuple[PlaceLook, ...]
     sightings: tuple[Sighting, ...]
     strangers: tuple[str, ...] = ()
-    exposure: float = 1.0
 
 
 class Assigner:
@@ -139,15 +137,7 @@ class Assigner:
                 strangers += [read.text] * read.believed
             else:
                 stock.append(self._placed(read, pose, where, front))
-        return ShelfLook(
-            codes.frame_seq,
-            pose,
-            tuple(stock),
-            codes.places,
-            tuple(sightings),
-            tuple(strangers),
-            codes.exposure,
-        )
+        return ShelfLook(codes, pose, tuple(stock), tuple(sightings), tuple(strangers))
 
     def _on_front(
         self, read: CodeRead, pose: BodyPose, front: tuple[str, Side]

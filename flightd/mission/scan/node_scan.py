@@ -70,11 +70,11 @@ class ScanTask:
         view = self.view
         if view is None or self._begun_ns is None or look.pose.stamp_ns < self._begun_ns:
             return
-        if not math.isclose(look.exposure, view.exposure, rel_tol=_SAME_EXPOSURE):
+        if not math.isclose(look.codes.exposure, view.exposure, rel_tol=_SAME_EXPOSURE):
             self._unfollowed += 1
             return
         self._followed += 1
-        places = {place.location: place for place in look.places}
+        places = {place.location: place for place in look.codes.places}
         reads: dict[str, list[PlacedRead]] = {}
         for placed in look.reads:
             reads.setdefault(placed.location, []).append(placed)
@@ -83,7 +83,7 @@ class ScanTask:
             place, own = places.get(code), reads.get(code, [])
             if place is not None and code in doubtful:  # somebody's code: not an empty place
                 place = replace(place, occupancy=Occupancy.GOODS, light=Light.FAIR)
-            self._open[code].add(look.frame_seq, look.pose, place, own)
+            self._open[code].add(look.codes.frame_seq, look.pose, place, own)
             self._settle(code, final=False)
 
     def step(self, now_ns: int) -> bool:
