@@ -76,14 +76,14 @@ class Sighting:
 
 @dataclass(frozen=True, slots=True)
 class ShelfLook:
-    """What was read in one picture taken at `pose`, sorted by location; `strangers` are location codes that
+    """What was read in one picture taken at `pose`, sorted by location; `unmapped` are location codes that
     the map lacks."""
 
     codes: CodeSet
     pose: BodyPose
     reads: tuple[PlacedRead, ...]
     sightings: tuple[Sighting, ...]
-    strangers: tuple[str, ...] = ()
+    unmapped: tuple[str, ...] = ()
 
 
 class Assigner:
@@ -125,7 +125,7 @@ class Assigner:
         """Everything of one picture taken at `pose` while facing the shelf `front` (aisle, side)."""
         stock: list[PlacedRead] = []
         sightings: list[Sighting] = []
-        strangers: list[str] = []
+        unmapped: list[str] = []
         for read in codes.reads:
             where = self._on_front(read, pose, front)
             if where is None:
@@ -134,10 +134,10 @@ class Assigner:
                 if read.believed:
                     sightings.append(self._sighting(read, pose, where, front))
             elif self._form.fullmatch(read.text):
-                strangers += [read.text] * read.believed
+                unmapped += [read.text] * read.believed
             else:
                 stock.append(self._placed(read, pose, where, front))
-        return ShelfLook(codes, pose, tuple(stock), tuple(sightings), tuple(strangers))
+        return ShelfLook(codes, pose, tuple(stock), tuple(sightings), tuple(unmapped))
 
     def _on_front(
         self, read: CodeRead, pose: BodyPose, front: tuple[str, Side]
