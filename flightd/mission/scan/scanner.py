@@ -140,7 +140,7 @@ class Scanner:
         over = self._task is None or self._task.step(now_ns)
         if self._task is not None and self._relights and not self._task.relights:
             self._relights = False
-            text = "the front camera does not follow a wanted exposure: what is lit wrongly stays unreadable"
+            text = "the front camera does not support exposure control: what is lit wrongly stays unreadable"
             self._events.append(Event(now_ns, EventLevel.WARNING, "exposure_fixed", text))
         self._gather()
         return over
