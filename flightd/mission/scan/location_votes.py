@@ -14,8 +14,8 @@ from flightd.mission.scan.code_votes import CodeVotes
 _LEAST_SHARE = 0.6
 """Part of a cell that must be in the picture for the picture to count as a look at it."""
 _WHOLE_SHARE = 0.9
-"""Part that one picture at least must show before more pictures are not asked for: what is cut off may
-hold a second label."""
+"""Part that one picture at least must show before no further ones are needed: what is cut off may hold a
+second label."""
 _SAME_LABEL = 0.5
 """Two codes nearer to each other than this part of their size are one label."""
 _LEAST_EMPTY = 2
