@@ -254,7 +254,7 @@ class Pilot:
         if guidance.guide is Guide.LEVEL or pose is None:
             wanted, age_s = control.level(now_ns, motion, reference, dt_s), 0.0
         elif guidance.guide is Guide.BRAKE:
-            wanted = control.rest(now_ns, motion, reference, dt_s, push, reckoned=guidance.reckoned)
+            wanted = control.rest(now_ns, motion, reference, dt_s, push, reckoned=guidance.dead_reckoned)
             age_s = min(senses.telemetry_age_s, sight_s)
         else:
             wanted = control.step(now_ns, motion, reference, dt_s)

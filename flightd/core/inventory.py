@@ -11,6 +11,8 @@ import json
 import math
 from dataclasses import dataclass
 
+from flightd.core.types import CodeRead
+
 
 class LocationState(enum.StrEnum):
     """The one thing that is known of a planned location."""
@@ -37,18 +39,6 @@ class PlannedLocation:
 
 
 @dataclass(frozen=True, slots=True)
-class StoredRead:
-    """One code at a location; the fields are those of `core.types.CodeRead`."""
-
-    symbology: str
-    text: str
-    sure: bool
-    agreeing: int
-    quality: float
-    gs1: tuple[tuple[str, str], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class CountPose:
     """Where the drone was when it saw the location; map frame, metres, radians."""
 
@@ -63,7 +53,8 @@ class CountPose:
 class Observation:
     """One look at one location: its state, what was read, from where, and how sure (0..1).
 
-    `evidence` is the SHA-256 of the picture, in hexadecimal, or empty.
+    `evidence` is the SHA-256 of the picture, in hexadecimal, or empty.  Where in the picture a code was is no
+    part of the record: reads that come from a store have no `corners_px` and no `gs1_problem`.
     """
 
     run: str
@@ -71,7 +62,7 @@ class Observation:
     utc_ns: int
     state: LocationState
     confidence: float
-    reads: tuple[StoredRead, ...] = ()
+    reads: tuple[CodeRead, ...] = ()
     pose: CountPose | None = None
     evidence: str = ""
 

@@ -166,13 +166,13 @@ class LineSet:
 class CodeRead:
     """One code read from one picture.
 
-    `symbology` is the reader's name for it ("QR Code", "EAN-13"); UPC-A is told as its 12 digits.
-    `corners_px` are in centred image coordinates, from the code's own top left, clockwise.  `sure` says
-    that the code's error correction or checksum vouches for the text; `agreeing` counts the ways of
-    looking at the picture that gave this text; `quality` is 1 for a code read from the picture as it is
-    and falls towards 0 with every alteration it took.  `gs1` are the (application identifier, value)
-    pairs of a GS1 code whose check digits hold, and `gs1_problem` says what is wrong with one that is
-    none.
+    `symbology` is the reader's name for it ("QR Code", "EAN-13"); UPC-A is reported as its 12 digits.
+    `corners_px` are in centred image coordinates, from the code's own top left, clockwise; none in a record
+    that comes from an inventory.  `sure` says that the code's error correction or checksum vouches for the
+    text; `agreeing` counts the ways of looking at the picture that gave this text; `quality` is 1 for a code
+    read from the picture as it is and falls towards 0 with every alteration it took.  `gs1` are the
+    (application identifier, value) pairs of a GS1 code whose check digits hold, and `gs1_problem` says what
+    is wrong with one that is none.
     """
 
     symbology: str

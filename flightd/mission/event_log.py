@@ -1,4 +1,4 @@
-"""What a mission tells people.  Pure."""
+"""What a mission reports: its events.  Pure."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from flightd.core.types import Event, EventLevel
 from flightd.mission.triggers import Trigger
 
 _AGAIN_S = 1.0
-"""A hazard that was away for longer is told anew."""
+"""A hazard that was away for longer is reported anew."""
 
 
 class EventLog:
@@ -16,15 +16,15 @@ class EventLog:
         self._events: list[Event] = []
         self._hazards: dict[Trigger, int] = {}
 
-    def tell(self, now_ns: int, level: EventLevel, name: str, text: str) -> None:
+    def report(self, now_ns: int, level: EventLevel, name: str, text: str) -> None:
         self._events.append(Event(now_ns, level, name, text))
 
     def hazard(self, now_ns: int, trigger: Trigger, action: str) -> None:
-        """Say once that a hazard was found, however long it lasts."""
+        """Report once that a hazard was found, however long it lasts."""
         last_ns = self._hazards.get(trigger)
         self._hazards[trigger] = now_ns
         if last_ns is None or (now_ns - last_ns) * 1e-9 > _AGAIN_S:
-            self.tell(now_ns, EventLevel.WARNING, "hazard", f"{trigger.value}: {action}")
+            self.report(now_ns, EventLevel.WARNING, "hazard", f"{trigger.value}: {action}")
 
     def drain(self) -> tuple[Event, ...]:
         """The events since the last call, oldest first."""

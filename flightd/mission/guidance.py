@@ -15,8 +15,8 @@ CEILING_MARGIN_M = 0.5
 
 
 class Guide(enum.Enum):
-    """What control is to do: nothing at all, level with height held, come to rest by the velocity as it is
-    reckoned and stay, or steer to the reference."""
+    """What control is to do: nothing at all, level with height held, come to rest by the dead-reckoned
+    velocity and stay, or steer to the reference."""
 
     NONE = "none"
     LEVEL = "level"
@@ -95,12 +95,13 @@ class MissionInputs:
 
 @dataclass(frozen=True, slots=True)
 class Guidance:
-    """What the mission wants: guide, reference (grid axes), demand on the vehicle.  `reckoned` says that
-    the velocity is still known while the floor is not seen, `at_once` that nothing may delay levelling."""
+    """What the mission wants: guide, reference (grid axes), demand on the vehicle.  `dead_reckoned` says
+    that the velocity is still known while the floor is not seen, `at_once` that nothing may delay
+    levelling."""
 
     phase: Phase
     guide: Guide
     reference: Reference
     demand: Demand
-    reckoned: bool = False
+    dead_reckoned: bool = False
     at_once: bool = False

@@ -1,7 +1,7 @@
 """The mission: what to do now, from what is known now.  Pure: time and data in, guidance out.
 
 Which phase follows is `machine`'s to say.  This is what belongs to each change: the route, the scan and the
-reference are led along, and people are told.
+reference are led along, and events are reported.
 """
 
 from __future__ import annotations
@@ -80,12 +80,12 @@ class Mission:
         self._route = Itinerary(site, plan, policy, self._events)
         self._scan = ShelfScan(site, scanner)
         self._progress = PhaseProgress(config, self._route, self._scan, scanner)
-        self._watch = HazardMonitor(config)
+        self._monitor = HazardMonitor(config)
         self._relocator = Relocator(config.mission, site.ceiling_m - CEILING_MARGIN_M, overhead_m)
         self._steering = ReferenceGenerator(
-            config, site.ceiling_m, self._watch, self._relocator, (start.x_m, start.y_m, plan.start_yaw_rad)
+            config, site.ceiling_m, self._monitor, self._relocator, (start.x_m, start.y_m, plan.start_yaw_rad)
         )
-        self._charging = BatterySwap(site, policy, config, scanner, self._route, self._watch)
+        self._charging = BatterySwap(site, policy, config, scanner, self._route, self._monitor)
         self.state = BEGIN
         self._reason: Reason | None = None
         self._cause: Reason | None = None
@@ -140,7 +140,7 @@ class Mission:
     def command(self, command: Command, now_ns: int) -> None:
         """Take an operator's order; a landing or stop acts at the next step."""
         kind, trigger = command.kind, COMMANDS[command.kind]
-        self._events.tell(now_ns, EventLevel.INFO, "command", f"{kind.value} {command.node}".strip())
+        self._events.report(now_ns, EventLevel.INFO, "command", f"{kind.value} {command.node}".strip())
         if trigger not in taken_in(self.state):
             self._refuse(command, now_ns)
             return
@@ -152,18 +152,18 @@ class Mission:
         elif kind is CommandKind.START:
             self._turn(trigger)
 
-    def step(self, senses: MissionInputs) -> Guidance:
+    def step(self, inputs: MissionInputs) -> Guidance:
         """Advance by one tick."""
-        doubts = self._relocator.step(senses, self.phase, self._progress.phase_s(senses.now_ns))
+        doubts = self._relocator.step(inputs, self.phase, self._progress.phase_s(inputs.now_ns))
         if self._relocator.jumped:
-            self._correct(senses)
-        triggers = self._triggers(senses) | doubts | self._scan.doubts(self.phase)
-        self._tell_hazards(triggers, senses.now_ns)
+            self._correct(inputs)
+        triggers = self._triggers(inputs) | doubts | self._scan.doubts(self.phase)
+        self._report_hazards(triggers, inputs.now_ns)
         _, trigger = next_state(self.state, triggers)
         if trigger is not None:
-            self._begin(senses, trigger)
+            self._begin(inputs, trigger)
             self._orders.acted_on(trigger)
-        return self._guide(senses)
+        return self._guide(inputs)
 
     # What has happened
 
@@ -178,7 +178,7 @@ class Mission:
         self._turn_back(self._charging.step(s, self.state))
         if self._progress.timed_out(s.now_ns):
             found.add(Trigger.TIMED_OUT)
-        found |= self._watch.step(s, self._situation(Trigger.HOLD in found))
+        found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))
         if Trigger.RECORD_LOST in found:
             found.remove(Trigger.RECORD_LOST)
             found |= self._lost(self._config.hazards.record_lost, Trigger.RECORD_LOST, s.now_ns)
@@ -200,13 +200,13 @@ class Mission:
             self._go_home(Trigger.HOME_IN_NEED, Happened(trigger), now_ns)
         return {LossAction.HOLD: {Trigger.HOLD}, LossAction.LAND: {trigger}}.get(action, set())
 
-    def _tell_hazards(self, triggers: set[Trigger], now_ns: int) -> None:
-        asked = triggers & ACTIONS.keys()
-        if not self.airborne:  # on the ground only what decides something there is worth telling
-            asked &= taken_in(self.state)
+    def _report_hazards(self, triggers: set[Trigger], now_ns: int) -> None:
+        reported = triggers & ACTIONS.keys()
+        if not self.airborne:  # on the ground only what decides something there is worth reporting
+            reported &= taken_in(self.state)
         elif self.phase in _NEAR_FLOOR:
-            asked &= taken_in(self.state) | triggers_of(Action.REPORT, Action.HOME)
-        for trigger in sorted(asked, key=list(Trigger).index):
+            reported &= taken_in(self.state) | triggers_of(Action.REPORT, Action.HOME)
+        for trigger in sorted(reported, key=list(Trigger).index):
             self._events.hazard(now_ns, trigger, ACTIONS[trigger].value)
 
     def _situation(self, paused: bool) -> FlightContext:
@@ -220,11 +220,13 @@ class Mission:
     def _ground(self, s: MissionInputs) -> set[Trigger]:
         """What a lost ground link asks for, by the configured action; the link's return ends a hold."""
         action = self._config.ground.lost_action
-        lost = self._watch.ground_lost(s)
+        lost = self._monitor.ground_lost(s)
         if lost is not self._ground_lost:
             self._ground_lost = lost
             text = f"silent for {s.ground_silent_s:.1f} s: {action.value}" if lost else "heard again"
-            self._events.tell(s.now_ns, EventLevel.WARNING if lost else EventLevel.INFO, "ground_link", text)
+            self._events.report(
+                s.now_ns, EventLevel.WARNING if lost else EventLevel.INFO, "ground_link", text
+            )
         return self._lost(action, Trigger.GROUND_LOST, s.now_ns) if lost else set()
 
     def _adopting(self, s: MissionInputs) -> bool:
@@ -258,7 +260,7 @@ class Mission:
             text = f"{ordered} refused: on the way home"
         else:
             text = f"{ordered} refused: not in phase {self.phase.value}"
-        self._events.tell(now_ns, EventLevel.WARNING, "command", text)
+        self._events.report(now_ns, EventLevel.WARNING, "command", text)
 
     def _go_home(self, trigger: Trigger, reason: Reason, now_ns: int) -> None:
         """Fly to the home pad; in need by the shortest way, against one-way lines too."""
@@ -293,7 +295,7 @@ class Mission:
         self._explain(s, trigger, outcome.cause)
         level = EventLevel.WARNING if _alarming(before, self.state, trigger) else EventLevel.INFO
         text = f"{before.phase.value} -> {self.phase.value}: {self.reason}"
-        self._events.tell(s.now_ns, level, "phase", text)
+        self._events.report(s.now_ns, level, "phase", text)
         self._progress.begin(s, self.phase)
         self._enter(s, trigger)
 
@@ -312,7 +314,7 @@ class Mission:
         refusal = s.vehicle.refusal if s.vehicle is not None and trigger is Trigger.TIMED_OUT else ""
         if trigger is Trigger.NOT_COUNTED and (blind := self._scanner.blind) is not None:
             self._cause = blind
-            self._events.tell(s.now_ns, EventLevel.ERROR, "not_counted", in_words(blind))
+            self._events.report(s.now_ns, EventLevel.ERROR, "not_counted", in_words(blind))
         elif cause is Cause.LANDED:
             self._cause = Plain.LANDED
         elif cause is Cause.TRIGGER:
@@ -337,7 +339,7 @@ class Mission:
                 self._await_start()
             case Phase.RECOVER if s.vehicle is not None:
                 text = f"found flying in mode {s.vehicle.mode} at {s.height_m:.1f} m: level, then landing"
-                self._events.tell(s.now_ns, EventLevel.ERROR, "restart", text)
+                self._events.report(s.now_ns, EventLevel.ERROR, "restart", text)
 
     def _go_on(self, s: MissionInputs) -> None:
         """To the next stop, which is the way back where the battery does not reach another one."""
@@ -350,7 +352,7 @@ class Mission:
         self._relocator.begin()
         places = ", ".join(f"{node} {share:.0%}" for node, share in s.rivals[:5])
         if places:
-            self._events.tell(s.now_ns, EventLevel.WARNING, "position", f"doubted, it may be {places}")
+            self._events.report(s.now_ns, EventLevel.WARNING, "position", f"doubted, it may be {places}")
 
     def _rejoin(self, s: MissionInputs) -> None:
         """Go on from where the drone turned out to be."""
@@ -364,7 +366,7 @@ class Mission:
         dx, dy = self._relocator.jump_m
         if s.pose is None or not self.airborne:
             return
-        self._events.tell(s.now_ns, EventLevel.WARNING, "position", f"corrected: it is {s.pose.node}")
+        self._events.report(s.now_ns, EventLevel.WARNING, "position", f"corrected: it is {s.pose.node}")
         self._steering.begin_anew()
         if self.state.on_pad:
             self._steering.anchor = (s.pose.x_m, s.pose.y_m)
@@ -404,6 +406,6 @@ def _alarming(before: State, after: State, trigger: Trigger) -> bool:
     """Whether a change of phase is none of those that were planned."""
     if after.phase is Phase.LAND:
         return not after.on_pad
-    if after.phase in {Phase.ABORTED, Phase.PILOT}:  # a landing has been told already
+    if after.phase in {Phase.ABORTED, Phase.PILOT}:  # a landing has been reported already
         return before.phase is not Phase.LAND or (before.stopped and trigger is not Trigger.DISARMED)
     return after.phase in _HALTED

@@ -101,7 +101,7 @@ Reason: TypeAlias = (
 
 
 def in_words(reason: Reason) -> str:
-    """What people are told, in status, events and logs."""
+    """What is reported to people, in status, events and logs."""
     match reason:
         case Plain():
             text = reason.value

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
+from flightd.core.inventory import LocationRecord, LocationState, Observation
 from flightd.core.types import Image
 from flightd.ports import Store
 from flightd.studies.frame_files import read_image
@@ -28,11 +28,7 @@ def count_photographs(store: Store, files: Sequence[Path], run: str) -> list[Loc
 
 
 def _look(location: str, picture: Image, utc_ns: int, run: str, evidence: str) -> Observation:
-    believed = [read for read in read_codes(picture) if read.believed]
-    reads = tuple(
-        StoredRead(read.symbology, read.text, read.sure, read.agreeing, read.quality, read.gs1)
-        for read in believed
-    )
+    reads = tuple(read for read in read_codes(picture) if read.believed)
     texts = {read.text for read in reads}
     if not texts:
         return Observation(run, location, utc_ns, LocationState.UNREADABLE, 0.0, evidence=evidence)

@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, StoredRead
+from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation
+from flightd.core.types import CodeRead
 from flightd.site.site import Location, Site
 from flightd.site.site_file import parse_site
 
@@ -74,7 +75,7 @@ def write_count(folder: Path, site: Site) -> None:
                 LocationState.READ: [text_at(place)],
                 LocationState.SEVERAL: [text_at(place), f"BOX <{number}> & co"],
             }.get(state, [])
-            reads = tuple(StoredRead("EAN-13", text, True, 3, 0.9) for text in texts)
+            reads = tuple(CodeRead("EAN-13", text, (), True, 3, 0.9) for text in texts)
             pose = CountPose(place.node, place.x_m, place.y_m, place.height_m, 0.0)
             confidence = 0.8 + 0.19 * random.Random(-number).random() if state.is_counted else 0.2
             evidence = store.keep_evidence(picture_of(place, state))

@@ -25,8 +25,8 @@ from flightd.core.inventory import (
     LocationState,
     Observation,
     PlannedLocation,
-    StoredRead,
 )
+from flightd.core.types import CodeRead
 
 _VERSION = 2
 _APPLICATION = 0x666C7464
@@ -241,13 +241,13 @@ class SqliteStore:
 
     def _observations(self, location: str | None = None) -> list[tuple[Observation, int]]:
         """All looks, or those at one location, with their standing, oldest first."""
-        reads: dict[str, list[StoredRead]] = {}
+        reads: dict[str, list[CodeRead]] = {}
         for seen, symbology, text, sure, agreeing, quality, gs1 in self._db.execute(
             "SELECT observation, symbology, text, sure, agreeing, quality, gs1 FROM code_read "
             "ORDER BY observation, number"
         ):
             elements = tuple((ai, value) for ai, value in json.loads(gs1))
-            read = StoredRead(symbology, text, bool(sure), agreeing, quality, elements)
+            read = CodeRead(symbology, text, (), bool(sure), agreeing, quality, elements)
             reads.setdefault(seen, []).append(read)
         rows = self._db.execute(
             "SELECT id, run, location, utc_ns, state, confidence, evidence, "
@@ -275,7 +275,7 @@ class SqliteStore:
         return int(after - before)
 
 
-def _observation(row: tuple[Any, ...], reads: tuple[StoredRead, ...]) -> Observation:
+def _observation(row: tuple[Any, ...], reads: tuple[CodeRead, ...]) -> Observation:
     _, run, location, utc_ns, state, confidence, evidence, node, *place = row
     pose = None if node is None else CountPose(node, *place)
     return Observation(run, location, utc_ns, LocationState(state), confidence, reads, pose, evidence)

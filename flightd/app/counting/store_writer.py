@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from typing import Self
 
 from flightd.core.errors import UnavailableError
-from flightd.core.inventory import CountPose, Observation, StoredRead
+from flightd.core.inventory import CountPose, Observation
 from flightd.core.scanning import Finding, Settled
 from flightd.ports import Clock, Store
 from flightd.runtime.clock import Hold
@@ -128,10 +128,9 @@ class StoreWriter:
         self._store.commit(self._observation(finding, evidence), confirmed=False)
 
     def _observation(self, f: Finding, evidence: str) -> Observation:
-        reads = tuple(StoredRead(r.symbology, r.text, r.sure, r.agreeing, r.quality, r.gs1) for r in f.reads)
         pose = CountPose(f.node, f.x_m, f.y_m, f.height_m, f.yaw_rad)
         utc_ns = self._utc_at_zero_ns + f.stamp_ns
-        return Observation(self._run, f.location, utc_ns, f.state, f.confidence, reads, pose, evidence)
+        return Observation(self._run, f.location, utc_ns, f.state, f.confidence, f.reads, pose, evidence)
 
     def _tell(self, text: str) -> None:
         now_ns = self._clock.now_ns()

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from typing import Any, Final
 from urllib.parse import quote
 
-from flightd.core.inventory import LocationRecord, Observation, StoredRead
+from flightd.core.inventory import LocationRecord, Observation
+from flightd.core.types import CodeRead
 from flightd.core.utc_time import utc_text
 
 _GTIN: Final = {"EAN-13": 13, "EAN-8": 8, "UPC-A": 12, "UPC-E": 12, "ITF-14": 14}
@@ -59,7 +60,7 @@ def _event(record: LocationRecord, seen: Observation, base_uri: str) -> dict[str
     return event
 
 
-def _epc(read: StoredRead, base_uri: str) -> tuple[str, bool]:
+def _epc(read: CodeRead, base_uri: str) -> tuple[str, bool]:
     """The URI of what a code names, and whether it names a class rather than one thing."""
     elements = dict(read.gs1)
     if "00" in elements:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from flightd.core.inventory import LocationRecord, StoredRead
+from flightd.core.inventory import LocationRecord
+from flightd.core.types import CodeRead
 from flightd.core.utc_time import utc_text
 
 COLUMNS: Final = (
@@ -19,7 +20,7 @@ def rows_of(records: Sequence[LocationRecord]) -> list[list[str | float]]:
     rows: list[list[str | float]] = []
     for record in records:
         seen = record.observation
-        reads: Sequence[StoredRead | None] = (seen.reads if seen else ()) or (None,)
+        reads: Sequence[CodeRead | None] = (seen.reads if seen else ()) or (None,)
         pose = seen.pose if seen else None
         told = {read.text if read else "": read for read in reads}
         for text, read in told.items():

@@ -29,12 +29,12 @@ class BatterySwap:
         config: Config,
         scanner: AnyScanner,
         itinerary: Itinerary,
-        watch: HazardMonitor,
+        monitor: HazardMonitor,
     ) -> None:
         self._sorties = Sorties(site, Legs(site, policy, Pace.of(config.mission)), config.battery, scanner)
         self._swap = config.battery.swap
         self._route = itinerary
-        self._watch = watch
+        self._monitor = monitor
         self._short = False
         self._visited_before = 0
 
@@ -56,7 +56,7 @@ class BatterySwap:
         self._sorties.step(s.now_ns, charge, state.airborne)
         if not state.airborne or state.returning or state.phase is Phase.LAND:
             return None
-        if self._watch.battery_low(s):
+        if self._monitor.battery_low(s):
             return self._go_charge(s.now_ns, ChargeLow(charge), in_need=True)
         goal = self._route.goal
         left_m = s.distance_m((goal.x_m, goal.y_m)) if state.phase is Phase.FOLLOW else 0.0

@@ -50,7 +50,7 @@ class ReferenceGenerator:
         self,
         config: Config,
         ceiling_m: float,
-        watch: HazardMonitor,
+        monitor: HazardMonitor,
         relocator: Relocator,
         start: tuple[float, float, float],
     ) -> None:
@@ -59,8 +59,8 @@ class ReferenceGenerator:
         self._params = p
         self._hazards = config.hazards
         self._ceiling_m = ceiling_m
-        self._watch = watch
-        self._blind = watch.blind
+        self._monitor = monitor
+        self._blind = monitor.blind
         self._relocator = relocator
         self._touchdown = Touchdown(p)
         self.anchor = (start[0], start[1])
@@ -111,8 +111,8 @@ class ReferenceGenerator:
         else:
             climb = self._climb_mps(s, task)
         guide = Guide.STEER if self._steers else Guide.BRAKE if self._may_brake(s, task) else Guide.LEVEL
-        reckoned = min(s.x_age_s, s.y_age_s) < self._hazards.expert.brake_s
-        return Guidance(task.phase, guide, self._reference(climb), demand, reckoned, task.state.stopped)
+        dead_reckoned = min(s.x_age_s, s.y_age_s) < self._hazards.expert.brake_s
+        return Guidance(task.phase, guide, self._reference(climb), demand, dead_reckoned, task.state.stopped)
 
     def _climb_mps(self, s: MissionInputs, task: ReferenceTask) -> float:
         """Climb rate towards the wanted height.  A take-off that drifts where no line tells how hurries: the
@@ -127,8 +127,8 @@ class ReferenceGenerator:
         return self._height.velocity
 
     def _may_brake(self, s: MissionInputs, task: ReferenceTask) -> bool:
-        """Without a view of the floor, but with an attitude by which to reckon on from the last one; or, the
-        other way round, with a view to brake by while the vehicle is not heard."""
+        """Without a view of the floor, but with an attitude by which to dead-reckon from the last one; or,
+        the other way round, with a view to brake by while the vehicle is not heard."""
         p = self._params
         heard = s.telemetry_age_s <= p.telemetry_hold_s
         seen = min(s.x_age_s, s.y_age_s) <= p.lines_hold_s
@@ -140,7 +140,7 @@ class ReferenceGenerator:
         p, h = self._params, self._hazards
         if task.phase is Phase.RELOCATE:
             return self._relocator.height_m(self._height_goal_m(task))
-        if task.phase is not Phase.HOLD or self._watch.unseen_s < h.expert.search_s:
+        if task.phase is not Phase.HOLD or self._monitor.unseen_s < h.expert.search_s:
             return self._height_goal_m(task)
         highest_m = self._ceiling_m - h.headroom_m
         return max(p.height_m, min(self._height_goal_m(task) + h.expert.search_climb_m, highest_m))

@@ -77,7 +77,7 @@ class Itinerary:
         """The goal was visited, if it was a wanted one."""
         if self.goal.visit:
             self.visited.append(self.goal.node)
-            self._events.tell(now_ns, EventLevel.INFO, "visited", self.goal.node)
+            self._events.report(now_ns, EventLevel.INFO, "visited", self.goal.node)
 
     def leave(self, nodes: Sequence[str]) -> None:
         """Visit these later, on another battery."""
@@ -86,7 +86,7 @@ class Itinerary:
     def turn_home(self, now_ns: int, reason: Reason, *, in_need: bool, pad: str | None = None) -> None:
         """Fly to the home pad or another; `in_need` by the shortest way, against one-way lines too."""
         self._left_over = self.remaining
-        self._events.tell(now_ns, EventLevel.WARNING, "home", in_words(reason))
+        self._events.report(now_ns, EventLevel.WARNING, "home", in_words(reason))
         self._replan([], in_need=in_need, home=pad)
 
     def go_to(self, now_ns: int, node: str) -> None:
@@ -100,12 +100,12 @@ class Itinerary:
                 why = f"goto {node} refused: {err}"
             else:
                 return
-        self._events.tell(now_ns, EventLevel.WARNING, "command", why)
+        self._events.report(now_ns, EventLevel.WARNING, "command", why)
 
     def rejoin(self, now_ns: int, pose: GridPose) -> None:
         """From where the drone turned out to be: over the nearest node along open lines to the goal."""
         goal = self.goal
-        self._events.tell(now_ns, EventLevel.INFO, "position", f"sure again: {pose.node}")
+        self._events.report(now_ns, EventLevel.INFO, "position", f"sure again: {pose.node}")
         node = self._site.nodes[pose.node]
         if node.id == goal.node:
             return
@@ -126,13 +126,15 @@ class Itinerary:
             try:
                 rest = make_plan(self._site, nodes, due[0], self._home, self._policy, self.goal.yaw_rad)
             except NoWayError as err:
-                self._events.tell(now_ns, EventLevel.WARNING, "recount", f"{', '.join(due)} left out: {err}")
+                self._events.report(
+                    now_ns, EventLevel.WARNING, "recount", f"{', '.join(due)} left out: {err}"
+                )
                 return
             self._stops[self._next :] = rest.stops
         else:
             self._left_over = (*due, *self._left_over)
         self.visited = [node for node in self.visited if node not in due]
-        self._events.tell(now_ns, EventLevel.WARNING, "recount", f"{', '.join(due)} to visit again")
+        self._events.report(now_ns, EventLevel.WARNING, "recount", f"{', '.join(due)} to visit again")
 
     def resume_from_pad(self, now_ns: int) -> None:
         """Stand on the pad that was flown to, with what was left over ahead."""
@@ -141,7 +143,7 @@ class Itinerary:
         rest = make_plan(self._site, self._left_over, pad.node, self._home, self._policy, pad.yaw_rad)
         self._stops, self._next = list(rest.stops), 0
         text = f"{len(self._left_over)} stops left; change the battery on the pad at {pad.node}"
-        self._events.tell(now_ns, EventLevel.WARNING, "swap", text)
+        self._events.report(now_ns, EventLevel.WARNING, "swap", text)
         self._left_over = ()
 
     def _replan(self, visits: list[str], *, in_need: bool = False, home: str | None = None) -> None:

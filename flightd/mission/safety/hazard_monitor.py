@@ -1,4 +1,4 @@
-"""What the mission's senses say of hazards: which of them hold now, each after its own time.  Pure."""
+"""What the mission's inputs say of hazards: which of them hold now, each after its own time.  Pure."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _JUMPED = 3
 
 _HOLDING = triggers_of(Action.HOLD)
 _Conditions: TypeAlias = dict[Trigger, tuple[bool, float]]
-"""Whether each hazard's condition holds now, and for how long it is borne."""
+"""Whether each hazard's condition holds now, and for how long it is tolerated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ class HazardMonitor:
         self._params = config.mission
         self._hazards = config.hazards
         self._ground_lost_s = config.ground.lost_s
-        self._lasting: defaultdict[Trigger, DebounceTimer] = defaultdict(DebounceTimer)
+        self._debounce: defaultdict[Trigger, DebounceTimer] = defaultdict(DebounceTimer)
         self._trouble = DebounceTimer()
         self._detectors, self._writers, self._stamps = Counted(), Counted(), Counted(_JUMPED)
         self._seen = DebounceTimer()
@@ -99,9 +99,9 @@ class HazardMonitor:
             found |= self._authority(s, s.vehicle) if situation.airborne else set()
             conditions |= self._vehicle(s, s.vehicle)
         conditions |= self._pictures(s) | self._place(s)
-        for trigger, (present, borne_s) in conditions.items():
+        for trigger, (present, tolerated_s) in conditions.items():
             holds = present and situation.airborne
-            if self._lasting[trigger].step(holds, s.now_ns) >= borne_s and holds:
+            if self._debounce[trigger].step(holds, s.now_ns) >= tolerated_s and holds:
                 found.add(trigger)
         holding = found & (_HOLDING - {Trigger.LINES_LOST})
         if self._trouble.step(bool(holding), s.now_ns) > self._params.lines_land_s:
@@ -156,11 +156,11 @@ class HazardMonitor:
         }
 
     def _pictures(self, s: MissionInputs) -> _Conditions:
-        borne_s, w = self._params.lines_hold_s, s.warnings
+        tolerated_s, w = self._params.lines_hold_s, s.warnings
         return {
-            Trigger.CAMERA_FROZEN: (w.frozen_s > borne_s, 0.0),
-            Trigger.CAMERA_BLIND: (w.blank_s > borne_s, 0.0),
-            Trigger.FRAMES_STALE: (w.picture_age_s > borne_s, 0.0),
+            Trigger.CAMERA_FROZEN: (w.frozen_s > tolerated_s, 0.0),
+            Trigger.CAMERA_BLIND: (w.blank_s > tolerated_s, 0.0),
+            Trigger.FRAMES_STALE: (w.picture_age_s > tolerated_s, 0.0),
         }
 
     def _place(self, s: MissionInputs) -> _Conditions:
@@ -180,8 +180,8 @@ class HazardMonitor:
         p = self._params
         lost = min(s.x_age_s, s.y_age_s) > p.lines_hold_s or not s.localised
         self.blind.step(s, situation.leg_along_x)
-        borne_s = p.lines_hold_s if situation.holds else p.expert.followed_hold_s
-        lost = lost or self.blind.unseen_s > borne_s
+        tolerated_s = p.lines_hold_s if situation.holds else p.expert.followed_hold_s
+        lost = lost or self.blind.unseen_s > tolerated_s
         seen_s = self._seen.step(not lost, s.now_ns)
         if seen_s > p.expert.lines_found_s or not situation.at_height:
             self._unseen_ns = None

@@ -66,7 +66,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "pilot",
         Trigger.PILOT_TOOK,
-        "the autopilot is in a mode that was not asked for",
+        "the autopilot is in a mode that was not commanded",
         Action.HANDS_OFF,
         "silence at once, for good",
         _FAST,
@@ -84,7 +84,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.TELEMETRY_STALE,
         "newest attitude older than `mission.telemetry_hold_s`",
         Action.HOLD,
-        "brake by the pictures, with the attitude that was asked for; level without them; no climb; never"
+        "brake by the pictures, with the commanded attitude; level without them; no climb; never"
         " taken for a pilot",
         _FAST,
     ),
@@ -187,7 +187,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "corridor_left",
         Trigger.CORRIDOR_LEFT,
-        "position further than `hazards.corridor_m` from the lines of the map, seen or reckoned, as long"
+        "position further than `hazards.corridor_m` from the lines of the map, seen or dead-reckoned, as long"
         " as it is known to 0.3 m",
         Action.HOLD,
         "no setpoint leans further out; back to the nearest line, land after `mission.lines_land_s`",

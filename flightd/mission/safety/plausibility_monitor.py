@@ -82,9 +82,9 @@ class PlausibilityMonitor:
             reference = guidance.reference
             self._off_m = math.hypot(reference.x_m - pose.x_m, reference.y_m - pose.y_m)
 
-    def height_m(self, told_m: float) -> float:
+    def height_m(self, reported_m: float) -> float:
         """The height by which to climb: NaN while the lines contradict it."""
-        return math.nan if self._doubt else told_m
+        return math.nan if self._doubt else reported_m
 
     def back(self, pose: GridPose | None, line_m: tuple[float, float]) -> tuple[float, float] | None:
         """The way back into the corridor, (forward, right) of the body; None inside it, and where the

@@ -1,4 +1,4 @@
-"""Flying on without a view of the floor: down while the reckoned position still holds.  Pure.
+"""Flying on without a view of the floor: down while the dead-reckoned position still holds.  Pure.
 
 What drifts unseen does so with the square of the time, so a drone whose camera shows nothing sinks at once,
 low enough to stand soon, high enough to find the lines again; one that sees pictures without lines climbs to
@@ -31,7 +31,7 @@ class FloorViewMonitor:
         self._lost_s = 0.0
 
     def step(self, s: MissionInputs, leg_along_x: bool | None) -> None:
-        """Take what one tick senses on, or stopped on, a leg along the map's x axis (None: on no leg)."""
+        """Take what one tick brings on, or stopped on, a leg along the map's x axis (None: on no leg)."""
         hold_s, w = self._params.lines_hold_s, s.warnings
         ages_s = s.x_age_s, s.y_age_s
         self.unseen_s = min(ages_s) if leg_along_x is None else ages_s[leg_along_x]

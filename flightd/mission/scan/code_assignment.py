@@ -15,7 +15,7 @@ import numpy as np
 
 from flightd.core.camera_view import CameraView, ForwardMount, Viewpoint
 from flightd.core.geometry import Lens, Matrix
-from flightd.core.scanning import BodyPose, CodeSet, Place, PlaceLook, Quad
+from flightd.core.scanning import BodyPose, CodeSet, Place, Quad
 from flightd.core.types import CodeRead
 from flightd.site.racks import code_form
 from flightd.site.shelf_cells import Cell, cells_of
@@ -76,16 +76,14 @@ class Sighting:
 
 @dataclass(frozen=True, slots=True)
 class ShelfLook:
-    """One picture, sorted by location; `strangers` are location codes that the map lacks, `exposure` is as in
-    `CodeSet`."""
+    """What was read in one picture taken at `pose`, sorted by location; `unmapped` are location codes that
+    the map lacks."""
 
-    frame_seq: int
+    codes: CodeSet
     pose: BodyPose
     reads: tuple[PlacedRead, ...]
-    places: tuple[PlaceLook, ...]
     sightings: tuple[Sighting, ...]
-    strangers: tuple[str, ...] = ()
-    exposure: float = 1.0
+    unmapped: tuple[str, ...] = ()
 
 
 class Assigner:
@@ -127,7 +125,7 @@ class Assigner:
         """Everything of one picture taken at `pose` while facing the shelf `front` (aisle, side)."""
         stock: list[PlacedRead] = []
         sightings: list[Sighting] = []
-        strangers: list[str] = []
+        unmapped: list[str] = []
         for read in codes.reads:
             where = self._on_front(read, pose, front)
             if where is None:
@@ -136,18 +134,10 @@ class Assigner:
                 if read.believed:
                     sightings.append(self._sighting(read, pose, where, front))
             elif self._form.fullmatch(read.text):
-                strangers += [read.text] * read.believed
+                unmapped += [read.text] * read.believed
             else:
                 stock.append(self._placed(read, pose, where, front))
-        return ShelfLook(
-            codes.frame_seq,
-            pose,
-            tuple(stock),
-            codes.places,
-            tuple(sightings),
-            tuple(strangers),
-            codes.exposure,
-        )
+        return ShelfLook(codes, pose, tuple(stock), tuple(sightings), tuple(unmapped))
 
     def _on_front(
         self, read: CodeRead, pose: BodyPose, front: tuple[str, Side]

@@ -1,22 +1,21 @@
-"""What several pictures say of one location, and when that is enough for a verdict."""
+"""What several pictures say of one location, and when that is enough for a finding."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import combinations
 
 from flightd.core.inventory import LocationState
-from flightd.core.scanning import BodyPose, Light, Occupancy, PlaceLook
-from flightd.core.types import CodeRead
+from flightd.core.scanning import BodyPose, Finding, Light, Occupancy, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
-from flightd.vision.shelf.read_votes import CodeVotes
+from flightd.mission.scan.code_votes import CodeVotes
 
 _LEAST_SHARE = 0.6
 """Part of a cell that must be in the picture for the picture to count as a look at it."""
 _WHOLE_SHARE = 0.9
-"""Part that one picture at least must show before more pictures are not asked for: what is cut off may
-hold a second label."""
+"""Part that one picture at least must show before no further ones are needed: what is cut off may hold a
+second label."""
 _SAME_LABEL = 0.5
 """Two codes nearer to each other than this part of their size are one label."""
 _LEAST_EMPTY = 2
@@ -28,35 +27,15 @@ _SEEN_EMPTY = 0.995
 _NO_CODE = 0.9
 
 
-@dataclass(frozen=True, slots=True)
-class LocationVerdict:
-    """The one state of a location, with how sure that is (0..1) and what vouches for it."""
-
-    state: LocationState
-    confidence: float
-    reads: tuple[CodeRead, ...]
-    evidence: str
-    pose: BodyPose
-
-
-@dataclass(slots=True)
-class _Spot:
-    """Where one text was seen on the shelf front, newest."""
-
-    x_m: float
-    height_m: float
-    size_m: float
-    probability: float
-
-
 class LocationVotes:
-    """The looks at one location.  `verdict` gives its state as soon as `pictures` looks agree on it; `light`
-    is how it came out in the last."""
+    """The looks at one location from a node.  `finding` gives its state as soon as `pictures` looks agree on
+    it; `light` is how it came out in the last."""
 
-    def __init__(self, pictures: int) -> None:
+    def __init__(self, location: str, node: str, pictures: int) -> None:
+        self._location = location
+        self._node = node
         self._least = pictures
         self._votes = CodeVotes()
-        self._spots: dict[tuple[str, str], _Spot] = {}
         self._seen: Counter[Occupancy] = Counter()
         self._empty_in_a_row = self._most_empty = 0
         self._quiet = 0
@@ -72,7 +51,7 @@ class LocationVotes:
         return self._seen.total()
 
     @property
-    def told(self) -> bool:
+    def exhausted(self) -> bool:
         """More pictures from the same place would show no more: codes are read, the rest is cut off."""
         return self.looks >= self._least and self._quiet >= 2 and bool(self._votes.believed())
 
@@ -80,18 +59,11 @@ class LocationVotes:
         self, frame_seq: int, pose: BodyPose, place: PlaceLook | None, reads: Sequence[PlacedRead]
     ) -> None:
         """Take in one picture: what it shows of the location, and the codes that are surely its own."""
-        new = False
-        for placed in reads:
-            key = placed.read.symbology, placed.read.text
-            new |= key not in self._spots
-            known = self._spots.get(key)
-            best = max(placed.probability, known.probability if known else 0.0)
-            self._spots[key] = _Spot(placed.x_m, placed.height_m, placed.size_m, best)
-        self._votes.add(frame_seq, (placed.read for placed in reads))
+        new = self._votes.add(frame_seq, reads)
         if place is not None and (place.share >= _LEAST_SHARE or reads):
             # what is burnt out looks like goods
-            told = place.light is Light.FAIR or place.occupancy is Occupancy.EMPTY
-            occupancy = place.occupancy if told else Occupancy.UNSURE
+            visible = place.light is Light.FAIR or place.occupancy is Occupancy.EMPTY
+            occupancy = place.occupancy if visible else Occupancy.UNSURE
             self._seen[occupancy] += 1
             self._empty_in_a_row = self._empty_in_a_row + 1 if occupancy is Occupancy.EMPTY else 0
             self._most_empty = max(self._most_empty, self._empty_in_a_row)
@@ -105,7 +77,7 @@ class LocationVotes:
             if worth >= self._best:
                 self._best, self._evidence = worth, place.evidence
 
-    def verdict(self, final: bool) -> LocationVerdict | None:
+    def finding(self, final: bool) -> Finding | None:
         """The state, None while more looks may still tell; `final` forces one, and is None only where no
         picture showed the location."""
         if self._pose is None:
@@ -115,13 +87,13 @@ class LocationVotes:
             settled = self._enough and self._quiet >= 2 and self._agreed(believed)
             return self._with_codes(believed, self._pose) if settled or final else None
         if self._is_empty(final):
-            return LocationVerdict(LocationState.EMPTY, _SEEN_EMPTY, (), self._evidence, self._pose)
+            return self._found(LocationState.EMPTY, _SEEN_EMPTY, self._pose)
         if not final or not self.looks:
             return None
         covered = self._seen[Occupancy.COVERED]
-        hidden = covered > self.looks / 2 and not self._spots
+        hidden = covered > self.looks / 2 and not self._votes.any_read
         state = LocationState.OCCLUDED if hidden else LocationState.UNREADABLE
-        return LocationVerdict(state, _NO_CODE, (), self._evidence, self._pose)
+        return self._found(state, _NO_CODE, self._pose)
 
     def _is_empty(self, final: bool) -> bool:
         """Whether looks in a row show an empty place, and none ever showed that there is something."""
@@ -129,36 +101,54 @@ class LocationVotes:
         if final:
             all_empty = self._empty_in_a_row == self.looks >= _LEAST_EMPTY
             enough = enough or all_empty or self._most_empty >= self._least
-        return enough and not self._spots and not any(self._seen[kind] for kind in _OCCUPIED)
+        return enough and not self._votes.any_read and not any(self._seen[kind] for kind in _OCCUPIED)
 
     @property
     def _enough(self) -> bool:
         return self.looks >= self._least and self._largest >= _WHOLE_SHARE
 
     @staticmethod
-    def _agreed(believed: Sequence[CodeRead]) -> bool:
-        return all(read.agreeing >= 2 for read in believed)
+    def _agreed(believed: Sequence[PlacedRead]) -> bool:
+        return all(placed.read.agreeing >= 2 for placed in believed)
 
-    def _with_codes(self, believed: Sequence[CodeRead], pose: BodyPose) -> LocationVerdict:
-        several = len({read.text for read in believed}) > 1
-        sure = min(
-            self._spots[read.symbology, read.text].probability
-            * (_SURE_TEXT if read.sure and read.agreeing >= 2 else _AGREED_TEXT)
-            for read in believed
+    def _with_codes(self, believed: Sequence[PlacedRead], pose: BodyPose) -> Finding:
+        several = len({placed.read.text for placed in believed}) > 1
+        confidence = min(
+            placed.probability
+            * (_SURE_TEXT if placed.read.sure and placed.read.agreeing >= 2 else _AGREED_TEXT)
+            for placed in believed
         )
         state = LocationState.SEVERAL if several else LocationState.READ
-        return LocationVerdict(state, sure, tuple(believed), self._evidence, pose)
+        return self._found(state, confidence, pose, believed)
 
-    def _believed(self) -> tuple[list[CodeRead], bool]:
+    def _found(
+        self, state: LocationState, confidence: float, pose: BodyPose, believed: Sequence[PlacedRead] = ()
+    ) -> Finding:
+        """The finding, with the time and place of the last look."""
+        return Finding(
+            stamp_ns=pose.stamp_ns,
+            location=self._location,
+            state=state,
+            confidence=round(confidence, 4),
+            reads=tuple(placed.read for placed in believed),
+            evidence=self._evidence,
+            node=self._node,
+            x_m=pose.x_m,
+            y_m=pose.y_m,
+            height_m=pose.height_m,
+            yaw_rad=pose.yaw_rad,
+        )
+
+    def _believed(self) -> tuple[tuple[PlacedRead, ...], bool]:
         """The reads that count, and whether one label was read as different texts: then none counts."""
-        believed = list(self._votes.believed())
-        for i, one in enumerate(believed):
-            for other in believed[i + 1 :]:
-                if one.text != other.text and self._is_one_label(one, other):
-                    return [], True
-        return believed, False
+        believed = self._votes.believed()
+        torn = any(
+            one.read.text != other.read.text and _is_one_label(one, other)
+            for one, other in combinations(believed, 2)
+        )
+        return (() if torn else believed), torn
 
-    def _is_one_label(self, one: CodeRead, other: CodeRead) -> bool:
-        a, b = self._spots[one.symbology, one.text], self._spots[other.symbology, other.text]
-        reach = _SAME_LABEL * min(a.size_m, b.size_m)
-        return abs(a.x_m - b.x_m) < reach and abs(a.height_m - b.height_m) < reach
+
+def _is_one_label(one: PlacedRead, other: PlacedRead) -> bool:
+    reach = _SAME_LABEL * min(one.size_m, other.size_m)
+    return abs(one.x_m - other.x_m) < reach and abs(one.height_m - other.height_m) < reach

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from flightd.config.scan import ScanConfig
-from flightd.core.scanning import BodyPose, Finding, Light, Occupancy
+from flightd.core.scanning import Finding, Light, Occupancy
 from flightd.mission.scan.code_assignment import PlacedRead, ShelfLook
-from flightd.mission.scan.location_votes import LocationVerdict, LocationVotes
+from flightd.mission.scan.location_votes import LocationVotes
 from flightd.mission.scan.views import View, ViewPlanner
 
 _SAME_EXPOSURE = 0.01
@@ -35,7 +35,7 @@ class ScanTask:
         self._planner = planner
         self._params = params
         self._open: dict[str, LocationVotes] = {
-            code: LocationVotes(params.pictures) for view in views for code in view.locations
+            code: LocationVotes(code, node, params.pictures) for view in views for code in view.locations
         }
         self._begun_ns: int | None = None
         self._relit = False
@@ -70,11 +70,11 @@ class ScanTask:
         view = self.view
         if view is None or self._begun_ns is None or look.pose.stamp_ns < self._begun_ns:
             return
-        if not math.isclose(look.exposure, view.exposure, rel_tol=_SAME_EXPOSURE):
+        if not math.isclose(look.codes.exposure, view.exposure, rel_tol=_SAME_EXPOSURE):
             self._unfollowed += 1
             return
         self._followed += 1
-        places = {place.location: place for place in look.places}
+        places = {place.location: place for place in look.codes.places}
         reads: dict[str, list[PlacedRead]] = {}
         for placed in look.reads:
             reads.setdefault(placed.location, []).append(placed)
@@ -83,7 +83,7 @@ class ScanTask:
             place, own = places.get(code), reads.get(code, [])
             if place is not None and code in doubtful:  # somebody's code: not an empty place
                 place = replace(place, occupancy=Occupancy.GOODS, light=Light.FAIR)
-            self._open[code].add(look.frame_seq, look.pose, place, own)
+            self._open[code].add(look.codes.frame_seq, look.pose, place, own)
             self._settle(code, final=False)
 
     def step(self, now_ns: int) -> bool:
@@ -94,7 +94,7 @@ class ScanTask:
         if self._begun_ns is None:
             return False
         left = self._left(view)
-        waiting = any(not self._open[code].told for code in left)
+        waiting = any(not self._open[code].exhausted for code in left)
         if waiting and (now_ns - self._begun_ns) * 1e-9 < self._params.view_s:
             return False
         self._begun_ns = None
@@ -132,25 +132,7 @@ class ScanTask:
         return tuple(code for code in view.locations if code in self._open)
 
     def _settle(self, code: str, final: bool) -> None:
-        verdict = self._open[code].verdict(final)
-        if verdict is not None:
+        finding = self._open[code].finding(final)
+        if finding is not None:
             del self._open[code]
-            self._findings.append(_finding(code, self.node, verdict))
-
-
-def _finding(location: str, node: str, verdict: LocationVerdict) -> Finding:
-    """A verdict as a message, with the time and place of its last look."""
-    pose: BodyPose = verdict.pose
-    return Finding(
-        stamp_ns=pose.stamp_ns,
-        location=location,
-        state=verdict.state,
-        confidence=round(verdict.confidence, 4),
-        reads=verdict.reads,
-        evidence=verdict.evidence,
-        node=node,
-        x_m=pose.x_m,
-        y_m=pose.y_m,
-        height_m=pose.height_m,
-        yaw_rad=pose.yaw_rad,
-    )
+            self._findings.append(finding)

@@ -62,9 +62,9 @@ class Scanner:
         self._settled: list[Settled] = []
         self._events: list[Event] = []
         self._sightings: list[Sighting] = []
-        self._accused: dict[str, float] = {}
-        self._overruled: dict[str, float] = {}
-        self._strangers: set[str] = set()
+        self._contradicting: dict[str, float] = {}
+        self._dismissed: dict[str, float] = {}
+        self._unmapped: set[str] = set()
         self._begun = self._begun_blind = 0
         self._due: list[str] = []
         self._again: Counter[str] = Counter()
@@ -140,8 +140,8 @@ class Scanner:
         over = self._task is None or self._task.step(now_ns)
         if self._task is not None and self._relights and not self._task.relights:
             self._relights = False
-            told = "the front camera does not follow a wanted exposure: what is lit wrongly stays unreadable"
-            self._events.append(Event(now_ns, EventLevel.WARNING, "exposure_fixed", told))
+            text = "the front camera does not support exposure control: what is lit wrongly stays unreadable"
+            self._events.append(Event(now_ns, EventLevel.WARNING, "exposure_fixed", text))
         self._gather()
         return over
 
@@ -177,15 +177,15 @@ class Scanner:
             self._done.difference_update(codes)
         self._due += [p.node for p in self._pending if p.locations and p.node not in self._due]
         self._pending.clear()
-        if codes or (self._accused and not self.doubted):
+        if codes or (self._contradicting and not self.doubted):
             text = f"{reason}; {len(codes)} findings withdrawn"
             self._events.append(Event(now_ns, EventLevel.WARNING, "map_contradiction", text))
 
     def trust(self) -> None:
         """The place is known again; labels that still contradict it hang wrong."""
         self.doubted = False
-        self._overruled |= self._accused
-        self._accused.clear()
+        self._dismissed |= self._contradicting
+        self._contradicting.clear()
 
     def take_due(self) -> tuple[str, ...]:
         """The nodes to fly to once more, their findings having been withdrawn, in the order of their first
@@ -216,14 +216,14 @@ class Scanner:
             return
         look = self._assigner.look(codes, pose, (view.aisle, view.side))
         self._sightings += look.sightings
-        for text in look.strangers:
-            if text not in self._strangers:
-                self._strangers.add(text)
-                told = f"label {text}, seen from {self._task.node}, is not on the map: not counted as stock"
-                self._events.append(Event(pose.stamp_ns, EventLevel.WARNING, "unknown_location", told))
-        against = [seen for seen in look.sightings if seen.contradicts and not self._is_overruled(seen)]
+        for text in look.unmapped:
+            if text not in self._unmapped:
+                self._unmapped.add(text)
+                words = f"label {text}, seen from {self._task.node}, is not on the map: not counted as stock"
+                self._events.append(Event(pose.stamp_ns, EventLevel.WARNING, "unknown_location", words))
+        against = [seen for seen in look.sightings if seen.contradicts and not self._is_dismissed(seen)]
         if against:
-            self._accused = {seen.location: seen.off_m for seen in against}
+            self._contradicting = {seen.location: seen.off_m for seen in against}
             text = f"label {against[0].location} seen {against[0].off_m:+.2f} m from its place"
             self.withdraw(pose.stamp_ns, f"at {self._task.node}: {text}")
             self.doubted = True
@@ -233,7 +233,7 @@ class Scanner:
         self._gather()
         agreeing = [seen.location for seen in look.sightings if not seen.contradicts]
         for location in agreeing:
-            self._overruled.pop(location, None)
+            self._dismissed.pop(location, None)
         if agreeing:
             self._confirm([p for p in self._pending if p.node == self._task.node])
 
@@ -254,9 +254,9 @@ class Scanner:
         sightings, self._sightings = tuple(self._sightings), []
         return sightings
 
-    def _is_overruled(self, seen: Sighting) -> bool:
+    def _is_dismissed(self, seen: Sighting) -> bool:
         """Whether this label has contradicted in the same way before, and the place proved right."""
-        known_m = self._overruled.get(seen.location)
+        known_m = self._dismissed.get(seen.location)
         return known_m is not None and abs(known_m - seen.off_m) < _SAME_OFF_M
 
     def _left(self, node: str) -> frozenset[str]:

@@ -150,7 +150,7 @@ def read_codes(picture: Image, *, deeper: bool = True) -> tuple[CodeRead, ...]:
     """Every code of a picture, (H, W, 3) BGR or (H, W), believed ones first, then from top to bottom.
 
     With `deeper` False only the first look is taken.  Reads that nothing vouches for yet are returned
-    too (`CodeRead.believed` is False): two frames may agree on them (`votes.CodeVotes`).
+    too (`CodeRead.believed` is False): two frames may agree on them (`mission.scan.code_votes`).
     """
     grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture, np.uint8)
     found: list[_Candidate] = []

@@ -22,7 +22,8 @@ from flightd.app.flight_orders import configured_order, going_on
 from flightd.cli.main import app
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
-from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, StoredRead
+from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation
+from flightd.core.types import CodeRead
 from flightd.inventory.export.csv_table import as_csv
 from flightd.inventory.export.epcis import as_epcis
 from flightd.inventory.export.xlsx import as_xlsx
@@ -85,15 +86,15 @@ def test_photographs_become_an_inventory_and_again_change_nothing(tmp_path: Path
     assert "3 locations: 1 read, 1 several, 1 unreadable" in run("show", store)
 
 
-def look(location: str, number: int, *reads: StoredRead, state: str = "") -> Observation:
+def look(location: str, number: int, *reads: CodeRead, state: str = "") -> Observation:
     texts = {read.text for read in reads}
     chosen = state or ("read" if len(texts) == 1 else "several")
     pose = CountPose("A2", 1.5, 0.0, 1.6, 0.0)
     return Observation("flight-1", location, 10**18 + number, LocationState(chosen), 0.9, reads, pose)
 
 
-def code(text: str, symbology: str = "QR Code", **gs1: str) -> StoredRead:
-    return StoredRead(symbology, text, True, 1, 1.0, tuple((key[1:], value) for key, value in gs1.items()))
+def code(text: str, symbology: str = "QR Code", **gs1: str) -> CodeRead:
+    return CodeRead(symbology, text, (), True, 1, 1.0, tuple((key[1:], value) for key, value in gs1.items()))
 
 
 @pytest.fixture

@@ -8,14 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
+from flightd.core.inventory import LocationRecord, LocationState, Observation
+from flightd.core.types import CodeRead
 from flightd.inventory.comparison import ComparisonOutcome, Difference, compare_stock, doubtful_locations
 
 
 def record(code: str, state: str, *texts: str, confidence: float = 0.9) -> LocationRecord:
     if state == "not_visited":
         return LocationRecord(code, "A1", None)
-    reads = tuple(StoredRead("QR Code", text, True, 1, 1.0) for text in texts)
+    reads = tuple(CodeRead("QR Code", text, (), True, 1, 1.0) for text in texts)
     return LocationRecord(code, "A1", Observation("run", code, 1, LocationState(state), confidence, reads))
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from flightd.core.errors import InputError
-from flightd.core.inventory import LocationRecord, LocationState, Observation, StoredRead
+from flightd.core.inventory import LocationRecord, LocationState, Observation
+from flightd.core.types import CodeRead
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.code_symbols import Symbol, Symbology
 from flightd.sim.racks.rack_layout import BEAM_M, faces, rack_levels
@@ -34,7 +35,7 @@ def truth() -> dict[str, LocationTruth]:
 
 
 def record(code: str, state: LocationState, *texts: str) -> LocationRecord:
-    reads = tuple(StoredRead("QR Code", text, True, 2, 1.0) for text in texts)
+    reads = tuple(CodeRead("QR Code", text, (), True, 2, 1.0) for text in texts)
     return LocationRecord(code, "A1", Observation("run", code, 1, state, 0.9, reads))
 
 

@@ -18,12 +18,13 @@ import sys
 from pathlib import Path
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.inventory import CountPose, LocationState, Observation, StoredRead
+from flightd.core.inventory import CountPose, LocationState, Observation
+from flightd.core.types import CodeRead
 
 
 def look(number: int, run: str = "kill", evidence: str = "") -> Observation:
     """The `number`-th observation of a run over 50 locations."""
-    read = StoredRead("QR Code", f"PALLET-{number:06d}", True, 1, 1.0)
+    read = CodeRead("QR Code", f"PALLET-{number:06d}", (), True, 1, 1.0)
     pose = CountPose("A1", 0.1 * number, -1.0, 1.6, 0.5)
     location = f"A-{number % 50:02d}"
     return Observation(run, location, 10**18 + number, LocationState.READ, 0.9, (read,), pose, evidence)

@@ -19,7 +19,8 @@ from hypothesis import strategies as st
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.inventory import LocationState, Observation, PlannedLocation, StoredRead
+from flightd.core.inventory import LocationState, Observation, PlannedLocation
+from flightd.core.types import CodeRead
 from flightd.ports import Store
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, evidence_jpeg
 from tests.unit.store.kill_at_random import look
@@ -39,7 +40,7 @@ def test_planned_locations_are_not_visited_until_somebody_looks(tmp_path: Path) 
 
 
 def test_what_was_committed_is_read_back_as_it_was(tmp_path: Path) -> None:
-    gs1 = StoredRead("Code 128", "0109501101530003", True, 3, 0.75, (("01", "09501101530003"),))
+    gs1 = CodeRead("Code 128", "0109501101530003", (), True, 3, 0.75, (("01", "09501101530003"),))
     seen = replace(look(2), reads=(gs1,), evidence="ab" * 32, confidence=1)
     bare = Observation("r", "B-1", 5, LocationState.EMPTY, 0.5)
     with SqliteStore(tmp_path) as store:
@@ -49,6 +50,17 @@ def test_what_was_committed_is_read_back_as_it_was(tmp_path: Path) -> None:
         assert store.history("A-02") == [seen]
         assert store.history("B-1") == [bare]
         assert [observation.id for observation in store.history("A-02")] == [seen.id]
+
+
+def test_where_in_the_picture_a_code_was_does_not_make_another_look(tmp_path: Path) -> None:
+    corners = ((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0))
+    bare = look(2)
+    flown = replace(bare, reads=tuple(replace(read, corners_px=corners) for read in bare.reads))
+    with SqliteStore(tmp_path) as store:
+        store.commit(flown)
+        store.commit(bare)
+        assert store.history("A-02") == [bare]
+    assert flown.id == bare.id
 
 
 def test_the_newest_look_is_the_state_whatever_the_order(tmp_path: Path) -> None:
@@ -178,7 +190,7 @@ def test_a_disk_that_refuses_is_said_so(tmp_path: Path) -> None:
     [("read", 0), ("read", 2), ("several", 1), ("empty", 1), ("not_visited", 0), ("occluded", 1)],
 )
 def test_a_state_that_its_reads_deny_cannot_be_made(state: str, texts: int) -> None:
-    reads = tuple(StoredRead("QR Code", f"T{n}", True, 1, 1.0) for n in range(texts))
+    reads = tuple(CodeRead("QR Code", f"T{n}", (), True, 1, 1.0) for n in range(texts))
     with pytest.raises(ValueError, match="A-1"):
         Observation("r", "A-1", 1, LocationState(state), 0.5, reads)
 

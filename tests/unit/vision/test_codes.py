@@ -11,10 +11,9 @@ import pytest
 import segno
 import zxingcpp
 
-from flightd.core.types import CodeRead, Image
+from flightd.core.types import Image
 from flightd.vision.shelf.code_reader import read_codes
 from flightd.vision.shelf.code_regions import code_regions
-from flightd.vision.shelf.read_votes import CodeVotes
 
 PHOTOGRAPHS = Path(__file__).parents[4] / "shared" / "real" / "codes"
 LINES = PHOTOGRAPHS.parent / "lines"
@@ -164,28 +163,6 @@ def test_the_region_of_a_code_is_found_and_a_bare_shelf_has_none() -> None:
     assert (region.x1 - region.x0) * (region.y1 - region.y0) < 0.2 * grey.size
     bare = on_shelf(np.full((10, 10), 128, np.uint8), 0, 0)
     assert code_regions(np.asarray(cv2.cvtColor(bare, cv2.COLOR_BGR2GRAY), np.uint8)) == []
-
-
-def some_read(text: str, *, sure: bool, agreeing: int = 1, symbology: str = "ITF") -> CodeRead:
-    return CodeRead(symbology, text, ((0.0, 0.0),) * 4, sure, agreeing, 0.5)
-
-
-def test_two_frames_make_a_read_without_checksum_believed() -> None:
-    votes = CodeVotes()
-    votes.add(1, [some_read("070429", sure=False)])
-    votes.add(1, [some_read("070429", sure=False)])
-    assert votes.believed() == ()
-    assert [read.text for read in votes.doubtful()] == ["070429"]
-    votes.add(2, [some_read("070429", sure=False), some_read("07042", sure=False)])
-    assert [(read.text, read.agreeing) for read in votes.believed()] == [("070429", 2)]
-    assert [read.text for read in votes.doubtful()] == ["07042"]
-
-
-def test_a_checksum_is_believed_at_once_and_the_most_seen_comes_first() -> None:
-    votes = CodeVotes()
-    votes.add(1, [some_read("A", sure=True), some_read("B", sure=True)])
-    votes.add(2, [some_read("B", sure=True)])
-    assert [read.text for read in votes.believed()] == ["B", "A"]
 
 
 @pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="the photographs are not beside this repository")

@@ -1,0 +1,54 @@
+"""Votes of many frames on what a code says: believed when a checksum vouches or two reads agree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from flightd.mission.scan.code_assignment import PlacedRead
+
+
+class CodeVotes:
+    """Collects the reads of one location over frames; it never chooses between contradicting texts by luck.
+
+    Reads are one code when symbology and text are equal.  Of each code it keeps the best read, the place
+    where it was seen last, and the highest probability that this is in the location.
+    """
+
+    def __init__(self) -> None:
+        self._codes: dict[tuple[str, str], PlacedRead] = {}
+        self._frames: dict[tuple[str, str], set[int]] = {}
+
+    @property
+    def any_read(self) -> bool:
+        """Whether any code was read, believed or not."""
+        return bool(self._codes)
+
+    def add(self, frame_seq: int, reads: Iterable[PlacedRead]) -> bool:
+        """Take in what one frame showed, the same frame twice counting once; whether a code was new."""
+        new = False
+        for placed in reads:
+            code = placed.read.symbology, placed.read.text
+            known = self._codes.get(code)
+            new |= known is None
+            self._codes[code] = placed if known is None else _merged(known, placed)
+            self._frames.setdefault(code, set()).add(frame_seq)
+        return new
+
+    def believed(self) -> tuple[PlacedRead, ...]:
+        """One read for each code that is believed, the most often seen first; `agreeing` counts frames
+        (or the looks at one frame, where those were more)."""
+        counted = (
+            replace(
+                placed, read=replace(placed.read, agreeing=max(len(self._frames[code]), placed.read.agreeing))
+            )
+            for code, placed in self._codes.items()
+        )
+        believed = (placed for placed in counted if placed.read.believed)
+        return tuple(sorted(believed, key=lambda placed: (-placed.read.agreeing, placed.read.text)))
+
+
+def _merged(known: PlacedRead, newest: PlacedRead) -> PlacedRead:
+    """One code seen twice."""
+    best = max(known.read, newest.read, key=lambda read: (read.sure, read.quality))
+    return replace(newest, read=best, probability=max(known.probability, newest.probability))
