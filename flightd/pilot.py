@@ -72,10 +72,10 @@ class Pilot:
         self._last_ns: int | None = None
         self._last_yaw: float | None = None
         self._yaw_rate = 0.0
-        self._pictures = FrameMonitor()
-        self._caution = PlausibilityMonitor(site, config)
-        self._unheard = AttitudeExtrapolation()
-        self._asked: AttitudeSetpoint | None = None
+        self._frames = FrameMonitor()
+        self._plausibility = PlausibilityMonitor(site, config)
+        self._extrapolation = AttitudeExtrapolation()
+        self._commanded: AttitudeSetpoint | None = None
 
     @property
     def mission(self) -> Mission:
@@ -96,7 +96,7 @@ class Pilot:
         shows them; none while nothing is scanned.  Changes nothing."""
         if not self._scanner.looking:
             return ()
-        pose = self._past.at(stamp_ns)
+        pose = self._pose_history.at(stamp_ns)
         return self._scanner.places(pose) if pose is not None else ()
 
     def step(self, tick: TickInput) -> TickOutput:
@@ -109,7 +109,7 @@ class Pilot:
         tracks = self._tracker.at(now_ns)
         pose = None if tracks is None else self._localiser.step(tracks, height_m)
         if pose is not None:
-            self._past.add(pose)
+            self._pose_history.add(pose)
         if tracks is not None and pose is not None:
             self._pads.step(tracks, pose)
         by_pad = None if pose is None else self._pads.over(pose, self._localiser.ever_matched)
@@ -117,12 +117,12 @@ class Pilot:
         for command in tick.commands:
             self._mission.command(command, now_ns)
         self._scan(tick)
-        senses = self._senses(tick, dt_s, pose, height_m, tracks)
-        senses = replace(senses, by_pad=by_pad is not None)
-        guidance = self._mission.step(senses)
+        inputs = self._inputs(tick, dt_s, pose, height_m, tracks)
+        inputs = replace(inputs, by_pad=by_pad is not None)
+        guidance = self._mission.step(inputs)
         push_mps2 = (tracks.push_x_mps2, tracks.push_y_mps2) if tracks is not None else (0.0, 0.0)
-        setpoint = self._asked = self._setpoint(senses, guidance, push_mps2)
-        self._caution.steered(guidance, pose)
+        setpoint = self._commanded = self._setpoint(inputs, guidance, push_mps2)
+        self._plausibility.steered(guidance, pose)
         mission = self._mission
         findings, settled = self._scanner.drain()
         return TickOutput(
@@ -146,7 +146,7 @@ class Pilot:
         if tick.counted:
             self._scanner.skip(tick.counted)
         for codes in tick.codes:
-            pose = self._past.at(codes.stamp_ns)
+            pose = self._pose_history.at(codes.stamp_ns)
             if pose is not None:
                 self._scanner.take(codes, pose)
         for seen in self._scanner.drain_sightings():
@@ -166,7 +166,7 @@ class Pilot:
         )
         view = camera.floor_reach(control.max_tilt_rad)
         self._localiser = GridLocaliser(self._site, node, view, self._config.localisation)
-        self._past = PoseHistory(self._scanner.least_integrity)
+        self._pose_history = PoseHistory(self._scanner.least_integrity)
         self._pads = PadFinder(self._site)
         self._stuck = StuckHeight()
 
@@ -182,9 +182,9 @@ class Pilot:
         self._armed = armed
         for sample in tick.attitudes:
             self._tracker.attitude(sample)
-            self._past.add_attitude(sample)
+            self._pose_history.add_attitude(sample)
         heard = tick.vehicle.attitude if tick.vehicle is not None else None
-        assumed = self._unheard.step(tick.now_ns, heard, self._asked)
+        assumed = self._extrapolation.step(tick.now_ns, heard, self._commanded)
         if assumed is not None:
             self._tracker.assume(assumed)
         if tick.vehicle is not None:
@@ -193,17 +193,17 @@ class Pilot:
                 self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
             self._mind_height(tick.now_ns, v)
         for lines in tick.lines:
-            if self._pictures.take(lines) and armed:
+            if self._frames.take(lines) and armed:
                 self._tracker.frame(lines, self._heights.at(lines.stamp_ns))
 
     def _mind_height(self, now_ns: int, vehicle: VehicleState) -> None:
         """Forget the heights of a range finder that is found to be stuck: then the lines' width tells."""
-        if not self._armed or self._asked is None or self._stuck.found:
+        if not self._armed or self._commanded is None or self._stuck.found:
             return
-        if self._stuck.step(now_ns, vehicle.height_m, vehicle.climb_mps, self._asked.climb_mps):
+        if self._stuck.step(now_ns, vehicle.height_m, vehicle.climb_mps, self._commanded.climb_mps):
             self._heights = HeightHistory()
 
-    def _senses(
+    def _inputs(
         self, tick: TickInput, dt_s: float, pose: GridPose | None, height_m: float, tracks: TrackSet | None
     ) -> MissionInputs:
         now_ns, v = tick.now_ns, tick.vehicle
@@ -218,7 +218,7 @@ class Pilot:
             pose=pose,
             localised=known and all(self._localiser.ever_matched),
             height_m=height_m,
-            frames_arrive=self._pictures.age_s(now_ns) < _FRAMES_ARRIVE_S,
+            frames_arrive=self._frames.age_s(now_ns) < _FRAMES_ARRIVE_S,
             x_age_s=(now_ns - x_ns) * 1e-9 if x_ns else math.inf,
             y_age_s=(now_ns - y_ns) * 1e-9 if y_ns else math.inf,
             telemetry_age_s=math.inf if v is None else (now_ns - v.attitude.stamp_ns) * 1e-9,
@@ -227,27 +227,27 @@ class Pilot:
             pad_m=self._pads.centre(self._mission.goal.node),
             rivals=tuple(self._localiser.rivals()) if doubted else (),
             way_out=self._localiser.way_out() if seeking else None,
-            warnings=self._caution.step(
+            warnings=self._plausibility.step(
                 now_ns,
                 dt_s,
                 pose,
                 height_m,
                 tracks,
                 self._tracker,
-                self._pictures,
+                self._frames,
                 tick.health,
                 self._stuck.found,
             ),
         )
 
     def _setpoint(
-        self, senses: MissionInputs, guidance: Guidance, push: tuple[float, float]
+        self, inputs: MissionInputs, guidance: Guidance, push: tuple[float, float]
     ) -> AttitudeSetpoint | None:
         """What control makes of the guidance, within the limits; None when nothing may be sent."""
-        now_ns, dt_s, pose = senses.now_ns, senses.dt_s, senses.pose
-        motion = self._motion(pose, self._caution.height_m(senses.height_m), dt_s)
+        now_ns, dt_s, pose = inputs.now_ns, inputs.dt_s, inputs.pose
+        motion = self._motion(pose, self._plausibility.height_m(inputs.height_m), dt_s)
         control, reference = self._control, guidance.reference
-        sight_s = min(senses.x_age_s, senses.y_age_s)
+        sight_s = min(inputs.x_age_s, inputs.y_age_s)
         if guidance.guide is Guide.NONE:
             control.reset()
             return None
@@ -255,15 +255,15 @@ class Pilot:
             wanted, age_s = control.level(now_ns, motion, reference, dt_s), 0.0
         elif guidance.guide is Guide.BRAKE:
             wanted = control.rest(now_ns, motion, reference, dt_s, push, reckoned=guidance.dead_reckoned)
-            age_s = min(senses.telemetry_age_s, sight_s)
+            age_s = min(inputs.telemetry_age_s, sight_s)
         else:
             wanted = control.step(now_ns, motion, reference, dt_s)
             # above the pad the mission steers on without lines: by the mat, or the motion last known
-            by_mat = senses.by_pad or (guidance.phase is Phase.LAND and sight_s < _TOUCHDOWN_S)
-            age_s = senses.telemetry_age_s if by_mat else max(sight_s, senses.telemetry_age_s)
+            by_mat = inputs.by_pad or (guidance.phase is Phase.LAND and sight_s < _TOUCHDOWN_S)
+            age_s = inputs.telemetry_age_s if by_mat else max(sight_s, inputs.telemetry_age_s)
         around = Surroundings(
-            headroom_m=senses.warnings.headroom_m,
-            back=self._caution.back(pose, senses.warnings.line_m) if senses.localised else None,
+            headroom_m=inputs.warnings.headroom_m,
+            back=self._plausibility.back(pose, inputs.warnings.line_m) if inputs.localised else None,
             data_age_s=age_s,
             at_once=guidance.at_once,
         )

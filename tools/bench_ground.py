@@ -134,7 +134,7 @@ def _tell(link: ZmqGround) -> Any:
     now_ns = LoopClock().now_ns()
     output = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 0, 2, None, None)
     link.tell(Snapshot(TickInput(now_ns), output, frames=1, fps=30.0))
-    return link._desk.status  # noqa: SLF001 - the counters as they were just published
+    return link._handler.status  # noqa: SLF001 - the counters as they were just published
 
 
 def _crowd(folder: Path, ports: list[int], clients: int, junk: int) -> None:

@@ -64,7 +64,9 @@ class MissionExpert(Section):
     adopt_s: float = Field(
         1.5, ge=0, le=1.5, description="a drone found flying is given so long to show that it obeys"
     )
-    phase_slack_s: float = Field(20.0, gt=0, le=600, description="a phase may take so long,")
+    phase_slack_s: float = Field(
+        20.0, gt=0, le=600, description="a phase may take so long on top of the share of its way's own time"
+    )
     phase_share: float = Field(
         2.0,
         ge=1,

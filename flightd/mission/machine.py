@@ -42,7 +42,6 @@ FLYING = (
 _ON_WAY = (Intent.VISIT, Intent.RETURN, Intent.HOME)
 _BACK = (Intent.RETURN, Intent.HOME)
 _ADOPTED = (Intent.ADOPTED, Intent.ADOPTED_STOP)
-_COMPLETE = (Intent.VISIT, Intent.RETURN)
 """Landed on the pad with one of these, the mission has done what it was for."""
 
 _INTENTS: Mapping[Phase, tuple[Intent, ...]] = {

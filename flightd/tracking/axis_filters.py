@@ -67,10 +67,6 @@ class AxisTracker:
         return float(self._x[0])
 
     @property
-    def velocity_sigma_mps(self) -> float:
-        return float(np.sqrt(self._p[0, 0]))
-
-    @property
     def disturbance_mps2(self) -> float:
         return float(self._x[1])
 

@@ -74,13 +74,13 @@ class ZmqGround:
         self._clients = load_clients(config.clients) if config.clients else {}
         self._session = secrets.token_hex(8)
         self._audit: AuditLog | None = None
-        self._desk = RequestHandler(site, self._session, self._write_down, config.picture_fps, inventory)
+        self._handler = RequestHandler(site, self._session, self._write_down, config.picture_fps, inventory)
         self._seq: Counter[bytes] = Counter()
         self._waiting: deque[tuple[list[bytes], AskPicture, int]] = deque()
         self._picture_ns = -(10**12)
         self._dropped = 0
         self._context: zmq.asyncio.Context | None = None
-        self._door: Authenticator | None = None
+        self._authenticator: Authenticator | None = None
         self._status: Any = None
         self._requests: Any = None
 
@@ -91,7 +91,7 @@ class ZmqGround:
         self._context = zmq.asyncio.Context()
         try:
             if self._keys is not None:
-                self._door = Authenticator(self._context, self._clients)
+                self._authenticator = Authenticator(self._context, self._clients)
             plain: zmq.Context[Any] = zmq.Context.shadow(self._context)
             self._status = self._listen(plain.socket(zmq.PUB), self._config.status_port, "status_port")
             self._requests = self._listen(
@@ -103,8 +103,8 @@ class ZmqGround:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._door is not None:
-            self._door.close()
+        if self._authenticator is not None:
+            self._authenticator.close()
         for socket in (self._status, self._requests):
             if socket is not None:
                 socket.close(linger=_LINGER_MS)
@@ -123,8 +123,8 @@ class ZmqGround:
         try:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._answer_requests(), name="ground requests")
-                if self._door is not None:
-                    tasks.create_task(self._door.run(), name="ground door")
+                if self._authenticator is not None:
+                    tasks.create_task(self._authenticator.run(), name="ground authenticator")
         except ExceptionGroup as group:
             failed, other = group.split(zmq.ZMQError)
             if failed is None or other is not None:
@@ -134,17 +134,17 @@ class ZmqGround:
     def tell(self, snapshot: Snapshot) -> None:
         """Publish it."""
         self.give_up_pictures(snapshot.stamp_ns)
-        door = self._door
+        authenticator = self._authenticator
         link = LinkReport(
-            attending=self._desk.attending(snapshot.stamp_ns),
-            requests=self._desk.requests,
-            refused=self._desk.refused,
-            denied=door.denied if door is not None else 0,
+            attending=self._handler.attending(snapshot.stamp_ns),
+            requests=self._handler.requests,
+            refused=self._handler.refused,
+            denied=authenticator.denied if authenticator is not None else 0,
             dropped=self._dropped + (self._audit.dropped if self._audit is not None else 0),
         )
         report = status_report(snapshot, self._session, self._next(STATUS_TOPIC), link)
-        self._desk.status = report
-        self._desk.possible = snapshot.possible
+        self._handler.status = report
+        self._handler.possible = snapshot.possible
         self._publish(STATUS_TOPIC, encode(report))
 
     def event(self, event: Event) -> None:
@@ -158,24 +158,24 @@ class ZmqGround:
             name=event.name,
             text=event.text,
         )
-        self._desk.events.append(report)
+        self._handler.events.append(report)
         self._publish(EVENT_TOPIC, encode(report))
 
     def take_commands(self) -> list[Command]:
-        return self._desk.take_commands()
+        return self._handler.take_commands()
 
     def silent_s(self, now_ns: int) -> float:
-        return self._desk.silent_ns(now_ns) * 1e-9
+        return self._handler.silent_ns(now_ns) * 1e-9
 
     @property
     def requests(self) -> int:
         """Requests heard so far, junk among them."""
-        return self._desk.requests
+        return self._handler.requests
 
     @property
     def refused(self) -> int:
         """Requests that were refused so far."""
-        return self._desk.refused
+        return self._handler.refused
 
     @property
     def pictures_wanted(self) -> int:
@@ -248,14 +248,14 @@ class ZmqGround:
         peer = self._peer(head[0], frames[-1])
         if peer is None:
             return
-        answer = self._desk.answer(body, peer, now_ns)
+        answer = self._handler.answer(body, peer, now_ns)
         if not isinstance(answer, AskPicture):
             self._send(head, answer)
         elif len(self._waiting) < _PICTURES_WAITING:
             self._waiting.append((head, answer, now_ns))
         else:
             text = "too many clients wait for a picture; ask again later"
-            self._send(head, self._desk.refuse_picture(answer, Code.BUSY, text))
+            self._send(head, self._handler.refuse_picture(answer, Code.BUSY, text))
 
     def _peer(self, route: bytes, frame: zmq.Frame) -> Peer | None:
         """Who sent it, by the key of its connection; None for nobody that is known."""
@@ -280,7 +280,7 @@ class ZmqGround:
         while self._waiting and now_ns - self._waiting[0][2] > _PICTURE_NS:
             head, request, _ = self._waiting.popleft()
             text = "the down camera delivers no picture"
-            self._send(head, self._desk.refuse_picture(request, Code.UNAVAILABLE, text))
+            self._send(head, self._handler.refuse_picture(request, Code.UNAVAILABLE, text))
 
     def _next(self, topic: bytes) -> int:
         self._seq[topic] += 1

@@ -1,4 +1,4 @@
-"""The desk at which requests from the ground are answered.  No sockets here: bytes in, answer out.
+"""Answers requests from the ground.  No sockets here: bytes in, answer out.
 
 Nothing that a stranger can send raises; whatever has no effect is refused with a reason.
 """

@@ -26,7 +26,7 @@ class PhaseProgress:
         self._itinerary = itinerary
         self._scan = scan
         self._scanner = scanner
-        self._first_look = FoundFlyingCheck(config.mission)
+        self._found_flying = FoundFlyingCheck(config.mission)
         self._settling = DebounceTimer()
         self._limit_s = math.inf
         self._since_ns = 0
@@ -49,7 +49,7 @@ class PhaseProgress:
         `may_start`."""
         p, v, goal = self._params, s.vehicle, self._itinerary.goal
         match state.phase:
-            case Phase.PREFLIGHT if self._first_look.flies_already(s):
+            case Phase.PREFLIGHT if self._found_flying.flies_already(s):
                 done, trigger = True, Trigger.FOUND_FLYING
             case Phase.RECOVER:
                 done, trigger = self.phase_s(s.now_ns) >= p.recover_s, Trigger.UNATTENDED

@@ -12,7 +12,6 @@ from flightd.inventory.comparison import ComparisonOutcome, Difference
 from flightd.replay.report.figures import Figure
 from flightd.replay.report.markup import number
 
-NS_PER_HOUR = 3.6e12
 SETTLED = frozenset({ComparisonOutcome.MATCH, ComparisonOutcome.UNCOUNTED})
 """Outcomes that are no difference: as the books say, or nobody could see."""
 

@@ -48,7 +48,7 @@ swap_s = 30.0            # time in which somebody changes it on the charge pad; 
 start_offset_m = [0.0, 0.0]  # how far from the pad it really stands at the start, x and y
 start_yaw_deg = 0.0      # how far it is turned from the heading in which it should stand, + to the right
 
-[[fault]]                # any number of them; the kinds and their keys are in `fault_spec`
+[[fault]]                # any number of them; the kinds and their keys are in `fault_schema`
 kind = "camera_frozen"
 at_x_m = 2.2             # or at_node = "A2", or at_s = 12.0 after take-off
 at_y_m = 0.0

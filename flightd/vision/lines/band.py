@@ -37,10 +37,6 @@ class LinearFit:
         """The parallel `by` further along v, itself known to `variance`."""
         return LinearFit(self.a + by, self.b, self.var_a + variance, self.var_b, self.cov_ab)
 
-    def sigma_at(self, u: float) -> float:
-        """Standard deviation of v at `u`."""
-        return math.sqrt(max(0.0, self.var_a + 2 * u * self.cov_ab + u * u * self.var_b))
-
 
 @dataclass(frozen=True, slots=True)
 class Band:

@@ -28,8 +28,8 @@ class Measured(Protocol):
 class SetpointShaper:
     """Heading and own height loop of one vehicle, let go of whenever the vehicle is not ours."""
 
-    def __init__(self, pursuit: ModeArmingManager, measured: Measured) -> None:
-        self._pursuit = pursuit
+    def __init__(self, modes: ModeArmingManager, measured: Measured) -> None:
+        self._modes = modes
         self._measured = measured
         self._heading = HeadingIntegrator()
         self.height = HeightLoop()
@@ -37,12 +37,12 @@ class SetpointShaper:
     def heading_rad(self, setpoint: AttitudeSetpoint, now_ns: int) -> float | None:
         """The heading for a setpoint that goes out now; None when none may."""
         yaw_rad = self._measured.yaw_rad
-        may_steer = self._pursuit.may_steer or self._pursuit.steers_unheard
+        may_steer = self._modes.may_steer or self._modes.steers_unheard
         if not may_steer or yaw_rad is None:
             self._heading.release()
             self.height.release()
             return None
-        if self._pursuit.stands:
+        if self._modes.stands:
             self._heading.release()  # the vehicle may be turned by hand, its compass may still settle
         return self._heading.step(now_ns, setpoint.yaw_rate_radps, yaw_rad)
 
@@ -55,14 +55,14 @@ class SetpointShaper:
             height_m=self._measured.height_m(now_ns),
             tilt_cos=math.cos(setpoint.roll_rad) * math.cos(setpoint.pitch_rad),
             armed=self._measured.armed,
-            on_floor=self._pursuit.stands,
+            on_floor=self._modes.stands,
         )
 
     def idle_thrust(self) -> float | None:
         """Thrust of a level setpoint while the mission makes none: PX4 enters OFFBOARD only while they
         stream.  On the floor nothing; in the air only until OFFBOARD is entered, never to keep it flying."""
-        if not self._pursuit.wants_flight:
+        if not self._modes.wants_flight:
             return None
-        if self._pursuit.stands and not (self._measured.armed and self.height.in_air):
+        if self._modes.stands and not (self._measured.armed and self.height.in_air):
             return 0.0
-        return None if self._pursuit.may_steer else self.height.hover
+        return None if self._modes.may_steer else self.height.hover

@@ -110,8 +110,8 @@ class MavlinkVehicle(abc.ABC):
         codec = Codec(system_id, signing=options.signing)
         self.link = MavlinkLink(transport, codec, clock, system_id, self._received)
         self._commander = Commander(self.link, system_id)
-        self._pursuit = ModeArmingManager(self, self._commander, self._telemetry, clock)
-        self._steering = SetpointShaper(self._pursuit, self._telemetry)
+        self._modes = ModeArmingManager(self, self._commander, self._telemetry, clock)
+        self._steering = SetpointShaper(self._modes, self._telemetry)
         self.streams = StreamKeeper(self._commander, clock, self.rates_hz)
         self.parameters = Parameters(self.link, system_id, bytewise=self.firmware is Firmware.PX4)
         self._texts = TextAssembler()
@@ -131,9 +131,9 @@ class MavlinkVehicle(abc.ABC):
             async with asyncio.TaskGroup() as tasks:
                 self._serve(tasks)
                 try:
-                    await self._pursuit.run()
+                    await self._modes.run()
                 finally:
-                    await self._pursuit.hand_back()
+                    await self._modes.hand_back()
         except ExceptionGroup as group:
             if len(group.exceptions) == 1:
                 raise group.exceptions[0] from None
@@ -145,16 +145,16 @@ class MavlinkVehicle(abc.ABC):
         return self._telemetry.state(
             now_ns,
             "" if mode is None else self.mode_name(mode),
-            in_control=self._pursuit.in_control,
-            refusal=words(self._pursuit.refusal),
+            in_control=self._modes.in_control,
+            refusal=words(self._modes.refusal),
         )
 
     def attitudes(self) -> list[Attitude]:
         return self._telemetry.attitudes()
 
     def demand(self, demand: Demand) -> None:
-        self._pursuit.demand(demand)
-        engaged = self._pursuit.is_engaged
+        self._modes.demand(demand)
+        engaged = self._modes.is_engaged
         self.link.system_status = dialect.MAV_STATE_ACTIVE if engaged else dialect.MAV_STATE_STANDBY
 
     def send(self, setpoint: AttitudeSetpoint) -> bool:
@@ -252,7 +252,7 @@ class MavlinkVehicle(abc.ABC):
                 if message.get_type() == "HEARTBEAT":
                     self._heard.set()
                     self._beats.heard(now_ns)
-                    self._pursuit.heartbeat(now_ns)
+                    self._modes.heartbeat(now_ns)
 
     def _rebooted(self) -> None:
         """The autopilot started anew: what was read of it and set in it may be so no longer."""
@@ -261,7 +261,7 @@ class MavlinkVehicle(abc.ABC):
     def _say(self, message: Message, now_ns: int) -> None:
         for severity, text in self._texts.add(message):
             _LOG.info("autopilot: %s", text)
-            self._pursuit.text(severity, text, now_ns)
+            self._modes.text(severity, text, now_ns)
 
     # Beside the demand
 
@@ -280,7 +280,7 @@ class MavlinkVehicle(abc.ABC):
         while True:
             await asyncio.sleep(_BEATS_CHECK_S)
             now_ns = self._clock.now_ns()
-            problem = None if self._pursuit.is_silent else too_slow(self._beats.rate_hz(now_ns))
+            problem = None if self._modes.is_silent else too_slow(self._beats.rate_hz(now_ns))
             if problem is not None:
                 _LOG.warning("%s", problem)
                 self.notify(Event(now_ns, EventLevel.WARNING, "heartbeat_rate", str(problem)))

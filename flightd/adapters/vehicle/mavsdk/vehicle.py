@@ -101,8 +101,8 @@ class MavsdkVehicle:
         self.gate = SetpointGate()
         self._line = MavsdkConnection(make_transport(parse_endpoint(url), opener), self.gate, clock)
         self._commander = SdkCommander()
-        self._pursuit = ModeArmingManager(self, self._commander, self._readings, clock)
-        self._steering = SetpointShaper(self._pursuit, self._readings)
+        self._modes = ModeArmingManager(self, self._commander, self._readings, clock)
+        self._steering = SetpointShaper(self._modes, self._readings)
         self._setpoints: Latest[SdkAttitude] = Latest()
         self._texts: deque[tuple[StatusTextType, str]] = deque(maxlen=_TEXTS_MAX)
         self._text_waits = asyncio.Event()
@@ -139,21 +139,21 @@ class MavsdkVehicle:
         async with asyncio.TaskGroup() as tasks:
             self._listen(tasks, library, plugins)
             try:
-                await self._pursuit.run()
+                await self._modes.run()
             finally:
-                await self._pursuit.hand_back()
+                await self._modes.hand_back()
 
     def state(self) -> VehicleState | None:
-        pursuit = self._pursuit
+        modes = self._modes
         return self._readings.state(
-            self._clock.now_ns(), in_control=pursuit.in_control, refusal=words(pursuit.refusal)
+            self._clock.now_ns(), in_control=modes.in_control, refusal=words(modes.refusal)
         )
 
     def attitudes(self) -> list[Attitude]:
         return self._readings.attitudes()
 
     def demand(self, demand: Demand) -> None:
-        self._pursuit.demand(demand)
+        self._modes.demand(demand)
         self._mind_gate()
 
     def send(self, setpoint: AttitudeSetpoint) -> bool:
@@ -257,12 +257,12 @@ class MavsdkVehicle:
 
     def _beat(self, mode: FlightMode, now_ns: int) -> None:
         self._readings.take_mode(mode, now_ns)
-        self._pursuit.heartbeat(now_ns)
+        self._modes.heartbeat(now_ns)
         self._mind_gate()
 
     def _say(self, text: Any, now_ns: int) -> None:
         _LOG.info("autopilot: %s", text.text)
-        self._pursuit.text(_SEVERITIES.get(text.type, _INFO), text.text, now_ns)
+        self._modes.text(_SEVERITIES.get(text.type, _INFO), text.text, now_ns)
 
     def _compare(self, message: Any, now_ns: int) -> None:
         fields = whole_fields(message.fields_json, "tc1", "ts1")
@@ -280,8 +280,8 @@ class MavsdkVehicle:
 
     def _mind_gate(self) -> None:
         """Shut it as soon as nobody here may steer any more, or command."""
-        self.gate.commanding = self._pursuit.may_command
-        if not self._pursuit.may_steer and not self._pursuit.wants_flight:
+        self.gate.commanding = self._modes.may_command
+        if not self._modes.may_steer and not self._modes.wants_flight:
             self.gate.close()
 
     def _steer(self, now_ns: int, roll_rad: float, pitch_rad: float, yaw_rad: float, thrust: float) -> None:
