@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -106,7 +107,13 @@ def test_the_hover_thrust_is_found_whatever_the_airframe(hover: float) -> None:
 def test_the_hover_thrust_that_was_found_is_not_lost_to_a_parameter_that_comes_late() -> None:
     async def test() -> None:
         async with px4_rig() as rig:
-            answer, rig.peer.parameters.answer = rig.peer.parameters.answer, lambda *_: None
+            answer = rig.peer.parameters.answer
+
+            def hold_back(message: Any, reply: Callable[[Any], None]) -> None:
+                if message.param_id != "MPC_THR_HOVER":
+                    answer(message, reply)
+
+            rig.peer.parameters.answer = hold_back
             await rig.take_off(1.5)
             rig.peer.parameters["MPC_THR_HOVER"] = 0.8
             rig.peer.parameters.answer = answer

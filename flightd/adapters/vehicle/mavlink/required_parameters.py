@@ -278,13 +278,21 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
     return (*table, *stricter.values())
 
 
-_WAY_DOWN = frozenset({"FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "SYSID_MYGCS", "COM_OBL_RC_ACT", "COM_OF_LOSS_T"})
+_LANDS = frozenset({"FS_GCS_ENABLE", "SYSID_MYGCS", "COM_OBL_RC_ACT"})
+_LANDS_WITHIN = {Firmware.ARDUPILOT: "FS_GCS_TIMEOUT", Firmware.PX4: "COM_OF_LOSS_T"}
 
 
 def way_down_rules(firmware: Firmware, system_id: int) -> tuple[Rule, ...]:
-    """What must be so before a flight begins: the autopilot itself lands when this computer dies."""
+    """What must be so before a flight begins: the autopilot itself lands when this computer dies.  How soon
+    it had better do so is for the doctor to say."""
     table = rules_for(firmware, Job(system_id))
-    return tuple(rule for rule in table if _WAY_DOWN.intersection(rule.names))
+    within = Rule(
+        (_LANDS_WITHIN[firmware],),
+        _within(0.1, 10.0),
+        "at most 10 s",
+        "so long the vehicle is in the air without anybody after this computer has died",
+    )
+    return (*(rule for rule in table if _LANDS.intersection(rule.names)), within)
 
 
 def judge(rule: Rule, found: tuple[str, float] | None) -> ParameterFinding | None:
