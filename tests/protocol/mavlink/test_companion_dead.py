@@ -20,7 +20,7 @@ def test_it_lands_and_disarms_by_itself(make: Callable[[], Any]) -> None:
         async with make() as rig:
             await rig.take_off()
             rig.cut(True)
-            await rig.until(lambda: not rig.peer.armed, 15.0)
+            await rig.until(lambda: not rig.peer.armed, 25.0)
             assert rig.peer.truth().height_m < 0.15
 
     virtual(test())

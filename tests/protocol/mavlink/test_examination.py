@@ -51,7 +51,7 @@ def test_the_factory_settings_of_arducopter_are_named_and_mended() -> None:
             assert report.firmware is Firmware.ARDUPILOT
             assert report.version == "4.5.6"
             wrong = {finding.name for finding in report.findings}
-            assert wrong == {"GUID_TIMEOUT", "FS_THR_ENABLE", "BATT_FS_LOW_ACT"}
+            assert wrong == {"GUID_TIMEOUT", "FS_GCS_TIMEOUT", "FS_THR_ENABLE", "BATT_FS_LOW_ACT"}
             assert "ARMING_SKIPCHK" in report.unread  # a name of 4.7
             assert await examination.fix(report.findings) == []
             assert peer.parameters["GUID_TIMEOUT"] == 0.5
