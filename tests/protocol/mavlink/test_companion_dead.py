@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import pytest
@@ -13,14 +14,17 @@ from flightd.sim.autopilot.autopilot import PeerConfig
 from tests.rigs.event_loops import virtual
 from tests.rigs.vehicles import ardupilot_rig, px4_rig
 
+_SHIPPED = PeerConfig(ready_s=0.5, parameters={"FS_GCS_TIMEOUT": 2.0})
+"""As configs/arducopter-nogps.parm has it."""
 
-@pytest.mark.parametrize("make", [ardupilot_rig, px4_rig], ids=["ardupilot", "px4"])
+
+@pytest.mark.parametrize("make", [partial(ardupilot_rig, _SHIPPED), px4_rig], ids=["ardupilot", "px4"])
 def test_it_lands_and_disarms_by_itself(make: Callable[[], Any]) -> None:
     async def test() -> None:
         async with make() as rig:
             await rig.take_off()
             rig.cut(True)
-            await rig.until(lambda: not rig.peer.armed, 25.0)
+            await rig.until(lambda: not rig.peer.armed, 15.0)
             assert rig.peer.truth().height_m < 0.15
 
     virtual(test())
