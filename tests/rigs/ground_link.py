@@ -25,6 +25,7 @@ from flightd.core.types import (
     Phase,
     VehicleState,
 )
+from flightd.mission.machine import possible_in
 from flightd.runtime.clock import LoopClock
 from flightd.site.site_file import load_site
 
@@ -122,7 +123,8 @@ def tell_once(
     pose = GridPose(now_ns, "A2", x_m - 1.5, 0.01, 0.0, x_m, 0.01, 0.4, 0.3, 1.6, (0.0,) * 9, 0.99)
     output = TickOutput(None, Demand.FLY, phase, "arrived", "A2", 1, 12, pose, None)
     latency_ms = {"detection": 5.0, "total": 71.0}
-    link.tell(Snapshot(TickInput(now_ns, vehicle=vehicle), output, 1, 12, 300, 2, 29.0, latency_ms))
+    told = Snapshot(TickInput(now_ns, vehicle=vehicle), output, 1, 12, 300, 2, 29.0, latency_ms)
+    link.tell(replace(told, possible=possible_in(phase)))
 
 
 def event(text: str) -> Event:

@@ -45,7 +45,7 @@ async def test_status_and_commands() -> None:
     async with serving(local()) as link:
         code, out, err = await flightctl(*at(link), "status")
         assert (code, out) == (2, "")
-        assert "does not fly yet" in err
+        assert "has not published a status yet" in err
         tell_once(link)
         code, out, _ = await flightctl(*at(link), "status")
         assert code == 0

@@ -33,7 +33,7 @@ def status(context: typer.Context, as_json: AsJson = False) -> None:
     link: Link = context.obj
     report = link.ask(lambda client: client.status())
     if report is None:
-        raise UnavailableError("flightd answers but does not fly yet", remedy="try again in a moment")
+        raise UnavailableError("flightd has not published a status yet", remedy="try again in a moment")
     print(encode(report).decode() if as_json else "\n".join(status_lines(report)))
 
 

@@ -10,20 +10,25 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 
 class RawClient(asyncio.DatagramProtocol):
-    """Sends as component 191 of system 1; keeps every message heard."""
+    """Sends as component 191 of system 1, with a heartbeat each second; keeps every message heard."""
 
     def __init__(self) -> None:
         self._mav = dialect.MAVLink(None, srcSystem=1, srcComponent=191)
         self._mav.robust_parsing = True
         self.heard: list[tuple[float, Any]] = []
         self.transport: Any = None
+        self._next_beat: asyncio.TimerHandle | None = None
 
     @classmethod
     async def connect(cls, address: tuple[str, int]) -> RawClient:
         loop = asyncio.get_running_loop()
         _, client = await loop.create_datagram_endpoint(cls, remote_addr=address)
-        client.send(dialect.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+        client._beat()
         return client
+
+    def _beat(self) -> None:
+        self.send(dialect.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+        self._next_beat = asyncio.get_running_loop().call_later(1.0, self._beat)
 
     def connection_made(self, transport: Any) -> None:
         self.transport = transport
@@ -35,6 +40,8 @@ class RawClient(asyncio.DatagramProtocol):
     def error_received(self, exc: Exception) -> None: ...
 
     def close(self) -> None:
+        if self._next_beat is not None:
+            self._next_beat.cancel()
         self.transport.close()
 
     def send(self, message: Any) -> None:
