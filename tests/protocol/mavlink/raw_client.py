@@ -23,12 +23,13 @@ class RawClient(asyncio.DatagramProtocol):
     async def connect(cls, address: tuple[str, int]) -> RawClient:
         loop = asyncio.get_running_loop()
         _, client = await loop.create_datagram_endpoint(cls, remote_addr=address)
-        client._beat()
+        client.beat()
         return client
 
-    def _beat(self) -> None:
+    def beat(self) -> None:
+        """A heartbeat now and each second from now on."""
         self.send(dialect.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
-        self._next_beat = asyncio.get_running_loop().call_later(1.0, self._beat)
+        self._next_beat = asyncio.get_running_loop().call_later(1.0, self.beat)
 
     def connection_made(self, transport: Any) -> None:
         self.transport = transport
