@@ -21,6 +21,7 @@ from flightd.adapters.vehicle.mavlink.required_parameters import Job, Rule, rule
 from flightd.config.schema import Config
 from flightd.guide import pages
 from flightd.mission.safety import hazard_table
+from flightd.sim.judge.verdict import KINDS
 from flightd.site.site_file import SiteFile
 from tools import reference_tables
 from tools.command_help import help_pages
@@ -55,6 +56,12 @@ def _parameters(firmware: Firmware) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _faults() -> str:
+    lines = ["| `kind` | what it says, and its `value` |", "|---|---|"]
+    lines += [f"| `{kind}` | {text} |" for kind, text in KINDS.items()]
+    return "\n".join(lines) + "\n"
+
+
 def _is_in(rule: Rule, usual: set[Rule]) -> bool:
     return any((rule.names, rule.expected) == (other.names, other.expected) for other in usual)
 
@@ -71,6 +78,7 @@ PARTS: Mapping[str, Callable[[], str]] = {
     "commands": _commands,
     "protocol": protocol_text.markdown,
     "hazards": hazard_table.markdown,
+    "faults": _faults,
     "parameters-ardupilot": lambda: _parameters(Firmware.ARDUPILOT),
     "parameters-px4": lambda: _parameters(Firmware.PX4),
     "pages": lambda: _page_list(""),

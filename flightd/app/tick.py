@@ -91,4 +91,5 @@ class Tick:
             restarts={"detector": vision.replaced, "recorder": flight.recorder.restarts},
             repeated_level=flight.setpoints.stale,
             possible=pilot.mission.possible_commands,
+            height_goal_m=pilot.mission.height_goal_m,
         )

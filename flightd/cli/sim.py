@@ -25,6 +25,7 @@ EXAMPLES = """Examples:
   flightd sim --truth-url tcp:127.0.0.1:5762 --vehicle-url tcp:127.0.0.1:5760   ArduCopter's SITL flies
   flightd sim --scenario camera_frozen --scenario wind.toml    what goes wrong, by name or file
   flightd sim --scenario all                   every hazard in turn, and one table
+  flightd sim --seeds 10                       ten flights, seeds 1 to 10, and one table
   flightd sim --set mission.heading=shelf --set control.tilt_compensation=none
 """
 
@@ -42,6 +43,9 @@ def sim(
         str | None, typer.Option(help="Site file, or random:SEED for a random site.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of wind, sensors, floor and camera.", min=0)] = 1,
+    seeds: Annotated[
+        int, typer.Option(help="So many flights, from --seed on, and one table.", min=1, max=10_000)
+    ] = 1,
     vehicle: Annotated[
         str | None,
         typer.Option(help="ardupilot (default), px4, ardrone or mavsdk (flies PX4, in real time)."),
@@ -68,10 +72,11 @@ def sim(
 ) -> None:
     """Fly a whole mission in the simulator and leave its log, report and summary.
 
-    Interrupted (Ctrl-C), it leaves those of what was flown so far."""
+    Exit code 0 where the simulator's judge calls the flight good, else 1.  Interrupted (Ctrl-C), it leaves
+    what was flown so far."""
     from flightd.app.simulation.prepare import SimOptions, prepare
     from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
-    from flightd.cli.scenario_sweep import sweep
+    from flightd.cli.scenario_sweep import fly_seeds, sweep
     from flightd.sim.scenario.scenario import Scenario
     from flightd.sim.scenario.scenario_files import load_scenarios
 
@@ -79,21 +84,29 @@ def sim(
         config, warehouse, seed, vehicle, speed, tuple(settings or ()), truth_url, vehicle_url
     )
     options.check()
+    every = range(seed, seed + seeds)
     if scenario == ["all"]:
-        sweep(
-            lambda conditions, name: prepare(options, conditions, out / name, _say, sweep_route=SHORT_ROUTE),
-            as_json=as_json,
-        )
+
+        def prepared(conditions: Scenario, name: str, seed: int) -> Simulation:
+            folder = out / name if seeds == 1 else out / name / f"seed-{seed}"
+            return prepare(replace(options, seed=seed), conditions, folder, _say, sweep_route=SHORT_ROUTE)
+
+        sweep(prepared, every, as_json=as_json)
         return
     conditions = load_scenarios(scenario) if scenario else Scenario()
-    _fly(prepare(options, conditions, out, _say), as_json=as_json)
+    if seeds == 1:
+        _fly(prepare(options, conditions, out, _say), as_json=as_json)
+        return
+    each = (prepare(replace(options, seed=n), conditions, out / f"seed-{n}", _say) for n in every)
+    fly_seeds(each, as_json=as_json)
 
 
 def _fly(simulation: Simulation, *, as_json: bool) -> None:
-    """Fly, write what came of it, and print it.  RunError where the mission was aborted."""
+    """Fly, write what came of it, and print it.  RunError where the judge calls it bad."""
     from flightd.app.simulation.launch import FlightInterruptedError, fly
     from flightd.app.simulation.summary import write_results
     from flightd.cli.flight_progress import FlightProgress
+    from flightd.cli.scenario_sweep import faults_in_words
     from flightd.replay.report.page import write_report
     from flightd.studies.counted_stock import counted_beside
 
@@ -118,8 +131,18 @@ def _fly(simulation: Simulation, *, as_json: bool) -> None:
     if interrupted is not None:
         _say(str(interrupted))
         raise typer.Exit(128 + interrupted.signal)
-    if summary["mission"] != "completed":
-        raise RunError(f"mission aborted: {summary['reason']}")
+    if summary["verdict"] != "good":
+        raise RunError(f"a bad flight: {faults_in_words(summary['faults'])}; mission {_ending(summary)}")
+
+
+def _verdict(summary: dict[str, Any]) -> str:
+    from flightd.cli.scenario_sweep import faults_in_words
+
+    return ": ".join(filter(None, (summary["verdict"], faults_in_words(summary["faults"]))))
+
+
+def _ending(summary: dict[str, Any]) -> str:
+    return f"{summary['mission']}: {summary['reason']}"
 
 
 def _say(line: str) -> None:
@@ -142,9 +165,7 @@ def _print_summary(summary: dict[str, Any], report: Path) -> None:
         value = summary[key]
         return "-" if value is None else f"{value * 100:.1f} cm"
 
-    table = Table(
-        title=f"Mission {summary['mission']}: {summary['reason']}", show_header=False, title_justify="left"
-    )
+    table = Table(title=f"Mission {_ending(summary)}", show_header=False, title_justify="left")
     simulated, wall = summary["flight_time_s"], summary["wall_time_s"]
     rows = [
         (
@@ -153,6 +174,7 @@ def _print_summary(summary: dict[str, Any], report: Path) -> None:
         ),
         ("off the line, rms", metres("cross_track_rms_m")),
         ("hover error, p95", metres("hover_error_p95_m")),
+        ("nearest to rack or ceiling", metres("min_clearance_m")),
         ("landing error", metres("landed_error_m")),
         ("flight time", f"{simulated:.0f} s in {wall:.0f} s ({simulated / max(wall, 1e-9):.1f} x)"),
         *([("locations", _counted(summary))] if summary.get("locations_planned") else []),
@@ -161,6 +183,7 @@ def _print_summary(summary: dict[str, Any], report: Path) -> None:
             "exposure to setpoint",
             f"{summary['latency_ms']['p50']:.0f} ms, p99 {summary['latency_ms']['p99']:.0f} ms",
         ),
+        ("verdict", _verdict(summary)),
         ("report", str(report)),
     ]
     for name, value in rows:

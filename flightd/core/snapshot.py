@@ -20,7 +20,8 @@ class Snapshot:
     stages of each frame flown by, both since the last that was told.  The others count since the start:
     `dropped` what a full queue or a lost worker cost, `restarts` what died and was brought back, each by the
     part's name; `repeated_level` the setpoints that went out because no tick made one.  `possible` are the
-    operator's commands that the mission takes now.
+    operator's commands that the mission takes now.  `height_goal_m` is the commanded height above the
+    floor.
     """
 
     tick: TickInput
@@ -37,6 +38,7 @@ class Snapshot:
     restarts: Mapping[str, int] = field(default_factory=dict)
     repeated_level: int = 0
     possible: frozenset[CommandKind] = frozenset()
+    height_goal_m: float = 0.0
 
     @property
     def stamp_ns(self) -> int:
@@ -93,4 +95,5 @@ class Snapshot:
             frames_dropped=self.frames_dropped,
             fps=self.fps,
             latency_ms=dict(self.latency_ms),
+            height_goal_m=self.height_goal_m,
         )

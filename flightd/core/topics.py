@@ -21,7 +21,8 @@ from flightd.core.types import (
 
 
 class Topic(enum.StrEnum):
-    """Names of the streams in `flight.mcap`; TRUTH, SCENARIO and FAULT are in the simulator's `truth.mcap`.
+    """Names of the streams in `flight.mcap`; TRUTH, SCENARIO, FAULT and ARMED are in the simulator's
+    `truth.mcap`.
 
     TICK and DECISION are all that the pilot was given and all that it answered (`core.tick.TickInput`,
     `core.tick.TickOutput`), so that a flight can be replayed; the others are for people and their tools.
@@ -45,6 +46,7 @@ class Topic(enum.StrEnum):
     TRUTH = "/truth"
     SCENARIO = "/scenario"
     FAULT = "/fault"
+    ARMED = "/armed"
 
 
 @dataclass(frozen=True, slots=True)

@@ -361,7 +361,8 @@ class Status:
     """A `core.snapshot.Snapshot` as the flight log keeps it.
 
     `latency_ms` are the newest frame's stages: capture, transport, detection, track (each from its
-    predecessor), and total (mid-exposure to setpoint on the wire).
+    predecessor), and total (mid-exposure to setpoint on the wire).  `height_goal_m` is the commanded height
+    above the floor, None in logs that do not tell it.
     """
 
     stamp_ns: int
@@ -377,3 +378,4 @@ class Status:
     frames_dropped: int
     fps: float
     latency_ms: dict[str, float]
+    height_goal_m: float | None = None

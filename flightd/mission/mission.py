@@ -115,6 +115,11 @@ class Mission:
         return self._route.goal
 
     @property
+    def height_goal_m(self) -> float:
+        """The height above the floor that it flies at or makes for; 0 on the ground and in a landing."""
+        return self._steering.height_goal_m if self.airborne else 0.0
+
+    @property
     def stand(self) -> tuple[str, float]:
         """The node on which the drone stands before it flies, and its heading there."""
         return self._route.stand

@@ -28,7 +28,7 @@ from flightd.sim.plant.airframe import Airframe, AirframeParams
 from flightd.sim.plant.battery_swapper import BatterySwapper
 from flightd.sim.plant.external_simulator import ExternalVehicle
 from flightd.sim.plant.external_truth import Placement
-from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.kinematics import ArmedChange, Kinematics
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
@@ -86,6 +86,11 @@ class VehiclePeer(Protocol):
     async def open(self) -> tuple[str, int]: ...
 
     async def run(self) -> None: ...
+
+    @property
+    def armed(self) -> bool | None:
+        """Whether its motors may turn; None where that is not known."""
+        ...
 
     def truth(self) -> Kinematics: ...
 
@@ -170,9 +175,13 @@ class World:
         self.vehicle.truth_at(now_ns)
 
     async def _log_truth(self) -> None:
+        armed: bool | None = None
         while True:
             truth: Kinematics = self.vehicle.truth()
             self._recorder.record(Topic.TRUTH, truth.stamp_ns, truth)
+            if (now := self.vehicle.armed) is not None and now is not armed:
+                armed = now
+                self._recorder.record(Topic.ARMED, truth.stamp_ns, ArmedChange(truth.stamp_ns, now))
             await asyncio.sleep(_TRUTH_PERIOD_S)
 
 

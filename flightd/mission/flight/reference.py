@@ -66,6 +66,8 @@ class ReferenceGenerator:
         self.anchor = (start[0], start[1])
         """Where it holds when no stop is flown to."""
         self._steers = False
+        self.height_goal_m = 0.0
+        """The height above the floor that is flown at or made for."""
         self._cruise_m = p.height_m
         self._x = Profile(start[0], p.speed_mps, p.accel_mps2)
         self._y = Profile(start[1], p.speed_mps, p.accel_mps2)
@@ -80,6 +82,7 @@ class ReferenceGenerator:
     def land(self) -> None:
         """A landing begins."""
         self._touchdown.begin()
+        self.height_goal_m = 0.0
 
     def begin_anew(self) -> None:
         """Start the reference at the drone, which is not where it was believed to be."""
@@ -117,13 +120,14 @@ class ReferenceGenerator:
     def _climb_mps(self, s: MissionInputs, task: ReferenceTask) -> float:
         """Climb rate towards the wanted height.  A take-off that drifts where no line tells how hurries: the
         picture has to widen faster than it leaves the lines behind."""
+        self.height_goal_m = self._wanted_height_m(task)
         rises = task.phase is Phase.TAKE_OFF and s.height_m >= self._params.expert.steer_above_m
         if rises and not self._steers:
             self._rise.reset(self._height.position, self._height.velocity)
-            self._rise.step(self._wanted_height_m(task), s.dt_s)
+            self._rise.step(self.height_goal_m, s.dt_s)
             self._height.reset(self._rise.position, self._rise.velocity)
         else:
-            self._height.step(self._wanted_height_m(task), s.dt_s)
+            self._height.step(self.height_goal_m, s.dt_s)
         return self._height.velocity
 
     def _may_brake(self, s: MissionInputs, task: ReferenceTask) -> bool:

@@ -161,6 +161,11 @@ class ArDroneServer:
             if packet is not None and self._client is not None and self._navdata is not None and self.radio:
                 self._down.carry(partial(self.send_navdata, packet))
 
+    @property
+    def armed(self) -> bool:
+        """Its motors turn in the air only, or on the way there and back."""
+        return self.drone.airborne
+
     def truth(self) -> Kinematics:
         """The true motion now."""
         return self.truth_at(self._clock.now_ns())

@@ -1,36 +1,46 @@
-"""How good a flight was, against the simulator's truth: what `summary.json` says.
+"""How good a flight was, against the simulator's truth: the figures of `summary.json`.
 
 Both sides are read from their logs after the flight: what the daemon claimed from its own, where the
-drone really was from the simulator's.
+drone really was from the simulator's.  The whole flight counts, from take-off to landing or to the pilot's
+take-over, whatever phase the daemon claims to be in.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_left
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
 
-from flightd.core.types import Event, EventLevel, Phase, Status
-from flightd.mission.plan.flight_plan import FlightPlan
-from flightd.sim.plant.kinematics import Kinematics
-from flightd.site.site import Site
+import numpy as np
+
+from flightd.core.types import Event, EventLevel, Phase
+from flightd.sim.judge.clearance import clearances
+from flightd.sim.judge.evidence import FlightEvidence
+from flightd.sim.judge.meant_leg import off_leg
+from flightd.sim.judge.motion import OFF_FLOOR_M, Motion, Values
 
 _AT_NODE_M = 0.5
 """A node counts as visited rightly when the drone was within this of it (less than half a cell)."""
-_OFF_FLOOR_M = 0.3
 _AT_STOP = {Phase.HOVER, Phase.CLIMB, Phase.SCAN}
 """A scan's views are all straight above the node."""
 _LAND_BEGINS = re.compile(r"(?!land )\w+ -> land: .*")
 """An event of this phase is a warning where the landing is not the plan's."""
-_ON_LINES = _AT_STOP | {Phase.FOLLOW, Phase.TURN, Phase.ACQUIRE, Phase.HOLD}
+_CONTROL_GAP_S = 0.5
+"""Setpoints further apart leave the drone to itself."""
+_SINKING_MPS = -0.1
+"""Who sinks like this is being landed by its autopilot."""
 
 
 @dataclass(frozen=True, slots=True)
 class FlightScore:
-    """The flight's part of the summary; metres, seconds.  None where there was nothing to measure."""
+    """The flight's part of the summary; metres, seconds.  None where there was nothing to measure.
+
+    `cross_track_*` are off the leg that was meant (`meant_leg`); `min_clearance_m` is free between the body
+    with its propellers and racks, ceiling and keep-outs, below 0 in them; `max_overshoot_m` how far above
+    the commanded height it came; `uncontrolled_s` the longest time in the air in which neither setpoints
+    went out nor the autopilot was landing it."""
 
     mission: str
     reason: str
@@ -43,132 +53,121 @@ class FlightScore:
     landed_error_m: float | None
     flight_time_s: float
     sorties: int
-    min_shelf_distance_m: float | None
+    min_clearance_m: float | None
+    max_overshoot_m: float | None
+    uncontrolled_s: float | None
 
 
-def score(
-    site: Site,
-    plan: FlightPlan,
-    statuses: Sequence[Status],
-    events: Sequence[Event],
-    truth: Sequence[Kinematics],
-) -> FlightScore:
-    """Measure one flight.  `statuses`, `events` are the daemon's, all in time order."""
-    final = statuses[-1] if statuses else None
-    visits = [event for event in events if event.name == "visited"]
-    right = [event for event in visits if _at_node(site, event, truth)]
-    flying = [t for t in truth if t.height_m > _OFF_FLOOR_M]
-    phases = _Phases(statuses)
-    on_lines = [_off_line(site, t) for t in flying if phases.at(t.stamp_ns) in _ON_LINES]
-    hover = _hover_errors(site, visits, truth, phases)
-    landed = truth[-1] if truth and truth[-1].height_m < _OFF_FLOOR_M and flying else None
+def score(flight: FlightEvidence) -> FlightScore:
+    """Measure one flight."""
+    final = flight.statuses[-1] if flight.statuses else None
+    visits = [event for event in flight.events if event.name == "visited"]
+    right = [event for event in visits if _at_node(flight, event)]
+    off = off_leg_in_air(flight)
+    off = off[np.isfinite(off)]
+    hover = _hover_errors(flight, visits)
+    above = overshoot(flight)
+    free = [clearance.least_m for clearance in clearances(flight.site, flight.in_air)]
     return FlightScore(
         mission="completed" if final and final.phase is Phase.DONE else "aborted",
         reason=final.reason if final else "the daemon never spoke",
-        nodes_planned=plan.nodes,
+        nodes_planned=flight.plan.nodes,
         nodes_visited=len({visit.text for visit in visits}),
         nodes_miscounted=len(visits) - len(right),
-        cross_track_rms_m=_rounded(_rms(on_lines)),
-        cross_track_max_m=_rounded(max(on_lines, default=None)),
+        cross_track_rms_m=_rounded(math.sqrt(float(np.mean(off**2))) if len(off) else None),
+        cross_track_max_m=_rounded(float(off.max()) if len(off) else None),
         hover_error_p95_m=_rounded(_p95(hover)),
-        landed_error_m=_rounded(_landed_error_m(site, statuses, events, landed)) if landed else None,
-        flight_time_s=_flight_time_s(truth),
+        landed_error_m=_rounded(_landed_error_m(flight)),
+        flight_time_s=_flight_time_s(flight.motion),
         sorties=sum(
             after.phase is Phase.TAKE_OFF and before.phase is not Phase.TAKE_OFF
-            for before, after in pairwise(statuses)
+            for before, after in pairwise(flight.statuses)
         ),
-        min_shelf_distance_m=_rounded(min((shelf_distance_m(site, t) for t in flying), default=None)),
+        min_clearance_m=_rounded(min(free, default=None)),
+        max_overshoot_m=_rounded(max(0.0, float(above.max())) if len(above) else None),
+        uncontrolled_s=_rounded(longest_uncontrolled(flight)[1] if flight.setpoints_ns else None),
     )
 
 
-def _landed_error_m(
-    site: Site, statuses: Sequence[Status], events: Sequence[Event], landed: Kinematics
-) -> float | None:
+def off_leg_in_air(flight: FlightEvidence) -> Values:
+    """How far beside its leg each sample in the air is, (n,) metres."""
+    return off_leg(flight.site, flight.plan.start, flight.statuses, flight.in_air)
+
+
+def overshoot(flight: FlightEvidence) -> Values:
+    """How far above the commanded height each sample in the air is, (n,) metres.  Who has yet to come down
+    to it may be as high as it was, and no higher.  Empty where the log tells no commanded height."""
+    told = [(s.stamp_ns * 1e-9, s.height_goal_m) for s in flight.statuses if s.height_goal_m is not None]
+    motion = flight.in_air
+    if not told:
+        return np.empty(0)
+    stamps, goals = (np.asarray(column, np.float64) for column in zip(*told, strict=True))
+    numbers = np.maximum(np.searchsorted(stamps, motion.stamp_s, side="right") - 1, 0)
+    above, bound = np.empty(len(motion)), 0.0
+    for i, (height_m, goal_m) in enumerate(zip(motion.height_m, goals[numbers], strict=True)):
+        bound = max(goal_m, min(bound, height_m))
+        above[i] = height_m - bound
+    return above
+
+
+def longest_uncontrolled(flight: FlightEvidence) -> tuple[float, float]:
+    """When the longest time without control began, s of the clock, and how long it was, s; 0 where nothing is
+    known of setpoints."""
+    motion = flight.in_air
+    sent = np.asarray(flight.setpoints_ns, np.float64) * 1e-9
+    if not len(motion) or not len(sent):
+        return math.inf, 0.0
+    before = np.searchsorted(sent, motion.stamp_s, side="right") - 1
+    age_s = np.where(before >= 0, motion.stamp_s - sent[np.maximum(before, 0)], math.inf)
+    alone = (age_s > _CONTROL_GAP_S) & (motion.climb_mps > _SINKING_MPS)
+    longest, since = (math.inf, 0.0), math.inf
+    for stamp_s, is_alone in zip(motion.stamp_s, alone, strict=True):
+        since = min(since, stamp_s) if is_alone else math.inf
+        if stamp_s - since > longest[1]:
+            longest = (float(since), float(stamp_s - since))
+    return longest
+
+
+def _landed_error_m(flight: FlightEvidence) -> float | None:
     """From the centre of the pad that it landed on by plan; None where the landing was ordered elsewhere."""
-    begun = [event for event in events if event.name == "phase" and _LAND_BEGINS.fullmatch(event.text)]
-    goal = next((status.goal for status in reversed(statuses) if status.phase is Phase.LAND), None)
-    pad = next((pad for pad in site.pads if pad.node == goal), None)
-    if pad is None or not begun or begun[-1].level is not EventLevel.INFO:
+    landed = flight.landed
+    begun = [e for e in flight.events if e.name == "phase" and _LAND_BEGINS.fullmatch(e.text)]
+    goal = next((status.goal for status in reversed(flight.statuses) if status.phase is Phase.LAND), None)
+    pad = next((pad for pad in flight.site.pads if pad.node == goal), None)
+    if landed is None or pad is None or not begun or begun[-1].level is not EventLevel.INFO:
         return None
-    x_m, y_m = site.pad_centre(pad)
+    x_m, y_m = flight.site.pad_centre(pad)
     return math.hypot(landed.x_m - x_m, landed.y_m - y_m)
 
 
-def as_summary(result: FlightScore) -> dict[str, object]:
-    return asdict(result)
-
-
-class _Phases:
-    """The phase that the daemon said to be in, at any time."""
-
-    def __init__(self, statuses: Sequence[Status]) -> None:
-        self._stamps = [status.stamp_ns for status in statuses]
-        self._phases = [status.phase for status in statuses]
-
-    def at(self, stamp_ns: int) -> Phase:
-        index = bisect_left(self._stamps, stamp_ns) - 1
-        return self._phases[index] if index >= 0 else Phase.PREFLIGHT
-
-
-def _nearest_in_time(truth: Sequence[Kinematics], stamp_ns: int) -> Kinematics | None:
-    index = bisect_left(truth, stamp_ns, key=lambda t: t.stamp_ns)
-    return truth[min(index, len(truth) - 1)] if truth else None
-
-
-def _at_node(site: Site, event: Event, truth: Sequence[Kinematics]) -> bool:
-    node, there = site.nodes.get(event.text), _nearest_in_time(truth, event.stamp_ns)
+def _at_node(flight: FlightEvidence, event: Event) -> bool:
+    node, there = flight.site.nodes.get(event.text), flight.truth_at(event.stamp_ns)
     if node is None or there is None:
         return False
     return math.hypot(there.x_m - node.x_m, there.y_m - node.y_m) < _AT_NODE_M
 
 
-def _off_line(site: Site, t: Kinematics) -> float:
-    """Distance from the drone to the nearest edge of the grid, on the floor."""
-    return min(_to_segment(t.x_m, t.y_m, site, edge.a, edge.b) for edge in site.edges)
-
-
-def _to_segment(x: float, y: float, site: Site, a: str, b: str) -> float:
-    p, q = site.nodes[a], site.nodes[b]
-    dx, dy = q.x_m - p.x_m, q.y_m - p.y_m
-    share = ((x - p.x_m) * dx + (y - p.y_m) * dy) / (dx * dx + dy * dy)
-    share = min(max(share, 0.0), 1.0)
-    return math.hypot(x - p.x_m - share * dx, y - p.y_m - share * dy)
-
-
-def _hover_errors(
-    site: Site, visits: Iterable[Event], truth: Sequence[Kinematics], phases: _Phases
-) -> list[float]:
+def _hover_errors(flight: FlightEvidence, visits: Iterable[Event]) -> list[float]:
     """Distances from the node during its whole dwell or scan, for each visit."""
     errors: list[float] = []
+    motion = flight.motion
     for visit in visits:
-        node = site.nodes.get(visit.text)
-        index = bisect_left(truth, visit.stamp_ns, key=lambda t: t.stamp_ns) - 1
-        while node is not None and index >= 0 and phases.at(truth[index].stamp_ns) in _AT_STOP:
-            errors.append(math.hypot(truth[index].x_m - node.x_m, truth[index].y_m - node.y_m))
+        node = flight.site.nodes.get(visit.text)
+        index = int(np.searchsorted(motion.stamp_s, visit.stamp_ns * 1e-9)) - 1
+        while node is not None and index >= 0 and _stops_at(flight, motion.stamp_s[index]):
+            errors.append(math.hypot(motion.x_m[index] - node.x_m, motion.y_m[index] - node.y_m))
             index -= 1
     return errors
 
 
-def shelf_distance_m(site: Site, t: Kinematics) -> float:
-    """From the drone to the nearest shelf that stands as high as it flies; infinite without one."""
-    distances = [
-        math.hypot(max(shelf.x0_m - t.x_m, 0.0, t.x_m - shelf.x1_m), t.y_m - shelf.y_m)
-        for shelf in site.shelves
-        if t.height_m < shelf.height_m
-    ]
-    return min(distances, default=math.inf)
+def _stops_at(flight: FlightEvidence, stamp_s: float) -> bool:
+    return flight.phase_at(round(stamp_s * 1e9)) in _AT_STOP
 
 
-def _flight_time_s(truth: Sequence[Kinematics]) -> float:
+def _flight_time_s(motion: Motion) -> float:
     """Time off the floor, in all sorties together."""
-    spans = [
-        b.stamp_ns - a.stamp_ns for a, b in pairwise(truth) if min(a.height_m, b.height_m) > _OFF_FLOOR_M
-    ]
-    return round(sum(spans) * 1e-9, 2)
-
-
-def _rms(values: Sequence[float]) -> float | None:
-    return math.sqrt(math.fsum(v * v for v in values) / len(values)) if values else None
+    both = np.minimum(motion.height_m[1:], motion.height_m[:-1]) > OFF_FLOOR_M
+    return round(float(np.diff(motion.stamp_s)[both].sum()), 2)
 
 
 def _p95(values: Sequence[float]) -> float | None:

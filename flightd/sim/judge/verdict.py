@@ -1,110 +1,128 @@
-"""How a flight with something wrong went: found by the daemon's own log, safe or not by the truth."""
+"""The one verdict on a flight: good, or bad by these faults."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import groupby
 
-from flightd.core.types import Event, Phase, Status
-from flightd.mission.safety.hazard_table import PHASE_OF, Hazard
-from flightd.sim.judge.flight_score import shelf_distance_m
-from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.scenario.scenario import Expectation
-from flightd.site.corridor import Corridor
-from flightd.site.site import Site
+import numpy as np
 
-BODY_M = 0.3
-"""Half the width of the drone, with its propellers."""
-WAY_M = 0.9
-"""The free way to both sides of the line: the shelves of the demo site less the drone."""
-_OFF_FLOOR_M = 0.3
-_ON_FLOOR_M = 0.2
-_AT_PAD_M = 0.5
+from flightd.sim.judge.clearance import clearances
+from flightd.sim.judge.evidence import FlightEvidence
+from flightd.sim.judge.flight_score import FlightScore, longest_uncontrolled, off_leg_in_air, overshoot
+from flightd.sim.judge.motion import OFF_FLOOR_M
+
+OFF_LEG_M = 0.9
+"""Further beside its leg it is lost: the shelves of the demo site less the drone."""
+OVERSHOOT_M = 0.5
+UNCONTROLLED_S = 10.0
+"""An autopilot whose companion died must be landing by then."""
+_OFF_PAD_M = 0.5
+_HARD_MPS = 1.2
+_STAYS_ARMED_S = 15.0
 
 
 @dataclass(frozen=True, slots=True)
-class ScenarioVerdict:
-    """One row.  `found_s` counts from the first fault (without faults: from take-off), None when the hazard
-    was not found; `wrong` says what is not as the table and the scenario have it, "" when all is."""
+class JudgedFault:
+    """One thing that was wrong: when, s after take-off, and how much (metres, seconds or a number of
+    things, as `kind` says in `KINDS`)."""
 
-    hazard: str
-    found_s: float | None
-    action: str
-    phases: tuple[str, ...]
-    outcome: str
-    min_shelf_distance_m: float | None
-    off_line_max_m: float
-    left_corridor: bool
-    wrong: str
+    kind: str
+    at_s: float
+    value: float
 
 
-def judge(
-    row: Hazard,
-    expected: Expectation,
-    site: Site,
-    begun_ns: Sequence[int],
-    statuses: Sequence[Status],
-    events: Sequence[Event],
-    truth: Sequence[Kinematics],
-) -> ScenarioVerdict:
-    """`begun_ns` are the times at which faults began; all in time order."""
-    ours_ns = next((status.stamp_ns for status in statuses if status.phase is Phase.PILOT), math.inf)
-    flying = [t for t in truth if t.height_m > _OFF_FLOOR_M and t.stamp_ns < ours_ns]  # then it is his
-    if not flying:
-        return ScenarioVerdict(
-            row.name, None, row.action.value, (), "never flew", None, 0.0, False, "never flew"
-        )
-    start_ns = min(begun_ns, default=flying[0].stamp_ns)
-    found_s = _found_s(row, events, start_ns)
-    after = [status.phase for status in statuses if status.stamp_ns >= start_ns]
-    phases = tuple(phase.value for phase, _ in groupby(after))
-    shelf_m = min(shelf_distance_m(site, t) for t in flying)
-    corridor = Corridor(site, WAY_M)
-    off_m = max(corridor.nearest(t.x_m, t.y_m).distance_m for t in flying)
-    outcome = _outcome(site, after[-1] if after else None, truth[-1])
-    wrongs = []
-    if row.trigger is not None and (found_s is None or found_s > expected.found_s):
-        wrongs.append("not found" if found_s is None else f"found later than {expected.found_s:g} s")
-    phase = PHASE_OF.get(row.action) if row.trigger is not None else None
-    if phase is not None and phase not in after:
-        wrongs.append(f"never in {phase.value}")
-    if outcome != expected.ends:
-        wrongs.append(f"{outcome} instead of {expected.ends}")
-    if shelf_m <= BODY_M:
-        wrongs.append("hit a shelf")
-    if off_m > WAY_M:
-        wrongs.append("left the corridor")
-    return ScenarioVerdict(
-        row.name,
-        None if found_s is None else round(found_s, 2),
-        row.action.value,
-        phases,
-        outcome,
-        None if math.isinf(shelf_m) else round(shelf_m, 2),
-        round(off_m, 2),
-        off_m > WAY_M,
-        "; ".join(wrongs),
-    )
+KINDS = {
+    "hit_rack": "the body touched a shelf front, by m",
+    "hit_ceiling": "the body touched the ceiling, by m",
+    "hit_keep_out": "the body was in a keep-out, by m",
+    "left_leg": f"more than {OFF_LEG_M:g} m beside the leg that was meant, by m",
+    "too_high": f"more than {OVERSHOOT_M:g} m above the commanded height, by m",
+    "out_of_control": f"in the air for more than {UNCONTROLLED_S:g} s without setpoint or landing, s",
+    "hard_landing": f"touched the floor faster than {_HARD_MPS:g} m/s, m/s",
+    "stayed_up": "in the air at the end, m above the floor",
+    "stayed_armed": f"armed on the floor for more than {_STAYS_ARMED_S:g} s, or at the end, s",
+    "aborted": "the mission was not completed, nodes left",
+    "miscounted": "nodes visited that were others",
+    "not_visited": "planned nodes that a completed mission left out",
+    "off_pad": f"landed more than {_OFF_PAD_M:g} m beside the pad's centre, m",
+    "codes_wrong": "codes in the inventory that are not on the shelf",
+    "empty_wrong": "places called empty that are not",
+    "not_found": "the scenario's hazard was not found",
+    "found_late": "the hazard was found later than the scenario allows, s",
+    "other_action": "the daemon did not do what the table of hazards says",
+    "other_end": "the flight did not end as the scenario says",
+    "down_late": "on the floor later than it must be after a hazard that asks for landing, s",
+}
+"""What each kind of fault says, with its value."""
+
+MISSION_KINDS = frozenset({"aborted", "not_visited", "off_pad"})
+"""What is no fault where a scenario asks for another end than a completed mission."""
 
 
-def _found_s(row: Hazard, events: Sequence[Event], start_ns: int) -> float | None:
-    if row.trigger is None:
-        return None
-    for event in events:
-        if event.name == "hazard" and event.stamp_ns >= start_ns and event.text.startswith(row.trigger.value):
-            return (event.stamp_ns - start_ns) * 1e-9
-    return None
+def judged(
+    flight: FlightEvidence, score: FlightScore, *, codes_wrong: int = 0, empty_wrong: int = 0
+) -> list[JudgedFault]:
+    """All faults of a flight, in the order of `KINDS`."""
+    end_s = float(flight.truth[-1].stamp_ns * 1e-9) - flight.begun_s if flight.truth else 0.0
+    counts = {
+        "miscounted": score.nodes_miscounted,
+        "codes_wrong": codes_wrong,
+        "empty_wrong": empty_wrong,
+    }
+    if score.mission != "completed":
+        counts["aborted"] = max(score.nodes_planned - score.nodes_visited, 1)
+    elif score.nodes_visited < score.nodes_planned:
+        counts["not_visited"] = score.nodes_planned - score.nodes_visited
+    found = [JudgedFault(kind, _finite(end_s), float(count)) for kind, count in counts.items() if count]
+    if len(flight.in_air):
+        found += [*_in_the_air(flight), *_at_the_floor(flight)]
+    if (score.landed_error_m or 0.0) > _OFF_PAD_M and score.landed_error_m is not None:
+        found.append(JudgedFault("off_pad", _finite(end_s), score.landed_error_m))
+    return sorted(found, key=lambda fault: list(KINDS).index(fault.kind))
 
 
-def _outcome(site: Site, phase: Phase | None, end: Kinematics) -> str:
-    if phase is Phase.PILOT:
-        return "handed over"
-    if end.height_m > _ON_FLOOR_M:
-        return "in the air"
-    if phase is Phase.DONE:
-        return "completed"
-    centres = (site.pad_centre(pad) for pad in site.pads)
-    home = any(math.hypot(end.x_m - x_m, end.y_m - y_m) < _AT_PAD_M for x_m, y_m in centres)
-    return "home" if home else "landed"
+def _in_the_air(flight: FlightEvidence) -> Iterator[JudgedFault]:
+    off = off_leg_in_air(flight)
+    above = overshoot(flight)
+    measured = [
+        *((f"hit_{each.obstacle}", -each.free_m, 0.0) for each in clearances(flight.site, flight.in_air)),
+        ("left_leg", np.where(np.isfinite(off), off, 0.0), OFF_LEG_M),
+        *([("too_high", above, OVERSHOOT_M)] if len(above) else []),
+    ]
+    for kind, values, bound in measured:
+        if (wrong := values > bound).any():
+            first_s = float(flight.in_air.stamp_s[int(np.argmax(wrong))]) - flight.begun_s
+            yield JudgedFault(kind, round(first_s, 2), round(float(values.max()), 3))
+    since_s, alone_s = longest_uncontrolled(flight)
+    if alone_s > UNCONTROLLED_S:
+        yield JudgedFault("out_of_control", round(since_s - flight.begun_s, 2), round(alone_s, 2))
+
+
+def _at_the_floor(flight: FlightEvidence) -> Iterator[JudgedFault]:
+    """How it came down, and how it stands there."""
+    motion, begun_s = flight.motion, flight.begun_s
+    flying = motion.flying
+    touched = np.flatnonzero(flying[:-1] & ~flying[1:])
+    sink_mps = -motion.climb_mps[touched]
+    if len(sink_mps) and sink_mps.max() > _HARD_MPS:
+        at_s = float(motion.stamp_s[touched[int(np.argmax(sink_mps))]]) - begun_s
+        yield JudgedFault("hard_landing", round(at_s, 2), round(float(sink_mps.max()), 2))
+    if flight.handed_over:
+        return
+    last = flight.truth[-1]
+    end_s = last.stamp_ns * 1e-9
+    if last.height_m > OFF_FLOOR_M:
+        yield JudgedFault("stayed_up", round(end_s - begun_s, 2), round(last.height_m, 2))
+    elif flight.armed is not None and len(touched):
+        down_s = float(motion.stamp_s[touched[-1] + 1])
+        disarmed = [c.stamp_ns * 1e-9 for c in flight.armed if not c.armed and c.stamp_ns * 1e-9 >= down_s]
+        armed_s = (disarmed[0] if disarmed else end_s) - down_s
+        if not disarmed or armed_s > _STAYS_ARMED_S:
+            yield JudgedFault("stayed_armed", round(down_s - begun_s, 2), round(armed_s, 2))
+
+
+def _finite(value: float) -> float:
+    """0 for a flight that never began."""
+    return round(value, 2) if math.isfinite(value) else 0.0

@@ -95,6 +95,10 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
         finally:
             await self.close()
 
+    @property
+    def armed(self) -> None:
+        """Not told by the truth link."""
+
     def truth(self) -> Kinematics:
         """The true motion now."""
         return self.truth_at(self._clock.now_ns())

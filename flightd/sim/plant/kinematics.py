@@ -24,3 +24,11 @@ class Kinematics:
     roll_rate_radps: float
     pitch_rate_radps: float
     yaw_rate_radps: float
+
+
+@dataclass(frozen=True, slots=True)
+class ArmedChange:
+    """The vehicle was armed or disarmed at `stamp_ns`."""
+
+    stamp_ns: int
+    armed: bool

@@ -1,7 +1,9 @@
-"""What a flight's score counts."""
+"""What the simulator's judge counts, and what it calls bad."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,49 +11,105 @@ import pytest
 from flightd.config.mission import Heading
 from flightd.core.types import Event, EventLevel, Phase, Status
 from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
+from flightd.sim.judge.evidence import FlightEvidence
 from flightd.sim.judge.flight_score import score
-from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.judge.verdict import KINDS, judged
+from flightd.sim.plant.kinematics import ArmedChange, Kinematics
 from flightd.site.site_file import load_site
+from flightd.site.ways import KeepOut
 
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
 PLAN = make_plan(SITE, ["A2"], "A1", "A1", HeadingPolicy(Heading.ALONG))
 MS = 1_000_000
+S = 1_000_000_000
 
 
-def standing(stamp_ns: int, y_m: float) -> Kinematics:
-    return Kinematics(stamp_ns, 1.5, y_m, 1.6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+def at(
+    stamp_ns: int, x_m: float = 1.5, y_m: float = 0.0, height_m: float = 1.6, climb: float = 0.0
+) -> Kinematics:
+    return Kinematics(stamp_ns, x_m, y_m, height_m, 0.0, 0.0, climb, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def status(stamp_ns: int, phase: Phase) -> Status:
-    return Status(stamp_ns, phase, "", "A2", "A2", 0, 1, 1.0, 1.6, 1, 0, 30.0, {})
+def status(
+    stamp_ns: int, phase: Phase = Phase.FOLLOW, node: str = "A2", goal: str = "A2", height_m: float = 1.6
+) -> Status:
+    return Status(stamp_ns, phase, "", node, goal, 0, 1, 1.0, 1.6, 1, 0, 30.0, {}, height_m)
+
+
+def evidence(
+    truth: Iterable[Kinematics],
+    statuses: Sequence[Status],
+    events: Sequence[Event] = (),
+    armed: Sequence[ArmedChange] | None = None,
+    setpoints_ns: Sequence[int] = (),
+) -> FlightEvidence:
+    return FlightEvidence(SITE, PLAN, statuses, events, list(truth), setpoints_ns, armed)
+
+
+def kinds(flight: FlightEvidence) -> dict[str, float]:
+    return {fault.kind: fault.value for fault in judged(flight, score(flight))}
+
+
+def landed(*flown: Kinematics) -> list[Kinematics]:
+    """What was flown, from the pad and back to it."""
+    last = flown[-1].stamp_ns
+    return [at(0, 0.0, height_m=0.1), *flown, at(last + S, 0.0, height_m=0.1)]
+
+
+DONE = status(8 * S, Phase.DONE, "A1", "A1")
 
 
 @pytest.mark.parametrize("phase", [Phase.HOVER, Phase.CLIMB, Phase.SCAN])
 def test_a_stop_that_scans_is_measured_like_one_that_hovers(phase: Phase) -> None:
-    truth = [standing(at * MS, 0.2) for at in range(0, 1000, 100)]
+    truth = [at(stamp * MS, y_m=0.2) for stamp in range(0, 1000, 100)]
     visited = Event(950 * MS, EventLevel.INFO, "visited", "A2")
-    result = score(SITE, PLAN, [status(0, phase)], [visited], truth)
+    result = score(evidence(truth, [status(0, phase)], [visited]))
     assert result.hover_error_p95_m == pytest.approx(0.2)
     assert result.cross_track_max_m == pytest.approx(0.2)
 
 
-def test_a_hold_off_the_line_is_not_passed_over() -> None:
-    truth = [standing(at * MS, 0.4) for at in range(0, 1000, 100)]
-    result = score(SITE, PLAN, [status(0, Phase.HOLD)], [], truth)
+@pytest.mark.parametrize("phase", [Phase.HOLD, Phase.TAKE_OFF, Phase.LAND])
+def test_no_phase_is_passed_over(phase: Phase) -> None:
+    truth = [at(stamp * MS, y_m=0.4) for stamp in range(0, 1000, 100)]
+    result = score(evidence(truth, [status(0, phase)]))
     assert result.cross_track_max_m == pytest.approx(0.4)
     assert result.hover_error_p95_m is None
+
+
+def test_a_line_of_the_wrong_aisle_is_as_far_off_as_the_aisles_are_apart() -> None:
+    """It flies to A4 as it believes, exactly above the line of aisle B."""
+    truth = [at(stamp * MS, 1.8 + stamp / 1000, 3.0) for stamp in range(0, 1000, 100)]
+    flight = evidence(truth, [status(0, node="A2", goal="A4")])
+    assert score(flight).cross_track_rms_m == pytest.approx(3.0)
+    assert kinds(flight)["left_leg"] == pytest.approx(3.0)
+
+
+def test_while_it_says_that_it_does_not_know_its_place_any_line_is_right() -> None:
+    truth = [at(stamp * MS, 1.8 + stamp / 1000, 3.0) for stamp in range(0, 1000, 100)]
+    assert score(evidence(truth, [status(0, Phase.RELOCATE, goal="A4")])).cross_track_rms_m == 0.0
+
+
+def test_who_turns_back_on_the_way_is_still_on_its_leg() -> None:
+    """Half-way from A2 to A4 it is sent home; the way from its nearest node begins behind it."""
+    statuses = [status(0, node="A2", goal="A4"), status(S, node="A3", goal="A1")]
+    truth = [at(0, 1.5), at(S - 1, 3.2), at(S + 1, 3.2), at(2 * S, 1.0), at(9 * S, 0.2)]
+    assert score(evidence(truth, statuses)).cross_track_max_m == pytest.approx(0.0)
+
+
+def test_what_a_pilot_does_is_not_judged() -> None:
+    truth = [at(0), at(S, y_m=1.1), at(2 * S, y_m=2.0, height_m=5.0)]
+    flight = evidence(truth, [status(0), status(S, Phase.PILOT)])
+    assert score(flight).cross_track_max_m == pytest.approx(0.0)
+    assert kinds(flight) == {"aborted": 1.0}
 
 
 def landing(event_text: str, level: EventLevel, goal: str = "A1") -> float | None:
     """The landing error told of a drone that comes down 0.3 m beside the pad's node."""
     pad_x_m, pad_y_m = SITE.pad_centre(SITE.home)
     heights_m = [0.0, 1.6, 1.6, 0.0]
-    truth = [
-        Kinematics(at * MS, pad_x_m + 0.3, pad_y_m, height_m, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        for at, height_m in enumerate(heights_m)
-    ]
-    said = [Status(2 * MS, Phase.LAND, "", "A1", goal, 1, 1, 1.0, 1.6, 1, 0, 30.0, {})]
-    return score(SITE, PLAN, said, [Event(2 * MS, level, "phase", event_text)], truth).landed_error_m
+    truth = [at(i * MS, pad_x_m + 0.3, pad_y_m, height_m) for i, height_m in enumerate(heights_m)]
+    said = [status(2 * MS, Phase.LAND, "A1", goal)]
+    return score(evidence(truth, said, [Event(2 * MS, level, "phase", event_text)])).landed_error_m
 
 
 def test_a_landing_on_the_pad_is_measured_from_its_centre() -> None:
@@ -61,3 +119,70 @@ def test_a_landing_on_the_pad_is_measured_from_its_centre() -> None:
 @pytest.mark.parametrize("goal", ["A1", "A3"])
 def test_a_landing_that_was_ordered_elsewhere_is_not_measured_from_the_pad(goal: str) -> None:
     assert landing("follow -> land: land command", EventLevel.WARNING, goal) is None
+
+
+def test_the_body_is_measured_with_its_propellers() -> None:
+    """The shelf fronts stand 1.2 m beside the line, 3 m high; the body reaches 0.3 m to the side."""
+    assert score(evidence([at(0, y_m=0.5)], [status(0)])).min_clearance_m == pytest.approx(0.4)
+    assert kinds(evidence([at(0, y_m=0.95)], [status(0)]))["hit_rack"] == pytest.approx(0.05)
+    assert "hit_rack" not in kinds(evidence([at(0, y_m=0.95, height_m=3.2)], [status(0)]))
+    assert score(evidence([at(0, y_m=1.2, height_m=3.4)], [status(0)])).min_clearance_m == pytest.approx(0.3)
+
+
+def test_the_ceiling_and_a_keep_out_are_hit_by_the_body_not_its_centre() -> None:
+    assert kinds(evidence([at(0, height_m=5.95)], [status(0)]))["hit_ceiling"] == pytest.approx(0.05)
+    hung = replace(SITE, keep_outs=(KeepOut(1.0, -0.2, 2.0, 0.2, from_m=1.65, to_m=2.5),))
+    flight = replace(evidence([at(0)], [status(0)]), site=hung)
+    assert kinds(flight)["hit_keep_out"] == pytest.approx(0.05)
+    assert "hit_keep_out" not in kinds(replace(flight, truth=[at(0, height_m=1.5)]))
+
+
+def test_a_climb_beyond_the_command_is_told_and_a_descent_to_it_is_none() -> None:
+    down = [status(0, height_m=2.2), status(S, height_m=1.0)]
+    descent = [
+        at(S // 2, height_m=2.2),
+        at(S + 1, height_m=2.2),
+        at(2 * S, height_m=1.4),
+        at(3 * S, height_m=1.0),
+    ]
+    assert score(evidence(descent, down)).max_overshoot_m == pytest.approx(0.0)
+    again = [*descent, at(4 * S, height_m=2.1)]
+    assert kinds(evidence(again, down))["too_high"] == pytest.approx(1.1)
+
+
+def test_a_drone_left_to_itself_in_the_air_is_out_of_control_unless_it_is_landing() -> None:
+    truth = [at(stamp * 100 * MS) for stamp in range(200)]
+    sent = [stamp * 20 * MS for stamp in range(100)]
+    assert kinds(evidence(truth, [status(0)], setpoints_ns=sent))["out_of_control"] > 10.0
+    sinking = [replace(t, climb_mps=-0.2) for t in truth]
+    assert "out_of_control" not in kinds(evidence(sinking, [status(0)], setpoints_ns=sent))
+
+
+def test_armed_on_the_floor_for_long_and_in_the_air_at_the_end_are_bad() -> None:
+    down = landed(at(S), at(7 * S))
+    late = [*down, at(60 * S, 0.0, height_m=0.1)]
+    armed = ArmedChange(0, armed=True)
+    assert "stayed_armed" not in kinds(evidence(late, [DONE], armed=[armed, ArmedChange(9 * S, armed=False)]))
+    assert kinds(evidence(late, [DONE], armed=[armed]))["stayed_armed"] == pytest.approx(52.0)
+    assert kinds(evidence([at(0), at(S)], [DONE]))["stayed_up"] == pytest.approx(1.6)
+
+
+def test_a_hard_touch_down_is_bad() -> None:
+    truth = [at(S, 0.0, climb=-2.0), at(2 * S, 0.0, height_m=0.1)]
+    assert kinds(evidence(truth, [DONE]))["hard_landing"] == pytest.approx(2.0)
+
+
+def test_counts_that_are_wrong_are_bad_and_a_flight_without_fault_is_good() -> None:
+    visited = Event(4 * S, EventLevel.INFO, "visited", "A2")
+    good = evidence(
+        landed(at(S, 0.0), at(4 * S, 1.5), at(7 * S, 0.0)), [status(0, node="A1", goal="A2"), DONE], [visited]
+    )
+    assert judged(good, score(good)) == []
+    wrong = judged(good, score(good), codes_wrong=2, empty_wrong=1)
+    assert [(fault.kind, fault.value) for fault in wrong] == [("codes_wrong", 2.0), ("empty_wrong", 1.0)]
+    elsewhere = replace(good, truth=landed(at(S, 0.0), at(4 * S, 2.7), at(7 * S, 0.0)))
+    assert kinds(elsewhere)["miscounted"] == 1.0
+
+
+def test_each_kind_of_fault_says_what_it_is() -> None:
+    assert all(KINDS.values())

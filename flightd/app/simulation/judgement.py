@@ -1,0 +1,79 @@
+"""A simulated flight judged by its two logs: figures, faults, one verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from flightd.app.simulation.simulation import Simulation
+from flightd.app.simulation.stock_summary import stock_summary
+from flightd.core.topics import Topic
+from flightd.core.types import AttitudeSetpoint, Event, Status
+from flightd.mission.safety.hazard_table import HAZARDS
+from flightd.replay.log import Entry, read_log
+from flightd.sim.judge.evidence import FlightEvidence
+from flightd.sim.judge.flight_score import FlightScore, score
+from flightd.sim.judge.hazard_verdict import HazardVerdict, judged_hazard
+from flightd.sim.judge.verdict import JudgedFault, judged
+from flightd.sim.plant.kinematics import ArmedChange, Kinematics
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """`stock` are the count's keys of the summary; `hazard` is how the hazard that the scenario expects went,
+    None where it expects none.  `faults` are all that was wrong, what the scenario expects left out."""
+
+    score: FlightScore
+    stock: dict[str, Any]
+    hazard: HazardVerdict | None
+    faults: tuple[JudgedFault, ...]
+
+    @property
+    def verdict(self) -> str:
+        return "bad" if self.faults else "good"
+
+
+def judge_flight(simulation: Simulation) -> Judgement:
+    """Judge the flight whose logs stand in the simulation's folder."""
+    flown = read_log(simulation.flight_log, {Topic.STATUS, Topic.EVENT, Topic.SETPOINT})
+    truth = read_log(simulation.truth_log, {Topic.TRUTH, Topic.FAULT, Topic.ARMED}).entries
+    armed = [ArmedChange(**row) for row in _rows(truth, Topic.ARMED, ArmedChange)]
+    evidence = FlightEvidence(
+        site=simulation.scenario.floor.site(simulation.site),
+        plan=simulation.plan(),
+        statuses=flown.messages(Status),
+        events=flown.messages(Event),
+        truth=[Kinematics(**row) for row in _rows(truth, Topic.TRUTH, Kinematics)],
+        setpoints_ns=[setpoint.stamp_ns for setpoint in flown.messages(AttitudeSetpoint)],
+        armed=armed or None,
+    )
+    figures = score(evidence)
+    stock = stock_summary(simulation, figures.flight_time_s)
+    faults = judged(
+        evidence,
+        figures,
+        codes_wrong=stock["codes_wrong"],
+        empty_wrong=stock.get("empty_wrong", 0),
+    )
+    expected = simulation.scenario.expect
+    if expected is None:
+        return Judgement(figures, stock, None, tuple(faults))
+    row = next(row for row in HAZARDS if row.name == expected.hazard)
+    begun = [
+        entry.message["stamp_ns"]
+        for entry in truth
+        if entry.topic == Topic.FAULT and isinstance(entry.message, dict) and entry.message["began"]
+    ]
+    verdict = judged_hazard(row, expected, evidence, figures, faults, begun)
+    return Judgement(figures, stock, verdict, verdict.faults)
+
+
+def _rows(entries: Sequence[Entry], topic: Topic, kind: type) -> list[dict[str, Any]]:
+    """The messages of a topic with the fields of `kind` alone, which viewers' fields stand beside."""
+    names = [field.name for field in fields(kind)]
+    return [
+        {name: entry.message[name] for name in names}
+        for entry in entries
+        if entry.topic == topic and isinstance(entry.message, dict)
+    ]

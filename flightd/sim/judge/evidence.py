@@ -1,0 +1,73 @@
+"""What a flight is judged by: what was planned, what the daemon logged, and what was true."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from flightd.core.types import Event, Phase, Status
+from flightd.mission.plan.flight_plan import FlightPlan
+from flightd.sim.judge.motion import Motion
+from flightd.sim.plant.kinematics import ArmedChange, Kinematics
+from flightd.site.site import Site
+
+
+@dataclass(frozen=True)
+class FlightEvidence:
+    """`site` as it really is; `statuses`, `events` and `setpoints_ns` (when setpoints went out) are the
+    daemon's, `truth` and `armed` the simulator's; all in time order.  `armed` is None where the vehicle does
+    not tell."""
+
+    site: Site
+    plan: FlightPlan
+    statuses: Sequence[Status]
+    events: Sequence[Event]
+    truth: Sequence[Kinematics]
+    setpoints_ns: Sequence[int] = ()
+    armed: Sequence[ArmedChange] | None = None
+
+    @cached_property
+    def handed_over_ns(self) -> float:
+        """When the pilot took over, infinite if he did not: what comes then is his."""
+        return next((status.stamp_ns for status in self.statuses if status.phase is Phase.PILOT), math.inf)
+
+    @property
+    def handed_over(self) -> bool:
+        return self.handed_over_ns < math.inf
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The motion for which the daemon answers, until it handed over."""
+        return Motion.of([t for t in self.truth if t.stamp_ns < self.handed_over_ns])
+
+    @cached_property
+    def in_air(self) -> Motion:
+        """The part of it off the floor."""
+        return self.motion.chosen(self.motion.flying)
+
+    @property
+    def begun_s(self) -> float:
+        """When it first left the floor; infinite if it never did."""
+        return float(self.in_air.stamp_s[0]) if len(self.in_air) else math.inf
+
+    @property
+    def landed(self) -> Kinematics | None:
+        """Where it stands at the end, None where it does not, or never flew."""
+        down = len(self.in_air) and self.truth[-1].height_m <= _ON_FLOOR_M
+        return self.truth[-1] if down else None
+
+    def truth_at(self, stamp_ns: int) -> Kinematics | None:
+        """The first sample not before `stamp_ns`, or the last."""
+        index = bisect_left(self.truth, stamp_ns, key=lambda t: t.stamp_ns)
+        return self.truth[min(index, len(self.truth) - 1)] if self.truth else None
+
+    def phase_at(self, stamp_ns: int) -> Phase:
+        """The phase that the daemon said to be in."""
+        index = bisect_left(self.statuses, stamp_ns, key=lambda status: status.stamp_ns) - 1
+        return self.statuses[index].phase if index >= 0 else Phase.PREFLIGHT
+
+
+_ON_FLOOR_M = 0.2

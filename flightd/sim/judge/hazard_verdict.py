@@ -1,0 +1,128 @@
+"""How a flight with something wrong went: found by the daemon's own log, answered as the table says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from flightd.core.types import Event, Phase
+from flightd.mission.safety.hazard_table import PHASE_OF, Action, Hazard
+from flightd.sim.judge.evidence import FlightEvidence
+from flightd.sim.judge.flight_score import FlightScore
+from flightd.sim.judge.verdict import MISSION_KINDS, JudgedFault
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.scenario.scenario import Expectation
+from flightd.site.site import Site
+
+DOWN_S = 20.0
+"""On the floor at most so long after a hazard that asks for landing was found."""
+_ON_FLOOR_M = 0.2
+_AT_PAD_M = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class HazardVerdict:
+    """One row.  `found_s` counts from the first fault (without faults: from take-off), None when the hazard
+    was not found; `down_s` from there to the floor, None where it asks for no landing or never came down.
+    `faults` are all that was wrong with the flight, those that the scenario expects left out."""
+
+    hazard: str
+    found_s: float | None
+    action: str
+    phases: tuple[str, ...]
+    outcome: str
+    down_s: float | None
+    min_clearance_m: float | None
+    off_leg_max_m: float | None
+    max_overshoot_m: float | None
+    uncontrolled_s: float | None
+    faults: tuple[JudgedFault, ...]
+
+
+def judged_hazard(
+    row: Hazard,
+    expected: Expectation,
+    flight: FlightEvidence,
+    score: FlightScore,
+    faults: Sequence[JudgedFault],
+    begun_ns: Sequence[int],
+) -> HazardVerdict:
+    """`faults` are the flight's own (`verdict.judged`), `begun_ns` the times at which what goes wrong
+    began, in time order."""
+    from_ns = min(begun_ns, default=None) or (round(flight.begun_s * 1e9) if len(flight.in_air) else 0)
+    found_s = _found_s(row, flight.events, from_ns)
+    after = [status.phase for status in flight.statuses if status.stamp_ns >= from_ns]
+    down_s = _down_s(row, flight, from_ns, found_s)
+    outcome = _outcome(flight, after[-1] if after else None)
+    at_s = _finite(from_ns * 1e-9 - flight.begun_s)
+    own = [fault for fault in faults if fault.kind not in _expected(expected)]
+    if row.trigger is not None and found_s is None:
+        own.append(JudgedFault("not_found", at_s, 0.0))
+    elif row.trigger is not None and found_s is not None and found_s > expected.found_s:
+        own.append(JudgedFault("found_late", at_s, round(found_s, 2)))
+    phase = PHASE_OF.get(row.action) if row.trigger is not None else None
+    if phase is not None and phase not in after:
+        own.append(JudgedFault("other_action", at_s, 0.0))
+    if outcome != expected.ends:
+        own.append(JudgedFault("other_end", at_s, 0.0))
+    if down_s is not None and down_s > DOWN_S:
+        own.append(JudgedFault("down_late", at_s, round(down_s, 2)))
+    return HazardVerdict(
+        row.name,
+        None if found_s is None else round(found_s, 2),
+        row.action.value,
+        tuple(phase.value for phase, _ in groupby(after)),
+        outcome,
+        None if down_s is None else round(down_s, 2),
+        score.min_clearance_m,
+        score.cross_track_max_m,
+        score.max_overshoot_m,
+        score.uncontrolled_s,
+        tuple(own),
+    )
+
+
+def _expected(expected: Expectation) -> frozenset[str]:
+    """The kinds of fault that are none in this scenario."""
+    mission = MISSION_KINDS if expected.ends != "completed" else frozenset()
+    return mission | frozenset(expected.bears)
+
+
+def _found_s(row: Hazard, events: Sequence[Event], from_ns: int) -> float | None:
+    if row.trigger is None:
+        return None
+    for event in events:
+        if event.name == "hazard" and event.stamp_ns >= from_ns and event.text.startswith(row.trigger.value):
+            return (event.stamp_ns - from_ns) * 1e-9
+    return None
+
+
+def _down_s(row: Hazard, flight: FlightEvidence, from_ns: int, found_s: float | None) -> float | None:
+    """From the finding (unfound: from the fault) until it flies no more; None where the row does not land."""
+    if row.action not in {Action.LAND, Action.STOP} or not len(flight.in_air):
+        return None
+    since_s = from_ns * 1e-9 + (found_s or 0.0)
+    return max(0.0, float(flight.in_air.stamp_s[-1]) - since_s)
+
+
+def _outcome(flight: FlightEvidence, phase: Phase | None) -> str:
+    if phase is Phase.PILOT:
+        return "handed over"
+    if not len(flight.in_air):
+        return "never flew"
+    if (end := flight.truth[-1]).height_m > _ON_FLOOR_M:
+        return "in the air"
+    if phase is Phase.DONE:
+        return "completed"
+    return "home" if _on_pad(flight.site, end) else "landed"
+
+
+def _on_pad(site: Site, end: Kinematics) -> bool:
+    centres = (site.pad_centre(pad) for pad in site.pads)
+    return any(math.hypot(end.x_m - x_m, end.y_m - y_m) < _AT_PAD_M for x_m, y_m in centres)
+
+
+def _finite(value: float) -> float:
+    return round(value, 2) if math.isfinite(value) else 0.0

@@ -1,0 +1,45 @@
+"""The true motion of a flight as arrays: what the judge computes on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightd.sim.plant.kinematics import Kinematics
+
+Values = NDArray[np.float64]
+
+OFF_FLOOR_M = 0.3
+"""A body origin higher than this flies; standing it is 0.1 m above the floor."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Samples in time order, each an array (n,): s, metres of the map, m/s, + up."""
+
+    stamp_s: Values
+    x_m: Values
+    y_m: Values
+    height_m: Values
+    climb_mps: Values
+
+    @classmethod
+    def of(cls, truth: Sequence[Kinematics]) -> Self:
+        rows = [(t.stamp_ns * 1e-9, t.x_m, t.y_m, t.height_m, t.climb_mps) for t in truth]
+        return cls(*np.asarray(rows, np.float64).reshape(-1, 5).T)
+
+    def __len__(self) -> int:
+        return len(self.stamp_s)
+
+    def chosen(self, wanted: NDArray[np.bool_]) -> Motion:
+        """Only the samples where `wanted` (n,) holds."""
+        return Motion(*(getattr(self, field.name)[wanted] for field in fields(self)))
+
+    @property
+    def flying(self) -> NDArray[np.bool_]:
+        """Which samples are off the floor, (n,)."""
+        return self.height_m > OFF_FLOOR_M
