@@ -18,6 +18,7 @@ from flightd.app.absent_parts import NO_GROUND, NO_RECORDER
 from flightd.app.build import build, detector_pool, ground_link
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
+from flightd.app.ending_signals import end_on_signals
 from flightd.app.flight_orders import configured_order, going_on, resumed
 from flightd.app.recording import FlightSetting, record_setting
 from flightd.config.schema import Config
@@ -62,15 +63,8 @@ def prepare(config: Config, path: Path, *, resume: bool) -> Run:
 async def run_until_signal(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult | signal.Signals:
     """The flight's result, or the signal that ended it."""
     flight = asyncio.ensure_future(_fly(run, observer))
-    loop = asyncio.get_running_loop()
     came: list[signal.Signals] = []
-
-    def end(number: signal.Signals) -> None:
-        came.append(number)
-        flight.cancel()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, end, number)
+    end_on_signals(flight, came)
     await asyncio.wait([flight])
     return came[0] if flight.cancelled() and came else flight.result()
 

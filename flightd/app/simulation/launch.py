@@ -21,6 +21,7 @@ from flightd.app.absent_parts import NO_GROUND
 from flightd.app.build import build, detector_pool, ground_link
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
+from flightd.app.ending_signals import end_on_signals
 from flightd.app.flight import Flight
 from flightd.app.recording import record_setting
 from flightd.app.service import monitors
@@ -74,22 +75,14 @@ def fly(simulation: Simulation) -> FlightResult:
         raise FlightInterruptedError(ended_by[0], None) from None
 
 
-def _end_on_signals(ended_by: list[signal.Signals]) -> None:
-    """SIGINT and SIGTERM end this task, so that everything is closed on the way out; the first stands in
-    `ended_by` then."""
-    task, loop = asyncio.current_task(), asyncio.get_running_loop()
+def _this_task() -> asyncio.Task[Any]:
+    task = asyncio.current_task()
     assert task is not None
-
-    def end(number: signal.Signals) -> None:
-        ended_by.append(number)
-        task.cancel()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, end, number)
+    return task
 
 
 async def _lockstep(simulation: Simulation, hold: Hold, ended_by: list[signal.Signals]) -> FlightResult:
-    _end_on_signals(ended_by)
+    end_on_signals(_this_task(), ended_by)
     clock, config, site = LoopClock(), simulation.config, simulation.site
     with ExitStack() as stack:
         recorder = stack.enter_context(_flight_recorder(simulation, clock, wait_for_disk))
@@ -134,7 +127,7 @@ async def _opened(
 
 
 async def _real_time(simulation: Simulation, factor: float, ended_by: list[signal.Signals]) -> FlightResult:
-    _end_on_signals(ended_by)
+    end_on_signals(_this_task(), ended_by)
     clock, config, site = LoopClock(), simulation.config, simulation.site
     ports = free_ports(config)
     peers = peers_at(ports, config)
