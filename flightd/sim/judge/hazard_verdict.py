@@ -10,10 +10,10 @@ from itertools import groupby
 from flightd.core.types import Event, Phase
 from flightd.mission.safety.hazard_table import PHASE_OF, Action, Hazard
 from flightd.sim.judge.evidence import FlightEvidence
+from flightd.sim.judge.expectation import Expectation
 from flightd.sim.judge.flight_score import FlightScore
 from flightd.sim.judge.verdict import MISSION_KINDS, JudgedFault
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.scenario.scenario import Expectation
 from flightd.site.site import Site
 
 DOWN_S = 20.0

@@ -66,13 +66,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from flightd.config.section import Section
-from flightd.mission.safety.hazard_table import HAZARDS
 from flightd.sim.autopilot.radio import RadioParams
 from flightd.sim.floor.appearance import Appearance, preset
-from flightd.sim.judge.verdict import KINDS
+from flightd.sim.judge.expectation import Expectation
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera, front_lens
@@ -81,7 +80,6 @@ from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.sensors.optics import SimCamera, wide_lens
 from flightd.site.site import Site
 
-_HAZARDS = frozenset(row.name for row in HAZARDS)
 _Shift = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
 _Carried = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
 
@@ -203,30 +201,6 @@ class VehicleScenario(Section):
     def radio(self) -> RadioParams:
         """Each way between a MAVLink autopilot and its companion."""
         return RadioParams(self.radio_loss, self.radio_delay_ms / 1000, self.radio_jitter_ms / 1000)
-
-
-class Expectation(Section):
-    """How a flight of this scenario should go: which hazard is found, how soon, and how it ends."""
-
-    hazard: str = Field(min_length=1, max_length=40)
-    found_s: float = Field(1.0, gt=0, le=600)
-    ends: Literal["completed", "home", "landed", "handed over"]
-    bears: tuple[str, ...] = ()
-
-    @field_validator("hazard")
-    @classmethod
-    def _in_the_table(cls, name: str) -> str:
-        if name not in _HAZARDS:
-            raise ValueError(f"no such hazard: {name!r}; `flightd guide hazards` lists them")
-        return name
-
-    @field_validator("bears")
-    @classmethod
-    def _known(cls, kinds: tuple[str, ...]) -> tuple[str, ...]:
-        for kind in kinds:
-            if kind not in KINDS:
-                raise ValueError(f"no such fault: {kind!r}; one of {', '.join(KINDS)}")
-        return kinds
 
 
 class Scenario(Section):

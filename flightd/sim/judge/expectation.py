@@ -1,0 +1,37 @@
+"""What a scenario expects of a flight: the `[expect]` of its file."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, field_validator
+
+from flightd.config.section import Section
+from flightd.mission.safety.hazard_table import HAZARDS
+from flightd.sim.judge.verdict import KINDS
+
+_HAZARDS = frozenset(row.name for row in HAZARDS)
+
+
+class Expectation(Section):
+    """How a flight of this scenario should go: which hazard is found, how soon, and how it ends."""
+
+    hazard: str = Field(min_length=1, max_length=40)
+    found_s: float = Field(1.0, gt=0, le=600)
+    ends: Literal["completed", "home", "landed", "handed over"]
+    bears: tuple[str, ...] = ()
+
+    @field_validator("hazard")
+    @classmethod
+    def _in_the_table(cls, name: str) -> str:
+        if name not in _HAZARDS:
+            raise ValueError(f"no such hazard: {name!r}; `flightd guide hazards` lists them")
+        return name
+
+    @field_validator("bears")
+    @classmethod
+    def _known(cls, kinds: tuple[str, ...]) -> tuple[str, ...]:
+        for kind in kinds:
+            if kind not in KINDS:
+                raise ValueError(f"no such fault: {kind!r}; one of {', '.join(KINDS)}")
+        return kinds
