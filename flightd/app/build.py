@@ -16,6 +16,7 @@ from flightd.adapters.store.progress import ProgressFile
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.app.absent_parts import NO_CAMERA, NO_COUNTING, NO_GROUND, NO_PROGRESS, NO_RECORDER, keep_pose
 from flightd.app.counting.count import Counting
+from flightd.app.counting.flight_count import counts_shelves
 from flightd.app.detection.detector_pool import DetectorPool, Detectors
 from flightd.app.detection.pipeline import DetectionPipeline
 from flightd.app.flight import Flight
@@ -45,7 +46,7 @@ from flightd.ports import Camera, Clock, Ground, Monitor, PoseTaker, Recorder, V
 from flightd.runtime.clock import Hold
 from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 from flightd.site.site import Site
-from flightd.vision.lines.detector import Detector
+from flightd.vision.line_detector import Detector
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,11 +151,6 @@ def pilot_of(config: Config, site: Site, order: FlightOrder | None = None) -> Pi
     scanner = scanner_of(config, site)
     check_battery(flown, plan, policy, config, scanner)
     return Pilot(flown, plan, policy, config, scanner, site.overhead_m, autostart=order.autostart)
-
-
-def counts_shelves(config: Config, site: Site) -> bool:
-    """Whether flights count: with a front camera, where there are locations."""
-    return config.front_camera.is_fitted and bool(site.locations)
 
 
 def scanner_of(config: Config, site: Site) -> AnyScanner:

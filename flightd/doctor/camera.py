@@ -14,7 +14,7 @@ from flightd.core.types import Image
 from flightd.doctor.check import Check, error, ok, warning
 from flightd.ports import Clock, Vehicle
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
-from flightd.vision.lines.detector import Detector
+from flightd.vision.line_detector import Detector
 
 _FIRST_S = 6.0
 _WATCH_S = 2.0

@@ -20,7 +20,7 @@ from flightd.doctor.ground import GroundListener, check_ground
 from flightd.doctor.vehicle import Autopilot
 from flightd.ports import Clock
 from flightd.site.site import Site
-from flightd.vision.lines.detector import Detector
+from flightd.vision.line_detector import Detector
 
 
 @dataclass(frozen=True, slots=True)

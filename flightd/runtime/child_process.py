@@ -21,7 +21,7 @@ from flightd.runtime.undisturbed_start import undisturbed
 
 _PRELOAD = [
     "flightd.app.detection.detector_pool",
-    "flightd.vision.lines.detector",
+    "flightd.vision.line_detector",
     "flightd.vision.shelf.shelf_look",
 ]
 _READY = "ready"

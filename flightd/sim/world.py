@@ -18,16 +18,16 @@ from flightd.core.topics import Topic
 from flightd.core.types import Image
 from flightd.ports import Clock, Recorder
 from flightd.runtime.clock import Hold
+from flightd.sim.appearance import DEFAULT, Appearance
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
-from flightd.sim.floor.appearance import DEFAULT, Appearance
+from flightd.sim.external.external_simulator import ExternalVehicle
+from flightd.sim.external.external_truth import Placement
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe, AirframeParams
 from flightd.sim.plant.battery_swapper import BatterySwapper
-from flightd.sim.plant.external_simulator import ExternalVehicle
-from flightd.sim.plant.external_truth import Placement
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance

@@ -29,7 +29,7 @@ from flightd.runtime.undisturbed_start import undisturbed
 from flightd.sim.dataset.generate import generate
 from flightd.studies.baselines import BASELINES
 from flightd.studies.progress_bar import track
-from flightd.vision.lines.detector import Detector
+from flightd.vision.line_detector import Detector
 
 METHODS = ("centroid", "skeleton", "combined", "naive")
 SIZES = ((1920, 1080), (640, 360))

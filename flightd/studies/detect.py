@@ -16,7 +16,7 @@ from flightd.core.errors import InputError
 from flightd.core.types import LineSet
 from flightd.studies.frame_files import all_pictures
 from flightd.studies.overlay import draw, write_picture
-from flightd.vision.lines.detector import Detector
+from flightd.vision.line_detector import Detector
 
 
 @dataclass(frozen=True, slots=True)

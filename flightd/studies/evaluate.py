@@ -19,8 +19,8 @@ from flightd.core.types import Image, LineSet
 from flightd.studies.frame_files import read_image
 from flightd.studies.overlay import draw_judged
 from flightd.studies.progress_bar import track
+from flightd.vision.line_detector import Detector
 from flightd.vision.lines.colour_profile import SHIPPED
-from flightd.vision.lines.detector import Detector
 from flightd.vision.training.labelled_frames import LabelledImage, Labels, read_labels
 from flightd.vision.training.line_score import Gate, LineScore, score_picture
 

@@ -14,7 +14,7 @@ from flightd.core.topics import RecordedFrame, Topic
 from flightd.core.types import Image, Line, LineSet
 from flightd.replay.log import LogReader
 from flightd.replay.perception_compare import replay_pictures
-from flightd.vision.lines.detector import Detector
+from flightd.vision.line_detector import Detector
 from tests.replay.synthetic_flight import picture, seen_lines
 
 

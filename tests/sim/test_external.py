@@ -13,8 +13,8 @@ from flightd.app.simulation.ports import free_port
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.geometry import wrap_pi
 from flightd.runtime.clock import LoopClock
-from flightd.sim.plant.external_simulator import ExternalVehicle
-from flightd.sim.plant.external_truth import Placement, TruthReader
+from flightd.sim.external.external_simulator import ExternalVehicle
+from flightd.sim.external.external_truth import Placement, TruthReader
 from flightd.sim.plant.kinematics import Kinematics
 from tests.command import Command
 from tests.rigs.event_loops import virtual

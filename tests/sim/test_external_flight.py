@@ -16,8 +16,8 @@ import pytest
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
 from flightd.runtime.clock import LoopClock
-from flightd.sim.plant.external_simulator import ExternalVehicle
-from flightd.sim.plant.external_truth import Placement
+from flightd.sim.external.external_simulator import ExternalVehicle
+from flightd.sim.external.external_truth import Placement
 from tests.rigs.event_loops import real
 from tests.rigs.vehicles import Rig
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from flightd.core.distortion import undistorted
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
-from flightd.sim.floor.appearance import DEFAULT, HARSH, Appearance, preset
+from flightd.sim.appearance import DEFAULT, HARSH, Appearance, preset
 from flightd.sim.floor.floor import Floor
 from flightd.sim.floor.lighting import Lighting
 from flightd.sim.floor.texture import Patch

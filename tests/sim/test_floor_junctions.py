@@ -10,7 +10,7 @@ from flightd.config.control import TiltCompensation
 from flightd.config.schema import load_config
 from flightd.core.tracks import FloorJunction
 from flightd.core.types import Attitude
-from flightd.sim.floor.appearance import DEFAULT
+from flightd.sim.appearance import DEFAULT
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import SimCamera
@@ -18,7 +18,7 @@ from flightd.site.painted_lines import Features, PaintMap
 from flightd.site.site_file import load_site
 from flightd.tracking.ground_junctions import floor_junctions
 from flightd.tracking.tilt_compensation import FloorView
-from flightd.vision.lines.detector import Detector
+from flightd.vision.line_detector import Detector
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CONFIG = load_config(CONFIGS / "sim.toml")

@@ -15,14 +15,14 @@ from flightd.config.schema import load_config
 from flightd.core.geometry import Mount
 from flightd.core.markers import MarkerDictionary, MarkerSet
 from flightd.core.types import Attitude, LineSet, Phase
-from flightd.sim.floor.appearance import DEFAULT, HARSH, Appearance
+from flightd.sim.appearance import DEFAULT, HARSH, Appearance
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.sensors.optics import SimCamera
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, Marker, Pad
 from flightd.site.site_file import load_site
 from flightd.tracking.tilt_compensation import FloorView, ground_point
-from flightd.vision.lines.detector import Detector
+from flightd.vision.line_detector import Detector
 from tests.sim.ideal_flight import IdealFlight
 from tests.sim.test_carried import wrong_visits
 from tests.sim.test_renderer import hover

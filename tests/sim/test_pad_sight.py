@@ -13,13 +13,13 @@ import pytest
 from flightd.config.control import TiltCompensation
 from flightd.core.geometry import Mount
 from flightd.core.types import Attitude, Image, PadSight
-from flightd.sim.floor.appearance import CLEAN, DEFAULT, HARSH, Appearance
+from flightd.sim.appearance import CLEAN, DEFAULT, HARSH, Appearance
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.scenario.scenario import FloorScenario
 from flightd.sim.sensors.optics import SimCamera
 from flightd.site.site_file import load_site
 from flightd.tracking.tilt_compensation import FloorView, ground_point
-from flightd.vision.lines.detector import Detector
+from flightd.vision.line_detector import Detector
 from tests.sim.test_renderer import hover
 
 DEMO = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")

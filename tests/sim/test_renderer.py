@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from flightd.core.geometry import Lens, Mount, ground_homography, heading_rotation, level_from_body
-from flightd.sim.floor.appearance import CLEAN, DEFAULT, HARSH, Appearance
+from flightd.sim.appearance import CLEAN, DEFAULT, HARSH, Appearance
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import SimCamera, wide_lens

@@ -10,7 +10,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.app.build import counts_shelves
 from flightd.app.counting.code_readers import ReaderPool, Readers
 from flightd.app.counting.count import Counting
 from flightd.app.counting.store_writer import StoreWriter
@@ -20,6 +19,11 @@ from flightd.core.inventory import PlannedLocation
 from flightd.ports import Clock
 from flightd.runtime.clock import Hold
 from flightd.site.site import Site
+
+
+def counts_shelves(config: Config, site: Site) -> bool:
+    """Whether flights count: with a front camera, where there are locations."""
+    return config.front_camera.is_fitted and bool(site.locations)
 
 
 class FlightCount:

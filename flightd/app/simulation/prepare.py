@@ -12,7 +12,7 @@ from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.simulator_config import simulator_config
 from flightd.config.schema import Config
 from flightd.core.errors import InputError
-from flightd.sim.plant.external_simulator import truth_address
+from flightd.sim.external.external_simulator import truth_address
 from flightd.sim.scenario.scenario import Scenario
 
 _FACTORS = 0.05, 50.0

@@ -17,11 +17,11 @@ from pathlib import Path
 from flightd.config.paths import shipped
 from flightd.core.errors import InputError
 from flightd.runtime.clock import LoopClock
+from flightd.sim.appearance import DEFAULT
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.front_camera import front_peer
 from flightd.sim.ardrone.server import ArDroneServer, DronePorts
 from flightd.sim.ardrone.video import VideoChannel
-from flightd.sim.floor.appearance import DEFAULT
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.racks.appearance import RackAppearance

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
+from flightd.sim.dataset.paint import Picture, Plane, bgr_of, paint_bgr
 from flightd.sim.dataset.severity import DARKNESS, Severity
-from flightd.sim.floor.paint import Picture, Plane, bgr_of, paint_bgr
 
 _MARGIN_PX = 14
 

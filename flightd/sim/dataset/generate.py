@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from flightd.core.types import Image
 from flightd.sim.dataset import disturbances as disturb
+from flightd.sim.dataset.paint import Bend, break_band, coverage, floor_bgr, floor_texture, paint_bgr, wear
 from flightd.sim.dataset.scenes import (
     Layout,
     Scene,
@@ -30,7 +31,6 @@ from flightd.sim.dataset.scenes import (
     visible_span,
 )
 from flightd.sim.dataset.severity import LEVELS
-from flightd.sim.floor.paint import Bend, break_band, coverage, floor_bgr, floor_texture, paint_bgr, wear
 from flightd.vision.training.labelled_frames import (
     LabelledImage,
     LabelledLine,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.sim.floor.appearance import Appearance
+from flightd.sim.appearance import Appearance
 from flightd.sim.floor.lighting import Lighting
 from flightd.sim.floor.printed_markers import FloorSigns
 from flightd.sim.floor.texture import NoiseField, Patch

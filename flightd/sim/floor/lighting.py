@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.sim.floor.appearance import Appearance
+from flightd.sim.appearance import Appearance
 from flightd.sim.floor.texture import Patch
 from flightd.sim.floor.wear_marks import MARGIN_M
 from flightd.site.site import Side, Site

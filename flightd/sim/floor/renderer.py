@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from flightd.core.camera_view import Viewpoint
 from flightd.core.types import Image
-from flightd.sim.floor.appearance import DEFAULT, Appearance
+from flightd.sim.appearance import DEFAULT, Appearance
 from flightd.sim.floor.floor import Box, Floor
 from flightd.sim.floor.lighting import Lighting
 from flightd.sim.floor.tiles import Ahead, TiledFloor

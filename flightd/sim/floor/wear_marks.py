@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.sim.floor.appearance import Appearance
+from flightd.sim.appearance import Appearance
 from flightd.sim.floor.texture import NoiseField, Patch
 from flightd.site.site import Site
 

@@ -13,7 +13,7 @@ from flightd.core.camera_view import CameraView, Viewpoint
 from flightd.core.distortion import undistorted
 from flightd.core.geometry import Lens
 from flightd.core.types import Image
-from flightd.sim.floor.appearance import Appearance
+from flightd.sim.appearance import Appearance
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera

@@ -69,8 +69,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from flightd.config.section import Section
+from flightd.sim.appearance import Appearance, preset
 from flightd.sim.autopilot.radio import RadioParams
-from flightd.sim.floor.appearance import Appearance, preset
 from flightd.sim.judge.expectation import Expectation
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance

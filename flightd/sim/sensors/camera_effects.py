@@ -9,7 +9,7 @@ import numpy as np
 
 from flightd.core.geometry import Lens
 from flightd.core.types import Image
-from flightd.sim.floor.appearance import Appearance
+from flightd.sim.appearance import Appearance
 from flightd.sim.sensors.optics import Floats
 
 _MIDDLE = 128

@@ -17,7 +17,7 @@ from flightd.doctor.camera import Pictures, check_latency, check_vision, judge_c
 from flightd.doctor.check import Check, CheckLevel
 from flightd.doctor.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
 from flightd.site.site_file import load_site
-from flightd.vision.lines.detector import Detector
+from flightd.vision.line_detector import Detector
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")

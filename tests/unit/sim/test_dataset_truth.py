@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flightd.sim.dataset.generate import COLOURS, generate
+from flightd.sim.dataset.paint import Bend, coverage
 from flightd.sim.dataset.scenes import (
     LAYOUTS,
     Scene,
@@ -18,7 +19,6 @@ from flightd.sim.dataset.scenes import (
     visible_span,
 )
 from flightd.sim.dataset.severity import LEVELS
-from flightd.sim.floor.paint import Bend, coverage
 from flightd.vision.training.labelled_frames import LabelledLine
 
 

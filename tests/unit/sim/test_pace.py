@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from flightd.sim.plant.external_pace import PaceMonitor
+from flightd.sim.external.external_pace import PaceMonitor
 
 
 def _paces(factor: float, seconds: float, watch: PaceMonitor, start_ms: int = 1000) -> list[float]:

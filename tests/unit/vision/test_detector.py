@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
 from flightd.core.types import UNCHECKED, JunctionKind, LineSet
-from flightd.vision.lines.detector import METHODS, Detector
+from flightd.vision.line_detector import METHODS, Detector
 from tests.unit.vision.drawing import Band, coverage, draw, errors, grid, nearest, picture
 
 RHO_PX = {"naive": 4.0, "centroid": 1.2, "skeleton": 1.2, "combined": 0.1}

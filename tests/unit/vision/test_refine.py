@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from flightd.core.types import Image
-from flightd.vision.lines.detector import Detector
+from flightd.vision.line_detector import Detector
 from tests.unit.vision.drawing import FLOOR, Band, coverage, draw, grid, nearest, photographed
 
 BAND = Band(20.0, 0.3, 60.0)

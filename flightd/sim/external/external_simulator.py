@@ -18,8 +18,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.geometry import wrap_pi
 from flightd.ports import Clock
-from flightd.sim.plant.external_pace import PaceMonitor
-from flightd.sim.plant.external_truth import Placement, TruthReader
+from flightd.sim.external.external_pace import PaceMonitor
+from flightd.sim.external.external_truth import Placement, TruthReader
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.truth_history import TruthHistory
 from flightd.sim.sensors.instruments import SensorParams
