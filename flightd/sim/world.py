@@ -6,7 +6,7 @@ It knows nothing of the daemon but the address that its camera reports to.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
@@ -19,10 +19,12 @@ from flightd.core.types import Image
 from flightd.ports import Clock, Recorder
 from flightd.runtime.clock import Hold
 from flightd.sim.appearance import DEFAULT, Appearance
-from flightd.sim.autopilot.autopilot import PeerConfig
+from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
+from flightd.sim.autopilot.parameters import COPTER_PARAMETERS, PX4_PARAMETERS
 from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
+from flightd.sim.autopilot.shipped_parameters import shipped_parameters
 from flightd.sim.external.external_simulator import ExternalVehicle
 from flightd.sim.external.external_truth import Placement
 from flightd.sim.floor.renderer import Renderer
@@ -58,7 +60,9 @@ class WorldSpec:
     commands, navdata, video and configuration; it transmits its pictures itself.  With a `truth_url` the
     vehicle is an external simulator's, which stands on the pad, and only the camera is ours; `radio` lies
     between a MAVLink autopilot and its companion.  With `swap_s` 0 nobody changes batteries.  The vehicle
-    stands `start_offset_m` (x, y) away from the start pad's centre.  `faults` go wrong on the way."""
+    stands `start_offset_m` (x, y) away from the start pad's centre.
+    `faults` go wrong on the way.  A MAVLink autopilot is set up as the shipped parameter file says, but for
+    `parameters`."""
 
     site: Site
     seed: int
@@ -78,6 +82,7 @@ class WorldSpec:
     radio: RadioParams = PERFECT
     truth_url: str = ""
     faults: tuple[Fault, ...] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
 
 class VehiclePeer(Protocol):
@@ -130,9 +135,7 @@ class World:
         elif spec.vehicle == "ardrone":
             self.vehicle, show, own_front = _ardrone(spec, airframe, clock, hold)
         else:
-            (port,) = spec.vehicle_ports
-            peer = Px4Peer if spec.vehicle == "px4" else ArduCopterPeer
-            self.vehicle = peer(clock, airframe, PeerConfig(port=port, seed=spec.seed, radio=spec.radio))
+            self.vehicle = _autopilot(spec, airframe, clock)
         swaps = spec.swap_s and not spec.truth_url
         self._battery_swapper = BatterySwapper(spec.site, airframe, spec.swap_s) if swaps else None
         self._cameras = {"camera": _down_camera(spec, self.vehicle, clock, show, hold)}
@@ -191,6 +194,15 @@ def _placement(spec: WorldSpec) -> Placement:
     pad = next(pad for pad in spec.site.pads if pad.node == start)
     x_m, y_m = spec.site.pad_centre(pad)
     return Placement(x_m + spec.start_offset_m[0], y_m + spec.start_offset_m[1], spec.start_yaw_rad)
+
+
+def _autopilot(spec: WorldSpec, airframe: Airframe, clock: Clock) -> AutopilotPeer:
+    (port,) = spec.vehicle_ports
+    is_px4 = spec.vehicle == "px4"
+    known = PX4_PARAMETERS if is_px4 else COPTER_PARAMETERS
+    parameters = {**shipped_parameters("px4" if is_px4 else "ardupilot", known), **spec.parameters}
+    config = PeerConfig(port=port, seed=spec.seed, radio=spec.radio, parameters=parameters)
+    return Px4Peer(clock, airframe, config) if is_px4 else ArduCopterPeer(clock, airframe, config)
 
 
 def _down_camera(

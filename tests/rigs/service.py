@@ -81,8 +81,8 @@ class ServiceRig:
         return "\n".join(lines)
 
     @contextmanager
-    def world(self) -> Iterator[None]:
-        """The simulated vehicle and camera, alive meanwhile."""
+    def world(self, **parameters: float) -> Iterator[None]:
+        """The simulated vehicle, but for `parameters` as shipped, and camera, alive meanwhile."""
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         spec = WorldSpec(
@@ -90,6 +90,7 @@ class ServiceRig:
             seed=3,
             camera_address=("127.0.0.1", self.ports[0]),
             vehicle_ports=(self.ports[1],),
+            parameters=parameters,
             camera=CAMERA.__class__(**_fields(CAMERA) | {"mount": _turned(CAMERA.mount)}),
         )
         log = self.folder / "truth.mcap"

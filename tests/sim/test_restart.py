@@ -22,14 +22,15 @@ from tests.rigs.service import ServiceRig
 
 _UP = {Phase.ACQUIRE, Phase.TURN, Phase.FOLLOW, Phase.HOVER, Phase.HOLD}
 _GUIDED_TIMEOUT_S = 3.0
-"""Of the simulated autopilot, after which it levels by itself."""
+"""After which the simulated autopilot levels by itself."""
 
 
 @pytest.mark.realtime
 @in_real_time
 async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp_path: Path) -> None:
+    """By an autopilot that waits long for its companion."""
     rig = ServiceRig(tmp_path, ("A3",))
-    with rig.world():
+    with rig.world(GUID_TIMEOUT=_GUIDED_TIMEOUT_S, FS_GCS_TIMEOUT=10.0):
         first = await rig.start()
         await rig.until(lambda status: status.phase in _UP, 120)
         assert [message for message in rig.said if message.get("READY") == "1"]
@@ -74,6 +75,30 @@ async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp
     assert cut.damage == ""
     ticks = [entry.stamp_ns * 1e-9 for entry in cut.entries if entry.topic == Topic.TICK]
     assert killed_s - ticks[-1] < 3.0, "no more than what had not reached the disk is lost"
+
+
+@pytest.mark.realtime
+@in_real_time
+async def test_killed_in_the_air_the_vehicle_as_shipped_lands_and_the_restart_leaves_it_alone(
+    tmp_path: Path,
+) -> None:
+    rig = ServiceRig(tmp_path, ("A3",))
+    with rig.world():
+        first = await rig.start()
+        await rig.until(lambda status: status.phase in _UP, 120)
+        killed_s = rig.kill()
+        await first.wait()
+        await asyncio.sleep(3.0)  # more than its failsafe waits: it is coming down by itself
+        second = await rig.start()
+        after = await rig.until(lambda status: status.phase not in {Phase.PREFLIGHT, Phase.RECOVER}, 60)
+        assert after.phase in {Phase.PILOT, Phase.LAND}
+        second.send_signal(signal.SIGTERM)
+        await asyncio.wait_for(second.wait(), 30)
+        await asyncio.sleep(8.0)
+    truth = rig.truth()
+    heights_m = [k.height_m for k in truth if k.stamp_ns * 1e-9 > killed_s]
+    assert max(heights_m) < heights_m[0] + 0.3, "it never climbs"
+    assert truth[-1].height_m < 0.15
 
 
 @pytest.mark.realtime

@@ -65,7 +65,7 @@ def judged_hazard(
     phase = PHASE_OF.get(row.action) if row.trigger is not None else None
     if phase is not None and phase not in after:
         own.append(JudgedFault("other_action", at_s, 0.0))
-    if outcome != expected.ends:
+    if outcome != expected.ends and (outcome, expected.ends) != ("home", "landed"):
         own.append(JudgedFault("other_end", at_s, 0.0))
     if down_s is not None and down_s > DOWN_S:
         own.append(JudgedFault("down_late", at_s, round(down_s, 2)))
