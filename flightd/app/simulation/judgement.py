@@ -39,6 +39,8 @@ def judge_flight(simulation: Simulation) -> Judgement:
     flown = read_log(simulation.flight_log, {Topic.STATUS, Topic.EVENT, Topic.SETPOINT})
     truth = read_log(simulation.truth_log, {Topic.TRUTH, Topic.FAULT, Topic.ARMED}).entries
     armed = [ArmedChange(**row) for row in _rows(truth, Topic.ARMED, ArmedChange)]
+    notes = [e.message for e in truth if e.topic == Topic.FAULT and isinstance(e.message, dict)]
+    begun = [note for note in notes if note["began"]]
     evidence = FlightEvidence(
         site=simulation.scenario.floor.site(simulation.site),
         plan=simulation.plan(),
@@ -47,6 +49,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
         truth=[Kinematics(**row) for row in _rows(truth, Topic.TRUTH, Kinematics)],
         setpoints_ns=[setpoint.stamp_ns for setpoint in flown.messages(AttitudeSetpoint)],
         armed=armed or None,
+        piloted=any(note["kind"] == "pilot" for note in begun) or bool(simulation.truth_url),
     )
     figures = score(evidence)
     stock = stock_summary(simulation, figures.flight_time_s)
@@ -60,12 +63,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
     if expected is None:
         return Judgement(figures, stock, None, tuple(faults))
     row = next(row for row in HAZARDS if row.name == expected.hazard)
-    begun = [
-        entry.message["stamp_ns"]
-        for entry in truth
-        if entry.topic == Topic.FAULT and isinstance(entry.message, dict) and entry.message["began"]
-    ]
-    verdict = judged_hazard(row, expected, evidence, figures, faults, begun)
+    verdict = judged_hazard(row, expected, evidence, figures, faults, [note["stamp_ns"] for note in begun])
     return Judgement(figures, stock, verdict, verdict.faults)
 
 

@@ -19,7 +19,8 @@ from flightd.site.site import Site
 class FlightEvidence:
     """`site` as it really is; `statuses`, `events` and `setpoints_ns` (when setpoints went out) are the
     daemon's, `truth` and `armed` the simulator's; all in time order.  `armed` is None where the vehicle does
-    not tell."""
+    not tell.  `piloted`: there was a pilot who could take over; where there was none a hand-over is the
+    autopilot's failsafe, and still judged."""
 
     site: Site
     plan: FlightPlan
@@ -28,11 +29,13 @@ class FlightEvidence:
     truth: Sequence[Kinematics]
     setpoints_ns: Sequence[int] = ()
     armed: Sequence[ArmedChange] | None = None
+    piloted: bool = True
 
     @cached_property
     def handed_over_ns(self) -> float:
         """When the pilot took over, infinite if he did not: what comes then is his."""
-        return next((status.stamp_ns for status in self.statuses if status.phase is Phase.PILOT), math.inf)
+        begins = (status.stamp_ns for status in self.statuses if status.phase is Phase.PILOT)
+        return next(begins, math.inf) if self.piloted else math.inf
 
     @property
     def handed_over(self) -> bool:

@@ -12,12 +12,10 @@ from flightd.mission.safety.hazard_table import PHASE_OF, Action, Hazard
 from flightd.sim.judge.evidence import FlightEvidence
 from flightd.sim.judge.expectation import Expectation
 from flightd.sim.judge.flight_score import FlightScore
-from flightd.sim.judge.verdict import MISSION_KINDS, JudgedFault
+from flightd.sim.judge.verdict import DOWN_S, MISSION_KINDS, JudgedFault
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.site.site import Site
 
-DOWN_S = 20.0
-"""On the floor at most so long after a hazard that asks for landing was found."""
 _ON_FLOOR_M = 0.2
 _AT_PAD_M = 0.5
 
@@ -67,7 +65,7 @@ def judged_hazard(
         own.append(JudgedFault("other_action", at_s, 0.0))
     if outcome != expected.ends and (outcome, expected.ends) != ("home", "landed"):
         own.append(JudgedFault("other_end", at_s, 0.0))
-    if down_s is not None and down_s > DOWN_S:
+    if down_s is not None and down_s > DOWN_S and all(fault.kind != "down_late" for fault in own):
         own.append(JudgedFault("down_late", at_s, round(down_s, 2)))
     return HazardVerdict(
         row.name,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flightd.mission.safety.hazard_table import Action
 from flightd.sim.judge.clearance import clearances
 from flightd.sim.judge.evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore, longest_uncontrolled, off_leg_in_air, overshoot
@@ -18,6 +19,8 @@ OFF_LEG_M = 0.9
 OVERSHOOT_M = 0.5
 UNCONTROLLED_S = 10.0
 """An autopilot whose companion died must be landing by then."""
+DOWN_S = 20.0
+"""On the floor at most so long after a hazard that asks for landing was found."""
 _OFF_PAD_M = 0.5
 _HARD_MPS = 1.2
 _STAYS_ARMED_S = 15.0
@@ -53,12 +56,27 @@ KINDS = {
     "found_late": "the hazard was found later than the scenario allows, s",
     "other_action": "the daemon did not do what the table of hazards says",
     "other_end": "the flight did not end as the scenario says",
-    "down_late": "on the floor later than it must be after a hazard that asks for landing, s",
+    "down_late": f"on the floor later than {DOWN_S:g} s after a hazard that asks for landing, s",
 }
 """What each kind of fault says, with its value."""
 
 MISSION_KINDS = frozenset({"aborted", "not_visited", "off_pad"})
 """What is no fault where a scenario asks for another end than a completed mission."""
+SAFETY_KINDS = frozenset(
+    {
+        "hit_rack",
+        "hit_ceiling",
+        "hit_keep_out",
+        "too_high",
+        "out_of_control",
+        "hard_landing",
+        "stayed_up",
+        "stayed_armed",
+        "down_late",
+    }
+)
+"""What must never be, whatever goes wrong."""
+_ASKS_FOR_LANDING = tuple(f": {action.value}" for action in (Action.LAND, Action.STOP))
 
 
 def judged(
@@ -111,6 +129,12 @@ def _at_the_floor(flight: FlightEvidence) -> Iterator[JudgedFault]:
         yield JudgedFault("hard_landing", round(at_s, 2), round(float(sink_mps.max()), 2))
     if flight.handed_over:
         return
+    asked = [
+        event for event in flight.events if event.name == "hazard" and event.text.endswith(_ASKS_FOR_LANDING)
+    ]
+    in_air = [e.stamp_ns * 1e-9 for e in asked if e.stamp_ns * 1e-9 < flight.in_air.stamp_s[-1]]
+    if in_air and (down_s := float(flight.in_air.stamp_s[-1]) - in_air[0]) > DOWN_S:
+        yield JudgedFault("down_late", round(in_air[0] - begun_s, 2), round(down_s, 2))
     last = flight.truth[-1]
     end_s = last.stamp_ns * 1e-9
     if last.height_m > OFF_FLOOR_M:

@@ -11,9 +11,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import Wind, WindParams
+
+_CHARGE = (0.0, 0.05, 0.1, 0.2, 0.5, 0.8, 1.0)
+_CELL_V = (3.3, 3.5, 3.65, 3.73, 3.84, 4.02, 4.2)
+"""A lithium polymer cell's voltage at rest by its charge."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +38,7 @@ class AirframeParams:
     rest_height_m: float = 0.10
     floor_friction: float = 0.6
     battery_capacity_ah: float = 5.0
-    battery_full_v: float = 12.6
-    battery_empty_v: float = 10.5
+    battery_cells: int = 3
     battery_resistance_ohm: float = 0.02
     hover_current_a: float = 14.0
     idle_current_a: float = 0.6
@@ -89,7 +94,7 @@ class Airframe:
     def battery_v(self) -> float:
         """Terminal voltage under the present load."""
         p = self.params
-        open_v = p.battery_empty_v + (p.battery_full_v - p.battery_empty_v) * self.battery_frac
+        open_v = p.battery_cells * float(np.interp(self.battery_frac, _CHARGE, _CELL_V))
         return open_v - p.battery_resistance_ohm * self.current_a
 
     @property
