@@ -71,6 +71,7 @@ class ArduCopterPeer(AutopilotPeer):
         self.mode = CopterMode.STABILIZE
         self._target = AngleTarget()
         self._low_battery_told = False
+        self._low_battery_s = 0.0
         self._client_silent_s: float | None = None
 
     def reboot(self) -> None:
@@ -160,7 +161,7 @@ class ArduCopterPeer(AutopilotPeer):
 
     def _control(self, dt_s: float) -> AirframeCommand:
         self._target.step(dt_s, max(0.1, self.parameters["GUID_TIMEOUT"]))
-        self._watch_battery()
+        self._watch_battery(dt_s)
         self._watch_client(dt_s)
         if not self.armed:
             return AirframeCommand()
@@ -230,10 +231,13 @@ class ArduCopterPeer(AutopilotPeer):
             if self.parameters["FS_GCS_ENABLE"] == _GCS_LAND:
                 self._set_mode(CopterMode.LAND)
 
-    def _watch_battery(self) -> None:
+    def _watch_battery(self, dt_s: float) -> None:
+        """The failsafe for a voltage that stays low for so long."""
         if self._low_battery_told or not self.armed:
             return
-        if self.airframe.battery_v < self.parameters["BATT_LOW_VOLT"]:
+        is_low = self.airframe.battery_v < self.parameters["BATT_LOW_VOLT"]
+        self._low_battery_s = self._low_battery_s + dt_s if is_low else 0.0
+        if self._low_battery_s > self.parameters["BATT_LOW_TIMER"]:
             self._low_battery_told = True
             self.say(dialect.MAV_SEVERITY_CRITICAL, f"Battery 1 is low {self.airframe.battery_v:.2f}V")
             if self.parameters["BATT_FS_LOW_ACT"] == 1:

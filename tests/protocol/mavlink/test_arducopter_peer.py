@@ -367,7 +367,9 @@ def test_a_low_battery_is_told_once_and_lands_if_so_set() -> None:
         async with pair(peer_config) as (peer, client):
             await hovering(peer, client)
             peer.airframe.battery_frac = 0.02
-            await asyncio.sleep(1.0)
+            await client.fly(9.0)
+            assert peer.mode == CopterMode.GUIDED_NOGPS, "a moment of load is no empty battery"
+            await client.fly(2.0)
             assert peer.mode == CopterMode.LAND
             texts = [t.text for t in client.all("STATUSTEXT") if "is low" in t.text]
             assert len(texts) == 1
