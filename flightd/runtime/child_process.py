@@ -1,8 +1,8 @@
-"""A child process that answers one request at a time over a pipe.
+"""Child processes that talk to this one over a channel; one kind answers a request at a time.
 
 Own code: a picture costs 0.2 ms on its way there and back, 0.3 ms in pebble 5.2 and 19 ms in loky 3.7; after
 a worker's death the next answer comes in 0.08 s, theirs in 0.11 to 0.19 s and 2.1 s (tools/bench_pools.py,
-on two loaded cores).  And here the loop itself waits for the pipe, no thread does.
+on two loaded cores).  And here the loop itself waits for the channel, no thread does.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ import asyncio
 import contextlib
 import multiprocessing
 import signal
+import socket
 from collections.abc import Callable
-from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
 from typing import Any
 
 from flightd.core.errors import TransientError
+from flightd.runtime.message_channel import Channel, ChildEnd
 from flightd.runtime.undisturbed_start import undisturbed
 
 _PRELOAD = [
@@ -25,6 +26,8 @@ _PRELOAD = [
     "flightd.vision.shelf.shelf_look",
 ]
 _READY = "ready"
+_START_S = 60.0
+"""A child that is not ready by then hangs."""
 
 
 def child_context() -> ForkServerContext:
@@ -35,21 +38,83 @@ def child_context() -> ForkServerContext:
     return context
 
 
-def _live(conn: Connection, make: Callable[[], Callable[[Any], Any]]) -> None:
-    """The child's life: it ends when its parent closes the pipe."""
+class LinkedProcess:
+    """A process that runs `target(ChildEnd, *args)`, all of it picklable, until it returns or this end is
+    closed.  What it sends goes to `on_message`; `on_end` is called once, when it is gone or was killed, and
+    told why."""
+
+    def __init__(
+        self,
+        target: Callable[..., None],
+        args: tuple[Any, ...],
+        on_message: Callable[[Any], None],
+        on_end: Callable[[str], None],
+    ) -> None:
+        self._on_message = on_message
+        self._on_end = on_end
+        self._channel = Channel()
+        arguments = (target, self._channel.theirs, args)
+        self._process = child_context().Process(target=_live, args=arguments, daemon=True)
+        self.alive = True
+        # in a thread: where the server that forks children has died too, a new one takes seconds
+        starting = asyncio.get_running_loop().run_in_executor(None, self._start)
+        starting.add_done_callback(self._started)
+
+    @property
+    def pid(self) -> int | None:
+        return self._process.pid
+
+    def send(self, message: Any) -> bool:
+        """Hand a message over, never waiting.  A process that does not take it is killed: it hangs."""
+        if self.alive and not self._channel.send(message):
+            self.kill("the process takes no messages")
+        return self.alive
+
+    def hang_up(self) -> None:
+        """Close this end: a process that listens ends by itself.  Nothing more comes from it."""
+        self.alive = False
+        self._channel.close()
+
+    def kill(self, why: str = "the process was killed") -> None:
+        """End the process at once; idempotent."""
+        if self.alive:
+            self.hang_up()
+            if self._process.pid is not None:
+                self._process.kill()
+            self._on_end(why)
+
+    def join(self, timeout_s: float) -> None:
+        """Wait for a process to be gone that was killed or left alone."""
+        if self._process.pid is not None:
+            self._process.join(timeout_s)
+
+    def _start(self) -> None:
+        with undisturbed():
+            self._process.start()
+
+    def _started(self, starting: asyncio.Future[None]) -> None:
+        self._channel.theirs.close()
+        if starting.cancelled() or starting.exception() is not None:
+            self.kill("the process did not start")
+        elif not self.alive:  # killed while it started
+            self._process.kill()
+        else:
+            self._channel.listen(self._on_message, self.kill)
+
+
+def _live(target: Callable[..., None], link: socket.socket, args: tuple[Any, ...]) -> None:
+    """The child's life: it ends when its parent closes the channel."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with contextlib.suppress(EOFError, OSError):
-        answer = make()
-        conn.send(_READY)
-        while True:
-            conn.send(answer(conn.recv()))
+        target(ChildEnd(link), *args)
 
 
 class Child:
     """One process made of `make`, which is called in the child (it must be picklable) and gives the
     function that answers requests.
 
-    `on_ready` is called when it can take its first request, `on_death` when it is gone, killed or not.
+    `on_ready` is called when it can take its first request, `on_death` when it is gone, killed or not.  One
+    that is not ready within a minute is killed; how long an answer may take is up to who asks.
     """
 
     def __init__(
@@ -62,17 +127,12 @@ class Child:
         self._on_ready = on_ready
         self._on_death = on_death
         self._answer: asyncio.Future[Any] | None = None
-        context = child_context()
-        self._conn, self._theirs = context.Pipe()
-        self._process = context.Process(target=_live, args=(self._theirs, make), daemon=True)
-        self.alive = True
-        # in a thread: where the server that forks children has died too, a new one takes seconds
-        self._starting = self._loop.run_in_executor(None, self._start)
-        self._starting.add_done_callback(self._started)
+        self._too_late = self._loop.call_later(_START_S, self.kill)
+        self._process = LinkedProcess(_answer_requests, (make,), self._received, self._ended)
 
-    def _start(self) -> None:
-        with undisturbed():
-            self._process.start()
+    @property
+    def alive(self) -> bool:
+        return self._process.alive
 
     @property
     def pid(self) -> int | None:
@@ -83,46 +143,33 @@ class Child:
         if not self.alive:
             raise TransientError("the process died")
         self._answer = self._loop.create_future()
-        try:
-            self._conn.send(request)
-        except OSError:
-            self.kill()
+        self._process.send(request)
         return await self._answer
 
     def kill(self) -> None:
         """End the child at once; idempotent."""
-        if not self.alive:
-            return
-        self.alive = False
-        self._loop.remove_reader(self._conn.fileno())
-        self._conn.close()
-        if self._process.pid is not None:
-            self._process.kill()
-        if self._answer is not None and not self._answer.done():
-            self._answer.set_exception(TransientError("the process died"))
-        self._on_death(self)
+        self._process.kill()
 
     def join(self, timeout_s: float) -> None:
         """Wait for a killed child to be gone."""
-        if self._process.pid is not None:
-            self._process.join(timeout_s)
+        self._process.join(timeout_s)
 
-    def _started(self, starting: asyncio.Future[None]) -> None:
-        self._theirs.close()
-        if starting.cancelled() or starting.exception() is not None:
-            self.kill()
-        elif not self.alive:  # killed while it started
-            self._process.kill()
-        else:
-            self._loop.add_reader(self._conn.fileno(), self._readable)
-
-    def _readable(self) -> None:
-        try:
-            answer = self._conn.recv()
-        except (EOFError, OSError):
-            self.kill()
-            return
-        if answer == _READY:
+    def _received(self, message: Any) -> None:
+        if message == _READY:
+            self._too_late.cancel()
             self._on_ready(self)
         elif self._answer is not None and not self._answer.done():
-            self._answer.set_result(answer)
+            self._answer.set_result(message)
+
+    def _ended(self, why: str) -> None:
+        self._too_late.cancel()
+        if self._answer is not None and not self._answer.done():
+            self._answer.set_exception(TransientError(why))
+        self._on_death(self)
+
+
+def _answer_requests(parent: ChildEnd, make: Callable[[], Callable[[Any], Any]]) -> None:
+    answer = make()
+    parent.send(_READY)
+    while True:
+        parent.send(answer(parent.receive()))

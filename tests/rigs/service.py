@@ -23,6 +23,7 @@ from flightd.adapters.ground_link.protocol import StatusReport
 from flightd.app.simulation.world_process import run_world
 from flightd.core.topics import Topic
 from flightd.replay.log import read_log
+from flightd.runtime.message_channel import Channel
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import SimCamera, wide_lens
 from flightd.sim.world import WorldSpec
@@ -84,7 +85,7 @@ class ServiceRig:
     def world(self, **parameters: float) -> Iterator[None]:
         """The simulated vehicle, but for `parameters` as shipped, and camera, alive meanwhile."""
         context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
+        channel = Channel()
         spec = WorldSpec(
             site=load_site(SITE_FILE),
             seed=3,
@@ -94,13 +95,13 @@ class ServiceRig:
             camera=CAMERA.__class__(**_fields(CAMERA) | {"mount": _turned(CAMERA.mount)}),
         )
         log = self.folder / "truth.mcap"
-        process = context.Process(target=run_world, args=(spec, 1.0, log, theirs), name="world")
+        process = context.Process(target=run_world, args=(spec, 1.0, log, channel.theirs), name="world")
         process.start()
-        theirs.close()
+        channel.theirs.close()
         try:
             yield
         finally:
-            ours.close()
+            channel.close()
             process.join(30)
             assert process.exitcode == 0
             self._manager.close()

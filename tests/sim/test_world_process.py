@@ -12,6 +12,7 @@ import pytest
 from flightd.app.simulation.world_process import run_world, watch_world
 from flightd.config.paths import shipped
 from flightd.core.errors import FlightdError, RunError, UnavailableError
+from flightd.runtime.message_channel import Channel
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.world import FrontSpec, WorldSpec
 from flightd.site.site_file import load_site
@@ -21,12 +22,12 @@ from tests.rigs.event_loops import real
 def death_of(spec: WorldSpec, log: Path) -> FlightdError:
     async def main() -> None:
         context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(target=run_world, args=(spec, 1.0, log, theirs))
+        channel = Channel()
+        process = context.Process(target=run_world, args=(spec, 1.0, log, channel.theirs))
         process.start()
-        theirs.close()
+        channel.theirs.close()
         async with asyncio.timeout(60.0):
-            await watch_world(process, ours, lambda _index, _begins: None)
+            await watch_world(process, channel, lambda _index, _begins: None)
 
     with pytest.raises(FlightdError) as told:
         real(main())

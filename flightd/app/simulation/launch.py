@@ -13,7 +13,6 @@ import signal
 from collections.abc import Coroutine
 from contextlib import AsyncExitStack, ExitStack
 from dataclasses import replace
-from multiprocessing.connection import Connection
 from typing import Any
 
 from flightd.adapters.recorder.recorder import McapRecorder, WhenFull, drop_newest, wait_for_disk
@@ -36,6 +35,7 @@ from flightd.core.topics import Document, Topic
 from flightd.runtime.clock import Hold, LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
 from flightd.runtime.event_loops import ScaledLoop, VirtualLoop
+from flightd.runtime.message_channel import Channel
 from flightd.runtime.undisturbed_start import undisturbed
 from flightd.sim.world import World
 
@@ -135,7 +135,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
         peers = replace(peers, vehicle=config.vehicle.url)
     async with monitors(config.metrics, {}, journal=False) as watchers, AsyncExitStack() as stack:
         recorder = stack.enter_context(_flight_recorder(simulation, clock, drop_newest))
-        process, pipe = _started_world(simulation, ports, factor, stack)
+        process, channel = _started_world(simulation, ports, factor, stack)
         pool = stack.enter_context(detector_pool(config, site, clock))
         counting = await FlightCount(config, site, simulation.folder, stack).begun(clock)
         link = ground_link(_ground_settings(simulation), site, clock, counting)
@@ -157,25 +157,25 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
             opener=open_paced_datagrams,
         )
         return await _beside(
-            simulation, flight, ended_by, watch_world(process, pipe, faults.tell), faults.run()
+            simulation, flight, ended_by, watch_world(process, channel, faults.tell), faults.run()
         )
 
 
 def _started_world(
     simulation: Simulation, ports: WorldPorts, factor: float, stack: AsyncExitStack
-) -> tuple[Any, Connection]:
-    """The world's process and the pipe from it; it ends when the pipe closes, however this process ends."""
+) -> tuple[Any, Channel]:
+    """The world's process and the channel from it; it ends when that closes, however this process ends."""
     context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
+    channel = Channel()
     spec = world_spec(simulation, ports)
-    arguments = (spec, factor, simulation.truth_log, theirs)
+    arguments = (spec, factor, simulation.truth_log, channel.theirs)
     process = context.Process(target=run_world, args=arguments, name="world")
     with undisturbed():
         process.start()
-    theirs.close()
+    channel.theirs.close()
     stack.callback(process.join, 15.0)
-    stack.callback(ours.close)
-    return process, ours
+    stack.callback(channel.close)
+    return process, channel
 
 
 def _ground_settings(simulation: Simulation) -> GroundConfig:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import socket
 from functools import partial
 
 import numpy as np
 import pytest
 
-from flightd.app.detection.detector_pool import Detection, DetectorPool
+from flightd.app.detection.detector_pool import Detection, DetectorPool, PicturePool, Work
 from flightd.app.simulation.lockstep import LockstepDetectors
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.core.types import Image, LineSet
@@ -32,6 +33,27 @@ class MeanDetector:
         if seq == 15:
             raise ValueError("a picture of nothing")
         return LineSet(seq, stamp_ns, bgr.shape[1], bgr.shape[0], (), (), str(int(bgr.mean())))
+
+
+LARGE_BYTES = 8 << 20
+
+
+def large_answer(_bgr: Image, _ticket: FrameTicket, _ask: bool) -> bytes:
+    return b"x" * LARGE_BYTES
+
+
+def large_answers(signal_in_first: signal.Signals | None) -> Work[bool, bytes]:
+    """Inside the worker: answers of 8 MB; the signal takes this process in the middle of the first."""
+    whole = socket.socket.sendall
+
+    def half(link: socket.socket, data: bytes) -> None:
+        if signal_in_first is not None and len(data) > LARGE_BYTES:
+            whole(link, data[: len(data) // 2])
+            os.kill(os.getpid(), signal_in_first)
+        whole(link, data)
+
+    socket.socket.sendall = half  # type: ignore[assignment, method-assign]
+    return large_answer
 
 
 def ticket(ring: FrameRing, seq: int, value: int) -> FrameTicket:
@@ -142,3 +164,56 @@ def test_in_lockstep_a_detector_that_hangs_costs_one_picture() -> None:
             ring.close()
 
     assert virtual(main(), patience_s=3.0) == [True, False, True, True]
+
+
+async def turns_until(asked: asyncio.Future[bytes | None], wait_s: float) -> int:
+    """How often another task that waits so long has its turn until the answer is there."""
+    turns = 0
+    while not asked.done():
+        turns += 1
+        await asyncio.sleep(wait_s)
+    return turns
+
+
+@pytest.mark.parametrize(("number", "why"), [(signal.SIGSTOP, "hung"), (signal.SIGKILL, "died")])
+def test_a_worker_stopped_or_killed_in_mid_answer_keeps_nothing_else_waiting(
+    number: signal.Signals, why: str
+) -> None:
+    """Half of 8 MB has come: the control loop goes on, the worker is replaced within its time."""
+
+    async def main() -> tuple[bytes | None, PicturePool[bool, bytes], int]:
+        ring, make = FrameRing.create(4, 64, 36), partial(large_answers, number)
+        try:
+            with PicturePool(make, 1, 0.5, LoopClock(), "test") as pool:
+                await pool.ready()
+                asked = asyncio.ensure_future(pool.ask(ticket(ring, 1, 7), True))
+                turns = await turns_until(asked, 0.005)
+                await pool.ready()
+                return await asked, pool, turns
+        finally:
+            ring.close()
+
+    answer, pool, turns = real(main())
+    assert answer is None
+    assert why in next(iter(pool.lost))
+    assert pool.replaced == 1
+    if number is signal.SIGSTOP:
+        assert turns > 10, "others had their turn meanwhile"
+
+
+def test_an_answer_of_8_mb_comes_whole_while_others_have_their_turn() -> None:
+    async def main() -> tuple[bytes | None, int]:
+        ring, make = FrameRing.create(4, 64, 36), partial(large_answers, None)
+        try:
+            with PicturePool(make, 1, 20.0, LoopClock(), "test") as pool:
+                await pool.ready()
+                asked = asyncio.ensure_future(pool.ask(ticket(ring, 1, 7), True))
+                turns = await turns_until(asked, 0.0)
+                return await asked, turns
+        finally:
+            ring.close()
+
+    answer, turns = real(main())
+    assert answer is not None
+    assert len(answer) == LARGE_BYTES
+    assert turns > 100
