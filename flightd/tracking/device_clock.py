@@ -4,6 +4,10 @@ from __future__ import annotations
 
 _DRIFT = 50e-6
 """Two cheap crystals drift apart by less than this."""
+_ANEW = 3
+"""So many messages in a row, in order among themselves, are no stragglers: the device counts anew."""
+_ANEW_NS = 500_000_000
+"""And nothing came in order for so long before: a device takes that long to start."""
 
 
 class DeviceClock:
@@ -17,15 +21,35 @@ class DeviceClock:
     def __init__(self, latency_ns: int) -> None:
         self._latency_ns = latency_ns
         self._offset_ns: int | None = None
-        self._last_ns = 0
+        self._newest_ns = self._in_order_ns = 0
+        self._anew_ns = 0
+        self._anew = 0
 
-    def to_ours(self, device_ns: int, arrival_ns: int) -> int:
-        """Our time of `device_ns`, heard of at `arrival_ns`; a clock that jumped back starts anew."""
+    def to_ours(self, device_ns: int, arrival_ns: int) -> int | None:
+        """Our time of `device_ns`, heard of at `arrival_ns`.
+
+        None for a message that is not newer than the one before: it comes out of order, and who flies by it
+        flies by the past.  Where that goes on, the device counts anew, and so does this.
+        """
         offset = arrival_ns - device_ns
-        if self._offset_ns is None or device_ns < self._last_ns:
+        if self._offset_ns is None or (
+            device_ns <= self._newest_ns and self._counts_anew(device_ns, arrival_ns)
+        ):
             self._offset_ns = offset
+        elif device_ns <= self._newest_ns:
+            return None
         else:
-            crept = self._offset_ns + round((device_ns - self._last_ns) * _DRIFT)
+            crept = self._offset_ns + round((device_ns - self._newest_ns) * _DRIFT)
             self._offset_ns = min(crept, offset)
-        self._last_ns = device_ns
+        self._newest_ns, self._in_order_ns, self._anew = device_ns, arrival_ns, 0
         return device_ns + self._offset_ns - self._latency_ns
+
+    @property
+    def offset_ns(self) -> int | None:
+        """Our time less the device's, the path's least delay included; None before the first message."""
+        return self._offset_ns
+
+    def _counts_anew(self, device_ns: int, arrival_ns: int) -> bool:
+        self._anew = self._anew + 1 if self._anew and device_ns > self._anew_ns else 1
+        self._anew_ns = device_ns
+        return self._anew >= _ANEW and arrival_ns - self._in_order_ns >= _ANEW_NS

@@ -7,14 +7,13 @@ from collections.abc import Callable
 from typing import Any
 from urllib.parse import urlsplit
 
+from flightd.adapters.camera.frame_order import OUT_OF_ORDER, FrameOrder
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ports import Clock
 from flightd.runtime.datagrams import is_stalled
 from flightd.runtime.frame_notice import ExposureRequest, decode_notice, encode_request
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.tracking.device_clock import DeviceClock
-
-_TELL_NS = 5_000_000_000
 
 
 def parse_address(url: str) -> tuple[str, int]:
@@ -30,9 +29,10 @@ def parse_address(url: str) -> tuple[str, int]:
 
 
 class SharedCamera(asyncio.DatagramProtocol):
-    """Listens for notices and hands each picture's ticket to `on_frame`; what is no usable notice is
-    counted and told to `on_trouble`, at most once in five seconds.  A notice of a picture that was taken
-    with another exposure than is wanted is answered by a request."""
+    """Listens for notices and hands each frame's ticket to `on_frame`; what is no usable notice, or one of a
+    frame older than one that was delivered, is counted (`refused`) and told to `on_trouble`, at most once in
+    five seconds.  A notice of a frame that was taken with another exposure than is wanted is answered by a
+    request."""
 
     def __init__(
         self,
@@ -47,14 +47,18 @@ class SharedCamera(asyncio.DatagramProtocol):
         self._url = url
         self._size_px = size_px
         self._clock = clock
-        self._device = DeviceClock(round(latency_s * 1e9))
+        latency_ns = round(latency_s * 1e9)
+        self._device = DeviceClock(latency_ns)
+        self._order = FrameOrder(url, latency_ns, on_trouble)
         self._on_frame = on_frame
         self.frames = 0
-        self._on_trouble = on_trouble
-        self._told_ns: int | None = None
         self._exposure = 1.0
         self._transport: asyncio.DatagramTransport | None = None
-        self.rejected = 0
+
+    @property
+    def refused(self) -> int:
+        """Notices of no use, and of frames that must not be flown by."""
+        return self._order.refused
 
     async def run(self) -> None:
         """Listen until cancelled.  Raises UnavailableError when the port is taken."""
@@ -81,19 +85,23 @@ class SharedCamera(asyncio.DatagramProtocol):
         try:
             notice = decode_notice(data)
         except InputError as err:
-            self._reject(str(err))
+            self._order.refuse(str(err), arrival_ns)
             return
         if (notice.width_px, notice.height_px) != self._size_px:
             wanted = "{}x{}".format(*self._size_px)
-            self._reject(
-                f"pictures are {notice.width_px}x{notice.height_px}, the configuration says {wanted}"
-            )
+            reason = f"pictures are {notice.width_px}x{notice.height_px}, the configuration says {wanted}"
+            self._order.refuse(reason, arrival_ns)
             return
         line = self._transport
         if notice.exposure != self._exposure and line is not None and not is_stalled(line):
             line.sendto(encode_request(ExposureRequest(self._exposure)), addr)
-        self.frames += 1
         stamp_ns = self._device.to_ours(notice.device_ns, arrival_ns)
+        if stamp_ns is None:
+            self._order.refuse(OUT_OF_ORDER, arrival_ns)
+            return
+        if not self._order.passes(stamp_ns, arrival_ns):
+            return
+        self.frames += 1
         self._on_frame(
             FrameTicket(
                 notice.ring,
@@ -107,10 +115,3 @@ class SharedCamera(asyncio.DatagramProtocol):
                 notice.exposure,
             )
         )
-
-    def _reject(self, reason: str) -> None:
-        self.rejected += 1
-        now_ns = self._clock.now_ns()
-        if self._told_ns is None or now_ns - self._told_ns >= _TELL_NS:
-            self._told_ns = now_ns
-            self._on_trouble(f"camera {self._url}: {reason} ({self.rejected} notices refused so far)")

@@ -83,14 +83,51 @@ def test_height_follows_the_climb_past_the_newest_sample_but_not_for_long() -> N
 )
 def test_jitter_leaves_the_mapped_time_within_the_least_delay_seen(offset: int, delays: list[int]) -> None:
     clock = DeviceClock(latency_ns=60_000_000)
-    stamps = []
     for i, delay in enumerate([0, *delays]):
         taken = i * 33_000_000
-        stamps.append(clock.to_ours(taken + offset, taken + 60_000_000 + delay) - taken)
-    assert all(0 <= error < 200_000 for error in stamps)  # drift allowance only: 50 ppm
+        stamp = clock.to_ours(taken + offset, taken + 60_000_000 + delay)
+        assert stamp is not None
+        assert 0 <= stamp - taken < 200_000  # drift allowance only: 50 ppm
 
 
-def test_a_device_clock_that_starts_again_is_taken_anew() -> None:
+MS = 1_000_000
+
+
+def test_a_message_that_comes_late_and_out_of_order_has_no_time_and_moves_nothing() -> None:
     clock = DeviceClock(latency_ns=0)
-    clock.to_ours(10**12, 500)
-    assert clock.to_ours(5, 2000) == 2000
+    assert [clock.to_ours(k * 33 * MS + 10**12, k * 33 * MS) for k in (0, 1, 2, 6)] == [
+        k * 33 * MS for k in (0, 1, 2, 6)
+    ]
+    assert clock.to_ours(2 * 33 * MS + 10**12, 7 * 33 * MS) is None, "150 ms late"
+    assert clock.to_ours(6 * 33 * MS + 10**12, 7 * 33 * MS) is None, "a second time"
+    stamp = clock.to_ours(8 * 33 * MS + 10**12, 8 * 33 * MS + 5 * MS)
+    assert stamp == pytest.approx(8 * 33 * MS, abs=10_000)
+
+
+def test_a_lone_straggler_after_a_long_silence_is_no_device_that_counts_anew() -> None:
+    clock = DeviceClock(latency_ns=0)
+    clock.to_ours(10_000 * MS, 0)
+    assert clock.to_ours(9_900 * MS, 3_000 * MS) is None
+    assert clock.to_ours(13_033 * MS, 3_033 * MS) == pytest.approx(3_033 * MS, abs=200_000)
+    assert clock.to_ours(9_933 * MS, 6_000 * MS) is None
+    assert clock.to_ours(9_966 * MS, 6_001 * MS) is None
+
+
+def test_a_device_clock_that_starts_again_is_taken_anew_after_three_messages() -> None:
+    clock = DeviceClock(latency_ns=0)
+    clock.to_ours(10**12, 500 * MS)
+    stamps = [clock.to_ours(k * 33 * MS, (2_000 + k * 33) * MS) for k in range(4)]
+    assert stamps[:2] == [None, None]
+    assert stamps[2:] == [(2_000 + k * 33) * MS for k in (2, 3)]
+
+
+@given(order=st.permutations(range(12)))
+def test_whatever_the_order_of_arrival_stamps_only_grow_and_are_true(order: list[int]) -> None:
+    """Frames of 30 ms each, all there within 0.4 s: what is given a time has the true one or a later one by
+    the delay of the first."""
+    clock = DeviceClock(latency_ns=0)
+    taken = [(k, clock.to_ours(k * 30 * MS, (i * 30 + 400) * MS)) for i, k in enumerate(order)]
+    stamps = [(k, stamp) for k, stamp in taken if stamp is not None]
+    assert [k for k, _ in stamps] == sorted(k for k, _ in stamps)
+    first_delay = (400 - order[0] * 30) * MS
+    assert all(stamp <= k * 30 * MS + first_delay + 100_000 for k, stamp in stamps)

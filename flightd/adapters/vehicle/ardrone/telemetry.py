@@ -74,7 +74,8 @@ class NavdataTelemetry:
         demo = packet.demo
         stamp_ns = now_ns - self._latency_ns
         if packet.clock_us is not None:
-            stamp_ns = self._clock.to_ours(self._counter.unwrap(packet.clock_us) * 1000, now_ns)
+            told_ns = self._clock.to_ours(self._counter.unwrap(packet.clock_us) * 1000, now_ns)
+            stamp_ns = stamp_ns if told_ns is None else told_ns  # a clock that has just started anew
         if self.attitude is not None:
             stamp_ns = max(stamp_ns, self.attitude.stamp_ns + 1)
         self.attitude = Attitude(stamp_ns, demo.roll_rad, demo.pitch_rad, demo.yaw_rad)

@@ -123,7 +123,8 @@ class VideoStream:
     """Hands every picture, the newest when several wait, to `show`; runs until cancelled.  `latency_s` is
     the least delay from mid-exposure to arrival; time is held by `hold` while a picture is decoded.
 
-    Counts: `pictures` shown, `dropped` frames never decoded, `broken` batches, `connections` made.
+    Counts: `pictures` shown, `dropped` frames never decoded, `broken` batches, frames `out_of_order` by the
+    encoder's clock, `connections` made.
     """
 
     def __init__(
@@ -145,6 +146,7 @@ class VideoStream:
         self._counter = WrappingCounter(_COUNTER_WRAP_MS)
         self.pictures = 0
         self.broken = 0
+        self.out_of_order = 0
         self.connections = 0
 
     @property
@@ -211,7 +213,10 @@ class VideoStream:
                 self._hand_on(frame, arrival_ns, bgr)
 
     def _hand_on(self, frame: PaveFrame, arrival_ns: int, bgr: Image) -> None:
-        self.pictures += 1
         device_ns = self._counter.unwrap(frame.header.timestamp_ms) * 1_000_000
         stamp_ns = self._device.to_ours(device_ns, arrival_ns)
+        if stamp_ns is None:
+            self.out_of_order += 1
+            return
+        self.pictures += 1
         self._show(DecodedFrame(frame.header.frame_number, stamp_ns, arrival_ns, bgr))
