@@ -19,8 +19,8 @@ class ArDroneCamera:
     """Hands a ticket for each picture to the taker of the camera that the stream shows.
 
     `latency_s` is the least delay from mid-exposure to arrival.  Both cameras come through one channel,
-    `vehicle.select_camera` chooses.  Pictures that arrive while the drone is switching may be of either
-    and go to nobody (`unassigned` counts them).
+    `vehicle.select_camera` chooses.  Pictures exposed while the drone is switching may be of either and go
+    to nobody (`unassigned` counts them), whenever they are read.
     """
 
     def __init__(
@@ -38,6 +38,7 @@ class ArDroneCamera:
         self._latency_s = latency_s
         self._hold = hold
         self._ring: FrameRing | None = None
+        self._stream: VideoStream | None = None
         self._seq = 0
         self.unassigned = 0
 
@@ -46,6 +47,11 @@ class ArDroneCamera:
         """Pictures delivered so far."""
         return self._seq
 
+    @property
+    def refused(self) -> int:
+        """Pictures of neither camera, and those out of order by the encoder's clock."""
+        return self.unassigned + (0 if self._stream is None else self._stream.out_of_order)
+
     def expose(self, part: float) -> None:
         """The drone exposes by itself: its pictures stay as they are."""
 
@@ -53,7 +59,8 @@ class ArDroneCamera:
         """Receive until cancelled; the shared memory lives as long.  Raises `UnavailableError` when
         PyAV is missing."""
         try:
-            await VideoStream(self._address, self._latency_s, self._clock, self._show, self._hold).run()
+            self._stream = VideoStream(self._address, self._latency_s, self._clock, self._show, self._hold)
+            await self._stream.run()
         finally:
             if self._ring is not None:
                 self._ring.close()
@@ -61,7 +68,7 @@ class ArDroneCamera:
     def _show(self, picture: DecodedFrame) -> None:
         since_ns = self._vehicle.camera_since_ns
         take = self._on_frame.get(self._vehicle.camera)
-        if take is None or since_ns is None or picture.arrival_ns < since_ns:
+        if take is None or since_ns is None or picture.stamp_ns < since_ns:
             self.unassigned += 1
             return
         height_px, width_px = picture.bgr.shape[:2]
