@@ -77,6 +77,11 @@ class Camera(Protocol):
         """Pictures delivered so far."""
         ...
 
+    @property
+    def refused(self) -> int:
+        """Pictures that came and were not delivered: out of order, old, or of no known time."""
+        ...
+
     def expose(self, part: float) -> None:
         """From now on, take pictures of this part of the usual exposure (1.0: the usual one again).  Never
         blocks.  Each ticket tells the exposure that its picture was taken with: a camera that cannot go by

@@ -64,6 +64,7 @@ class NoCamera:
     """`ports.Camera` that is not fitted."""
 
     frames = 0
+    refused = 0
 
     def expose(self, part: float) -> None:
         pass

@@ -74,6 +74,7 @@ class Tick:
         vision, dropped = flight.vision, dict(flight.vision.dropped)
         lost = sum(dropped.values())
         dropped["recorder"] = flight.recorder.dropped
+        dropped["refused"] = flight.camera.refused + flight.front_camera.refused
         if isinstance(flight.vehicle, CountsDrops):
             dropped["vehicle"] = flight.vehicle.dropped
         return Snapshot(

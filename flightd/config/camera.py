@@ -59,7 +59,7 @@ class CameraConfig(OpticsSection):
     url: str = Field(
         "udp://127.0.0.1:5600",
         description="udp://HOST:PORT (notices of pictures in shared memory), device:/dev/videoN, "
-        "file:PATH (a video), folder:PATH (pictures)",
+        "stream:URL (rtsp, rtp, mpeg-ts…), file:PATH (a video), folder:PATH (pictures)",
     )
     width_px: Width = 640
     height_px: Height = 360

@@ -17,8 +17,8 @@ class FrontCameraConfig(OpticsSection):
 
     url: str = Field(
         "",
-        description="as camera.url: udp://HOST:PORT, device:/dev/videoN, file:PATH or folder:PATH; "
-        "empty: there is none, nothing is scanned",
+        description="as camera.url: udp://HOST:PORT, device:/dev/videoN, stream:URL, file:PATH or "
+        "folder:PATH; empty: there is none, nothing is scanned",
     )
     width_px: Width = 1280
     height_px: Height = 800

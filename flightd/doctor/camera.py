@@ -96,6 +96,9 @@ def judge_camera(config: Config, found: Pictures) -> list[Check]:
         checks.append(warning("camera", text, remedy))
     else:
         checks.append(ok("camera", text))
+    if found.trouble:
+        remedy = "nobody flies by frames of a doubtful time; flightd guide cameras says what is needed"
+        checks.append(warning("camera", found.trouble, remedy))
     if found.picture is not None and not _DARK < (level := float(found.picture.mean())) < _BRIGHT:
         word = "black" if level <= _DARK else "white"
         checks.append(error("camera", f"pictures are {word}", "take off the lens cap; check the exposure"))

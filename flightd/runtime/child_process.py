@@ -71,16 +71,17 @@ class LinkedProcess:
         return self.alive
 
     def hang_up(self) -> None:
-        """Close this end: a process that listens ends by itself.  Nothing more comes from it."""
+        """Close this end, `on_end` is not told: a process that listens ends by itself."""
         self.alive = False
         self._channel.close()
 
     def kill(self, why: str = "the process was killed") -> None:
         """End the process at once; idempotent."""
-        if self.alive:
-            self.hang_up()
-            if self._process.pid is not None:
-                self._process.kill()
+        told, self.alive = not self.alive, False
+        self._channel.close()
+        if self._process.pid is not None:
+            self._process.kill()
+        if not told:
             self._on_end(why)
 
     def join(self, timeout_s: float) -> None:

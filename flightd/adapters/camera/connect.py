@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import nullcontext
 
-from flightd.adapters.camera.capture import CaptureCamera, parse_source
+from flightd.adapters.camera.capture import CaptureCamera
 from flightd.adapters.camera.shared_memory import SharedCamera
+from flightd.adapters.camera.source import parse_source
 from flightd.adapters.vehicle.ardrone.camera import ArDroneCamera
 from flightd.adapters.vehicle.ardrone.settings import DroneCamera
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
@@ -32,7 +33,7 @@ def connect_camera(
 ) -> Camera:
     """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address.
 
-    `on_trouble` hears, now and then, in a line for a person, why pictures are refused.
+    `on_trouble` hears, now and then, in a line for a person, why frames are refused or of doubtful time.
     `url` is where its pictures come from, unless that is the configuration's; time is held by `hold`
     while threads work."""
     url = config.url if url is None else url
@@ -46,4 +47,4 @@ def connect_camera(
         size_px = config.width_px, config.height_px
         return SharedCamera(url, size_px, config.latency_s, clock, on_frame, on_trouble)
     source = parse_source(url, config.width_px, config.height_px, config.fps)
-    return CaptureCamera(source, config.latency_s, clock, on_frame)
+    return CaptureCamera(source, config.latency_s, clock, on_frame, on_trouble)

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from flightd.adapters.camera.capture import CaptureCamera, parse_source
+from flightd.adapters.camera.capture import CaptureCamera
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.camera.shared_memory import SharedCamera
+from flightd.adapters.camera.source import parse_source
 from flightd.config.camera import CameraConfig
 from flightd.core.errors import InputError, TransientError, UnavailableError
 from flightd.runtime.clock import LoopClock
@@ -53,10 +57,80 @@ def test_notices_become_tickets_in_our_time_and_junk_is_counted() -> None:
 
     tickets, camera = virtual(main())
     assert [t.seq for t in tickets] == [0, 1, 2]
-    assert camera.rejected == 5
+    assert camera.refused == 5
     assert len(troubles) == 1, "told once, not for every datagram"
     assert "not a picture notice" in troubles[0]
     assert all(abs(t.arrival_ns - t.stamp_ns - 50_000_000) < 10_000 for t in tickets)
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Of a frame `seq` frames after the first, sent so much after its exposure."""
+
+    seq: int
+    late_s: float
+
+
+def delivered_of(notices: list[Notice], interval_s: float = 0.03) -> tuple[list[tuple[int, float]], int]:
+    """What a shared camera makes of them: (seq, error of its stamp in seconds) of each frame, and how many it
+    refused.  Its camera's clock is not ours."""
+    delivered: list[tuple[int, float]] = []
+
+    async def main() -> int:
+        clock, port = LoopClock(), free_port()
+        began_ns = clock.now_ns()
+
+        def take(ticket: FrameTicket) -> None:
+            exposed_s = began_ns * 1e-9 + ticket.seq * interval_s
+            delivered.append((ticket.seq, ticket.stamp_ns * 1e-9 - exposed_s))
+
+        camera = SharedCamera(f"udp://127.0.0.1:{port}", (64, 36), 0.05, clock, take, lambda _: None)
+        running = asyncio.ensure_future(camera.run())
+        loop = asyncio.get_running_loop()
+        sender, _ = await loop.create_datagram_endpoint(
+            asyncio.DatagramProtocol, remote_addr=("127.0.0.1", port)
+        )
+        for sent in sorted(notices, key=lambda n: n.seq * interval_s + n.late_s):
+            due_s = sent.seq * interval_s + sent.late_s
+            await asyncio.sleep(due_s - (clock.now_ns() - began_ns) * 1e-9)
+            sender.sendto(notice(sent.seq, began_ns + round(sent.seq * interval_s * 1e9) + 10**15))
+        await asyncio.sleep(0.01)
+        running.cancel()
+        await asyncio.wait([running])
+        sender.close()
+        return camera.refused
+
+    refused = virtual(main())
+    return delivered, refused
+
+
+def test_a_notice_that_comes_late_and_out_of_order_is_refused_and_moves_no_other() -> None:
+    """150 ms late, behind five newer ones."""
+    notices = [Notice(seq, 0.2 if seq == 20 else 0.05) for seq in range(40)]
+    delivered, refused = delivered_of(notices)
+    assert [seq for seq, _ in delivered] == [seq for seq in range(40) if seq != 20]
+    assert refused == 1
+    assert all(abs(error_s) < 1e-3 for _, error_s in delivered)
+
+
+@given(late=st.lists(st.integers(0, 300), min_size=30, max_size=30))
+@settings(max_examples=25, deadline=None)
+def test_whatever_order_notices_come_in_frames_are_delivered_in_that_of_exposure(late: list[int]) -> None:
+    notices = [Notice(seq, 0.05 + (late_ms * 1e-3 if seq > 2 else 0.0)) for seq, late_ms in enumerate(late)]
+    delivered, refused = delivered_of(notices)
+    seqs = [seq for seq, _ in delivered]
+    assert seqs == sorted(set(seqs))
+    assert len(delivered) + refused == len(notices)
+    assert all(abs(error_s) < 1e-3 for _, error_s in delivered), (
+        "late ones too are told when they were exposed"
+    )
+
+
+def test_a_frame_exposed_long_ago_is_refused_though_no_newer_one_came() -> None:
+    notices = [Notice(0, 0.05), Notice(1, 0.05), Notice(2, 1.5), Notice(60, 0.05)]
+    delivered, refused = delivered_of(notices)
+    assert [seq for seq, _ in delivered] == [0, 1, 60]
+    assert refused == 1
 
 
 def test_a_port_in_use_is_said_in_one_line() -> None:
@@ -71,7 +145,8 @@ def test_a_port_in_use_is_said_in_one_line() -> None:
 
 
 @pytest.mark.parametrize(
-    "url", ["udp://", "udp://host", "http://x:1", "device:", "file:/no/such", "folder:/no/such"]
+    "url",
+    ["udp://", "udp://host", "http://x:1", "device:", "file:/no/such", "folder:/no/such", "stream:camera"],
 )
 def test_a_wrong_address_is_refused_before_anything_opens(url: str) -> None:
     async def main() -> None:
@@ -93,7 +168,7 @@ def test_a_folder_is_played_in_order_and_its_end_is_told(tmp_path: Path) -> None
 
     async def main() -> None:
         source = parse_source(f"folder:{tmp_path}", 64, 36, 200.0)
-        await CaptureCamera(source, 0.01, LoopClock(), tickets.append).run()
+        await CaptureCamera(source, 0.01, LoopClock(), tickets.append, print).run()
 
     with pytest.raises(TransientError, match="no more pictures"):
         real(main())
@@ -106,7 +181,7 @@ def test_pictures_of_another_size_are_refused_by_name(tmp_path: Path) -> None:
 
     async def main() -> None:
         source = parse_source(f"folder:{tmp_path}", 640, 360, 200.0)
-        await CaptureCamera(source, 0.0, LoopClock(), lambda _: None).run()
+        await CaptureCamera(source, 0.0, LoopClock(), lambda _: None, print).run()
 
     with pytest.raises(TransientError, match="pictures are 64x36, the configuration says 640x360"):
         real(main())

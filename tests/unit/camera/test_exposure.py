@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import socket
 from collections.abc import Callable
 from contextlib import closing
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from flightd.adapters.camera.capture import Source, SourceKind, pictures_of
+from flightd.adapters.camera.capture_process import frames_of
 from flightd.adapters.camera.exposure import DeviceExposure
+from flightd.adapters.camera.source import Source, SourceKind
+from flightd.runtime.message_channel import ChildEnd
 
 AUTOMATIC = 3.0
 
@@ -23,9 +24,10 @@ class Device:
     def __init__(self, usual: float, stubborn: bool = False) -> None:
         self.values = {cv2.CAP_PROP_AUTO_EXPOSURE: AUTOMATIC, cv2.CAP_PROP_EXPOSURE: usual}
         self._stubborn = stubborn
+        self.position_ms = 0.0
 
     def get(self, prop: int, /) -> float:
-        return self.values[prop]
+        return self.position_ms if prop == cv2.CAP_PROP_POS_MSEC else self.values[prop]
 
     def set(self, prop: int, value: float, /) -> bool:
         if self._stubborn:
@@ -33,7 +35,10 @@ class Device:
         self.values[prop] = round(value)
         return True
 
-    def read(self) -> tuple[bool, np.ndarray]:
+    def grab(self) -> bool:
+        return True
+
+    def retrieve(self) -> tuple[bool, np.ndarray]:
         return True, np.zeros((36, 64, 3), np.uint8)
 
 
@@ -69,24 +74,34 @@ def test_pictures_of_a_device_that_cannot_are_said_to_have_the_usual_exposure(de
     assert device.values == before
 
 
-@pytest.mark.parametrize(
-    "end", [lambda ours, pictures: pictures.close(), lambda ours, pictures: ours.close()]
-)
+@pytest.mark.parametrize("end", [lambda ours, frames: frames.close(), lambda ours, frames: ours.close()])
 def test_a_device_is_left_with_the_exposure_that_it_was_found_with(
     monkeypatch: pytest.MonkeyPatch, end: Callable[..., None]
 ) -> None:
     device = Device(200.0)
     monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
-    ours, theirs = multiprocessing.Pipe()
-    with closing(
-        pictures_of(Source(SourceKind.DEVICE, Path("/dev/video0"), 64, 36, 30.0), theirs)
-    ) as pictures:
-        next(pictures)
+    ours, theirs = socket.socketpair()
+    source = Source(SourceKind.DEVICE, "/dev/video0", 64, 36, 30.0)
+    with ours, theirs, closing(frames_of(source, ChildEnd(theirs))) as frames:
+        next(frames)
         before = dict(device.values)
-        ours.send(0.4)
-        assert [next(pictures)[1] for _ in range(9)][-1] == 0.4
+        ChildEnd(ours).send(0.4)
+        assert [next(frames).exposure for _ in range(9)][-1] == 0.4
         assert device.values != before
-        end(ours, pictures)
+        end(ours, frames)
         with pytest.raises((StopIteration, EOFError)):
-            next(pictures)
+            next(frames)
     assert device.values == before
+
+
+def test_a_frame_of_a_device_has_the_time_of_its_buffer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """V4L2's, which OpenCV tells as the position in milliseconds; 0 from a driver without one."""
+    device = Device(200.0)
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
+    ours, theirs = socket.socketpair()
+    source = Source(SourceKind.DEVICE, "/dev/video0", 64, 36, 30.0)
+    with ours, theirs, closing(frames_of(source, ChildEnd(theirs))) as frames:
+        device.position_ms = 123_456.789
+        assert next(frames).device_ns == 123_456_789_000
+        device.position_ms = -1.0
+        assert next(frames).device_ns is None

@@ -1,0 +1,172 @@
+"""The process that reads a camera by OpenCV into shared memory, and what it tells of each frame.
+
+It does nothing else, so that a frame's arrival is known here whatever the daemon's own loop is busy with.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Generator, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from flightd.adapters.camera.exposure import DeviceExposure
+from flightd.adapters.camera.exposure_times import ExposureTimes, TimeSource
+from flightd.adapters.camera.source import Source, SourceKind
+from flightd.core.errors import UnavailableError
+from flightd.core.types import Image
+from flightd.runtime.frame_ring import FrameRing
+from flightd.runtime.message_channel import ChildEnd
+
+SLOTS = 8
+_IMAGES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"}
+_OPEN_MS, _READ_MS = 5000, 2000
+"""A stream that does not open, or stands still, for so long has ended."""
+_FFMPEG = {
+    # as little as possible waits in buffers; what a stream of damaged packets says goes nowhere
+    "OPENCV_FFMPEG_CAPTURE_OPTIONS": "fflags;nobuffer|flags;low_delay|probesize;200000"
+    "|analyzeduration;500000",
+    "OPENCV_FFMPEG_LOGLEVEL": "8",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Grabbed:
+    """One frame as it was read at `arrival_ns` of the machine's monotonic clock; `device_ns` is what driver
+    or stream say of its time, by any clock, None if nothing."""
+
+    bgr: Image
+    arrival_ns: int
+    device_ns: int | None = None
+    exposure: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Captured:
+    """A frame lies in the ring.  `stamp_ns` is mid-exposure, as `arrival_ns` by the machine's monotonic
+    clock; `refused` frames so far had no time that can be believed."""
+
+    slot: int
+    seq: int
+    stamp_ns: int
+    arrival_ns: int
+    exposure: float
+    refused: int
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureOver:
+    """No more frames: why."""
+
+    reason: str
+
+
+def capture(parent: ChildEnd, source: Source, ring_name: str, latency_ns: int) -> None:
+    """The process's life.  Sends `Captured`, a `TimeSource` when it is known what tells of exposures, and
+    `CaptureOver` at the end."""
+    try:
+        ring = FrameRing.attach(ring_name, SLOTS, source.width_px, source.height_px)
+    except UnavailableError as err:
+        parent.send(CaptureOver(str(err)))
+        return
+    parent.send(CaptureOver(_reason_of_end(parent, source, ring, latency_ns)))
+
+
+def _reason_of_end(parent: ChildEnd, source: Source, ring: FrameRing, latency_ns: int) -> str:
+    reason, refused = "cannot be opened, or gives no picture", 0
+    times = ExposureTimes(latency_ns, round(1e9 / source.fps)) if source.kind.is_live else None
+    told: TimeSource | None = None
+    with contextlib.closing(frames_of(source, parent)) as frames:
+        for seq, frame in enumerate(frames):
+            reason = "no more pictures"
+            if frame.bgr.shape != (source.height_px, source.width_px, 3) or frame.bgr.dtype != np.uint8:
+                size = f"{frame.bgr.shape[1]}x{frame.bgr.shape[0]}"
+                return f"pictures are {size}, the configuration says {source.width_px}x{source.height_px}"
+            stamp_ns = _stamp_of(frame, times, latency_ns)
+            if times is not None and times.source not in {None, told}:
+                told = times.source
+                parent.send(told)
+            if stamp_ns is None:
+                refused += 1
+                continue
+            slot = ring.begin(seq)
+            np.copyto(ring.pixels(slot), frame.bgr)
+            ring.publish(slot, seq, stamp_ns)
+            parent.send(Captured(slot, seq, stamp_ns, frame.arrival_ns, frame.exposure, refused))
+    return reason
+
+
+def _stamp_of(frame: Grabbed, times: ExposureTimes | None, latency_ns: int) -> int | None:
+    """Mid-exposure; a recording's frames are exposed when they are due."""
+    if times is None:
+        return frame.arrival_ns - latency_ns
+    return times.of(frame.device_ns, frame.arrival_ns)
+
+
+def frames_of(source: Source, parent: ChildEnd) -> Generator[Grabbed, None, None]:
+    """The source's frames as they come, exposed as `parent` asks for where that can be set."""
+    if source.kind is SourceKind.FOLDER:
+        paths = sorted(path for path in Path(source.place).iterdir() if path.suffix.lower() in _IMAGES)
+        yield from _paced(map(_read, paths), source.fps)
+    elif source.kind is SourceKind.FILE:
+        video = _grabbed(cv2.VideoCapture(source.place))
+        yield from _paced((frame.bgr for frame in video), source.fps)
+    elif source.kind is SourceKind.STREAM:
+        os.environ.update(_FFMPEG)
+        patience = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, _OPEN_MS, cv2.CAP_PROP_READ_TIMEOUT_MSEC, _READ_MS]
+        yield from _grabbed(
+            cv2.VideoCapture(source.place, cv2.CAP_FFMPEG, [*patience, cv2.CAP_PROP_N_THREADS, 1])
+        )
+    else:
+        yield from _of_device(source, parent)
+
+
+def _of_device(source: Source, parent: ChildEnd) -> Iterator[Grabbed]:
+    device = cv2.VideoCapture(source.place, cv2.CAP_V4L2)
+    device.set(cv2.CAP_PROP_FRAME_WIDTH, source.width_px)
+    device.set(cv2.CAP_PROP_FRAME_HEIGHT, source.height_px)
+    device.set(cv2.CAP_PROP_FPS, source.fps)
+    device.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+    exposure = DeviceExposure(device)
+    try:
+        for frame in _grabbed(device):
+            part = exposure.of_next_picture()
+            yield Grabbed(frame.bgr, frame.arrival_ns, frame.device_ns, part)
+            while parent.has_news():
+                exposure.ask(parent.receive())
+    finally:
+        exposure.give_back()
+
+
+def _grabbed(video: cv2.VideoCapture) -> Iterator[Grabbed]:
+    """Frames with the time of their buffer (V4L2) or their presentation time (a stream): OpenCV tells both as
+    the position, 0 where there is none."""
+    while video.grab():
+        arrival_ns = time.monotonic_ns()
+        position_ms = video.get(cv2.CAP_PROP_POS_MSEC)
+        good, bgr = video.retrieve()
+        if not good:
+            return
+        device_ns = round(position_ms * 1e6) if position_ms >= 0.0 else None
+        yield Grabbed(np.asarray(bgr, dtype=np.uint8), arrival_ns, device_ns)
+
+
+def _read(path: Path) -> Image | None:
+    bgr = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    return None if bgr is None else np.asarray(bgr, dtype=np.uint8)
+
+
+def _paced(recorded: Iterable[Image | None], fps: float) -> Iterator[Grabbed]:
+    """Recorded frames at their rate; unreadable ones are left out."""
+    due_s = time.monotonic()
+    for bgr in recorded:
+        if bgr is None:
+            continue
+        due_s += 1.0 / fps
+        time.sleep(max(due_s - time.monotonic(), 0.0))
+        yield Grabbed(bgr, time.monotonic_ns())
