@@ -68,6 +68,8 @@ class Faults:
     blank: bool = False
     bare: bool = False
     late_ns: int = 0
+    stall_ns: int = 0
+    """No tick for so long; the setpoint before holds, what comes meanwhile waits."""
     silent: bool = False
     heartless: bool = False
     rangeless: bool = False
@@ -196,7 +198,8 @@ class IdealFlight:
                     vision.put(due_ns, self._see(seq))
             self._photograph()
             if self._now_ns >= tick_ns:
-                tick_ns += TICK_NS
+                tick_ns += TICK_NS + self.faults.stall_ns
+                self.faults.stall_ns = 0
                 if self._battery_swapper is not None:
                     self._battery_swapper.look(self._now_ns)
                 output = tick.run(self._now_ns)

@@ -98,6 +98,7 @@ TRIALS: dict[str, Trial] = {
     "detector_hung": Trial(fault(health=Health(0.08, 2)), ends=Phase.DONE, found_s=0.05),
     "overload": Trial(fault(health=Health(0.4)), found_s=3.2),
     "clock_jump": Trial(fault(stamps_refused=40), ends=Phase.DONE, found_s=0.05),
+    "loop_stalled": Trial(fault(stall_ns=700_000_000), ends=Phase.DONE, found_s=0.75),
     "disk_full": Trial(fault(health=Health(0.08, 0, 0, "No space left on device")), found_s=0.05),
     "recorder_dead": Trial(fault(health=Health(0.08, 0, 1)), ends=Phase.DONE, found_s=0.05),
 }

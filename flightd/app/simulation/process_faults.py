@@ -6,6 +6,7 @@ import asyncio
 import os
 import resource
 import signal
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 
@@ -21,6 +22,7 @@ from flightd.sim.scenario.fault_schema import (
     Fault,
     GroundOrder,
     GroundSilent,
+    LoopStalled,
     OfCamera,
     ProcessFault,
 )
@@ -28,6 +30,7 @@ from flightd.sim.scenario.faults import place_of
 from flightd.site.site import Site
 
 _ATTEND_S = 0.5
+_LOOK_S = 0.005
 _TURN_S = 0.4
 """One turn in which the processor is taken and given back."""
 
@@ -93,6 +96,8 @@ class LauncherFaults:
                 _signal((self._recorder.pid,), signal.SIGKILL)
             case ProcessFault(kind="disk_full"):
                 self._fill_disk(on)
+            case LoopStalled() if on:
+                _stand_still(fault.stall_s)
             case CpuTaken():
                 self._taken = fault.share if on else 0.0
             case GroundSilent():
@@ -132,6 +137,14 @@ class LauncherFaults:
         assert self._ground is not None
         status, command = (int(endpoint.rpartition(":")[2]) for endpoint in self._ground.endpoints)
         return Address("127.0.0.1", status, command)
+
+
+def _stand_still(stall_s: float) -> None:
+    """Let nothing else on the loop have its turn for so long, by the loop's own time."""
+    loop = asyncio.get_running_loop()
+    until_s = loop.time() + stall_s
+    while loop.time() < until_s:
+        time.sleep(_LOOK_S)
 
 
 def _signal(pids: Sequence[int], what: signal.Signals) -> None:

@@ -245,9 +245,17 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "frames_disordered",
+        None,
+        "a frame exposed before one that was delivered already, or more than a second ago",
+        Action.REPORT,
+        "refused and counted, never flown by; the times of the others stay as they are",
+        "tests/sim/test_camera_times.py",
+    ),
+    Hazard(
         "detector_killed",
         Trigger.DETECTOR_LOST,
-        "the detector's pipe closes",
+        "the detector's channel closes, in the middle of an answer too",
         Action.REPORT,
         "replaced at once, the frame counted as lost; all of them gone is as stale pictures",
         _FAST,
@@ -255,7 +263,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "detector_hung",
         Trigger.DETECTOR_LOST,
-        "no answer within `vision.timeout_s`",
+        "no answer, or only a part of one, within `vision.timeout_s`",
         Action.REPORT,
         "killed and replaced, the frame counted as lost",
         _FAST,
@@ -276,6 +284,15 @@ HAZARDS: tuple[Hazard, ...] = (
         Action.HOLD,
         "times of arrival are used; on when the clocks agree again; wall time decides nothing",
         _FAST,
+    ),
+    Hazard(
+        "loop_stalled",
+        Trigger.CLOCK_JUMP,
+        "a tick half a second late: the daemon stood still",
+        Action.HOLD,
+        "frames and attitudes that waited keep the time at which they were true, what is old is refused; on"
+        " when nothing is missing",
+        "tests/sim/test_camera_times.py",
     ),
     Hazard(
         "map_wrong",

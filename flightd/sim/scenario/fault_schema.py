@@ -60,6 +60,14 @@ class CameraLate(OfCamera):
     delay_s: float = Field(0.9, gt=0, le=5, description="on top of the capture delay")
 
 
+class CameraDisordered(OfCamera):
+    """Every so many frames one comes late, behind newer ones."""
+
+    kind: Literal["camera_disordered"]
+    delay_s: float = Field(0.15, gt=0, le=0.2, description="on top of the capture delay")
+    every: int = Field(4, ge=2, le=100)
+
+
 class CameraTurned(OfCamera):
     """A mount that was knocked: the picture turns, clockwise, about its middle."""
 
@@ -168,6 +176,15 @@ class ProcessFault(_Fault):
     kind: Literal["detector_hung", "writer_killed", "disk_full"]
 
 
+class LoopStalled(_Fault):
+    """The daemon's own process stands still for so long, as one does whose memory was swapped out."""
+
+    by_launcher = True
+    real_time = True
+    kind: Literal["loop_stalled"]
+    stall_s: float = Field(0.8, gt=0, le=5)
+
+
 class CpuTaken(_Fault):
     """The detectors get only the rest of the processor, in turns of 0.4 s."""
 
@@ -199,6 +216,7 @@ class GroundOrder(_Fault):
 Fault: TypeAlias = Annotated[
     CameraFault
     | CameraLate
+    | CameraDisordered
     | CameraTurned
     | BareFloor
     | LinkFault
@@ -212,6 +230,7 @@ Fault: TypeAlias = Annotated[
     | ClockJump
     | DetectorKilled
     | ProcessFault
+    | LoopStalled
     | CpuTaken
     | GroundSilent
     | GroundOrder,

@@ -24,6 +24,7 @@ from flightd.sim.scenario.fault_schema import (
     AttitudeBiased,
     BareFloor,
     BatteryDrop,
+    CameraDisordered,
     CameraFault,
     CameraLate,
     CameraTurned,
@@ -154,7 +155,7 @@ class WorldFaults:
     def turn(self, fault: Fault, on: bool) -> None:
         """Begin or end one fault that is the world's own."""
         match fault:
-            case CameraFault() | CameraLate() | CameraTurned():
+            case CameraFault() | CameraLate() | CameraDisordered() | CameraTurned():
                 self._spoil(fault, on)
             case BatteryDrop() if on:
                 self._airframe.battery_frac = fault.charge
@@ -164,7 +165,7 @@ class WorldFaults:
             case _ if isinstance(self._vehicle, AutopilotPeer):
                 _break(self._vehicle, fault, on)
 
-    def _spoil(self, fault: CameraFault | CameraLate | CameraTurned, on: bool) -> None:
+    def _spoil(self, fault: CameraFault | CameraLate | CameraDisordered | CameraTurned, on: bool) -> None:
         camera = self._cameras.get("camera" if fault.camera == "down" else "front-camera")
         if camera is None:
             return
@@ -172,6 +173,8 @@ class WorldFaults:
         match fault:
             case CameraLate():
                 trouble.late_s = fault.delay_s if on else 0.0
+            case CameraDisordered():
+                trouble.straggler_s, trouble.straggler_every = (fault.delay_s if on else 0.0), fault.every
             case CameraTurned():
                 trouble.turn_deg = fault.turn_deg if on else 0.0
             case CameraFault(kind="camera_frozen"):

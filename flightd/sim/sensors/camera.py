@@ -96,6 +96,9 @@ class CameraTrouble:
 
     gone: bool = False
     late_s: float = 0.0
+    straggler_s: float = 0.0
+    straggler_every: int = 1
+    """One frame of so many is late by `straggler_s`, the others come before it."""
     frozen: bool = False
     level: int | None = None
     """Every pixel is of this grey level."""
@@ -197,7 +200,9 @@ class CameraPeer:
                 jitter_s = self._random.random() * self._camera.jitter_s
                 due_ns = exposure_ns + round((self._camera.capture_delay_s + jitter_s) * 1e9)
                 truth = self._truth_at(exposure_ns)
-                due_ns += round(self.trouble.late_s * 1e9)
+                straggles = seq % self.trouble.straggler_every == 0
+                late_s = self.trouble.late_s + (self.trouble.straggler_s if straggles else 0.0)
+                due_ns += round(late_s * 1e9)
                 pictures.create_task(self._deliver(child, transport, truth, seq, due_ns, self._exposure))
             seq += 1
 
