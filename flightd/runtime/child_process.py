@@ -139,17 +139,19 @@ class Child:
     def pid(self) -> int | None:
         return self._process.pid
 
-    async def ask(self, request: Any) -> Any:
-        """The child's answer.  Raises TransientError when it dies over it.  One request at a time."""
-        if not self.alive:
-            raise TransientError("the process died")
-        self._answer = self._loop.create_future()
-        self._process.send(request)
-        return await self._answer
+    def ask(self, request: Any) -> asyncio.Future[Any]:
+        """The child's answer, to be awaited or cancelled: TransientError when it dies over it.  One request
+        at a time."""
+        self._answer = answer = self._loop.create_future()
+        if self.alive:
+            self._process.send(request)
+        else:
+            answer.set_exception(TransientError("the process died"))
+        return answer
 
-    def kill(self) -> None:
-        """End the child at once; idempotent."""
-        self._process.kill()
+    def kill(self, why: str = "the process was killed") -> None:
+        """End the child at once, which its answer fails with; idempotent."""
+        self._process.kill(why)
 
     def join(self, timeout_s: float) -> None:
         """Wait for a killed child to be gone."""

@@ -30,6 +30,8 @@ FoundT_co = TypeVar("FoundT_co", covariant=True)
 
 _Lines: TypeAlias = "tuple[LineSet, bytes | None]"
 _MAX_RINGS = 4
+_STOOD_STILL_S = 0.1
+"""A timer that is late by more shows that the loop stood still."""
 _HOPELESS = 8
 """Workers that died in a row without one being ready."""
 
@@ -169,22 +171,33 @@ class PicturePool(Generic[AskT, FoundT]):
         worker = await self._take()
         answer: _Answer
         try:
-            async with asyncio.timeout(self._timeout_s):
-                answer = await worker.ask((ticket, ask))
-        except TimeoutError:
-            answer = f"the {self._name} process hung"
-            worker.kill()
+            answer = await self._in_time(worker, (ticket, ask))
         except TransientError as err:
             answer = str(err)
-        except asyncio.CancelledError:
-            worker.kill()  # its answer would be taken for the next picture's
-            raise
         if worker.alive:
             self._idle.put_nowait(worker)
         if isinstance(answer, str):
             self.lost[answer.split(":", maxsplit=1)[0]] += 1
             return None
         found: FoundT = answer[0]
+        return found
+
+    async def _in_time(self, worker: Child, request: tuple[FrameTicket, AskT]) -> _Answer:
+        """The worker's answer; TransientError when it died over it, or was killed because it hung.  Where
+        this loop stood still, what came meanwhile still has to be read: that is no fault of the worker's."""
+        answer, loop = worker.ask(request), asyncio.get_running_loop()
+        due_s = loop.time() + self._timeout_s
+        try:
+            await asyncio.wait([answer], timeout=self._timeout_s)
+            if loop.time() - due_s > _STOOD_STILL_S:
+                await asyncio.wait([answer], timeout=self._timeout_s)
+        except asyncio.CancelledError:
+            answer.cancel()
+            worker.kill()  # its answer would be taken for the next picture's
+            raise
+        if not answer.done():
+            worker.kill(f"the {self._name} process hung")
+        found: _Answer = answer.result()
         return found
 
     async def _take(self) -> Child:

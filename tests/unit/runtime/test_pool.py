@@ -6,6 +6,7 @@ import asyncio
 import os
 import signal
 import socket
+import threading
 from functools import partial
 
 import numpy as np
@@ -199,6 +200,24 @@ def test_a_worker_stopped_or_killed_in_mid_answer_keeps_nothing_else_waiting(
     assert pool.replaced == 1
     if number is signal.SIGSTOP:
         assert turns > 10, "others had their turn meanwhile"
+
+
+def test_an_answer_that_waited_for_a_stalled_loop_is_taken_and_its_worker_lives() -> None:
+    async def main() -> tuple[bytes | None, PicturePool[bool, bytes]]:
+        ring, make = FrameRing.create(4, 64, 36), partial(large_answers, None)
+        try:
+            with PicturePool(make, 1, 0.3, LoopClock(), "test") as pool:
+                await pool.ready()
+                asked = asyncio.ensure_future(pool.ask(ticket(ring, 1, 7), True))
+                await asyncio.sleep(0)
+                threading.Event().wait(0.6)  # nothing else has its turn meanwhile
+                return await asked, pool
+        finally:
+            ring.close()
+
+    answer, pool = real(main())
+    assert answer is not None
+    assert pool.replaced == 0
 
 
 def test_an_answer_of_8_mb_comes_whole_while_others_have_their_turn() -> None:
