@@ -206,11 +206,11 @@ def test_an_answer_that_waited_for_a_stalled_loop_is_taken_and_its_worker_lives(
     async def main() -> tuple[bytes | None, PicturePool[bool, bytes]]:
         ring, make = FrameRing.create(4, 64, 36), partial(large_answers, None)
         try:
-            with PicturePool(make, 1, 0.3, LoopClock(), "test") as pool:
+            with PicturePool(make, 1, 0.7, LoopClock(), "test") as pool:
                 await pool.ready()
                 asked = asyncio.ensure_future(pool.ask(ticket(ring, 1, 7), True))
                 await asyncio.sleep(0)
-                threading.Event().wait(0.6)  # nothing else has its turn meanwhile
+                threading.Event().wait(1.0)  # nothing else has its turn meanwhile
                 return await asked, pool
         finally:
             ring.close()
