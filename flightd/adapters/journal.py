@@ -10,7 +10,7 @@ import json
 import logging
 import os
 import re
-from typing import TextIO
+from typing import Protocol, TextIO
 
 from flightd.core.snapshot import Snapshot
 from flightd.core.types import Event, EventLevel
@@ -34,10 +34,18 @@ def line(priority: int, **fields: object) -> str:
     return f"<{priority}>" + " ".join(f"{key}={_value(value)}" for key, value in fields.items())
 
 
+class Lines(Protocol):
+    """What lines are written to; the control tick writes: it must not wait (`runtime.line_writer`)."""
+
+    def write(self, text: str, /) -> int: ...
+
+    def flush(self) -> None: ...
+
+
 class JournalMonitor:
     """`ports.Monitor`: every event as a line, the status every ten seconds and at each change of phase."""
 
-    def __init__(self, out: TextIO) -> None:
+    def __init__(self, out: Lines) -> None:
         self._out = out
         self._said_ns = -(10**18)
         self._phase = ""

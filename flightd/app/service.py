@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
 import sys
 from collections.abc import AsyncIterator, Mapping
@@ -14,6 +15,7 @@ from flightd.adapters.metrics.server import MetricsServer
 from flightd.adapters.systemd import SystemdMonitor
 from flightd.config.metrics import MetricsConfig
 from flightd.ports import Monitor
+from flightd.runtime.line_writer import LineWriter
 
 _MARK = "started"
 
@@ -22,7 +24,9 @@ def logs_to_journal(environment: Mapping[str, str]) -> bool:
     """Whether stderr goes to the journal; if so, the program's own log lines take its form from now on."""
     if not goes_to_journal(sys.stderr, environment.get("JOURNAL_STREAM", "")):
         return False
-    handler = logging.StreamHandler(sys.stderr)
+    lines = LineWriter(sys.stderr)
+    atexit.register(lines.close)
+    handler = logging.StreamHandler(lines)
     handler.setFormatter(JournalFormatter())
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
     return True
@@ -58,7 +62,9 @@ async def monitors(
     found: list[Monitor] = []
     async with AsyncExitStack() as stack:
         if journal:
-            found.append(JournalMonitor(sys.stderr))
+            lines = LineWriter(sys.stderr)
+            stack.callback(lines.close)
+            found.append(JournalMonitor(lines))
         if (systemd := SystemdMonitor.of_environment(environment)) is not None:
             stack.callback(systemd.close)
             found.append(systemd)
