@@ -27,6 +27,8 @@ SLOTS = 8
 _IMAGES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"}
 _OPEN_MS, _READ_MS = 5000, 2000
 """A stream that does not open, or stands still, for so long has ended."""
+_DOUBTFUL_NS = 4_000_000_000
+"""A live source without one frame to fly by for so long is opened anew."""
 _FFMPEG = {
     # as little as possible waits in buffers; what a stream of damaged packets says goes nowhere
     "OPENCV_FFMPEG_CAPTURE_OPTIONS": "fflags;nobuffer|flags;low_delay|probesize;200000"
@@ -81,6 +83,7 @@ def _reason_of_end(parent: ChildEnd, source: Source, ring: FrameRing, latency_ns
     reason, refused = "cannot be opened, or gives no picture", 0
     times = ExposureTimes(latency_ns, round(1e9 / source.fps)) if source.kind.is_live else None
     told: TimeSource | None = None
+    good_ns: int | None = None
     with contextlib.closing(frames_of(source, parent)) as frames:
         for seq, frame in enumerate(frames):
             reason = "no more pictures"
@@ -91,9 +94,13 @@ def _reason_of_end(parent: ChildEnd, source: Source, ring: FrameRing, latency_ns
             if times is not None and times.source not in {None, told}:
                 told = times.source
                 parent.send(told)
+            good_ns = good_ns or frame.arrival_ns
             if stamp_ns is None:
                 refused += 1
+                if frame.arrival_ns - good_ns > _DOUBTFUL_NS:
+                    return "frames come, but none of a time that can be believed"
                 continue
+            good_ns = frame.arrival_ns
             slot = ring.begin(seq)
             np.copyto(ring.pixels(slot), frame.bgr)
             ring.publish(slot, seq, stamp_ns)

@@ -10,9 +10,12 @@ import cv2
 import numpy as np
 import pytest
 
-from flightd.adapters.camera.capture_process import frames_of
+from flightd.adapters.camera import capture_process
+from flightd.adapters.camera.capture_process import CaptureOver, frames_of
 from flightd.adapters.camera.exposure import DeviceExposure
+from flightd.adapters.camera.exposure_times import TimeSource
 from flightd.adapters.camera.source import Source, SourceKind
+from flightd.runtime.frame_ring import FrameRing
 from flightd.runtime.message_channel import ChildEnd
 
 AUTOMATIC = 3.0
@@ -105,3 +108,41 @@ def test_a_frame_of_a_device_has_the_time_of_its_buffer(monkeypatch: pytest.Monk
         assert next(frames).device_ns == 123_456_789_000
         device.position_ms = -1.0
         assert next(frames).device_ns is None
+
+
+class InventedTimes:
+    """A stream whose frames come every 25 ms and are said to be 40 ms apart, and the clock that shows it."""
+
+    def __init__(self) -> None:
+        self.now_ns = 0
+
+    def monotonic_ns(self) -> int:
+        return self.now_ns
+
+    def get(self, _prop: int, /) -> float:
+        return self.now_ns * 1e-6 * 40 / 25
+
+    def grab(self) -> bool:
+        self.now_ns += 25_000_000
+        return True
+
+    def retrieve(self) -> tuple[bool, np.ndarray]:
+        return True, np.zeros((36, 64, 3), np.uint8)
+
+
+def test_a_stream_whose_times_are_invented_is_not_flown_by(monkeypatch: pytest.MonkeyPatch) -> None:
+    video = InventedTimes()
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: video)
+    monkeypatch.setattr(capture_process, "time", video)
+    ring = FrameRing.create(capture_process.SLOTS, 64, 36)
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        source = Source(SourceKind.STREAM, "rtsp://camera", 64, 36, 40.0)
+        capture_process.capture(ChildEnd(theirs), source, ring.name, 0)
+        daemon = ChildEnd(ours)
+        assert daemon.receive() is TimeSource.DEVICE
+        over = daemon.receive()
+    ring.close()
+    assert isinstance(over, CaptureOver)
+    assert "none of a time that can be believed" in over.reason
+    assert video.now_ns < 10e9
