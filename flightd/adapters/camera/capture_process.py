@@ -71,6 +71,7 @@ class CaptureOver:
 def capture(parent: ChildEnd, source: Source, ring_name: str, latency_ns: int) -> None:
     """The process's life.  Sends `Captured`, a `TimeSource` when it is known what tells of exposures, and
     `CaptureOver` at the end."""
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)  # what cannot be opened is told
     try:
         ring = FrameRing.attach(ring_name, SLOTS, source.width_px, source.height_px)
     except UnavailableError as err:
