@@ -66,8 +66,7 @@ class CaptureCamera:
 
     async def run(self) -> None:
         source = self._source
-        # in a thread: the memory is taken at once, tens of megabytes of it
-        ring = await asyncio.to_thread(FrameRing.create, SLOTS, source.width_px, source.height_px)
+        ring = await _memory_for(source)
         over: asyncio.Future[str] = asyncio.get_running_loop().create_future()
 
         def end(reason: str) -> None:
@@ -142,3 +141,15 @@ class CaptureCamera:
                     frame.exposure,
                 )
             )
+
+
+async def _memory_for(source: Source) -> FrameRing:
+    """In a thread: the memory is taken at once, tens of megabytes of it."""
+    taken = asyncio.ensure_future(
+        asyncio.to_thread(FrameRing.create, SLOTS, source.width_px, source.height_px)
+    )
+    try:
+        return await asyncio.shield(taken)
+    except asyncio.CancelledError:
+        (await taken).close()
+        raise

@@ -18,8 +18,9 @@ ROOT = Path(__file__).parents[3]
 def test_names_are_unique_and_a_trigger_has_one_action() -> None:
     names = [row.name for row in HAZARDS]
     assert len(set(names)) == len(names)
-    actions = {(row.trigger, row.action) for row in HAZARDS}
-    assert len(actions) == len({row.trigger for row in HAZARDS})
+    told = [row for row in HAZARDS if row.trigger is not None]
+    actions = {(row.trigger, row.action) for row in told}
+    assert len(actions) == len({row.trigger for row in told})
 
 
 @pytest.mark.parametrize("row", HAZARDS, ids=lambda row: row.name)
