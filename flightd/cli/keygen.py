@@ -39,7 +39,7 @@ def keygen(
       flightd keygen --mavlink /etc/flightd/mavlink.key --send serial:///dev/ttyACM0:115200
       then in the configuration: [vehicle] signing_key = "mavlink.key"
     """
-    from flightd.adapters.vehicle.mavlink.link.key_transfer import give_key, refuse_overheard
+    from flightd.adapters.vehicle.mavlink.key_transfer import give_key, refuse_overheard
     from flightd.adapters.vehicle.mavlink.link.signing import make_key, read_key
     from flightd.runtime.clock import LoopClock
 

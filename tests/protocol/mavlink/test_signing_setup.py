@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.examination import Examination
+from flightd.adapters.vehicle.mavlink.key_transfer import give_key, refuse_overheard
 from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
-from flightd.adapters.vehicle.mavlink.link.key_transfer import give_key, refuse_overheard
 from flightd.adapters.vehicle.mavlink.link.signing import Signing
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
 from flightd.cli.main import app

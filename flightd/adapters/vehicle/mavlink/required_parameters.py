@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
-from flightd.adapters.vehicle.mavlink.services.parameters import Names
+
+Names: TypeAlias = tuple[str, ...]
+"""One parameter under the names it has had, oldest first."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,11 +20,11 @@ from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
 from flightd.adapters.vehicle.mavlink.refusal import NoWayDown, ParameterUnread, WrongFirmware
-from flightd.adapters.vehicle.mavlink.required_parameters import judge, way_down_rules
+from flightd.adapters.vehicle.mavlink.required_parameters import Names, judge, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, Beats, too_slow
-from flightd.adapters.vehicle.mavlink.services.parameters import Names, Parameters
+from flightd.adapters.vehicle.mavlink.services.parameters import Parameters
 from flightd.adapters.vehicle.mavlink.services.statustext import SEVERITIES, TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target

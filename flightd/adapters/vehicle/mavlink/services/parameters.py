@@ -7,15 +7,12 @@ import math
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link.codec import Message
 from flightd.adapters.vehicle.mavlink.link.connection import MavlinkLink
-
-Names: TypeAlias = tuple[str, ...]
-"""One parameter under the names it has had, oldest first."""
+from flightd.adapters.vehicle.mavlink.required_parameters import Names
 
 _ANSWER_S = 0.4
 _ATTEMPTS = 3
