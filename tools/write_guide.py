@@ -23,7 +23,7 @@ from flightd.guide import pages
 from flightd.mission.safety import hazard_table
 from flightd.sim.judge.verdict import KINDS
 from flightd.site.site_file import SiteFile
-from tools import reference_tables
+from tools import reference_tables, safety_case
 from tools.command_help import help_pages
 from tools.layer_picture import layers, picture
 
@@ -79,6 +79,7 @@ PARTS: Mapping[str, Callable[[], str]] = {
     "protocol": protocol_text.markdown,
     "hazards": hazard_table.markdown,
     "faults": _faults,
+    "safety-case": safety_case.markdown,
     "parameters-ardupilot": lambda: _parameters(Firmware.ARDUPILOT),
     "parameters-px4": lambda: _parameters(Firmware.PX4),
     "pages": lambda: _page_list(""),

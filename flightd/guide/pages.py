@@ -19,6 +19,7 @@ TOPICS = (
     "service",
     "ground-link",
     "hazards",
+    "safety-case",
     "troubleshooting",
     "configuration",
     "commands",

@@ -1,0 +1,86 @@
+"""The safety case of the guide: each hazard with its cause, how it is found and answered, and the evidence.
+
+python -m tools.safety_case SWEEP.json...   # take the evidence from what `flightd sim --scenario all --seeds N
+                                            # --json` printed; then run `python -m tools.write_guide`
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from flightd.guide.pages import FOLDER
+from flightd.mission.safety.hazard_table import HAZARDS
+from flightd.sim.scenario.scenario_files import shipped_scenarios
+
+EVIDENCE = FOLDER / "safety-evidence.json"
+_WORST = {"min_clearance_m": min, "off_leg_max_m": max, "max_overshoot_m": max, "down_s": max}
+
+
+def evidence_of(flights: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """What the flights of a sweep show of each hazard: how many there were and were good, the worst figures
+    of all of them (None where none was measured)."""
+    found: dict[str, dict[str, Any]] = {}
+    by_hazard: dict[str, list[Mapping[str, Any]]] = {}
+    for flight in flights:
+        by_hazard.setdefault(flight["hazard"], []).append(flight)
+    for hazard, flown in by_hazard.items():
+        row: dict[str, Any] = {
+            "flights": len(flown),
+            "good": sum(not (flight["faults"] or flight["error"]) for flight in flown),
+        }
+        for key, worst in _WORST.items():
+            values = [flight[key] for flight in flown if flight[key] is not None]
+            row[key] = worst(values) if values else None
+        found[hazard] = row
+    return found
+
+
+def markdown() -> str:
+    """The table as the guide prints it."""
+    evidence = json.loads(EVIDENCE.read_text(encoding="utf-8"))
+    paths = shipped_scenarios()
+    lines = [
+        "| hazard | cause | found by | action | flown | good | nearest | off its leg | too high | down in |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in HAZARDS:
+        shown = evidence.get(row.name)
+        cells = [f"`{row.name}`", _cause(paths[row.name]), row.found_by, str(row.action)]
+        cells += ["not yet", *[""] * 5] if shown is None else _cells(shown)
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _cells(shown: Mapping[str, Any]) -> list[str]:
+    figures = [
+        "-" if shown[key] is None else f"{shown[key]:.2f} {'s' if key == 'down_s' else 'm'}" for key in _WORST
+    ]
+    return [str(shown["flights"]), str(shown["good"]), *figures]
+
+
+def _cause(scenario: Path) -> str:
+    """What goes wrong in a scenario: the sentence at the head of its file."""
+    lines = scenario.read_text(encoding="utf-8").splitlines()
+    head = [line.lstrip("# ") for line in lines[: next(i for i, line in enumerate(lines) if line[:1] != "#")]]
+    return " ".join(head)
+
+
+def main(arguments: Sequence[str]) -> int:
+    plain = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=plain)
+    parser.add_argument("sweeps", type=Path, nargs="+")
+    options = parser.parse_args(arguments)
+    sweeps = [json.loads(path.read_text(encoding="utf-8")) for path in options.sweeps]
+    flights = [flight for sweep in sweeps for flight in sweep["flights"]]
+    EVIDENCE.write_text(json.dumps(evidence_of(flights), indent=1) + "\n", encoding="utf-8")
+    print(f"{EVIDENCE.name}: {len(flights)} flights")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
