@@ -58,6 +58,12 @@ class HazardConfig(Section):
     corridor_m: float = Field(
         0.45, ge=0.3, le=5, description="free way to both sides of every painted line of the map"
     )
+    clock_error_s: float = Field(
+        0.02,
+        ge=0.005,
+        le=0.2,
+        description="times of the vehicle's clock that are less certain (1 sigma) are not flown by",
+    )
     latency_s: float = Field(
         0.25, ge=0.05, le=2, description="p99 from exposure to the wire that can be flown by"
     )

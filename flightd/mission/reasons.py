@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -43,6 +44,14 @@ class StartChargeLow:
 
     charge_frac: float
     needed_frac: float
+
+
+@dataclass(frozen=True, slots=True)
+class ClockUnsure:
+    """The vehicle's clock is not known in ours well enough; `error_s` is NaN where it does not answer."""
+
+    error_s: float
+    limit_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +101,7 @@ Reason: TypeAlias = (
     | Happened
     | Refused
     | StartChargeLow
+    | ClockUnsure
     | LatePictures
     | AwaitsBattery
     | ChargeLow
@@ -111,6 +121,11 @@ def in_words(reason: Reason) -> str:
             text = f"{in_words(why)}: {refusal}"
         case StartChargeLow(charge, needed):
             text = f"battery at {charge:.0%}, {needed:.0%} needed to start"
+        case ClockUnsure(error_s, limit_s) if math.isnan(error_s):
+            text = "the vehicle does not answer about its clock (TIMESYNC)"
+        case ClockUnsure(error_s, limit_s):
+            known = f"known to {error_s * 1e3:.0f} ms only"
+            text = f"the vehicle's clock is {known}, {limit_s * 1e3:.0f} ms are needed"
         case LatePictures(limit_s):
             text = f"pictures are more than {limit_s * 1e3:.0f} ms old when they have been looked at"
         case AwaitsBattery(stops, charge, full):

@@ -31,6 +31,7 @@ class Trigger(enum.Enum):
     TIMED_OUT = "the phase took too long"
     TELEMETRY_STALE = "vehicle telemetry stale"
     CLOCK_JUMP = "a clock jumped"
+    CLOCK_UNSURE = "the vehicle's clock is not known well enough"
     CAMERA_FROZEN = "camera frozen"
     CAMERA_BLIND = "camera black or over-exposed"
     FRAMES_STALE = "pictures stale or gone"

@@ -98,6 +98,9 @@ TRIALS: dict[str, Trial] = {
     "detector_hung": Trial(fault(health=Health(0.08, 2)), ends=Phase.DONE, found_s=0.05),
     "overload": Trial(fault(health=Health(0.4)), found_s=3.2),
     "clock_jump": Trial(fault(stamps_refused=40), ends=Phase.DONE, found_s=0.05),
+    "clock_unsure": Trial(
+        fault(clock_error_s=0.1), fault(clock_error_s=0.0), 2.0, ends=Phase.DONE, found_s=1.1
+    ),
     "disk_full": Trial(fault(health=Health(0.08, 0, 0, "No space left on device")), found_s=0.05),
     "recorder_dead": Trial(fault(health=Health(0.08, 0, 1)), ends=Phase.DONE, found_s=0.05),
 }

@@ -80,6 +80,7 @@ class NewestReadings:
             heartbeat_ns=self.heartbeat_ns,
             refusal=refusal,
             stamps_refused=stamps_refused,
+            clock_error_s=self._sync.error_s(now_ns),
         )
 
     def _set_range(self, distance_m: float, stamp_ns: int) -> None:

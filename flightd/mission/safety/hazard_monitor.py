@@ -22,6 +22,8 @@ _TICK_S = 0.06
 _GAP_S = 0.5
 _NEWS_S = 1.0
 """Something that was replaced is news for so long."""
+_CLOCK_S = 0.3
+"""So soon clocks are compared anew after a reboot or a jump."""
 _JUMPED = 3
 """So many attitudes with a senseless time are no stray datagram."""
 
@@ -132,6 +134,7 @@ class HazardMonitor:
             Trigger.BATTERY_CRITICAL: (v.battery_frac < p.battery_land, 0.0),
             Trigger.BATTERY_LOW: (self.battery_low(s), 0.0),
             Trigger.CLOCK_JUMP: (jumped, 0.0),
+            Trigger.CLOCK_UNSURE: (not v.clock_error_s <= h.clock_error_s, _CLOCK_S),
         }
 
     def _links(self, s: MissionInputs) -> _Conditions:

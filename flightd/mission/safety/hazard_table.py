@@ -278,6 +278,15 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "clock_unsure",
+        Trigger.CLOCK_UNSURE,
+        "offset and rate of the vehicle's clock not known to `hazards.clock_error_s`: it does not answer, or too"
+        " late",
+        Action.HOLD,
+        _HOLD,
+        _FAST,
+    ),
+    Hazard(
         "map_wrong",
         Trigger.POSITION_DOUBTED,
         "probability of the node below `mission.integrity_min` for 0.3 s (3 s after take-off), or the"

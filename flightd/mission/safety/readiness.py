@@ -6,16 +6,18 @@ import math
 
 from flightd.config.schema import Config
 from flightd.mission.guidance import MissionInputs
-from flightd.mission.reasons import AwaitsBattery, LatePictures, Plain, Reason, StartChargeLow
+from flightd.mission.reasons import AwaitsBattery, ClockUnsure, LatePictures, Plain, Reason, StartChargeLow
 
 
 def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason | None:
     """Why the flight cannot start, None if it can; `ground_silent`: who attends it has fallen silent."""
     p, v, latency_s = config.mission, s.vehicle, config.hazards.latency_s
+    clock_s = config.hazards.clock_error_s
     if v is None or s.telemetry_age_s > p.telemetry_hold_s:
         return Plain.NO_TELEMETRY
     checks: tuple[tuple[bool, Reason], ...] = (
         (v.armed, Plain.ARMED_ALREADY),
+        (not v.clock_error_s <= clock_s, ClockUnsure(v.clock_error_s, clock_s)),
         (math.isnan(s.height_m), Plain.NO_HEIGHT),
         (math.isnan(v.battery_frac), Plain.NO_CHARGE),
         (v.battery_frac < p.battery_start, StartChargeLow(v.battery_frac, p.battery_start)),

@@ -96,6 +96,7 @@ class AutopilotPeer(abc.ABC):
         self._config = config
         self._clock = clock
         self._now_ns = self._boot_ns = clock.now_ns()
+        self._clock_ppm = config.clock_ppm
         self.streams = MessageStreams(self.link, self, self._now_ns, config.step_ns)
         self._steps = 0
         self._truth = TruthHistory(_TRUTH_SAMPLES)
@@ -193,6 +194,13 @@ class AutopilotPeer(abc.ABC):
         """The boot clock goes on from elsewhere; streams keep their rates."""
         self._boot_ns -= jump_ns
         self.instruments.clock_changed()
+
+    def pace_clock(self, ppm: float) -> None:
+        """The boot clock runs so much fast from now on."""
+        now_ns = self._clock.now_ns()
+        told_ns = self.boot_clock_ns(now_ns)
+        self._clock_ppm = ppm
+        self._boot_ns = now_ns - round(told_ns / (1.0 + ppm * 1e-6))
 
     def reboot(self) -> None:
         """Power cycle: the boot clock starts again, streams are forgotten, motors stop."""
@@ -307,7 +315,7 @@ class AutopilotPeer(abc.ABC):
     def boot_clock_ns(self, now_ns: int) -> int:
         """The time since boot by the autopilot's own clock."""
         elapsed_ns = now_ns - self._boot_ns
-        return elapsed_ns + round(elapsed_ns * self._config.clock_ppm * 1e-6)
+        return elapsed_ns + round(elapsed_ns * self._clock_ppm * 1e-6)
 
     def _refresh(self, now_ns: int) -> None:
         self.instruments.boot_ms = self.boot_clock_ns(now_ns) // _NS_PER_MS

@@ -83,11 +83,11 @@ class BareFloor(_Fault):
 
 
 class LinkFault(_Fault):
-    """What the autopilot tells no longer arrives (nothing at all, or no heartbeats); or nothing passes either
-    way, as when the companion computer is dead."""
+    """What the autopilot tells no longer arrives (nothing at all, no heartbeats, or no answers about its
+    clock); or nothing passes either way, as when the companion computer is dead."""
 
     by_vehicle = True
-    kind: Literal["telemetry_silent", "heartbeat_silent", "companion_dead"]
+    kind: Literal["telemetry_silent", "heartbeat_silent", "timesync_silent", "companion_dead"]
 
 
 class AttitudeBiased(_Fault):
@@ -155,6 +155,14 @@ class ClockJump(_Fault):
     jump_s: float = Field(ge=-3600, le=3600)
 
 
+class ClockRate(_Fault):
+    """The autopilot's clock runs fast by this share of time, as one that is simulated or overloaded may."""
+
+    by_vehicle = True
+    kind: Literal["clock_rate"]
+    share: float = Field(0.015, ge=-0.2, le=0.2)
+
+
 class DetectorKilled(_Fault):
     by_launcher = True
     kind: Literal["detector_killed"]
@@ -210,6 +218,7 @@ Fault: TypeAlias = Annotated[
     | WindChange
     | VehicleFault
     | ClockJump
+    | ClockRate
     | DetectorKilled
     | ProcessFault
     | CpuTaken

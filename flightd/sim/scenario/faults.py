@@ -28,6 +28,7 @@ from flightd.sim.scenario.fault_schema import (
     CameraLate,
     CameraTurned,
     ClockJump,
+    ClockRate,
     Fault,
     HeightBiased,
     HeightLost,
@@ -40,6 +41,11 @@ from flightd.sim.sensors.camera import CameraPeer
 from flightd.site.site import Site
 
 _LOOKS_S = 0.01
+_WITHHELD: Mapping[str, int] = {
+    "heartbeat_silent": dialect.MAVLINK_MSG_ID_HEARTBEAT,
+    "timesync_silent": dialect.MAVLINK_MSG_ID_TIMESYNC,
+}
+"""Which message a fault of the link keeps back."""
 _OFF_FLOOR_M = 0.3
 _HERE_M = 0.4
 
@@ -192,8 +198,8 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
         case LinkFault(kind="companion_dead"):
             vehicle.link.muted = on
         case LinkFault():
-            heartbeat = {dialect.MAVLINK_MSG_ID_HEARTBEAT}
-            vehicle.link.withheld = vehicle.link.withheld | heartbeat if on else set()
+            kept = {_WITHHELD[fault.kind]}
+            vehicle.link.withheld = vehicle.link.withheld | kept if on else vehicle.link.withheld - kept
         case AttitudeBiased():
             angles = math.radians(fault.roll_deg), math.radians(fault.pitch_deg), math.radians(fault.yaw_deg)
             wrong.roll_rad, wrong.pitch_rad, wrong.yaw_rad = angles if on else (0.0, 0.0, 0.0)
@@ -203,6 +209,8 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
             wrong.range_lost = on
         case HeightStuck():
             wrong.range_stuck_m = fault.reading_m if on else None
+        case ClockRate():
+            vehicle.pace_clock(fault.share * 1e6 if on else 0.0)
         case ClockJump():
             vehicle.jump_clock(round(fault.jump_s * 1e9) * (1 if on else -1))
         case VehicleFault(kind="pilot"):

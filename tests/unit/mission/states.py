@@ -275,6 +275,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.TIMED_OUT: Stimulus(_stuck, 70.0),
     Trigger.TELEMETRY_STALE: sensed(telemetry_age_s=0.2),
     Trigger.CLOCK_JUMP: sensed(dt_s=0.6),
+    Trigger.CLOCK_UNSURE: sensed(clock_error_s=0.5),
     Trigger.CAMERA_FROZEN: warned(frozen_s=9.0),
     Trigger.CAMERA_BLIND: warned(blank_s=9.0),
     Trigger.FRAMES_STALE: warned(picture_age_s=9.0),

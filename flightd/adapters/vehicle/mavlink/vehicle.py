@@ -21,7 +21,7 @@ from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
 from flightd.adapters.vehicle.mavlink.refusal import NoWayDown, ParameterUnread, WrongFirmware
 from flightd.adapters.vehicle.mavlink.required_parameters import judge, way_down_rules
-from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, Beats, too_slow
 from flightd.adapters.vehicle.mavlink.services.parameters import Names, Parameters
@@ -55,7 +55,6 @@ RATES_HZ: dict[int, float] = {
     dialect.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
 }
 
-_SYNC_FAST_S, _SYNC_SLOW_S = 0.1, 1.0
 _BEATS_SETTLE_S, _BEATS_WINDOW_S, _BEATS_CHECK_S = 5.0, 3.0, 1.0
 _PAD_NEAR_M = 1.0
 """Further away the pad is not shown: a landing of last resort must not set out for it."""
@@ -289,4 +288,4 @@ class MavlinkVehicle(abc.ABC):
     async def _compare_clocks(self) -> None:
         while True:
             self.link.send(dialect.MAVLink_timesync_message(0, self._sync.ask(self._clock.now_ns())))
-            await asyncio.sleep(_SYNC_SLOW_S if self._sync.is_settled else _SYNC_FAST_S)
+            await asyncio.sleep(ASK_S if self._sync.is_settled else ASK_FAST_S)

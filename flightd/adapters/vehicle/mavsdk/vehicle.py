@@ -27,7 +27,7 @@ from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.refusal import BeyondLibrary, WrongSystemId
-from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavsdk.commands import SdkCommander
@@ -79,7 +79,6 @@ _YAW_LEAD_S = 0.2
 
 _IDLE_PERIOD_S = 0.05
 _PUMP_SILENT_NS = 150_000_000
-_SYNC_FAST_S, _SYNC_SLOW_S = 0.1, 1.0
 
 
 class MavsdkVehicle:
@@ -274,7 +273,7 @@ class MavsdkVehicle:
             question = library.message("TIMESYNC", tc1=0, ts1=self._sync.ask(self._clock.now_ns()))
             with contextlib.suppress(MavsdkError):
                 await library.call(plugins.direct.send_message(question))
-            await asyncio.sleep(_SYNC_SLOW_S if self._sync.is_settled else _SYNC_FAST_S)
+            await asyncio.sleep(ASK_S if self._sync.is_settled else ASK_FAST_S)
 
     # Setpoints
 
