@@ -280,8 +280,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "clock_unsure",
         Trigger.CLOCK_UNSURE,
-        "offset and rate of the vehicle's clock not known to `hazards.clock_error_s`: it does not answer, or too"
-        " late",
+        "offset and rate of the vehicle's clock are not known to `hazards.clock_error_s`: it does not answer",
         Action.HOLD,
         _HOLD,
         _FAST,

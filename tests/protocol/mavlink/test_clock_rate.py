@@ -1,4 +1,4 @@
-"""An autopilot whose clock runs at another rate than ours: its times are put right all the same."""
+"""An autopilot whose clock runs at another rate than ours, or begins anew: its times are put right."""
 
 from __future__ import annotations
 
@@ -114,5 +114,25 @@ def test_attitudes_keep_their_age_when_the_autopilots_clock_runs_off(name: str, 
             assert max(ages_ms) < 14.0  # the radio, one step of 5 ms, whole milliseconds
             assert rig.known().clock_error_s < 0.003
             assert rig.known().stamps_refused == 0
+
+    virtual(test())
+
+
+@pytest.mark.parametrize("name", list(RIGS))
+def test_attitudes_are_taken_on_when_the_boot_time_begins_anew_after_49_days(name: str) -> None:
+    """Every later one was refused, and the clocks were never compared again."""
+
+    async def test() -> None:
+        async with RIGS[name](PeerConfig(ready_s=0.5)) as rig:
+            rig.peer.jump_clock((2**32 - 30_000) * MS)
+            await rig.take_off(1.5)
+            rig.vehicle.attitudes()
+            clock, ages_ms = LoopClock(), []
+            while rig.peer.boot_clock_ns(clock.now_ns()) < (2**32 + 5_000) * MS:
+                await rig.stream(0.02)
+                ages_ms += [(clock.now_ns() - a.stamp_ns) / MS for a in rig.vehicle.attitudes()]
+            assert max(ages_ms) < 30.0
+            assert rig.known().stamps_refused == 0
+            assert clock.now_ns() - rig.known().height_stamp_ns < 200 * MS
 
     virtual(test())

@@ -17,7 +17,7 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing, setup_message
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, ParameterFinding, judge, rules_for
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
-from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, Beats
+from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, BeatPoll, Beats
 from flightd.adapters.vehicle.mavlink.services.parameters import Parameters
 from flightd.core.errors import UnavailableError
 from flightd.ports import Clock
@@ -128,11 +128,15 @@ class Examination:
         return remaining
 
     async def _measure_beats(self) -> float:
-        """The rate of its heartbeats once the one that a flight needs was asked for."""
+        """The rate of its heartbeats once they were asked for as a flight does."""
         beat, period_us = dialect.MAVLINK_MSG_ID_HEARTBEAT, round(1e6 / BEATS_HZ)
         await self._commander.send(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, beat, period_us)
         self._beats.start(self._clock.now_ns())
-        await asyncio.sleep(_BEATS_WINDOW_S)
+        poll = BeatPoll()
+        while math.isnan(self._beats.rate_hz(self._clock.now_ns())):
+            if poll.is_due(self._clock.now_ns(), self._beats.newest_ns):
+                self._commander.post(dialect.MAV_CMD_REQUEST_MESSAGE, beat)
+            await asyncio.sleep(BeatPoll.LOOK_S)
         return self._beats.rate_hz(self._clock.now_ns())
 
     def _take(self, message: Message, now_ns: int) -> None:

@@ -23,13 +23,13 @@ from flightd.adapters.vehicle.mavlink.refusal import NoWayDown, ParameterUnread,
 from flightd.adapters.vehicle.mavlink.required_parameters import judge, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
-from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, Beats, too_slow
+from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, BeatPoll, Beats, too_slow
 from flightd.adapters.vehicle.mavlink.services.parameters import Names, Parameters
 from flightd.adapters.vehicle.mavlink.services.statustext import SEVERITIES, TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
-from flightd.adapters.vehicle.mavlink.telemetry import MavlinkTelemetry
+from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource, MavlinkTelemetry
 from flightd.adapters.vehicle.refusal import Refusal, words
 from flightd.core.types import (
     Attitude,
@@ -71,6 +71,8 @@ class MavlinkOptions:
     pose_form: PoseForm | None = None
     raw_thrust: bool | None = None
     origin_deg: tuple[float, float] = (51.4778, 0.0)
+    range_finder: int | None = None
+    """Id of the DISTANCE_SENSOR to fly by; None: the one that measures best as the vehicle stands."""
     opener: OpenDatagrams = open_datagrams
     """What opens its UDP socket."""
 
@@ -97,13 +99,14 @@ class MavlinkVehicle(abc.ABC):
     required_names: ClassVar[tuple[Names, ...]] = ()
     """Those of them without which it is not flown."""
     rates_hz: ClassVar[dict[int, float]] = RATES_HZ
+    climb_from: ClassVar[ClimbSource] = ClimbSource.GLOBAL_POSITION
 
     def __init__(self, url: str, clock: Clock, options: MavlinkOptions = DEFAULTS) -> None:
         system_id = options.system_id
         self._clock = clock
         self._system_id = system_id
         self._sync = ClockSync()
-        self._telemetry = MavlinkTelemetry(self._sync)
+        self._telemetry = MavlinkTelemetry(self._sync, self.climb_from, options.range_finder)
         self._pose_output = None if options.pose_form is None else PoseOutput(options.pose_form)
         transport = make_transport(parse_endpoint(url), options.opener)
         codec = Codec(system_id, signing=options.signing)
@@ -118,6 +121,7 @@ class MavlinkVehicle(abc.ABC):
         self._way_down = way_down_rules(self.firmware, system_id)
         self._heard = asyncio.Event()
         self._beats = Beats(_BEATS_WINDOW_S)
+        self._poll = BeatPoll()
 
     # The port
 
@@ -229,6 +233,7 @@ class MavlinkVehicle(abc.ABC):
         tasks.create_task(self._once_heard(self.streams.run), name="mavlink streams")
         tasks.create_task(self._once_heard(self._read_parameters), name="mavlink parameters")
         tasks.create_task(self._once_heard(self._mind_beats), name="mavlink heartbeat rate")
+        tasks.create_task(self._once_heard(self._poll_beats), name="mavlink heartbeat poll")
 
     # Receiving
 
@@ -237,6 +242,8 @@ class MavlinkVehicle(abc.ABC):
         match message.get_type():
             case "COMMAND_ACK":
                 self._commander.acknowledged(message)
+                if message.command == dialect.MAV_CMD_REQUEST_MESSAGE and message.result:
+                    self._poll.refused(now_ns)
             case "TIMESYNC" if message.tc1 == 0:
                 self.link.send(dialect.MAVLink_timesync_message(now_ns, message.ts1))
             case "TIMESYNC":
@@ -284,6 +291,13 @@ class MavlinkVehicle(abc.ABC):
                 _LOG.warning("%s", problem)
                 self.notify(Event(now_ns, EventLevel.WARNING, "heartbeat_rate", str(problem)))
                 return
+
+    async def _poll_beats(self) -> None:
+        beat = dialect.MAVLINK_MSG_ID_HEARTBEAT
+        while True:
+            if self._poll.is_due(self._clock.now_ns(), self._telemetry.heartbeat_ns):
+                self._commander.post(dialect.MAV_CMD_REQUEST_MESSAGE, beat)
+            await asyncio.sleep(BeatPoll.LOOK_S)
 
     async def _compare_clocks(self) -> None:
         while True:

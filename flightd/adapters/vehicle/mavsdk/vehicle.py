@@ -28,6 +28,7 @@ from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.refusal import BeyondLibrary, WrongSystemId
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
+from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BeatPoll
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavsdk.commands import SdkCommander
@@ -238,6 +239,7 @@ class MavsdkVehicle:
             tasks.create_task(self._take(source, streams, message_id, take), name=f"mavsdk {message_id}")
         tasks.create_task(streams.run(), name="mavsdk streams")
         tasks.create_task(self._compare_clocks(library, plugins), name="mavsdk timesync")
+        tasks.create_task(self._poll_beats(), name="mavsdk heartbeat poll")
         tasks.create_task(self._pass_on(library, plugins), name="mavsdk setpoints")
         tasks.create_task(self._idle(), name="mavsdk idle setpoints")
         tasks.create_task(self._tell(library, plugins), name="mavsdk texts")
@@ -267,6 +269,13 @@ class MavsdkVehicle:
         fields = whole_fields(message.fields_json, "tc1", "ts1")
         if fields is not None and fields[0] != 0:
             self._sync.answered(fields[1], fields[0], now_ns)
+
+    async def _poll_beats(self) -> None:
+        poll, beat = BeatPoll(), dialect.MAVLINK_MSG_ID_HEARTBEAT
+        while True:
+            if poll.is_due(self._clock.now_ns(), self._readings.heartbeat_ns):
+                self._commander.post(dialect.MAV_CMD_REQUEST_MESSAGE, beat)
+            await asyncio.sleep(BeatPoll.LOOK_S)
 
     async def _compare_clocks(self, library: Library, plugins: Plugins) -> None:
         while True:
