@@ -123,7 +123,7 @@ def test_attitudes_are_taken_on_when_the_boot_time_begins_anew_after_49_days(nam
     """Every later one was refused, and the clocks were never compared again."""
 
     async def test() -> None:
-        async with RIGS[name](PeerConfig(ready_s=0.5)) as rig:
+        async with RIGS[name](PeerConfig(ready_s=0.5, clock_ppm=0.0)) as rig:
             rig.peer.jump_clock((2**32 - 30_000) * MS)
             await rig.take_off(1.5)
             rig.vehicle.attitudes()
