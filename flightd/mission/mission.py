@@ -51,6 +51,8 @@ _NEAR_FLOOR = {Phase.TAKE_OFF, Phase.LAND}
 _HALTED = (Phase.HOLD, Phase.RELOCATE)
 _INTERRUPTED = (*_HALTED, Phase.ACQUIRE)
 """Where a leg that was interrupted goes on from."""
+_OVER_PAD_M = 0.5
+"""So near its centre a landing goes on onto the pad, whatever the position was taken for before."""
 _VISITED = (Trigger.DWELLED, Trigger.ROUTE_DONE)
 
 
@@ -373,6 +375,8 @@ class Mission:
             return
         self._events.report(s.now_ns, EventLevel.WARNING, "position", f"corrected: it is {s.pose.node}")
         self._steering.begin_anew()
+        if self.state.on_pad and s.pad_m is not None and s.distance_m(s.pad_m) < _OVER_PAD_M:
+            return  # it is still coming down on its pad
         if self.state.on_pad:
             self._steering.anchor = (s.pose.x_m, s.pose.y_m)
         else:
