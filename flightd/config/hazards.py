@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
+from typing import Literal
 
 from pydantic import Field
 
@@ -68,6 +69,9 @@ class HazardConfig(Section):
         0.25, ge=0.05, le=2, description="p99 from exposure to the wire that can be flown by"
     )
     overload_s: float = Field(3.0, ge=0.5, le=60, description="latency or late ticks tolerated for so long")
+    battery_unknown: Literal[LossAction.HOME, LossAction.LAND] = Field(
+        LossAction.HOME, description="what to do when the battery's charge is not known any more in flight"
+    )
     record_lost: LossAction = Field(
         LossAction.HOME, description="what to do when the flight log cannot be written"
     )

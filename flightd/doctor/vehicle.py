@@ -37,8 +37,11 @@ class Autopilot:
     fixed: tuple[str, ...] = ()
 
 
-async def examine(config: VehicleConfig, clock: Clock, agreed: Collection[str] = ()) -> Autopilot:
-    """Read and judge the parameters, after writing the better values of those `agreed` on by name.
+async def examine(
+    config: VehicleConfig, clock: Clock, agreed: Collection[str] = (), cells: int | None = None
+) -> Autopilot:
+    """Read and judge the parameters, after writing the better values of those `agreed` on by name; `cells`
+    are the battery's, None: not configured.
 
     InputError for a wrong address or signing key."""
     signing = signing_of(config, clock)
@@ -48,6 +51,7 @@ async def examine(config: VehicleConfig, clock: Clock, agreed: Collection[str] =
         raw_thrust=config.raw_thrust,
         shares_pose=config.shares_pose,
         landing_target=config.landing_target,
+        cells=cells,
     )
     examination = Examination(config.url, clock, config.system_id, signing, job)
     try:

@@ -189,6 +189,9 @@ class Mission:
         if Trigger.RECORD_LOST in found:
             found.remove(Trigger.RECORD_LOST)
             found |= self._lost(self._config.hazards.record_lost, Trigger.RECORD_LOST, s.now_ns)
+        if Trigger.BATTERY_UNKNOWN in found:
+            found.remove(Trigger.BATTERY_UNKNOWN)
+            found |= self._lost(self._config.hazards.battery_unknown, Trigger.BATTERY_UNKNOWN, s.now_ns)
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found

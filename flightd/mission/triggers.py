@@ -24,6 +24,7 @@ class Trigger(enum.Enum):
     WIND = "pushed beyond the limits"
     LAND_HERE = "landing ordered"
     GROUND_LOST = "ground link lost"
+    BATTERY_UNKNOWN = "the battery's charge is not known"
     RECORD_LOST = "the flight log cannot be written"
     HAZARD_LASTS = "held for too long"
     LINES_LOST_LONG = "lines lost for too long"

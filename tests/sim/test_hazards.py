@@ -85,6 +85,7 @@ TRIALS: dict[str, Trial] = {
     "attitude_wrong": Trial(fault(yaw_rad=math.radians(25.0)), found_s=1.0),
     "battery_low": Trial(fault(battery=0.15), found_s=0.05, ends=Phase.SWAP),
     "battery_critical": Trial(fault(battery=0.05), found_s=0.05),
+    "battery_unknown": Trial(fault(battery=math.nan), found_s=3.2),
     "wind": Trial(blow(0.0, 3.5), found_s=9.0),
     "ceiling_left": Trial(fault(height_m=4.2), found_s=0.6),
     "corridor_left": Trial(blow(0.0, 5.4), blow(0.0, 0.0), 1.0, found_s=2.5, ends=Phase.DONE),

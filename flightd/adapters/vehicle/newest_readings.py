@@ -34,6 +34,9 @@ class NewestReadings:
         self._landed, self._landed_ns = LandedState.UNKNOWN, 0
         self._battery_frac = math.nan
         self._battery_v = math.nan
+        self._battery_a = math.nan
+        self._battery_cells = 0
+        self._battery_ns = 0
         self.heartbeat_ns = 0
         self.armed = False
 
@@ -85,8 +88,19 @@ class NewestReadings:
             heartbeat_ns=self.heartbeat_ns,
             refusal=refusal,
             stamps_refused=stamps_refused,
+            battery_stamp_ns=self._battery_ns,
+            battery_a=self._battery_a,
+            battery_cells=self._battery_cells,
             clock_error_s=self._sync.error_s(now_ns),
         )
+
+    def _set_battery(
+        self, now_ns: int, *, frac: float, volts: float, amperes: float = math.nan, cells: int = 0
+    ) -> None:
+        """All that one message tells: what it does not know is not known any more."""
+        self._battery_frac = frac if 0.0 <= frac <= 1.0 else math.nan
+        self._battery_v = volts if volts > 0.0 else math.nan
+        self._battery_a, self._battery_cells, self._battery_ns = amperes, cells, now_ns
 
     def _take_sample(self, sample: RangeSample, stamp_ns: int, now_ns: int) -> None:
         """Take a distance along the body's z axis: the height is what the tilt leaves of it.

@@ -83,11 +83,13 @@ class BareFloor(_Fault):
 
 
 class LinkFault(_Fault):
-    """What the autopilot tells no longer arrives (nothing at all, no heartbeats, or no answers about its
-    clock); or nothing passes either way, as when the companion computer is dead."""
+    """What the autopilot tells no longer arrives (nothing at all, no heartbeats, no answers about its clock,
+    nothing of its battery); or nothing passes either way, as when the companion computer is dead."""
 
     by_vehicle = True
-    kind: Literal["telemetry_silent", "heartbeat_silent", "timesync_silent", "companion_dead"]
+    kind: Literal[
+        "telemetry_silent", "heartbeat_silent", "timesync_silent", "battery_silent", "companion_dead"
+    ]
 
 
 class AttitudeBiased(_Fault):
@@ -127,6 +129,14 @@ class BatteryDrop(_Fault):
     by_airframe = True
     kind: Literal["battery"]
     charge: float = Field(ge=0, le=1)
+
+
+class ChargeTold(_Fault):
+    """The autopilot tells this charge whatever the battery holds; -1 says that it does not know."""
+
+    by_vehicle = True
+    kind: Literal["charge_told"]
+    percent: int = Field(-1, ge=-1, le=100)
 
 
 class WindChange(_Fault):
@@ -215,6 +225,7 @@ Fault: TypeAlias = Annotated[
     | HeightLost
     | HeightStuck
     | BatteryDrop
+    | ChargeTold
     | WindChange
     | VehicleFault
     | ClockJump

@@ -27,6 +27,7 @@ from flightd.sim.scenario.fault_schema import (
     CameraFault,
     CameraLate,
     CameraTurned,
+    ChargeTold,
     ClockJump,
     ClockRate,
     Fault,
@@ -41,11 +42,12 @@ from flightd.sim.sensors.camera import CameraPeer
 from flightd.site.site import Site
 
 _LOOKS_S = 0.01
-_WITHHELD: Mapping[str, int] = {
-    "heartbeat_silent": dialect.MAVLINK_MSG_ID_HEARTBEAT,
-    "timesync_silent": dialect.MAVLINK_MSG_ID_TIMESYNC,
+_WITHHELD: Mapping[str, frozenset[int]] = {
+    "heartbeat_silent": frozenset({dialect.MAVLINK_MSG_ID_HEARTBEAT}),
+    "timesync_silent": frozenset({dialect.MAVLINK_MSG_ID_TIMESYNC}),
+    "battery_silent": frozenset({dialect.MAVLINK_MSG_ID_BATTERY_STATUS, dialect.MAVLINK_MSG_ID_SYS_STATUS}),
 }
-"""Which message a fault of the link keeps back."""
+"""Which messages a fault of the link keeps back."""
 _OFF_FLOOR_M = 0.3
 _HERE_M = 0.4
 
@@ -198,7 +200,7 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
         case LinkFault(kind="companion_dead"):
             vehicle.link.muted = on
         case LinkFault():
-            kept = {_WITHHELD[fault.kind]}
+            kept = _WITHHELD[fault.kind]
             vehicle.link.withheld = vehicle.link.withheld | kept if on else vehicle.link.withheld - kept
         case AttitudeBiased():
             angles = math.radians(fault.roll_deg), math.radians(fault.pitch_deg), math.radians(fault.yaw_deg)
@@ -209,6 +211,8 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
             wrong.range_lost = on
         case HeightStuck():
             wrong.range_stuck_m = fault.reading_m if on else None
+        case ChargeTold():
+            wrong.charge_pc = fault.percent if on else None
         case ClockRate():
             vehicle.pace_clock(fault.share * 1e6 if on else 0.0)
         case ClockJump():

@@ -29,6 +29,7 @@ _SLOPE_SAMPLES = 4
 _LEAP_MPS = 6.0
 """No vehicle of ours climbs or sinks so fast: the height's origin was moved (at arming, say)."""
 _NO_CELL_MV = 65535
+_STATUS_STALE_NS = 5_000_000_000
 _UNKNOWN_U16 = 65535
 _UNKNOWN_QUALITY, _NO_SIGNAL = 0, 1
 
@@ -65,6 +66,7 @@ class MavlinkTelemetry(NewestReadings):
         self._boot_ms = 0
         self._heights: deque[tuple[int, int]] = deque(maxlen=_HEIGHTS_MAX)
         self._stamps_refused = 0
+        self._status_ns = -2 * _STATUS_STALE_NS
         self.custom_mode: int | None = None
 
     def take(self, message: Message, now_ns: int) -> bool:
@@ -87,11 +89,9 @@ class MavlinkTelemetry(NewestReadings):
                 self._landed = _LANDED.get(message.landed_state, LandedState.UNKNOWN)
                 self._landed_ns = now_ns
             case "BATTERY_STATUS" if message.id == 0:
-                cells = [mv for mv in message.voltages if mv != _NO_CELL_MV]
-                self._take_battery(sum(cells), message.battery_remaining)
-            case "SYS_STATUS":
-                millivolt = message.voltage_battery
-                self._take_battery(0 if millivolt == _UNKNOWN_U16 else millivolt, message.battery_remaining)
+                self._take_battery(message, now_ns)
+            case "SYS_STATUS" if now_ns - self._status_ns > _STATUS_STALE_NS:
+                self._take_system_status(message, now_ns)
             case _:
                 pass
         return False
@@ -159,11 +159,27 @@ class MavlinkTelemetry(NewestReadings):
         moved_mm = abs(height_mm - self._heights[-1][1])
         return 0 <= since_ms <= _SLOPE_GAP_MS and moved_mm <= _LEAP_MPS * max(since_ms, 20)
 
-    def _take_battery(self, millivolt: int, remaining_pc: int) -> None:
-        if millivolt > 0:
-            self._battery_v = millivolt / 1000.0
-        if 0 <= remaining_pc <= 100:
-            self._battery_frac = remaining_pc / 100.0
+    def _take_battery(self, message: Message, now_ns: int) -> None:
+        """BATTERY_STATUS: one voltage for each cell, or that of them all in the first place."""
+        cells = [mv for mv in message.voltages if mv != _NO_CELL_MV]
+        self._status_ns = now_ns
+        self._set_battery(
+            now_ns,
+            frac=message.battery_remaining / 100.0,
+            volts=sum(cells) / 1000.0,
+            amperes=math.nan if message.current_battery < 0 else message.current_battery / 100.0,
+            cells=len(cells) if len(cells) > 1 else 0,
+        )
+
+    def _take_system_status(self, message: Message, now_ns: int) -> None:
+        """SYS_STATUS, from an autopilot that sends no BATTERY_STATUS."""
+        millivolt = message.voltage_battery
+        self._set_battery(
+            now_ns,
+            frac=message.battery_remaining / 100.0,
+            volts=0.0 if millivolt == _UNKNOWN_U16 else millivolt / 1000.0,
+            amperes=math.nan if message.current_battery < 0 else message.current_battery / 100.0,
+        )
 
     def _boot_ns(self, boot_ms: int, now_ns: int) -> int:
         """The autopilot's time of a stamp, whose 32 bits begin anew every 49.7 days: TIMESYNC's do not."""
