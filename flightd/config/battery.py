@@ -63,8 +63,7 @@ class BatteryConfig(Section):
         0.10,
         ge=0.03,
         le=1,
-        description="a charge is not believed that stands still in flight while so much should have gone; 1: it "
-        "is",
+        description="a charge that stands still in flight is believed until so much should have gone; 1: for good",
         json_schema_extra=unit("share of full"),
     )
     swap: bool = Field(

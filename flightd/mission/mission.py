@@ -302,7 +302,7 @@ class Mission:
         if trigger is Trigger.DWELLED:
             self._go_on(s)
         self._anchor(s, trigger)
-        self._explain(s, trigger, outcome.cause)
+        self._explain(s, trigger, outcome.cause, was_on_pad=before.on_pad)
         level = EventLevel.WARNING if _alarming(before, self.state, trigger) else EventLevel.INFO
         text = f"{before.phase.value} -> {self.phase.value}: {self.reason}"
         self._events.report(s.now_ns, level, "phase", text)
@@ -319,8 +319,8 @@ class Mission:
         elif self.phase in _HALTED or (self.phase is Phase.LAND and not self.state.on_pad):
             self._steering.anchor = here
 
-    def _explain(self, s: MissionInputs, trigger: Trigger, cause: Cause) -> None:
-        """Set the reason for the phase that begins."""
+    def _explain(self, s: MissionInputs, trigger: Trigger, cause: Cause, *, was_on_pad: bool) -> None:
+        """Set the reason for the phase that begins; of an end on the pad, why it turned home."""
         refusal = s.vehicle.refusal if s.vehicle is not None and trigger is Trigger.TIMED_OUT else ""
         if trigger is Trigger.NOT_COUNTED and (blind := self._scanner.blind) is not None:
             self._cause = blind
@@ -330,6 +330,8 @@ class Mission:
         elif cause is Cause.TRIGGER:
             happened = Happened(trigger)
             self._cause = Refused(happened, refusal) if refusal else happened
+        elif self.state.over and was_on_pad:
+            self._cause = self._route.why_home or self._cause
         self._reason = self._cause
 
     def _enter(self, s: MissionInputs, trigger: Trigger) -> None:

@@ -162,3 +162,10 @@ def test_a_correction_away_from_the_pad_is_what_the_mission_ends_for() -> None:
     flight = landing_corrected(3.0)
     assert ids(flight.mission.state) == "aborted-end"
     assert flight.mission.reason == Trigger.POSITION_CORRECTED.value
+
+
+def test_a_mission_that_ends_early_on_its_pad_says_why_it_came_home() -> None:
+    """It ended as "aborted: route done"."""
+    flight = fresh(State(Phase.LAND, Intent.HOME))
+    assert down(flight) == "aborted-end"
+    assert flight.mission.reason == Trigger.GO_HOME.value
