@@ -63,7 +63,7 @@ class BatteryConfig(Section):
         0.10,
         ge=0.03,
         le=1,
-        description="a charge that stands still in flight is believed until so much should have gone; 1: for good",
+        description="a charge that stands still in flight is believed till so much should be gone; 1: always",
         json_schema_extra=unit("share of full"),
     )
     swap: bool = Field(

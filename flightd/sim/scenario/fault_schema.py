@@ -125,6 +125,14 @@ class HeightStuck(_Fault):
     reading_m: float = Field(0.1, ge=0.05, le=8)
 
 
+class HeightQuality(_Fault):
+    """The range finder goes on reading, and tells this quality of its signal: 0 is unknown, 1 none."""
+
+    by_vehicle = True
+    kind: Literal["height_quality"]
+    percent: int = Field(1, ge=0, le=100)
+
+
 class BatteryDrop(_Fault):
     by_airframe = True
     kind: Literal["battery"]
@@ -224,6 +232,7 @@ Fault: TypeAlias = Annotated[
     | HeightBiased
     | HeightLost
     | HeightStuck
+    | HeightQuality
     | BatteryDrop
     | ChargeTold
     | WindChange

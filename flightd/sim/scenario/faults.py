@@ -33,12 +33,14 @@ from flightd.sim.scenario.fault_schema import (
     Fault,
     HeightBiased,
     HeightLost,
+    HeightQuality,
     HeightStuck,
     LinkFault,
     VehicleFault,
     WindChange,
 )
 from flightd.sim.sensors.camera import CameraPeer
+from flightd.sim.sensors.instruments import SensorFault
 from flightd.site.site import Site
 
 _LOOKS_S = 0.01
@@ -193,7 +195,6 @@ class WorldFaults:
 
 def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
     """What goes wrong in an autopilot, or between it and its companion."""
-    wrong = vehicle.sensors.fault
     match fault:
         case LinkFault(kind="telemetry_silent"):
             vehicle.link.down.params = RadioParams(loss=1.0) if on else vehicle.link.up.params
@@ -202,17 +203,6 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
         case LinkFault():
             kept = _WITHHELD[fault.kind]
             vehicle.link.withheld = vehicle.link.withheld | kept if on else vehicle.link.withheld - kept
-        case AttitudeBiased():
-            angles = math.radians(fault.roll_deg), math.radians(fault.pitch_deg), math.radians(fault.yaw_deg)
-            wrong.roll_rad, wrong.pitch_rad, wrong.yaw_rad = angles if on else (0.0, 0.0, 0.0)
-        case HeightBiased():
-            wrong.range_m = fault.offset_m if on else 0.0
-        case HeightLost():
-            wrong.range_lost = on
-        case HeightStuck():
-            wrong.range_stuck_m = fault.reading_m if on else None
-        case ChargeTold():
-            wrong.charge_pc = fault.percent if on else None
         case ClockRate():
             vehicle.pace_clock(fault.share * 1e6 if on else 0.0)
         case ClockJump():
@@ -221,3 +211,23 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
             vehicle.pilot_mode(vehicle.pilots_mode if on else vehicle.landing_mode)
         case VehicleFault() if on:
             vehicle.reboot()
+        case _:
+            _mislead(vehicle.sensors.fault, fault, on)
+
+
+def _mislead(wrong: SensorFault, fault: Fault, on: bool) -> None:
+    """What the sensors tell wrong."""
+    match fault:
+        case AttitudeBiased():
+            angles = math.radians(fault.roll_deg), math.radians(fault.pitch_deg), math.radians(fault.yaw_deg)
+            wrong.roll_rad, wrong.pitch_rad, wrong.yaw_rad = angles if on else (0.0, 0.0, 0.0)
+        case HeightBiased():
+            wrong.range_m = fault.offset_m if on else 0.0
+        case HeightLost():
+            wrong.range_lost = on
+        case HeightQuality():
+            wrong.range_quality_pc = fault.percent if on else 0
+        case HeightStuck():
+            wrong.range_stuck_m = fault.reading_m if on else None
+        case ChargeTold():
+            wrong.charge_pc = fault.percent if on else None

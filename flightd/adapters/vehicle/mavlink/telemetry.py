@@ -41,6 +41,27 @@ _LANDED = {
 }
 
 
+def range_sample(message: Message) -> RangeSample | None:
+    """A DISTANCE_SENSOR, distances in cm, of a sensor that looks down; None of another, and where its quality
+    (0: unknown) is 1: no signal."""
+    quality_pc = message.signal_quality
+    if message.orientation != dialect.MAV_SENSOR_ROTATION_PITCH_270 or quality_pc == _NO_SIGNAL:
+        return None
+    return RangeSample(
+        message.id,
+        message.current_distance / 100.0,
+        max(message.min_distance, 1) / 100.0,
+        message.max_distance / 100.0,
+        None if quality_pc == _UNKNOWN_QUALITY else quality_pc,
+    )
+
+
+def cells_told(message: Message) -> int:
+    """The cells of a BATTERY_STATUS, which has their voltages; 0 where it has only that of them all."""
+    cells = sum(mv != _NO_CELL_MV for mv in message.voltages)
+    return cells if cells > 1 else 0
+
+
 class ClimbSource(enum.Enum):
     """The one message by which an autopilot's climb rate is known."""
 
@@ -78,8 +99,11 @@ class MavlinkTelemetry(NewestReadings):
                 self.armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
             case "ATTITUDE":
                 return self._take_attitude(message, now_ns)
-            case "DISTANCE_SENSOR" if message.orientation == dialect.MAV_SENSOR_ROTATION_PITCH_270:
-                self._take_range(message, now_ns)
+            case "DISTANCE_SENSOR":
+                sample = range_sample(message)
+                if sample is not None:
+                    stamp_ns = self._stamp(self._boot_ns(message.time_boot_ms, now_ns), now_ns)
+                    self._take_sample(sample, stamp_ns, now_ns)
             case "GLOBAL_POSITION_INT" as name if name == self._climb_from:
                 self._take_global_position(message, now_ns)
             case "LOCAL_POSITION_NED" as name if name == self._climb_from and math.isfinite(message.vz):
@@ -121,20 +145,6 @@ class MavlinkTelemetry(NewestReadings):
                 self._attitudes.append(sample)
         return rebooted
 
-    def _take_range(self, message: Message, now_ns: int) -> None:
-        """Distances in cm; a quality of 0 is unknown, 1 says that the signal is none."""
-        quality_pc = message.signal_quality
-        if quality_pc == _NO_SIGNAL:
-            return
-        sample = RangeSample(
-            message.id,
-            message.current_distance / 100.0,
-            max(message.min_distance, 1) / 100.0,
-            message.max_distance / 100.0,
-            None if quality_pc == _UNKNOWN_QUALITY else quality_pc,
-        )
-        self._take_sample(sample, self._stamp(self._boot_ns(message.time_boot_ms, now_ns), now_ns), now_ns)
-
     def _take_global_position(self, message: Message, now_ns: int) -> None:
         """Climb from the velocity; ArduPilot sends all zeros when it estimates none, and then the
         height's own slope tells, over several samples without a gap or leap between them."""
@@ -161,14 +171,13 @@ class MavlinkTelemetry(NewestReadings):
 
     def _take_battery(self, message: Message, now_ns: int) -> None:
         """BATTERY_STATUS: one voltage for each cell, or that of them all in the first place."""
-        cells = [mv for mv in message.voltages if mv != _NO_CELL_MV]
         self._status_ns = now_ns
         self._set_battery(
             now_ns,
             frac=message.battery_remaining / 100.0,
-            volts=sum(cells) / 1000.0,
+            volts=sum(mv for mv in message.voltages if mv != _NO_CELL_MV) / 1000.0,
             amperes=math.nan if message.current_battery < 0 else message.current_battery / 100.0,
-            cells=len(cells) if len(cells) > 1 else 0,
+            cells=cells_told(message),
         )
 
     def _take_system_status(self, message: Message, now_ns: int) -> None:
