@@ -194,3 +194,13 @@ def test_the_shipped_parameter_files_are_fit_and_complete(
             assert rule.names[-1] in {"ARMING_CHECK", "ARMING_SKIPCHK"}
     assert judged >= 8
     assert all(len(name) <= 16 for name in values)
+
+
+def test_range_finders_and_cells_are_looked_at() -> None:
+    async def test() -> None:
+        async with examined(ArduCopterPeer) as (_, examination):
+            report = await examination.report()
+            assert [sample.measures for sample in report.range_finders] == [True]
+            assert report.cells == 3
+
+    virtual(test())
