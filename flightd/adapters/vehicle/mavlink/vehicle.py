@@ -242,7 +242,8 @@ class MavlinkVehicle(abc.ABC):
         match message.get_type():
             case "COMMAND_ACK":
                 self._commander.acknowledged(message)
-                if message.command == dialect.MAV_CMD_REQUEST_MESSAGE and message.result:
+                unsupported = message.result == dialect.MAV_RESULT_UNSUPPORTED
+                if message.command == dialect.MAV_CMD_REQUEST_MESSAGE and unsupported:
                     self._poll.refused(now_ns)
             case "TIMESYNC" if message.tc1 == 0:
                 self.link.send(dialect.MAVLink_timesync_message(now_ns, message.ts1))

@@ -84,15 +84,9 @@ class MavsdkTelemetry(NewestReadings):
             self._climb_mps, self._climb_ns = -down_mps, now_ns
 
     def take_battery(self, battery: Any, now_ns: int) -> None:
-        """A Battery: volts, amperes and per cent, NaN or negative where they are not known."""
+        """A Battery: volts and per cent, NaN or negative where they are not known."""
         if battery.id == 0:
-            amperes = float(battery.current_battery_a)
-            self._set_battery(
-                now_ns,
-                frac=battery.remaining_percent / 100.0,
-                volts=float(battery.voltage_v),
-                amperes=amperes if amperes >= 0.0 else math.nan,
-            )
+            self._set_battery(now_ns, frac=battery.remaining_percent / 100.0, volts=float(battery.voltage_v))
 
     def take_armed(self, armed: bool, _now_ns: int) -> None:
         self.armed = bool(armed)
