@@ -33,6 +33,7 @@ from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.site.site import Site
 from flightd.tracking.attitude_extrapolation import AttitudeExtrapolation
+from flightd.tracking.battery_charge import BatteryCharge
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.height_history import HeightHistory
 from flightd.tracking.line_tracker import LineTracker
@@ -66,6 +67,7 @@ class Pilot:
         self._mission = Mission(site, plan, policy, config, scanner, overhead_m, autostart=autostart)
         self._begin()
         self._heights = HeightHistory()
+        self._charge = BatteryCharge(config.battery)
         self._control = FlightController(config.control)
         self._limiter = Limiter(config.control)
         self._armed = False
@@ -223,6 +225,7 @@ class Pilot:
             y_age_s=(now_ns - y_ns) * 1e-9 if y_ns else math.inf,
             telemetry_age_s=math.inf if v is None else (now_ns - v.attitude.stamp_ns) * 1e-9,
             vehicle=v,
+            judged_charge=self._charge.step(now_ns, v, flying=self._mission.airborne),
             ground_silent_s=tick.ground_silent_s,
             pad_m=self._pads.centre(self._mission.goal.node),
             rivals=tuple(self._localiser.rivals()) if doubted else (),

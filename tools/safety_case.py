@@ -1,7 +1,7 @@
 """The safety case of the guide: each hazard with its cause, how it is found and answered, and the evidence.
 
-python -m tools.safety_case SWEEP.json...   # take the evidence from what `flightd sim --scenario all` printed with
-                                            # --seeds N --json; then run `python -m tools.write_guide`
+python -m tools.safety_case SWEEP.json...   # the evidence is what flightd sim --scenario all --seeds N --json
+                                            # printed; then run python -m tools.write_guide
 """
 
 from __future__ import annotations

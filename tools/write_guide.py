@@ -45,6 +45,7 @@ def _parameters(firmware: Firmware) -> str:
         ("raw_thrust = false", Job(raw_thrust=False)),
         ("pose_output", Job(shares_pose=True)),
         ("landing_target", Job(landing_target=True)),
+        ("battery.cells = 4", Job(cells=4)),
     ):
         rules += [(rule, key) for rule in rules_for(firmware, job) if not _is_in(rule, usual)]
     lines = ["| parameter | must be | `--fix` sets | only with | why |", "|---|---|---|---|---|"]

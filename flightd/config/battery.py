@@ -36,6 +36,36 @@ class BatteryConfig(Section):
         description="least charge of a battery put in to go on",
         json_schema_extra=unit("share of full"),
     )
+    cells: int | None = Field(
+        None, ge=1, le=14, description="cells in series; left out: as the vehicle tells, if it does"
+    )
+    cell_start_v: float = Field(
+        3.6, ge=2.5, le=4.3, description="least voltage of a cell to start", json_schema_extra=unit("V")
+    )
+    cell_home_v: float = Field(
+        3.45,
+        ge=2.5,
+        le=4.3,
+        description="fly home when a cell has less in flight",
+        json_schema_extra=unit("V"),
+    )
+    cell_land_v: float = Field(
+        3.3,
+        ge=2.5,
+        le=4.3,
+        description="land at once when a cell has less in flight",
+        json_schema_extra=unit("V"),
+    )
+    silent_s: float = Field(
+        10.0, ge=3, le=120, description="charge and voltage older than this are not known"
+    )
+    frozen: float = Field(
+        0.10,
+        ge=0.03,
+        le=1,
+        description="a charge that stands still in flight is believed till so much should be gone; 1: always",
+        json_schema_extra=unit("share of full"),
+    )
     swap: bool = Field(
         False,
         description="wait on the charge pad for a fresh battery and go on; false: the mission ends there",
@@ -50,7 +80,9 @@ class BatteryConfig(Section):
         return self.flight_s
 
     @model_validator(mode="after")
-    def _both_or_neither(self) -> Self:
+    def _fits_together(self) -> Self:
         if (self.capacity_wh is None) != (self.hover_w is None):
             raise ValueError("capacity_wh and hover_w belong together: give both or neither")
+        if not self.cell_land_v < self.cell_home_v <= self.cell_start_v:
+            raise ValueError("cell_land_v < cell_home_v <= cell_start_v is required")
         return self

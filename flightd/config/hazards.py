@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
+from typing import Literal
 
 from pydantic import Field
 
@@ -58,10 +59,19 @@ class HazardConfig(Section):
     corridor_m: float = Field(
         0.45, ge=0.3, le=5, description="free way to both sides of every painted line of the map"
     )
+    clock_error_s: float = Field(
+        0.02,
+        ge=0.005,
+        le=0.2,
+        description="times of the vehicle's clock that are less certain (1 sigma) are not flown by",
+    )
     latency_s: float = Field(
         0.25, ge=0.05, le=2, description="p99 from exposure to the wire that can be flown by"
     )
     overload_s: float = Field(3.0, ge=0.5, le=60, description="latency or late ticks tolerated for so long")
+    battery_unknown: Literal[LossAction.HOME, LossAction.LAND] = Field(
+        LossAction.HOME, description="what to do when the battery's charge is not known any more in flight"
+    )
     record_lost: LossAction = Field(
         LossAction.HOME, description="what to do when the flight log cannot be written"
     )

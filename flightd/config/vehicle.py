@@ -48,6 +48,13 @@ class VehicleConfig(Section):
         description="ArduCopter with pose_output: the hall's latitude and longitude, roughly; its estimator "
         "has to have some",
     )
+    range_finder: int | None = Field(
+        None,
+        ge=0,
+        le=255,
+        description="id of the DISTANCE_SENSOR to fly by; left out: of those that look down the one that "
+        "measures best as the vehicle stands",
+    )
     landing_target: bool = Field(
         False, description="tell the autopilot's precision landing where the home pad is, near it"
     )
@@ -62,6 +69,7 @@ class VehicleConfig(Section):
         for key, wanted in (
             ("signing_key", self.signing_key is not None),
             ("pose_output", self.shares_pose),
+            ("range_finder", self.range_finder is not None),
         ):
             if wanted and not speaks:
                 raise ValueError(f'{key} needs kind = "ardupilot" or "px4", not "{self.kind}"')

@@ -213,7 +213,12 @@ class VehicleState:
     `in_control` says that the autopilot is in the mode in which it obeys our setpoints (or, while LAND
     is demanded, in its landing mode) *and* that we asked for that mode: False means hands off.
     `height_m` is above the floor below, along the vertical; NaN when no range finder speaks.
-    `stamps_refused` counts attitudes whose own time made no sense (the arrival's was taken).
+    `stamps_refused` counts attitudes whose own time made no sense (the arrival's was taken);
+    `clock_error_s` is by how much their times may be wrong in our clock (standard deviation), NaN where the
+    vehicle's clock was never compared with ours.
+    `battery_frac` is NaN while the vehicle does not know it, `battery_stamp_ns` the time at which it last
+    told anything of its battery (0: it gives none), `battery_a` the current and `battery_cells` the cells in
+    series (NaN and 0: not told).
     """
 
     attitude: Attitude
@@ -229,6 +234,10 @@ class VehicleState:
     heartbeat_ns: int
     refusal: str = ""
     stamps_refused: int = 0
+    clock_error_s: float = 0.0
+    battery_stamp_ns: int = 0
+    battery_a: float = math.nan
+    battery_cells: int = 0
 
 
 class Demand(enum.StrEnum):

@@ -90,7 +90,7 @@ async def examine(subject: Subject) -> Diagnosis:
         checks += found
     else:
         pictures = await camera.watch(config, subject.clock, None)
-        autopilot = await vehicle.examine(config.vehicle, subject.clock)
+        autopilot = await vehicle.examine(config.vehicle, subject.clock, cells=config.battery.cells)
     checks += check_ground(config.ground, subject.ground)
     checks += camera.judge_camera(config, pictures)
     checks += camera.check_vision(config, subject.detector, pictures.picture)
@@ -105,7 +105,7 @@ async def examine_quickly(subject: Subject) -> Diagnosis:
 
 async def fix_parameters(found: Diagnosis, config: Config, agreed: Sequence[str], clock: Clock) -> Diagnosis:
     """Write the better values of the parameters `agreed` on by name; the diagnosis with what is known now."""
-    autopilot = await vehicle.examine(config.vehicle, clock, agreed)
+    autopilot = await vehicle.examine(config.vehicle, clock, agreed, config.battery.cells)
     rest = [check for check in found.checks if check.name not in {"vehicle", "parameter"}]
     return Diagnosis([*rest, *autopilot.checks], autopilot.report, autopilot.fixed)
 

@@ -23,6 +23,8 @@ _NAMES = {Firmware.ARDUPILOT: "ArduCopter", Firmware.PX4: "PX4"}
 _CABLE = "check vehicle.url, cable (TX to RX), baud rate and power; is another flightd running?"
 _KEY = "; does the autopilot have the same signing key?"
 _BEATS = "grant SET_MESSAGE_INTERVAL of HEARTBEAT (newer firmware), or a faster line; else warn the pilot"
+_LEAST_MAX_M = 0.35
+"""A take-off by a height that does not follow is ended after 0.4 m of climb."""
 _POLL_S = 0.1
 _PATIENCE_S = 8.0
 
@@ -37,8 +39,11 @@ class Autopilot:
     fixed: tuple[str, ...] = ()
 
 
-async def examine(config: VehicleConfig, clock: Clock, agreed: Collection[str] = ()) -> Autopilot:
-    """Read and judge the parameters, after writing the better values of those `agreed` on by name.
+async def examine(
+    config: VehicleConfig, clock: Clock, agreed: Collection[str] = (), cells: int | None = None
+) -> Autopilot:
+    """Read and judge the parameters, after writing the better values of those `agreed` on by name; `cells`
+    are the battery's, None: not configured.
 
     InputError for a wrong address or signing key."""
     signing = signing_of(config, clock)
@@ -48,6 +53,7 @@ async def examine(config: VehicleConfig, clock: Clock, agreed: Collection[str] =
         raw_thrust=config.raw_thrust,
         shares_pose=config.shares_pose,
         landing_target=config.landing_target,
+        cells=cells,
     )
     examination = Examination(config.url, clock, config.system_id, signing, job)
     try:
@@ -55,17 +61,17 @@ async def examine(config: VehicleConfig, clock: Clock, agreed: Collection[str] =
             report = await examination.report()
             wanted = [found for found in report.findings if found.name in agreed]
             if not wanted:
-                return Autopilot(tuple(judge(config, report)), report)
+                return Autopilot(tuple(judge(config, report, cells)), report)
             left = {found.name for found in await examination.fix(wanted)}
             fixed = tuple(found.name for found in wanted if found.name not in left)
             report = await examination.report()
-            return Autopilot((*judge(config, report), *_after_fix(fixed, sorted(left))), report, fixed)
+            return Autopilot((*judge(config, report, cells), *_after_fix(fixed, sorted(left))), report, fixed)
     except UnavailableError as err:
         return Autopilot((error("vehicle", str(err), _CABLE + (_KEY if signing else "")),))
 
 
-def judge(config: VehicleConfig, report: ExaminationReport) -> list[Check]:
-    """Kind and state of the autopilot, then a line for each parameter that is wrong."""
+def judge(config: VehicleConfig, report: ExaminationReport, cells: int | None = None) -> list[Check]:
+    """Kind and state of the autopilot and its sensors, then a line for each parameter that is wrong."""
     name = _NAMES[report.firmware]
     text = f"{name} {report.version}".strip() + f" answers at {config.url}"
     checks = []
@@ -83,6 +89,7 @@ def judge(config: VehicleConfig, report: ExaminationReport) -> list[Check]:
         checks.append(warning("heartbeat", str(slow), _BEATS))
     else:
         checks.append(ok("heartbeat", f"{report.heartbeat_hz:.0f} heartbeats a second"))
+    checks += [_judge_range(config, report), _judge_cells(cells, report)]
     for found in report.findings:
         remedy = (
             "choose it yourself, in a ground station"
@@ -91,6 +98,37 @@ def judge(config: VehicleConfig, report: ExaminationReport) -> list[Check]:
         )
         checks.append(error("parameter", str(found), remedy))
     return checks
+
+
+def _judge_range(config: VehicleConfig, report: ExaminationReport) -> Check:
+    """The range finder that is flown by, as the vehicle stands."""
+    name, heard = "range finder", {sample.sensor: sample for sample in report.range_finders}
+    wanted = config.range_finder
+    if not heard or (wanted is not None and wanted not in heard):
+        text = "none that looks down is heard" if wanted is None else f"{wanted} is not heard"
+        return warning(name, text, "see its wiring, type and orientation; nothing flies without a height")
+    chosen = max(heard.values(), key=lambda sample: (sample.measures, sample.quality_pc or 0))
+    chosen = chosen if wanted is None else heard[wanted]
+    if chosen.is_below and chosen.least_m > _LEAST_MAX_M:
+        text = f"it stands lower than its range finder's minimum of {chosen.least_m:g} m"
+        return error(name, text, f"mount it higher, or take one that measures from {_LEAST_MAX_M:g} m on")
+    if len(heard) > 1 and wanted is None:
+        ids = ", ".join(str(sensor) for sensor in heard)
+        text = f"{len(heard)} look down (ids {ids}); by what they measure now {chosen.sensor} is flown by"
+        return warning(name, text, "name one as vehicle.range_finder")
+    if chosen.is_below:
+        return ok(name, f"on the floor, lower than {chosen.least_m:g} m: it measures from there on")
+    return ok(name, f"{chosen.distance_m:.2f} m as it stands")
+
+
+def _judge_cells(cells: int | None, report: ExaminationReport) -> Check:
+    told = report.cells
+    if cells is None and not told:
+        return warning("battery", "its cells are not known: its volts decide nothing", "give battery.cells")
+    if cells is not None and told and cells != told:
+        text = f"battery.cells = {cells}, the autopilot tells of {told}"
+        return error("battery", text, "one of them is wrong, and with it every low voltage")
+    return ok("battery", f"{cells or told} cells")
 
 
 def _after_fix(fixed: tuple[str, ...], left: list[str]) -> list[Check]:

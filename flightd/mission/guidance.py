@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from flightd.config.mission import MissionConfig
 from flightd.control.flight_controller import Reference
 from flightd.core.types import HEALTHY, Demand, GridPose, Health, Phase, VehicleState
+from flightd.tracking.battery_charge import Charge, told_charge
 
 CEILING_MARGIN_M = 0.5
 """Nothing is flown nearer to the ceiling."""
@@ -78,6 +79,12 @@ class MissionInputs:
     rivals: tuple[tuple[str, float], ...] = ()
     way_out: tuple[float, float] | None = None
     warnings: Warnings = ALL_WELL
+    judged_charge: Charge | None = None
+
+    @property
+    def charge(self) -> Charge:
+        """What the battery is believed to hold; where nobody judged that, what it is told to."""
+        return told_charge(self.vehicle) if self.judged_charge is None else self.judged_charge
 
     @property
     def speed_mps(self) -> float:

@@ -134,6 +134,7 @@ _SAFETY = {
     Trigger.DISARMED: Phase.ABORTED,
     Trigger.LAND_HERE: Phase.LAND,
     Trigger.GROUND_LOST: Phase.LAND,
+    Trigger.BATTERY_UNKNOWN: Phase.LAND,
     Trigger.RECORD_LOST: Phase.LAND,
 }
 _UNDER_WAY = _SAFETY | {Trigger.TIMED_OUT: Phase.LAND}

@@ -51,6 +51,8 @@ _NEAR_FLOOR = {Phase.TAKE_OFF, Phase.LAND}
 _HALTED = (Phase.HOLD, Phase.RELOCATE)
 _INTERRUPTED = (*_HALTED, Phase.ACQUIRE)
 """Where a leg that was interrupted goes on from."""
+_OVER_PAD_M = 0.5
+"""So near its centre a landing goes on onto the pad, whatever the position was taken for before."""
 _VISITED = (Trigger.DWELLED, Trigger.ROUTE_DONE)
 
 
@@ -187,6 +189,9 @@ class Mission:
         if Trigger.RECORD_LOST in found:
             found.remove(Trigger.RECORD_LOST)
             found |= self._lost(self._config.hazards.record_lost, Trigger.RECORD_LOST, s.now_ns)
+        if Trigger.BATTERY_UNKNOWN in found:
+            found.remove(Trigger.BATTERY_UNKNOWN)
+            found |= self._lost(self._config.hazards.battery_unknown, Trigger.BATTERY_UNKNOWN, s.now_ns)
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found
@@ -297,7 +302,7 @@ class Mission:
         if trigger is Trigger.DWELLED:
             self._go_on(s)
         self._anchor(s, trigger)
-        self._explain(s, trigger, outcome.cause)
+        self._explain(s, trigger, outcome.cause, was_on_pad=before.on_pad)
         level = EventLevel.WARNING if _alarming(before, self.state, trigger) else EventLevel.INFO
         text = f"{before.phase.value} -> {self.phase.value}: {self.reason}"
         self._events.report(s.now_ns, level, "phase", text)
@@ -314,8 +319,8 @@ class Mission:
         elif self.phase in _HALTED or (self.phase is Phase.LAND and not self.state.on_pad):
             self._steering.anchor = here
 
-    def _explain(self, s: MissionInputs, trigger: Trigger, cause: Cause) -> None:
-        """Set the reason for the phase that begins."""
+    def _explain(self, s: MissionInputs, trigger: Trigger, cause: Cause, *, was_on_pad: bool) -> None:
+        """Set the reason for the phase that begins; of an end on the pad, why it turned home."""
         refusal = s.vehicle.refusal if s.vehicle is not None and trigger is Trigger.TIMED_OUT else ""
         if trigger is Trigger.NOT_COUNTED and (blind := self._scanner.blind) is not None:
             self._cause = blind
@@ -325,6 +330,8 @@ class Mission:
         elif cause is Cause.TRIGGER:
             happened = Happened(trigger)
             self._cause = Refused(happened, refusal) if refusal else happened
+        elif self.state.over and was_on_pad:
+            self._cause = self._route.why_home or self._cause
         self._reason = self._cause
 
     def _enter(self, s: MissionInputs, trigger: Trigger) -> None:
@@ -373,6 +380,8 @@ class Mission:
             return
         self._events.report(s.now_ns, EventLevel.WARNING, "position", f"corrected: it is {s.pose.node}")
         self._steering.begin_anew()
+        if self.state.on_pad and s.pad_m is not None and s.distance_m(s.pad_m) < _OVER_PAD_M:
+            return  # it is still coming down on its pad
         if self.state.on_pad:
             self._steering.anchor = (s.pose.x_m, s.pose.y_m)
         else:

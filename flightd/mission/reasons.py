@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
 from flightd.mission.triggers import Trigger
+from flightd.tracking.battery_charge import ChargeDoubt
 
 
 class Plain(enum.Enum):
@@ -17,7 +19,6 @@ class Plain(enum.Enum):
     NO_TELEMETRY = "no telemetry from the vehicle"
     ARMED_ALREADY = "the vehicle is armed already: disarm it first"
     NO_HEIGHT = "no height from the vehicle's range finder"
-    NO_CHARGE = "no battery level from the vehicle"
     NO_PICTURE = "no picture from the down camera"
     GROUND_SILENT = "the ground station that attends this flight fell silent"
 
@@ -43,6 +44,29 @@ class StartChargeLow:
 
     charge_frac: float
     needed_frac: float
+
+
+@dataclass(frozen=True, slots=True)
+class ChargeUnknown:
+    """The battery's charge is not known, and why."""
+
+    doubt: ChargeDoubt
+
+
+@dataclass(frozen=True, slots=True)
+class CellsLow:
+    """A cell has too little to start, or in flight to go on with."""
+
+    cell_v: float
+    needed_v: float
+
+
+@dataclass(frozen=True, slots=True)
+class ClockUnsure:
+    """The vehicle's clock is not known in ours well enough; `error_s` is NaN where it does not answer."""
+
+    error_s: float
+    limit_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,17 +111,8 @@ class NothingRead:
     scans: int
 
 
-Reason: TypeAlias = (
-    Plain
-    | Happened
-    | Refused
-    | StartChargeLow
-    | LatePictures
-    | AwaitsBattery
-    | ChargeLow
-    | ChargeShort
-    | NothingRead
-)
+_OfBattery: TypeAlias = StartChargeLow | ChargeUnknown | CellsLow | AwaitsBattery | ChargeLow | ChargeShort
+Reason: TypeAlias = Plain | Happened | Refused | _OfBattery | ClockUnsure | LatePictures | NothingRead
 
 
 def in_words(reason: Reason) -> str:
@@ -109,10 +124,30 @@ def in_words(reason: Reason) -> str:
             text = trigger.value
         case Refused(why, refusal):
             text = f"{in_words(why)}: {refusal}"
-        case StartChargeLow(charge, needed):
-            text = f"battery at {charge:.0%}, {needed:.0%} needed to start"
+        case ClockUnsure(error_s, limit_s) if math.isnan(error_s):
+            text = "the vehicle does not answer about its clock (TIMESYNC)"
+        case ClockUnsure(error_s, limit_s):
+            known = f"known to {error_s * 1e3:.0f} ms only"
+            text = f"the vehicle's clock is {known}, {limit_s * 1e3:.0f} ms are needed"
         case LatePictures(limit_s):
             text = f"pictures are more than {limit_s * 1e3:.0f} ms old when they have been looked at"
+        case NothingRead(blind, scans):
+            text = f"no picture of a shelf was read at the last {blind} of {scans} scans"
+        case _:
+            text = _of_battery(reason)
+    return text
+
+
+def _of_battery(reason: _OfBattery) -> str:
+    match reason:
+        case StartChargeLow(charge, needed):
+            text = f"battery at {charge:.0%}, {needed:.0%} needed to start"
+        case ChargeUnknown(ChargeDoubt.UNKNOWN):
+            text = "no battery level from the vehicle"
+        case ChargeUnknown(doubt):
+            text = f"battery: {doubt.value}"
+        case CellsLow(cell_v, needed_v):
+            text = f"battery at {cell_v:.2f} V a cell, {needed_v:.2f} V needed"
         case AwaitsBattery(stops, charge, full):
             text = f"{stops} stops left: waiting for a battery at {full:.0%}, it is at {charge:.0%}"
         case ChargeLow(charge):
@@ -120,6 +155,4 @@ def in_words(reason: Reason) -> str:
         case ChargeShort(node, pad, charge, needed, reserve):
             what = f"a visit to {node} and the way back" if node else f"the way back to {pad}"
             text = f"battery at {charge:.0%}: {what} needs {needed:.0%} and {reserve:.0%} stay in reserve"
-        case NothingRead(blind, scans):
-            text = f"no picture of a shelf was read at the last {blind} of {scans} scans"
     return text

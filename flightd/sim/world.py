@@ -38,7 +38,7 @@ from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.scenario.faults import FaultListener, WorldFaults, bare_boxes
 from flightd.sim.sensors.camera import CameraPeer
-from flightd.sim.sensors.instruments import Sensors
+from flightd.sim.sensors.instruments import SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
 from flightd.site.site import Site
 
@@ -62,7 +62,8 @@ class WorldSpec:
     between a MAVLink autopilot and its companion.  With `swap_s` 0 nobody changes batteries.  The vehicle
     stands `start_offset_m` (x, y) away from the start pad's centre.
     `faults` go wrong on the way.  A MAVLink autopilot is set up as the shipped parameter file says, but for
-    `parameters`."""
+    `parameters`; its clock runs `clock_ppm` fast, its range finder measures from `range_least_m` on, and one
+    beside it reads `second_range_m` more (None: there is none)."""
 
     site: Site
     seed: int
@@ -80,6 +81,9 @@ class WorldSpec:
     battery_ah: float = 5.0
     swap_s: float = 0.0
     radio: RadioParams = PERFECT
+    clock_ppm: float = 20.0
+    range_least_m: float = 0.05
+    second_range_m: float | None = None
     truth_url: str = ""
     faults: tuple[Fault, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -201,7 +205,15 @@ def _autopilot(spec: WorldSpec, airframe: Airframe, clock: Clock) -> AutopilotPe
     is_px4 = spec.vehicle == "px4"
     known = PX4_PARAMETERS if is_px4 else COPTER_PARAMETERS
     parameters = {**shipped_parameters("px4" if is_px4 else "ardupilot", known), **spec.parameters}
-    config = PeerConfig(port=port, seed=spec.seed, radio=spec.radio, parameters=parameters)
+    config = PeerConfig(
+        port=port,
+        seed=spec.seed,
+        radio=spec.radio,
+        parameters=parameters,
+        clock_ppm=spec.clock_ppm,
+        sensors=SensorParams(range_min_m=spec.range_least_m),
+        second_range_m=spec.second_range_m,
+    )
     return Px4Peer(clock, airframe, config) if is_px4 else ArduCopterPeer(clock, airframe, config)
 
 

@@ -170,6 +170,23 @@ COVERED: dict[str, tuple[str, ...]] = {
         "mavlink/test_link_care.py::test_rates_that_a_ground_station_overwrote_are_asked_for_again",
         "mavlink/test_link_care.py::test_a_denied_stream_is_not_asked_for_all_the_time",
     ),
+    "the rate of HEARTBEAT is denied: it is asked for one by one": (
+        "mavlink/test_px4_vehicle.py::test_a_take_over_is_seen_in_time_though_the_heartbeat_keeps_its_rate",
+        "mavlink/test_px4_peer.py::test_its_heartbeat_keeps_its_rate_and_comes_when_it_is_asked_for",
+    ),
+    "the height above home leaps when home is set at arming": (
+        "mavlink/test_px4_vehicle.py::test_a_leap_of_the_height_above_home_at_arming_is_no_climb",
+    ),
+    "the autopilot's clock runs off, or its 32 bits begin anew": (
+        "mavlink/test_clock_rate.py::test_attitudes_keep_their_age_when_the_autopilots_clock_runs_off",
+        "mavlink/test_clock_rate.py::"
+        "test_attitudes_are_taken_on_when_the_boot_time_begins_anew_after_49_days",
+    ),
+    "two range finders, one below its minimum, one without a signal": (
+        "mavlink/test_telemetry.py::test_of_two_range_finders_the_one_that_measures_on_the_floor_is_flown_by",
+        "mavlink/test_telemetry.py::test_standing_lower_than_the_sensor_measures_is_a_height",
+        "mavlink/test_telemetry.py::test_a_signal_that_is_none_is_no_height_whatever_is_read",
+    ),
     "loss, delay, reordering": (
         "mavlink/test_link_care.py::test_a_poor_radio_is_flown_through",
         "mavlink/test_link_care.py::test_an_overtaken_heartbeat_is_no_take_over",

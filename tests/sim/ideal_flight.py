@@ -78,6 +78,7 @@ class Faults:
     height_m: float = 0.0
     battery: float | None = None
     stamps_refused: int = 0
+    clock_error_s: float = 0.0
     health: Health = HEALTHY
 
 
@@ -320,6 +321,7 @@ class IdealFlight:
             battery_v=12.0,
             heartbeat_ns=self._beat_ns,
             stamps_refused=faults.stamps_refused,
+            clock_error_s=faults.clock_error_s,
         )
         return self._told
 

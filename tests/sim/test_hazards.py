@@ -85,6 +85,7 @@ TRIALS: dict[str, Trial] = {
     "attitude_wrong": Trial(fault(yaw_rad=math.radians(25.0)), found_s=1.0),
     "battery_low": Trial(fault(battery=0.15), found_s=0.05, ends=Phase.SWAP),
     "battery_critical": Trial(fault(battery=0.05), found_s=0.05),
+    "battery_unknown": Trial(fault(battery=math.nan), found_s=3.2),
     "wind": Trial(blow(0.0, 3.5), found_s=9.0),
     "ceiling_left": Trial(fault(height_m=4.2), found_s=0.6),
     "corridor_left": Trial(blow(0.0, 5.4), blow(0.0, 0.0), 1.0, found_s=2.5, ends=Phase.DONE),
@@ -99,6 +100,9 @@ TRIALS: dict[str, Trial] = {
     "overload": Trial(fault(health=Health(0.4)), found_s=3.2),
     "clock_jump": Trial(fault(stamps_refused=40), ends=Phase.DONE, found_s=0.05),
     "loop_stalled": Trial(fault(stall_ns=700_000_000), ends=Phase.DONE, found_s=0.75),
+    "clock_unsure": Trial(
+        fault(clock_error_s=0.1), fault(clock_error_s=0.0), 2.0, ends=Phase.DONE, found_s=1.1
+    ),
     "disk_full": Trial(fault(health=Health(0.08, 0, 0, "No space left on device")), found_s=0.05),
     "recorder_dead": Trial(fault(health=Health(0.08, 0, 1)), ends=Phase.DONE, found_s=0.05),
 }

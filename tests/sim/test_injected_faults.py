@@ -134,3 +134,42 @@ def test_a_pilot_takes_it_and_lands_it(in_flight: Any) -> None:
         await rig.until(lambda: rig.peer.landed, 15.0)
 
     in_flight(test)
+
+
+def test_a_range_finder_without_a_signal_is_not_believed(in_flight: Any) -> None:
+    async def test(rig: Rig, turn: Any) -> None:
+        turn(True, kind="height_quality")
+        await rig.stream(1.0)
+        assert math.isnan(rig.known().height_m)
+        turn(False, kind="height_quality")
+        await rig.stream(0.3)
+        assert rig.known().height_m == pytest.approx(1.5, abs=0.3)
+
+    in_flight(test)
+
+
+def test_a_battery_that_is_told_of_no_longer_or_not_known_is_as_told(in_flight: Any) -> None:
+    async def test(rig: Rig, turn: Any) -> None:
+        turn(True, kind="charge_told")
+        await rig.stream(2.5)
+        assert math.isnan(rig.known().battery_frac)
+        assert rig.known().battery_cells == 3
+        turn(False, kind="charge_told")
+        turn(True, kind="battery_silent")
+        told_ns = rig.known().battery_stamp_ns
+        await rig.stream(3.0)
+        assert rig.known().battery_stamp_ns - told_ns < 1_100_000_000
+
+    in_flight(test)
+
+
+def test_without_answers_about_its_clock_the_error_grows(in_flight: Any) -> None:
+    async def test(rig: Rig, turn: Any) -> None:
+        turn(True, kind="clock_rate", share=0.03)
+        await rig.stream(5.0)
+        assert rig.known().clock_error_s < 0.003
+        turn(True, kind="timesync_silent")
+        await rig.stream(6.0)
+        assert rig.known().clock_error_s > 0.02
+
+    in_flight(test)

@@ -71,5 +71,6 @@ def _options(config: VehicleConfig, clock: Clock, opener: OpenDatagrams) -> Mavl
         pose_form=PoseForm(config.pose_output) if config.shares_pose else None,
         raw_thrust=config.raw_thrust,
         origin_deg=config.origin_deg,
+        range_finder=config.range_finder,
         opener=opener,
     )

@@ -4,31 +4,51 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from typing import Protocol
 
-from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.range_finders import RangeFinders, RangeSample
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _ATTITUDES_MAX = 512
 _STAMP_AGE_MAX_NS = 500_000_000
 _RANGE_STALE_NS = 500_000_000
 _LANDED_STALE_NS = 1_000_000_000
+_NEAR_LEAST_M = 0.15
+"""Seen so little above its range finder's minimum, a vehicle may be below it at the next sample."""
+
+
+class VehicleClock(Protocol):
+    """The vehicle's clock beside ours."""
+
+    def to_ours(self, theirs_ns: int) -> int | None: ...
+
+    def to_theirs(self, ours_ns: int) -> int | None: ...
+
+    def error_s(self, now_ns: int) -> float: ...
+
+    def reset(self) -> None: ...
 
 
 class NewestReadings:
     """What was told last, with its time, and when it is too old to be used.  What is not finite or makes no
-    sense is not taken; a subclass takes what its own carrier tells."""
+    sense is not taken; a subclass takes what its own carrier tells.  `range_finder` is the one to fly by,
+    None: the best."""
 
     climb_stale_ns: int
 
-    def __init__(self, sync: ClockSync) -> None:
+    def __init__(self, sync: VehicleClock, range_finder: int | None = None) -> None:
         self._sync = sync
         self._attitude: Attitude | None = None
         self._attitudes: deque[Attitude] = deque(maxlen=_ATTITUDES_MAX)
         self._range_m, self._range_ns = math.nan, 0
+        self._finders = RangeFinders(range_finder)
         self._climb_mps, self._climb_ns = math.nan, 0
         self._landed, self._landed_ns = LandedState.UNKNOWN, 0
         self._battery_frac = math.nan
         self._battery_v = math.nan
+        self._battery_a = math.nan
+        self._battery_cells = 0
+        self._battery_ns = 0
         self.heartbeat_ns = 0
         self.armed = False
 
@@ -80,14 +100,39 @@ class NewestReadings:
             heartbeat_ns=self.heartbeat_ns,
             refusal=refusal,
             stamps_refused=stamps_refused,
+            battery_stamp_ns=self._battery_ns,
+            battery_a=self._battery_a,
+            battery_cells=self._battery_cells,
+            clock_error_s=self._sync.error_s(now_ns),
         )
 
-    def _set_range(self, distance_m: float, stamp_ns: int) -> None:
-        """Take a distance along the body's z axis: the height is what the tilt leaves of it."""
-        tilt_cos = 1.0
-        if self._attitude is not None:
-            tilt_cos = math.cos(self._attitude.roll_rad) * math.cos(self._attitude.pitch_rad)
-        self._range_m, self._range_ns = distance_m * max(tilt_cos, 0.0), stamp_ns
+    def _set_battery(
+        self, now_ns: int, *, frac: float, volts: float, amperes: float = math.nan, cells: int = 0
+    ) -> None:
+        """All that one message tells: what it does not know is not known any more."""
+        self._battery_frac = frac if 0.0 <= frac <= 1.0 else math.nan
+        self._battery_v = volts if volts > 0.0 else math.nan
+        self._battery_a, self._battery_cells, self._battery_ns = amperes, cells, now_ns
+
+    def _take_sample(self, sample: RangeSample, stamp_ns: int, now_ns: int) -> None:
+        """Take a distance along the body's z axis: the height is what the tilt leaves of it.
+
+        Below the sensor's minimum it is taken for that minimum where the vehicle is near the floor anyway."""
+        if not self._finders.take(sample, now_ns, armed=self.armed):
+            return
+        if sample.measures:
+            tilt_cos = 1.0
+            if self._attitude is not None:
+                tilt_cos = math.cos(self._attitude.roll_rad) * math.cos(self._attitude.pitch_rad)
+            self._range_m, self._range_ns = sample.distance_m * max(tilt_cos, 0.0), stamp_ns
+        elif sample.is_below and self._is_low(sample.least_m, now_ns):
+            self._range_m, self._range_ns = sample.least_m, stamp_ns
+
+    def _is_low(self, least_m: float, now_ns: int) -> bool:
+        """Whether the vehicle stands, or was last seen hardly higher than the sensor's minimum."""
+        if not self.armed or self._range_m <= least_m + _NEAR_LEAST_M:
+            return True
+        return math.isnan(self._range_m) and self.landed(now_ns) is LandedState.ON_GROUND
 
     def _stamp(self, boot_ns: int, now_ns: int) -> int:
         """Our time of an autopilot's stamp; the arrival while the clocks are not yet compared or when the

@@ -76,6 +76,9 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
         battery_ah=scenario.vehicle.battery_ah,
         swap_s=scenario.vehicle.swap_s,
         radio=scenario.vehicle.radio(),
+        clock_ppm=scenario.vehicle.clock_ppm,
+        range_least_m=scenario.vehicle.range_least_m,
+        second_range_m=scenario.vehicle.second_range_m,
         truth_url=simulation.truth_url,
         faults=scenario.fault,
     )

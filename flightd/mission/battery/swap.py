@@ -12,7 +12,7 @@ from flightd.mission.machine import State
 from flightd.mission.plan.flight_plan import HeadingPolicy
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.plan.leg_times import Legs, Pace
-from flightd.mission.reasons import ChargeLow, Reason
+from flightd.mission.reasons import CellsLow, ChargeLow, Reason
 from flightd.mission.safety.hazard_monitor import HazardMonitor
 from flightd.mission.scan.no_scan import AnyScanner
 from flightd.mission.triggers import Trigger
@@ -33,6 +33,7 @@ class BatterySwap:
     ) -> None:
         self._sorties = Sorties(site, Legs(site, policy, Pace.of(config.mission)), config.battery, scanner)
         self._swap = config.battery.swap
+        self._cell_home_v = config.battery.cell_home_v
         self._route = itinerary
         self._monitor = monitor
         self._short = False
@@ -52,12 +53,13 @@ class BatterySwap:
     def step(self, s: MissionInputs, state: State) -> Trigger | None:
         """Turn back in time: below the fixed share, or when what is left only just brings it back.  How it
         turned back with this tick, None if it did not."""
-        charge = math.nan if s.vehicle is None else s.vehicle.battery_frac
+        charge = s.charge.frac
         self._sorties.step(s.now_ns, charge, state.airborne)
         if not state.airborne or state.returning or state.phase is Phase.LAND:
             return None
         if self._monitor.battery_low(s):
-            return self._go_charge(s.now_ns, ChargeLow(charge), in_need=True)
+            low = CellsLow(s.charge.cell_v, self._cell_home_v) if s.charge.low else ChargeLow(charge)
+            return self._go_charge(s.now_ns, low, in_need=True)
         goal = self._route.goal
         left_m = s.distance_m((goal.x_m, goal.y_m)) if state.phase is Phase.FOLLOW else 0.0
         if math.isfinite(left_m) and (reason := self._sorties.must_return(goal.node, left_m)):

@@ -27,6 +27,8 @@ class Itinerary:
         self._stops: list[Stop] = list(plan.stops)
         self._next = 0
         self._left_over: tuple[str, ...] = ()
+        self.why_home: Reason | None = None
+        """Why it turned home last; None where it never did."""
         self.stand = (plan.start, plan.start_yaw_rad)
         """The node on which the drone stands before it flies, and its heading there."""
         self.visited: list[str] = []
@@ -86,6 +88,7 @@ class Itinerary:
     def turn_home(self, now_ns: int, reason: Reason, *, in_need: bool, pad: str | None = None) -> None:
         """Fly to the home pad or another; `in_need` by the shortest way, against one-way lines too."""
         self._left_over = self.remaining
+        self.why_home = reason
         self._events.report(now_ns, EventLevel.WARNING, "home", in_words(reason))
         self._replan([], in_need=in_need, home=pad)
 

@@ -22,6 +22,8 @@ _TICK_S = 0.06
 _GAP_S = 0.5
 _NEWS_S = 1.0
 """Something that was replaced is news for so long."""
+_CLOCK_S = 0.3
+"""So soon clocks are compared anew after a reboot or a jump."""
 _JUMPED = 3
 """So many attitudes with a senseless time are no stray datagram."""
 
@@ -112,8 +114,8 @@ class HazardMonitor:
         return s.ground_silent_s > self._ground_lost_s
 
     def battery_low(self, s: MissionInputs) -> bool:
-        p = self._params
-        return s.vehicle is not None and p.battery_land <= s.vehicle.battery_frac < p.battery_home
+        p, charge = self._params, s.charge
+        return p.battery_land <= charge.frac < p.battery_home or charge.low
 
     def _authority(self, s: MissionInputs, v: VehicleState) -> set[Trigger]:
         silent_s = max(s.telemetry_age_s, (s.now_ns - v.heartbeat_ns) * 1e-9 - _HEARTBEAT_S)
@@ -129,9 +131,11 @@ class HazardMonitor:
         jumped = self._stamps.step(v.stamps_refused, s.now_ns) or s.dt_s > _GAP_S
         return {
             Trigger.HEARTBEAT_LOST: (heartbeat_s > h.heartbeat_land_s, 0.0),
-            Trigger.BATTERY_CRITICAL: (v.battery_frac < p.battery_land, 0.0),
+            Trigger.BATTERY_CRITICAL: (s.charge.frac < p.battery_land or s.charge.empty, 0.0),
+            Trigger.BATTERY_UNKNOWN: (s.charge.doubt is not None, 0.0),
             Trigger.BATTERY_LOW: (self.battery_low(s), 0.0),
             Trigger.CLOCK_JUMP: (jumped, 0.0),
+            Trigger.CLOCK_UNSURE: (not v.clock_error_s <= h.clock_error_s, _CLOCK_S),
         }
 
     def _links(self, s: MissionInputs) -> _Conditions:

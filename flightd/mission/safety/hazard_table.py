@@ -153,8 +153,8 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "battery_low",
         Trigger.BATTERY_LOW,
-        "charge below `mission.battery_home`, or what flying took so far, times the time of the way back, and"
-        " `battery.reserve` left",
+        "charge below `mission.battery_home`, a cell below `battery.cell_home_v` for 2 s, or what flying took"
+        " so far, times the time of the way back, and `battery.reserve` left",
         Action.HOME,
         "fly to the nearest charge pad, against one-way lines when below",
         _FAST,
@@ -162,9 +162,18 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "battery_critical",
         Trigger.BATTERY_CRITICAL,
-        "charge below `mission.battery_land`",
+        "charge below `mission.battery_land`, or a cell below `battery.cell_land_v` for 2 s",
         Action.LAND,
         "land here",
+        _FAST,
+    ),
+    Hazard(
+        "battery_unknown",
+        Trigger.BATTERY_UNKNOWN,
+        "nothing told of the battery for `battery.silent_s`, no charge for 3 s, one that stands still while"
+        " `battery.frozen` should have gone, or volts that its cells cannot have",
+        Action.CONFIGURED,
+        "`hazards.battery_unknown`: home or land",
         _FAST,
     ),
     Hazard(
@@ -293,6 +302,14 @@ HAZARDS: tuple[Hazard, ...] = (
         "frames and attitudes that waited keep the time at which they were true, what is old is refused; on"
         " when nothing is missing",
         "tests/sim/test_camera_times.py",
+    ),
+    Hazard(
+        "clock_unsure",
+        Trigger.CLOCK_UNSURE,
+        "offset and rate of the vehicle's clock are not known to `hazards.clock_error_s`: it does not answer",
+        Action.HOLD,
+        _HOLD,
+        _FAST,
     ),
     Hazard(
         "map_wrong",

@@ -6,7 +6,9 @@ import abc
 import asyncio
 import math
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -23,6 +25,7 @@ from flightd.sim.plant.truth_history import TruthHistory
 from flightd.sim.sensors.instruments import SensorParams, Sensors
 
 _NS_PER_MS = 1_000_000
+_BOOT_WRAP_MS = 2**32
 _TRUTH_EVERY = 2
 _TRUTH_SAMPLES = 1000
 _TEXTS_KEPT = 50
@@ -59,6 +62,11 @@ class PeerConfig:
     clock_ppm: float = 20.0
     sensors: SensorParams = field(default_factory=SensorParams)
     seed: int = 0
+    home_leap_m: float = 1.4
+    """PX4: by so much the height above home leaps when it is armed."""
+    second_range_m: float | None = None
+    """A second range finder beside the first reads so much more, and nothing on the floor; None: there is
+    none."""
     signing_key: bytes | None = None
     radio: RadioParams = PERFECT
     parameters: dict[str, float] = field(default_factory=dict)
@@ -79,6 +87,12 @@ class AutopilotPeer(abc.ABC):
 
     landing_mode: int
 
+    unasked_ns: ClassVar[Mapping[int, int]] = {}
+    """Periods of the messages that everybody gets who speaks to it, by message id."""
+
+    fixed_rates: ClassVar[frozenset[int]] = frozenset()
+    """Messages whose rate cannot be changed, by id."""
+
     refused_arming: int
     """The MAV_RESULT of an arming that something is against."""
 
@@ -87,7 +101,7 @@ class AutopilotPeer(abc.ABC):
     ) -> None:
         self.airframe = airframe
         self.sensors = Sensors(config.sensors, config.seed)
-        self.instruments = Instruments(airframe, self.sensors)
+        self.instruments = Instruments(airframe, self.sensors, config.second_range_m)
         self.parameters = parameters
         self.link = UdpLink(
             config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self.received, config.signing_key, config.seed
@@ -96,6 +110,7 @@ class AutopilotPeer(abc.ABC):
         self._config = config
         self._clock = clock
         self._now_ns = self._boot_ns = clock.now_ns()
+        self._clock_ppm = config.clock_ppm
         self.streams = MessageStreams(self.link, self, self._now_ns, config.step_ns)
         self._steps = 0
         self._truth = TruthHistory(_TRUTH_SAMPLES)
@@ -194,6 +209,13 @@ class AutopilotPeer(abc.ABC):
         self._boot_ns -= jump_ns
         self.instruments.clock_changed()
 
+    def pace_clock(self, ppm: float) -> None:
+        """The boot clock runs so much fast from now on."""
+        now_ns = self._clock.now_ns()
+        told_ns = self.boot_clock_ns(now_ns)
+        self._clock_ppm = ppm
+        self._boot_ns = now_ns - round(told_ns / (1.0 + ppm * 1e-6))
+
     def reboot(self) -> None:
         """Power cycle: the boot clock starts again, streams are forgotten, motors stop."""
         self._boot_ns = self._now_ns
@@ -201,6 +223,7 @@ class AutopilotPeer(abc.ABC):
         for channel in self.link.channels.values():
             channel.intervals_ns.clear()
             channel.due_ns.clear()
+            channel.greeted = False
 
     @property
     def up_s(self) -> float:
@@ -300,23 +323,33 @@ class AutopilotPeer(abc.ABC):
         """Whether it has such a message to send."""
         return message_id == HEARTBEAT_ID or self.instruments.knows(message_id)
 
-    def message(self, message_id: int) -> Message:
-        """The message with that id, as things are now."""
-        return self._heartbeat() if message_id == HEARTBEAT_ID else self.instruments.message(message_id)
+    def messages(self, message_id: int) -> tuple[Message, ...]:
+        """The messages with that id, as things are now: one for each sensor of the kind."""
+        if message_id == HEARTBEAT_ID:
+            return (self._heartbeat(),)
+        return self.instruments.messages(message_id)
 
     def boot_clock_ns(self, now_ns: int) -> int:
         """The time since boot by the autopilot's own clock."""
         elapsed_ns = now_ns - self._boot_ns
-        return elapsed_ns + round(elapsed_ns * self._config.clock_ppm * 1e-6)
+        return elapsed_ns + round(elapsed_ns * self._clock_ppm * 1e-6)
 
     def _refresh(self, now_ns: int) -> None:
-        self.instruments.boot_ms = self.boot_clock_ns(now_ns) // _NS_PER_MS
+        self.instruments.boot_ms = self.boot_clock_ns(now_ns) // _NS_PER_MS % _BOOT_WRAP_MS
         self.instruments.healthy = self.is_ready
+
+    def _greet(self, channel: Channel, now_ns: int) -> None:
+        """Begin what everybody gets."""
+        if not channel.greeted:
+            channel.greeted = True
+            for message_id, period_ns in self.unasked_ns.items():
+                channel.stream(message_id, period_ns, now_ns)
 
     def received(self, channel: Channel, message: Message) -> None:
         """Take a message that came in by `channel`."""
         now_ns = self._clock.now_ns()
         self.advance(now_ns)
+        self._greet(channel, now_ns)
         target = getattr(message, "target_system", 0)
         if target not in {0, self._config.system_id}:
             return
@@ -347,7 +380,9 @@ class AutopilotPeer(abc.ABC):
         params = tuple(float(getattr(message, f"param{i}")) for i in range(1, 8))
         match message.command:
             case dialect.MAV_CMD_SET_MESSAGE_INTERVAL:
-                result = self.streams.set_interval(channel, params[0], params[1], now_ns)
+                result = int(dialect.MAV_RESULT_FAILED)
+                if whole(params[0]) not in self.fixed_rates:
+                    result = self.streams.set_interval(channel, params[0], params[1], now_ns)
             case dialect.MAV_CMD_REQUEST_MESSAGE:
                 self._refresh(now_ns)
                 result = self.streams.send_now(channel, params[0])

@@ -27,6 +27,8 @@ class Channel:
             self.sign(key)
         self.intervals_ns: dict[int, int] = {}
         self.due_ns: dict[int, int] = {}
+        self.greeted = False
+        """Whether it gets what the autopilot streams unasked."""
 
     def sign(self, key: bytes) -> None:
         """Sign what goes out from now on."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import enum
 import math
+from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -51,6 +52,8 @@ class Px4Peer(AutopilotPeer):
 
     pilots_mode = Px4Mode.ALTCTL
     landing_mode = Px4Mode.AUTO_LAND
+    unasked_ns: ClassVar = {dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 20_000_000}
+    fixed_rates: ClassVar = frozenset({dialect.MAVLINK_MSG_ID_HEARTBEAT})
     refused_arming = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 
     def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
@@ -130,6 +133,7 @@ class Px4Peer(AutopilotPeer):
 
     def _on_armed(self) -> None:
         self._has_flown = False
+        self.instruments.home_m = -self._config.home_leap_m
         self.say(dialect.MAV_SEVERITY_INFO, "Armed by external command")
 
     def _arming_refusal(self) -> str:

@@ -21,7 +21,7 @@ class MessageSource(Protocol):
 
     def knows(self, message_id: int) -> bool: ...
 
-    def message(self, message_id: int) -> Message: ...
+    def messages(self, message_id: int) -> tuple[Message, ...]: ...
 
     def boot_clock_ns(self, now_ns: int) -> int: ...
 
@@ -42,7 +42,7 @@ class MessageStreams:
             self._heartbeat_due_ns = max(self._heartbeat_due_ns + _HEARTBEAT_NS, now_ns)
             for channel in self._link.channels.values():
                 if HEARTBEAT_ID not in channel.intervals_ns:
-                    self._link.send(channel, self._source.message(HEARTBEAT_ID))
+                    self._send(channel, HEARTBEAT_ID)
         if now_ns >= self._timesync_due_ns:
             self._timesync_due_ns += _TIMESYNC_NS
             boot_ns = self._source.boot_clock_ns(now_ns)
@@ -53,7 +53,7 @@ class MessageStreams:
                     period_ns = channel.intervals_ns[message_id]
                     missed = (now_ns - due_ns) // period_ns
                     channel.due_ns[message_id] = due_ns + (1 + missed) * period_ns
-                    self._link.send(channel, self._source.message(message_id))
+                    self._send(channel, message_id)
 
     def next_due_ns(self, now_ns: int) -> int:
         """When something may be due again."""
@@ -75,8 +75,12 @@ class MessageStreams:
         wanted = whole(message_id)
         if not self._source.knows(wanted):
             return int(dialect.MAV_RESULT_FAILED)
-        self._link.send(channel, self._source.message(wanted))
+        self._send(channel, wanted)
         return int(dialect.MAV_RESULT_ACCEPTED)
+
+    def _send(self, channel: Channel, message_id: int) -> None:
+        for message in self._source.messages(message_id):
+            self._link.send(channel, message)
 
     @staticmethod
     def set_data_stream(channel: Channel, request: Message, now_ns: int) -> None:

@@ -16,6 +16,7 @@ LANDED_AIR = dialect.MAV_LANDED_STATE_IN_AIR
 LANDED_LANDING = dialect.MAV_LANDED_STATE_LANDING
 
 _RANGE_PERIOD_MS = 40
+_OWN_RANGE_ID, _OTHER_RANGE_ID = 0, 1
 _CELLS = 3
 _NO_CELL = 65535
 _BUILD = (4 << 24) | (5 << 16) | (6 << 8) | 255
@@ -36,12 +37,15 @@ DATA_STREAMS: dict[int, tuple[int, ...]] = {
 class Instruments:
     """Telemetry of one vehicle.  The peer keeps `boot_ms`, `healthy` and `landed_state` up to date."""
 
-    def __init__(self, airframe: Airframe, sensors: Sensors) -> None:
+    def __init__(self, airframe: Airframe, sensors: Sensors, second_range_m: float | None = None) -> None:
         self._airframe = airframe
         self._sensors = sensors
+        self._second_range_m = second_range_m
         self.boot_ms = 0
         self.healthy = False
         self.landed_state = LANDED_GROUND
+        self.home_m = 0.0
+        """Where home has been set, above the first origin of the heights."""
         self._range_m = 0.0
         self._ranged_ms = -math.inf
         self._builders: dict[int, Callable[[], Message]] = {
@@ -56,16 +60,18 @@ class Instruments:
         }
 
     def tell_local_position(self) -> None:
-        """Exchange GLOBAL_POSITION_INT for LOCAL_POSITION_NED, as PX4 without a global position."""
-        del self._builders[dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT]
+        """Have LOCAL_POSITION_NED besides GLOBAL_POSITION_INT, as PX4."""
         self._builders[dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED] = self._local_position
 
     def knows(self, message_id: int) -> bool:
         return message_id in self._builders
 
-    def message(self, message_id: int) -> Message:
-        """The message with the present readings; KeyError for one it does not know."""
-        return self._builders[message_id]()
+    def messages(self, message_id: int) -> tuple[Message, ...]:
+        """The messages with the present readings, one for each sensor; KeyError for what it does not know."""
+        message = self._builders[message_id]()
+        if message_id != dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR or self._second_range_m is None:
+            return (message,)
+        return self._range_message(_OWN_RANGE_ID, self._second_m(self._second_range_m)), message
 
     def clock_changed(self) -> None:
         """The boot clock goes on from elsewhere: the range finder measures anew whatever it says."""
@@ -84,28 +90,46 @@ class Instruments:
         )
 
     def _distance(self) -> Message:
-        if self.boot_ms - self._ranged_ms >= _RANGE_PERIOD_MS:
+        if not 0 <= self.boot_ms - self._ranged_ms < _RANGE_PERIOD_MS:
             self._ranged_ms = self.boot_ms
             self._range_m = self._sensors.range_m(self._airframe)
+        return self._range_message(0 if self._second_range_m is None else _OTHER_RANGE_ID, self._range_m)
+
+    def _second_m(self, more_m: float) -> float:
+        """What the second one reads: 0 on the floor, as where it is built into the body."""
+        return 0.0 if self.landed_state == LANDED_GROUND or not self._range_m else self._range_m + more_m
+
+    def _range_message(self, number: int, distance_m: float) -> Message:
         params = self._sensors.params
         return dialect.MAVLink_distance_sensor_message(
             self.boot_ms,
             round(params.range_min_m * 100),
             round(params.range_max_m * 100),
-            round(self._range_m * 100),
+            round(distance_m * 100),
             dialect.MAV_DISTANCE_SENSOR_LASER,
-            0,
+            number,
             dialect.MAV_SENSOR_ROTATION_PITCH_270,
             0,
+            signal_quality=self._sensors.fault.range_quality_pc,
         )
 
     def _global_position(self) -> Message:
-        """Without a position latitude and longitude stay 0; height and climb are the barometer's."""
+        """Without a position latitude and longitude stay 0; height and climb are the barometer's.  On the
+        floor no speed is estimated."""
         sensors = self._sensors
         height_mm = round(sensors.height_m * 1000)
+        sinks_cmps = 0 if self.landed_state == LANDED_GROUND else -round(sensors.climb_mps * 100)
         heading_cdeg = round(math.degrees(sensors.yaw_rad % math.tau) * 100) % 36000
         return dialect.MAVLink_global_position_int_message(
-            self.boot_ms, 0, 0, height_mm, height_mm, 0, 0, -round(sensors.climb_mps * 100), heading_cdeg
+            self.boot_ms,
+            0,
+            0,
+            height_mm,
+            height_mm - round(self.home_m * 1000),
+            0,
+            0,
+            sinks_cmps,
+            heading_cdeg,
         )
 
     def _local_position(self) -> Message:
@@ -127,17 +151,21 @@ class Instruments:
         cell_mv = round(airframe.battery_v * 1000 / _CELLS)
         cells = [cell_mv] * _CELLS + [_NO_CELL] * (10 - _CELLS)
         used_mah = round((1.0 - airframe.battery_frac) * airframe.params.battery_capacity_ah * 1000)
-        current_ca, remaining_pc = round(airframe.current_a * 100), round(airframe.battery_frac * 100)
+        current_ca, remaining_pc = round(airframe.current_a * 100), self._remaining_pc()
         return dialect.MAVLink_battery_status_message(
             0, 0, dialect.MAV_BATTERY_TYPE_LIPO, 32767, cells, current_ca, used_mah, -1, remaining_pc
         )
+
+    def _remaining_pc(self) -> int:
+        told_pc = self._sensors.fault.charge_pc
+        return round(self._airframe.battery_frac * 100) if told_pc is None else told_pc
 
     def _sys_status(self) -> Message:
         airframe = self._airframe
         sensors = dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO | dialect.MAV_SYS_STATUS_PREARM_CHECK
         healthy = sensors if self.healthy else dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO
         millivolt, centiampere = round(airframe.battery_v * 1000), round(airframe.current_a * 100)
-        remaining_pc = round(airframe.battery_frac * 100)
+        remaining_pc = self._remaining_pc()
         return dialect.MAVLink_sys_status_message(
             sensors, sensors, healthy, 200, millivolt, centiampere, remaining_pc, 0, 0, 0, 0, 0, 0
         )

@@ -91,11 +91,13 @@ class BareFloor(_Fault):
 
 
 class LinkFault(_Fault):
-    """What the autopilot tells no longer arrives (nothing at all, or no heartbeats); or nothing passes either
-    way, as when the companion computer is dead."""
+    """What the autopilot tells no longer arrives (nothing at all, no heartbeats, no answers about its clock,
+    nothing of its battery); or nothing passes either way, as when the companion computer is dead."""
 
     by_vehicle = True
-    kind: Literal["telemetry_silent", "heartbeat_silent", "companion_dead"]
+    kind: Literal[
+        "telemetry_silent", "heartbeat_silent", "timesync_silent", "battery_silent", "companion_dead"
+    ]
 
 
 class AttitudeBiased(_Fault):
@@ -131,10 +133,26 @@ class HeightStuck(_Fault):
     reading_m: float = Field(0.1, ge=0.05, le=8)
 
 
+class HeightQuality(_Fault):
+    """The range finder goes on reading, and tells this quality of its signal: 0 is unknown, 1 none."""
+
+    by_vehicle = True
+    kind: Literal["height_quality"]
+    percent: int = Field(1, ge=0, le=100)
+
+
 class BatteryDrop(_Fault):
     by_airframe = True
     kind: Literal["battery"]
     charge: float = Field(ge=0, le=1)
+
+
+class ChargeTold(_Fault):
+    """The autopilot tells this charge whatever the battery holds; -1 says that it does not know."""
+
+    by_vehicle = True
+    kind: Literal["charge_told"]
+    percent: int = Field(-1, ge=-1, le=100)
 
 
 class WindChange(_Fault):
@@ -161,6 +179,14 @@ class ClockJump(_Fault):
     by_vehicle = True
     kind: Literal["clock_jump"]
     jump_s: float = Field(ge=-3600, le=3600)
+
+
+class ClockRate(_Fault):
+    """The autopilot's clock runs fast by this share of time, as one that is simulated or overloaded may."""
+
+    by_vehicle = True
+    kind: Literal["clock_rate"]
+    share: float = Field(0.015, ge=-0.2, le=0.2)
 
 
 class DetectorKilled(_Fault):
@@ -224,10 +250,13 @@ Fault: TypeAlias = Annotated[
     | HeightBiased
     | HeightLost
     | HeightStuck
+    | HeightQuality
     | BatteryDrop
+    | ChargeTold
     | WindChange
     | VehicleFault
     | ClockJump
+    | ClockRate
     | DetectorKilled
     | ProcessFault
     | LoopStalled

@@ -28,19 +28,29 @@ from flightd.sim.scenario.fault_schema import (
     CameraFault,
     CameraLate,
     CameraTurned,
+    ChargeTold,
     ClockJump,
+    ClockRate,
     Fault,
     HeightBiased,
     HeightLost,
+    HeightQuality,
     HeightStuck,
     LinkFault,
     VehicleFault,
     WindChange,
 )
 from flightd.sim.sensors.camera import CameraPeer
+from flightd.sim.sensors.instruments import SensorFault
 from flightd.site.site import Site
 
 _LOOKS_S = 0.01
+_WITHHELD: Mapping[str, frozenset[int]] = {
+    "heartbeat_silent": frozenset({dialect.MAVLINK_MSG_ID_HEARTBEAT}),
+    "timesync_silent": frozenset({dialect.MAVLINK_MSG_ID_TIMESYNC}),
+    "battery_silent": frozenset({dialect.MAVLINK_MSG_ID_BATTERY_STATUS, dialect.MAVLINK_MSG_ID_SYS_STATUS}),
+}
+"""Which messages a fault of the link keeps back."""
 _OFF_FLOOR_M = 0.3
 _HERE_M = 0.4
 
@@ -188,15 +198,29 @@ class WorldFaults:
 
 def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
     """What goes wrong in an autopilot, or between it and its companion."""
-    wrong = vehicle.sensors.fault
     match fault:
         case LinkFault(kind="telemetry_silent"):
             vehicle.link.down.params = RadioParams(loss=1.0) if on else vehicle.link.up.params
         case LinkFault(kind="companion_dead"):
             vehicle.link.muted = on
         case LinkFault():
-            heartbeat = {dialect.MAVLINK_MSG_ID_HEARTBEAT}
-            vehicle.link.withheld = vehicle.link.withheld | heartbeat if on else set()
+            kept = _WITHHELD[fault.kind]
+            vehicle.link.withheld = vehicle.link.withheld | kept if on else vehicle.link.withheld - kept
+        case ClockRate():
+            vehicle.pace_clock(fault.share * 1e6 if on else 0.0)
+        case ClockJump():
+            vehicle.jump_clock(round(fault.jump_s * 1e9) * (1 if on else -1))
+        case VehicleFault(kind="pilot"):
+            vehicle.pilot_mode(vehicle.pilots_mode if on else vehicle.landing_mode)
+        case VehicleFault() if on:
+            vehicle.reboot()
+        case _:
+            _mislead(vehicle.sensors.fault, fault, on)
+
+
+def _mislead(wrong: SensorFault, fault: Fault, on: bool) -> None:
+    """What the sensors tell wrong."""
+    match fault:
         case AttitudeBiased():
             angles = math.radians(fault.roll_deg), math.radians(fault.pitch_deg), math.radians(fault.yaw_deg)
             wrong.roll_rad, wrong.pitch_rad, wrong.yaw_rad = angles if on else (0.0, 0.0, 0.0)
@@ -204,11 +228,9 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
             wrong.range_m = fault.offset_m if on else 0.0
         case HeightLost():
             wrong.range_lost = on
+        case HeightQuality():
+            wrong.range_quality_pc = fault.percent if on else 0
         case HeightStuck():
             wrong.range_stuck_m = fault.reading_m if on else None
-        case ClockJump():
-            vehicle.jump_clock(round(fault.jump_s * 1e9) * (1 if on else -1))
-        case VehicleFault(kind="pilot"):
-            vehicle.pilot_mode(vehicle.pilots_mode if on else vehicle.landing_mode)
-        case VehicleFault() if on:
-            vehicle.reboot()
+        case ChargeTold():
+            wrong.charge_pc = fault.percent if on else None

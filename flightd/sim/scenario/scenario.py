@@ -47,6 +47,9 @@ battery_ah = 5.0         # its capacity; hovering takes 14 A
 swap_s = 30.0            # time in which somebody changes it on the charge pad; 0: nobody does
 start_offset_m = [0.0, 0.0]  # how far from the pad it really stands at the start, x and y
 start_yaw_deg = 0.0      # how far it is turned from the heading in which it should stand, + to the right
+clock_ppm = 20.0         # by so many millionths the autopilot's clock runs fast
+range_least_m = 0.05     # the range finder measures from here on; the drone stands with it 0.10 m high
+# second_range_m = 0.1   # a second one beside it reads so much more, and nothing on the floor
 
 [[fault]]                # any number of them; the kinds and their keys are in `fault_schema`
 kind = "camera_frozen"
@@ -197,6 +200,9 @@ class VehicleScenario(Section):
     radio_loss: float = Field(0.0, ge=0, le=1)
     radio_delay_ms: float = Field(0.0, ge=0, le=2000)
     radio_jitter_ms: float = Field(0.0, ge=0, le=2000)
+    clock_ppm: float = Field(20.0, ge=-200_000, le=200_000)
+    range_least_m: float = Field(0.05, ge=0.01, le=1)
+    second_range_m: float | None = Field(None, ge=-1, le=1)
 
     def radio(self) -> RadioParams:
         """Each way between a MAVLink autopilot and its companion."""

@@ -43,6 +43,10 @@ class SensorFault:
     range_lost: bool = False
     range_stuck_m: float | None = None
     """What the range finder reads whatever is below it; None: it measures."""
+    charge_pc: int | None = None
+    """What is told of the charge whatever the battery holds; None: it is measured."""
+    range_quality_pc: int = 0
+    """What it tells of its signal: 0 is nothing, 1 that there is none."""
 
 
 class Sensors:

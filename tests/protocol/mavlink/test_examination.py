@@ -21,6 +21,7 @@ from flightd.ports import Clock
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
+from flightd.sim.autopilot.link import Channel
 from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.autopilot.streams import MessageStreams
 from flightd.sim.plant.airframe import Airframe
@@ -89,9 +90,12 @@ class _FixedRates(MessageStreams):
     def set_interval(self, *_: Any) -> int:
         return int(dialect.MAV_RESULT_DENIED)
 
+    def send_now(self, channel: Channel, message_id: float) -> int:
+        return int(dialect.MAV_RESULT_UNSUPPORTED)
+
 
 class _DeniesRates(ArduCopterPeer):
-    """Firmware that changes no message's interval."""
+    """Firmware that changes no message's interval, and sends none on request."""
 
     def __init__(self, clock: Clock, airframe: Airframe, config: PeerConfig | None = None) -> None:
         config = config or PeerConfig()
@@ -109,6 +113,9 @@ def test_the_rate_of_heartbeats_is_measured_and_a_slow_one_is_named() -> None:
             report = await examination.report()
             assert report.heartbeat_hz == pytest.approx(1.0)
             assert "seen up to 1.0 s late" in str(too_slow(report.heartbeat_hz))
+        async with examined(Px4Peer) as (_, examination):  # keeps its rate, and sends one when asked
+            report = await examination.report()
+            assert too_slow(report.heartbeat_hz) is None
 
     virtual(test())
 
@@ -187,3 +194,13 @@ def test_the_shipped_parameter_files_are_fit_and_complete(
             assert rule.names[-1] in {"ARMING_CHECK", "ARMING_SKIPCHK"}
     assert judged >= 8
     assert all(len(name) <= 16 for name in values)
+
+
+def test_range_finders_and_cells_are_looked_at() -> None:
+    async def test() -> None:
+        async with examined(ArduCopterPeer) as (_, examination):
+            report = await examination.report()
+            assert [sample.measures for sample in report.range_finders] == [True]
+            assert report.cells == 3
+
+    virtual(test())

@@ -148,3 +148,56 @@ def test_a_disarmed_vehicle_gets_no_thrust_however_it_was_left() -> None:
             on_floor=True,
         )
         assert thrust == 0.0
+
+
+def step_for(loop: HeightLoop, start_s: float, duration_s: float, **known: float | bool) -> list[float]:
+    """Thrusts of a climb that is wanted while the vehicle stands on the floor."""
+    stands: dict[str, float | bool] = {"climb_mps": 0.0, "height_m": 0.1, "on_floor": True, **known}
+    return [
+        loop.step(round((start_s + i * 0.02) * 1e9), 0.5, tilt_cos=1.0, armed=True, **stands)  # type: ignore[arg-type]
+        for i in range(round(duration_s / 0.02))
+    ]
+
+
+def test_a_single_sample_of_climb_is_no_lift_off() -> None:
+    loop = HeightLoop()
+    step_for(loop, 0.0, 0.1)
+    step_for(loop, 0.1, 0.06, climb_mps=4.8)
+    step_for(loop, 0.16, 0.04)
+    step_for(loop, 0.2, 0.06, height_m=1.5)
+    assert not loop.in_air
+    assert loop.hover == 0.5
+
+
+def test_a_lift_off_that_never_was_costs_no_time_and_teaches_little() -> None:
+    """Climb is told for a quarter of a second while the vehicle stands at a sixth of its weight's thrust."""
+    loop = HeightLoop()
+    step_for(loop, 0.0, 0.2)
+    step_for(loop, 0.2, 0.3, climb_mps=4.8)
+    assert loop.hover >= 0.2
+    thrusts = step_for(loop, 0.5, 2.0)
+    assert not loop.in_air
+    assert thrusts[-1] > 0.45
+
+
+def test_a_false_climb_at_lift_off_is_not_flown_on_with() -> None:
+    loop, airframe = HeightLoop(), Airframe(wind=CALM)
+    now_ns, highest_mps, in_air_ns = 0, 0.0, 0
+    for _ in range(400):
+        now_ns += 20_000_000
+        false_mps = 2.3 if in_air_ns == 0 or now_ns - in_air_ns < 200_000_000 else 0.0
+        thrust = loop.step(
+            now_ns,
+            0.4,
+            climb_mps=airframe.climb_mps + (false_mps if airframe.climb_mps > 0.05 else 0.0),
+            height_m=math.nan,
+            tilt_cos=1.0,
+            armed=True,
+            on_floor=not loop.in_air,
+        )
+        in_air_ns = in_air_ns or (now_ns if loop.in_air else 0)
+        for _ in range(5):
+            airframe.step(0.004, AirframeCommand(motors=True, collective=thrust))
+        highest_mps = max(highest_mps, airframe.climb_mps)
+    assert loop.in_air
+    assert highest_mps < 0.9

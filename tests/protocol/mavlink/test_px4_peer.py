@@ -7,6 +7,7 @@ import math
 import struct
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -193,13 +194,30 @@ def test_whole_parameters_travel_as_bytes() -> None:
     virtual(test())
 
 
-def test_height_is_told_by_local_position_alone() -> None:
+def test_the_local_position_goes_on_where_the_height_above_home_leaps_at_arming() -> None:
     async def test() -> None:
         async with pair() as (peer, client):
             await client.stream(32, 50)
-            assert await client.command(511, 33, 20000) == 2
             await hopping(peer, client)
             told: Any = client.last("LOCAL_POSITION_NED")
             assert -told.z == pytest.approx(peer.truth().height_m - 0.1, abs=0.06)
+            above = [message.relative_alt for message in client.all("GLOBAL_POSITION_INT")]  # unasked
+            steps = [abs(after - before) for before, after in pairwise(above)]
+            assert max(steps) > 1300
+            assert sorted(steps)[-2] < 200
+
+    virtual(test())
+
+
+def test_its_heartbeat_keeps_its_rate_and_comes_when_it_is_asked_for() -> None:
+    async def test() -> None:
+        async with pair() as (_, client):
+            assert await client.command(511, 0, 50_000) == 4
+            await asyncio.sleep(5.0)
+            assert 4 <= len(client.all("HEARTBEAT")) <= 7
+            before = len(client.all("HEARTBEAT"))
+            for _ in range(5):
+                assert await client.command(512, 0) == 0
+            assert len(client.all("HEARTBEAT")) >= before + 5
 
     virtual(test())

@@ -175,3 +175,47 @@ def test_a_flight_whose_landed_state_stays_that_of_the_floor_is_not_dropped(told
             assert rig.peer.truth().height_m > 1.0
 
     virtual(test())
+
+
+@pytest.mark.parametrize("leap_m", [1.4, -1.4])
+def test_a_leap_of_the_height_above_home_at_arming_is_no_climb(leap_m: float) -> None:
+    """It was taken for 4.8 m/s of climb: the hover thrust was learnt far too low, the take-off took 13 s."""
+
+    async def test() -> None:
+        config = PeerConfig(ready_s=0.5, home_leap_m=leap_m)
+        async with px4_rig(config) as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            rig.vehicle.demand(Demand.FLY)
+            await rig.until(lambda: rig.known().armed and rig.known().in_control)
+            climbs = []
+            for _ in range(60):
+                await rig.stream(0.1, climb_mps=0.5)
+                climbs.append(rig.known().climb_mps)
+                if rig.peer.truth().height_m > 1.0:
+                    break
+            assert rig.peer.truth().height_m > 1.0
+            assert min(climbs) > -0.3
+            assert max(climbs) < 0.9
+
+    virtual(test())
+
+
+def test_a_take_over_is_seen_in_time_though_the_heartbeat_keeps_its_rate() -> None:
+    """PX4 refuses SET_MESSAGE_INTERVAL of HEARTBEAT: a take-over was seen up to a second late."""
+
+    async def test() -> None:
+        async with px4_rig() as rig:
+            await rig.take_off(1.5)
+            for at_s in (0.2, 0.45, 0.7):
+                rig.peer.pilot_mode(Px4Mode.OFFBOARD)
+                rig.vehicle.demand(Demand.STANDBY)
+                await asyncio.sleep(0.1)
+                rig.vehicle.demand(Demand.FLY)
+                await rig.until(lambda: rig.known().in_control)
+                await rig.stream(at_s)
+                rig.take_over()
+                assert await rig.until(lambda: not rig.known().in_control, 1.0) < 0.15
+            texts = [text for text in rig.peer.texts if text.startswith("heartbeat_rate")]
+            assert not texts
+
+    virtual(test())

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
-from flightd.adapters.vehicle.mavlink.telemetry import MavlinkTelemetry
+from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource, MavlinkTelemetry
 from flightd.core.types import LandedState, VehicleState
 
 NOW_NS = 1_000_000_000_000
@@ -29,8 +29,33 @@ def told(*messages: Any, telemetry: MavlinkTelemetry | None = None, now_ns: int 
     return state
 
 
-def distance(centimetres: int, orientation: int = 25, least: int = 20, most: int = 400) -> Any:
-    return dialect.MAVLink_distance_sensor_message(0, least, most, centimetres, 1, 0, orientation, 0)
+def distance(
+    centimetres: int,
+    orientation: int = 25,
+    least: int = 20,
+    most: int = 400,
+    number: int = 0,
+    quality: int = 0,
+) -> Any:
+    return dialect.MAVLink_distance_sensor_message(
+        0, least, most, centimetres, 1, number, orientation, 0, signal_quality=quality
+    )
+
+
+def heartbeat(*, armed: bool) -> Any:
+    return dialect.MAVLink_heartbeat_message(2, 3, 129 if armed else 1, 20, 4, 3)
+
+
+def heights(*messages: Any, armed: bool = False, telemetry: MavlinkTelemetry | None = None) -> list[float]:
+    """The height after each message, 40 ms apart."""
+    telemetry = telemetry or MavlinkTelemetry(ClockSync())
+    telemetry.take(heartbeat(armed=armed), NOW_NS)
+    known = []
+    for number, message in enumerate(messages):
+        now_ns = NOW_NS + number * 40 * MS
+        telemetry.take(message, now_ns)
+        known.append(telemetry.height_m(now_ns))
+    return known
 
 
 def test_nothing_is_known_before_heartbeat_and_attitude() -> None:
@@ -52,7 +77,69 @@ def test_the_range_is_along_the_body_and_the_height_along_the_vertical() -> None
 
 @pytest.mark.parametrize("message", [distance(0), distance(19), distance(401), distance(155, orientation=0)])
 def test_what_the_range_finder_did_not_see_is_no_height(message: Any) -> None:
-    assert math.isnan(told(message).height_m)
+    seen = heights(distance(155), message, *[message] * 20, armed=True)
+    assert seen[0] == pytest.approx(1.55)
+    assert math.isnan(seen[-1])
+
+
+def test_a_signal_that_is_none_is_no_height_whatever_is_read() -> None:
+    assert math.isnan(heights(distance(155, quality=1))[0])
+    for quality in (0, 2, 100):
+        assert heights(distance(155, quality=quality)) == [pytest.approx(1.55)]
+
+
+@pytest.mark.parametrize("read", [0, 12])
+def test_standing_lower_than_the_sensor_measures_is_a_height(read: int) -> None:
+    """ArduCopter says 0 for as long as it stands so: the flight waited for a height for ever."""
+    telemetry = MavlinkTelemetry(ClockSync())
+    assert heights(*[distance(read)] * 3, telemetry=telemetry) == [pytest.approx(0.2)] * 3
+    climbing = heights(*[distance(0)] * 20, distance(21), distance(35), armed=True, telemetry=telemetry)
+    assert climbing[:20] == [pytest.approx(0.2)] * 20
+    assert climbing[-1] == pytest.approx(0.35)
+    sinking = [distance(cm) for cm in (90, 60, 30, 0, 0)]
+    assert heights(*sinking, armed=True, telemetry=telemetry)[-1] == pytest.approx(0.2)
+
+
+def test_nothing_seen_from_high_up_is_not_the_floor() -> None:
+    telemetry = MavlinkTelemetry(ClockSync())
+    heights(distance(0), telemetry=telemetry)
+    seen = heights(distance(150), *[distance(0)] * 20, armed=True, telemetry=telemetry)
+    assert seen[1] == pytest.approx(1.5)
+    assert math.isnan(seen[-1])
+
+
+def two(own_cm: int, other_cm: int, own_quality: int = 0, other_quality: int = 0) -> list[Any]:
+    return [
+        distance(own_cm, least=5, number=0, quality=own_quality),
+        distance(other_cm, least=5, number=1, quality=other_quality),
+    ]
+
+
+def test_of_two_range_finders_the_one_that_measures_on_the_floor_is_flown_by() -> None:
+    """Side by side, 10 cm apart: the height leapt to and fro between them."""
+    telemetry = MavlinkTelemetry(ClockSync())
+    heights(*two(0, 10) * 30, telemetry=telemetry)
+    flown = heights(*two(160, 150) * 10, armed=True, telemetry=telemetry)
+    assert flown[1:] == [pytest.approx(1.5)] * 19
+
+
+def test_the_choice_stands_in_flight_even_when_the_chosen_one_falls_silent() -> None:
+    telemetry = MavlinkTelemetry(ClockSync())
+    heights(*two(10, 12, 90, 40) * 30, telemetry=telemetry)
+    assert heights(*two(150, 160, 90, 40), armed=True, telemetry=telemetry)[-1] == pytest.approx(1.5)
+    rest = heights(*[distance(160, least=5, number=1)] * 20, armed=True, telemetry=telemetry)
+    assert math.isnan(rest[-1])
+
+
+def test_the_range_finder_that_is_configured_is_the_one() -> None:
+    telemetry = MavlinkTelemetry(ClockSync(), range_finder=0)
+    heights(*two(0, 10) * 30, telemetry=telemetry)
+    assert heights(*two(160, 150) * 10, armed=True, telemetry=telemetry)[-1] == pytest.approx(1.6)
+
+
+def test_the_better_signal_decides_between_two_that_measure() -> None:
+    telemetry = MavlinkTelemetry(ClockSync())
+    assert heights(*two(10, 12, 30, 95) * 30, telemetry=telemetry)[-1] == pytest.approx(0.12)
 
 
 def test_a_silent_range_finder_is_no_height() -> None:
@@ -68,15 +155,40 @@ def position(boot_ms: int, relative_mm: int, vz: int = 0, vx: int = 0) -> Any:
 
 def test_the_climb_rate_points_up() -> None:
     assert told(position(0, 1000, vz=-50)).climb_mps == pytest.approx(0.5)
-    ned = dialect.MAVLink_local_position_ned_message(0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.3)
-    assert told(ned).climb_mps == pytest.approx(-0.3)
+    by_local = MavlinkTelemetry(ClockSync(), ClimbSource.LOCAL_POSITION)
+    assert told(local(0.3), telemetry=by_local).climb_mps == pytest.approx(-0.3)
+
+
+def local(vz_mps: float) -> Any:
+    return dialect.MAVLink_local_position_ned_message(0, 0.0, 0.0, -1.0, 0.0, 0.0, vz_mps)
+
+
+@pytest.mark.parametrize("source", list(ClimbSource))
+def test_the_climb_rate_comes_from_one_message_only(source: ClimbSource) -> None:
+    telemetry = MavlinkTelemetry(ClockSync(), source)
+    state = told(position(0, 1000, vz=-50), local(0.3), position(40, 1000, vz=-50), telemetry=telemetry)
+    wanted = 0.5 if source is ClimbSource.GLOBAL_POSITION else -0.3
+    assert state.climb_mps == pytest.approx(wanted)
+
+
+def test_a_leap_of_the_height_is_no_climb() -> None:
+    """Home is set at arming: everything is 1.4 m lower, or higher, from one sample to the next."""
+    telemetry = MavlinkTelemetry(ClockSync())
+    for leap_mm in (1436, -1436):
+        seen = [
+            told(position(40 * i, 1000 + (leap_mm if i >= 20 else 0)), telemetry=telemetry).climb_mps
+            for i in range(40)
+        ]
+        known = [climb for climb in seen if not math.isnan(climb)]
+        assert len(known) > 30
+        assert max(map(abs, known)) < 0.01
 
 
 def test_without_a_velocity_the_climb_rate_is_the_heights_slope() -> None:
     """ArduPilot without a velocity estimate sends zeros, also while it climbs."""
     rising = [position(40 * i, 1000 + 20 * i) for i in range(20)]
     assert told(*rising).climb_mps == pytest.approx(0.5)
-    assert told(*rising, position(5000, 9000)).climb_mps == 0.0  # after a gap it starts anew
+    assert math.isnan(told(*rising, position(5000, 9000)).climb_mps)  # after a gap it starts anew
     assert told(position(0, 1000, vx=10)).climb_mps == 0.0
 
 

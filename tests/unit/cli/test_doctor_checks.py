@@ -9,13 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flightd.adapters.vehicle.mavlink.examination import ExaminationReport
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.required_parameters import Job, rules_for
+from flightd.adapters.vehicle.mavlink.required_parameters import judge as judge_parameter
+from flightd.adapters.vehicle.range_finders import RangeSample
 from flightd.config.camera import CameraConfig
 from flightd.config.recorder import RecorderConfig
 from flightd.config.schema import Config, load_config
+from flightd.config.vehicle import VehicleConfig
 from flightd.doctor.calibration import check_calibration
 from flightd.doctor.camera import Pictures, check_latency, check_vision, judge_camera
 from flightd.doctor.check import Check, CheckLevel
 from flightd.doctor.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
+from flightd.doctor.vehicle import judge as judge_vehicle
 from flightd.site.site_file import load_site
 from flightd.vision.line_detector import Detector
 
@@ -153,3 +160,54 @@ def test_pictures_that_come_too_late_to_fly_by_are_told_before_the_flight(
 
 def config() -> Config:
     return load_config(CONFIGS / "sim.toml")
+
+
+def sample(sensor: int, distance_m: float, least_m: float = 0.2) -> RangeSample:
+    return RangeSample(sensor, distance_m, least_m, 8.0)
+
+
+@pytest.mark.parametrize(
+    ("heard", "wanted", "level", "told"),
+    [
+        ((sample(0, 0.3),), None, CheckLevel.OK, "0.30 m as it stands"),
+        ((sample(0, 0.0),), None, CheckLevel.OK, "on the floor, lower than 0.2 m"),
+        ((sample(0, 0.0, 0.5),), None, CheckLevel.ERROR, "minimum of 0.5 m"),
+        ((sample(0, 0.0), sample(1, 0.25)), None, CheckLevel.WARNING, "1 is flown by"),
+        ((sample(0, 0.0), sample(1, 0.25)), 1, CheckLevel.OK, "0.25 m"),
+        ((sample(0, 0.3),), 2, CheckLevel.WARNING, "2 is not heard"),
+        ((), None, CheckLevel.WARNING, "none that looks down"),
+    ],
+)
+def test_the_range_finder_as_the_vehicle_stands(
+    heard: tuple[RangeSample, ...], wanted: int | None, level: CheckLevel, told: str
+) -> None:
+    report = ExaminationReport(Firmware.ARDUPILOT, "", False, (), (), 20.0, heard, 3)
+    checks = judge_vehicle(VehicleConfig(range_finder=wanted), report)
+    (check,) = [check for check in checks if check.name == "range finder"]
+    assert check.level is level
+    assert told in check.text
+
+
+@pytest.mark.parametrize(
+    ("cells", "told", "level"),
+    [
+        (None, 0, CheckLevel.WARNING),
+        (4, 3, CheckLevel.ERROR),
+        (4, 0, CheckLevel.OK),
+        (None, 3, CheckLevel.OK),
+    ],
+)
+def test_the_cells_of_the_battery(cells: int | None, told: int, level: CheckLevel) -> None:
+    report = ExaminationReport(Firmware.ARDUPILOT, "", False, (), (), 20.0, (sample(0, 0.3),), told)
+    checks = judge_vehicle(VehicleConfig(), report, cells)
+    (check,) = [check for check in checks if check.name == "battery"]
+    assert check.level is level
+
+
+@pytest.mark.parametrize(("volts", "cells", "fits"), [(10.5, 3, True), (10.5, 4, False), (14.0, 4, True)])
+def test_a_low_voltage_for_three_cells_does_not_pass_on_four(volts: float, cells: int, fits: bool) -> None:
+    rules = [
+        rule for rule in rules_for(Firmware.ARDUPILOT, Job(cells=cells)) if "BATT_LOW_VOLT" in rule.names
+    ]
+    (rule,) = rules
+    assert (judge_parameter(rule, ("BATT_LOW_VOLT", volts)) is None) is fits

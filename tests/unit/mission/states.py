@@ -49,6 +49,7 @@ _AT_ONCE = HazardConfig().model_copy(
         "disagree_s": 0.0,
         "overload_s": 0.0,
         "record_lost": LossAction.LAND,
+        "battery_unknown": LossAction.LAND,
         "expert": HazardExpert().model_copy(update={"push_s": 0.0, "outside_s": 0.0}),
     }
 )
@@ -268,6 +269,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.WIND: warned(push_mps2=5.0),
     Trigger.LAND_HERE: ordered(CommandKind.LAND),
     Trigger.GROUND_LOST: sensed(ground_silent_s=9.0),
+    Trigger.BATTERY_UNKNOWN: sensed(battery_frac=math.nan),
     Trigger.RECORD_LOST: sick(recorder_error="disk full"),
     Trigger.HAZARD_LASTS: warned(1.3, frozen_s=9.0),
     Trigger.LINES_LOST_LONG: sensed(2.5, x_age_s=9.0, y_age_s=9.0),
@@ -275,6 +277,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.TIMED_OUT: Stimulus(_stuck, 70.0),
     Trigger.TELEMETRY_STALE: sensed(telemetry_age_s=0.2),
     Trigger.CLOCK_JUMP: sensed(dt_s=0.6),
+    Trigger.CLOCK_UNSURE: sensed(clock_error_s=0.5),
     Trigger.CAMERA_FROZEN: warned(frozen_s=9.0),
     Trigger.CAMERA_BLIND: warned(blank_s=9.0),
     Trigger.FRAMES_STALE: warned(picture_age_s=9.0),

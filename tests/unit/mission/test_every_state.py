@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from flightd.core.types import CommandKind, LandedState, Phase
@@ -12,7 +14,7 @@ from tests.unit.mission.states import PARAMS, STIMULI, Stimulus, fresh
 
 _AT_NODE = (Phase.HOVER, Phase.CLIMB, Phase.SCAN)
 _BACK = (Intent.RETURN, Intent.HOME)
-_SLOW = (Trigger.HEIGHT_LOST, Trigger.TIMED_OUT, Trigger.POSITION_DOUBTED)
+_SLOW = (Trigger.HEIGHT_LOST, Trigger.CLOCK_UNSURE, Trigger.TIMED_OUT, Trigger.POSITION_DOUBTED)
 SHADOWED = {
     # on the way back nothing is done at a node: it goes on before anything that takes time
     *((State(phase, intent), trigger) for phase in _AT_NODE for intent in _BACK for trigger in _SLOW),
@@ -132,3 +134,38 @@ def test_nothing_counted_on_the_last_battery_is_no_completed_mission() -> None:
     flight.set(battery_frac=0.15)
     assert down(flight) == "aborted-end"
     assert flight.mission.reason.startswith("no picture of a shelf")
+
+
+def landing_corrected(by_m: float) -> Flight:
+    """All nodes are visited; over the pad the position turns out to be `by_m` further along."""
+    flight = fresh(State(Phase.LAND, Intent.VISIT))
+    pad = flight.mission.goal
+    flight.set(pad_m=(pad.x_m, pad.y_m))
+    flight.run(0.1)
+    pose = flight.senses.pose
+    assert pose is not None
+    flight.set(pose=replace(pose, x_m=pose.x_m + by_m))
+    flight.run(0.02, follow=False)
+    flight.set(landed=LandedState.ON_GROUND, armed=False)
+    flight.run(0.02, follow=False)
+    return flight
+
+
+def test_a_correction_that_leaves_it_over_its_pad_does_not_end_the_mission_otherwise() -> None:
+    flight = landing_corrected(0.45)
+    assert ids(flight.mission.state) == "done-end"
+    assert flight.mission.reason == "landed on the pad"
+
+
+def test_a_correction_away_from_the_pad_is_what_the_mission_ends_for() -> None:
+    """It ended as "aborted: route done"."""
+    flight = landing_corrected(3.0)
+    assert ids(flight.mission.state) == "aborted-end"
+    assert flight.mission.reason == Trigger.POSITION_CORRECTED.value
+
+
+def test_a_mission_that_ends_early_on_its_pad_says_why_it_came_home() -> None:
+    """It ended as "aborted: route done"."""
+    flight = fresh(State(Phase.LAND, Intent.HOME))
+    assert down(flight) == "aborted-end"
+    assert flight.mission.reason == Trigger.GO_HOME.value

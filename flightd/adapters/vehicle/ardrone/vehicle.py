@@ -25,6 +25,8 @@ MIN_GAP_NS = 20_000_000
 _DEAF_NS = 1_000_000_000
 _LAST_WORDS = 3
 _CAMERA_ATTEMPTS = 3
+_CELLS = 3
+"""Of its battery."""
 
 _MODES: dict[int, str] = {
     Major.DEFAULT: "default",
@@ -95,6 +97,8 @@ class ArDroneVehicle:
             landed=landed if linked else LandedState.UNKNOWN,
             battery_frac=demo.battery_percent / 100.0,
             battery_v=telemetry.battery_v,
+            battery_stamp_ns=telemetry.flight_ns,
+            battery_cells=_CELLS,
             heartbeat_ns=telemetry.arrival_ns,
             refusal=words(self._flight.refusal(now_ns)),
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Hashable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
@@ -17,12 +17,15 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing, setup_message
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, ParameterFinding, judge, rules_for
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
-from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, Beats
+from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, BeatPoll, Beats
 from flightd.adapters.vehicle.mavlink.services.parameters import Parameters
+from flightd.adapters.vehicle.mavlink.telemetry import cells_told, range_sample
+from flightd.adapters.vehicle.range_finders import RangeSample
 from flightd.core.errors import UnavailableError
 from flightd.ports import Clock
 
 _BEATS_WINDOW_S = 1.0
+_LOOK_US = 200_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +39,10 @@ class ExaminationReport:
     findings: tuple[ParameterFinding, ...]
     unread: tuple[str, ...]
     heartbeat_hz: float
+    range_finders: tuple[RangeSample, ...] = ()
+    """The newest sample of each that looks down."""
+    cells: int = 0
+    """In series in the battery; 0 where it is not told."""
 
 
 class Examination:
@@ -63,6 +70,8 @@ class Examination:
         self._version = ""
         self._beats = Beats(_BEATS_WINDOW_S)
         self._heartbeat_hz = math.nan
+        self._ranges: dict[Hashable, RangeSample] = {}
+        self._cells = 0
 
     @asynccontextmanager
     async def connected(self, patience_s: float = 5.0) -> AsyncIterator[None]:
@@ -114,8 +123,16 @@ class Examination:
             raise UnavailableError(f"{self._url}: the autopilot is heard but does not answer; {remedy}")
         if math.isnan(self._heartbeat_hz):
             self._heartbeat_hz = await self._measure_beats()
-        found_all = (tuple(findings), tuple(unread), self._heartbeat_hz)
-        return ExaminationReport(firmware, self._version, self._armed, *found_all)
+        return ExaminationReport(
+            firmware,
+            self._version,
+            self._armed,
+            tuple(findings),
+            tuple(unread),
+            self._heartbeat_hz,
+            tuple(self._ranges.values()),
+            self._cells,
+        )
 
     async def fix(self, findings: Sequence[ParameterFinding]) -> list[ParameterFinding]:
         """Write the better values and read them back; the findings that remain.  Nothing is written to
@@ -128,11 +145,17 @@ class Examination:
         return remaining
 
     async def _measure_beats(self) -> float:
-        """The rate of its heartbeats once the one that a flight needs was asked for."""
+        """The rate of its heartbeats once they were asked for as a flight does."""
         beat, period_us = dialect.MAVLINK_MSG_ID_HEARTBEAT, round(1e6 / BEATS_HZ)
+        for message_id in (dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR, dialect.MAVLINK_MSG_ID_BATTERY_STATUS):
+            await self._commander.send(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, _LOOK_US)
         await self._commander.send(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, beat, period_us)
         self._beats.start(self._clock.now_ns())
-        await asyncio.sleep(_BEATS_WINDOW_S)
+        poll = BeatPoll()
+        while math.isnan(self._beats.rate_hz(self._clock.now_ns())):
+            if poll.is_due(self._clock.now_ns(), self._beats.newest_ns):
+                self._commander.post(dialect.MAV_CMD_REQUEST_MESSAGE, beat)
+            await asyncio.sleep(BeatPoll.LOOK_S)
         return self._beats.rate_hz(self._clock.now_ns())
 
     def _take(self, message: Message, now_ns: int) -> None:
@@ -147,6 +170,12 @@ class Examination:
                 self._commander.acknowledged(message)
             case "PARAM_VALUE":
                 self._parameters.value(message)
+            case "DISTANCE_SENSOR":
+                sample = range_sample(message)
+                if sample is not None:
+                    self._ranges[sample.sensor] = sample
+            case "BATTERY_STATUS" if message.id == 0:
+                self._cells = cells_told(message)
             case "AUTOPILOT_VERSION":
                 number = message.flight_sw_version
                 self._version = f"{number >> 24 & 0xFF}.{number >> 16 & 0xFF}.{number >> 8 & 0xFF}"

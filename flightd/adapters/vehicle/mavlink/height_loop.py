@@ -18,6 +18,12 @@ _RAMP_PER_S = 0.25
 _THRUST_MAX = 0.95
 _LIFTED_MPS = 0.12
 _LIFTED_M = 0.04
+_LIFTED_S = 0.1
+"""For so long without a break it must climb, or be higher: a single sample may be a leap of the estimate."""
+_HOVER_SHARE = (0.4, 2.0)
+"""What the hover thrust may be learnt to be, of the guess: at lift-off, and as the battery sags."""
+_SETTLE_MAX_MPS = 0.5
+"""The loop begins with the climb that it finds, but with no more."""
 _AT_LIFT_OFF = 0.96
 """Share of the thrust at which lift-off was noticed that is the weight: it is noticed a moment late."""
 
@@ -59,6 +65,8 @@ class HeightLoop:
         self._trim_mps2 = 0.0
         self._floor_m = math.nan
         self._touched_s = 0.0
+        self._lifted_s = self._stuck_s = 0.0
+        self._guess = self.hover
 
     @property
     def in_air(self) -> bool:
@@ -102,15 +110,27 @@ class HeightLoop:
             case _:
                 self._fly(dt_s, wanted_mps, climb_mps, tilt_cos)
                 self._feel_floor(dt_s, wanted_mps, climb_mps, height_m, on_floor)
+                self._doubt_lift_off(dt_s, wanted_mps, climb_mps, height_m)
         return self._thrust
 
+    def guess(self, hover: float) -> None:
+        """The hover thrust as the autopilot's own parameters have it."""
+        self.hover = self._guess = hover
+
     def _settle(self, climb_mps: float) -> None:
-        self._wanted_mps = 0.0 if math.isnan(climb_mps) else climb_mps
-        self._trim_mps2 = self._touched_s = 0.0
+        known = 0.0 if math.isnan(climb_mps) else climb_mps
+        self._wanted_mps = min(max(known, -_SETTLE_MAX_MPS), _SETTLE_MAX_MPS)
+        self._trim_mps2 = self._touched_s = self._stuck_s = 0.0
+
+    def _learn(self, hover: float) -> None:
+        """Take a hover thrust within what the guess allows."""
+        least, most = (max(share * self._guess, 0.1) for share in _HOVER_SHARE)
+        self.hover = min(max(hover, least), most, 0.8)
 
     def _stand(self, wanted_mps: float, height_m: float) -> None:
         self._thrust = 0.0
         self._floor_m = height_m
+        self._lifted_s = 0.0
         if wanted_mps > 0.0:
             self._stage, self._thrust = _Stage.RAMP, _RAMP_START
 
@@ -119,8 +139,11 @@ class HeightLoop:
             self._stage, self._thrust = _Stage.FLOOR, 0.0
             return
         self._thrust = min(self._thrust + _RAMP_PER_S * dt_s, _THRUST_MAX)
-        if climb_mps > _LIFTED_MPS or height_m - self._floor_m > _LIFTED_M:
-            self._stage, self.hover = _Stage.AIR, self._thrust * _AT_LIFT_OFF
+        lifted = climb_mps > _LIFTED_MPS or height_m - self._floor_m > _LIFTED_M
+        self._lifted_s = self._lifted_s + dt_s if lifted else 0.0
+        if self._lifted_s >= _LIFTED_S:
+            self._stage = _Stage.AIR
+            self._learn((self._thrust - _RAMP_PER_S * self._lifted_s) * _AT_LIFT_OFF)
             self._settle(climb_mps)
 
     def _fly(self, dt_s: float, wanted_mps: float, climb_mps: float, tilt_cos: float) -> None:
@@ -134,9 +157,17 @@ class HeightLoop:
             accel = _VELOCITY_PER_S * error_mps + self._trim_mps2
             learnt = self._trim_mps2 * min(dt_s / _LEARN_S, 1.0)
             self._trim_mps2 -= learnt
-            self.hover = min(max(self.hover * (1.0 + learnt / GRAVITY_MPS2), 0.1), 0.8)
+            self._learn(self.hover * (1.0 + learnt / GRAVITY_MPS2))
         thrust = self.hover * (1.0 + accel / GRAVITY_MPS2) / max(tilt_cos, 0.5)
         self._thrust = min(max(thrust, _LEAST_IN_AIR * self.hover), _THRUST_MAX)
+
+    def _doubt_lift_off(self, dt_s: float, wanted_mps: float, climb_mps: float, height_m: float) -> None:
+        """Up is wanted, nothing moves and the floor is as near as before: it never left it.  The ramp goes on
+        from the thrust that it has."""
+        stands = abs(climb_mps) < _STANDING_MPS and height_m - self._floor_m < _LIFTED_M
+        self._stuck_s = self._stuck_s + dt_s if stands and wanted_mps > 0.0 else 0.0
+        if self._stuck_s >= _TOUCHED_S:
+            self._stage, self._lifted_s = _Stage.RAMP, 0.0
 
     def _feel_floor(
         self, dt_s: float, wanted_mps: float, climb_mps: float, height_m: float, told: bool

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
+from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource
 from flightd.adapters.vehicle.mavlink.vehicle import DEFAULTS, RATES_HZ, MavlinkOptions, MavlinkVehicle
 from flightd.core.types import AttitudeSetpoint
 from flightd.ports import Clock
@@ -47,6 +48,7 @@ class Px4Vehicle(MavlinkVehicle):
     landing_mode = LAND
     prime_s = 1.3  # PX4 wants more than a second
     parameter_names = (("MPC_THR_HOVER",),)
+    climb_from = ClimbSource.LOCAL_POSITION
     rates_hz = {
         message_id: hz
         for message_id, hz in RATES_HZ.items()
@@ -87,7 +89,7 @@ class Px4Vehicle(MavlinkVehicle):
         found = self.parameters.get(("MPC_THR_HOVER",))
         if found is not None and not self._guessed and not self._steering.height.in_air:
             self._guessed = True
-            self._steering.height.hover = min(max(found[1], 0.1), 0.8)
+            self._steering.height.guess(min(max(found[1], 0.1), 0.8))
 
     async def _idle(self) -> None:
         while True:

@@ -39,6 +39,8 @@ class Job:
     """What bit 3 of ArduCopter's GUID_OPTIONS must be; None: either."""
     shares_pose: bool = False
     landing_target: bool = False
+    cells: int | None = None
+    """In series in the battery; None: not known here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,6 +216,7 @@ _PX4: tuple[Rule, ...] = (
     Rule(("MPC_THR_HOVER",), _within(0.1, 0.8), "0.1 to 0.8", "the first guess of the hover thrust"),
 )
 
+_LOW_CELL_V = (3.2, 3.7)
 _GUID_OPTIONS = "the thrust of our setpoints would be taken for something else (vehicle.raw_thrust)"
 _POSE = "the grid pose that is shared (vehicle.pose_output) is in the map's frame, its yaw too"
 
@@ -248,6 +251,27 @@ def _guid_options(raw: bool) -> Rule:
     )
 
 
+def _low_volt(cells: int) -> Rule:
+    least, most = round(_LOW_CELL_V[0] * cells, 2), round(_LOW_CELL_V[1] * cells, 2)
+    return Rule(
+        ("BATT_LOW_VOLT",),
+        _within(least, most),
+        f"{least:g} to {most:g} V for {cells} cells (battery.cells)",
+        "a threshold for fewer cells is never reached in time, one for more lands at once",
+        round(3.5 * cells, 2),
+    )
+
+
+def _cells_of(cells: int) -> Rule:
+    return Rule(
+        ("BAT1_N_CELLS", "BAT_N_CELLS"),
+        _one_of(cells),
+        f"{cells} (battery.cells)",
+        "the autopilot's own charge and low-battery landing go by it",
+        cells,
+    )
+
+
 def _supervised(system_id: int) -> Rule:
     return Rule(
         ("SYSID_MYGCS", "MAV_GCS_SYSID"),
@@ -266,6 +290,8 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
     extra: tuple[Rule, ...] = ()
     if firmware is Firmware.ARDUPILOT:
         extra += (_supervised(job.system_id),)
+        if job.cells is not None:
+            extra += (_low_volt(job.cells),)
         if job.guided:
             extra += _ARDUPILOT_GUIDED
         if job.raw_thrust is not None:
@@ -274,8 +300,11 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
             extra += _ARDUPILOT_POSE
         if job.landing_target:
             extra += _ARDUPILOT_LANDING
-    elif job.shares_pose:
-        extra += _PX4_POSE
+    else:
+        if job.cells is not None:
+            extra += (_cells_of(job.cells),)
+        if job.shares_pose:
+            extra += _PX4_POSE
     stricter = {rule.names: rule for rule in extra}
     table = [stricter.pop(rule.names, rule) for rule in RULES[firmware]]
     return (*table, *stricter.values())

@@ -21,15 +21,15 @@ from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
 from flightd.adapters.vehicle.mavlink.refusal import NoWayDown, ParameterUnread, WrongFirmware
 from flightd.adapters.vehicle.mavlink.required_parameters import Names, judge, way_down_rules
-from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
-from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, Beats, too_slow
+from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, BeatPoll, Beats, too_slow
 from flightd.adapters.vehicle.mavlink.services.parameters import Parameters
 from flightd.adapters.vehicle.mavlink.services.statustext import SEVERITIES, TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
-from flightd.adapters.vehicle.mavlink.telemetry import MavlinkTelemetry
+from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource, MavlinkTelemetry
 from flightd.adapters.vehicle.refusal import Refusal, words
 from flightd.core.types import (
     Attitude,
@@ -55,7 +55,6 @@ RATES_HZ: dict[int, float] = {
     dialect.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
 }
 
-_SYNC_FAST_S, _SYNC_SLOW_S = 0.1, 1.0
 _BEATS_SETTLE_S, _BEATS_WINDOW_S, _BEATS_CHECK_S = 5.0, 3.0, 1.0
 _PAD_NEAR_M = 1.0
 """Further away the pad is not shown: a landing of last resort must not set out for it."""
@@ -72,6 +71,8 @@ class MavlinkOptions:
     pose_form: PoseForm | None = None
     raw_thrust: bool | None = None
     origin_deg: tuple[float, float] = (51.4778, 0.0)
+    range_finder: int | None = None
+    """Id of the DISTANCE_SENSOR to fly by; None: the one that measures best as the vehicle stands."""
     opener: OpenDatagrams = open_datagrams
     """What opens its UDP socket."""
 
@@ -98,13 +99,14 @@ class MavlinkVehicle(abc.ABC):
     required_names: ClassVar[tuple[Names, ...]] = ()
     """Those of them without which it is not flown."""
     rates_hz: ClassVar[dict[int, float]] = RATES_HZ
+    climb_from: ClassVar[ClimbSource] = ClimbSource.GLOBAL_POSITION
 
     def __init__(self, url: str, clock: Clock, options: MavlinkOptions = DEFAULTS) -> None:
         system_id = options.system_id
         self._clock = clock
         self._system_id = system_id
         self._sync = ClockSync()
-        self._telemetry = MavlinkTelemetry(self._sync)
+        self._telemetry = MavlinkTelemetry(self._sync, self.climb_from, options.range_finder)
         self._pose_output = None if options.pose_form is None else PoseOutput(options.pose_form)
         transport = make_transport(parse_endpoint(url), options.opener)
         codec = Codec(system_id, signing=options.signing)
@@ -119,6 +121,7 @@ class MavlinkVehicle(abc.ABC):
         self._way_down = way_down_rules(self.firmware, system_id)
         self._heard = asyncio.Event()
         self._beats = Beats(_BEATS_WINDOW_S)
+        self._poll = BeatPoll()
 
     # The port
 
@@ -230,6 +233,7 @@ class MavlinkVehicle(abc.ABC):
         tasks.create_task(self._once_heard(self.streams.run), name="mavlink streams")
         tasks.create_task(self._once_heard(self._read_parameters), name="mavlink parameters")
         tasks.create_task(self._once_heard(self._mind_beats), name="mavlink heartbeat rate")
+        tasks.create_task(self._once_heard(self._poll_beats), name="mavlink heartbeat poll")
 
     # Receiving
 
@@ -238,6 +242,9 @@ class MavlinkVehicle(abc.ABC):
         match message.get_type():
             case "COMMAND_ACK":
                 self._commander.acknowledged(message)
+                unsupported = message.result == dialect.MAV_RESULT_UNSUPPORTED
+                if message.command == dialect.MAV_CMD_REQUEST_MESSAGE and unsupported:
+                    self._poll.refused(now_ns)
             case "TIMESYNC" if message.tc1 == 0:
                 self.link.send(dialect.MAVLink_timesync_message(now_ns, message.ts1))
             case "TIMESYNC":
@@ -286,7 +293,14 @@ class MavlinkVehicle(abc.ABC):
                 self.notify(Event(now_ns, EventLevel.WARNING, "heartbeat_rate", str(problem)))
                 return
 
+    async def _poll_beats(self) -> None:
+        beat = dialect.MAVLINK_MSG_ID_HEARTBEAT
+        while True:
+            if self._poll.is_due(self._clock.now_ns(), self._telemetry.heartbeat_ns):
+                self._commander.post(dialect.MAV_CMD_REQUEST_MESSAGE, beat)
+            await asyncio.sleep(BeatPoll.LOOK_S)
+
     async def _compare_clocks(self) -> None:
         while True:
             self.link.send(dialect.MAVLink_timesync_message(0, self._sync.ask(self._clock.now_ns())))
-            await asyncio.sleep(_SYNC_SLOW_S if self._sync.is_settled else _SYNC_FAST_S)
+            await asyncio.sleep(ASK_S if self._sync.is_settled else ASK_FAST_S)

@@ -10,6 +10,7 @@ from mavsdk.plugins.telemetry import LandedState as SdkLanded
 
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.newest_readings import NewestReadings
+from flightd.adapters.vehicle.range_finders import RangeSample
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _CLIMB_STALE_NS = 500_000_000
@@ -67,13 +68,14 @@ class MavsdkTelemetry(NewestReadings):
             self._attitudes.append(self._attitude)
 
     def take_range(self, sensor: Any, now_ns: int) -> None:
-        """A DistanceSensor, metres along the body's axis; outside its limits it saw nothing."""
+        """A DistanceSensor, metres along the body's axis.  It bears no number: two are told apart by their
+        limits."""
         distance_m = sensor.current_distance_m
         looks_down = abs(sensor.orientation.pitch_deg % 360.0 - _DOWN_DEG) < 1.0
-        least_m = max(sensor.minimum_distance_m, 0.01)
-        if not looks_down or not least_m <= distance_m <= sensor.maximum_distance_m:
+        if not looks_down or not math.isfinite(distance_m):
             return
-        self._set_range(distance_m, now_ns)
+        least_m, most_m = max(sensor.minimum_distance_m, 0.01), sensor.maximum_distance_m
+        self._take_sample(RangeSample((least_m, most_m), distance_m, least_m, most_m), now_ns, now_ns)
 
     def take_velocity(self, motion: Any, now_ns: int) -> None:
         """A PositionVelocityNed, of which only the vertical speed is known without GPS."""
@@ -81,14 +83,10 @@ class MavsdkTelemetry(NewestReadings):
         if math.isfinite(down_mps):
             self._climb_mps, self._climb_ns = -down_mps, now_ns
 
-    def take_battery(self, battery: Any, _now_ns: int) -> None:
-        """A Battery: volts and per cent."""
-        if battery.id != 0:
-            return
-        if battery.voltage_v > 0.0:
-            self._battery_v = float(battery.voltage_v)
-        if 0.0 <= battery.remaining_percent <= 100.0:
-            self._battery_frac = battery.remaining_percent / 100.0
+    def take_battery(self, battery: Any, now_ns: int) -> None:
+        """A Battery: volts and per cent, NaN or negative where they are not known."""
+        if battery.id == 0:
+            self._set_battery(now_ns, frac=battery.remaining_percent / 100.0, volts=float(battery.voltage_v))
 
     def take_armed(self, armed: bool, _now_ns: int) -> None:
         self.armed = bool(armed)

@@ -27,7 +27,8 @@ from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.refusal import BeyondLibrary, WrongSystemId
-from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
+from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BeatPoll
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavsdk.commands import SdkCommander
@@ -79,7 +80,6 @@ _YAW_LEAD_S = 0.2
 
 _IDLE_PERIOD_S = 0.05
 _PUMP_SILENT_NS = 150_000_000
-_SYNC_FAST_S, _SYNC_SLOW_S = 0.1, 1.0
 
 
 class MavsdkVehicle:
@@ -239,6 +239,7 @@ class MavsdkVehicle:
             tasks.create_task(self._take(source, streams, message_id, take), name=f"mavsdk {message_id}")
         tasks.create_task(streams.run(), name="mavsdk streams")
         tasks.create_task(self._compare_clocks(library, plugins), name="mavsdk timesync")
+        tasks.create_task(self._poll_beats(), name="mavsdk heartbeat poll")
         tasks.create_task(self._pass_on(library, plugins), name="mavsdk setpoints")
         tasks.create_task(self._idle(), name="mavsdk idle setpoints")
         tasks.create_task(self._tell(library, plugins), name="mavsdk texts")
@@ -269,12 +270,19 @@ class MavsdkVehicle:
         if fields is not None and fields[0] != 0:
             self._sync.answered(fields[1], fields[0], now_ns)
 
+    async def _poll_beats(self) -> None:
+        poll, beat = BeatPoll(), dialect.MAVLINK_MSG_ID_HEARTBEAT
+        while True:
+            if poll.is_due(self._clock.now_ns(), self._readings.heartbeat_ns):
+                self._commander.post(dialect.MAV_CMD_REQUEST_MESSAGE, beat)
+            await asyncio.sleep(BeatPoll.LOOK_S)
+
     async def _compare_clocks(self, library: Library, plugins: Plugins) -> None:
         while True:
             question = library.message("TIMESYNC", tc1=0, ts1=self._sync.ask(self._clock.now_ns()))
             with contextlib.suppress(MavsdkError):
                 await library.call(plugins.direct.send_message(question))
-            await asyncio.sleep(_SYNC_SLOW_S if self._sync.is_settled else _SYNC_FAST_S)
+            await asyncio.sleep(ASK_S if self._sync.is_settled else ASK_FAST_S)
 
     # Setpoints
 
