@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from flightd.core.tick import TickInput, TickOutput
+from flightd.core.tick import StepFailure, TickInput, TickOutput
 from flightd.core.types import CommandKind, Phase, Status, VehicleState
 
 
@@ -20,8 +20,8 @@ class Snapshot:
     stages of each frame flown by, both since the last that was told.  The others count since the start:
     `dropped` what a full queue or a lost worker cost, `restarts` what died and was brought back, each by the
     part's name; `repeated_level` the setpoints that went out because no tick made one.  `possible` are the
-    operator's commands that the mission takes now.  `height_goal_m` is the commanded height above the
-    floor.
+    operator's commands that the mission takes now, `failure` what the step raised, if anything.
+    `height_goal_m` is the commanded height above the floor.
     """
 
     tick: TickInput
@@ -38,6 +38,7 @@ class Snapshot:
     restarts: Mapping[str, int] = field(default_factory=dict)
     repeated_level: int = 0
     possible: frozenset[CommandKind] = frozenset()
+    failure: StepFailure | None = None
     height_goal_m: float = 0.0
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from dataclasses import dataclass, field
 
 from flightd.core.scanning import CodeSet, Finding, Settled
@@ -22,6 +23,7 @@ from flightd.core.types import (
 
 TICK_S = 0.02
 """Period of the control tick."""
+_SHOWN_CHARS = 160
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,3 +62,19 @@ class TickOutput:
     events: tuple[Event, ...] = field(default=())
     findings: tuple[Finding, ...] = ()
     settled: tuple[Settled, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class StepFailure:
+    """What a tick raised: one line for people, and the whole traceback for the log."""
+
+    stamp_ns: int
+    error: str
+    traceback: str
+
+    @classmethod
+    def of(cls, now_ns: int, err: Exception, part: str = "") -> StepFailure:
+        """What `part` of the tick raised (empty: the pilot's step)."""
+        words = (part, type(err).__name__, str(err).replace("\n", " "))
+        line = ": ".join(word for word in words if word)
+        return cls(now_ns, line[:_SHOWN_CHARS], "".join(traceback.format_exception(err)))

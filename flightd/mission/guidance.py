@@ -60,7 +60,8 @@ class MissionInputs:
     `pad_m` is the centre of the goal's pad on the map, as seen or else as drawn; None where there is none.
     `by_pad` says that the pose is only that over the pad: enough to climb straight up.
     While the position is sought again, `rivals` are the nodes where the drone may be with their
-    probability, and `way_out` a move that is safe at all of them."""
+    probability, and `way_out` a move that is safe at all of them.  `failed`: a step before this one raised
+    an error."""
 
     now_ns: int
     dt_s: float
@@ -78,6 +79,7 @@ class MissionInputs:
     rivals: tuple[tuple[str, float], ...] = ()
     way_out: tuple[float, float] | None = None
     warnings: Warnings = ALL_WELL
+    failed: bool = False
 
     @property
     def speed_mps(self) -> float:

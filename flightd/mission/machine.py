@@ -139,7 +139,7 @@ _SAFETY = {
 _UNDER_WAY = _SAFETY | {Trigger.TIMED_OUT: Phase.LAND}
 _SEEING = _UNDER_WAY | dict.fromkeys(triggers_of(Action.HOLD) | {Trigger.HOLD}, Phase.HOLD)
 _ON_LINES = _SEEING | dict.fromkeys(triggers_of(Action.RELOCATE), Phase.RELOCATE)
-_GIVEN_UP = {Trigger.STOP: Phase.ABORTED, Trigger.LAND_HERE: Phase.ABORTED}
+_GIVEN_UP = dict.fromkeys((Trigger.STOP, Trigger.LAND_HERE, Trigger.STEP_FAILED), Phase.ABORTED)
 
 _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.PREFLIGHT: _GIVEN_UP | {Trigger.FOUND_FLYING: Phase.RECOVER, Trigger.READY: Phase.ARMING},
@@ -161,7 +161,12 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
         Trigger.LINES_LOST_LONG: Phase.LAND,
         Trigger.LINES_FOUND: Phase.ACQUIRE,
     },
-    Phase.RELOCATE: _SEEING | {Trigger.POSITION_UNKNOWN: Phase.LAND, Trigger.POSITION_SURE: Phase.ACQUIRE},
+    Phase.RELOCATE: _SEEING
+    | {
+        Trigger.POSITION_UNKNOWN: Phase.LAND,
+        Trigger.CUT_OFF: Phase.LAND,
+        Trigger.POSITION_SURE: Phase.ACQUIRE,
+    },
     Phase.LAND: {
         Trigger.PILOT_TOOK: Phase.PILOT,
         Trigger.VANISHED: Phase.ABORTED,

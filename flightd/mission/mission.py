@@ -162,6 +162,8 @@ class Mission:
         doubts = self._relocator.step(inputs, self.phase, self._progress.phase_s(inputs.now_ns))
         if self._relocator.jumped:
             self._correct(inputs)
+        if Trigger.POSITION_SURE in doubts and not self._route.leads_on_from(inputs.pose):
+            doubts = {Trigger.CUT_OFF}
         triggers = self._triggers(inputs) | doubts | self._scan.doubts(self.phase)
         self._report_hazards(triggers, inputs.now_ns)
         _, trigger = next_state(self.state, triggers)
@@ -183,6 +185,8 @@ class Mission:
         self._turn_back(self._charging.step(s, self.state))
         if self._progress.timed_out(s.now_ns):
             found.add(Trigger.TIMED_OUT)
+        if s.failed:
+            found.add(Trigger.STEP_FAILED)
         found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))
         if Trigger.RECORD_LOST in found:
             found.remove(Trigger.RECORD_LOST)

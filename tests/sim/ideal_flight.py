@@ -148,6 +148,7 @@ class IdealFlight:
         """Orders that the next tick takes."""
         self._battery_swapper = BatterySwapper(site, self.airframe, swap_s) if swap_s else None
         self.counted: tuple[str, ...] = ()
+        self.on_record: Callable[[str, int, object], None] = lambda _topic, _stamp_ns, _message: None
         self.on_tick: Callable[[Phase, int], None] = lambda _phase, _now_ns: None
 
     def now_ns(self) -> int:
@@ -156,7 +157,7 @@ class IdealFlight:
 
     def _composed(self, vehicle: IdealVehicle, vision: IdealVision, setpoints: HeldSetpoint) -> Flight:
         """The daemon's own tick flies it, with these behind its ports."""
-        recorder = IdealRecorder(lambda: self.faults.health)
+        recorder = IdealRecorder(lambda: self.faults.health, self.on_record)
         ground = IdealGround(self._take_commands, lambda: self.ground_silent_s)
         return Flight(
             clock=self,

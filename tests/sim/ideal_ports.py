@@ -107,10 +107,14 @@ class IdealVision:
 
 
 class IdealRecorder(NoRecorder):
-    """Keeps nothing; its health is `health`'s."""
+    """Hands what it is given to `keep`; its health is `health`'s."""
 
-    def __init__(self, health: Callable[[], Health]) -> None:
+    def __init__(self, health: Callable[[], Health], keep: Callable[[str, int, object], None]) -> None:
         self._health = health
+        self._keep = keep
+
+    def record(self, topic: str, stamp_ns: int, message: object) -> None:
+        self._keep(topic, stamp_ns, message)
 
     @property
     def restarts(self) -> int:  # type: ignore[override]

@@ -105,6 +105,7 @@ async def _lockstep(simulation: Simulation, hold: Hold, ended_by: list[signal.Si
             peers=peers_at(ports, config),
             hold=hold,
         )
+        faults.mission = flight.pilot.mission
         return await _beside(simulation, flight, ended_by, world.run(), faults.run())
 
 
@@ -156,6 +157,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
             peers=peers,
             opener=open_paced_datagrams,
         )
+        faults.mission = flight.pilot.mission
         return await _beside(
             simulation, flight, ended_by, watch_world(process, pipe, faults.tell), faults.run()
         )

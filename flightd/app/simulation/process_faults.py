@@ -1,4 +1,4 @@
-"""Faults that are done to the daemon from outside: to its processes, and over its ground link."""
+"""Faults that are done to the daemon: to its processes, over its ground link, to its own code."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.app.detection.detector_pool import DetectorPool
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError
+from flightd.mission.guidance import Guidance, MissionInputs
+from flightd.mission.mission import Mission
 from flightd.sim.scenario.fault_schema import (
     CpuTaken,
     DetectorKilled,
@@ -23,6 +25,7 @@ from flightd.sim.scenario.fault_schema import (
     GroundSilent,
     OfCamera,
     ProcessFault,
+    StepFails,
 )
 from flightd.sim.scenario.faults import place_of
 from flightd.site.site import Site
@@ -69,6 +72,8 @@ class LauncherFaults:
         self._turns: asyncio.Queue[tuple[Fault, bool]] = asyncio.Queue()
         self._attending = any(isinstance(fault, GroundSilent) for fault in faults)
         self._taken = 0.0
+        self.mission: Mission | None = None
+        """Of the flight, once that is built."""
 
     def tell(self, index: int, begins: bool) -> None:
         self._turns.put_nowait((self._faults[index], begins))
@@ -93,6 +98,8 @@ class LauncherFaults:
                 _signal((self._recorder.pid,), signal.SIGKILL)
             case ProcessFault(kind="disk_full"):
                 self._fill_disk(on)
+            case StepFails() if self.mission is not None:
+                _break(self.mission, on)
             case CpuTaken():
                 self._taken = fault.share if on else 0.0
             case GroundSilent():
@@ -132,6 +139,22 @@ class LauncherFaults:
         assert self._ground is not None
         status, command = (int(endpoint.rpartition(":")[2]) for endpoint in self._ground.endpoints)
         return Address("127.0.0.1", status, command)
+
+
+class SimulatedFaultError(Exception):
+    """An error as any part of the flight software might raise it."""
+
+
+def _break(mission: Mission, broken: bool) -> None:
+    """The mission's step raises from now on; or does its work again."""
+
+    def fail(_: MissionInputs) -> Guidance:
+        raise SimulatedFaultError("the scenario wants it")
+
+    if broken:
+        mission.__dict__["step"] = fail
+    else:
+        mission.__dict__.pop("step", None)
 
 
 def _signal(pids: Sequence[int], what: signal.Signals) -> None:

@@ -284,8 +284,18 @@ HAZARDS: tuple[Hazard, ...] = (
         " position turned out to be another",
         Action.RELOCATE,
         "stop, climb up to 1 m to see more, move along the line to where the possible places differ; on from"
-        " the right node when sure; land after `mission.relocate_s`; no node counts as visited meanwhile",
+        " the right node when sure; land after `mission.relocate_s`, or where no open line leads on from that"
+        " node; no node counts as visited meanwhile",
         "tests/sim/test_carried.py",
+    ),
+    Hazard(
+        "step_failed",
+        Trigger.STEP_FAILED,
+        "an error in the flight software itself, at whatever place of a control tick",
+        Action.LAND,
+        "level at the same tick; the next one lands, by the lines; where that fails too, level and down by"
+        " the autopilot's own landing; the error is an event, its traceback is in the flight log",
+        "tests/sim/test_step_failures.py",
     ),
     Hazard(
         "disk_full",

@@ -177,6 +177,13 @@ class CpuTaken(_Fault):
     share: float = Field(0.9, gt=0, lt=1)
 
 
+class StepFails(_Fault):
+    """An error in the flight software: the mission's own step raises, as long as the fault lasts."""
+
+    by_launcher = True
+    kind: Literal["step_fails"]
+
+
 class GroundSilent(_Fault):
     """A ground station attends from the start, and falls silent."""
 
@@ -213,6 +220,7 @@ Fault: TypeAlias = Annotated[
     | DetectorKilled
     | ProcessFault
     | CpuTaken
+    | StepFails
     | GroundSilent
     | GroundOrder,
     Field(discriminator="kind"),
