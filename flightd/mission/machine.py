@@ -171,6 +171,7 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
         Trigger.PILOT_TOOK: Phase.PILOT,
         Trigger.VANISHED: Phase.ABORTED,
         Trigger.STOP: Phase.LAND,
+        Trigger.TIMED_OUT: Phase.LAND,
     },
     Phase.SWAP: _GIVEN_UP | {Trigger.TIMED_OUT: Phase.ABORTED, Trigger.READY: Phase.ARMING},
     Phase.DONE: {},
@@ -225,6 +226,8 @@ def _begins(state: State, trigger: Trigger) -> Outcome | None:
         phase, cause = _OVER_PAD[trigger, state.intent]
     elif state.phase is Phase.LAND and trigger is Trigger.DISARMED:
         phase, cause = Phase.ABORTED, Cause.KEPT
+    elif state.phase is Phase.LAND and trigger is Trigger.TIMED_OUT and state.stopped:
+        phase, cause = Phase.ABORTED, Cause.TRIGGER
     elif trigger not in _BEGINS[state.phase] or (trigger in _FOR_VISITS and state.intent is not Intent.VISIT):
         return STAYS
     else:
@@ -240,7 +243,7 @@ def _intent_of(state: State, phase: Phase, trigger: Trigger) -> Intent:
         return Intent.WAIT
     if phase is Phase.RECOVER:
         return Intent.ADOPTED
-    if phase is Phase.LAND and trigger is Trigger.STOP:
+    if phase is Phase.LAND and (trigger is Trigger.STOP or state.phase is Phase.LAND):
         return Intent.ADOPTED_STOP if state.adopted else Intent.STOP
     if phase is Phase.LAND and trigger is not Trigger.ROUTE_DONE:
         return Intent.ADOPTED if state.adopted else Intent.END

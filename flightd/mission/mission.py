@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
-from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, Phase
+from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, LandedState, Phase
 from flightd.mission.battery.swap import BatterySwap
 from flightd.mission.event_log import EventLog
 from flightd.mission.flight.phase_progress import PhaseProgress
@@ -183,7 +183,7 @@ class Mission:
         if self._orders.paused:
             found.add(Trigger.HOLD)
         self._turn_back(self._charging.step(s, self.state))
-        if self._progress.timed_out(s.now_ns):
+        if self._progress.timed_out(s.now_ns) and not self._lands_unheard(s):
             found.add(Trigger.TIMED_OUT)
         if s.failed:
             found.add(Trigger.STEP_FAILED)
@@ -194,6 +194,10 @@ class Mission:
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found
+
+    def _lands_unheard(self, s: MissionInputs) -> bool:
+        """A landing of a vehicle that is not heard ends when it is given up as vanished."""
+        return self.phase is Phase.LAND and s.telemetry_age_s > self._config.mission.telemetry_land_s
 
     def _landed(self) -> set[Trigger]:
         """What a landing on the pad is more than its end."""
@@ -302,6 +306,8 @@ class Mission:
             self._go_on(s)
         self._anchor(s, trigger)
         self._explain(s, trigger, outcome.cause)
+        if trigger is Trigger.TIMED_OUT and before.phase is Phase.LAND:
+            self._report_endless_landing(s)
         level = EventLevel.WARNING if _alarming(before, self.state, trigger) else EventLevel.INFO
         text = f"{before.phase.value} -> {self.phase.value}: {self.reason}"
         self._events.report(s.now_ns, level, "phase", text)
@@ -331,6 +337,14 @@ class Mission:
             self._cause = Refused(happened, refusal) if refusal else happened
         self._reason = self._cause
 
+    def _report_endless_landing(self, s: MissionInputs) -> None:
+        """Say what becomes of a landing that does not come to its end."""
+        if self.state.over:
+            text = "not disarmed after all: see that the drone stands, and disarm it by hand"
+        else:
+            text = f"not down after {self._progress.phase_s(s.now_ns):.0f} s: the autopilot lands by itself"
+        self._events.report(s.now_ns, EventLevel.ERROR, "landing", text)
+
     def _enter(self, s: MissionInputs, trigger: Trigger) -> None:
         """What the phase that begins starts with."""
         match self.phase:
@@ -341,7 +355,7 @@ class Mission:
             case Phase.RELOCATE:
                 self._relocate(s)
             case Phase.LAND:
-                self._steering.land()
+                self._steering.land(by_itself=trigger is Trigger.TIMED_OUT)
             case Phase.SWAP:
                 self._steering.anchor = (self.goal.x_m, self.goal.y_m)
                 self._charging.await_battery(s.now_ns)
@@ -390,7 +404,8 @@ class Mission:
         if self.state.waiting:
             self._reason = self._grounded(s) or Plain.AWAITS_START
         if not self.airborne:
-            return self._steering.on_ground(self.phase, _DEMANDS.get(self.phase, Demand.FLY))
+            demand = _DEMANDS.get(self.phase, Demand.FLY)
+            return self._steering.on_ground(s, self.phase, _in_air(demand) if _flies(s) else demand)
         guidance = self._steering.step(s, self._task(s.now_ns))
         if self.phase is Phase.LAND:
             refusal = s.vehicle.refusal if s.vehicle is not None else ""
@@ -409,6 +424,16 @@ class Mission:
         cruise = self.state.returning or not self.goal.visit or not self._leads_along_x()
         view = self._scan.view(self.phase)
         return ReferenceTask(self.state, self._progress.phase_s(now_ns), self.goal, view, cruise)
+
+
+def _flies(s: MissionInputs) -> bool:
+    """The vehicle says that it is in the air, whatever the mission is at."""
+    return s.vehicle is not None and s.vehicle.armed and s.vehicle.landed is LandedState.IN_AIR
+
+
+def _in_air(demand: Demand) -> Demand:
+    """Nothing disarms in the air."""
+    return Demand.LAND if demand is Demand.DISARM else demand
 
 
 def _alarming(before: State, after: State, trigger: Trigger) -> bool:

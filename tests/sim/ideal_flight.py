@@ -76,6 +76,8 @@ class Faults:
     height_m: float = 0.0
     battery: float | None = None
     stamps_refused: int = 0
+    untold: bool = False
+    endless: bool = False
     health: Health = HEALTHY
 
 
@@ -244,7 +246,7 @@ class IdealFlight:
             self._armed = True
             self._yaw_target = self.airframe.yaw_rad
             self._climb.reset(self.airframe.height_m)
-        elif demand is Demand.DISARM:
+        elif demand is Demand.DISARM and not self.faults.endless:
             self._armed = False
 
     def _step(self, setpoint: AttitudeSetpoint | None) -> None:
@@ -313,7 +315,7 @@ class IdealFlight:
             mode="GUIDED_NOGPS",
             in_control=self._armed and self.in_control,
             armed=self._armed,
-            landed=LandedState.ON_GROUND if on_floor else LandedState.IN_AIR,
+            landed=LandedState.ON_GROUND if on_floor and not faults.untold else LandedState.IN_AIR,
             battery_frac=battery,
             battery_v=12.0,
             heartbeat_ns=self._beat_ns,

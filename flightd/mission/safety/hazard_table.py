@@ -177,6 +177,18 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "landing_untold",
+        None,
+        "down at the height that the range finder read on the floor, neither climbing nor turning over, while"
+        " it sinks; or a landing that takes longer than twice its way's time and"
+        " `mission.expert.phase_slack_s`",
+        Action.LAND,
+        "after 1.5 s level, after 2.5 s the autopilot's own landing, which disarms; then asked to disarm,"
+        " never forced. By time: the autopilot's own landing, then given up with an error, still asked to"
+        " land",
+        "tests/sim/test_landing_untold.py",
+    ),
+    Hazard(
         "ceiling_left",
         Trigger.CEILING_LEFT,
         "height above the ceiling less `hazards.headroom_m`",

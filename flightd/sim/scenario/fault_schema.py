@@ -123,6 +123,13 @@ class HeightStuck(_Fault):
     reading_m: float = Field(0.1, ge=0.05, le=8)
 
 
+class LandingUntold(_Fault):
+    """The autopilot never reports that it stands."""
+
+    by_vehicle = True
+    kind: Literal["landing_untold"]
+
+
 class BatteryDrop(_Fault):
     by_airframe = True
     kind: Literal["battery"]
@@ -213,6 +220,7 @@ Fault: TypeAlias = Annotated[
     | HeightBiased
     | HeightLost
     | HeightStuck
+    | LandingUntold
     | BatteryDrop
     | WindChange
     | VehicleFault

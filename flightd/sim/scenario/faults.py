@@ -32,6 +32,7 @@ from flightd.sim.scenario.fault_schema import (
     HeightBiased,
     HeightLost,
     HeightStuck,
+    LandingUntold,
     LinkFault,
     VehicleFault,
     WindChange,
@@ -203,6 +204,8 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
             wrong.range_lost = on
         case HeightStuck():
             wrong.range_stuck_m = fault.reading_m if on else None
+        case LandingUntold():
+            vehicle.tells_landed = not on
         case ClockJump():
             vehicle.jump_clock(round(fault.jump_s * 1e9) * (1 if on else -1))
         case VehicleFault(kind="pilot"):
