@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from flightd.core.tick import StepFailure, TickInput, TickOutput
 from flightd.core.types import CommandKind, Phase, Status, VehicleState
+
+_WAITING = frozenset({Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.HOLD, Phase.RELOCATE})
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +71,18 @@ class Snapshot:
 
     @property
     def battery_frac(self) -> float:
-        """Charge, 0 to 1; 0 before the vehicle was heard."""
-        return self.tick.vehicle.battery_frac if self.tick.vehicle else 0.0
+        """Charge, 0 to 1; NaN before the vehicle told it."""
+        return self.tick.vehicle.battery_frac if self.tick.vehicle else math.nan
+
+    @property
+    def battery_text(self) -> str:
+        """The charge for people: a hyphen where it is not known."""
+        return "-" if math.isnan(self.battery_frac) else f"{self.battery_frac:.0%}"
+
+    @property
+    def waits(self) -> bool:
+        """It stands on the ground or holds, and the reason says what for."""
+        return self.phase in _WAITING
 
     @property
     def height_m(self) -> float:

@@ -145,7 +145,12 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.PREFLIGHT: _GIVEN_UP | {Trigger.FOUND_FLYING: Phase.RECOVER, Trigger.READY: Phase.ARMING},
     Phase.RECOVER: _SAFETY | {Trigger.UNATTENDED: Phase.LAND},
     Phase.ARMING: _GIVEN_UP
-    | {Trigger.GROUND_LOST: Phase.ABORTED, Trigger.TIMED_OUT: Phase.ABORTED, Trigger.ARMED: Phase.TAKE_OFF},
+    | {
+        Trigger.GROUND_LOST: Phase.ABORTED,
+        Trigger.TIMED_OUT: Phase.ABORTED,
+        Trigger.START_EXPIRED: Phase.PREFLIGHT,
+        Trigger.ARMED: Phase.TAKE_OFF,
+    },
     Phase.TAKE_OFF: _UNDER_WAY | {Trigger.AT_HEIGHT: Phase.ACQUIRE},
     Phase.ACQUIRE: _ON_LINES | {Trigger.ACQUIRED: Phase.TURN},
     Phase.FOLLOW: _ON_LINES | {Trigger.ARRIVED: Phase.HOVER},
@@ -209,6 +214,9 @@ _TURNS: Mapping[Trigger, tuple[Collection[Phase], Mapping[Intent, Intent]]] = {
 }
 """In which phases a trigger is taken without beginning another, and what it makes of the intent."""
 
+_WITHDRAWS = frozenset({Trigger.PAUSE, Trigger.START_EXPIRED})
+"""What takes a start back as long as it waits."""
+
 COMMANDS: Mapping[CommandKind, Trigger] = {
     CommandKind.START: Trigger.START,
     CommandKind.PAUSE: Trigger.PAUSE,
@@ -239,7 +247,7 @@ def _intent_of(state: State, phase: Phase, trigger: Trigger) -> Intent:
     """What a phase is for that a trigger begins."""
     if phase in _TERMINAL:
         return Intent.END
-    if phase is Phase.SWAP:
+    if phase in _WAITING:
         return Intent.WAIT
     if phase is Phase.RECOVER:
         return Intent.ADOPTED
@@ -251,6 +259,8 @@ def _intent_of(state: State, phase: Phase, trigger: Trigger) -> Intent:
 
 
 def _outcome(state: State, trigger: Trigger) -> Outcome | None:
+    if trigger in _WITHDRAWS and state.waiting and state.intent is Intent.VISIT:
+        return Outcome(State(state.phase, Intent.WAIT), False, Cause.KEPT)
     phases, intents = _TURNS.get(trigger, ((), {}))
     if state.phase in phases and state.intent in intents:
         cause = Cause.TRIGGER if trigger is Trigger.POSITION_CORRECTED else Cause.KEPT

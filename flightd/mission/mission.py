@@ -22,15 +22,16 @@ from flightd.mission.machine import (
     COMMANDS,
     TABLE,
     Cause,
+    Intent,
     State,
     next_state,
     possible_commands,
     taken_in,
 )
-from flightd.mission.orders import StandingOrders
+from flightd.mission.orders import StandingOrders, StartOrder
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
-from flightd.mission.reasons import Happened, Plain, Reason, Refused, in_words
+from flightd.mission.reasons import Happened, Paused, Plain, Reason, Refused, StartsIn, in_words
 from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
 from flightd.mission.safety.hazard_table import ACTIONS, Action, triggers_of
 from flightd.mission.safety.readiness import not_fresh, not_ready
@@ -77,6 +78,8 @@ class Mission:
         self._scanner = scanner
         self._events = EventLog()
         self._orders = StandingOrders()
+        self._start = StartOrder(config.mission)
+        self._obstacle: Reason | None = Plain.NO_TELEMETRY
         self._route = Itinerary(site, plan, policy, self._events)
         self._scan = ShelfScan(site, scanner)
         self._progress = PhaseProgress(config, self._route, self._scan, scanner)
@@ -136,8 +139,9 @@ class Mission:
 
     @property
     def possible_commands(self) -> frozenset[CommandKind]:
-        """What an operator may order now."""
-        return possible_commands(self.state)
+        """What an operator may order now; no start before the flight is ready."""
+        possible = possible_commands(self.state)
+        return possible - {CommandKind.START} if self.state.waiting and self._obstacle else possible
 
     def drain_events(self) -> tuple[Event, ...]:
         return (*self._events.drain(), *self._scanner.drain_events())
@@ -149,13 +153,30 @@ class Mission:
         if trigger not in taken_in(self.state):
             self._refuse(command, now_ns)
             return
+        if self.state.waiting and kind in {CommandKind.START, CommandKind.PAUSE}:
+            self._take_start(trigger, now_ns)
+            return
         self._orders.take(kind)
         if kind is CommandKind.HOME:
             self._go_home(trigger, Happened(trigger), now_ns)
         elif kind is CommandKind.GOTO:
             self._route.go_to(now_ns, command.node)
-        elif kind is CommandKind.START:
-            self._turn(trigger)
+
+    def _take_start(self, trigger: Trigger, now_ns: int) -> None:
+        """Begin a start's count-down if nothing keeps the drone on the ground, or take it back."""
+        level, text = EventLevel.WARNING, "taken back"
+        if trigger is Trigger.PAUSE:
+            self._start.withdraw()
+        elif self.state.intent is not Intent.WAIT:
+            return
+        elif self._obstacle is not None:
+            self._events.report(now_ns, level, "command", f"start refused: {in_words(self._obstacle)}")
+            return
+        else:
+            self._start.give(now_ns)
+            text = in_words(StartsIn(self._start.left_s(now_ns)))
+        self._turn(trigger)
+        self._events.report(now_ns, level, "start", text)
 
     def step(self, inputs: MissionInputs) -> Guidance:
         """Advance by one tick."""
@@ -176,7 +197,8 @@ class Mission:
 
     def _triggers(self, s: MissionInputs) -> set[Trigger]:
         """What has happened by this tick.  Turning back acts at once."""
-        may_start = self.state.waiting and not self._grounded(s)
+        self._obstacle = self._grounded(s) if self.state.waiting else None
+        may_start = self.state.waiting and self._obstacle is None and not self._start.left_s(s.now_ns)
         found = self._progress.step(s, self.state, may_start=may_start)
         found |= self._orders.urgent
         found |= self._ground(s)
@@ -187,6 +209,11 @@ class Mission:
             found.add(Trigger.TIMED_OUT)
         if s.failed:
             found.add(Trigger.STEP_FAILED)
+        if self._start.is_void(s.now_ns) and Trigger.START_EXPIRED in taken_in(self.state):
+            found.add(Trigger.START_EXPIRED)
+            self._void_start(s.now_ns)
+        if Trigger.FOUND_FLYING in found:  # an order to land or stop stands until it may be obeyed
+            found -= self._orders.urgent
         found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))
         if Trigger.RECORD_LOST in found:
             found.remove(Trigger.RECORD_LOST)
@@ -194,6 +221,14 @@ class Mission:
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found
+
+    def _void_start(self, now_ns: int) -> None:
+        """A start that came to nothing is not kept for later."""
+        self._start.withdraw()
+        if self.state.waiting:
+            why = "" if self._obstacle is None else f": {in_words(self._obstacle)}"
+            self._events.report(now_ns, EventLevel.WARNING, "start", f"{Trigger.START_EXPIRED.value}{why}")
+            self._turn(Trigger.START_EXPIRED)
 
     def _lands_unheard(self, s: MissionInputs) -> bool:
         """A landing of a vehicle that is not heard ends when it is given up as vanished."""
@@ -326,7 +361,8 @@ class Mission:
 
     def _explain(self, s: MissionInputs, trigger: Trigger, cause: Cause) -> None:
         """Set the reason for the phase that begins."""
-        refusal = s.vehicle.refusal if s.vehicle is not None and trigger is Trigger.TIMED_OUT else ""
+        refused = s.vehicle is not None and trigger in {Trigger.TIMED_OUT, Trigger.START_EXPIRED}
+        refusal = s.vehicle.refusal if s.vehicle is not None and refused else ""
         if trigger is Trigger.NOT_COUNTED and (blind := self._scanner.blind) is not None:
             self._cause = blind
             self._events.report(s.now_ns, EventLevel.ERROR, "not_counted", in_words(blind))
@@ -349,6 +385,7 @@ class Mission:
         """What the phase that begins starts with."""
         match self.phase:
             case Phase.TAKE_OFF:
+                self._start.withdraw()
                 self._steering.take_off(s.height_m)
             case Phase.ACQUIRE if trigger is Trigger.POSITION_SURE:
                 self._rejoin(s)
@@ -402,11 +439,16 @@ class Mission:
 
     def _guide(self, s: MissionInputs) -> Guidance:
         if self.state.waiting:
-            self._reason = self._grounded(s) or Plain.AWAITS_START
+            self._obstacle = self._grounded(s)
+            left_s = self._start.left_s(s.now_ns)
+            self._reason = self._obstacle or (StartsIn(left_s) if left_s else Plain.AWAITS_START)
         if not self.airborne:
             demand = _DEMANDS.get(self.phase, Demand.FLY)
             return self._steering.on_ground(s, self.phase, _in_air(demand) if _flies(s) else demand)
         guidance = self._steering.step(s, self._task(s.now_ns))
+        if self.phase in _HALTED and self._cause is not None:
+            held = self._orders.paused and self._cause != Happened(Trigger.HOLD)
+            self._reason = Paused(self._cause) if held else self._cause
         if self.phase is Phase.LAND:
             refusal = s.vehicle.refusal if s.vehicle is not None else ""
             self._reason = self._cause
@@ -440,6 +482,8 @@ def _alarming(before: State, after: State, trigger: Trigger) -> bool:
     """Whether a change of phase is none of those that were planned."""
     if after.phase is Phase.LAND:
         return not after.on_pad
+    if trigger is Trigger.START_EXPIRED:
+        return True
     if after.phase in {Phase.ABORTED, Phase.PILOT}:  # a landing has been reported already
         return before.phase is not Phase.LAND or (before.stopped and trigger is not Trigger.DISARMED)
     return after.phase in _HALTED

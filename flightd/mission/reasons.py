@@ -38,11 +38,25 @@ class Refused:
 
 
 @dataclass(frozen=True, slots=True)
+class Paused:
+    """As `why`, and an operator wants it to wait, too."""
+
+    why: Reason
+
+
+@dataclass(frozen=True, slots=True)
 class StartChargeLow:
     """Too little charge to start."""
 
     charge_frac: float
     needed_frac: float
+
+
+@dataclass(frozen=True, slots=True)
+class StartsIn:
+    """The count-down of a start command."""
+
+    seconds: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +105,9 @@ Reason: TypeAlias = (
     Plain
     | Happened
     | Refused
+    | Paused
     | StartChargeLow
+    | StartsIn
     | LatePictures
     | AwaitsBattery
     | ChargeLow
@@ -109,8 +125,12 @@ def in_words(reason: Reason) -> str:
             text = trigger.value
         case Refused(why, refusal):
             text = f"{in_words(why)}: {refusal}"
+        case Paused(why):
+            text = f"{in_words(why)}; paused besides, until resume"
         case StartChargeLow(charge, needed):
             text = f"battery at {charge:.0%}, {needed:.0%} needed to start"
+        case StartsIn(seconds):
+            text = f"arms in {seconds} s; pause takes the start back"
         case LatePictures(limit_s):
             text = f"pictures are more than {limit_s * 1e3:.0f} ms old when they have been looked at"
         case AwaitsBattery(stops, charge, full):

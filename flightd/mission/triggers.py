@@ -29,6 +29,7 @@ class Trigger(enum.Enum):
     HAZARD_LASTS = "held for too long"
     LINES_LOST_LONG = "lines lost for too long"
     CUT_OFF = "no open line leads on from here"
+    START_EXPIRED = "the start command is void"
     POSITION_UNKNOWN = "position not found again"
     TIMED_OUT = "the phase took too long"
     TELEMETRY_STALE = "vehicle telemetry stale"

@@ -103,7 +103,7 @@ class Walk:
         self.pilot_wins(before, after)
         if after.phase is Phase.ARMING or (flight.guidance and flight.guidance.demand is Demand.FLY):
             assert self.started or before.adopted, "nothing is armed that was not ordered to start"
-        if after.phase is Phase.SWAP:
+        if after.waiting:
             self.started = after.intent is Intent.VISIT
         if after.airborne and after.phase is not Phase.LAND:
             assert self.since_s < 70.0, "time leads out of it"
