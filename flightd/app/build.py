@@ -5,6 +5,7 @@ What differs between a real vehicle and a simulated one (clock, detectors, recor
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -45,7 +46,7 @@ from flightd.pilot import Pilot
 from flightd.ports import Camera, Clock, Ground, Monitor, PoseTaker, Recorder, Vehicle
 from flightd.runtime.clock import Hold
 from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
-from flightd.site.site import Site
+from flightd.site.site import UNTOLD_CEILING_M, Site
 from flightd.vision.line_detector import Detector
 
 
@@ -141,6 +142,7 @@ def pilot_of(config: Config, site: Site, order: FlightOrder | None = None) -> Pi
     """A fresh pilot for one flight of an order (by default the configuration's).  InputError where map and
     configuration contradict each other."""
     order = order or configured_order(config)
+    _demand_ceiling(config, site)
     if config.mission.height_m > site.ceiling_m - CEILING_MARGIN_M:
         raise InputError(
             f"mission.height_m {config.mission.height_m} is not {CEILING_MARGIN_M} m below the ceiling of"
@@ -168,17 +170,40 @@ def scanner_of(config: Config, site: Site) -> AnyScanner:
 
 
 def flown_between_m(config: Config, site: Site) -> tuple[float, float]:
-    """The heights that are flown between: with a scan, those of its views too."""
+    """The heights that are flown between: with a scan, those of its views too.  InputError where they need a
+    ceiling that the site does not give."""
     low_m, high_m = config.mission.flown_between_m()
+    _demand_ceiling(config, site)
     if not counts_shelves(config, site):
         return low_m, high_m
+    views_m = _view_heights_m(config, site, site.ceiling_m - CEILING_MARGIN_M)
+    return min(low_m, min(views_m) - HEIGHT_ROOM_M), max(high_m, max(views_m) + HEIGHT_ROOM_M)
+
+
+def _view_heights_m(config: Config, site: Site, below_m: float) -> list[float]:
+    """The heights of the views of all locations, where nothing may be flown above `below_m`."""
     scan, mount = config.scan, config.front_camera.mount()
-    heights_m = scan.min_height_m, scan.highest_m(site.ceiling_m - CEILING_MARGIN_M)
-    views_m = [
+    heights_m = scan.min_height_m, scan.highest_m(below_m)
+    return [
         view_height_m(place.height_m, abs(place.y_m - site.nodes[place.node].y_m), mount, heights_m)
         for place in site.locations.values()
     ]
-    return min(low_m, min(views_m) - HEIGHT_ROOM_M), max(high_m, max(views_m) + HEIGHT_ROOM_M)
+
+
+def _demand_ceiling(config: Config, site: Site) -> None:
+    """InputError where something would fly above 2 m under a ceiling that nobody measured."""
+    highest_m, key = config.mission.height_m, "mission.height_m"
+    if counts_shelves(config, site):
+        view_m = max(_view_heights_m(config, site, math.inf))
+        if view_m > highest_m:
+            highest_m, key = view_m, "the highest view of a shelf (scan.max_height_m)"
+    if not site.ceiling_told and highest_m > UNTOLD_CEILING_M - CEILING_MARGIN_M:
+        raise InputError(
+            f"not given, and {key} is at {highest_m:.2g} m",
+            file=f"site {site.name}",
+            key="site.ceiling_m",
+            remedy="measure the lowest thing under the roof and give it; without it nothing flies above 2 m",
+        )
 
 
 def profile_of(config: Config, site: Site) -> str:
