@@ -262,6 +262,8 @@ class Pilot:
             rivals=tuple(self._localiser.rivals()) if doubted else (),
             way_out=self._localiser.way_out() if seeking else None,
             failed=self._last_resort.failed,
+            unfit=tick.unfit,
+            aisle_closed=tick.aisle_closed,
             warnings=self._plausibility.step(
                 now_ns,
                 dt_s,

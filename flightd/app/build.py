@@ -13,9 +13,18 @@ from functools import partial
 
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.ground_link.link import ZmqGround
+from flightd.adapters.interlock import FileInterlock
 from flightd.adapters.store.progress import ProgressFile
 from flightd.adapters.vehicle.connect import connect_vehicle
-from flightd.app.absent_parts import NO_CAMERA, NO_COUNTING, NO_GROUND, NO_PROGRESS, NO_RECORDER, keep_pose
+from flightd.app.absent_parts import (
+    NO_CAMERA,
+    NO_COUNTING,
+    NO_GROUND,
+    NO_INTERLOCK,
+    NO_PROGRESS,
+    NO_RECORDER,
+    keep_pose,
+)
 from flightd.app.counting.count import Counting
 from flightd.app.counting.flight_count import counts_shelves
 from flightd.app.detection.detector_pool import DetectorPool, Detectors
@@ -43,7 +52,7 @@ from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.scanner import Scanner
 from flightd.mission.scan.views import view_height_m
 from flightd.pilot import Pilot
-from flightd.ports import Camera, Clock, Ground, Monitor, PoseTaker, Recorder, Vehicle
+from flightd.ports import Camera, Clock, Ground, Interlock, Monitor, PoseTaker, Recorder, Vehicle
 from flightd.runtime.clock import Hold
 from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 from flightd.site.site import UNTOLD_CEILING_M, Site
@@ -81,9 +90,12 @@ def build(
     opener: OpenDatagrams = open_datagrams,
     hold: Hold = nullcontext,
     startup_fault: FlightdError | None = None,
+    interlock: Interlock | None = None,
+    unfit: str = "",
 ) -> Flight:
     """Compose the flight that `order` asks for.  `peers` are those of the configuration unless given;
     `opener` opens sockets and time is held by `hold` while threads work, as the event loop wants it;
+    `interlock` is the configured one unless given, `unfit` what speaks against a flight on this computer;
     `keep_progress`: the stops left over are kept in `mission.progress`, if that names a file.  InputError
     where configuration, map and order contradict each other."""
     peers = peers or configured_peers(config)
@@ -119,7 +131,23 @@ def build(
         publishers=publishers,
         share_pose=_pose_sharing(config, site, vehicle),
         startup_fault=startup_fault,
+        interlock=interlock or interlock_of(config, site, clock),
+        unfit=unfit,
     )
+
+
+def interlock_of(config: Config, site: Site, clock: Clock) -> Interlock:
+    """What tells whether the aisles are closed.  InputError where the site demands that, and nothing does."""
+    settings = config.interlock
+    if settings.file is not None:
+        return FileInterlock(settings.file, settings.closed, clock)
+    if site.interlock:
+        raise InputError(
+            f"site {site.name} demands it, and there is none",
+            key="interlock.file",
+            remedy="name the file that says whether the aisles are closed",
+        )
+    return NO_INTERLOCK
 
 
 def plan_of(config: Config, site: Site, order: FlightOrder | None = None) -> FlightPlan:

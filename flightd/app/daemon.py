@@ -81,6 +81,7 @@ class Daemon:
             **flight.vision.tasks(),
             "recorder": restarted(flight.recorder.run, self.failed),
             "ground": restarted(flight.ground.run, self.failed),
+            "interlock": flight.interlock.run(),
             "progress": restarted(flight.progress.run, self.failed),
             "front-camera": restarted(flight.front_camera.run, self.failed),
             **flight.counting.tasks(flight.publishers.trouble),

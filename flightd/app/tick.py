@@ -45,6 +45,8 @@ class Tick:
             call("count", flight.counting.take, ()),
             call("count", flight.counting.take_counted, ()),
             call("health", lambda: self._health(now_ns), HEALTHY),
+            flight.unfit,
+            call("interlock", lambda: flight.interlock.is_closed, False),
         )
 
     def _health(self, now_ns: int) -> Health:

@@ -30,7 +30,9 @@ _SHOWN_CHARS = 160
 class TickInput:
     """What arrived since the last tick, oldest first.  `vehicle` is the newest state, None until there
     is one; `ground_silent_s` the time since an attending ground station was heard, 0 if none attends;
-    `counted` names locations that an earlier flight of the same count has booked."""
+    `counted` names locations that an earlier flight of the same count has booked.  `unfit` is what the check
+    of this computer before the flight found against it, "" for nothing; `aisle_closed` what the interlock of
+    the aisle says, where one is demanded."""
 
     now_ns: int
     lines: tuple[LineSet, ...] = ()
@@ -41,6 +43,8 @@ class TickInput:
     codes: tuple[CodeSet, ...] = ()
     counted: tuple[str, ...] = ()
     health: Health = HEALTHY
+    unfit: str = ""
+    aisle_closed: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -213,7 +213,8 @@ class VehicleState:
     `in_control` says that the autopilot is in the mode in which it obeys our setpoints (or, while LAND
     is demanded, in its landing mode) *and* that we asked for that mode: False means hands off.
     `height_m` is above the floor below, along the vertical; NaN when no range finder speaks.
-    `stamps_refused` counts attitudes whose own time made no sense (the arrival's was taken).
+    `stamps_refused` counts attitudes whose own time made no sense (the arrival's was taken).  `unfit` is why
+    the adapter would not arm it, as far as can be asked while it stands; "" where nothing is against it.
     """
 
     attitude: Attitude
@@ -229,6 +230,7 @@ class VehicleState:
     heartbeat_ns: int
     refusal: str = ""
     stamps_refused: int = 0
+    unfit: str = ""
 
 
 class Demand(enum.StrEnum):

@@ -135,6 +135,7 @@ _SAFETY = {
     Trigger.LAND_HERE: Phase.LAND,
     Trigger.GROUND_LOST: Phase.LAND,
     Trigger.RECORD_LOST: Phase.LAND,
+    Trigger.AISLE_OPEN: Phase.LAND,
 }
 _UNDER_WAY = _SAFETY | {Trigger.TIMED_OUT: Phase.LAND}
 _SEEING = _UNDER_WAY | dict.fromkeys(triggers_of(Action.HOLD) | {Trigger.HOLD}, Phase.HOLD)
@@ -147,6 +148,7 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.ARMING: _GIVEN_UP
     | {
         Trigger.GROUND_LOST: Phase.ABORTED,
+        Trigger.AISLE_OPEN: Phase.ABORTED,
         Trigger.TIMED_OUT: Phase.ABORTED,
         Trigger.START_EXPIRED: Phase.PREFLIGHT,
         Trigger.ARMED: Phase.TAKE_OFF,

@@ -31,8 +31,8 @@ from flightd.mission.machine import (
 from flightd.mission.orders import StandingOrders, StartOrder
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
-from flightd.mission.reasons import Happened, Paused, Plain, Reason, Refused, StartsIn, in_words
-from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
+from flightd.mission.reasons import Happened, Paused, Plain, Reason, Refused, StartsIn, Unfit, in_words
+from flightd.mission.safety.hazard_monitor import DebounceTimer, FlightContext, HazardMonitor
 from flightd.mission.safety.hazard_table import ACTIONS, Action, triggers_of
 from flightd.mission.safety.readiness import not_fresh, not_ready
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
@@ -49,6 +49,8 @@ _DEMANDS = {
 }
 _NEAR_FLOOR = {Phase.TAKE_OFF, Phase.LAND}
 """Where lines come and go."""
+_UNFIT_S = 3.0
+"""Parameters are still being read for about so long."""
 _HALTED = (Phase.HOLD, Phase.RELOCATE)
 _INTERRUPTED = (*_HALTED, Phase.ACQUIRE)
 """Where a leg that was interrupted goes on from."""
@@ -80,6 +82,8 @@ class Mission:
         self._orders = StandingOrders()
         self._start = StartOrder(config.mission)
         self._obstacle: Reason | None = Plain.NO_TELEMETRY
+        self._unfit = DebounceTimer()
+        self._unfit_told: Reason | None = None
         self._route = Itinerary(site, plan, policy, self._events)
         self._scan = ShelfScan(site, scanner)
         self._progress = PhaseProgress(config, self._route, self._scan, scanner)
@@ -197,8 +201,8 @@ class Mission:
 
     def _triggers(self, s: MissionInputs) -> set[Trigger]:
         """What has happened by this tick.  Turning back acts at once."""
-        self._obstacle = self._grounded(s) if self.state.waiting else None
-        may_start = self.state.waiting and self._obstacle is None and not self._start.left_s(s.now_ns)
+        ready = self.state.waiting and self._grounded(s) is None
+        may_start = ready and not self._start.left_s(s.now_ns)
         found = self._progress.step(s, self.state, may_start=may_start)
         found |= self._orders.urgent
         found |= self._ground(s)
@@ -215,9 +219,16 @@ class Mission:
         if Trigger.FOUND_FLYING in found:  # an order to land or stop stands until it may be obeyed
             found -= self._orders.urgent
         found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))
-        if Trigger.RECORD_LOST in found:
-            found.remove(Trigger.RECORD_LOST)
-            found |= self._lost(self._config.hazards.record_lost, Trigger.RECORD_LOST, s.now_ns)
+        hazards = self._config.hazards
+        for lost, action in (
+            (Trigger.RECORD_LOST, hazards.record_lost),
+            (Trigger.AISLE_OPEN, hazards.aisle_open),
+        ):
+            if lost in found:
+                found.remove(lost)
+                found |= self._lost(action, lost, s.now_ns)
+        if self.phase is Phase.ARMING and not s.aisle_closed:
+            found.add(Trigger.AISLE_OPEN)
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found
@@ -440,6 +451,7 @@ class Mission:
     def _guide(self, s: MissionInputs) -> Guidance:
         if self.state.waiting:
             self._obstacle = self._grounded(s)
+            self._report_unfit(s.now_ns, self._obstacle)
             left_s = self._start.left_s(s.now_ns)
             self._reason = self._obstacle or (StartsIn(left_s) if left_s else Plain.AWAITS_START)
         if not self.airborne:
@@ -455,6 +467,13 @@ class Mission:
             if refusal and self._cause is not None and guidance.demand is Demand.DISARM:
                 self._reason = Refused(self._cause, refusal)
         return guidance
+
+    def _report_unfit(self, now_ns: int, obstacle: Reason | None) -> None:
+        """Say once what was found against a flight, as soon as it is no passing matter."""
+        unfit_s = self._unfit.step(isinstance(obstacle, Unfit), now_ns)
+        if isinstance(obstacle, Unfit) and unfit_s > _UNFIT_S and obstacle != self._unfit_told:
+            self._unfit_told = obstacle
+            self._events.report(now_ns, EventLevel.WARNING, "unfit", obstacle.found)
 
     def _leads_along_x(self) -> bool:
         """The way to the goal is along its aisle, not from one aisle to another."""

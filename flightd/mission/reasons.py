@@ -19,6 +19,7 @@ class Plain(enum.Enum):
     NO_HEIGHT = "no height from the vehicle's range finder"
     NO_CHARGE = "no battery level from the vehicle"
     NO_PICTURE = "no picture from the down camera"
+    AISLE_OPEN = "the aisle is not closed"
     GROUND_SILENT = "the ground station that attends this flight fell silent"
 
 
@@ -50,6 +51,13 @@ class StartChargeLow:
 
     charge_frac: float
     needed_frac: float
+
+
+@dataclass(frozen=True, slots=True)
+class Unfit:
+    """What the check before the flight found, in the words of who found it."""
+
+    found: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +116,7 @@ Reason: TypeAlias = (
     | Paused
     | StartChargeLow
     | StartsIn
+    | Unfit
     | LatePictures
     | AwaitsBattery
     | ChargeLow
@@ -129,6 +138,8 @@ def in_words(reason: Reason) -> str:
             text = f"{in_words(why)}; paused besides, until resume"
         case StartChargeLow(charge, needed):
             text = f"battery at {charge:.0%}, {needed:.0%} needed to start"
+        case Unfit(found):
+            text = f"not fit to fly: {found}"
         case StartsIn(seconds):
             text = f"arms in {seconds} s; pause takes the start back"
         case LatePictures(limit_s):

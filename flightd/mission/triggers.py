@@ -25,6 +25,7 @@ class Trigger(enum.Enum):
     WIND = "pushed beyond the limits"
     LAND_HERE = "landing ordered"
     GROUND_LOST = "ground link lost"
+    AISLE_OPEN = "the aisle is not closed any more"
     RECORD_LOST = "the flight log cannot be written"
     HAZARD_LASTS = "held for too long"
     LINES_LOST_LONG = "lines lost for too long"

@@ -198,6 +198,8 @@ class Site:
     blocked: tuple[tuple[str, str], ...] = ()
     keep_outs: tuple[KeepOut, ...] = ()
     markers: tuple[Marker, ...] = ()
+    interlock: bool = False
+    """Whether nothing may arm here unless an interlock says that the aisles are closed to people."""
     ceiling_told: bool = True
     """Whether the site file gives the ceiling; otherwise it is UNTOLD_CEILING_M."""
 

@@ -46,6 +46,7 @@ from tests.sim.ideal_ports import (
     HeldSetpoint,
     IdealCount,
     IdealGround,
+    IdealInterlock,
     IdealRecorder,
     IdealVehicle,
     IdealVision,
@@ -146,6 +147,7 @@ class IdealFlight:
         self._range = (0.1, self._now_ns)
         self._last_seen: LineSet | None = None
         self.ground_silent_s = 0.0
+        self.aisle_closed = True
         self.commands: list[Command] = []
         """Orders that the next tick takes."""
         self._battery_swapper = BatterySwapper(site, self.airframe, swap_s) if swap_s else None
@@ -175,6 +177,7 @@ class IdealFlight:
             progress=NO_PROGRESS,
             publishers=TelemetryPublishers(self, vehicle, recorder, ground, observers=self._observers),
             share_pose=keep_pose,
+            interlock=IdealInterlock(lambda: self.aisle_closed),
         )
 
     def fly(self, limit_s: float = 600.0) -> Flown:

@@ -151,3 +151,17 @@ class IdealCount(NoCounting):
 
     def take_counted(self) -> tuple[str, ...]:
         return self._counted()
+
+
+class IdealInterlock:
+    """`ports.Interlock` that says what `closed` says."""
+
+    def __init__(self, closed: Callable[[], bool]) -> None:
+        self._closed = closed
+
+    @property
+    def is_closed(self) -> bool:
+        return self._closed()
+
+    async def run(self) -> None:
+        """There is no file."""

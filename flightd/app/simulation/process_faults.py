@@ -18,6 +18,7 @@ from flightd.core.errors import FlightdError, InputError
 from flightd.mission.guidance import Guidance, MissionInputs
 from flightd.mission.mission import Mission
 from flightd.sim.scenario.fault_schema import (
+    AisleOpened,
     CpuTaken,
     DetectorKilled,
     Fault,
@@ -72,6 +73,7 @@ class LauncherFaults:
         self._turns: asyncio.Queue[tuple[Fault, bool]] = asyncio.Queue()
         self._attending = any(isinstance(fault, GroundSilent) for fault in faults)
         self._taken = 0.0
+        self.interlock = SimulatedInterlock()
         self.mission: Mission | None = None
         """Of the flight, once that is built."""
 
@@ -98,6 +100,8 @@ class LauncherFaults:
                 _signal((self._recorder.pid,), signal.SIGKILL)
             case ProcessFault(kind="disk_full"):
                 self._fill_disk(on)
+            case AisleOpened():
+                self.interlock.is_closed = not on
             case StepFails() if self.mission is not None:
                 _break(self.mission, on)
             case CpuTaken():
@@ -139,6 +143,15 @@ class LauncherFaults:
         assert self._ground is not None
         status, command = (int(endpoint.rpartition(":")[2]) for endpoint in self._ground.endpoints)
         return Address("127.0.0.1", status, command)
+
+
+class SimulatedInterlock:
+    """`ports.Interlock` of the simulated hall: closed until a fault opens an aisle."""
+
+    is_closed = True
+
+    async def run(self) -> None:
+        await asyncio.get_running_loop().create_future()
 
 
 class SimulatedFaultError(Exception):

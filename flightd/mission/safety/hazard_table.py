@@ -215,6 +215,15 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "aisle_open",
+        Trigger.AISLE_OPEN,
+        "where the site demands it (`interlock`): `interlock.file` does not say any more that the aisles are"
+        " closed, or cannot be read",
+        Action.CONFIGURED,
+        "nothing arms; in flight `hazards.aisle_open`: continue, hold, home or land",
+        _FAST,
+    ),
+    Hazard(
         "lines_lost",
         Trigger.LINES_LOST,
         "no line of the map newer than `mission.lines_hold_s`, the followed one older than 0.8 s, or the"

@@ -6,7 +6,7 @@ import math
 
 from flightd.config.schema import Config
 from flightd.mission.guidance import MissionInputs
-from flightd.mission.reasons import AwaitsBattery, LatePictures, Plain, Reason, StartChargeLow
+from flightd.mission.reasons import AwaitsBattery, LatePictures, Plain, Reason, StartChargeLow, Unfit
 
 
 def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason | None:
@@ -16,12 +16,14 @@ def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason |
         return Plain.NO_TELEMETRY
     checks: tuple[tuple[bool, Reason], ...] = (
         (v.armed, Plain.ARMED_ALREADY),
+        (bool(s.unfit or v.unfit), Unfit(s.unfit or v.unfit)),
         (math.isnan(s.height_m), Plain.NO_HEIGHT),
         (math.isnan(v.battery_frac), Plain.NO_CHARGE),
         (v.battery_frac < p.battery_start, StartChargeLow(v.battery_frac, p.battery_start)),
         (not s.frames_arrive, Plain.NO_PICTURE),
         (s.warnings.picture_age_s > latency_s, LatePictures(latency_s)),
         (ground_silent, Plain.GROUND_SILENT),
+        (not s.aisle_closed, Plain.AISLE_OPEN),
     )
     return next((reason for failed, reason in checks if failed), None)
 

@@ -191,6 +191,13 @@ class StepFails(_Fault):
     kind: Literal["step_fails"]
 
 
+class AisleOpened(_Fault):
+    """Somebody opens an aisle, and the interlock tells it."""
+
+    by_launcher = True
+    kind: Literal["aisle_opened"]
+
+
 class GroundSilent(_Fault):
     """A ground station attends from the start, and falls silent."""
 
@@ -229,6 +236,7 @@ Fault: TypeAlias = Annotated[
     | ProcessFault
     | CpuTaken
     | StepFails
+    | AisleOpened
     | GroundSilent
     | GroundOrder,
     Field(discriminator="kind"),

@@ -289,6 +289,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.WIND: warned(push_mps2=5.0),
     Trigger.LAND_HERE: ordered(CommandKind.LAND),
     Trigger.GROUND_LOST: sensed(ground_silent_s=9.0),
+    Trigger.AISLE_OPEN: sensed(aisle_closed=False),
     Trigger.RECORD_LOST: sick(recorder_error="disk full"),
     Trigger.HAZARD_LASTS: warned(1.3, frozen_s=9.0),
     Trigger.LINES_LOST_LONG: sensed(2.5, x_age_s=9.0, y_age_s=9.0),

@@ -176,6 +176,13 @@ class ModeArmingManager:
         return not self._telemetry.armed or says is LandedState.ON_GROUND
 
     @property
+    def unfit(self) -> Refusal | None:
+        """Why a vehicle that stands disarmed would not be armed by us; None where it would."""
+        if self._telemetry.armed or self.is_silent:
+            return None
+        return self._firmware.not_fit() or self._firmware.no_way_down()
+
+    @property
     def off_floor_m(self) -> float | None:
         """The height at which nothing is disarmed, whatever the autopilot says; None on the floor.  NaN where
         no range finder tells and the autopilot does not say that it stands."""
