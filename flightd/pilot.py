@@ -15,10 +15,11 @@ from flightd.config.schema import Config
 from flightd.control.flight_controller import FlightController, Motion
 from flightd.control.limits import Limiter, Surroundings
 from flightd.core.scanning import Place
-from flightd.core.tick import TICK_S, TickInput, TickOutput
+from flightd.core.tick import TICK_S, StepFailure, TickInput, TickOutput
 from flightd.core.tracks import TrackSet
 from flightd.core.types import (
     AttitudeSetpoint,
+    Demand,
     GridPose,
     Phase,
     VehicleState,
@@ -29,6 +30,7 @@ from flightd.localisation.pose_history import PoseHistory
 from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.mission import Mission
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
+from flightd.mission.safety.last_resort import LastResort
 from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.site.site import Site
@@ -78,6 +80,23 @@ class Pilot:
         self._plausibility = PlausibilityMonitor(site, config)
         self._extrapolation = AttitudeExtrapolation()
         self._commanded: AttitudeSetpoint | None = None
+        self._last_resort = LastResort(config.mission)
+        self._answered = TickOutput(None, Demand.STANDBY, Phase.PREFLIGHT, "", "", 0, plan.visits, None, None)
+
+    @property
+    def phase(self) -> Phase:
+        """What it answered last."""
+        return self._answered.phase
+
+    @property
+    def reason(self) -> str:
+        """Why, in words."""
+        return self._answered.reason
+
+    @property
+    def failure(self) -> StepFailure | None:
+        """What the newest step raised, None where it raised nothing."""
+        return self._last_resort.failure
 
     @property
     def mission(self) -> Mission:
@@ -102,10 +121,27 @@ class Pilot:
         return self._scanner.places(pose) if pose is not None else ()
 
     def step(self, tick: TickInput) -> TickOutput:
-        """Fly one tick."""
+        """Fly one tick.  Raises nothing: what goes wrong levels the drone at this tick and lands it from the
+        next one, by the lines as long as that works, else by its autopilot."""
+        resort = self._last_resort
+        resort.failure = None
+        if not resort.given_up:
+            try:
+                self._answered = self._fly(tick)
+            except Exception as err:  # noqa: BLE001 - whatever it is, the drone has to come down
+                resort.caught(tick.now_ns, err)
+            else:
+                return self._answered
+        self._answered = resort.answer(tick, self._answered, self._mission.drain_events, self._scanner.drain)
+        self._commanded = self._answered.setpoint
+        return self._answered
+
+    def _fly(self, tick: TickInput) -> TickOutput:
         now_ns = tick.now_ns
         dt_s = TICK_S if self._last_ns is None else max((now_ns - self._last_ns) * 1e-9, 1e-3)
         self._last_ns = now_ns
+        for command in tick.commands:
+            self._mission.command(command, now_ns)
         self._take(tick)
         height_m = self._heights.at(now_ns)
         tracks = self._tracker.at(now_ns)
@@ -116,8 +152,6 @@ class Pilot:
             self._pads.step(tracks, pose)
         by_pad = None if pose is None else self._pads.over(pose, self._localiser.ever_matched)
         pose = by_pad or pose
-        for command in tick.commands:
-            self._mission.command(command, now_ns)
         self._scan(tick)
         inputs = self._inputs(tick, dt_s, pose, height_m, tracks)
         inputs = replace(inputs, by_pad=by_pad is not None)
@@ -230,6 +264,9 @@ class Pilot:
             pad_m=self._pads.centre(self._mission.goal.node),
             rivals=tuple(self._localiser.rivals()) if doubted else (),
             way_out=self._localiser.way_out() if seeking else None,
+            failed=self._last_resort.failed,
+            unfit=tick.unfit,
+            aisle_closed=tick.aisle_closed,
             warnings=self._plausibility.step(
                 now_ns,
                 dt_s,

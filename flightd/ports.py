@@ -68,6 +68,15 @@ class CountsDrops(Protocol):
     def dropped(self) -> int: ...
 
 
+class Interlock(Protocol):
+    """Whether the aisles are closed to people; `run` keeps it up to date until cancelled."""
+
+    @property
+    def is_closed(self) -> bool: ...
+
+    async def run(self) -> None: ...
+
+
 class Camera(Protocol):
     """The down camera or the front camera.  `run` delivers tickets of pictures in shared memory until
     cancelled; it raises TransientError when the source failed and another `run` may succeed."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import os
 import re
 from typing import Protocol, TextIO
@@ -61,7 +62,7 @@ class JournalMonitor:
             "goal": snapshot.goal,
             "nodes": f"{snapshot.nodes_done}/{snapshot.nodes_planned}",
             "height_m": f"{snapshot.height_m:.2f}",
-            "battery": f"{snapshot.battery_frac:.2f}",
+            "battery": "" if math.isnan(snapshot.battery_frac) else f"{snapshot.battery_frac:.2f}",
             "fps": f"{snapshot.fps:.0f}",
             "latency_ms": f"{snapshot.latency_ms.get('total', 0.0):.0f}",
             "dropped": sum(snapshot.dropped.values()),

@@ -117,4 +117,4 @@ def _line(snapshot: Snapshot, missing: list[str]) -> str:
         return f"waiting for {' and '.join(missing)}"
     done = f"{snapshot.nodes_done}/{snapshot.nodes_planned} nodes"
     reason = f" ({snapshot.reason})" if snapshot.reason else ""
-    return f"{snapshot.phase}{reason}, {done}, battery {snapshot.battery_frac:.0%}"
+    return f"{snapshot.phase}{reason}, {done}, battery {snapshot.battery_text}"

@@ -60,6 +60,15 @@ class NoGround:
         pass
 
 
+class NoInterlock:
+    """`ports.Interlock` where no site demands one: people may be anywhere."""
+
+    is_closed = True
+
+    async def run(self) -> None:
+        await _idle()
+
+
 class NoCamera:
     """`ports.Camera` that is not fitted."""
 
@@ -105,6 +114,7 @@ def keep_pose(pose: GridPose) -> None:
 
 NO_RECORDER = NoRecorder()
 NO_GROUND = NoGround()
+NO_INTERLOCK = NoInterlock()
 NO_CAMERA = NoCamera()
 NO_COUNTING = NoCounting()
 NO_PROGRESS = NoProgress()

@@ -5,6 +5,7 @@ What differs between a real vehicle and a simulated one (clock, detectors, recor
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -12,9 +13,18 @@ from functools import partial
 
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.ground_link.link import ZmqGround
+from flightd.adapters.interlock import FileInterlock
 from flightd.adapters.store.progress import ProgressFile
 from flightd.adapters.vehicle.connect import connect_vehicle
-from flightd.app.absent_parts import NO_CAMERA, NO_COUNTING, NO_GROUND, NO_PROGRESS, NO_RECORDER, keep_pose
+from flightd.app.absent_parts import (
+    NO_CAMERA,
+    NO_COUNTING,
+    NO_GROUND,
+    NO_INTERLOCK,
+    NO_PROGRESS,
+    NO_RECORDER,
+    keep_pose,
+)
 from flightd.app.counting.count import Counting
 from flightd.app.counting.flight_count import counts_shelves
 from flightd.app.detection.detector_pool import DetectorPool, Detectors
@@ -42,10 +52,10 @@ from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.scanner import Scanner
 from flightd.mission.scan.views import view_height_m
 from flightd.pilot import Pilot
-from flightd.ports import Camera, Clock, Ground, Monitor, PoseTaker, Recorder, Vehicle
+from flightd.ports import Camera, Clock, Ground, Interlock, Monitor, PoseTaker, Recorder, Vehicle
 from flightd.runtime.clock import Hold
 from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
-from flightd.site.site import Site
+from flightd.site.site import UNTOLD_CEILING_M, Site
 from flightd.vision.line_detector import Detector
 
 
@@ -80,9 +90,12 @@ def build(
     opener: OpenDatagrams = open_datagrams,
     hold: Hold = nullcontext,
     startup_fault: FlightdError | None = None,
+    interlock: Interlock | None = None,
+    unfit: str = "",
 ) -> Flight:
     """Compose the flight that `order` asks for.  `peers` are those of the configuration unless given;
     `opener` opens sockets and time is held by `hold` while threads work, as the event loop wants it;
+    `interlock` is the configured one unless given, `unfit` what speaks against a flight on this computer;
     `keep_progress`: the stops left over are kept in `mission.progress`, if that names a file.  InputError
     where configuration, map and order contradict each other."""
     peers = peers or configured_peers(config)
@@ -118,7 +131,23 @@ def build(
         publishers=publishers,
         share_pose=_pose_sharing(config, site, vehicle),
         startup_fault=startup_fault,
+        interlock=interlock or interlock_of(config, site, clock),
+        unfit=unfit,
     )
+
+
+def interlock_of(config: Config, site: Site, clock: Clock) -> Interlock:
+    """What tells whether the aisles are closed.  InputError where the site demands that, and nothing does."""
+    settings = config.interlock
+    if settings.file is not None:
+        return FileInterlock(settings.file, settings.closed, clock)
+    if site.interlock:
+        raise InputError(
+            f"site {site.name} demands it, and there is none",
+            key="interlock.file",
+            remedy="name the file that says whether the aisles are closed",
+        )
+    return NO_INTERLOCK
 
 
 def plan_of(config: Config, site: Site, order: FlightOrder | None = None) -> FlightPlan:
@@ -141,6 +170,7 @@ def pilot_of(config: Config, site: Site, order: FlightOrder | None = None) -> Pi
     """A fresh pilot for one flight of an order (by default the configuration's).  InputError where map and
     configuration contradict each other."""
     order = order or configured_order(config)
+    _demand_ceiling(config, site)
     if config.mission.height_m > site.ceiling_m - CEILING_MARGIN_M:
         raise InputError(
             f"mission.height_m {config.mission.height_m} is not {CEILING_MARGIN_M} m below the ceiling of"
@@ -168,17 +198,40 @@ def scanner_of(config: Config, site: Site) -> AnyScanner:
 
 
 def flown_between_m(config: Config, site: Site) -> tuple[float, float]:
-    """The heights that are flown between: with a scan, those of its views too."""
+    """The heights that are flown between: with a scan, those of its views too.  InputError where they need a
+    ceiling that the site does not give."""
     low_m, high_m = config.mission.flown_between_m()
+    _demand_ceiling(config, site)
     if not counts_shelves(config, site):
         return low_m, high_m
+    views_m = _view_heights_m(config, site, site.ceiling_m - CEILING_MARGIN_M)
+    return min(low_m, min(views_m) - HEIGHT_ROOM_M), max(high_m, max(views_m) + HEIGHT_ROOM_M)
+
+
+def _view_heights_m(config: Config, site: Site, below_m: float) -> list[float]:
+    """The heights of the views of all locations, where nothing may be flown above `below_m`."""
     scan, mount = config.scan, config.front_camera.mount()
-    heights_m = scan.min_height_m, scan.highest_m(site.ceiling_m - CEILING_MARGIN_M)
-    views_m = [
+    heights_m = scan.min_height_m, scan.highest_m(below_m)
+    return [
         view_height_m(place.height_m, abs(place.y_m - site.nodes[place.node].y_m), mount, heights_m)
         for place in site.locations.values()
     ]
-    return min(low_m, min(views_m) - HEIGHT_ROOM_M), max(high_m, max(views_m) + HEIGHT_ROOM_M)
+
+
+def _demand_ceiling(config: Config, site: Site) -> None:
+    """InputError where something would fly above 2 m under a ceiling that nobody measured."""
+    highest_m, key = config.mission.height_m, "mission.height_m"
+    if counts_shelves(config, site):
+        view_m = max(_view_heights_m(config, site, math.inf))
+        if view_m > highest_m:
+            highest_m, key = view_m, "the highest view of a shelf (scan.max_height_m)"
+    if not site.ceiling_told and highest_m > UNTOLD_CEILING_M - CEILING_MARGIN_M:
+        raise InputError(
+            f"not given, and {key} is at {highest_m:.2g} m",
+            file=f"site {site.name}",
+            key="site.ceiling_m",
+            remedy="measure the lowest thing under the roof and give it; without it nothing flies above 2 m",
+        )
 
 
 def profile_of(config: Config, site: Site) -> str:

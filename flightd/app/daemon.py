@@ -81,6 +81,7 @@ class Daemon:
             **flight.vision.tasks(),
             "recorder": restarted(flight.recorder.run, self.failed),
             "ground": restarted(flight.ground.run, self.failed),
+            "interlock": flight.interlock.run(),
             "progress": restarted(flight.progress.run, self.failed),
             "front-camera": restarted(flight.front_camera.run, self.failed),
             **flight.counting.tasks(flight.publishers.trouble),
@@ -122,7 +123,7 @@ class Daemon:
         """Look after a vehicle that flies; once one that only stands there is disarmed, the daemon ends."""
         await self._in_air_or(err)
         self._flight.publishers.trouble(str(err))
-        while self._flight.pilot.mission.phase is Phase.PREFLIGHT:
+        while self._flight.pilot.phase is Phase.PREFLIGHT:
             state = self._flight.vehicle.state()
             if state is not None and not state.armed:
                 raise err
@@ -145,11 +146,11 @@ class Daemon:
 
     def result(self) -> FlightResult:
         """How the flight stands after the newest tick."""
-        flight, mission = self._flight, self._flight.pilot.mission
+        flight, pilot = self._flight, self._flight.pilot
         return FlightResult(
-            phase=mission.phase,
-            reason=mission.reason,
-            visited=tuple(mission.visited),
+            phase=pilot.phase,
+            reason=pilot.reason,
+            visited=tuple(pilot.mission.visited),
             nodes_planned=flight.pilot.plan.nodes,
             frames=flight.camera.frames,
             frames_dropped=sum(flight.vision.dropped.values()),

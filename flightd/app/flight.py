@@ -13,7 +13,7 @@ from flightd.core.scanning import CodeSet
 from flightd.core.tick import TickOutput
 from flightd.core.types import AttitudeSetpoint, GridPose, LineSet
 from flightd.pilot import Pilot
-from flightd.ports import Camera, Clock, Ground, Recorder, Vehicle
+from flightd.ports import Camera, Clock, Ground, Interlock, Recorder, Vehicle
 
 Tasks: TypeAlias = Mapping[str, Coroutine[Any, Any, None]]
 """What runs beside the tick until it is cancelled, by name."""
@@ -114,7 +114,7 @@ class Flight:
 
     `share_pose` gives the vehicle's own estimator the pose, where it can use it.  `startup_fault` is what
     the daemon should not fly with: on the ground it ends with that; a vehicle that it finds flying is looked
-    after all the same."""
+    after all the same.  `unfit` is what the check of this computer found against a flight, "" for nothing."""
 
     clock: Clock
     pilot: Pilot
@@ -129,4 +129,6 @@ class Flight:
     progress: Progress
     publishers: TelemetryPublishers
     share_pose: Callable[[GridPose], None]
+    interlock: Interlock
     startup_fault: FlightdError | None = None
+    unfit: str = ""

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from flightd.core.snapshot import Snapshot
+from flightd.core.tick import StepFailure
 from flightd.core.topics import Topic
 from flightd.core.types import Event, EventLevel, Phase
 from flightd.ports import Clock, Ground, Monitor, Recorder, Vehicle
+from flightd.runtime.supervisor import FaultBarrier
 
 _STATUS_NS = 100_000_000
 
 
 class TelemetryPublishers:
-    """Tells each of them what it is there for; none of them can keep the control tick waiting."""
+    """Tells each of them what it is there for; none of them can keep the control tick waiting, or end it.
+    `barrier` keeps what a part raises from the tick."""
 
     def __init__(
         self,
@@ -31,6 +35,7 @@ class TelemetryPublishers:
         self._ground = ground
         self._monitors = tuple(monitors)
         self._observers = tuple(observers)
+        self.barrier = FaultBarrier(self._failed)
         self._told_ns = 0
         self._told_phase: Phase | None = None
         self._late_s: list[float] = []
@@ -39,15 +44,22 @@ class TelemetryPublishers:
     def trouble(self, text: str) -> None:
         """Something failed that people should know of, outside of any tick."""
         event = Event(self._clock.now_ns(), EventLevel.ERROR, "failure", text)
-        self._recorder.record(Topic.EVENT, event.stamp_ns, event)
+        self.barrier.call("recorder", lambda: self._recorder.record(Topic.EVENT, event.stamp_ns, event), None)
         self._event(event)
+
+    def _failed(self, part: str, err: Exception) -> None:
+        failure = StepFailure.of(self._clock.now_ns(), err, part)
+        self.barrier.call(
+            "recorder", lambda: self._recorder.record(Topic.FAILURE, failure.stamp_ns, failure), None
+        )
+        self.trouble(failure.error)
 
     def publish(self, snapshot: Snapshot) -> None:
         """A tick: its events to everybody, all of it to the record; ten times a second and at each change of
         phase it is told to everybody."""
         for event in snapshot.output.events:
             self._event(event)
-        _record(self._recorder, snapshot)
+        self.barrier.call("recorder", lambda: _record(self._recorder, snapshot), None)
         self._late_s += snapshot.tick_late_s
         self._latencies_ms += snapshot.latencies_ms
         if snapshot.stamp_ns - self._told_ns >= _STATUS_NS or snapshot.phase is not self._told_phase:
@@ -59,18 +71,21 @@ class TelemetryPublishers:
         snapshot = replace(snapshot, tick_late_s=tuple(self._late_s), latencies_ms=tuple(self._latencies_ms))
         self._late_s.clear()
         self._latencies_ms.clear()
-        self._recorder.record(Topic.STATUS, snapshot.stamp_ns, snapshot.status())
-        self._ground.tell(snapshot)
+        call = self.barrier.call
+        status = snapshot.status()
+        call("recorder", lambda: self._recorder.record(Topic.STATUS, snapshot.stamp_ns, status), None)
+        call("ground link", lambda: self._ground.tell(snapshot), None)
         for monitor in self._monitors:
-            monitor.tell(snapshot)
+            call("monitor", partial(monitor.tell, snapshot), None)
         for observer in self._observers:
-            observer(snapshot)
+            call("display", partial(observer, snapshot), None)
 
     def _event(self, event: Event) -> None:
-        self._vehicle.notify(event)
-        self._ground.event(event)
+        call = self.barrier.call
+        call("vehicle", lambda: self._vehicle.notify(event), None)
+        call("ground link", lambda: self._ground.event(event), None)
         for monitor in self._monitors:
-            monitor.event(event)
+            call("monitor", partial(monitor.event, event), None)
 
 
 def _record(recorder: Recorder, snapshot: Snapshot) -> None:
@@ -92,3 +107,5 @@ def _record(recorder: Recorder, snapshot: Snapshot) -> None:
         recorder.record(Topic.COMMAND, now_ns, command)
     for event in output.events:
         recorder.record(Topic.EVENT, event.stamp_ns, event)
+    if snapshot.failure is not None:
+        recorder.record(Topic.FAILURE, now_ns, snapshot.failure)

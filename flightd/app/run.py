@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 import signal
 from collections.abc import AsyncIterator, Callable
@@ -24,11 +25,17 @@ from flightd.app.recording import FlightSetting, record_setting
 from flightd.config.schema import Config
 from flightd.core.errors import InputError, TransientError
 from flightd.core.snapshot import Snapshot
+from flightd.doctor.calibration import check_calibration
+from flightd.doctor.check import CheckLevel
+from flightd.doctor.machine import check_clock, check_disk, check_processor
 from flightd.ports import Recorder
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
 from flightd.runtime.supervisor import restarted
+from flightd.site.site import Site
 from flightd.site.site_file import load_site
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +104,24 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
             keep_progress=True,
             opener=open_paced_datagrams,
             startup_fault=count.error,
+            unfit=unfit_here(config, site),
         )
         daemon = Daemon(flight)
         async with room_kept(archive, daemon.failed):
             return await daemon.fly()
+
+
+def unfit_here(config: Config, site: Site) -> str:
+    """What the doctor finds against a flight on this computer without moving or asking anything, in one line;
+    what only deserves a look is logged."""
+    camera, height_m = config.camera, config.mission.height_m
+    checks = [check_clock(), check_disk(config.recorder), *check_processor(config.vision.workers)]
+    checks += check_calibration(camera, site, height_m)
+    for check in checks:
+        if check.level is CheckLevel.WARNING:
+            _LOG.warning("%s: %s; %s", check.name, check.text, check.remedy)
+    wrong = (check for check in checks if check.level is CheckLevel.ERROR)
+    return "; ".join(f"{check.text} ({check.remedy})" for check in wrong)
 
 
 @asynccontextmanager

@@ -6,7 +6,7 @@ from flightd.adapters.store.progress import LeftOver
 from flightd.app.flight import Flight
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
-from flightd.core.types import Command, CommandKind, Health
+from flightd.core.types import HEALTHY, Command, CommandKind, Health
 from flightd.ports import CountsDrops
 
 
@@ -16,38 +16,42 @@ class Tick:
     def __init__(self, flight: Flight) -> None:
         self._flight = flight
         self._orders: list[Command] = []
+        self._call = flight.publishers.barrier.call
 
     def order(self, command: Command) -> None:
         """Hand an operator's order to the next tick."""
         self._orders.append(command)
 
     def run(self, now_ns: int, late_s: float = 0.0) -> TickOutput:
-        """Tick once, `late_s` after the tick was due."""
+        """Tick once, `late_s` after the tick was due.  A part that fails loses its turn."""
         tick = self._gather(now_ns)
         output = self._flight.pilot.step(tick)
         self._obey(output)
-        self._flight.publishers.publish(self._snapshot(tick, output, late_s))
+        self._call(
+            "status", lambda: self._flight.publishers.publish(self._snapshot(tick, output, late_s)), None
+        )
         return output
 
     def _gather(self, now_ns: int) -> TickInput:
-        """What arrived since the last tick."""
-        flight = self._flight
+        """What arrived since the last tick; nothing from a part that fails."""
+        flight, call = self._flight, self._call
         return TickInput(
             now_ns,
-            flight.vision.fresh(now_ns),
-            flight.vehicle.state(),
-            tuple(flight.vehicle.attitudes()),
-            self._take_commands(),
-            flight.ground.silent_s(now_ns),
-            flight.counting.take(),
-            flight.counting.take_counted(),
-            Health(
-                flight.vision.latency_p99_s(now_ns),
-                flight.vision.replaced,
-                flight.recorder.restarts,
-                flight.recorder.error,
-            ),
+            call("detection", lambda: flight.vision.fresh(now_ns), ()),
+            call("vehicle", flight.vehicle.state, None),
+            call("vehicle", lambda: tuple(flight.vehicle.attitudes()), ()),
+            call("ground link", self._take_commands, ()),
+            call("ground link", lambda: flight.ground.silent_s(now_ns), 0.0),
+            call("count", flight.counting.take, ()),
+            call("count", flight.counting.take_counted, ()),
+            call("health", lambda: self._health(now_ns), HEALTHY),
+            flight.unfit,
+            call("interlock", lambda: flight.interlock.is_closed, False),
         )
+
+    def _health(self, now_ns: int) -> Health:
+        vision, recorder = self._flight.vision, self._flight.recorder
+        return Health(vision.latency_p99_s(now_ns), vision.replaced, recorder.restarts, recorder.error)
 
     def _take_commands(self) -> tuple[Command, ...]:
         orders, self._orders = self._orders, []
@@ -58,19 +62,24 @@ class Tick:
 
     def _obey(self, output: TickOutput) -> None:
         """Give each part what the pilot answered for it."""
-        flight, mission = self._flight, self._flight.pilot.mission
-        flight.vehicle.demand(output.demand)
-        flight.setpoints.set(output.setpoint)
+        flight, call = self._flight, self._call
+        call("vehicle", lambda: flight.vehicle.demand(output.demand), None)
+        call("setpoints", lambda: flight.setpoints.set(output.setpoint), None)
         if output.setpoint is None:
-            flight.vision.not_flying()
-        if output.pose is not None:
-            flight.share_pose(output.pose)
-        flight.counting.keep(output)
-        flight.front_camera.expose(flight.pilot.exposure)
-        flight.progress.put(LeftOver(mission.remaining, *mission.stand))
+            call("detection", flight.vision.not_flying, None)
+        pose = output.pose
+        if pose is not None:
+            call("pose output", lambda: flight.share_pose(pose), None)
+        call("count", lambda: flight.counting.keep(output), None)
+        call("front camera", lambda: flight.front_camera.expose(flight.pilot.exposure), None)
+        call("progress", self._keep_left_over, None)
+
+    def _keep_left_over(self) -> None:
+        mission = self._flight.pilot.mission
+        self._flight.progress.put(LeftOver(mission.remaining, *mission.stand))
 
     def _snapshot(self, tick: TickInput, output: TickOutput, late_s: float) -> Snapshot:
-        flight, pilot = self._flight, self._flight.pilot
+        flight, pilot, call = self._flight, self._flight.pilot, self._call
         vision, dropped = flight.vision, dict(flight.vision.dropped)
         lost = sum(dropped.values())
         dropped["recorder"] = flight.recorder.dropped
@@ -80,7 +89,7 @@ class Tick:
         return Snapshot(
             tick,
             output,
-            nodes_done=len(set(pilot.mission.visited)),
+            nodes_done=call("mission", lambda: len(set(pilot.mission.visited)), 0),
             nodes_planned=pilot.plan.nodes,
             frames=flight.camera.frames,
             frames_dropped=lost,
@@ -91,6 +100,7 @@ class Tick:
             dropped=dropped,
             restarts={"detector": vision.replaced, "recorder": flight.recorder.restarts},
             repeated_level=flight.setpoints.stale,
-            possible=pilot.mission.possible_commands,
-            height_goal_m=pilot.mission.height_goal_m,
+            possible=call("mission", lambda: pilot.mission.possible_commands, frozenset()),
+            failure=pilot.failure,
+            height_goal_m=call("mission", lambda: pilot.mission.height_goal_m, 0.0),
         )

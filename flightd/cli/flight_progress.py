@@ -29,6 +29,7 @@ class FlightProgress:
         )
         self._task: TaskID | None = None
         self._plain_ns = 0
+        self._waits_for = ""
 
     def __enter__(self) -> Self:
         self._progress.start()
@@ -41,12 +42,18 @@ class FlightProgress:
         if not self._shown:
             return
         detail = (
-            f"at {snapshot.node or '-':<4} to {snapshot.goal:<4} {snapshot.height_m:4.1f} m  "
-            f"battery {snapshot.battery_frac:4.0%}  {snapshot.fps:3.0f} fps  "
-            f"latency {snapshot.latency_ms.get('total', 0.0):3.0f} ms"
+            snapshot.reason
+            if snapshot.waits
+            else (
+                f"at {snapshot.node or '-':<4} to {snapshot.goal:<4} {snapshot.height_m:4.1f} m  "
+                f"battery {snapshot.battery_text:>4}  {snapshot.fps:3.0f} fps  "
+                f"latency {snapshot.latency_ms.get('total', 0.0):3.0f} ms"
+            )
         )
         if not self._live:
-            if snapshot.stamp_ns - self._plain_ns >= _PLAIN_NS:
+            anew = snapshot.waits and snapshot.reason != self._waits_for
+            self._waits_for = snapshot.reason
+            if anew or snapshot.stamp_ns - self._plain_ns >= _PLAIN_NS:
                 self._plain_ns = snapshot.stamp_ns
                 print(
                     f"{snapshot.phase:<9} {snapshot.nodes_done}/{snapshot.nodes_planned} nodes  {detail}",

@@ -75,6 +75,9 @@ class HazardConfig(Section):
     record_lost: LossAction = Field(
         LossAction.HOME, description="what to do when the flight log cannot be written"
     )
+    aisle_open: LossAction = Field(
+        LossAction.LAND, description="what to do in flight when the interlock says that an aisle is open"
+    )
     expert: HazardExpert = HazardExpert()
 
     @property

@@ -61,6 +61,9 @@ class MissionExpert(Section):
         0.8, gt=0, le=10, description="the line followed not seen for so long: level and hold"
     )
     arm_timeout_s: float = Field(60.0, gt=0, le=3600, description="not armed for so long: give up")
+    start_expires_s: float = Field(
+        5.0, gt=0, le=5, description="a start command that has not armed so long after its count-down is void"
+    )
     adopt_s: float = Field(
         1.5, ge=0, le=1.5, description="a drone found flying is given so long to show that it obeys"
     )
@@ -141,6 +144,12 @@ class MissionConfig(Section):
     )
     resume: bool = Field(False, description="fly what that file holds, if anything, instead of the nodes")
     autostart: bool = Field(False, description="start without waiting for the start command")
+    start_countdown_s: float = Field(
+        3.0,
+        ge=0,
+        le=60,
+        description="from a start command to arming, told to everybody; pause takes the start back",
+    )
     recover_s: float = Field(
         2.0,
         ge=1.5,

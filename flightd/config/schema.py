@@ -15,6 +15,7 @@ from flightd.config.control import ControlConfig
 from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.ground import GroundConfig
 from flightd.config.hazards import HazardConfig
+from flightd.config.interlock import InterlockConfig
 from flightd.config.inventory import InventoryConfig
 from flightd.config.localisation import LocalisationConfig
 from flightd.config.metrics import MetricsConfig
@@ -45,6 +46,7 @@ class Config(Section):
     recorder: RecorderConfig = RecorderConfig()
     ground: GroundConfig = GroundConfig()
     metrics: MetricsConfig = MetricsConfig()
+    interlock: InterlockConfig = InterlockConfig()
     hazards: HazardConfig = HazardConfig()
     tracking: TrackingConfig = TrackingConfig()
     localisation: LocalisationConfig = LocalisationConfig()

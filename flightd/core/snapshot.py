@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from flightd.core.tick import TickInput, TickOutput
+from flightd.core.tick import StepFailure, TickInput, TickOutput
 from flightd.core.types import CommandKind, Phase, Status, VehicleState
+
+_WAITING = frozenset({Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.HOLD, Phase.RELOCATE})
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,8 +23,8 @@ class Snapshot:
     stages of each frame flown by, both since the last that was told.  The others count since the start:
     `dropped` what a full queue or a lost worker cost, `restarts` what died and was brought back, each by the
     part's name; `repeated_level` the setpoints that went out because no tick made one.  `possible` are the
-    operator's commands that the mission takes now.  `height_goal_m` is the commanded height above the
-    floor.
+    operator's commands that the mission takes now, `failure` what the step raised, if anything.
+    `height_goal_m` is the commanded height above the floor.
     """
 
     tick: TickInput
@@ -38,6 +41,7 @@ class Snapshot:
     restarts: Mapping[str, int] = field(default_factory=dict)
     repeated_level: int = 0
     possible: frozenset[CommandKind] = frozenset()
+    failure: StepFailure | None = None
     height_goal_m: float = 0.0
 
     @property
@@ -67,8 +71,18 @@ class Snapshot:
 
     @property
     def battery_frac(self) -> float:
-        """Charge, 0 to 1; 0 before the vehicle was heard."""
-        return self.tick.vehicle.battery_frac if self.tick.vehicle else 0.0
+        """Charge, 0 to 1; NaN before the vehicle told it."""
+        return self.tick.vehicle.battery_frac if self.tick.vehicle else math.nan
+
+    @property
+    def battery_text(self) -> str:
+        """The charge for people: a hyphen where it is not known."""
+        return "-" if math.isnan(self.battery_frac) else f"{self.battery_frac:.0%}"
+
+    @property
+    def waits(self) -> bool:
+        """It stands on the ground or holds, and the reason says what for."""
+        return self.phase in _WAITING
 
     @property
     def height_m(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from dataclasses import dataclass, field
 
 from flightd.core.scanning import CodeSet, Finding, Settled
@@ -22,13 +23,16 @@ from flightd.core.types import (
 
 TICK_S = 0.02
 """Period of the control tick."""
+_SHOWN_CHARS = 160
 
 
 @dataclass(frozen=True, slots=True)
 class TickInput:
     """What arrived since the last tick, oldest first.  `vehicle` is the newest state, None until there
     is one; `ground_silent_s` the time since an attending ground station was heard, 0 if none attends;
-    `counted` names locations that an earlier flight of the same count has booked."""
+    `counted` names locations that an earlier flight of the same count has booked.  `unfit` is what the check
+    of this computer before the flight found against it, "" for nothing; `aisle_closed` what the interlock of
+    the aisle says, where one is demanded."""
 
     now_ns: int
     lines: tuple[LineSet, ...] = ()
@@ -39,6 +43,8 @@ class TickInput:
     codes: tuple[CodeSet, ...] = ()
     counted: tuple[str, ...] = ()
     health: Health = HEALTHY
+    unfit: str = ""
+    aisle_closed: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,3 +66,19 @@ class TickOutput:
     events: tuple[Event, ...] = field(default=())
     findings: tuple[Finding, ...] = ()
     settled: tuple[Settled, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class StepFailure:
+    """What a tick raised: one line for people, and the whole traceback for the log."""
+
+    stamp_ns: int
+    error: str
+    traceback: str
+
+    @classmethod
+    def of(cls, now_ns: int, err: Exception, part: str = "") -> StepFailure:
+        """What `part` of the tick raised (empty: the pilot's step)."""
+        words = (part, type(err).__name__, str(err).replace("\n", " "))
+        line = ": ".join(word for word in words if word)
+        return cls(now_ns, line[:_SHOWN_CHARS], "".join(traceback.format_exception(err)))

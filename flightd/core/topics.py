@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from flightd.core.flight_order import FlightOrder
 from flightd.core.scanning import CodeSet, Finding
+from flightd.core.tick import StepFailure
 from flightd.core.types import (
     AttitudeSetpoint,
     Command,
@@ -25,7 +26,8 @@ class Topic(enum.StrEnum):
     `truth.mcap`.
 
     TICK and DECISION are all that the pilot was given and all that it answered (`core.tick.TickInput`,
-    `core.tick.TickOutput`), so that a flight can be replayed; the others are for people and their tools.
+    `core.tick.TickOutput`), so that a flight can be replayed; FAILURE is what a tick raised;
+    the others are for people and their tools.
     """
 
     LINES = "/lines"
@@ -40,6 +42,7 @@ class Topic(enum.StrEnum):
     FRAME = "/frame"
     TICK = "/tick"
     DECISION = "/decision"
+    FAILURE = "/failure"
     CONFIG = "/config"
     MAP = "/map"
     ORDER = "/order"
@@ -83,6 +86,7 @@ MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(
         Topic.EVENT: Event,
         Topic.COMMAND: Command,
         Topic.FRAME: RecordedFrame,
+        Topic.FAILURE: StepFailure,
         Topic.CONFIG: Document,
         Topic.MAP: Document,
         Topic.ORDER: FlightOrder,

@@ -219,6 +219,8 @@ class VehicleState:
     `battery_frac` is NaN while the vehicle does not know it, `battery_stamp_ns` the time at which it last
     told anything of its battery (0: it gives none), `battery_a` the current and `battery_cells` the cells in
     series (NaN and 0: not told).
+    `unfit` is why the adapter would not arm it, as far as can be asked while it stands; "" where nothing is
+    against it.
     """
 
     attitude: Attitude
@@ -238,6 +240,7 @@ class VehicleState:
     battery_stamp_ns: int = 0
     battery_a: float = math.nan
     battery_cells: int = 0
+    unfit: str = ""
 
 
 class Demand(enum.StrEnum):

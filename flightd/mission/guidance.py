@@ -61,7 +61,9 @@ class MissionInputs:
     `pad_m` is the centre of the goal's pad on the map, as seen or else as drawn; None where there is none.
     `by_pad` says that the pose is only that over the pad: enough to climb straight up.
     While the position is sought again, `rivals` are the nodes where the drone may be with their
-    probability, and `way_out` a move that is safe at all of them."""
+    probability, and `way_out` a move that is safe at all of them.  `failed`: a step before this one raised
+    an error.  `unfit` is what this computer's check before the flight found, `aisle_closed` what the
+    interlock says."""
 
     now_ns: int
     dt_s: float
@@ -80,6 +82,9 @@ class MissionInputs:
     way_out: tuple[float, float] | None = None
     warnings: Warnings = ALL_WELL
     judged_charge: Charge | None = None
+    failed: bool = False
+    unfit: str = ""
+    aisle_closed: bool = True
 
     @property
     def charge(self) -> Charge:

@@ -136,17 +136,24 @@ _SAFETY = {
     Trigger.GROUND_LOST: Phase.LAND,
     Trigger.BATTERY_UNKNOWN: Phase.LAND,
     Trigger.RECORD_LOST: Phase.LAND,
+    Trigger.AISLE_OPEN: Phase.LAND,
 }
 _UNDER_WAY = _SAFETY | {Trigger.TIMED_OUT: Phase.LAND}
 _SEEING = _UNDER_WAY | dict.fromkeys(triggers_of(Action.HOLD) | {Trigger.HOLD}, Phase.HOLD)
 _ON_LINES = _SEEING | dict.fromkeys(triggers_of(Action.RELOCATE), Phase.RELOCATE)
-_GIVEN_UP = {Trigger.STOP: Phase.ABORTED, Trigger.LAND_HERE: Phase.ABORTED}
+_GIVEN_UP = dict.fromkeys((Trigger.STOP, Trigger.LAND_HERE, Trigger.STEP_FAILED), Phase.ABORTED)
 
 _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.PREFLIGHT: _GIVEN_UP | {Trigger.FOUND_FLYING: Phase.RECOVER, Trigger.READY: Phase.ARMING},
     Phase.RECOVER: _SAFETY | {Trigger.UNATTENDED: Phase.LAND},
     Phase.ARMING: _GIVEN_UP
-    | {Trigger.GROUND_LOST: Phase.ABORTED, Trigger.TIMED_OUT: Phase.ABORTED, Trigger.ARMED: Phase.TAKE_OFF},
+    | {
+        Trigger.GROUND_LOST: Phase.ABORTED,
+        Trigger.AISLE_OPEN: Phase.ABORTED,
+        Trigger.TIMED_OUT: Phase.ABORTED,
+        Trigger.START_EXPIRED: Phase.PREFLIGHT,
+        Trigger.ARMED: Phase.TAKE_OFF,
+    },
     Phase.TAKE_OFF: _UNDER_WAY | {Trigger.AT_HEIGHT: Phase.ACQUIRE},
     Phase.ACQUIRE: _ON_LINES | {Trigger.ACQUIRED: Phase.TURN},
     Phase.FOLLOW: _ON_LINES | {Trigger.ARRIVED: Phase.HOVER},
@@ -162,11 +169,17 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
         Trigger.LINES_LOST_LONG: Phase.LAND,
         Trigger.LINES_FOUND: Phase.ACQUIRE,
     },
-    Phase.RELOCATE: _SEEING | {Trigger.POSITION_UNKNOWN: Phase.LAND, Trigger.POSITION_SURE: Phase.ACQUIRE},
+    Phase.RELOCATE: _SEEING
+    | {
+        Trigger.POSITION_UNKNOWN: Phase.LAND,
+        Trigger.CUT_OFF: Phase.LAND,
+        Trigger.POSITION_SURE: Phase.ACQUIRE,
+    },
     Phase.LAND: {
         Trigger.PILOT_TOOK: Phase.PILOT,
         Trigger.VANISHED: Phase.ABORTED,
         Trigger.STOP: Phase.LAND,
+        Trigger.TIMED_OUT: Phase.LAND,
     },
     Phase.SWAP: _GIVEN_UP | {Trigger.TIMED_OUT: Phase.ABORTED, Trigger.READY: Phase.ARMING},
     Phase.DONE: {},
@@ -204,6 +217,9 @@ _TURNS: Mapping[Trigger, tuple[Collection[Phase], Mapping[Intent, Intent]]] = {
 }
 """In which phases a trigger is taken without beginning another, and what it makes of the intent."""
 
+_WITHDRAWS = frozenset({Trigger.PAUSE, Trigger.START_EXPIRED})
+"""What takes a start back as long as it waits."""
+
 COMMANDS: Mapping[CommandKind, Trigger] = {
     CommandKind.START: Trigger.START,
     CommandKind.PAUSE: Trigger.PAUSE,
@@ -221,6 +237,8 @@ def _begins(state: State, trigger: Trigger) -> Outcome | None:
         phase, cause = _OVER_PAD[trigger, state.intent]
     elif state.phase is Phase.LAND and trigger is Trigger.DISARMED:
         phase, cause = Phase.ABORTED, Cause.KEPT
+    elif state.phase is Phase.LAND and trigger is Trigger.TIMED_OUT and state.stopped:
+        phase, cause = Phase.ABORTED, Cause.TRIGGER
     elif trigger not in _BEGINS[state.phase] or (trigger in _FOR_VISITS and state.intent is not Intent.VISIT):
         return STAYS
     else:
@@ -232,11 +250,11 @@ def _intent_of(state: State, phase: Phase, trigger: Trigger) -> Intent:
     """What a phase is for that a trigger begins."""
     if phase in _TERMINAL:
         return Intent.END
-    if phase is Phase.SWAP:
+    if phase in _WAITING:
         return Intent.WAIT
     if phase is Phase.RECOVER:
         return Intent.ADOPTED
-    if phase is Phase.LAND and trigger is Trigger.STOP:
+    if phase is Phase.LAND and (trigger is Trigger.STOP or state.phase is Phase.LAND):
         return Intent.ADOPTED_STOP if state.adopted else Intent.STOP
     if phase is Phase.LAND and trigger is not Trigger.ROUTE_DONE:
         return Intent.ADOPTED if state.adopted else Intent.END
@@ -244,6 +262,8 @@ def _intent_of(state: State, phase: Phase, trigger: Trigger) -> Intent:
 
 
 def _outcome(state: State, trigger: Trigger) -> Outcome | None:
+    if trigger in _WITHDRAWS and state.waiting and state.intent is Intent.VISIT:
+        return Outcome(State(state.phase, Intent.WAIT), False, Cause.KEPT)
     phases, intents = _TURNS.get(trigger, ((), {}))
     if state.phase in phases and state.intent in intents:
         cause = Cause.TRIGGER if trigger is Trigger.POSITION_CORRECTED else Cause.KEPT

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
-from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, Phase
+from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, LandedState, Phase
 from flightd.mission.battery.swap import BatterySwap
 from flightd.mission.event_log import EventLog
 from flightd.mission.flight.phase_progress import PhaseProgress
@@ -22,16 +22,17 @@ from flightd.mission.machine import (
     COMMANDS,
     TABLE,
     Cause,
+    Intent,
     State,
     next_state,
     possible_commands,
     taken_in,
 )
-from flightd.mission.orders import StandingOrders
+from flightd.mission.orders import StandingOrders, StartOrder
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
-from flightd.mission.reasons import Happened, Plain, Reason, Refused, in_words
-from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
+from flightd.mission.reasons import Happened, Paused, Plain, Reason, Refused, StartsIn, Unfit, in_words
+from flightd.mission.safety.hazard_monitor import DebounceTimer, FlightContext, HazardMonitor
 from flightd.mission.safety.hazard_table import ACTIONS, Action, triggers_of
 from flightd.mission.safety.readiness import not_fresh, not_ready
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
@@ -48,6 +49,8 @@ _DEMANDS = {
 }
 _NEAR_FLOOR = {Phase.TAKE_OFF, Phase.LAND}
 """Where lines come and go."""
+_UNFIT_S = 3.0
+"""Parameters are still being read for about so long."""
 _HALTED = (Phase.HOLD, Phase.RELOCATE)
 _INTERRUPTED = (*_HALTED, Phase.ACQUIRE)
 """Where a leg that was interrupted goes on from."""
@@ -79,6 +82,10 @@ class Mission:
         self._scanner = scanner
         self._events = EventLog()
         self._orders = StandingOrders()
+        self._start = StartOrder(config.mission)
+        self._obstacle: Reason | None = Plain.NO_TELEMETRY
+        self._unfit = DebounceTimer()
+        self._unfit_told: Reason | None = None
         self._route = Itinerary(site, plan, policy, self._events)
         self._scan = ShelfScan(site, scanner)
         self._progress = PhaseProgress(config, self._route, self._scan, scanner)
@@ -138,8 +145,9 @@ class Mission:
 
     @property
     def possible_commands(self) -> frozenset[CommandKind]:
-        """What an operator may order now."""
-        return possible_commands(self.state)
+        """What an operator may order now; no start before the flight is ready."""
+        possible = possible_commands(self.state)
+        return possible - {CommandKind.START} if self.state.waiting and self._obstacle else possible
 
     def drain_events(self) -> tuple[Event, ...]:
         return (*self._events.drain(), *self._scanner.drain_events())
@@ -151,19 +159,38 @@ class Mission:
         if trigger not in taken_in(self.state):
             self._refuse(command, now_ns)
             return
+        if self.state.waiting and kind in {CommandKind.START, CommandKind.PAUSE}:
+            self._take_start(trigger, now_ns)
+            return
         self._orders.take(kind)
         if kind is CommandKind.HOME:
             self._go_home(trigger, Happened(trigger), now_ns)
         elif kind is CommandKind.GOTO:
             self._route.go_to(now_ns, command.node)
-        elif kind is CommandKind.START:
-            self._turn(trigger)
+
+    def _take_start(self, trigger: Trigger, now_ns: int) -> None:
+        """Begin a start's count-down if nothing keeps the drone on the ground, or take it back."""
+        level, text = EventLevel.WARNING, "taken back"
+        if trigger is Trigger.PAUSE:
+            self._start.withdraw()
+        elif self.state.intent is not Intent.WAIT:
+            return
+        elif self._obstacle is not None:
+            self._events.report(now_ns, level, "command", f"start refused: {in_words(self._obstacle)}")
+            return
+        else:
+            self._start.give(now_ns)
+            text = in_words(StartsIn(self._start.left_s(now_ns)))
+        self._turn(trigger)
+        self._events.report(now_ns, level, "start", text)
 
     def step(self, inputs: MissionInputs) -> Guidance:
         """Advance by one tick."""
         doubts = self._relocator.step(inputs, self.phase, self._progress.phase_s(inputs.now_ns))
         if self._relocator.jumped:
             self._correct(inputs)
+        if Trigger.POSITION_SURE in doubts and not self._route.leads_on_from(inputs.pose):
+            doubts = {Trigger.CUT_OFF}
         triggers = self._triggers(inputs) | doubts | self._scan.doubts(self.phase)
         self._report_hazards(triggers, inputs.now_ns)
         _, trigger = next_state(self.state, triggers)
@@ -176,25 +203,50 @@ class Mission:
 
     def _triggers(self, s: MissionInputs) -> set[Trigger]:
         """What has happened by this tick.  Turning back acts at once."""
-        may_start = self.state.waiting and not self._grounded(s)
+        ready = self.state.waiting and self._grounded(s) is None
+        may_start = ready and not self._start.left_s(s.now_ns)
         found = self._progress.step(s, self.state, may_start=may_start)
         found |= self._orders.urgent
         found |= self._ground(s)
         if self._orders.paused:
             found.add(Trigger.HOLD)
         self._turn_back(self._charging.step(s, self.state))
-        if self._progress.timed_out(s.now_ns):
+        if self._progress.timed_out(s.now_ns) and not self._lands_unheard(s):
             found.add(Trigger.TIMED_OUT)
+        if s.failed:
+            found.add(Trigger.STEP_FAILED)
+        if self._start.is_void(s.now_ns) and Trigger.START_EXPIRED in taken_in(self.state):
+            found.add(Trigger.START_EXPIRED)
+            self._void_start(s.now_ns)
+        if Trigger.FOUND_FLYING in found:  # an order to land or stop stands until it may be obeyed
+            found -= self._orders.urgent
         found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))
-        if Trigger.RECORD_LOST in found:
-            found.remove(Trigger.RECORD_LOST)
-            found |= self._lost(self._config.hazards.record_lost, Trigger.RECORD_LOST, s.now_ns)
-        if Trigger.BATTERY_UNKNOWN in found:
-            found.remove(Trigger.BATTERY_UNKNOWN)
-            found |= self._lost(self._config.hazards.battery_unknown, Trigger.BATTERY_UNKNOWN, s.now_ns)
+        hazards = self._config.hazards
+        for lost, action in (
+            (Trigger.RECORD_LOST, hazards.record_lost),
+            (Trigger.BATTERY_UNKNOWN, hazards.battery_unknown),
+            (Trigger.AISLE_OPEN, hazards.aisle_open),
+        ):
+            if lost in found:
+                found.remove(lost)
+                found |= self._lost(action, lost, s.now_ns)
+        if self.phase is Phase.ARMING and not s.aisle_closed:
+            found.add(Trigger.AISLE_OPEN)
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found
+
+    def _void_start(self, now_ns: int) -> None:
+        """A start that came to nothing is not kept for later."""
+        self._start.withdraw()
+        if self.state.waiting:
+            why = "" if self._obstacle is None else f": {in_words(self._obstacle)}"
+            self._events.report(now_ns, EventLevel.WARNING, "start", f"{Trigger.START_EXPIRED.value}{why}")
+            self._turn(Trigger.START_EXPIRED)
+
+    def _lands_unheard(self, s: MissionInputs) -> bool:
+        """A landing of a vehicle that is not heard ends when it is given up as vanished."""
+        return self.phase is Phase.LAND and s.telemetry_age_s > self._config.mission.telemetry_land_s
 
     def _landed(self) -> set[Trigger]:
         """What a landing on the pad is more than its end."""
@@ -303,6 +355,8 @@ class Mission:
             self._go_on(s)
         self._anchor(s, trigger)
         self._explain(s, trigger, outcome.cause, was_on_pad=before.on_pad)
+        if trigger is Trigger.TIMED_OUT and before.phase is Phase.LAND:
+            self._report_endless_landing(s)
         level = EventLevel.WARNING if _alarming(before, self.state, trigger) else EventLevel.INFO
         text = f"{before.phase.value} -> {self.phase.value}: {self.reason}"
         self._events.report(s.now_ns, level, "phase", text)
@@ -321,7 +375,8 @@ class Mission:
 
     def _explain(self, s: MissionInputs, trigger: Trigger, cause: Cause, *, was_on_pad: bool) -> None:
         """Set the reason for the phase that begins; of an end on the pad, why it turned home."""
-        refusal = s.vehicle.refusal if s.vehicle is not None and trigger is Trigger.TIMED_OUT else ""
+        refused = s.vehicle is not None and trigger in {Trigger.TIMED_OUT, Trigger.START_EXPIRED}
+        refusal = s.vehicle.refusal if s.vehicle is not None and refused else ""
         if trigger is Trigger.NOT_COUNTED and (blind := self._scanner.blind) is not None:
             self._cause = blind
             self._events.report(s.now_ns, EventLevel.ERROR, "not_counted", in_words(blind))
@@ -334,17 +389,26 @@ class Mission:
             self._cause = self._route.why_home or self._cause
         self._reason = self._cause
 
+    def _report_endless_landing(self, s: MissionInputs) -> None:
+        """Say what becomes of a landing that does not come to its end."""
+        if self.state.over:
+            text = "not disarmed after all: see that the drone stands, and disarm it by hand"
+        else:
+            text = f"not down after {self._progress.phase_s(s.now_ns):.0f} s: the autopilot lands by itself"
+        self._events.report(s.now_ns, EventLevel.ERROR, "landing", text)
+
     def _enter(self, s: MissionInputs, trigger: Trigger) -> None:
         """What the phase that begins starts with."""
         match self.phase:
             case Phase.TAKE_OFF:
+                self._start.withdraw()
                 self._steering.take_off(s.height_m)
             case Phase.ACQUIRE if trigger is Trigger.POSITION_SURE:
                 self._rejoin(s)
             case Phase.RELOCATE:
                 self._relocate(s)
             case Phase.LAND:
-                self._steering.land()
+                self._steering.land(by_itself=trigger is Trigger.TIMED_OUT)
             case Phase.SWAP:
                 self._steering.anchor = (self.goal.x_m, self.goal.y_m)
                 self._charging.await_battery(s.now_ns)
@@ -393,16 +457,30 @@ class Mission:
 
     def _guide(self, s: MissionInputs) -> Guidance:
         if self.state.waiting:
-            self._reason = self._grounded(s) or Plain.AWAITS_START
+            self._obstacle = self._grounded(s)
+            self._report_unfit(s.now_ns, self._obstacle)
+            left_s = self._start.left_s(s.now_ns)
+            self._reason = self._obstacle or (StartsIn(left_s) if left_s else Plain.AWAITS_START)
         if not self.airborne:
-            return self._steering.on_ground(self.phase, _DEMANDS.get(self.phase, Demand.FLY))
+            demand = _DEMANDS.get(self.phase, Demand.FLY)
+            return self._steering.on_ground(s, self.phase, _in_air(demand) if _flies(s) else demand)
         guidance = self._steering.step(s, self._task(s.now_ns))
+        if self.phase in _HALTED and self._cause is not None:
+            held = self._orders.paused and self._cause != Happened(Trigger.HOLD)
+            self._reason = Paused(self._cause) if held else self._cause
         if self.phase is Phase.LAND:
             refusal = s.vehicle.refusal if s.vehicle is not None else ""
             self._reason = self._cause
             if refusal and self._cause is not None and guidance.demand is Demand.DISARM:
                 self._reason = Refused(self._cause, refusal)
         return guidance
+
+    def _report_unfit(self, now_ns: int, obstacle: Reason | None) -> None:
+        """Say once what was found against a flight, as soon as it is no passing matter."""
+        unfit_s = self._unfit.step(isinstance(obstacle, Unfit), now_ns)
+        if isinstance(obstacle, Unfit) and unfit_s > _UNFIT_S and obstacle != self._unfit_told:
+            self._unfit_told = obstacle
+            self._events.report(now_ns, EventLevel.WARNING, "unfit", obstacle.found)
 
     def _leads_along_x(self) -> bool:
         """The way to the goal is along its aisle, not from one aisle to another."""
@@ -416,10 +494,22 @@ class Mission:
         return ReferenceTask(self.state, self._progress.phase_s(now_ns), self.goal, view, cruise)
 
 
+def _flies(s: MissionInputs) -> bool:
+    """The vehicle says that it is in the air, whatever the mission is at."""
+    return s.vehicle is not None and s.vehicle.armed and s.vehicle.landed is LandedState.IN_AIR
+
+
+def _in_air(demand: Demand) -> Demand:
+    """Nothing disarms in the air."""
+    return Demand.LAND if demand is Demand.DISARM else demand
+
+
 def _alarming(before: State, after: State, trigger: Trigger) -> bool:
     """Whether a change of phase is none of those that were planned."""
     if after.phase is Phase.LAND:
         return not after.on_pad
+    if trigger is Trigger.START_EXPIRED:
+        return True
     if after.phase in {Phase.ABORTED, Phase.PILOT}:  # a landing has been reported already
         return before.phase is not Phase.LAND or (before.stopped and trigger is not Trigger.DISARMED)
     return after.phase in _HALTED

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+from flightd.config.mission import MissionConfig
 from flightd.core.types import CommandKind
 from flightd.mission.triggers import Trigger
 
@@ -31,3 +34,36 @@ class StandingOrders:
     def urgent(self) -> set[Trigger]:
         """The landing or stop that stands."""
         return set() if self._urgent is None else {self._urgent}
+
+
+class StartOrder:
+    """A start command: counted down, and void a while after, so that it never arms by surprise."""
+
+    def __init__(self, params: MissionConfig) -> None:
+        self._countdown_s = params.start_countdown_s
+        self._expires_s = params.expert.start_expires_s
+        self._given_ns: int | None = None
+
+    def give(self, now_ns: int) -> None:
+        """The command comes; again, it changes nothing."""
+        self._given_ns = self._given_ns or now_ns
+
+    def withdraw(self) -> None:
+        """It stands no longer."""
+        self._given_ns = None
+
+    @property
+    def given(self) -> bool:
+        """A command stands; without one a mission starts by itself, if at all."""
+        return self._given_ns is not None
+
+    def left_s(self, now_ns: int) -> int:
+        """Whole seconds of the count-down that are left; 0 when it is over, and without a command."""
+        return 0 if self._given_ns is None else max(math.ceil(self._countdown_s - self._age_s(now_ns)), 0)
+
+    def is_void(self, now_ns: int) -> bool:
+        """It has not armed in time."""
+        return self.given and self._age_s(now_ns) > self._countdown_s + self._expires_s
+
+    def _age_s(self, now_ns: int) -> float:
+        return (now_ns - (self._given_ns or now_ns)) * 1e-9

@@ -20,6 +20,7 @@ class Plain(enum.Enum):
     ARMED_ALREADY = "the vehicle is armed already: disarm it first"
     NO_HEIGHT = "no height from the vehicle's range finder"
     NO_PICTURE = "no picture from the down camera"
+    AISLE_OPEN = "the aisle is not closed"
     GROUND_SILENT = "the ground station that attends this flight fell silent"
 
 
@@ -36,6 +37,13 @@ class Refused:
 
     why: Reason
     refusal: str
+
+
+@dataclass(frozen=True, slots=True)
+class Paused:
+    """As `why`, and an operator wants it to wait, too."""
+
+    why: Reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +75,20 @@ class ClockUnsure:
 
     error_s: float
     limit_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Unfit:
+    """What the check before the flight found, in the words of who found it."""
+
+    found: str
+
+
+@dataclass(frozen=True, slots=True)
+class StartsIn:
+    """The count-down of a start command."""
+
+    seconds: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +134,18 @@ class NothingRead:
 
 
 _OfBattery: TypeAlias = StartChargeLow | ChargeUnknown | CellsLow | AwaitsBattery | ChargeLow | ChargeShort
-Reason: TypeAlias = Plain | Happened | Refused | _OfBattery | ClockUnsure | LatePictures | NothingRead
+Reason: TypeAlias = (
+    Plain
+    | Happened
+    | Refused
+    | Paused
+    | StartsIn
+    | Unfit
+    | _OfBattery
+    | ClockUnsure
+    | LatePictures
+    | NothingRead
+)
 
 
 def in_words(reason: Reason) -> str:
@@ -129,6 +162,12 @@ def in_words(reason: Reason) -> str:
         case ClockUnsure(error_s, limit_s):
             known = f"known to {error_s * 1e3:.0f} ms only"
             text = f"the vehicle's clock is {known}, {limit_s * 1e3:.0f} ms are needed"
+        case Paused(why):
+            text = f"{in_words(why)}; paused besides, until resume"
+        case Unfit(found):
+            text = f"not fit to fly: {found}"
+        case StartsIn(seconds):
+            text = f"arms in {seconds} s; pause takes the start back"
         case LatePictures(limit_s):
             text = f"pictures are more than {limit_s * 1e3:.0f} ms old when they have been looked at"
         case NothingRead(blind, scans):

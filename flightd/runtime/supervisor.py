@@ -1,11 +1,15 @@
-"""What is not critical restarts; this is the one place that decides so."""
+"""What is not critical restarts, and what fails in a tick ends no flight; this is the one place that decides
+so."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from typing import TypeVar
 
 from flightd.core.errors import TransientError
+
+_T = TypeVar("_T")
 
 _FIRST_WAIT_S = 0.1
 _LONGEST_WAIT_S = 5.0
@@ -26,3 +30,23 @@ async def restarted(part: Callable[[], Awaitable[None]], failed: Callable[[Trans
             wait_s = _FIRST_WAIT_S
         await asyncio.sleep(wait_s)
         wait_s = min(2 * wait_s, _LONGEST_WAIT_S)
+
+
+class FaultBarrier:
+    """Between the control tick and what it calls: an error there costs that part its turn, never the flight.
+    `failed` is told the part and its error, once for each kind of error."""
+
+    def __init__(self, failed: Callable[[str, Exception], None]) -> None:
+        self._failed = failed
+        self._told: set[tuple[str, type[Exception]]] = set()
+
+    def call(self, part: str, act: Callable[[], _T], otherwise: _T) -> _T:
+        """What `act` returns, or `otherwise` where it raises."""
+        try:
+            return act()
+        except Exception as err:  # noqa: BLE001 - a flight goes on whatever else fails
+            kind = part, type(err)
+            if kind not in self._told:
+                self._told.add(kind)  # before it is told: that may fail, too
+                self._failed(part, err)
+            return otherwise

@@ -41,7 +41,7 @@ class AisleGrid:
     shelves: Sequence[str]
     shelf_distance_m: float
     shelf_height_m: float
-    ceiling_m: float
+    ceiling_m: float | None
     racks: RackRow | None = None
 
     def toml(self) -> str:
@@ -58,10 +58,11 @@ class AisleGrid:
         )
 
     def _head(self) -> str:
-        return (
+        head = (
             f"[site]\nname = {json.dumps(self.name)}\nline_width_m = {self.line_width_m}\n"
-            f"line_colour = {json.dumps(self.line_colour)}\nceiling_m = {self.ceiling_m}"
+            f"line_colour = {json.dumps(self.line_colour)}"
         )
+        return head if self.ceiling_m is None else f"{head}\nceiling_m = {self.ceiling_m}"
 
     def _aisle(self, number: int, letter: str) -> str:
         steps = [repr(self.spacing_m[i % len(self.spacing_m)]) for i in range(self.nodes - 1)]

@@ -1,4 +1,4 @@
-"""The free way around the painted lines: how far outside a point is, and the way back."""
+"""The free way around the painted lines, less the keep-outs: how far outside a point is, and the way back."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.site.site import Site
+from flightd.site.ways import KEEP_OUT_CLEARANCE_M, KeepOut
 
 _BACK_MPS = 0.3
 """Who comes back faster than this may brake."""
+NEAR_KEEP_OUT_M = KEEP_OUT_CLEARANCE_M / 2
+"""Nearer to a keep-out than this the free way is left: half of what every open line keeps from it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,11 +26,18 @@ class Nearest:
 
 
 class Corridor:
-    """All points within `half_width_m` of an edge of the grid."""
+    """All points off the keep-outs within `half_width_m` of an edge of the grid that none of them closes."""
 
     def __init__(self, site: Site, half_width_m: float) -> None:
         self.half_width_m = half_width_m
+        self._keep_outs = site.keep_outs
         ends = [(site.nodes[edge.a], site.nodes[edge.b]) for edge in site.edges]
+        open_ends = [
+            (a, b)
+            for a, b in ends
+            if not any(area.touches(a.x_m, a.y_m, b.x_m, b.y_m) for area in site.keep_outs)
+        ]
+        ends = open_ends or ends
         self._a = np.array([(a.x_m, a.y_m) for a, _ in ends]).reshape(-1, 2)
         self._along = np.array([(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in ends]).reshape(-1, 2)
         self._square = np.maximum(np.einsum("ij,ij->i", self._along, self._along), 1e-12)
@@ -43,10 +53,35 @@ class Corridor:
         best = int(np.argmin(distances))
         return Nearest(float(points[best, 0]), float(points[best, 1]), float(distances[best]))
 
+    def nearest_keep_out(self, x_m: float, y_m: float) -> Nearest:
+        """The nearest point of a keep-out's edge; the distance is negative within it, and infinite on a site
+        that has none."""
+        found = (_nearest_of(area, x_m, y_m) for area in self._keep_outs)
+        return min(found, key=lambda near: near.distance_m, default=Nearest(x_m, y_m, math.inf))
+
+    def outside_m(self, x_m: float, y_m: float) -> float:
+        """How far outside the free way a point is; 0 within it."""
+        beside_m = self.nearest(x_m, y_m).distance_m - self.half_width_m
+        return max(beside_m, NEAR_KEEP_OUT_M - self.nearest_keep_out(x_m, y_m).distance_m, 0.0)
+
     def back(self, x_m: float, y_m: float, vx_mps: float, vy_mps: float) -> tuple[float, float] | None:
-        """Outside: the unit vector (map axes) back to the line, unless the drone comes back already."""
-        near = self.nearest(x_m, y_m)
-        if not self.half_width_m < near.distance_m < math.inf:
+        """Near a keep-out: the unit vector (map axes) away from it; outside: the one back to the line.  None
+        elsewhere, and when the drone comes back already."""
+        area, near = self.nearest_keep_out(x_m, y_m), self.nearest(x_m, y_m)
+        if area.distance_m < KEEP_OUT_CLEARANCE_M and abs(area.distance_m) > 1e-6:
+            bx, by = (x_m - area.x_m) / area.distance_m, (y_m - area.y_m) / area.distance_m
+        elif self.half_width_m < near.distance_m < math.inf:
+            bx, by = (near.x_m - x_m) / near.distance_m, (near.y_m - y_m) / near.distance_m
+        else:
             return None
-        bx, by = (near.x_m - x_m) / near.distance_m, (near.y_m - y_m) / near.distance_m
         return None if vx_mps * bx + vy_mps * by > _BACK_MPS else (bx, by)
+
+
+def _nearest_of(area: KeepOut, x_m: float, y_m: float) -> Nearest:
+    at_x, at_y = min(max(x_m, area.x0_m), area.x1_m), min(max(y_m, area.y0_m), area.y1_m)
+    away_m = math.hypot(x_m - at_x, y_m - at_y)
+    if away_m > 0.0:
+        return Nearest(at_x, at_y, away_m)
+    edges = ((area.x0_m, y_m), (area.x1_m, y_m), (x_m, area.y0_m), (x_m, area.y1_m))
+    at_x, at_y = min(edges, key=lambda edge: math.dist(edge, (x_m, y_m)))
+    return Nearest(at_x, at_y, -math.dist((at_x, at_y), (x_m, y_m)))

@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterable, Sequence
 from flightd.site.closures import mistakes
 from flightd.site.racks import RackError, place_locations
 from flightd.site.site import (
+    UNTOLD_CEILING_M,
     Aisle,
     Edge,
     LineColour,
@@ -51,7 +52,8 @@ def lay_out(
     *,
     line_width_m: float = 0.075,
     line_colour: LineColour = LineColour.YELLOW,
-    ceiling_m: float = 6.0,
+    ceiling_m: float | None = None,
+    interlock: bool = False,
     racks: Sequence[Rack] = (),
     one_way_crosses: Collection[tuple[str, str]] = (),
     blocked: Sequence[tuple[str, str]] = (),
@@ -61,7 +63,8 @@ def lay_out(
     """Make the site, or raise LayoutError naming the part that does not fit.
 
     `crosses` are pairs of node ids at equal x in neighbouring aisles, in any order; those that are also
-    `one_way_crosses` are flown from the first to the second only."""
+    `one_way_crosses` are flown from the first to the second only.  Without a `ceiling_m` nothing may be flown
+    above 2 m."""
     _check_aisles(aisles, line_width_m, ceiling_m)
     nodes = {node.id: node for aisle in aisles for node in _nodes(aisle)}
     cross_edges = _crosses(tuple(crosses), aisles, nodes, one_way_crosses)
@@ -85,7 +88,9 @@ def lay_out(
         shelves=shelves,
         line_width_m=line_width_m,
         line_colour=line_colour,
-        ceiling_m=ceiling_m,
+        ceiling_m=UNTOLD_CEILING_M if ceiling_m is None else ceiling_m,
+        ceiling_told=ceiling_m is not None,
+        interlock=interlock,
         racks=tuple(racks),
         locations=locations,
         blocked=tuple(blocked),
@@ -113,7 +118,7 @@ def _nodes(aisle: Aisle) -> list[Node]:
     return nodes
 
 
-def _check_aisles(aisles: Sequence[Aisle], width_m: float, ceiling_m: float) -> None:
+def _check_aisles(aisles: Sequence[Aisle], width_m: float, ceiling_m: float | None) -> None:
     if not aisles:
         raise LayoutError("aisle", "there is none; a site needs at least one [[aisle]]")
     seen: set[str] = set()
@@ -138,7 +143,7 @@ def _check_aisles(aisles: Sequence[Aisle], width_m: float, ceiling_m: float) -> 
                 f"{aisle.shelf_distance_m} m: the cross lines reach {aisle.cross_half_m} m, into the shelf"
             )
             raise LayoutError(f"{key}.shelf_distance_m", problem)
-        if aisle.shelves and aisle.shelf_height_m > ceiling_m:
+        if aisle.shelves and ceiling_m is not None and aisle.shelf_height_m > ceiling_m:
             problem = f"{aisle.shelf_height_m} m is above the ceiling ({ceiling_m} m)"
             raise LayoutError(f"{key}.shelf_height_m", problem)
     for i, a in enumerate(aisles):

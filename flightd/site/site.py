@@ -17,6 +17,8 @@ from flightd.core.errors import InputError
 from flightd.core.markers import MarkerDictionary, MarkerSet
 from flightd.site.ways import KEEP_OUT_CLEARANCE_M, KeepOut, NoWayError, OneWay, Ways
 
+UNTOLD_CEILING_M = 2.5
+"""The ceiling of a site whose file gives none: half a metre below it, at 2 m, nobody needs to measure one."""
 PAD_REACH_M = 0.5
 """A pad further than this from its place on the map is not taken for it."""
 
@@ -196,6 +198,10 @@ class Site:
     blocked: tuple[tuple[str, str], ...] = ()
     keep_outs: tuple[KeepOut, ...] = ()
     markers: tuple[Marker, ...] = ()
+    interlock: bool = False
+    """Whether nothing may arm here unless an interlock says that the aisles are closed to people."""
+    ceiling_told: bool = True
+    """Whether the site file gives the ceiling; otherwise it is UNTOLD_CEILING_M."""
 
     @cached_property
     def _ways(self) -> Ways:

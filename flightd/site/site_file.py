@@ -90,7 +90,8 @@ class _SiteTable(Section):
     name: str = Field(min_length=1, max_length=80)
     line_width_m: float = Field(0.075, ge=0.05, le=0.10)
     line_colour: LineColour = LineColour.YELLOW
-    ceiling_m: _Metres = 6.0
+    ceiling_m: float | None = Field(None, gt=0, le=1000, allow_inf_nan=False)
+    interlock: bool = False
 
 
 class _AisleTable(Section):
@@ -206,6 +207,7 @@ def parse_site(text: str, source: str) -> Site:
             line_width_m=file.site.line_width_m,
             line_colour=file.site.line_colour,
             ceiling_m=file.site.ceiling_m,
+            interlock=file.site.interlock,
             racks=[_rack(rack, file.aisle) for rack in file.rack],
             one_way_crosses=[cross.nodes for cross in file.cross if cross.one_way],
             blocked=[blocked.nodes for blocked in file.blocked],
@@ -238,8 +240,11 @@ def site_toml(site: Site) -> str:
         f"name = {_quoted(site.name)}",
         f"line_width_m = {site.line_width_m!r}",
         f"line_colour = {_quoted(site.line_colour)}",
-        f"ceiling_m = {site.ceiling_m!r}",
     ]
+    if site.ceiling_told:
+        parts.append(f"ceiling_m = {site.ceiling_m!r}")
+    if site.interlock:
+        parts.append("interlock = true")
     for aisle in site.aisles:
         parts += ["", "[[aisle]]", f"id = {_quoted(aisle.id)}"]
         parts += [f"x_m = {aisle.x_m!r}", f"y_m = {aisle.y_m!r}"]

@@ -46,6 +46,7 @@ from tests.sim.ideal_ports import (
     HeldSetpoint,
     IdealCount,
     IdealGround,
+    IdealInterlock,
     IdealRecorder,
     IdealVehicle,
     IdealVision,
@@ -79,6 +80,8 @@ class Faults:
     battery: float | None = None
     stamps_refused: int = 0
     clock_error_s: float = 0.0
+    untold: bool = False
+    endless: bool = False
     health: Health = HEALTHY
 
 
@@ -147,10 +150,12 @@ class IdealFlight:
         self._range = (0.1, self._now_ns)
         self._last_seen: LineSet | None = None
         self.ground_silent_s = 0.0
+        self.aisle_closed = True
         self.commands: list[Command] = []
         """Orders that the next tick takes."""
         self._battery_swapper = BatterySwapper(site, self.airframe, swap_s) if swap_s else None
         self.counted: tuple[str, ...] = ()
+        self.on_record: Callable[[str, int, object], None] = lambda _topic, _stamp_ns, _message: None
         self.on_tick: Callable[[Phase, int], None] = lambda _phase, _now_ns: None
 
     def now_ns(self) -> int:
@@ -159,7 +164,7 @@ class IdealFlight:
 
     def _composed(self, vehicle: IdealVehicle, vision: IdealVision, setpoints: HeldSetpoint) -> Flight:
         """The daemon's own tick flies it, with these behind its ports."""
-        recorder = IdealRecorder(lambda: self.faults.health)
+        recorder = IdealRecorder(lambda: self.faults.health, self.on_record)
         ground = IdealGround(self._take_commands, lambda: self.ground_silent_s)
         return Flight(
             clock=self,
@@ -175,6 +180,7 @@ class IdealFlight:
             progress=NO_PROGRESS,
             publishers=TelemetryPublishers(self, vehicle, recorder, ground, observers=self._observers),
             share_pose=keep_pose,
+            interlock=IdealInterlock(lambda: self.aisle_closed),
         )
 
     def fly(self, limit_s: float = 600.0) -> Flown:
@@ -247,7 +253,7 @@ class IdealFlight:
             self._armed = True
             self._yaw_target = self.airframe.yaw_rad
             self._climb.reset(self.airframe.height_m)
-        elif demand is Demand.DISARM:
+        elif demand is Demand.DISARM and not self.faults.endless:
             self._armed = False
 
     def _step(self, setpoint: AttitudeSetpoint | None) -> None:
@@ -316,7 +322,7 @@ class IdealFlight:
             mode="GUIDED_NOGPS",
             in_control=self._armed and self.in_control,
             armed=self._armed,
-            landed=LandedState.ON_GROUND if on_floor else LandedState.IN_AIR,
+            landed=LandedState.ON_GROUND if on_floor and not faults.untold else LandedState.IN_AIR,
             battery_frac=battery,
             battery_v=12.0,
             heartbeat_ns=self._beat_ns,

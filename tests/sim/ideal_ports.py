@@ -107,10 +107,14 @@ class IdealVision:
 
 
 class IdealRecorder(NoRecorder):
-    """Keeps nothing; its health is `health`'s."""
+    """Hands what it is given to `keep`; its health is `health`'s."""
 
-    def __init__(self, health: Callable[[], Health]) -> None:
+    def __init__(self, health: Callable[[], Health], keep: Callable[[str, int, object], None]) -> None:
         self._health = health
+        self._keep = keep
+
+    def record(self, topic: str, stamp_ns: int, message: object) -> None:
+        self._keep(topic, stamp_ns, message)
 
     @property
     def restarts(self) -> int:  # type: ignore[override]
@@ -147,3 +151,17 @@ class IdealCount(NoCounting):
 
     def take_counted(self) -> tuple[str, ...]:
         return self._counted()
+
+
+class IdealInterlock:
+    """`ports.Interlock` that says what `closed` says."""
+
+    def __init__(self, closed: Callable[[], bool]) -> None:
+        self._closed = closed
+
+    @property
+    def is_closed(self) -> bool:
+        return self._closed()
+
+    async def run(self) -> None:
+        """There is no file."""

@@ -70,6 +70,10 @@ def pilot(flight: IdealFlight) -> None:
     flight.in_control = False
 
 
+def open_aisle(flight: IdealFlight) -> None:
+    flight.aisle_closed = False
+
+
 def silence(flight: IdealFlight) -> None:
     flight.ground_silent_s = 60.0
 
@@ -90,6 +94,7 @@ TRIALS: dict[str, Trial] = {
     "ceiling_left": Trial(fault(height_m=4.2), found_s=0.6),
     "corridor_left": Trial(blow(0.0, 5.4), blow(0.0, 0.0), 1.0, found_s=2.5, ends=Phase.DONE),
     "ground_lost": Trial(silence, found_s=0.05, ends=Phase.DONE),
+    "aisle_open": Trial(open_aisle, found_s=0.05),
     "lines_lost": Trial(fault(bare=True)),
     "camera_frozen": Trial(fault(frozen=True)),
     "camera_blind": Trial(fault(blank=True)),

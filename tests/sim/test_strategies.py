@@ -184,7 +184,8 @@ def test_after_a_swap_the_start_command_is_waited_for_unless_it_starts_by_itself
     flight = IdealFlight(DEMO, config(battery=SWAPS, autostart=False), visits=ROW, airframe=SMALL, swap_s=5.0)
     flight.airframe.battery_frac = 0.5
     swapped = lambda o: o.phase is Phase.SWAP and o.reason == "waiting for the start command"  # noqa: E731
-    when(flight, (lambda o: True, CommandKind.START, ""), (swapped, CommandKind.START, ""))
+    ready = lambda o: o.reason == "waiting for the start command"  # noqa: E731
+    when(flight, (ready, CommandKind.START, ""), (swapped, CommandKind.START, ""))
     flown = flight.fly(600)
     assert (flown.phase, flown.visited) == (Phase.DONE, [*ROW])
     assert phases(flown).count(Phase.TAKE_OFF) == 2

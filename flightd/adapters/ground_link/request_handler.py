@@ -51,6 +51,7 @@ _TAKEN_OVER_NS = 3_000_000_000
 """Who attends but was silent for so long has been taken over from, once somebody else attends."""
 
 _URGENT = frozenset({CommandKind.LAND, CommandKind.STOP})
+_WAITING = frozenset({Phase.PREFLIGHT, Phase.SWAP})
 """Never held back for being too many."""
 
 
@@ -219,9 +220,15 @@ class RequestHandler:
                 Code.NODE,
                 f"no node {node!r} on site {self._floor.name}",
             ),
-            (kind not in self.possible, Code.PHASE, f"cannot {kind} in phase {phase}"),
+            (kind not in self.possible, Code.PHASE, self._impossible(kind, phase)),
         )
         return next(((code, text) for applies, code, text in checks if applies), (None, ""))
+
+    def _impossible(self, kind: CommandKind, phase: Phase) -> str:
+        """Why the mission does not take an order now."""
+        if kind is CommandKind.START and phase in _WAITING and self.status is not None:
+            return f"cannot {kind}: {self.status.reason}"
+        return f"cannot {kind} in phase {phase}"
 
     def _has_time(self, peer: Peer, kind: CommandKind, now_ns: int) -> bool:
         """Hold back who orders too much; what is urgent always gets through."""

@@ -104,7 +104,9 @@ async def _lockstep(simulation: Simulation, hold: Hold, ended_by: list[signal.Si
             observers=[simulation.observer],
             peers=peers_at(ports, config),
             hold=hold,
+            interlock=faults.interlock,
         )
+        faults.mission = flight.pilot.mission
         return await _beside(simulation, flight, ended_by, world.run(), faults.run())
 
 
@@ -155,7 +157,9 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
             observers=[simulation.observer],
             peers=peers,
             opener=open_paced_datagrams,
+            interlock=faults.interlock,
         )
+        faults.mission = flight.pilot.mission
         return await _beside(
             simulation, flight, ended_by, watch_world(process, channel, faults.tell), faults.run()
         )

@@ -1,4 +1,4 @@
-"""Faults that are done to the daemon from outside: to its processes, and over its ground link."""
+"""Faults that are done to the daemon: to its processes, over its ground link, to its own code."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.app.detection.detector_pool import DetectorPool
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError
+from flightd.mission.guidance import Guidance, MissionInputs
+from flightd.mission.mission import Mission
 from flightd.sim.scenario.fault_schema import (
+    AisleOpened,
     CpuTaken,
     DetectorKilled,
     Fault,
@@ -25,6 +28,7 @@ from flightd.sim.scenario.fault_schema import (
     LoopStalled,
     OfCamera,
     ProcessFault,
+    StepFails,
 )
 from flightd.sim.scenario.faults import place_of
 from flightd.site.site import Site
@@ -72,6 +76,9 @@ class LauncherFaults:
         self._turns: asyncio.Queue[tuple[Fault, bool]] = asyncio.Queue()
         self._attending = any(isinstance(fault, GroundSilent) for fault in faults)
         self._taken = 0.0
+        self.interlock = SimulatedInterlock()
+        self.mission: Mission | None = None
+        """Of the flight, once that is built."""
 
     def tell(self, index: int, begins: bool) -> None:
         self._turns.put_nowait((self._faults[index], begins))
@@ -98,6 +105,10 @@ class LauncherFaults:
                 self._fill_disk(on)
             case LoopStalled() if on:
                 _stand_still(fault.stall_s)
+            case AisleOpened():
+                self.interlock.is_closed = not on
+            case StepFails() if self.mission is not None:
+                _break(self.mission, on)
             case CpuTaken():
                 self._taken = fault.share if on else 0.0
             case GroundSilent():
@@ -145,6 +156,31 @@ def _stand_still(stall_s: float) -> None:
     until_s = loop.time() + stall_s
     while loop.time() < until_s:
         time.sleep(_LOOK_S)
+
+
+class SimulatedInterlock:
+    """`ports.Interlock` of the simulated hall: closed until a fault opens an aisle."""
+
+    is_closed = True
+
+    async def run(self) -> None:
+        await asyncio.get_running_loop().create_future()
+
+
+class SimulatedFaultError(Exception):
+    """An error as any part of the flight software might raise it."""
+
+
+def _break(mission: Mission, broken: bool) -> None:
+    """The mission's step raises from now on; or does its work again."""
+
+    def fail(_: MissionInputs) -> Guidance:
+        raise SimulatedFaultError("the scenario wants it")
+
+    if broken:
+        mission.__dict__["step"] = fail
+    else:
+        mission.__dict__.pop("step", None)
 
 
 def _signal(pids: Sequence[int], what: signal.Signals) -> None:

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import GroundClient
 
 _ORDERS: Final = {
-    "start": "Start the mission that waits in preflight.",
-    "pause": "Hold the position until `resume`.",
+    "start": "Start the mission that waits in preflight, after a count-down; refused unless it is ready.",
+    "pause": "Hold the position until `resume`; before a flight, take a start back that counts down.",
     "resume": "Go on after `pause`.",
     "home": "Fly home along the lines and land on the pad.",
     "land": "Land here and now.",

@@ -35,7 +35,9 @@ def new(
     ] = "both",
     shelf_distance_m: Annotated[float, typer.Option(help="From the line to the shelf front.")] = 1.2,
     shelf_height_m: Annotated[float, typer.Option(help="Height of the shelves.")] = 3.0,
-    ceiling_m: Annotated[float, typer.Option(help="Height of the hall.")] = 6.0,
+    ceiling_m: Annotated[
+        float | None, typer.Option(help="Lowest thing under the roof; to fly above 2 m it is needed.")
+    ] = None,
     levels_m: Annotated[
         str | None, typer.Option(help="Heights of the labels, as in 0.3,1.5: adds racks with locations.")
     ] = None,

@@ -7,6 +7,7 @@ import math
 from flightd.config.schema import Config
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Phase
+from flightd.mission.flight.touchdown import AIM_S
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.machine import State
 from flightd.mission.plan.itinerary import Itinerary
@@ -116,7 +117,7 @@ class PhaseProgress:
 
     def _time_limit_s(self, s: MissionInputs, phase: Phase) -> float:
         """How long the phase just begun may take: a fixed slack, and a multiple of its way's own time.  A
-        pause may last as long as a full battery does; a landing lasts until the vehicle stands."""
+        pause may last as long as a full battery does."""
         p, goal = self._params, self._itinerary.goal
         match phase:
             case Phase.ARMING:
@@ -137,6 +138,9 @@ class PhaseProgress:
                 way_s = math.pi / p.turn_rate_radps
             case Phase.CLIMB:
                 way_s = self._to_view_s(s)
+            case Phase.LAND:
+                height_m = p.height_m if math.isnan(s.height_m) else s.height_m
+                way_s = height_m / min(p.land_mps, p.expert.touch_mps, p.expert.touch_blind_mps) + AIM_S
             case Phase.FOLLOW:
                 here_m = s.distance_m((goal.x_m, goal.y_m))
                 way_s = (0.0 if math.isinf(here_m) else here_m) / p.speed_mps

@@ -11,7 +11,7 @@ from flightd.control.motion_profile import Profile
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Demand, LandedState, Phase
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.flight.touchdown import Touchdown
+from flightd.mission.flight.touchdown import Standstill, Touchdown
 from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.machine import State
 from flightd.mission.plan.flight_plan import Stop
@@ -23,6 +23,9 @@ _TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
 _SETTLE_S = 3.0
 """The most that a landing waits for the drone to come to rest."""
 _REST_MPS = 0.15
+# the autopilots themselves say after a second that they stand
+_FADE_S, _OWN_LANDING_S, _DISARM_S = 1.5, 2.5, 5.5
+"""Down and still for so long: lean no more, have the autopilot land by itself, ask it to disarm."""
 _HURRY = 4.0 / 3.0
 """How much faster than usual a take-off out of sight climbs, within the limits."""
 
@@ -63,6 +66,9 @@ class ReferenceGenerator:
         self._blind = monitor.blind
         self._relocator = relocator
         self._touchdown = Touchdown(p)
+        self._standstill = Standstill(p)
+        self._still_s = 0.0
+        self._by_itself = False
         self.anchor = (start[0], start[1])
         """Where it holds when no stop is flown to."""
         self._steers = False
@@ -79,17 +85,22 @@ class ReferenceGenerator:
         """A climb begins from here."""
         self._height.reset(0.0 if math.isnan(height_m) else height_m)
 
-    def land(self) -> None:
-        """A landing begins."""
+    def land(self, *, by_itself: bool = False) -> None:
+        """A landing begins; `by_itself`: the autopilot's own."""
         self._touchdown.begin()
         self.height_goal_m = 0.0
+        self._standstill.begin()
+        self._still_s = 0.0
+        self._by_itself = by_itself
 
     def begin_anew(self) -> None:
         """Start the reference at the drone, which is not where it was believed to be."""
         self._steers = False
 
-    def on_ground(self, phase: Phase, demand: Demand) -> Guidance:
+    def on_ground(self, s: MissionInputs, phase: Phase, demand: Demand) -> Guidance:
         """What is wanted while nothing is flown."""
+        if s.vehicle is not None and not s.vehicle.armed:
+            self._standstill.stands(s.height_m)
         return Guidance(phase, Guide.NONE, self._reference(0.0), demand)
 
     def step(self, s: MissionInputs, task: ReferenceTask) -> Guidance:
@@ -114,6 +125,8 @@ class ReferenceGenerator:
         else:
             climb = self._climb_mps(s, task)
         guide = Guide.STEER if self._steers else Guide.BRAKE if self._may_brake(s, task) else Guide.LEVEL
+        if task.phase is Phase.LAND and self._still_s > _FADE_S:
+            guide = Guide.LEVEL
         dead_reckoned = min(s.x_age_s, s.y_age_s) < self._hazards.expert.brake_s
         return Guidance(task.phase, guide, self._reference(climb), demand, dead_reckoned, task.state.stopped)
 
@@ -151,8 +164,9 @@ class ReferenceGenerator:
 
     def _descend(self, s: MissionInputs, task: ReferenceTask) -> tuple[float, Demand]:
         """Climb rate and demand of a landing: at rest first, unless stopped or out of sight; down until
-        the vehicle says that it stands; then disarm."""
+        the vehicle says that it stands, or does so without a word; then disarm."""
         p, v = self._params, s.vehicle
+        self._still_s = self._standstill.step(s)
         moving = self._steers and s.speed_mps > _REST_MPS
         if moving and not task.state.on_pad and task.phase_s < _SETTLE_S:
             self._height.reset(self._height.position)
@@ -163,7 +177,8 @@ class ReferenceGenerator:
         self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
         deaf = s.telemetry_age_s > p.telemetry_land_s
         standing = v is not None and v.landed is LandedState.ON_GROUND and not deaf
-        by_itself = deaf or task.state.adopted
+        standing = standing or self._still_s > _DISARM_S
+        by_itself = deaf or task.state.adopted or self._by_itself or self._still_s > _OWN_LANDING_S
         return -rate, Demand.DISARM if standing else Demand.LAND if by_itself else Demand.FLY
 
     def _steer(self, s: MissionInputs, task: ReferenceTask) -> bool:

@@ -1,22 +1,71 @@
-"""The last metres above a pad: wait until it lies straight below, then down in one go.  Pure."""
+"""The last metres of a landing: aim, go down in one go, and know when it stands.  Pure."""
 
 from __future__ import annotations
 
 import math
 
 from flightd.config.mission import MissionConfig
+from flightd.core.types import Attitude
 from flightd.mission.guidance import MissionInputs
 
 ALIGN_M = 0.85
+AIM_S = 6.0
+"""Not longer: a draught may never let it stand still."""
 """From this height down neither pad nor lines are wholly in the picture for long: aim before."""
 _AIMED_M = 0.04
 _AIMED_MPS = 0.08
-_AIM_S = 6.0
-"""Not longer: a draught may never let it stand still."""
 _SLOW_OVER_PAD = 0.62
 """Where it has aimed, it slows down later: what is flown unseen is short then."""
 _UNSEEN_S = 1.6
 """So long the last stretch may be flown on the motion known when the last line left the picture."""
+
+
+_STANDS_M = 0.1
+"""What the range finder reads on the floor, until it was read there."""
+_FLOOR_M = 0.5
+"""No range finder reads more on the floor."""
+_NEAR_FLOOR_M = 0.08
+_STILL_MPS = 0.1
+_STILL_M = 0.04
+_STILL_RAD = math.radians(2.0)
+
+
+class Standstill:
+    """For how long a vehicle that sinks has been down and still, whatever its autopilot says of it: near the
+    height that it read on the floor (or with none read), neither climbing nor turning over."""
+
+    def __init__(self, params: MissionConfig) -> None:
+        self._hold_s = params.telemetry_hold_s
+        self._floor_m = _STANDS_M
+        self._since: tuple[int, float, Attitude] | None = None
+
+    def stands(self, height_m: float) -> None:
+        """It stands on the floor and reads this, NaN for nothing."""
+        if height_m < _FLOOR_M:
+            self._floor_m = height_m
+
+    def begin(self) -> None:
+        """A landing begins."""
+        self._since = None
+
+    def step(self, s: MissionInputs) -> float:
+        """Seconds; 0 while it moves, is higher, or is not heard."""
+        v = s.vehicle
+        if v is None or s.telemetry_age_s > self._hold_s or not self._is_down(s.height_m, v.climb_mps):
+            self._since = None
+            return 0.0
+        if self._since is None or not _is_still(self._since[1:], (s.height_m, v.attitude)):
+            self._since = s.now_ns, s.height_m, v.attitude
+        return (s.now_ns - self._since[0]) * 1e-9
+
+    def _is_down(self, height_m: float, climb_mps: float) -> bool:
+        return not (height_m > self._floor_m + _NEAR_FLOOR_M or abs(climb_mps) > _STILL_MPS)  # NaN: unknown
+
+
+def _is_still(before: tuple[float, Attitude], now: tuple[float, Attitude]) -> bool:
+    a, b = before[1], now[1]
+    turned_rad = max(abs(a.roll_rad - b.roll_rad), abs(a.pitch_rad - b.pitch_rad))
+    return not abs(before[0] - now[0]) > _STILL_M and turned_rad < _STILL_RAD
 
 
 class Touchdown:
@@ -24,10 +73,10 @@ class Touchdown:
 
     def __init__(self, params: MissionConfig) -> None:
         self._params = params
-        self._left_s = _AIM_S
+        self._left_s = AIM_S
 
     def begin(self) -> None:
-        self._left_s = _AIM_S
+        self._left_s = AIM_S
 
     def rate_mps(self, s: MissionInputs, target_m: tuple[float, float] | None) -> float:
         """Rate of descent; 0 while it still aims at `target_m` (None: it lands where it is)."""

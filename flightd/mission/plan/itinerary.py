@@ -86,11 +86,15 @@ class Itinerary:
         self._left_over = tuple(nodes)
 
     def turn_home(self, now_ns: int, reason: Reason, *, in_need: bool, pad: str | None = None) -> None:
-        """Fly to the home pad or another; `in_need` by the shortest way, against one-way lines too."""
+        """Fly to the home pad or another; by the shortest way, against one-way lines too, `in_need` and where
+        no legal way leads there."""
         self._left_over = self.remaining
         self.why_home = reason
         self._events.report(now_ns, EventLevel.WARNING, "home", in_words(reason))
-        self._replan([], in_need=in_need, home=pad)
+        try:
+            self._replan([], in_need=in_need, home=pad)
+        except NoWayError:
+            self._replan([], in_need=True, home=pad)
 
     def go_to(self, now_ns: int, node: str) -> None:
         """Fly over `node` home, as ordered; an order that cannot be followed changes nothing."""
@@ -105,8 +109,19 @@ class Itinerary:
                 return
         self._events.report(now_ns, EventLevel.WARNING, "command", why)
 
+    def leads_on_from(self, pose: GridPose | None) -> bool:
+        """Whether open lines lead to the goal from where the drone turned out to be."""
+        if pose is None or pose.node not in self._site.nodes:
+            return False
+        try:
+            self._site.path(pose.node, self.goal.node, against_one_way=True)
+        except NoWayError:
+            return False
+        return True
+
     def rejoin(self, now_ns: int, pose: GridPose) -> None:
-        """From where the drone turned out to be: over the nearest node along open lines to the goal."""
+        """From where the drone turned out to be, which must lead on: over the nearest node, by open lines, to
+        the goal."""
         goal = self.goal
         self._events.report(now_ns, EventLevel.INFO, "position", f"sure again: {pose.node}")
         node = self._site.nodes[pose.node]

@@ -155,6 +155,7 @@ class HazardMonitor:
         return {
             Trigger.OVERLOAD: (slow, h.overload_s),
             Trigger.RECORD_LOST: (bool(health.recorder_error), 0.0),
+            Trigger.AISLE_OPEN: (not s.aisle_closed, 0.0),
             Trigger.DETECTOR_LOST: (self._detectors.step(health.detectors_replaced, s.now_ns), 0.0),
             Trigger.RECORDER_DEAD: (self._writers.step(health.recorder_restarts, s.now_ns), 0.0),
         }

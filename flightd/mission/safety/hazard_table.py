@@ -186,6 +186,18 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "landing_untold",
+        None,
+        "down at the height that the range finder read on the floor, neither climbing nor turning over, while"
+        " it sinks; or a landing that takes longer than twice its way's time and"
+        " `mission.expert.phase_slack_s`",
+        Action.LAND,
+        "after 1.5 s level, after 2.5 s the autopilot's own landing, which disarms; then asked to disarm,"
+        " never forced. By time: the autopilot's own landing, then given up with an error, still asked to"
+        " land",
+        "tests/sim/test_landing_untold.py",
+    ),
+    Hazard(
         "ceiling_left",
         Trigger.CEILING_LEFT,
         "height above the ceiling less `hazards.headroom_m`",
@@ -196,10 +208,11 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "corridor_left",
         Trigger.CORRIDOR_LEFT,
-        "position further than `hazards.corridor_m` from the lines of the map, seen or dead-reckoned, as long"
-        " as it is known to 0.3 m",
+        "position further than `hazards.corridor_m` from the open lines of the map, or nearer than 0.15 m to"
+        " a keep-out, seen or dead-reckoned, as long as it is known to 0.3 m",
         Action.HOLD,
-        "no setpoint leans further out; back to the nearest line, land after `mission.lines_land_s`",
+        "no setpoint leans further out, nor towards a keep-out within 0.3 m; back to the nearest line, land"
+        " after `mission.lines_land_s`",
         _FAST,
     ),
     Hazard(
@@ -208,6 +221,15 @@ HAZARDS: tuple[Hazard, ...] = (
         "the last ground station that attends silent for `ground.lost_s`",
         Action.CONFIGURED,
         "`ground.lost_action`: continue, hold, home or land",
+        _FAST,
+    ),
+    Hazard(
+        "aisle_open",
+        Trigger.AISLE_OPEN,
+        "where the site demands it (`interlock`): `interlock.file` does not say any more that the aisles are"
+        " closed, or cannot be read",
+        Action.CONFIGURED,
+        "nothing arms; in flight `hazards.aisle_open`: continue, hold, home or land",
         _FAST,
     ),
     Hazard(
@@ -318,8 +340,18 @@ HAZARDS: tuple[Hazard, ...] = (
         " position turned out to be another",
         Action.RELOCATE,
         "stop, climb up to 1 m to see more, move along the line to where the possible places differ; on from"
-        " the right node when sure; land after `mission.relocate_s`; no node counts as visited meanwhile",
+        " the right node when sure; land after `mission.relocate_s`, or where no open line leads on from that"
+        " node; no node counts as visited meanwhile",
         "tests/sim/test_carried.py",
+    ),
+    Hazard(
+        "step_failed",
+        Trigger.STEP_FAILED,
+        "an error in the flight software itself, at whatever place of a control tick",
+        Action.LAND,
+        "level at the same tick; the next one lands, by the lines; where that fails too, level and down by"
+        " the autopilot's own landing; the error is an event, its traceback is in the flight log",
+        "tests/sim/test_step_failures.py",
     ),
     Hazard(
         "disk_full",

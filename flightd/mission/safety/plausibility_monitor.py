@@ -57,8 +57,8 @@ class PlausibilityMonitor:
         if pose is not None:
             near = self._corridor.nearest(pose.x_m, pose.y_m)
             line_m = (near.x_m, near.y_m)
-            if _tells_side(pose, line_m):
-                outside_m = max(near.distance_m - self._corridor.half_width_m, 0.0)
+            if self._tells_side(pose, line_m):
+                outside_m = self._corridor.outside_m(pose.x_m, pose.y_m)
         return Warnings(
             picture_age_s=pictures.age_s(now_ns),
             frozen_s=pictures.frozen_s(now_ns),
@@ -87,9 +87,10 @@ class PlausibilityMonitor:
         return math.nan if self._doubt else reported_m
 
     def back(self, pose: GridPose | None, line_m: tuple[float, float]) -> tuple[float, float] | None:
-        """The way back into the corridor, (forward, right) of the body; None inside it, and where the
-        position is too uncertain to tell the side of the line, whose nearest point is `line_m`."""
-        if pose is None or not _tells_side(pose, line_m):
+        """The way back into the corridor, or away from a keep-out, (forward, right) of the body; None inside
+        it, and where the position is too uncertain to tell the side of the line, whose nearest point is
+        `line_m`."""
+        if pose is None or not self._tells_side(pose, line_m):
             return None
         back = self._corridor.back(pose.x_m, pose.y_m, pose.vx_mps, pose.vy_mps)
         if back is None:
@@ -97,9 +98,13 @@ class PlausibilityMonitor:
         cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
         return cos * back[0] + sin * back[1], -sin * back[0] + cos * back[1]
 
-
-def _tells_side(pose: GridPose, line_m: tuple[float, float]) -> bool:
-    return _across_sigma_m(pose, line_m) < _KNOWN_M
+    def _tells_side(self, pose: GridPose, line_m: tuple[float, float]) -> bool:
+        """The position is known well enough to say how far the nearest line, and keep-out, is."""
+        area = self._corridor.nearest_keep_out(pose.x_m, pose.y_m)
+        by_line = _across_sigma_m(pose, line_m) < _KNOWN_M
+        return by_line and (
+            math.isinf(area.distance_m) or _across_sigma_m(pose, (area.x_m, area.y_m)) < _KNOWN_M
+        )
 
 
 def _across_sigma_m(pose: GridPose, line_m: tuple[float, float]) -> float:

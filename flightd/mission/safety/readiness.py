@@ -15,6 +15,7 @@ from flightd.mission.reasons import (
     Plain,
     Reason,
     StartChargeLow,
+    Unfit,
 )
 from flightd.tracking.battery_charge import ChargeDoubt
 
@@ -30,6 +31,7 @@ def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason |
     checks: tuple[tuple[bool, Reason], ...] = (
         (v.armed, Plain.ARMED_ALREADY),
         (not v.clock_error_s <= clock_s, ClockUnsure(v.clock_error_s, clock_s)),
+        (bool(s.unfit or v.unfit), Unfit(s.unfit or v.unfit)),
         (math.isnan(s.height_m), Plain.NO_HEIGHT),
         (charge.doubt is not None, ChargeUnknown(charge.doubt or ChargeDoubt.UNKNOWN)),
         (charge.frac < p.battery_start, StartChargeLow(charge.frac, p.battery_start)),
@@ -37,6 +39,7 @@ def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason |
         (not s.frames_arrive, Plain.NO_PICTURE),
         (s.warnings.picture_age_s > latency_s, LatePictures(latency_s)),
         (ground_silent, Plain.GROUND_SILENT),
+        (not s.aisle_closed, Plain.AISLE_OPEN),
     )
     return next((reason for failed, reason in checks if failed), None)
 

@@ -141,6 +141,13 @@ class HeightQuality(_Fault):
     percent: int = Field(1, ge=0, le=100)
 
 
+class LandingUntold(_Fault):
+    """The autopilot never reports that it stands."""
+
+    by_vehicle = True
+    kind: Literal["landing_untold"]
+
+
 class BatteryDrop(_Fault):
     by_airframe = True
     kind: Literal["battery"]
@@ -220,6 +227,20 @@ class CpuTaken(_Fault):
     share: float = Field(0.9, gt=0, lt=1)
 
 
+class StepFails(_Fault):
+    """An error in the flight software: the mission's own step raises, as long as the fault lasts."""
+
+    by_launcher = True
+    kind: Literal["step_fails"]
+
+
+class AisleOpened(_Fault):
+    """Somebody opens an aisle, and the interlock tells it."""
+
+    by_launcher = True
+    kind: Literal["aisle_opened"]
+
+
 class GroundSilent(_Fault):
     """A ground station attends from the start, and falls silent."""
 
@@ -251,6 +272,7 @@ Fault: TypeAlias = Annotated[
     | HeightLost
     | HeightStuck
     | HeightQuality
+    | LandingUntold
     | BatteryDrop
     | ChargeTold
     | WindChange
@@ -261,6 +283,8 @@ Fault: TypeAlias = Annotated[
     | ProcessFault
     | LoopStalled
     | CpuTaken
+    | StepFails
+    | AisleOpened
     | GroundSilent
     | GroundOrder,
     Field(discriminator="kind"),

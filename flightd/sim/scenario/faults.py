@@ -36,6 +36,7 @@ from flightd.sim.scenario.fault_schema import (
     HeightLost,
     HeightQuality,
     HeightStuck,
+    LandingUntold,
     LinkFault,
     VehicleFault,
     WindChange,
@@ -206,6 +207,8 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
         case LinkFault():
             kept = _WITHHELD[fault.kind]
             vehicle.link.withheld = vehicle.link.withheld | kept if on else vehicle.link.withheld - kept
+        case LandingUntold():
+            vehicle.tells_landed = not on
         case ClockRate():
             vehicle.pace_clock(fault.share * 1e6 if on else 0.0)
         case ClockJump():

@@ -53,3 +53,21 @@ def test_nothing_is_armed_that_would_stay_in_the_air(
             assert "flightd doctor --fix" in rig.known().refusal
 
     virtual(test())
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "value"), [(ardupilot_rig, "FS_GCS_ENABLE", 0.0), (px4_rig, "COM_OBL_RC_ACT", 0)]
+)
+def test_what_would_not_be_armed_is_told_before_anybody_asks_for_a_flight(
+    make: Callable[[PeerConfig], Any], name: str, value: float
+) -> None:
+    async def test() -> None:
+        async with make(PeerConfig(ready_s=0.5, parameters={name: value})) as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            await rig.until(lambda: name in rig.known().unfit, 6.0)
+        async with make(_SHIPPED if make is ardupilot_rig else PeerConfig(ready_s=0.5)) as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            await rig.until(lambda: not rig.known().unfit, 6.0)
+            assert not rig.known().armed
+
+    virtual(test())

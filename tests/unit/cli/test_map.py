@@ -84,7 +84,7 @@ def test_new_keeps_a_file_that_is_there(flightd: Command, tmp_path: Path) -> Non
 def test_new_refuses_numbers_that_make_no_floor(
     flightd: Command, tmp_path: Path, option: str, value: str, words: str
 ) -> None:
-    code, _, err = flightd("map", "new", tmp_path / "hall.toml", option, value)
+    code, _, err = flightd("map", "new", tmp_path / "hall.toml", "--ceiling-m", "6", option, value)
     assert code == 2
     assert words in err
     assert err.count("\n") == 1

@@ -29,6 +29,7 @@ _SHIPPED = configured(
     speed_mps=1.5,
     accel_mps2=2.0,
     autostart=False,
+    start_countdown_s=0.0,
     telemetry_hold_s=0.1,
     telemetry_land_s=0.3,
     lines_land_s=1.0,
@@ -37,6 +38,7 @@ _SHIPPED = configured(
     expert={
         "view_height_m": 0.15,
         "arm_timeout_s": 2.0,
+        "start_expires_s": 1.0,
         "adopt_s": 0.1,
         "phase_slack_s": 3.0,
         "doubt_s": 0.05,
@@ -86,8 +88,8 @@ def _lead(flight: Flight, state: State) -> None:
     phase, intent = state.phase, state.intent
     if phase is Phase.PREFLIGHT:
         if intent is Intent.VISIT:
+            start(flight)
             flight.set(battery_frac=0.25)
-            flight.order(CommandKind.START)
     elif state.adopted:
         found_flying(flight)
         if phase is Phase.LAND:
@@ -107,7 +109,8 @@ def _lead(flight: Flight, state: State) -> None:
     elif phase is Phase.SWAP:
         land_to_swap(flight)
         if intent is Intent.VISIT:
-            flight.order(CommandKind.START)
+            start(flight)
+            flight.set(battery_frac=0.15)
     elif phase is Phase.DONE:
         fly_to(flight, Phase.LAND)
         flight.set(armed=False)
@@ -136,8 +139,15 @@ def found_flying(flight: Flight) -> None:
     flight.run(0.2, follow=False)
 
 
-def fly_to(flight: Flight, phase: Phase) -> None:
+def start(flight: Flight) -> None:
+    """Order a start once the flight is ready."""
+    flight.set(battery_frac=0.95)
+    flight.run(0.02, follow=False)
     flight.order(CommandKind.START)
+
+
+def fly_to(flight: Flight, phase: Phase) -> None:
+    start(flight)
     if phase is Phase.HOLD:
         flight.to(Phase.FOLLOW)
         flight.order(CommandKind.PAUSE)
@@ -224,6 +234,13 @@ def _resume(flight: Flight) -> None:
         flight.order(CommandKind.RESUME)
 
 
+def _start(flight: Flight) -> None:
+    if flight.mission.state.intent is Intent.WAIT:
+        start(flight)
+    else:
+        flight.order(CommandKind.START)
+
+
 def _idle(_: Flight) -> None:
     """Time passes."""
 
@@ -250,6 +267,9 @@ def _found(flight: Flight) -> None:
 
 _HOME = losing(record=LossAction.HOME)
 _HELD = losing(ground=LossAction.HOLD)
+_PATIENT = PARAMS.with_values(
+    mission=PARAMS.mission.with_values(expert=PARAMS.mission.expert.with_values(start_expires_s=5.0))
+)
 _ONE_BATTERY = PARAMS.model_copy(update={"battery": BatteryConfig(flight_s=60.0)})
 
 STIMULI: Mapping[Trigger, Stimulus] = {
@@ -260,6 +280,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.DISARMED: sensed(armed=False),
     Trigger.VANISHED: sensed(61.0, telemetry_age_s=70.0),
     Trigger.TELEMETRY_LOST: sensed(telemetry_age_s=0.4),
+    Trigger.STEP_FAILED: sensed(failed=True),
     Trigger.HEARTBEAT_LOST: Stimulus(_beat_lost),
     Trigger.HEIGHT_STUCK: warned(height_stuck=True),
     Trigger.HEIGHT_LOST: sensed(height_m=math.nan),
@@ -270,11 +291,14 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.LAND_HERE: ordered(CommandKind.LAND),
     Trigger.GROUND_LOST: sensed(ground_silent_s=9.0),
     Trigger.BATTERY_UNKNOWN: sensed(battery_frac=math.nan),
+    Trigger.AISLE_OPEN: sensed(aisle_closed=False),
     Trigger.RECORD_LOST: sick(recorder_error="disk full"),
     Trigger.HAZARD_LASTS: warned(1.3, frozen_s=9.0),
     Trigger.LINES_LOST_LONG: sensed(2.5, x_age_s=9.0, y_age_s=9.0),
+    Trigger.CUT_OFF: placed(node="beyond the barrier"),
     Trigger.POSITION_UNKNOWN: Stimulus(_idle, 3.3),
-    Trigger.TIMED_OUT: Stimulus(_stuck, 70.0),
+    Trigger.TIMED_OUT: Stimulus(_stuck, 70.0, params=_PATIENT),
+    Trigger.START_EXPIRED: Stimulus(_idle, 1.2),
     Trigger.TELEMETRY_STALE: sensed(telemetry_age_s=0.2),
     Trigger.CLOCK_JUMP: sensed(dt_s=0.6),
     Trigger.CLOCK_UNSURE: sensed(clock_error_s=0.5),
@@ -305,7 +329,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.BATTERY_LOW: sensed(battery_frac=0.15),
     Trigger.DETECTOR_LOST: sick(detectors_replaced=5),
     Trigger.RECORDER_DEAD: sick(recorder_restarts=5),
-    Trigger.START: ordered(CommandKind.START),
+    Trigger.START: Stimulus(_start, 0.04, hold=False),
     Trigger.GOTO: ordered(CommandKind.GOTO, "A3"),
     Trigger.GO_HOME: ordered(CommandKind.HOME),
     Trigger.PAUSE: ordered(CommandKind.PAUSE),

@@ -25,6 +25,8 @@ SHADOWED = {
     # there is another stop, another view; the states of a landing were reached through these
     *((State(Phase.HOVER, intent), Trigger.ROUTE_DONE) for intent in (Intent.VISIT, *_BACK)),
     (State(Phase.SCAN, Intent.VISIT), Trigger.DWELLED),
+    # a start is taken only of a vehicle that was seen to stand
+    (State(Phase.PREFLIGHT, Intent.VISIT), Trigger.FOUND_FLYING),
 }
 """What another trigger comes before in these flights."""
 _ON_PAD = {
@@ -94,6 +96,9 @@ def test_a_command_that_is_not_possible_is_refused_and_changes_nothing(
     state: State, kind: CommandKind
 ) -> None:
     flight = fresh(state)
+    if state.waiting and state.intent is Intent.WAIT:  # a start is refused before it is ready
+        flight.set(battery_frac=0.95)
+        flight.run(0.02, follow=False)
     flight.mission.drain_events()
     flight.order(kind, "A3" if kind is CommandKind.GOTO else "")
     refused = any("refused" in event.text for event in flight.mission.drain_events())

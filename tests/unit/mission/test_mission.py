@@ -16,7 +16,7 @@ from flightd.core.types import (
     Phase,
 )
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.guidance import Guide
+from flightd.mission.guidance import ALL_WELL, Guide
 from flightd.mission.machine import Intent, State
 from flightd.mission.scan.scanner import Scanner
 from tests.unit.mission import shelves
@@ -276,3 +276,17 @@ def test_a_moment_of_doubt_as_a_view_ends_does_not_hold_the_scan_for_ever() -> N
     assert flight.phase is Phase.SCAN
     flight.to(Phase.CLIMB, 1.0)
     assert scanner.view is not first
+
+
+def test_a_pause_in_a_hold_that_a_hazard_began_is_told() -> None:
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    flight.set(warnings=replace(ALL_WELL, frozen_s=9.0))
+    flight.run(0.1, follow=False)
+    assert (flight.phase, flight.mission.reason) == (Phase.HOLD, "camera frozen")
+    flight.order(CommandKind.PAUSE)
+    flight.run(0.02, follow=False)
+    assert flight.mission.reason == "camera frozen; paused besides, until resume"
+    flight.order(CommandKind.RESUME)
+    flight.run(0.02, follow=False)
+    assert flight.mission.reason == "camera frozen"

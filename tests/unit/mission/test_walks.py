@@ -39,6 +39,7 @@ SENSED: Mapping[str, Mapping[str, Any]] = {
     "windy": {"warnings": replace(ALL_WELL, push_mps2=5.0)},
     "frozen": {"warnings": replace(ALL_WELL, frozen_s=9.0)},
     "outside": {"warnings": replace(ALL_WELL, outside_m=1.0)},
+    "aisle open": {"aisle_closed": False},
     "disk full": {"warnings": replace(ALL_WELL, health=replace(ALL_WELL.health, recorder_error="full"))},
     "in doubt": {},
     "elsewhere": {},
@@ -46,6 +47,7 @@ SENSED: Mapping[str, Mapping[str, Any]] = {
 USUAL = {
     "in_control": True, "landed": LandedState.IN_AIR, "telemetry_age_s": 0.0, "height_m": 1.5, "x_age_s": 0.0,
     "y_age_s": 0.0, "localised": True, "ground_silent_s": 0.0, "battery_frac": 0.95, "warnings": ALL_WELL,
+    "aisle_closed": True,
 }  # fmt: skip
 
 SPELLS = st.lists(
@@ -103,7 +105,7 @@ class Walk:
         self.pilot_wins(before, after)
         if after.phase is Phase.ARMING or (flight.guidance and flight.guidance.demand is Demand.FLY):
             assert self.started or before.adopted, "nothing is armed that was not ordered to start"
-        if after.phase is Phase.SWAP:
+        if after.waiting:
             self.started = after.intent is Intent.VISIT
         if after.airborne and after.phase is not Phase.LAND:
             assert self.since_s < 70.0, "time leads out of it"

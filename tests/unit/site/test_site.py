@@ -160,7 +160,7 @@ def test_a_floor_that_cannot_be_is_refused_by_name(
     aisles: tuple[Aisle, ...], crosses: tuple[tuple[str, str], ...], pads: tuple[Pad, ...], words: str
 ) -> None:
     with pytest.raises(LayoutError) as refused:
-        lay_out("bad", aisles, crosses, pads)
+        lay_out("bad", aisles, crosses, pads, ceiling_m=6.0)
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
 

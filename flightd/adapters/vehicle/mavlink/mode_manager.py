@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 from collections import deque
 from collections.abc import Callable
 from typing import Protocol
@@ -12,7 +13,7 @@ from typing import Protocol
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.authority import Authority
-from flightd.adapters.vehicle.mavlink.refusal import CommandRefused, ExplainedRefusal, TakenOver
+from flightd.adapters.vehicle.mavlink.refusal import CommandRefused, ExplainedRefusal, OffFloor, TakenOver
 from flightd.adapters.vehicle.mavlink.services.commands import Answer
 from flightd.adapters.vehicle.refusal import Refusal
 from flightd.core.types import Attitude, Demand, LandedState
@@ -175,6 +176,24 @@ class ModeArmingManager:
         return not self._telemetry.armed or says is LandedState.ON_GROUND
 
     @property
+    def unfit(self) -> Refusal | None:
+        """Why a vehicle that stands disarmed would not be armed by us; None where it would."""
+        if self._telemetry.armed or self.is_silent:
+            return None
+        return self._firmware.not_fit() or self._firmware.no_way_down()
+
+    @property
+    def off_floor_m(self) -> float | None:
+        """The height at which nothing is disarmed, whatever the autopilot says; None on the floor.  NaN where
+        no range finder tells and the autopilot does not say that it stands."""
+        now_ns = self._clock.now_ns()
+        height_m = self._telemetry.height_m(now_ns)
+        stands = height_m <= _FLOOR_M or (
+            math.isnan(height_m) and self._telemetry.landed(now_ns) is LandedState.ON_GROUND
+        )
+        return None if stands else height_m
+
+    @property
     def refusal(self) -> Refusal | None:
         """What was refused and the autopilot's own words at that time; None where nothing was."""
         if self._authority.taken:
@@ -262,6 +281,8 @@ class ModeArmingManager:
                 await self._ask("arming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
             case Demand.LAND if held is not None and held != firmware.landing_mode:
                 await self._ask_mode(firmware.landing_mode)
+            case Demand.DISARM if held is not None and armed and (off_m := self.off_floor_m) is not None:
+                self._refuse(OffFloor(off_m))
             case Demand.DISARM if held is not None and armed:
                 await self._ask("disarming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
             case _:

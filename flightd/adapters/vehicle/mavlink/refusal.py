@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
@@ -96,3 +97,14 @@ class TakenOver(Refusal):
 
     def __str__(self) -> str:
         return "the pilot or a failsafe changed the mode"
+
+
+@dataclass(frozen=True, slots=True)
+class OffFloor(Refusal):
+    """A vehicle at this height (NaN: not known) is not disarmed."""
+
+    height_m: float
+
+    def __str__(self) -> str:
+        where = "nobody says that it stands" if math.isnan(self.height_m) else f"{self.height_m:.1f} m high"
+        return f"disarming: {where}"

@@ -7,7 +7,7 @@ import asyncio
 import logging
 import math
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -145,12 +145,13 @@ class MavlinkVehicle(abc.ABC):
     def state(self) -> VehicleState | None:
         now_ns = self._clock.now_ns()
         mode = self._telemetry.custom_mode
-        return self._telemetry.state(
+        state = self._telemetry.state(
             now_ns,
             "" if mode is None else self.mode_name(mode),
             in_control=self._modes.in_control,
             refusal=words(self._modes.refusal),
         )
+        return state and replace(state, unfit=words(self._modes.unfit))
 
     def attitudes(self) -> list[Attitude]:
         return self._telemetry.attitudes()

@@ -14,6 +14,7 @@ import logging
 import math
 from collections import deque
 from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
 from typing import Any
 
 from mavsdk.autopilot import Autopilot
@@ -145,9 +146,10 @@ class MavsdkVehicle:
 
     def state(self) -> VehicleState | None:
         modes = self._modes
-        return self._readings.state(
+        state = self._readings.state(
             self._clock.now_ns(), in_control=modes.in_control, refusal=words(modes.refusal)
         )
+        return state and replace(state, unfit=words(modes.unfit))
 
     def attitudes(self) -> list[Attitude]:
         return self._readings.attitudes()

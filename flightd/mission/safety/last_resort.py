@@ -1,0 +1,135 @@
+"""What is flown when the step itself fails: level and down, by what the vehicle reports alone.  Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from flightd.config.mission import MissionConfig
+from flightd.core.scanning import Finding, Settled
+from flightd.core.tick import StepFailure, TickInput, TickOutput
+from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, LandedState, Phase, VehicleState
+from flightd.mission.reasons import Happened, in_words
+from flightd.mission.safety.hazard_table import ACTIONS
+from flightd.mission.triggers import Trigger
+
+_T = TypeVar("_T")
+
+_GIVE_UP_NS = 60_000_000_000
+"""A vehicle that nobody heard for so long is not waited for."""
+_FAILED = Trigger.STEP_FAILED
+_OVER = frozenset({Phase.DONE, Phase.ABORTED, Phase.PILOT})
+
+
+@dataclass(frozen=True, slots=True)
+class Fallback:
+    """What goes out in place of the mission's guidance."""
+
+    phase: Phase
+    demand: Demand
+    setpoint: AttitudeSetpoint | None
+
+
+class LastResort:
+    """Answers a tick whose step has failed: tell it by `caught`, then ask for the `answer`.
+
+    After the first failure the drone is levelled at the same height, and the mission is left to land it.  It
+    has `given_up` the mission once that fails again: what is in the air is kept level and sinks, and its
+    autopilot is told to land; a pilot who takes it keeps it; what was found flying is taken over first.
+    Nothing is armed, and what stands is disarmed."""
+
+    def __init__(self, params: MissionConfig) -> None:
+        self._hold_ns = round(params.telemetry_hold_s * 1e9)
+        self._sink_mps = params.land_mps
+        self._end: Phase | None = None
+        self._failures = 0
+        self.failure: StepFailure | None = None
+        """What the newest step raised, None where it raised nothing."""
+
+    @property
+    def failed(self) -> bool:
+        """A step has failed in this flight."""
+        return self._failures > 0
+
+    @property
+    def given_up(self) -> bool:
+        """The mission is not stepped any more."""
+        return self._failures > 1
+
+    def caught(self, now_ns: int, err: Exception) -> None:
+        """The step has raised this."""
+        self._failures += 1
+        self.failure = StepFailure.of(now_ns, err)
+
+    def answer(
+        self,
+        tick: TickInput,
+        last: TickOutput,
+        drain_events: Callable[[], tuple[Event, ...]],
+        drain_findings: Callable[[], tuple[tuple[Finding, ...], tuple[Settled, ...]]],
+    ) -> TickOutput:
+        """What goes out; `last` is what did before, the rest drains what the mission's parts still have to
+        tell."""
+        answer = Fallback(last.phase, last.demand, last.setpoint and AttitudeSetpoint(tick.now_ns))
+        if self.given_up:
+            answer = self.step(tick.now_ns, tick.vehicle, last.phase)
+        no_events: tuple[Event, ...] = ()
+        nothing: tuple[tuple[Finding, ...], tuple[Settled, ...]] = ((), ())
+        findings, settled = _rescued(drain_findings, nothing)
+        return replace(
+            last,
+            setpoint=answer.setpoint,
+            demand=answer.demand,
+            phase=answer.phase,
+            reason=in_words(Happened(_FAILED)),
+            pose=None,
+            tracks=None,
+            events=(*_rescued(drain_events, no_events), *self._news(tick.now_ns, last.phase, answer.phase)),
+            findings=findings,
+            settled=settled,
+        )
+
+    def step(self, now_ns: int, vehicle: VehicleState | None, before: Phase) -> Fallback:
+        """Level and down; `before` is the phase answered last."""
+        if before in _OVER:
+            self._end = self._end or before
+        silent_ns = _GIVE_UP_NS if vehicle is None else now_ns - vehicle.attitude.stamp_ns
+        heard = silent_ns <= self._hold_ns
+        if self._end is None and vehicle is not None:
+            if (heard and not vehicle.armed) or silent_ns > _GIVE_UP_NS:
+                self._end = Phase.ABORTED
+            elif heard and not vehicle.in_control and before is not Phase.RECOVER:
+                self._end = Phase.PILOT
+        if self._end is Phase.PILOT:
+            return Fallback(Phase.PILOT, Demand.HANDS_OFF, None)
+        if self._end is not None or vehicle is None:
+            return Fallback(self._end or Phase.ABORTED, _ended(vehicle), None)
+        sinking = AttitudeSetpoint(now_ns, climb_mps=-self._sink_mps)
+        if not vehicle.in_control:
+            return Fallback(before, Demand.KEEP, sinking)
+        standing = heard and vehicle.landed is LandedState.ON_GROUND
+        return Fallback(Phase.LAND, Demand.DISARM if standing else Demand.LAND, sinking)
+
+    def _news(self, now_ns: int, before: Phase, after: Phase) -> tuple[Event, ...]:
+        events = []
+        why = in_words(Happened(_FAILED))
+        if self.failure is not None:
+            events.append(Event(now_ns, EventLevel.ERROR, "step_failed", self.failure.error))
+        if after is not before:
+            events.append(Event(now_ns, EventLevel.WARNING, "hazard", f"{why}: {ACTIONS[_FAILED]}"))
+            events.append(Event(now_ns, EventLevel.WARNING, "phase", f"{before} -> {after}: {why}"))
+        return tuple(events)
+
+
+def _ended(vehicle: VehicleState | None) -> Demand:
+    flies = vehicle is not None and vehicle.armed and vehicle.landed is LandedState.IN_AIR
+    return Demand.LAND if flies else Demand.DISARM
+
+
+def _rescued(drain: Callable[[], _T], otherwise: _T) -> _T:
+    """What a part still has to tell after a step that failed."""
+    try:
+        return drain()
+    except Exception:  # noqa: BLE001 - the failure itself is told already
+        return otherwise

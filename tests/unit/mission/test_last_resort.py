@@ -1,0 +1,73 @@
+"""What is flown when the mission cannot be stepped: by the vehicle's word alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from flightd.core.tick import TickInput, TickOutput
+from flightd.core.types import Demand, GridPose, LandedState, Phase, VehicleState
+from flightd.mission.event_log import EventLog
+from flightd.mission.plan.flight_plan import make_plan
+from flightd.mission.plan.itinerary import Itinerary
+from flightd.mission.safety.last_resort import LastResort
+from tests.unit.mission.configured import configured
+from tests.unit.mission.driven import POLICY, SITE
+from tests.unit.mission.test_readiness import VEHICLE
+
+NOW_NS = 10**9
+FLYING = replace(VEHICLE, armed=True, in_control=True, landed=LandedState.IN_AIR, height_m=1.5)
+
+
+def answers(vehicle: VehicleState | None, before: Phase = Phase.FOLLOW) -> tuple[Phase, Demand, bool]:
+    resort = LastResort(configured().mission)
+    answer = resort.step(NOW_NS, vehicle, before)
+    if answer.setpoint is not None:
+        assert (answer.setpoint.roll_rad, answer.setpoint.pitch_rad) == (0.0, 0.0)
+        assert answer.setpoint.climb_mps < 0.0
+    return answer.phase, answer.demand, answer.setpoint is not None
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "before", "expected"),
+    [
+        (FLYING, Phase.FOLLOW, (Phase.LAND, Demand.LAND, True)),
+        (replace(FLYING, landed=LandedState.ON_GROUND), Phase.LAND, (Phase.LAND, Demand.DISARM, True)),
+        (replace(FLYING, in_control=False), Phase.FOLLOW, (Phase.PILOT, Demand.HANDS_OFF, False)),
+        (FLYING, Phase.PILOT, (Phase.PILOT, Demand.HANDS_OFF, False)),
+        (replace(FLYING, in_control=False), Phase.RECOVER, (Phase.RECOVER, Demand.KEEP, True)),
+        (replace(FLYING, heartbeat_ns=0), Phase.FOLLOW, (Phase.LAND, Demand.LAND, True)),
+        (VEHICLE, Phase.PREFLIGHT, (Phase.ABORTED, Demand.DISARM, False)),
+        (None, Phase.PREFLIGHT, (Phase.ABORTED, Demand.DISARM, False)),
+        (FLYING, Phase.ABORTED, (Phase.ABORTED, Demand.LAND, False)),
+    ],
+)
+def test_it_lands_what_flies_and_leaves_the_rest(
+    vehicle: VehicleState | None, before: Phase, expected: tuple[Phase, Demand, bool]
+) -> None:
+    assert answers(vehicle, before) == expected
+
+
+def test_the_mission_is_given_up_at_its_second_failure() -> None:
+    resort, flying = LastResort(configured().mission), TickInput(NOW_NS, vehicle=FLYING)
+    last = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, None, None)
+    resort.caught(NOW_NS, ValueError("first"))
+    last = resort.answer(flying, last, tuple, lambda: ((), ()))
+    assert (last.phase, last.demand, resort.given_up) == (Phase.FOLLOW, Demand.FLY, False)
+    resort.caught(NOW_NS, ValueError("second"))
+    last = resort.answer(flying, last, tuple, lambda: ((), ()))
+    assert (last.phase, last.demand, resort.given_up) == (Phase.LAND, Demand.LAND, True)
+    assert [event.name for event in last.events] == ["step_failed", "hazard", "phase"]
+
+
+def test_a_node_behind_a_barrier_leads_nowhere() -> None:
+    home, aisle = SITE.home.node, SITE.aisles[0].id
+    a, b = SITE.aisle_nodes(aisle)[-2:]
+    shut = tuple((b.id, other) for other in SITE.neighbours(b.id))
+    closed = replace(SITE, blocked=shut)
+    plan = make_plan(closed, [a.id], home, home, POLICY)
+    itinerary = Itinerary(closed, plan, POLICY, EventLog())
+    at_b = GridPose(0, b.id, 0, 0, 0.0, b.x_m, b.y_m, 0, 0, 1.5, (0.0,) * 9, 1.0)
+    assert not itinerary.leads_on_from(at_b)
+    assert itinerary.leads_on_from(replace(at_b, node=a.id))

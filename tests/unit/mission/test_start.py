@@ -1,0 +1,135 @@
+"""A start: refused with the reason unless ready, counted down, taken back, and never kept for later."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightd.core.types import Command, CommandKind, Demand, LandedState, Phase
+from tests.unit.mission.configured import configured
+from tests.unit.mission.driven import Flight
+
+
+def waiting(start_countdown_s: float = 3.0) -> Flight:
+    flight = Flight(configured(autostart=False, start_countdown_s=start_countdown_s))
+    flight.run(0.1, follow=False)
+    flight.mission.drain_events()
+    return flight
+
+
+def said(flight: Flight) -> list[str]:
+    return [event.text for event in flight.mission.drain_events() if event.name in {"command", "start"}]
+
+
+def test_a_start_at_a_low_battery_is_refused_and_not_kept_until_it_is_full() -> None:
+    flight = waiting()
+    flight.set(battery_frac=0.1)
+    flight.run(0.1, follow=False)
+    assert CommandKind.START not in flight.mission.possible_commands
+    flight.order(CommandKind.START)
+    assert said(flight) == ["start", "start refused: battery at 10%, 30% needed to start"]
+    flight.set(battery_frac=1.0)
+    flight.run(600.0, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+    assert flight.guidance is not None
+    assert flight.guidance.demand is Demand.STANDBY
+
+
+def test_before_anything_was_heard_it_is_refused() -> None:
+    flight = Flight(configured(autostart=False))
+    flight.order(CommandKind.START)
+    assert said(flight)[-1] == "start refused: no telemetry from the vehicle"
+
+
+def test_it_arms_after_a_count_down_that_is_told() -> None:
+    flight = waiting()
+    flight.order(CommandKind.START)
+    reasons = []
+    for _ in range(200):
+        flight.run(0.02, follow=False)
+        if flight.phase is not Phase.PREFLIGHT:
+            break
+        reasons.append(flight.mission.reason)
+    assert len(reasons) == pytest.approx(150, abs=2)
+    assert list(dict.fromkeys(reasons)) == [
+        f"arms in {left} s; pause takes the start back" for left in (3, 2, 1)
+    ]
+    assert said(flight) == ["start", "arms in 3 s; pause takes the start back"]
+    assert flight.phase is Phase.ARMING
+
+
+@pytest.mark.parametrize("kind", [CommandKind.PAUSE, CommandKind.STOP])
+def test_any_operator_takes_it_back_meanwhile(kind: CommandKind) -> None:
+    flight = waiting()
+    flight.order(CommandKind.START)
+    flight.run(2.0, follow=False)
+    flight.order(kind)
+    flight.run(10.0, follow=False)
+    assert flight.phase is (Phase.PREFLIGHT if kind is CommandKind.PAUSE else Phase.ABORTED)
+    if kind is CommandKind.PAUSE:
+        assert said(flight)[-1] == "taken back"
+        flight.order(CommandKind.START)
+        flight.to(Phase.ARMING, 3.1)
+        flight.to(Phase.FOLLOW)  # the pause does not come back in flight
+
+
+def test_what_it_waits_for_voids_it_within_five_seconds() -> None:
+    flight = waiting()
+    flight.order(CommandKind.START)
+    flight.run(1.0, follow=False)
+    flight.set(battery_frac=0.1)
+    flight.run(7.2, follow=False)
+    assert said(flight)[-1] == "the start command is void: battery at 10%, 30% needed to start"
+    flight.set(battery_frac=1.0)
+    flight.run(60.0, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+
+
+def test_an_arming_that_is_refused_for_five_seconds_voids_it() -> None:
+    flight = waiting(start_countdown_s=0.0)
+    flight.order(CommandKind.START)
+    flight.run(0.1, follow=False)
+    assert flight.mission.state.phase is Phase.ARMING
+    flight.set(refusal="arming: failed (PreArm: gyros)")
+    flight.run(5.2, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+    told = [event.text for event in flight.mission.drain_events() if event.name == "phase"]
+    assert told[-1] == "arming -> preflight: the start command is void: arming: failed (PreArm: gyros)"
+    flight.run(600.0, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+
+
+def test_one_that_starts_by_itself_waits_for_what_it_lacks_without_a_count_down() -> None:
+    flight = Flight(configured(autostart=True, start_countdown_s=3.0))
+    flight.set(battery_frac=0.1)
+    flight.run(30.0, follow=False)
+    assert str(flight.mission.phase) == "preflight"
+    flight.set(battery_frac=1.0)
+    flight.run(0.04, follow=False)
+    assert str(flight.mission.phase) == "arming"
+
+
+@pytest.mark.parametrize("kind", [CommandKind.STOP, CommandKind.LAND])
+def test_a_stop_as_it_is_found_flying_lands_it_and_disarms_nothing(kind: CommandKind) -> None:
+    flight = Flight(configured(autostart=False))
+    flight.set(armed=True, landed=LandedState.IN_AIR, height_m=1.5, in_control=True)
+    flight.mission.command(Command("1", kind), flight.now_ns)
+    demands = set()
+    for _ in range(100):
+        flight.run(0.02, follow=False)
+        assert flight.guidance is not None
+        demands.add(flight.guidance.demand)
+    assert flight.phase is Phase.LAND
+    assert Demand.DISARM not in demands
+
+
+def test_a_mission_that_ended_before_its_vehicle_was_heard_disarms_nothing_in_the_air() -> None:
+    flight = Flight(configured(autostart=False))
+    flight.set(telemetry_age_s=9.0)
+    flight.run(0.1, follow=False)
+    flight.order(CommandKind.STOP)
+    flight.run(0.1, follow=False)
+    assert flight.phase is Phase.ABORTED
+    flight.set(telemetry_age_s=0.0, armed=True, landed=LandedState.IN_AIR, height_m=1.5)
+    flight.run(0.1, follow=False)
+    assert flight.guidance is not None
+    assert flight.guidance.demand is Demand.LAND

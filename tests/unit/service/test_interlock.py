@@ -1,0 +1,94 @@
+"""The interlock: a file that says whether the aisles are closed; nothing arms without it."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from flightd.adapters.interlock import FileInterlock
+from flightd.app.absent_parts import NO_INTERLOCK
+from flightd.app.build import interlock_of
+from flightd.app.run import unfit_here
+from flightd.config.schema import load_config
+from flightd.core.errors import InputError
+from flightd.core.types import CommandKind, Phase
+from flightd.runtime.clock import LoopClock
+from flightd.site.site_file import load_site, parse_site, site_toml
+from tests.rigs.event_loops import in_real_time
+from tests.rigs.waiting import until
+from tests.unit.mission.configured import configured
+from tests.unit.mission.driven import Flight
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+CONFIG = load_config(CONFIGS / "sim.toml")
+SITE = load_site(CONFIGS / "site-demo.toml")
+
+
+@in_real_time
+async def test_it_is_closed_only_while_the_file_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "value"
+    interlock = FileInterlock(path, "1", LoopClock())
+    assert not interlock.is_closed
+    reading = asyncio.ensure_future(interlock.run())
+    try:
+        path.write_text("1\n")
+        await until(lambda: interlock.is_closed, 20.0)
+        path.write_text("0\n")
+        await until(lambda: not interlock.is_closed, 20.0)
+        path.write_text("1\n")
+        await until(lambda: interlock.is_closed, 20.0)
+        path.unlink()
+        await until(lambda: not interlock.is_closed, 20.0)
+    finally:
+        reading.cancel()
+        await asyncio.wait([reading])
+    path.write_text("1\n")
+    await until(lambda: not interlock.is_closed, 20.0)  # nobody reads it any more
+
+
+def test_a_site_that_demands_one_is_not_flown_without() -> None:
+    demanding = replace(SITE, interlock=True)
+    assert parse_site(site_toml(demanding), "again") == demanding
+
+    class Clock:
+        def now_ns(self) -> int:
+            return 0
+
+    assert interlock_of(CONFIG, SITE, Clock()) is NO_INTERLOCK
+    with pytest.raises(InputError, match=r"interlock.file: site demo demands it.*name the file"):
+        interlock_of(CONFIG, demanding, Clock())
+    config = CONFIG.with_values(interlock={"file": Path("/run/aisle")})
+    assert isinstance(interlock_of(config, SITE, Clock()), FileInterlock)
+
+
+def test_with_an_open_aisle_nothing_starts_or_arms() -> None:
+    flight = Flight(configured(autostart=True))
+    flight.set(aisle_closed=False)
+    flight.run(5.0, follow=False)
+    assert (str(flight.mission.phase), flight.mission.reason) == ("preflight", "the aisle is not closed")
+    flight.order(CommandKind.START)
+    flight.set(aisle_closed=True)
+    flight.run(0.04, follow=False)
+    assert str(flight.mission.phase) == "arming"
+    flight.set(aisle_closed=False)
+    flight.run(0.04, follow=False)
+    assert flight.phase is Phase.ABORTED
+
+
+def test_what_the_check_before_the_flight_finds_keeps_it_on_the_ground_and_is_told() -> None:
+    flight = Flight(configured(autostart=True))
+    flight.set(unfit="FS_GCS_ENABLE is 0, expected 5")
+    flight.run(10.0, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+    assert flight.mission.reason == "not fit to fly: FS_GCS_ENABLE is 0, expected 5"
+    told = [event.text for event in flight.mission.drain_events() if event.name == "unfit"]
+    assert told == ["FS_GCS_ENABLE is 0, expected 5"]
+
+
+def test_this_computer_is_looked_at_without_waiting(tmp_path: Path) -> None:
+    lost = CONFIG.with_values(recorder={"folder": tmp_path / "file" / "folder"})
+    (tmp_path / "file").write_text("no folder")
+    assert "file" in unfit_here(lost, SITE)

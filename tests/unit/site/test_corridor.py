@@ -1,0 +1,55 @@
+"""The free way around the lines, and the keep-outs in it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flightd.site.corridor import NEAR_KEEP_OUT_M, Corridor
+from flightd.site.site_file import load_site
+from flightd.site.ways import KEEP_OUT_CLEARANCE_M, KeepOut
+
+SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
+A, B = SITE.aisle_nodes(SITE.aisles[0].id)[1:3]
+MIDDLE_M = (A.x_m + B.x_m) / 2
+BESIDE = KeepOut(MIDDLE_M - 0.3, A.y_m + 0.35, MIDDLE_M + 0.3, A.y_m + 1.0)
+"""Beside an open line, within the corridor's half width."""
+CORRIDOR = Corridor(replace(SITE, keep_outs=(BESIDE,)), 0.45)
+
+
+def test_beside_a_line_a_keep_out_ends_the_corridor() -> None:
+    towards = (MIDDLE_M, A.y_m + 0.25)
+    assert Corridor(SITE, 0.45).back(*towards, 0.0, 0.0) is None
+    assert CORRIDOR.back(*towards, 0.0, 0.2) == pytest.approx((0.0, -1.0))
+    assert CORRIDOR.outside_m(*towards) == pytest.approx(NEAR_KEEP_OUT_M - 0.1)
+    assert CORRIDOR.back(MIDDLE_M, A.y_m, 0.0, 0.0) is None, "the line itself is free"
+    assert CORRIDOR.outside_m(MIDDLE_M, A.y_m) == 0.0
+    assert CORRIDOR.back(*towards, 0.0, -0.5) is None, "who comes back may brake"
+
+
+def test_in_a_keep_out_the_way_back_is_its_nearest_edge() -> None:
+    inside = (MIDDLE_M + 0.25, A.y_m + 0.6)
+    assert CORRIDOR.back(*inside, 0.0, 0.0) == pytest.approx((1.0, 0.0))
+    assert CORRIDOR.outside_m(*inside) > NEAR_KEEP_OUT_M
+
+
+def test_a_line_that_a_keep_out_closes_is_no_way_back() -> None:
+    across = KeepOut(MIDDLE_M - 0.2, A.y_m - 0.2, MIDDLE_M + 0.2, A.y_m + 0.2)
+    closed = Corridor(replace(SITE, keep_outs=(across,)), 0.45)
+    near = closed.nearest(MIDDLE_M, A.y_m)
+    assert near.distance_m == pytest.approx(abs(A.x_m - MIDDLE_M))
+
+
+@given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
+def test_the_way_back_never_leads_deeper_into_a_keep_out(dx_m: float, dy_m: float) -> None:
+    x_m, y_m = MIDDLE_M + dx_m, BESIDE.y0_m + dy_m
+    before = CORRIDOR.nearest_keep_out(x_m, y_m).distance_m
+    back = CORRIDOR.back(x_m, y_m, 0.0, 0.0)
+    if back is not None and before < KEEP_OUT_CLEARANCE_M:
+        assert math.hypot(*back) == pytest.approx(1.0)
+        assert CORRIDOR.nearest_keep_out(x_m + 0.01 * back[0], y_m + 0.01 * back[1]).distance_m > before
