@@ -352,7 +352,7 @@ def test_a_failsafe_of_the_autopilot_counts_as_a_take_over() -> None:
         async with ardupilot_rig(PeerConfig(ready_s=0.5, parameters={"BATT_FS_LOW_ACT": 1})) as rig:
             await rig.take_off()
             rig.peer.airframe.battery_frac = 0.02
-            await rig.until(lambda: not rig.known().in_control, 2.0)
+            await rig.until(lambda: not rig.known().in_control, 12.0)
             assert rig.known().mode == "LAND"
             assert not any(await rig.stream(1.0))
 
