@@ -24,6 +24,7 @@ from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
 from flightd.core.types import EventLevel, Phase
+from flightd.mission.reasons import in_words
 from flightd.mission.safety.last_resort import LastResort
 from flightd.pilot import Pilot
 from tests.sim.ideal_flight import Flown, IdealFlight
@@ -187,3 +188,10 @@ def test_whoever_fails_at_being_told_ends_no_flight_and_is_named_once() -> None:
     assert [
         message.text for topic, message in kept if topic == Topic.EVENT and message.name == "failure"
     ] == ["display: InjectedError: no display"]
+
+
+def test_the_words_for_a_failure_may_fail_too() -> None:
+    flown, _, raised_ns = fly_with(in_words.__code__, 16.4, once=False)
+    assert raised_ns
+    assert flown.phase is Phase.ABORTED
+    assert flown.truth[-1][1].height_m < 0.2

@@ -10,7 +10,6 @@ from flightd.config.mission import MissionConfig
 from flightd.core.scanning import Finding, Settled
 from flightd.core.tick import StepFailure, TickInput, TickOutput
 from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, LandedState, Phase, VehicleState
-from flightd.mission.reasons import Happened, in_words
 from flightd.mission.safety.hazard_table import ACTIONS
 from flightd.mission.triggers import Trigger
 
@@ -18,7 +17,9 @@ _T = TypeVar("_T")
 
 _GIVE_UP_NS = 60_000_000_000
 """A vehicle that nobody heard for so long is not waited for."""
-_FAILED = Trigger.STEP_FAILED
+# constants: what is answered here calls as little as possible of what may have failed
+_WHY = Trigger.STEP_FAILED.value
+_ACTION = ACTIONS[Trigger.STEP_FAILED].value
 _OVER = frozenset({Phase.DONE, Phase.ABORTED, Phase.PILOT})
 
 
@@ -82,7 +83,7 @@ class LastResort:
             setpoint=answer.setpoint,
             demand=answer.demand,
             phase=answer.phase,
-            reason=in_words(Happened(_FAILED)),
+            reason=_WHY,
             pose=None,
             tracks=None,
             events=(*_rescued(drain_events, no_events), *self._news(tick.now_ns, last.phase, answer.phase)),
@@ -113,12 +114,11 @@ class LastResort:
 
     def _news(self, now_ns: int, before: Phase, after: Phase) -> tuple[Event, ...]:
         events = []
-        why = in_words(Happened(_FAILED))
         if self.failure is not None:
             events.append(Event(now_ns, EventLevel.ERROR, "step_failed", self.failure.error))
         if after is not before:
-            events.append(Event(now_ns, EventLevel.WARNING, "hazard", f"{why}: {ACTIONS[_FAILED]}"))
-            events.append(Event(now_ns, EventLevel.WARNING, "phase", f"{before} -> {after}: {why}"))
+            events.append(Event(now_ns, EventLevel.WARNING, "hazard", f"{_WHY}: {_ACTION}"))
+            events.append(Event(now_ns, EventLevel.WARNING, "phase", f"{before} -> {after}: {_WHY}"))
         return tuple(events)
 
 
