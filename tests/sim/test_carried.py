@@ -18,7 +18,7 @@ from tests.sim.ideal_flight import Flown, IdealFlight
 CONFIGS = Path(__file__).parents[2] / "configs"
 CONFIG = load_config(CONFIGS / "sim.toml")
 DEMO = load_site(CONFIGS / "site-demo.toml")
-UNIFORM = lay_out("uniform", [Aisle("A", 0.0, 0.0, (1.5,) * 6)], [], [Pad("home", "A4", 0.5)])
+UNIFORM = lay_out("uniform", [Aisle("A", 0.0, 0.0, (1.5,) * 6)], [], [Pad("home", "A4", 0.5)], ceiling_m=6.0)
 
 
 def wrong_visits(flown: Flown, site: Site) -> list[str]:

@@ -22,6 +22,7 @@ ALIKE = parse_site(
     """
 [site]
 name = "alike"
+ceiling_m = 6.0
 
 [[aisle]]
 id = "A"

@@ -22,6 +22,7 @@ SITE = parse_site(
     """
 [site]
 name = "tall"
+ceiling_m = 6.0
 
 [[aisle]]
 id = "A"

@@ -89,6 +89,7 @@ UNIFORM = lay_out(
     [Aisle("A", 0.0, 0.0, (1.5,) * 8)],
     [],
     [Pad("home", "A4", 0.5)],
+    ceiling_m=6.0,
     markers=[Marker(3, MarkerDictionary.ARUCO_4X4_50, 6.2, 0.2)],
 )
 

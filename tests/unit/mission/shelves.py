@@ -12,6 +12,7 @@ SITE = parse_site(
     """
 [site]
 name = "shelves"
+ceiling_m = 6.0
 
 [[aisle]]
 id = "A"
