@@ -132,7 +132,7 @@ def _fly(simulation: Simulation, *, as_json: bool) -> None:
         _say(str(interrupted))
         raise typer.Exit(128 + interrupted.signal)
     if summary["verdict"] != "good":
-        raise RunError(f"a bad flight: {faults_in_words(summary['faults'])}; mission {_ending(summary)}")
+        raise RunError(f"mission {_ending(summary)}; a bad flight: {faults_in_words(summary['faults'])}")
 
 
 def _verdict(summary: dict[str, Any]) -> str:
