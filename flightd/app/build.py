@@ -111,16 +111,11 @@ def build(
         counting.read_for(pilot.places)
         front_camera = connect(config.front_camera, on_frame=counting.frame, url=peers.front_camera)
     kept = config.mission.progress if keep_progress else None
-
-    def sent(setpoint: AttitudeSetpoint, now_ns: int) -> None:
-        vision.latency.sent(now_ns)
-        recorder.record(Topic.SETPOINT, setpoint.stamp_ns, setpoint)
-
     return Flight(
         clock=clock,
         pilot=pilot,
         vehicle=vehicle,
-        setpoints=SetpointPump(vehicle, clock, sent, TICK_S),
+        setpoints=SetpointPump(vehicle, clock, _noted(vision, recorder), TICK_S),
         camera=camera,
         front_camera=front_camera,
         vision=vision,
@@ -134,6 +129,16 @@ def build(
         interlock=interlock or interlock_of(config, site, clock),
         unfit=unfit,
     )
+
+
+def _noted(vision: DetectionPipeline, recorder: Recorder) -> Callable[[AttitudeSetpoint, int], None]:
+    """What hears of each setpoint that goes out: it ends a frame's way, and is recorded."""
+
+    def sent(setpoint: AttitudeSetpoint, now_ns: int) -> None:
+        vision.latency.sent(now_ns)
+        recorder.record(Topic.SETPOINT, setpoint.stamp_ns, setpoint)
+
+    return sent
 
 
 def interlock_of(config: Config, site: Site, clock: Clock) -> Interlock:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +15,7 @@ import typer
 from flightd.core.errors import RunError
 
 if TYPE_CHECKING:
+    from flightd.app.simulation.prepare import SimOptions
     from flightd.app.simulation.simulation import Simulation
 
 EXAMPLES = """Examples:
@@ -74,17 +76,24 @@ def sim(
 
     Exit code 0 where the simulator's judge calls the flight good, else 1.  Interrupted (Ctrl-C), it leaves
     what was flown so far."""
-    from flightd.app.simulation.prepare import SimOptions, prepare
-    from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
-    from flightd.cli.scenario_sweep import fly_seeds, sweep
-    from flightd.sim.scenario.scenario import Scenario
-    from flightd.sim.scenario.scenario_files import load_scenarios
+    from flightd.app.simulation.prepare import SimOptions
 
     options = SimOptions(
         config, warehouse, seed, vehicle, speed, tuple(settings or ()), truth_url, vehicle_url
     )
     options.check()
-    every = range(seed, seed + seeds)
+    _fly_all(options, scenario or [], seeds, out, as_json=as_json)
+
+
+def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path, *, as_json: bool) -> None:
+    """One flight, one for each seed, or one for each hazard and seed, in folders of their own."""
+    from flightd.app.simulation.prepare import prepare
+    from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
+    from flightd.cli.scenario_sweep import fly_seeds, sweep
+    from flightd.sim.scenario.scenario import Scenario
+    from flightd.sim.scenario.scenario_files import load_scenarios
+
+    every = range(options.seed, options.seed + seeds)
     if scenario == ["all"]:
 
         def prepared(conditions: Scenario, name: str, seed: int) -> Simulation:
