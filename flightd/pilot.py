@@ -19,6 +19,7 @@ from flightd.core.tick import TICK_S, StepFailure, TickInput, TickOutput
 from flightd.core.tracks import TrackSet
 from flightd.core.types import (
     AttitudeSetpoint,
+    CommandKind,
     Demand,
     GridPose,
     Phase,
@@ -101,6 +102,11 @@ class Pilot:
     @property
     def mission(self) -> Mission:
         return self._mission
+
+    @property
+    def possible_commands(self) -> frozenset[CommandKind]:
+        """What an operator may order now; nothing once the mission is not stepped any more."""
+        return frozenset() if self._last_resort.given_up else self._mission.possible_commands
 
     @property
     def plan(self) -> FlightPlan:

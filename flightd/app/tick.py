@@ -100,7 +100,7 @@ class Tick:
             dropped=dropped,
             restarts={"detector": vision.replaced, "recorder": flight.recorder.restarts},
             repeated_level=flight.setpoints.stale,
-            possible=call("mission", lambda: pilot.mission.possible_commands, frozenset()),
+            possible=call("mission", lambda: pilot.possible_commands, frozenset()),
             failure=pilot.failure,
             height_goal_m=call("mission", lambda: pilot.mission.height_goal_m, 0.0),
         )

@@ -42,7 +42,7 @@ FLYING = (
 _ON_WAY = (Intent.VISIT, Intent.RETURN, Intent.HOME)
 _BACK = (Intent.RETURN, Intent.HOME)
 _ADOPTED = (Intent.ADOPTED, Intent.ADOPTED_STOP)
-"""Landed on the pad with one of these, the mission has done what it was for."""
+"""Of a vehicle found flying at a restart."""
 
 _INTENTS: Mapping[Phase, tuple[Intent, ...]] = {
     Phase.PREFLIGHT: (Intent.WAIT, Intent.VISIT),

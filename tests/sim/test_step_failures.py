@@ -24,6 +24,7 @@ from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
 from flightd.core.types import EventLevel, Phase
+from flightd.mission.guidance import Guidance, MissionInputs
 from flightd.mission.reasons import in_words
 from flightd.mission.safety.last_resort import LastResort
 from flightd.pilot import Pilot
@@ -195,3 +196,16 @@ def test_the_words_for_a_failure_may_fail_too() -> None:
     assert raised_ns
     assert flown.phase is Phase.ABORTED
     assert flown.truth[-1][1].height_m < 0.2
+
+
+def test_a_mission_that_is_given_up_takes_no_command() -> None:
+    pilot = IdealFlight(SITE, CONFIG, visits=("A2",), seed=5).pilot
+
+    def fail(_: MissionInputs) -> Guidance:
+        raise ValueError("broken")
+
+    assert pilot.possible_commands
+    pilot.mission.step = fail  # type: ignore[method-assign]
+    for now_ns in (20_000_000, 40_000_000):
+        pilot.step(TickInput(now_ns))
+    assert not pilot.possible_commands

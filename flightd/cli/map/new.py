@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,9 @@ import typer
 from flightd.cli.map.site_files import Force, write_new
 from flightd.cli.options import AsJson
 from flightd.core.errors import InputError
+
+_OVER_SHELVES_M = 1.5
+"""Of a ceiling that nobody gave: room for the drone above what it counts."""
 
 
 def register(app: typer.Typer) -> None:
@@ -36,7 +40,8 @@ def new(
     shelf_distance_m: Annotated[float, typer.Option(help="From the line to the shelf front.")] = 1.2,
     shelf_height_m: Annotated[float, typer.Option(help="Height of the shelves.")] = 3.0,
     ceiling_m: Annotated[
-        float | None, typer.Option(help="Lowest thing under the roof; to fly above 2 m it is needed.")
+        float | None,
+        typer.Option(help="Lowest thing under the roof; over racks one is assumed, and told."),
     ] = None,
     levels_m: Annotated[
         str | None, typer.Option(help="Heights of the labels, as in 0.3,1.5: adds racks with locations.")
@@ -71,6 +76,7 @@ def new(
             )
         levels = _metres("--levels-m", levels_m)
         racks = RackRow(bay_width_m, levels, positions, deck_below_label_m, pattern)
+        ceiling_m = ceiling_m or _assumed_ceiling_m(shelf_height_m, levels)
     grid = AisleGrid(
         name=name or out.stem,
         aisles=aisles,
@@ -90,6 +96,17 @@ def new(
     site = parse_site(grid.toml(), str(out))
     write_new(out, site_toml(site), force)
     print(json.dumps({"file": str(out), **site_facts(site)}) if as_json else out)
+
+
+def _assumed_ceiling_m(shelf_height_m: float, levels_m: tuple[float, ...]) -> float:
+    """A ceiling over racks for which none was given; says so."""
+    assumed_m = round(max(shelf_height_m, *levels_m) + _OVER_SHELVES_M, 2)
+    print(
+        f"flightd: --ceiling-m is not given: ceiling_m = {assumed_m:g} is assumed and written; measure the"
+        " lowest thing under the roof before anything flies there",
+        file=sys.stderr,
+    )
+    return assumed_m
 
 
 def _sides(shelves: str) -> tuple[str, ...]:

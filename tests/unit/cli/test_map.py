@@ -6,7 +6,10 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+from flightd.app.build import pilot_of
+from flightd.app.simulation.prepare import SimOptions, prepare
 from flightd.sim.random_sites import random_site
+from flightd.sim.scenario.scenario import Scenario
 from flightd.site.site_file import load_site, site_toml
 from tests.command import Command
 
@@ -58,6 +61,18 @@ def test_new_makes_a_site_that_loads(flightd: Command, tmp_path: Path) -> None:
     assert (site.name, len(site.aisles), site.aisles[0].spacing_m) == ("hall", 4, (1.4, 1.7, 1.4, 1.7))
     assert [aisle.y_m for aisle in site.aisles] == [0.0, 3.2, 6.4, 9.6]
     assert len(site.crosses) == 6
+
+
+def test_a_hall_with_high_labels_and_no_ceiling_given_gets_one_told_and_can_be_flown(
+    flightd: Command, tmp_path: Path
+) -> None:
+    hall = tmp_path / "hall.toml"
+    size = ("--aisles", "6", "--nodes", "6", "--spacing-m", "1.4,1.9,1.2,2.1", "--pitch-m", "3.2")
+    code, _, err = flightd("map", "new", hall, *size, "--levels-m", "0.4,1.3,2.2")
+    assert (code, load_site(hall).ceiling_m) == (0, 4.5)
+    assert "ceiling_m = 4.5 is assumed" in err
+    simulation = prepare(SimOptions(warehouse=str(hall)), Scenario(), tmp_path / "out", lambda _: None)
+    assert pilot_of(simulation.config, simulation.site, simulation.setting.order).plan.nodes
 
 
 def test_new_keeps_a_file_that_is_there(flightd: Command, tmp_path: Path) -> None:

@@ -204,3 +204,7 @@ class PiCamera:
         return {"SensorTimestamp": self._stamp_ns}
 
     def release(self) -> None: ...
+
+
+def test_the_demo_says_how_to_go_on() -> None:
+    assert ". .venv/bin/activate" in (ROOT / "tools" / "demo").read_text(encoding="utf-8")
