@@ -277,10 +277,15 @@ TABLE: Mapping[State, Mapping[Trigger, Outcome | None]] = {
 """What each trigger makes of each state; complete."""
 
 
+_URGENCY = {trigger: place for place, trigger in enumerate(Trigger)}
+"""The most urgent first, as they are listed."""
+
+
 def next_state(state: State, triggers: Collection[Trigger]) -> tuple[State, Trigger | None]:
     """The state that follows, and the most urgent trigger of those that begin a phase (None: none does)."""
-    for trigger in Trigger:
-        outcome = TABLE[state][trigger] if trigger in triggers else STAYS
+    row = TABLE[state]
+    for trigger in sorted(triggers, key=_URGENCY.__getitem__):
+        outcome = row[trigger]
         if outcome is not None and outcome.begins:
             return outcome.state, trigger
     return state, None

@@ -18,6 +18,8 @@ _WANTED_M, _WANTED_NS = 3.0, 8_000_000_000
 before a vehicle leaves the floor."""
 _SHARE = 0.25
 """A height that changes by less than this share of the way stands still."""
+_KEPT_EVERY_NS = 100_000_000
+"""The past is looked through at each tick: a sample in so long is enough of it."""
 
 
 class _Sample(NamedTuple):
@@ -34,17 +36,20 @@ class StuckHeight:
         self.found = False
         """Stays so until the end of the flight: what stuck once is not believed again."""
         self._samples: deque[_Sample] = deque()
+        self._last = _Sample(0, math.nan, 0.0, 0.0)
 
     def step(self, now_ns: int, height_m: float, climb_mps: float, wanted_mps: float) -> bool:
         """Take the newest height (m), climb rate and commanded climb rate (m/s, + up; NaN: not known)."""
         if math.isnan(height_m):
             self._samples.clear()
             return self.found
-        last = self._samples[-1] if self._samples else _Sample(now_ns, height_m, 0.0, 0.0)
+        last = self._last if self._samples else _Sample(now_ns, height_m, 0.0, 0.0)
         dt_s = (now_ns - last.stamp_ns) * 1e-9
         climbed_m = last.climbed_m + (0.0 if math.isnan(climb_mps) else climb_mps * dt_s)
         new = _Sample(now_ns, height_m, climbed_m, last.wanted_m + wanted_mps * dt_s)
-        self._samples.append(new)
+        self._last = new
+        if not self._samples or now_ns - self._samples[-1].stamp_ns >= _KEPT_EVERY_NS:
+            self._samples.append(new)
         while now_ns - self._samples[0].stamp_ns > _WANTED_NS:
             self._samples.popleft()
         self.found = self.found or self._stands_still(new)
