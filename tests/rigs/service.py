@@ -12,8 +12,8 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -81,8 +81,8 @@ class ServiceRig:
             lines += [f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in keys.items()), ""]
         return "\n".join(lines)
 
-    @contextmanager
-    def world(self, **parameters: float) -> Iterator[None]:
+    @asynccontextmanager
+    async def world(self, **parameters: float) -> AsyncIterator[None]:
         """The simulated vehicle, but for `parameters` as shipped, and camera, alive meanwhile."""
         context = multiprocessing.get_context("spawn")
         channel = Channel()
@@ -101,6 +101,9 @@ class ServiceRig:
         try:
             yield
         finally:
+            if self.process is not None and self.process.returncode is None:
+                self.process.kill()  # a test that failed leaves nothing behind to trouble the next one
+                await self.process.wait()
             channel.close()
             process.join(30)
             assert process.exitcode == 0

