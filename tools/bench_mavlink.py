@@ -31,7 +31,7 @@ from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
 from flightd.core.types import AttitudeSetpoint, Demand, GridPose
 from flightd.runtime.clock import LoopClock
-from flightd.sim.autopilot.link import Channel, UdpLink
+from flightd.sim.autopilot.link import MavlinkChannel, UdpLink
 
 TICK_HZ = 50
 OTHERS_HZ = 32
@@ -74,7 +74,7 @@ class Sender:
             case _:
                 return dialect.MAVLink_heartbeat_message(2, 3, 129, self._mode, 4, 3)
 
-    def _received(self, channel: Channel, message: Message) -> None:
+    def _received(self, channel: MavlinkChannel, message: Message) -> None:
         kind = message.get_type()
         if kind == "COMMAND_LONG":
             if message.command == dialect.MAV_CMD_DO_SET_MODE:

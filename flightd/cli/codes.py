@@ -41,14 +41,14 @@ def codes(
     from flightd.studies import codes as command
 
     expected = command.read_expected(labels) if labels else None
-    pages = command.read(paths)
+    pictures = command.read(paths)
     if as_json:
-        sys.stdout.write(command.as_json(list(pages), expected) + "\n")
+        sys.stdout.write(command.as_json(list(pictures), expected) + "\n")
         return
     console = stdout()
     shown = []
-    for page in pages:
-        command.print_page(page, console)
-        shown.append(page)
+    for picture in pictures:
+        command.print_picture(picture, console)
+        shown.append(picture)
     if expected is not None:
         command.print_verdict(command.compare(shown, expected), console)

@@ -12,7 +12,7 @@ import typer
 from flightd.core.errors import InputError, RunError
 
 if TYPE_CHECKING:
-    from flightd.guide.pages import Page
+    from flightd.guide.pages import GuidePage
 
 
 def register(app: typer.Typer) -> None:
@@ -68,7 +68,7 @@ def _print_list(*, as_json: bool) -> None:
         print(f"{page.topic:<16} {page.summary}")
 
 
-def _print_page(page: Page, *, as_json: bool) -> None:
+def _print_page(page: GuidePage, *, as_json: bool) -> None:
     if as_json:
         print(json.dumps(asdict(page)))
     elif sys.stdout.isatty():

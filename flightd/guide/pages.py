@@ -36,7 +36,7 @@ _HEADING = re.compile(r"^#+ ")
 
 
 @dataclass(frozen=True, slots=True)
-class Page:
+class GuidePage:
     """One page: `summary` is the sentence below its title, `text` the Markdown without its comments."""
 
     topic: str
@@ -54,14 +54,14 @@ class Hit:
     line: str
 
 
-def page(topic: str) -> Page:
+def page(topic: str) -> GuidePage:
     """The page on `topic`, one of TOPICS."""
     text = _COMMENT.sub("", (FOLDER / f"{topic}.md").read_text(encoding="utf-8"))
     title, summary, *_ = (block.strip() for block in text.split("\n\n"))
-    return Page(topic, _HEADING.sub("", title), " ".join(summary.split()), text)
+    return GuidePage(topic, _HEADING.sub("", title), " ".join(summary.split()), text)
 
 
-def pages() -> list[Page]:
+def pages() -> list[GuidePage]:
     """Every page, in reading order."""
     return [page(topic) for topic in TOPICS]
 

@@ -31,7 +31,7 @@ from flightd.mission.machine import (
 from flightd.mission.orders import StandingOrders, StartOrder
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
-from flightd.mission.reasons import Happened, Paused, Plain, Reason, Refused, StartsIn, Unfit, in_words
+from flightd.mission.reasons import Happened, Paused, Plain, Reason, StartsIn, Unfit, VehicleRefuses, in_words
 from flightd.mission.safety.hazard_monitor import DebounceTimer, FlightContext, HazardMonitor
 from flightd.mission.safety.hazard_table import ACTIONS, Action, triggers_of
 from flightd.mission.safety.readiness import not_fresh, not_ready
@@ -384,7 +384,7 @@ class Mission:
             self._cause = Plain.LANDED
         elif cause is Cause.TRIGGER:
             happened = Happened(trigger)
-            self._cause = Refused(happened, refusal) if refusal else happened
+            self._cause = VehicleRefuses(happened, refusal) if refusal else happened
         elif self.state.over and was_on_pad:
             self._cause = self._route.why_home or self._cause
         self._reason = self._cause
@@ -472,7 +472,7 @@ class Mission:
             refusal = s.vehicle.refusal if s.vehicle is not None else ""
             self._reason = self._cause
             if refusal and self._cause is not None and guidance.demand is Demand.DISARM:
-                self._reason = Refused(self._cause, refusal)
+                self._reason = VehicleRefuses(self._cause, refusal)
         return guidance
 
     def _report_unfit(self, now_ns: int, obstacle: Reason | None) -> None:

@@ -32,7 +32,7 @@ class Happened:
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class VehicleRefuses:
     """As `why`, and the vehicle says what it refuses."""
 
     why: Reason
@@ -137,7 +137,7 @@ _OfBattery: TypeAlias = StartChargeLow | ChargeUnknown | CellsLow | AwaitsBatter
 Reason: TypeAlias = (
     Plain
     | Happened
-    | Refused
+    | VehicleRefuses
     | Paused
     | StartsIn
     | Unfit
@@ -155,7 +155,7 @@ def in_words(reason: Reason) -> str:
             text = reason.value
         case Happened(trigger):
             text = trigger.value
-        case Refused(why, refusal):
+        case VehicleRefuses(why, refusal):
             text = f"{in_words(why)}: {refusal}"
         case ClockUnsure(error_s, limit_s) if math.isnan(error_s):
             text = "the vehicle does not answer about its clock (TIMESYNC)"

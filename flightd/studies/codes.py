@@ -24,7 +24,7 @@ Expected: TypeAlias = Mapping[str, frozenset[str]]
 
 
 @dataclass(frozen=True, slots=True)
-class Page:
+class ReadPicture:
     """What was read in one picture, and how long it took."""
 
     name: str
@@ -54,13 +54,13 @@ class ReadVerdict:
         return self.read / self.expected if self.expected else 1.0
 
 
-def read(paths: Sequence[Path]) -> Iterator[Page]:
+def read(paths: Sequence[Path]) -> Iterator[ReadPicture]:
     """Read every picture that `paths` mean, in order."""
     for picture in all_pictures(paths, "reading"):
         start = perf_counter()
         reads = read_codes(picture.bgr)
         ms = (perf_counter() - start) * 1e3
-        yield Page(picture.name, picture.bgr.shape[1], picture.bgr.shape[0], ms, reads)
+        yield ReadPicture(picture.name, picture.bgr.shape[1], picture.bgr.shape[0], ms, reads)
 
 
 def read_expected(path: Path) -> Expected:
@@ -84,20 +84,20 @@ def read_expected(path: Path) -> Expected:
     return {file: frozenset(those) for file, those in texts.items()}
 
 
-def compare(pages: Sequence[Page], expected: Expected) -> ReadVerdict:
+def compare(pictures: Sequence[ReadPicture], expected: Expected) -> ReadVerdict:
     """Hold the believed reads against the labels; pictures without a label are left out."""
-    told = {Path(page.name).name: page for page in pages}
+    told = {Path(picture.name).name: picture for picture in pictures}
     missed, wrong, read_count, count = [], [], 0, 0
     for file, texts in expected.items():
-        page = told.get(file)
-        if page is None:
+        picture = told.get(file)
+        if picture is None:
             raise InputError("is labelled, but not among the pictures", file=file)
-        seen = {_plain(read.text) for read in page.believed}
+        seen = {_plain(read.text) for read in picture.believed}
         count += len(texts)
         read_count += len(texts & seen)
         missed += [f"{file}: {text}" for text in sorted(texts - seen)]
         wrong += [f"{file}: {text}" for text in sorted(seen - texts)]
-    times = [page.ms for page in pages]
+    times = [picture.ms for picture in pictures]
     return ReadVerdict(count, read_count, tuple(missed), tuple(wrong), median(times) if times else 0.0)
 
 
@@ -107,17 +107,17 @@ def _plain(text: str) -> str:
     return bare[1:] if len(bare) == 13 and bare.startswith("0") and bare.isdecimal() else bare
 
 
-def as_json(pages: Sequence[Page], expected: Expected | None) -> str:
+def as_json(pictures: Sequence[ReadPicture], expected: Expected | None) -> str:
     """The one JSON document of `flightd codes --json`; corners are pixels from the top left."""
-    document: dict[str, object] = {"images": [_image(page) for page in pages]}
+    document: dict[str, object] = {"images": [_image(picture) for picture in pictures]}
     if expected is not None:
-        verdict = compare(pages, expected)
+        verdict = compare(pictures, expected)
         document["verdict"] = asdict(verdict) | {"read_part": round(verdict.read_part, 5)}
     return json.dumps(document, indent=1, ensure_ascii=False)
 
 
-def _image(page: Page) -> dict[str, object]:
-    cx, cy = (page.width_px - 1) / 2, (page.height_px - 1) / 2
+def _image(picture: ReadPicture) -> dict[str, object]:
+    cx, cy = (picture.width_px - 1) / 2, (picture.height_px - 1) / 2
     codes = [
         {
             "symbology": read.symbology,
@@ -129,23 +129,23 @@ def _image(page: Page) -> dict[str, object]:
             "gs1": dict(read.gs1),
             "gs1_problem": read.gs1_problem,
         }
-        for read in page.believed
+        for read in picture.believed
     ]
     return {
-        "path": page.name,
-        "width": page.width_px,
-        "height": page.height_px,
-        "ms": round(page.ms, 3),
+        "path": picture.name,
+        "width": picture.width_px,
+        "height": picture.height_px,
+        "ms": round(picture.ms, 3),
         "codes": codes,
-        "doubtful": len(page.reads) - len(page.believed),
+        "doubtful": len(picture.reads) - len(picture.believed),
     }
 
 
-def print_page(page: Page, console: Console) -> None:
+def print_picture(picture: ReadPicture, console: Console) -> None:
     """One picture for people."""
-    title = f"{page.name}  {page.width_px}x{page.height_px}  {page.ms:.1f} ms"
+    title = f"{picture.name}  {picture.width_px}x{picture.height_px}  {picture.ms:.1f} ms"
     console.print(title, style="bold", highlight=False, markup=False, soft_wrap=True)
-    for read in page.believed:
+    for read in picture.believed:
         how = "checksum" if read.sure else f"{read.agreeing} reads agree"
         line = f"  {read.symbology:<12} {visible(read.text)}  ({how})"
         console.print(line, highlight=False, markup=False, soft_wrap=True)
@@ -153,8 +153,8 @@ def print_page(page: Page, console: Console) -> None:
             console.print(f"    ({ai}) {value}", highlight=False, markup=False)
         if read.gs1_problem:
             console.print(f"    no valid GS1: {read.gs1_problem}", highlight=False, markup=False)
-    doubtful = len(page.reads) - len(page.believed)
-    if not page.believed:
+    doubtful = len(picture.reads) - len(picture.believed)
+    if not picture.believed:
         console.print("  no code")
     if doubtful:
         console.print(f"  {doubtful} doubtful, not told")

@@ -9,10 +9,12 @@ from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
 from flightd.inventory.comparison import compare_stock
 from flightd.inventory.expected_stock import read_stock
-from flightd.replay.report.stock import Count
+from flightd.replay.report.stock import CountedStock
 
 
-def counted_beside(log: Path, inventory: Path | None = None, expected: Path | None = None) -> Count | None:
+def counted_beside(
+    log: Path, inventory: Path | None = None, expected: Path | None = None
+) -> CountedStock | None:
     """What was counted, for the report of `log`: the inventory in `inventory`, or beside the log if there
     is one; compared with an `expected` stock.  Raises InputError when what is asked for is missing; one that
     merely lies there and cannot be read is told and left out."""
@@ -37,4 +39,4 @@ def counted_beside(log: Path, inventory: Path | None = None, expected: Path | No
         except (OSError, ValueError):
             return None
 
-    return Count(records, picture, differences)
+    return CountedStock(records, picture, differences)

@@ -21,7 +21,7 @@ from flightd.inventory.comparison import ComparisonOutcome
 from flightd.replay.report.loader import load_flight
 from flightd.replay.report.page import render
 from flightd.replay.report.racks import racks_section
-from flightd.replay.report.stock import Count, count_figures, percent
+from flightd.replay.report.stock import CountedStock, count_figures, percent
 from flightd.replay.report.stocktaking import inventory_section
 from flightd.site.site import Side, Site
 from flightd.studies.counted_stock import counted_beside
@@ -45,14 +45,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory, site: Site) -> Path:
 
 
 @pytest.fixture(scope="module")
-def count(folder: Path) -> Count:
+def count(folder: Path) -> CountedStock:
     found = counted_beside(folder / "flight.mcap", expected=folder / "stock.csv")
     assert found is not None
     return found
 
 
 @pytest.fixture(scope="module")
-def section(count: Count, site: Site) -> str:
+def section(count: CountedStock, site: Site) -> str:
     return inventory_section(count, site)
 
 
@@ -78,7 +78,7 @@ class Cells(HTMLParser):
         assert self.open.pop() == tag
 
 
-def test_every_location_is_drawn_once_in_its_state(section: str, count: Count) -> None:
+def test_every_location_is_drawn_once_in_its_state(section: str, count: CountedStock) -> None:
     cells = Cells(section)
     drawn = {code: classes for code, classes, _ in cells.places}
     assert len(drawn) == len(cells.places) == len(count.records)
@@ -86,7 +86,7 @@ def test_every_location_is_drawn_once_in_its_state(section: str, count: Count) -
     assert cells.loaded == []
 
 
-def test_places_differing_from_the_books_are_marked_and_no_others(section: str, count: Count) -> None:
+def test_places_differing_from_the_books_are_marked_and_no_others(section: str, count: CountedStock) -> None:
     marked = {code for code, classes, _ in Cells(section).places if "differs" in classes}
     wrong = [
         line
@@ -97,7 +97,9 @@ def test_places_differing_from_the_books_are_marked_and_no_others(section: str, 
     assert marked
 
 
-def test_a_place_tells_its_codes_on_hover_and_no_label_becomes_markup(section: str, count: Count) -> None:
+def test_a_place_tells_its_codes_on_hover_and_no_label_becomes_markup(
+    section: str, count: CountedStock
+) -> None:
     several = next(record for record in count.records if record.state is LocationState.SEVERAL)
     title = next(title for code, _, title in Cells(section).places if code == several.code)
     assert all(text in title for text in several.texts)
@@ -105,7 +107,9 @@ def test_a_place_tells_its_codes_on_hover_and_no_label_becomes_markup(section: s
     assert not re.search(r"BOX <\d", section)
 
 
-def test_fronts_are_drawn_as_they_are_seen_from_the_aisle(section: str, count: Count, site: Site) -> None:
+def test_fronts_are_drawn_as_they_are_seen_from_the_aisle(
+    section: str, count: CountedStock, site: Site
+) -> None:
     order = [code for code, _, _ in Cells(racks_section(count, site)).places]
     for side, rising in ((Side.LEFT, True), (Side.RIGHT, False)):
         top = [
@@ -119,7 +123,7 @@ def test_fronts_are_drawn_as_they_are_seen_from_the_aisle(section: str, count: C
     assert first == [4] * 3 + [3] * 3 + [2] * 3 + [1] * 3
 
 
-def test_the_exceptions_are_all_that_need_a_person(section: str, count: Count) -> None:
+def test_the_exceptions_are_all_that_need_a_person(section: str, count: CountedStock) -> None:
     listed = re.search(r'class="exceptions".*?</table>', section, re.DOTALL)
     assert listed is not None
     codes = re.findall(r'data-code="([^"]+)"', listed[0])
@@ -127,7 +131,7 @@ def test_the_exceptions_are_all_that_need_a_person(section: str, count: Count) -
     assert sorted(codes) == sorted(record.code for record in count.records if record.state not in calm)
 
 
-def test_differences_are_those_of_the_comparison(section: str, count: Count) -> None:
+def test_differences_are_those_of_the_comparison(section: str, count: CountedStock) -> None:
     listed = re.search(r'class="differences".*?</table>', section, re.DOTALL)
     assert listed is not None
     outcomes = Counter(re.findall(r'class="level error">([^<]+)', listed[0]))
@@ -135,7 +139,7 @@ def test_differences_are_those_of_the_comparison(section: str, count: Count) -> 
     assert outcomes == Counter({k: n for k, n in expected.items() if k not in {"match", "uncounted"}})
 
 
-def test_figures_say_what_was_counted(count: Count, site: Site) -> None:
+def test_figures_say_what_was_counted(count: CountedStock, site: Site) -> None:
     figures = {figure.label: figure for figure in count_figures(count, 1800.0)}
     states = Counter(state_of(number) for number in range(len(site.locations)))
     looked = len(site.locations) - states[LocationState.NOT_VISITED]
@@ -163,7 +167,7 @@ def data_of(section: str, name: str) -> dict[str, object]:
     return document
 
 
-def test_a_click_shows_the_evidence_picture(section: str, count: Count) -> None:
+def test_a_click_shows_the_evidence_picture(section: str, count: CountedStock) -> None:
     looks, pictures = data_of(section, "counted"), data_of(section, "pictures")
     assert set(looks) == {record.code for record in count.records}
     for record in count.records:
@@ -188,7 +192,7 @@ def test_pictures_have_a_budget_and_those_of_exceptions_come_first() -> None:
     jpeg = bytes(cv2.imencode(".jpg", noise, [cv2.IMWRITE_JPEG_QUALITY, 80])[1])
     made = records(150, LocationState.EMPTY)
     odd = Observation("r", "odd", 5, LocationState.UNREADABLE, 0.0, evidence="f" * 64)
-    page = inventory_section(Count([*made, LocationRecord("odd", "", odd)], lambda _name: jpeg), None)
+    page = inventory_section(CountedStock([*made, LocationRecord("odd", "", odd)], lambda _name: jpeg), None)
     pictures = data_of(page, "pictures")
     assert next(iter(pictures)) == "f" * 64
     assert 10 < len(pictures) < 150
@@ -197,18 +201,18 @@ def test_pictures_have_a_budget_and_those_of_exceptions_come_first() -> None:
 
 @pytest.mark.parametrize("picture", [None, b"no picture"])
 def test_evidence_that_is_gone_or_damaged_is_left_out(picture: bytes | None) -> None:
-    page = inventory_section(Count(records(2, LocationState.UNREADABLE), lambda _name: picture), None)
+    page = inventory_section(CountedStock(records(2, LocationState.UNREADABLE), lambda _name: picture), None)
     assert data_of(page, "pictures") == {}
 
 
-def test_locations_that_the_map_does_not_know_are_shown_too(count: Count, site: Site) -> None:
+def test_locations_that_the_map_does_not_know_are_shown_too(count: CountedStock, site: Site) -> None:
     stray = records(3, LocationState.EMPTY)
-    page = racks_section(Count([*count.records, *stray]), site)
+    page = racks_section(CountedStock([*count.records, *stray]), site)
     assert "Not on the map" in page
     assert len(Cells(page).places) == len(count.records) + 3
 
 
-def test_the_page_has_the_inventory_only_where_there_is_one(folder: Path, count: Count) -> None:
+def test_the_page_has_the_inventory_only_where_there_is_one(folder: Path, count: CountedStock) -> None:
     flight = load_flight(folder / "flight.mcap")
     assert 'id="counted"' in render(flight, count)
     assert 'id="counted"' not in render(flight)

@@ -17,7 +17,7 @@ _T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class DaemonConnection:
     """Where flightd listens, the two keys, and how long to wait for an answer."""
 
     host: str

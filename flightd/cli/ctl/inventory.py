@@ -6,7 +6,7 @@ import json
 
 import typer
 
-from flightd.cli.ctl.connection import Link
+from flightd.cli.ctl.connection import DaemonConnection
 from flightd.cli.options import AsJson
 
 
@@ -23,7 +23,7 @@ def inventory(context: typer.Context, as_json: AsJson = False) -> None:
       flightctl inventory
       flightctl inventory --json
     """
-    link: Link = context.obj
+    link: DaemonConnection = context.obj
     places = link.ask(lambda client: client.inventory())
     if as_json:
         print(json.dumps({"places": places}))

@@ -9,7 +9,7 @@ import typer
 
 from flightd.cli.application import application, keep_blocks, version_option
 from flightd.cli.ctl import inventory, keygen, orders, picture, protocol, status, watch
-from flightd.cli.ctl.connection import Link
+from flightd.cli.ctl.connection import DaemonConnection
 from flightd.cli.exits import run_app
 
 app = application("flightctl")
@@ -45,7 +45,7 @@ def flightctl(
       flightctl status
       flightctl --host drone-1 --key ann.key_secret --server-key drone-1.key watch
     """
-    context.obj = Link(host, status_port, command_port, key, server_key, timeout)
+    context.obj = DaemonConnection(host, status_port, command_port, key, server_key, timeout)
 
 
 keep_blocks(app)

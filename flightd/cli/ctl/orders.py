@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from flightd.cli.ctl.connection import Link
+from flightd.cli.ctl.connection import DaemonConnection
 from flightd.cli.options import AsJson
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def goto(
     _give(context.obj, "goto", node, as_json)
 
 
-def _give(link: Link, kind: str, node: str, as_json: bool) -> None:
+def _give(link: DaemonConnection, kind: str, node: str, as_json: bool) -> None:
     from flightd.adapters.ground_link.protocol import encode
     from flightd.core.types import CommandKind
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from flightd.cli.ctl.connection import Link
+from flightd.cli.ctl.connection import DaemonConnection
 from flightd.cli.options import AsJson
 from flightd.core.errors import cannot_write
 
@@ -29,7 +29,7 @@ def picture(
     Examples:
       flightctl picture now.jpg
     """
-    link: Link = context.obj
+    link: DaemonConnection = context.obj
     answer, jpeg = link.ask(lambda client: client.picture())
     try:
         out.write_bytes(jpeg)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from flightd.cli.ctl.connection import Link
+from flightd.cli.ctl.connection import DaemonConnection
 from flightd.cli.options import AsJson
 from flightd.core.errors import UnavailableError
 
@@ -30,7 +30,7 @@ def status(context: typer.Context, as_json: AsJson = False) -> None:
     """
     from flightd.adapters.ground_link.protocol import encode
 
-    link: Link = context.obj
+    link: DaemonConnection = context.obj
     report = link.ask(lambda client: client.status())
     if report is None:
         raise UnavailableError("flightd has not published a status yet", remedy="try again in a moment")

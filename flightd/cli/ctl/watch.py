@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightd.cli.ctl.connection import Link
+from flightd.cli.ctl.connection import DaemonConnection
 
 if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import GroundClient
@@ -40,5 +40,5 @@ def watch(
     async def show(client: GroundClient) -> None:
         await WatchApp(client, await client.hello(), attend).run_async()
 
-    link: Link = context.obj
+    link: DaemonConnection = context.obj
     link.ask(show)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.core.types import EventLevel, Phase
-from flightd.replay.report.flight import Array, Flight, Track
+from flightd.replay.report.flight import Array, RecordedFlight, Track
 from flightd.replay.report.markup import MINUS, clock, element, number, path_data, text, thin, ticks
 
 PHASE_TONE: dict[Phase, str] = {
@@ -82,7 +82,7 @@ class ChartStrip:
         return floor, high + missing / 2 + margin
 
 
-def strips(flight: Flight) -> tuple[ChartStrip, ...]:
+def strips(flight: RecordedFlight) -> tuple[ChartStrip, ...]:
     """The charts of a flight, top to bottom; those without data are left out."""
     estimate, truth, vehicle, setpoints = flight.estimate, flight.truth, flight.telemetry, flight.setpoints
     cross = [ChartLine("estimated", "estimate", estimate.t_s, flight.cross_track_m(estimate) * 100)]
@@ -128,7 +128,7 @@ def strips(flight: Flight) -> tuple[ChartStrip, ...]:
     return tuple(strip for strip in made if strip.has_data())
 
 
-def timeline(flight: Flight, shown: Sequence[ChartStrip]) -> str:
+def timeline(flight: RecordedFlight, shown: Sequence[ChartStrip]) -> str:
     """The phase ribbon and all strips, one below the other on one time axis."""
     if not shown:
         return element("p", "The log holds no telemetry to draw.", class_="empty")
@@ -139,7 +139,7 @@ def timeline(flight: Flight, shown: Sequence[ChartStrip]) -> str:
     return _tones(flight) + element("div", drawn, class_="timeline", data_duration=number(duration_s, 3))
 
 
-def _bands(flight: Flight) -> str:
+def _bands(flight: RecordedFlight) -> str:
     return "".join(
         f'<rect class="band {PHASE_TONE[span.phase]}" x="{number(span.start_s, 3)}" y="0" '
         f'width="{number(max(span.end_s - span.start_s, 0.0), 3)}" height="{_FULL:g}"/>'
@@ -147,7 +147,7 @@ def _bands(flight: Flight) -> str:
     )
 
 
-def _ribbon(flight: Flight, duration_s: float) -> str:
+def _ribbon(flight: RecordedFlight, duration_s: float) -> str:
     """The phases by name, above the strips, with a mark at each warning and error; names hide where
     there is no room."""
     blocks = "".join(
@@ -183,7 +183,7 @@ def _ribbon(flight: Flight, duration_s: float) -> str:
     )
 
 
-def _tones(flight: Flight) -> str:
+def _tones(flight: RecordedFlight) -> str:
     """The legend of the bands: each colour with the phases it stands for."""
     names: dict[str, list[str]] = {}
     for phase in Phase:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.core.types import Phase
-from flightd.replay.report.flight import Array, Flight, Track
+from flightd.replay.report.flight import Array, RecordedFlight, Track
 from flightd.replay.report.markup import clock, number
 
 
@@ -37,7 +37,7 @@ class Figure:
     tone: str = ""
 
 
-def outcome(flight: Flight) -> FlightOutcome:
+def outcome(flight: RecordedFlight) -> FlightOutcome:
     """How the mission ended, by the summary or else by the last status."""
     mission, reason = flight.summary.get("mission"), str(flight.summary.get("reason") or "")
     last = flight.last_status
@@ -52,7 +52,7 @@ def outcome(flight: Flight) -> FlightOutcome:
     )
 
 
-def key_figures(flight: Flight) -> tuple[Figure, ...]:
+def key_figures(flight: RecordedFlight) -> tuple[Figure, ...]:
     """The tiles at the top of the page, only those that can be given."""
     made = (
         _nodes(flight),
@@ -81,7 +81,7 @@ def _centimetres(value_m: float) -> str:
     return number(value_m * 100, 1)
 
 
-def _nodes(flight: Flight) -> Figure | None:
+def _nodes(flight: RecordedFlight) -> Figure | None:
     visited, planned = _number(flight.summary, "nodes_visited"), _number(flight.summary, "nodes_planned")
     last = flight.last_status
     if visited is None and last is not None:
@@ -97,7 +97,7 @@ def _nodes(flight: Flight) -> Figure | None:
     )
 
 
-def _cross_track(flight: Flight) -> Figure | None:
+def _cross_track(flight: RecordedFlight) -> Figure | None:
     rms_m, note = _number(flight.summary, "cross_track_rms_m"), "RMS, true"
     if rms_m is None:
         track, note = (
@@ -111,7 +111,7 @@ def _cross_track(flight: Flight) -> Figure | None:
     return Figure("Cross-track", _centimetres(rms_m), "cm", note)
 
 
-def _hover(flight: Flight) -> Figure | None:
+def _hover(flight: RecordedFlight) -> Figure | None:
     p95_m, note = _number(flight.summary, "hover_error_p95_m"), "p95 at the nodes, true"
     if p95_m is None:
         errors = [visit.true_error_m for visit in flight.visits if math.isfinite(visit.true_error_m)]
@@ -127,7 +127,7 @@ def _hover(flight: Flight) -> Figure | None:
     return Figure("Hover error", _centimetres(p95_m), "cm", note)
 
 
-def _position(flight: Flight) -> Figure | None:
+def _position(flight: RecordedFlight) -> Figure | None:
     """How far the drone was from where it thought it was."""
     if flight.truth is None:
         return None
@@ -142,7 +142,7 @@ def _position(flight: Flight) -> Figure | None:
     return Figure("Position error", _centimetres(float(np.percentile(error_m, 95))), "cm", note)
 
 
-def _smoothing(flight: Flight) -> Figure | None:
+def _smoothing(flight: RecordedFlight) -> Figure | None:
     """How far the drone believed itself from where the whole flight says that it was."""
     if not isinstance(flight.smoothed, Track):
         return None
@@ -153,7 +153,7 @@ def _smoothing(flight: Flight) -> Figure | None:
     return Figure("Live pose", _centimetres(rms_m), "cm", "RMS, believed against smoothed")
 
 
-def _apart_m(flight: Flight, track: Track, other: Track) -> Array:
+def _apart_m(flight: RecordedFlight, track: Track, other: Track) -> Array:
     """Horizontal distances between two tracks in flight, where both are known."""
     x, y = other.at(track.t_s)
     apart_m = np.hypot(track.x_m - x, track.y_m - y)[flight.flying(track.t_s)]
@@ -161,7 +161,7 @@ def _apart_m(flight: Flight, track: Track, other: Track) -> Array:
     return known
 
 
-def _landing(flight: Flight) -> Figure | None:
+def _landing(flight: RecordedFlight) -> Figure | None:
     error_m = _number(flight.summary, "landed_error_m")
     return (
         None
@@ -179,7 +179,7 @@ def _codes(summary: Mapping[str, object]) -> Figure | None:
     return Figure("Codes read", number(read), f"of {number(expected)}", f"{number(wrong)} wrong", tone)
 
 
-def flight_time_s(flight: Flight) -> float | None:
+def flight_time_s(flight: RecordedFlight) -> float | None:
     """Time in the air, by the summary or else by the phases; None when it never flew."""
     seconds = _number(flight.summary, "flight_time_s")
     if seconds is None:
@@ -188,7 +188,7 @@ def flight_time_s(flight: Flight) -> float | None:
     return seconds
 
 
-def _flight_time(flight: Flight) -> Figure | None:
+def _flight_time(flight: RecordedFlight) -> Figure | None:
     seconds = flight_time_s(flight)
     return None if seconds is None else Figure("Flight time", clock(seconds), "min")
 
@@ -196,7 +196,7 @@ def _flight_time(flight: Flight) -> Figure | None:
 _ON_GROUND = frozenset({Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.DONE, Phase.ABORTED})
 
 
-def _latency(flight: Flight) -> Figure | None:
+def _latency(flight: RecordedFlight) -> Figure | None:
     told = flight.summary.get("latency_ms")
     if isinstance(told, dict) and (p99 := _number(told, "p99")) is not None:
         p50 = _number(told, "p50")
@@ -209,7 +209,7 @@ def _latency(flight: Flight) -> Figure | None:
     return Figure("Latency", number(p99, 1), "ms", note)
 
 
-def _frames(flight: Flight) -> Figure | None:
+def _frames(flight: RecordedFlight) -> Figure | None:
     frames, dropped = _number(flight.summary, "frames"), _number(flight.summary, "frames_dropped")
     last = flight.last_status
     if frames is None and last is not None:
@@ -220,7 +220,7 @@ def _frames(flight: Flight) -> Figure | None:
     return Figure("Frames", f"{frames:,.0f}".replace(",", "\u202f"), "", note)
 
 
-def _battery(flight: Flight) -> Figure | None:
+def _battery(flight: RecordedFlight) -> Figure | None:
     charge = flight.telemetry.battery_frac[np.isfinite(flight.telemetry.battery_frac)]
     if not len(charge):
         return None

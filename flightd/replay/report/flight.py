@@ -113,7 +113,7 @@ class Latency:
 
 
 @dataclass(frozen=True, slots=True)
-class Flight:
+class RecordedFlight:
     """A flight as the report shows it.  `truth` and `summary` are there if their files are; `smoothed` is the
     estimate judged afterwards, or why there is none."""
 

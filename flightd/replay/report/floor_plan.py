@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from flightd.replay.report.flight import Array, Flight, Track
+from flightd.replay.report.flight import Array, RecordedFlight, Track
 from flightd.replay.report.markup import element, number, path_data, text
 from flightd.site.site import Shelf, Side, Site
 
@@ -47,7 +47,7 @@ class _Projection:
         return (x_m - self._x_min) * self.scale, (y_m - self._y_min) * self.scale
 
 
-def floor_plan(flight: Flight) -> str:
+def floor_plan(flight: RecordedFlight) -> str:
     """The plan as a figure; a sentence where there is neither a map nor a track."""
     bounds = _bounds(flight)
     if bounds is None:
@@ -72,7 +72,7 @@ def floor_plan(flight: Flight) -> str:
     return element("figure", element("div", drawing, class_="scroll"), _caption(flight), class_="floor")
 
 
-def _bounds(flight: Flight) -> tuple[float, float, float, float] | None:
+def _bounds(flight: RecordedFlight) -> tuple[float, float, float, float] | None:
     boxes = []
     if flight.site is not None:
         x0, y0, x1, y1 = flight.site.bounds()
@@ -130,7 +130,7 @@ def _square(name: str, x: float, y: float, size: float) -> str:
     )
 
 
-def _track(track: Track, place: _Projection, role: str, flight: Flight) -> str:
+def _track(track: Track, place: _Projection, role: str, flight: RecordedFlight) -> str:
     if not len(track.t_s):
         return ""
     chosen = np.unique(np.linspace(0, len(track.t_s) - 1, min(_POINTS, len(track.t_s))).astype(int))
@@ -140,7 +140,7 @@ def _track(track: Track, place: _Projection, role: str, flight: Flight) -> str:
     return f'<path class="flown {role}" d="{path_data(x, y, 1)}" data-times="{times}"/>{arrows}'
 
 
-def _arrows(track: Track, place: _Projection, flight: Flight) -> str:
+def _arrows(track: Track, place: _Projection, flight: RecordedFlight) -> str:
     """A chevron halfway between two stops, pointing where the drone went."""
     arrows = []
     for before, after in itertools.pairwise(flight.visits):
@@ -159,7 +159,7 @@ def _arrows(track: Track, place: _Projection, flight: Flight) -> str:
     return "".join(arrows)
 
 
-def _nodes(site: Site, flight: Flight, place: _Projection) -> str:
+def _nodes(site: Site, flight: RecordedFlight, place: _Projection) -> str:
     visited = {visit.node for visit in flight.visits}
     spacing = min((site.distance_m(edge.a, edge.b) for edge in site.edges), default=1.0) * place.scale
     named = spacing >= _NAMED_SPACING
@@ -178,7 +178,7 @@ def _nodes(site: Site, flight: Flight, place: _Projection) -> str:
     return "".join(marks)
 
 
-def _visits(flight: Flight, site: Site, place: _Projection) -> str:
+def _visits(flight: RecordedFlight, site: Site, place: _Projection) -> str:
     """The order of the stops, below each node that was visited."""
     orders: dict[str, list[str]] = {}
     for visit in flight.visits:
@@ -201,7 +201,7 @@ def _label(kind: str, x: float, y: float, label: str) -> str:
     return f'<text class="{kind}" x="{number(x)}" y="{number(y)}">{text(label)}</text>'
 
 
-def _caption(flight: Flight) -> str:
+def _caption(flight: RecordedFlight) -> str:
     keys: Iterable[tuple[str, str]] = [("estimate", "where it thought it was")]
     if flight.truth is not None:
         keys = [("truth", "where it was"), *keys]

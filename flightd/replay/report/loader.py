@@ -1,4 +1,4 @@
-"""Make a `Flight` of a log and of what lies beside it."""
+"""Make a `RecordedFlight` of a log and of what lies beside it."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from flightd.replay.log import FlightLog, read_log
 from flightd.replay.report.flight import (
     NS_PER_S,
     Array,
-    Flight,
     Latency,
     PhaseSpan,
+    RecordedFlight,
     Setpoints,
     Summary,
     TelemetrySeries,
@@ -37,7 +37,7 @@ _SHORTEST_STOP_S = 0.2
 _AT_STOP = {Phase.HOVER, Phase.CLIMB, Phase.SCAN}
 
 
-def load_flight(path: Path) -> Flight:
+def load_flight(path: Path) -> RecordedFlight:
     """Read a log, and `truth.mcap` and `summary.json` if they lie beside it.  Raises InputError."""
     log = read_log(path, FOR_PEOPLE)
     truths = _truth_messages(path.with_name("truth.mcap"))
@@ -53,7 +53,7 @@ def load_flight(path: Path) -> Flight:
     truth = _truth(truths, seconds) if truths else None
     site, map_error = _site(log)
     phases = tuple(_phase_spans(statuses, start_ns))
-    return Flight(
+    return RecordedFlight(
         log=log,
         start_ns=start_ns,
         duration_s=max(0.0, (end_ns - start_ns) / NS_PER_S),

@@ -12,13 +12,13 @@ from flightd import __version__
 from flightd.core.errors import UnavailableError
 from flightd.replay.report.charts import strips, timeline
 from flightd.replay.report.figures import Figure, flight_time_s, key_figures, outcome
-from flightd.replay.report.flight import Flight
+from flightd.replay.report.flight import RecordedFlight
 from flightd.replay.report.floor_plan import floor_plan
 from flightd.replay.report.latency import latency_section
 from flightd.replay.report.loader import load_flight
 from flightd.replay.report.markup import NOTHING, clock, element, number, table, text
 from flightd.replay.report.pictures import frames_section
-from flightd.replay.report.stock import Count, count_figures
+from flightd.replay.report.stock import CountedStock, count_figures
 from flightd.replay.report.stocktaking import inventory_section
 
 _EVENTS_SHOWN = 400
@@ -27,7 +27,7 @@ _STOPS_OPEN = 16
 """More stops than this are folded away."""
 
 
-def write_report(log: Path, out: Path, count: Count | None = None) -> None:
+def write_report(log: Path, out: Path, count: CountedStock | None = None) -> None:
     """Write the report of `log` to `out`, with `truth.mcap` and `summary.json` if they lie beside it, and
     with what was counted.
 
@@ -40,7 +40,7 @@ def write_report(log: Path, out: Path, count: Count | None = None) -> None:
         raise UnavailableError(f"{out}: cannot write the report: {err.strerror}") from None
 
 
-def render(flight: Flight, count: Count | None = None) -> str:
+def render(flight: RecordedFlight, count: CountedStock | None = None) -> str:
     """The report as HTML text."""
     ending = outcome(flight)
     figures = (*(count_figures(count, flight_time_s(flight)) if count else ()), *key_figures(flight))
@@ -71,11 +71,11 @@ def _file(name: str) -> str:
     return resources.files("flightd.replay.report").joinpath(name).read_text(encoding="utf-8")
 
 
-def _site_name(flight: Flight) -> str:
+def _site_name(flight: RecordedFlight) -> str:
     return flight.site.name if flight.site is not None else flight.log.path.name
 
 
-def _facts(flight: Flight) -> str:
+def _facts(flight: RecordedFlight) -> str:
     """The line under the headline: when, with what, how long, and what is wrong with the log."""
     metadata = flight.log.metadata
     facts = [
@@ -109,7 +109,7 @@ def _tile(figure: Figure) -> str:
     )
 
 
-def _visits(flight: Flight) -> str:
+def _visits(flight: RecordedFlight) -> str:
     if not flight.visits:
         return ""
     has_truth = any(math.isfinite(visit.true_error_m) for visit in flight.visits)
@@ -132,7 +132,7 @@ def _centimetres(value_m: float) -> str:
     return f"{value_m * 100:.1f} cm" if math.isfinite(value_m) else NOTHING
 
 
-def _events(flight: Flight) -> str:
+def _events(flight: RecordedFlight) -> str:
     if not flight.events:
         return element("p", "Nothing was reported.", class_="empty")
     rows = [
@@ -151,7 +151,7 @@ def _events(flight: Flight) -> str:
     return shown + (element("p", f"{missing} more in the log.", class_="note") if missing > 0 else "")
 
 
-def _summary(flight: Flight) -> str:
+def _summary(flight: RecordedFlight) -> str:
     """Every field of summary.json, as it stands there."""
     if not flight.summary:
         return ""
@@ -170,7 +170,7 @@ def _plain(value: object) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def _documents(flight: Flight) -> str:
+def _documents(flight: RecordedFlight) -> str:
     if not flight.config.strip():
         return ""
     return element("details", element("summary", "Configuration"), element("pre", text(flight.config)))

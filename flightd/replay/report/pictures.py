@@ -11,7 +11,7 @@ import numpy as np
 from flightd.core.topics import RecordedFrame, Topic
 from flightd.core.types import LineKind, LineSet
 from flightd.replay.log import LogReader
-from flightd.replay.report.flight import FLYING, Flight
+from flightd.replay.report.flight import FLYING, RecordedFlight
 from flightd.replay.report.markup import clock, element, number, text
 
 _SHOWN = 6
@@ -19,7 +19,7 @@ _WIDEST_PX = 960
 _QUALITY = 82
 
 
-def frames_section(flight: Flight) -> str:
+def frames_section(flight: RecordedFlight) -> str:
     """Up to six pictures spread over the flight; a sentence where none were recorded."""
     pictures = _chosen(flight)
     if not pictures:
@@ -27,7 +27,7 @@ def frames_section(flight: Flight) -> str:
     return element("div", *(_figure(flight, picture) for picture in pictures), class_="frames")
 
 
-def _chosen(flight: Flight) -> list[RecordedFrame]:
+def _chosen(flight: RecordedFlight) -> list[RecordedFrame]:
     """Pictures at times spread evenly over the flying phases (over all, if there are none)."""
     reader = LogReader(flight.log.path)
     stamps = [entry.stamp_ns for entry in reader.entries({Topic.FRAME})]
@@ -48,7 +48,7 @@ def _chosen(flight: Flight) -> list[RecordedFrame]:
     return [kept[stamp] for stamp in sorted(kept)]
 
 
-def _figure(flight: Flight, picture: RecordedFrame) -> str:
+def _figure(flight: RecordedFlight, picture: RecordedFrame) -> str:
     shown = _embedded(picture.jpeg)
     if shown is None:
         return ""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from flightd.core.inventory import LocationRecord, LocationState
 from flightd.replay.report.markup import element, text
-from flightd.replay.report.stock import Count
+from flightd.replay.report.stock import CountedStock
 from flightd.site.site import Location, Side, Site
 
 _HALF_COLUMNS = 30
@@ -23,7 +23,7 @@ STATE_NAMES = {
 }
 
 
-def racks_section(count: Count, site: Site | None) -> str:
+def racks_section(count: CountedStock, site: Site | None) -> str:
     """One front for each side of each aisle, and a list of what the map does not know."""
     records = {record.code: record for record in count.records}
     outcomes = {code: outcome.value for code, outcome in count.outcomes().items()}
@@ -39,7 +39,7 @@ def racks_section(count: Count, site: Site | None) -> str:
     return _legend(count) + element("div", *drawn, class_="racks")
 
 
-def _legend(count: Count) -> str:
+def _legend(count: CountedStock) -> str:
     states = count.states()
     keys = [
         element(

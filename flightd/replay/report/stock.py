@@ -22,7 +22,7 @@ def no_picture(_name: str) -> bytes | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Count:
+class CountedStock:
     """Every location as it stands, the evidence picture (JPEG) of a name, and the comparison with the
     expected stock (None where there was none to compare with)."""
 
@@ -44,7 +44,7 @@ class Count:
         return found
 
 
-def count_figures(count: Count, flight_s: float | None) -> tuple[Figure, ...]:
+def count_figures(count: CountedStock, flight_s: float | None) -> tuple[Figure, ...]:
     """Coverage, read rate, pace, confidence and agreement with the books, as far as they can be given.
 
     `flight_s` is the time in the air, for the pace of the newest run alone.
@@ -66,7 +66,7 @@ def percent(part: int, whole: int) -> str:
     return number(max(shown, 0.1) if part else 0.0, 1)
 
 
-def _coverage(count: Count) -> Figure:
+def _coverage(count: CountedStock) -> Figure:
     states, whole = count.states(), len(count.records)
     looked = whole - states[LocationState.NOT_VISITED]
     if not whole:
@@ -75,7 +75,7 @@ def _coverage(count: Count) -> Figure:
     return Figure("Coverage", percent(looked, whole), "%", note, "good" if looked == whole else "bad")
 
 
-def _read_rate(count: Count) -> Figure | None:
+def _read_rate(count: CountedStock) -> Figure | None:
     states = count.states()
     read = states[LocationState.READ] + states[LocationState.SEVERAL]
     labels = read + states[LocationState.UNREADABLE]
@@ -84,7 +84,7 @@ def _read_rate(count: Count) -> Figure | None:
     return Figure("Read rate", percent(read, labels), "%", f"{read:,} of {labels:,} labels seen")
 
 
-def _pace(count: Count, flight_s: float | None) -> Figure | None:
+def _pace(count: CountedStock, flight_s: float | None) -> Figure | None:
     seen = [record.observation for record in count.records if record.observation]
     if not seen or not flight_s:
         return None
@@ -94,7 +94,7 @@ def _pace(count: Count, flight_s: float | None) -> Figure | None:
     return Figure("Pace", f"{looked * 3600 / flight_s:,.0f}", "locations/h", note)
 
 
-def _confidence(count: Count) -> Figure | None:
+def _confidence(count: CountedStock) -> Figure | None:
     sure = [
         (record.observation.confidence, record.code)
         for record in count.records
@@ -108,7 +108,7 @@ def _confidence(count: Count) -> Figure | None:
     return Figure("Confidence", number(shown, 1), "%", f"least {least:.0%} at {where}")
 
 
-def _books(count: Count) -> Figure | None:
+def _books(count: CountedStock) -> Figure | None:
     if count.differences is None:
         return None
     wrong = sum(line.outcome not in SETTLED for line in count.differences)

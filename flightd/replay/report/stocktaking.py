@@ -14,7 +14,7 @@ from flightd.core.inventory import LocationRecord, LocationState
 from flightd.inventory.comparison import ComparisonOutcome
 from flightd.replay.report.markup import NOTHING, element, table, text
 from flightd.replay.report.racks import STATE_NAMES, racks_section
-from flightd.replay.report.stock import SETTLED, Count
+from flightd.replay.report.stock import SETTLED, CountedStock
 from flightd.site.site import Site
 
 _PICTURES_BYTES = 12_000_000
@@ -37,7 +37,7 @@ _REMEDIES = {
 }
 
 
-def inventory_section(count: Count, site: Site | None) -> str:
+def inventory_section(count: CountedStock, site: Site | None) -> str:
     """Racks, exceptions and differences, with the data that a click shows."""
     parts = [
         element("h2", "Racks"),
@@ -52,7 +52,7 @@ def inventory_section(count: Count, site: Site | None) -> str:
     return element("section", *parts, class_="wide inventory") + dialog + _data(count)
 
 
-def _exceptions(count: Count) -> str:
+def _exceptions(count: CountedStock) -> str:
     found = [record for state in _ORDER for record in count.records if record.state is state]
     if not found:
         return element("p", "None: every location was counted, each with one code or empty.", class_="empty")
@@ -74,7 +74,7 @@ def _exception(record: LocationRecord) -> str:
     return element("tr", *cells, data_code=record.code)
 
 
-def _differences(count: Count) -> str:
+def _differences(count: CountedStock) -> str:
     wrong = [line for line in count.differences or () if line.outcome not in SETTLED]
     unknown = sum(line.outcome is ComparisonOutcome.UNCOUNTED for line in count.differences or ())
     note = (
@@ -116,7 +116,7 @@ def _when(utc_ns: int) -> str:
 # What a click shows
 
 
-def _data(count: Count) -> str:
+def _data(count: CountedStock) -> str:
     outcomes = {code: outcome.value.replace("_", " ") for code, outcome in count.outcomes().items()}
     looks = {record.code: _look(record, outcomes.get(record.code, "")) for record in count.records}
     return _block("counted", looks) + _block("pictures", _pictures(count, outcomes))
@@ -144,7 +144,7 @@ def _look(record: LocationRecord, outcome: str) -> dict[str, object]:
     return look
 
 
-def _pictures(count: Count, outcomes: Mapping[str, str]) -> dict[str, str]:
+def _pictures(count: CountedStock, outcomes: Mapping[str, str]) -> dict[str, str]:
     """Small JPEGs in base64 by name, as many as the page may carry; what needs a look comes first."""
 
     def calm(record: LocationRecord) -> bool:

@@ -105,10 +105,10 @@ class ArDroneServer:
         loop = asyncio.get_running_loop()
         host = self.ports.host
         self._at, _ = await loop.create_datagram_endpoint(
-            lambda: _Receiver(self._command), local_addr=(host, self.ports.at)
+            lambda: _PortReceiver(self._command), local_addr=(host, self.ports.at)
         )
         self._navdata, _ = await loop.create_datagram_endpoint(
-            lambda: _Receiver(self._wake), local_addr=(host, self.ports.navdata)
+            lambda: _PortReceiver(self._wake), local_addr=(host, self.ports.navdata)
         )
         video = await asyncio.start_server(self._handled(self._watch_video), host, self.ports.video)
         control = await asyncio.start_server(
@@ -269,7 +269,7 @@ class _Stream:
         return self._packer.pack(units, timestamp_ms)
 
 
-class _Receiver(asyncio.DatagramProtocol):
+class _PortReceiver(asyncio.DatagramProtocol):
     def __init__(self, receive: Any) -> None:
         self._receive = receive
 

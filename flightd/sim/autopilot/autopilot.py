@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.ports import Clock
 from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
-from flightd.sim.autopilot.link import Address, Channel, Message, UdpLink
+from flightd.sim.autopilot.link import Address, MavlinkChannel, Message, UdpLink
 from flightd.sim.autopilot.parameters import ParameterServer
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.autopilot.streams import HEARTBEAT_ID, MessageStreams, whole
@@ -340,14 +340,14 @@ class AutopilotPeer(abc.ABC):
         self.instruments.boot_ms = self.boot_clock_ns(now_ns) // _NS_PER_MS % _BOOT_WRAP_MS
         self.instruments.healthy = self.is_ready
 
-    def _greet(self, channel: Channel, now_ns: int) -> None:
+    def _greet(self, channel: MavlinkChannel, now_ns: int) -> None:
         """Begin what everybody gets."""
         if not channel.greeted:
             channel.greeted = True
             for message_id, period_ns in self.unasked_ns.items():
                 channel.stream(message_id, period_ns, now_ns)
 
-    def received(self, channel: Channel, message: Message) -> None:
+    def received(self, channel: MavlinkChannel, message: Message) -> None:
         """Take a message that came in by `channel`."""
         now_ns = self._clock.now_ns()
         self.advance(now_ns)
@@ -378,7 +378,7 @@ class AutopilotPeer(abc.ABC):
             case _:
                 pass
 
-    def _answer(self, channel: Channel, message: Message, now_ns: int) -> None:
+    def _answer(self, channel: MavlinkChannel, message: Message, now_ns: int) -> None:
         params = tuple(float(getattr(message, f"param{i}")) for i in range(1, 8))
         match message.command:
             case dialect.MAV_CMD_SET_MESSAGE_INTERVAL:

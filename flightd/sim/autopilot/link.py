@@ -17,7 +17,7 @@ Message: TypeAlias = Any
 _CHANNELS_MAX = 8
 
 
-class Channel:
+class MavlinkChannel:
     """One peer address: its own sequence numbers and message intervals, as an autopilot's serial port."""
 
     def __init__(self, address: Address, system_id: int, component_id: int, key: bytes | None = None) -> None:
@@ -61,7 +61,7 @@ class UdpLink(asyncio.DatagramProtocol):
         self,
         system_id: int,
         component_id: int,
-        received: Callable[[Channel, Message], None],
+        received: Callable[[MavlinkChannel, Message], None],
         key: bytes | None = None,
         seed: int = 0,
     ) -> None:
@@ -76,7 +76,7 @@ class UdpLink(asyncio.DatagramProtocol):
         self._parser.signing.secret_key = key
         self._key = key
         self._transport: asyncio.DatagramTransport | None = None
-        self.channels: dict[Address, Channel] = {}
+        self.channels: dict[Address, MavlinkChannel] = {}
         self.muted = False
         """A cut cable: nothing goes out, nothing comes in."""
         self.withheld: set[int] = set()
@@ -102,16 +102,16 @@ class UdpLink(asyncio.DatagramProtocol):
             self._transport.close()
             self._transport = None
 
-    def channel(self, address: Address) -> Channel | None:
+    def channel(self, address: Address) -> MavlinkChannel | None:
         """The channel of that address, made at its first use; None when too many have spoken."""
         channel = self.channels.get(address)
         if channel is None and len(self.channels) < _CHANNELS_MAX:
-            channel = self.channels[address] = Channel(
+            channel = self.channels[address] = MavlinkChannel(
                 address, self._system_id, self._component_id, self._key
             )
         return channel
 
-    def send(self, channel: Channel, message: Message) -> None:
+    def send(self, channel: MavlinkChannel, message: Message) -> None:
         if self._transport is not None and not self.muted and message.get_msgId() not in self.withheld:
             frame = channel.pack(message, self._parser.signing.timestamp)
             self.down.carry(lambda: self.transmit(frame, channel.address))

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.sim.autopilot.link import Channel, Message, UdpLink
+from flightd.sim.autopilot.link import MavlinkChannel, Message, UdpLink
 from flightd.sim.autopilot.telemetry import DATA_STREAMS
 
 HEARTBEAT_ID = dialect.MAVLINK_MSG_ID_HEARTBEAT
@@ -62,7 +62,7 @@ class MessageStreams:
             due_ns = min(due_ns, *channel.due_ns.values()) if channel.due_ns else due_ns
         return max(due_ns, now_ns + self._step_ns)
 
-    def set_interval(self, channel: Channel, message_id: float, period_us: float, now_ns: int) -> int:
+    def set_interval(self, channel: MavlinkChannel, message_id: float, period_us: float, now_ns: int) -> int:
         """SET_MESSAGE_INTERVAL; the MAV_RESULT."""
         wanted, period = whole(message_id), whole(period_us)
         if not self._source.knows(wanted):
@@ -70,7 +70,7 @@ class MessageStreams:
         channel.stream(wanted, 0 if period <= 0 else max(period * 1000, self._step_ns), now_ns)
         return int(dialect.MAV_RESULT_ACCEPTED)
 
-    def send_now(self, channel: Channel, message_id: float) -> int:
+    def send_now(self, channel: MavlinkChannel, message_id: float) -> int:
         """REQUEST_MESSAGE; the MAV_RESULT."""
         wanted = whole(message_id)
         if not self._source.knows(wanted):
@@ -78,12 +78,12 @@ class MessageStreams:
         self._send(channel, wanted)
         return int(dialect.MAV_RESULT_ACCEPTED)
 
-    def _send(self, channel: Channel, message_id: int) -> None:
+    def _send(self, channel: MavlinkChannel, message_id: int) -> None:
         for message in self._source.messages(message_id):
             self._link.send(channel, message)
 
     @staticmethod
-    def set_data_stream(channel: Channel, request: Message, now_ns: int) -> None:
+    def set_data_stream(channel: MavlinkChannel, request: Message, now_ns: int) -> None:
         """REQUEST_DATA_STREAM, the old way to ask for groups of messages."""
         rate_hz = request.req_message_rate if request.start_stop else 0
         period_ns = 1_000_000_000 // rate_hz if rate_hz else 0

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flightd.sim.judge.motion import Motion, Values
+from flightd.sim.judge.motion import TrueMotion, Values
 from flightd.site.site import Shelf, Site
 from flightd.site.ways import KeepOut
 
@@ -34,7 +34,7 @@ class Clearance:
         return float(self.free_m.min())
 
 
-def clearances(site: Site, motion: Motion) -> list[Clearance]:
+def clearances(site: Site, motion: TrueMotion) -> list[Clearance]:
     """The free distances to racks, ceiling and keep-outs, where the site has any.  Empty without motion."""
     if not len(motion):
         return []
@@ -49,7 +49,7 @@ def clearances(site: Site, motion: Motion) -> list[Clearance]:
     return found
 
 
-def _to_racks(shelves: Sequence[Shelf], motion: Motion) -> Iterator[Values]:
+def _to_racks(shelves: Sequence[Shelf], motion: TrueMotion) -> Iterator[Values]:
     """To each shelf front, which stands from the floor to its height."""
     for shelf in shelves:
         dx = np.maximum(np.maximum(shelf.x0_m - motion.x_m, motion.x_m - shelf.x1_m), 0.0)
@@ -57,7 +57,7 @@ def _to_racks(shelves: Sequence[Shelf], motion: Motion) -> Iterator[Values]:
         yield _free(beside, motion.height_m - BODY_HALF_HEIGHT_M - shelf.height_m)
 
 
-def _to_keep_outs(areas: Sequence[KeepOut], motion: Motion) -> Iterator[Values]:
+def _to_keep_outs(areas: Sequence[KeepOut], motion: TrueMotion) -> Iterator[Values]:
     for area in areas:
         dx = np.maximum(np.maximum(area.x0_m - motion.x_m, motion.x_m - area.x1_m), 0.0)
         dy = np.maximum(np.maximum(area.y0_m - motion.y_m, motion.y_m - area.y1_m), 0.0)

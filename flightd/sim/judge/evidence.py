@@ -10,7 +10,7 @@ from functools import cached_property
 
 from flightd.core.types import Event, Phase, Status
 from flightd.mission.plan.flight_plan import FlightPlan
-from flightd.sim.judge.motion import Motion
+from flightd.sim.judge.motion import TrueMotion
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
 from flightd.site.site import Site
 
@@ -42,12 +42,12 @@ class FlightEvidence:
         return self.handed_over_ns < math.inf
 
     @cached_property
-    def motion(self) -> Motion:
+    def motion(self) -> TrueMotion:
         """The motion for which the daemon answers, until it handed over."""
-        return Motion.of([t for t in self.truth if t.stamp_ns < self.handed_over_ns])
+        return TrueMotion.of([t for t in self.truth if t.stamp_ns < self.handed_over_ns])
 
     @cached_property
-    def in_air(self) -> Motion:
+    def in_air(self) -> TrueMotion:
         """The part of it off the floor."""
         return self.motion.chosen(self.motion.flying)
 

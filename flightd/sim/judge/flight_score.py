@@ -19,7 +19,7 @@ from flightd.core.types import Event, EventLevel, Phase
 from flightd.sim.judge.clearance import clearances
 from flightd.sim.judge.evidence import FlightEvidence
 from flightd.sim.judge.meant_leg import off_leg
-from flightd.sim.judge.motion import OFF_FLOOR_M, Motion, Values
+from flightd.sim.judge.motion import OFF_FLOOR_M, TrueMotion, Values
 
 _AT_NODE_M = 0.5
 """A node counts as visited rightly when the drone was within this of it (less than half a cell)."""
@@ -164,7 +164,7 @@ def _stops_at(flight: FlightEvidence, stamp_s: float) -> bool:
     return flight.phase_at(round(stamp_s * 1e9)) in _AT_STOP
 
 
-def _flight_time_s(motion: Motion) -> float:
+def _flight_time_s(motion: TrueMotion) -> float:
     """Time off the floor, in all sorties together."""
     both = np.minimum(motion.height_m[1:], motion.height_m[:-1]) > OFF_FLOOR_M
     return round(float(np.diff(motion.stamp_s)[both].sum()), 2)

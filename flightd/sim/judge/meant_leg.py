@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from flightd.core.types import Phase, Status
-from flightd.sim.judge.motion import Motion, Values
+from flightd.sim.judge.motion import TrueMotion, Values
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
 
@@ -40,7 +40,7 @@ class _Leg:
     before_until_s: float
 
 
-def off_leg(site: Site, start: str, statuses: Sequence[Status], motion: Motion) -> Values:
+def off_leg(site: Site, start: str, statuses: Sequence[Status], motion: TrueMotion) -> Values:
     """How far beside the leg that was meant each sample of `motion` is, (n,) metres on the floor.  `start` is
     the node at which the flight begins; `statuses` in time order.  Infinite before the first."""
     legs = list(_legs(site, start, statuses))

@@ -18,7 +18,7 @@ OFF_FLOOR_M = 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class TrueMotion:
     """Samples in time order, each an array (n,): s, metres of the map, m/s, + up."""
 
     stamp_s: Values
@@ -35,9 +35,9 @@ class Motion:
     def __len__(self) -> int:
         return len(self.stamp_s)
 
-    def chosen(self, wanted: NDArray[np.bool_]) -> Motion:
+    def chosen(self, wanted: NDArray[np.bool_]) -> TrueMotion:
         """Only the samples where `wanted` (n,) holds."""
-        return Motion(*(getattr(self, field.name)[wanted] for field in fields(self)))
+        return TrueMotion(*(getattr(self, field.name)[wanted] for field in fields(self)))
 
     @property
     def flying(self) -> NDArray[np.bool_]:

@@ -13,7 +13,7 @@ from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions, MavlinkVehicle
 from flightd.core.types import VehicleState
 from flightd.runtime.clock import LoopClock
-from flightd.sim.autopilot.link import Channel, UdpLink
+from flightd.sim.autopilot.link import MavlinkChannel, UdpLink
 
 SET_MODE, ARM, INTERVAL = 176, 400, 511
 GUIDED_NOGPS, ALT_HOLD, LAND = 20, 2, 9
@@ -74,7 +74,7 @@ class ScriptedAutopilot:
     def commands(self, command: int) -> list[Any]:
         return [m for m in self.all("COMMAND_LONG") if m.command == command]
 
-    def _received(self, channel: Channel, message: Any) -> None:
+    def _received(self, channel: MavlinkChannel, message: Any) -> None:
         self.heard.append((asyncio.get_running_loop().time(), message))
         if message.get_type() == "COMMAND_LONG":
             self._command(channel, message)
@@ -82,7 +82,7 @@ class ScriptedAutopilot:
             value = self.parameters[message.param_id]
             self.say(dialect.MAVLink_param_value_message(message.param_id.encode(), value, 9, 3, 0))
 
-    def _command(self, channel: Channel, message: Any) -> None:
+    def _command(self, channel: MavlinkChannel, message: Any) -> None:
         planned = self.results.get(message.command, 0)
         if isinstance(planned, list):
             planned = planned.pop(0) if len(planned) > 1 else planned[0]

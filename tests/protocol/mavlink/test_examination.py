@@ -21,7 +21,7 @@ from flightd.ports import Clock
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
-from flightd.sim.autopilot.link import Channel
+from flightd.sim.autopilot.link import MavlinkChannel
 from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.autopilot.streams import MessageStreams
 from flightd.sim.plant.airframe import Airframe
@@ -90,7 +90,7 @@ class _FixedRates(MessageStreams):
     def set_interval(self, *_: Any) -> int:
         return int(dialect.MAV_RESULT_DENIED)
 
-    def send_now(self, channel: Channel, message_id: float) -> int:
+    def send_now(self, channel: MavlinkChannel, message_id: float) -> int:
         return int(dialect.MAV_RESULT_UNSUPPORTED)
 
 

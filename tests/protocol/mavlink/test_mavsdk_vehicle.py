@@ -35,7 +35,7 @@ from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import ScaledLoop
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
-from flightd.sim.autopilot.link import Channel, Message
+from flightd.sim.autopilot.link import MavlinkChannel, Message
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
 from flightd.sim.plant.airframe import Airframe
 from tests.rigs.event_loops import real, run_in
@@ -67,7 +67,7 @@ class _DeafToModes(Px4Peer):
         super().__init__(*arguments)
         self.passed_over: list[Message] = []
 
-    def received(self, channel: Channel, message: Message) -> None:
+    def received(self, channel: MavlinkChannel, message: Message) -> None:
         if message.get_type() == "COMMAND_LONG" and message.command == 176:
             self.passed_over.append(message)
         else:

@@ -19,7 +19,7 @@ WAKE_PERIOD_NS = 200_000_000
 REOPEN_NS = 3_000_000_000
 
 
-class Link:
+class ArDroneLink:
     """Sends commands, takes navdata and hands every accepted packet to `receive`.
 
     Sockets are connected, so only the drone is heard; they are opened anew when it stays silent, because
@@ -94,7 +94,7 @@ class Link:
                 asyncio.DatagramProtocol, remote_addr=(host, self._settings.at_port)
             )
             self._navdata, _ = await loop.create_datagram_endpoint(
-                lambda: _Receiver(self._take), remote_addr=(host, self._settings.navdata_port)
+                lambda: _NavdataReceiver(self._take), remote_addr=(host, self._settings.navdata_port)
             )
         except OSError as error:
             _log.warning("no network to the drone at %s: %s", host, error)
@@ -117,7 +117,7 @@ class Link:
             self._next = None
 
 
-class _Receiver(asyncio.DatagramProtocol):
+class _NavdataReceiver(asyncio.DatagramProtocol):
     def __init__(self, take: Callable[[bytes], None]) -> None:
         self._take = take
 

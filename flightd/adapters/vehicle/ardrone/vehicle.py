@@ -9,7 +9,7 @@ import math
 from flightd.adapters.vehicle.ardrone import at
 from flightd.adapters.vehicle.ardrone.configurator import Configurator
 from flightd.adapters.vehicle.ardrone.flight import FlightLogic
-from flightd.adapters.vehicle.ardrone.link import Link
+from flightd.adapters.vehicle.ardrone.link import ArDroneLink
 from flightd.adapters.vehicle.ardrone.navdata import DroneState, Major, Navdata
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, DroneCamera
 from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
@@ -57,7 +57,7 @@ class ArDroneVehicle:
         self._clock = clock
         self._telemetry = NavdataTelemetry(round(settings.attitude_latency_s * 1e9))
         self._flight = FlightLogic(settings, self._telemetry)
-        self._link = Link(settings, clock, self._receive)
+        self._link = ArDroneLink(settings, clock, self._receive)
         self._configurator = Configurator(self._link, settings)
         self._unconfigured = asyncio.Event()
         self._unconfigured.set()
