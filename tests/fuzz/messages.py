@@ -1,4 +1,4 @@
-"""Fuzz what comes over the ground link, at the daemon's desk and at the client's: `python -m
+"""Fuzz what comes over the ground link, at the daemon's request handler and at the client: `python -m
 tests.fuzz.messages COUNT`."""
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ _OPERATOR, _VIEWER = Peer("ann", Role.OPERATOR, b"1"), Peer("bob", Role.VIEWER, 
 def target(folder: Path) -> Target:
     del folder  # no files here
     audit: list[AuditEntry] = []
-    desk = RequestHandler(load_site(_CONFIGS / "site-demo.toml"), "session", audit.append)
+    handler = RequestHandler(load_site(_CONFIGS / "site-demo.toml"), "session", audit.append)
     clock = itertools.count(10**12, 200_000_000)
 
     def attempt(data: bytes) -> bool:
-        answer = desk.answer(data, _OPERATOR, next(clock))
-        desk.take_commands()
-        viewed = desk.answer(data, _VIEWER, next(clock))
+        answer = handler.answer(data, _OPERATOR, next(clock))
+        handler.take_commands()
+        viewed = handler.answer(data, _VIEWER, next(clock))
         assert not isinstance(viewed, Accepted), "a viewer's order was accepted"
-        assert not desk.take_commands(), "a viewer's order reached the flight"
+        assert not handler.take_commands(), "a viewer's order reached the flight"
         audit.clear()
         if not isinstance(answer, AskPicture):
             assert decode_answer(encode(answer)) == answer

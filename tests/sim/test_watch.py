@@ -21,8 +21,8 @@ from tests.rigs.waiting import until
 
 
 def floor() -> FloorStatus:
-    desk = RequestHandler(SITE, "s", lambda _: None)
-    welcome = desk.answer(b'{"version":1,"id":"12345678","op":"hello"}', Peer("x", Role.VIEWER), 0)
+    handler = RequestHandler(SITE, "s", lambda _: None)
+    welcome = handler.answer(b'{"version":1,"id":"12345678","op":"hello"}', Peer("x", Role.VIEWER), 0)
     assert isinstance(welcome, Welcome)
     return welcome.floor
 

@@ -32,7 +32,7 @@ TICK_NS = 20_000_000
 
 
 class Flight:
-    """Feeds a mission with senses: by default all is well and the drone is wherever the mission wants."""
+    """Feeds a mission with inputs: by default all is well and the drone is wherever the mission wants."""
 
     def __init__(
         self, params: Config | None = None, site: Site = SITE, scanner: AnyScanner = NO_SCAN
@@ -58,7 +58,7 @@ class Flight:
             12.0,
             0,
         )
-        self.senses = MissionInputs(0, 0.02, None, True, 0.1, True, 0.0, 0.0, 0.0, state)
+        self.inputs = MissionInputs(0, 0.02, None, True, 0.1, True, 0.0, 0.0, 0.0, state)
 
     @property
     def phase(self) -> Phase:
@@ -67,9 +67,9 @@ class Flight:
     def set(self, **changes: object) -> None:
         vehicle = {k: v for k, v in changes.items() if k in VehicleState.__slots__ and k != "height_m"}
         other = {k: v for k, v in changes.items() if k not in vehicle}
-        assert self.senses.vehicle is not None
-        state = replace(self.senses.vehicle, **vehicle)  # type: ignore[arg-type]
-        self.senses = replace(self.senses, vehicle=state, **other)  # type: ignore[arg-type]
+        assert self.inputs.vehicle is not None
+        state = replace(self.inputs.vehicle, **vehicle)  # type: ignore[arg-type]
+        self.inputs = replace(self.inputs, vehicle=state, **other)  # type: ignore[arg-type]
 
     def run(self, seconds: float, until: Callable[[], bool] = lambda: False, follow: bool = True) -> None:
         for _ in range(round(seconds / 0.02)):
@@ -77,8 +77,8 @@ class Flight:
             g = self.guidance
             if follow and g is not None and g.guide is not Guide.NONE:
                 height = 0.1 + (0.0 if math.isnan(g.reference.height_m) else g.reference.height_m)
-                if not math.isnan(self.senses.height_m):
-                    self.senses = replace(self.senses, height_m=height)
+                if not math.isnan(self.inputs.height_m):
+                    self.inputs = replace(self.inputs, height_m=height)
                 r = g.reference
                 node = self.site.nearest(r.x_m, r.y_m)
                 pose = GridPose(
@@ -95,12 +95,12 @@ class Flight:
                     (0.0,) * 9,
                     self.integrity,
                 )
-                self.senses = replace(self.senses, pose=pose)
+                self.inputs = replace(self.inputs, pose=pose)
             if follow and g is not None and g.demand is Demand.FLY:
                 self.set(armed=True)
-            heard_s = self.senses.telemetry_age_s + self.heartbeat_s
+            heard_s = self.inputs.telemetry_age_s + self.heartbeat_s
             self.set(heartbeat_ns=self.now_ns - round(heard_s * 1e9))
-            self.guidance = self.mission.step(replace(self.senses, now_ns=self.now_ns))
+            self.guidance = self.mission.step(replace(self.inputs, now_ns=self.now_ns))
             if until():
                 return
 

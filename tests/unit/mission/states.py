@@ -220,7 +220,7 @@ def placed(within_s: float = 0.8, **changes: Any) -> Stimulus:
 
 
 def _pose(flight: Flight) -> GridPose:
-    return flight.senses.pose or GridPose(0, "A1", 0, 0, 0.0, 0, 0, 0, 0, 1.5, (0.0,) * 9, 1.0)
+    return flight.inputs.pose or GridPose(0, "A1", 0, 0, 0.0, 0, 0, 0, 0, 1.5, (0.0,) * 9, 1.0)
 
 
 def _jump(flight: Flight) -> None:

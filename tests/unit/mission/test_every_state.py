@@ -147,7 +147,7 @@ def landing_corrected(by_m: float) -> Flight:
     pad = flight.mission.goal
     flight.set(pad_m=(pad.x_m, pad.y_m))
     flight.run(0.1)
-    pose = flight.senses.pose
+    pose = flight.inputs.pose
     assert pose is not None
     flight.set(pose=replace(pose, x_m=pose.x_m + by_m))
     flight.run(0.02, follow=False)

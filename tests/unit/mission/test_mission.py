@@ -40,7 +40,7 @@ def test_a_flight_where_all_is_well_visits_everything() -> None:
 def test_a_correction_over_the_pad_is_the_reason_for_the_end_that_it_makes() -> None:
     flight = Flight()
     flight.to(Phase.LAND, 600)
-    pose = flight.senses.pose
+    pose = flight.inputs.pose
     assert pose is not None
     flight.set(pose=replace(pose, x_m=pose.x_m + 2.0))
     flight.run(0.1, follow=False)
@@ -107,7 +107,7 @@ def test_a_position_lost_between_two_flights_does_not_shift_the_second_one() -> 
     relocator = Relocator(configured().mission, math.inf, ())
     flight = Flight()
     flight.to(Phase.FOLLOW)
-    sure = flight.senses
+    sure = flight.inputs
     assert sure.pose is not None
     for tick, pose in enumerate((sure.pose, None, replace(sure.pose, x_m=sure.pose.x_m + 7.0))):
         relocator.step(replace(sure, now_ns=tick * TICK_NS, pose=pose), Phase.TAKE_OFF, 1.0)
@@ -201,7 +201,7 @@ def test_a_view_lost_at_height_is_borne_as_long_as_any_however_long_the_climb_sa
     flight = Flight(configured(climb_mps=0.2))
     flight.set(x_age_s=60.0, y_age_s=60.0)
     flight.to(Phase.TAKE_OFF)
-    flight.run(60.0, lambda: flight.senses.height_m > 1.35)
+    flight.run(60.0, lambda: flight.inputs.height_m > 1.35)
     flight.set(x_age_s=0.0, y_age_s=0.0)  # but not for long enough to count as found
     flight.to(Phase.ACQUIRE)
     flight.set(x_age_s=0.5, y_age_s=0.5)

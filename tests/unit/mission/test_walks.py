@@ -79,13 +79,13 @@ class Walk:
         """Sense these for a while; the orders come first."""
         flight = self.flight
         usual = dict(USUAL)
-        if follow and flight.senses.vehicle is not None and not math.isnan(flight.senses.height_m):
+        if follow and flight.inputs.vehicle is not None and not math.isnan(flight.inputs.height_m):
             usual.pop("height_m")
         flight.integrity = 0.5 if "in doubt" in sensed else 1.0
         changes = usual | {key: value for name in sorted(sensed) for key, value in SENSED[name].items()}
         flight.set(**changes)
-        if "elsewhere" in sensed and flight.senses.pose is not None:
-            flight.set(pose=replace(flight.senses.pose, x_m=flight.senses.pose.x_m + 3.0))
+        if "elsewhere" in sensed and flight.inputs.pose is not None:
+            flight.set(pose=replace(flight.inputs.pose, x_m=flight.inputs.pose.x_m + 3.0))
         for order in sorted(orders):
             flight.order(order, "A3" if order is CommandKind.GOTO else "")
             self.started |= order is CommandKind.START
@@ -128,7 +128,7 @@ class Walk:
         assert any(after in _turned(end) for end in ends)
 
     def pilot_wins(self, before: State, after: State) -> None:
-        s = self.flight.senses
+        s = self.flight.inputs
         heard = s.telemetry_age_s < PARAMS.mission.telemetry_hold_s and s.vehicle is not None
         if heard and before.airborne and before.phase is not Phase.RECOVER and s.vehicle is not None:
             assert not s.vehicle.armed or s.vehicle.in_control or after.phase is Phase.PILOT

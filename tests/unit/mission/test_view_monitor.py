@@ -16,7 +16,7 @@ PARAMS = configured()
 EXPERT = PARAMS.mission.expert
 
 
-def senses(x_age_s: float, y_age_s: float, picture_age_s: float = 0.0) -> MissionInputs:
+def inputs(x_age_s: float, y_age_s: float, picture_age_s: float = 0.0) -> MissionInputs:
     return MissionInputs(
         now_ns=10**9,
         dt_s=0.02,
@@ -33,21 +33,21 @@ def senses(x_age_s: float, y_age_s: float, picture_age_s: float = 0.0) -> Missio
 
 
 def test_a_camera_that_shows_nothing_makes_it_sink_and_pictures_without_lines_do_not() -> None:
-    blind = FloorViewMonitor(PARAMS)
-    blind.step(senses(0.5, 0.5, picture_age_s=0.5), leg_along_x=True)
-    assert blind.is_blind
-    assert blind.sink_mps(1.6) > 0.0
-    assert blind.sink_mps(PARAMS.hazards.expert.blind_m) == 0.0
-    blind.step(senses(0.5, 0.5), leg_along_x=True)
-    assert not blind.is_blind
+    monitor = FloorViewMonitor(PARAMS)
+    monitor.step(inputs(0.5, 0.5, picture_age_s=0.5), leg_along_x=True)
+    assert monitor.is_blind
+    assert monitor.sink_mps(1.6) > 0.0
+    assert monitor.sink_mps(PARAMS.hazards.expert.blind_m) == 0.0
+    monitor.step(inputs(0.5, 0.5), leg_along_x=True)
+    assert not monitor.is_blind
 
 
-def over(blind: FloorViewMonitor, seconds: float, leg_along_x: bool, telemetry_age_s: float = 0.0) -> bool:
+def over(monitor: FloorViewMonitor, seconds: float, leg_along_x: bool, telemetry_age_s: float = 0.0) -> bool:
     """Whether it has to land after seeing only lines that cross the x axis for so long."""
     for tick in range(round(seconds / 0.02)):
-        at = replace(senses(0.0, tick * 0.02), now_ns=tick * 20_000_000, telemetry_age_s=telemetry_age_s)
-        blind.step(at, leg_along_x)
-    return blind.too_long
+        at = replace(inputs(0.0, tick * 0.02), now_ns=tick * 20_000_000, telemetry_age_s=telemetry_age_s)
+        monitor.step(at, leg_along_x)
+    return monitor.too_long
 
 
 def test_on_a_leg_only_the_line_that_is_followed_keeps_it_in_the_air() -> None:
@@ -62,8 +62,8 @@ def test_lost_telemetry_is_not_taken_for_a_lost_view() -> None:
 
 @given(st.floats(0.0, 20.0), st.floats(0.0, 20.0))
 def test_a_blind_descent_never_stops_and_is_gentle_at_the_floor(a_m: float, b_m: float) -> None:
-    blind = FloorViewMonitor(PARAMS)
+    monitor = FloorViewMonitor(PARAMS)
     low, high = sorted((a_m, b_m))
-    assert EXPERT.touch_blind_mps <= blind.rate_mps(low) <= blind.rate_mps(high) <= EXPERT.blind_mps
-    assert blind.rate_mps(0.1) == EXPERT.touch_blind_mps
-    assert blind.rate_mps(math.nan) == PARAMS.mission.land_mps
+    assert EXPERT.touch_blind_mps <= monitor.rate_mps(low) <= monitor.rate_mps(high) <= EXPERT.blind_mps
+    assert monitor.rate_mps(0.1) == EXPERT.touch_blind_mps
+    assert monitor.rate_mps(math.nan) == PARAMS.mission.land_mps

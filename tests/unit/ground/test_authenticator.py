@@ -1,4 +1,4 @@
-"""The door: only listed keys, whatever is asked."""
+"""The authenticator: only listed keys, whatever is asked."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ KEY = z85.decode(PUBLIC)
 RIGHT = [b"1.0", b"7", b"flightd", b"10.0.0.2", b"", b"CURVE", KEY]
 
 
-def door() -> tuple[zmq.asyncio.Context, Authenticator]:
+def listening() -> tuple[zmq.asyncio.Context, Authenticator]:
     context = zmq.asyncio.Context()
     return context, Authenticator(context, {PUBLIC.decode(): Client("ann", Role.OPERATOR)})
 
 
 def test_a_listed_key_comes_in_under_its_own_name_and_no_other_does() -> None:
-    context, keeper = door()
-    assert keeper.answer(RIGHT) == [b"1.0", b"7", b"200", b"OK", PUBLIC, b""]
+    context, authenticator = listening()
+    assert authenticator.answer(RIGHT) == [b"1.0", b"7", b"200", b"OK", PUBLIC, b""]
     other = z85.decode(zmq.curve_keypair()[0])
-    assert keeper.answer([*RIGHT[:6], other])[2] == b"400"
-    assert keeper.denied == 1
-    keeper.close()
+    assert authenticator.answer([*RIGHT[:6], other])[2] == b"400"
+    assert authenticator.denied == 1
+    authenticator.close()
     context.term()
 
 
 def test_every_other_shape_of_question_is_refused() -> None:
-    context, keeper = door()
+    context, authenticator = listening()
     random_ = random.Random(3)
     for length, _ in itertools.product(range(10), range(200)):
         frames = [random_.randbytes(random_.randrange(40)) for _ in range(length)]
-        assert keeper.answer(frames)[2] == b"400"
+        assert authenticator.answer(frames)[2] == b"400"
     for mechanism in (b"NULL", b"PLAIN", b"GSSAPI", b"curve"):
-        assert keeper.answer([*RIGHT[:5], mechanism, KEY])[2] == b"400"
-    assert keeper.answer([*RIGHT, b"more"])[2] == b"400"
-    assert keeper.answer([b"2.0", *RIGHT[1:]])[2] == b"400"
-    keeper.close()
+        assert authenticator.answer([*RIGHT[:5], mechanism, KEY])[2] == b"400"
+    assert authenticator.answer([*RIGHT, b"more"])[2] == b"400"
+    assert authenticator.answer([b"2.0", *RIGHT[1:]])[2] == b"400"
+    authenticator.close()
     context.term()

@@ -1,4 +1,4 @@
-"""What the desk answers, does and writes down."""
+"""What the request handler answers, does and writes down."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from flightd.adapters.ground_link.protocol import (
 from flightd.adapters.ground_link.request_handler import Peer
 from flightd.core.types import CommandKind, Phase
 from flightd.mission.machine import possible_in
-from tests.unit.ground.desk_rig import OPERATOR, SESSION, SITE, VIEWER, DeskRig, S, body
+from tests.unit.ground.request_handler_rig import OPERATOR, SESSION, SITE, VIEWER, RequestHandlerRig, S, body
 
 OVER = (Phase.DONE, Phase.ABORTED, Phase.PILOT)
 
@@ -35,49 +35,49 @@ def refusal(answer: object) -> Code:
 
 
 def test_an_operators_command_reaches_the_flight_once_and_is_written_down() -> None:
-    rig = DeskRig()
+    rig = RequestHandlerRig()
     assert isinstance(rig.order("goto", node="A3"), Accepted)
-    (command,) = rig.desk.take_commands()
+    (command,) = rig.handler.take_commands()
     assert (command.kind, command.node) == (CommandKind.GOTO, "A3")
-    assert rig.desk.take_commands() == []
+    assert rig.handler.take_commands() == []
     assert (rig.audit[0].client, rig.audit[0].command, rig.audit[0].outcome) == ("ann", "goto", "accepted")
 
 
 def test_a_command_sent_again_is_answered_again_but_not_done_again() -> None:
-    rig = DeskRig()
+    rig = RequestHandlerRig()
     request = body("command", command="home")
     first, second = rig.hand(request), rig.hand(request)
     assert isinstance(first, Accepted)
     assert isinstance(second, Accepted)
     assert (first.repeated, second.repeated) == (False, True)
-    assert len(rig.desk.take_commands()) == 1
+    assert len(rig.handler.take_commands()) == 1
     assert [entry.outcome for entry in rig.audit] == ["accepted", "repeated"]
 
 
 def test_an_id_names_one_command_of_one_client() -> None:
-    rig = DeskRig()
+    rig = RequestHandlerRig()
     rig.order("pause", id="same-id-1")
     assert refusal(rig.order("land", id="same-id-1")) is Code.ID_REUSED
     other = Peer("eve", Role.OPERATOR)
     assert isinstance(rig.order("land", other, id="same-id-1"), Accepted)
-    assert [command.kind for command in rig.desk.take_commands()] == [CommandKind.PAUSE, CommandKind.LAND]
+    assert [command.kind for command in rig.handler.take_commands()] == [CommandKind.PAUSE, CommandKind.LAND]
 
 
 def test_a_refused_command_may_be_tried_again_with_its_id() -> None:
-    rig = DeskRig(Phase.LAND)
+    rig = RequestHandlerRig(Phase.LAND)
     request = body("command", command="pause")
     assert refusal(rig.hand(request)) is Code.PHASE
-    flying = DeskRig(Phase.FOLLOW).desk
-    rig.desk.status, rig.desk.possible = flying.status, flying.possible
+    flying = RequestHandlerRig(Phase.FOLLOW).handler
+    rig.handler.status, rig.handler.possible = flying.status, flying.possible
     assert isinstance(rig.hand(request), Accepted)
 
 
 @pytest.mark.parametrize("kind", list(CommandKind))
 def test_a_viewer_commands_nothing_and_the_attempt_is_written_down(kind: CommandKind) -> None:
-    rig = DeskRig(Phase.PREFLIGHT)
+    rig = RequestHandlerRig(Phase.PREFLIGHT)
     assert refusal(rig.order(kind, VIEWER, node="A2" if kind is CommandKind.GOTO else "")) is Code.ROLE
     assert refusal(rig.hand(body("attend"), VIEWER)) is Code.ROLE
-    assert rig.desk.take_commands() == []
+    assert rig.handler.take_commands() == []
     assert [entry.outcome for entry in rig.audit] == ["role"]
 
 
@@ -86,13 +86,13 @@ def test_a_viewer_commands_nothing_and_the_attempt_is_written_down(kind: Command
 def test_every_command_in_every_phase_is_accepted_or_refused_by_the_table(
     kind: CommandKind, phase: Phase
 ) -> None:
-    rig = DeskRig(phase)
+    rig = RequestHandlerRig(phase)
     answer = rig.order(kind, node="A2" if kind is CommandKind.GOTO else "")
     if kind in possible_in(phase):
         assert isinstance(answer, Accepted)
     else:
         assert refusal(answer) is Code.PHASE
-        assert rig.desk.take_commands() == []
+        assert rig.handler.take_commands() == []
 
 
 @pytest.mark.parametrize("phase", [p for p in Phase if p not in OVER])
@@ -102,7 +102,7 @@ def test_land_and_stop_are_possible_until_it_is_over(phase: Phase) -> None:
 
 
 def test_what_is_wrong_with_a_command_is_named() -> None:
-    rig = DeskRig()
+    rig = RequestHandlerRig()
     assert refusal(rig.order("goto", node="Z9")) is Code.NODE
     assert refusal(rig.order("goto")) is Code.MALFORMED
     assert refusal(rig.order("land", node="A1")) is Code.MALFORMED
@@ -111,12 +111,12 @@ def test_what_is_wrong_with_a_command_is_named() -> None:
     assert refusal(rig.order("pause", colour="red")) is Code.MALFORMED
     assert refusal(rig.order("pause", session="another run")) is Code.SESSION
     assert isinstance(rig.order("pause", session=SESSION), Accepted)
-    assert rig.desk.refused == 7
+    assert rig.handler.refused == 7
 
 
 @pytest.mark.parametrize("version", [0, 2, -1, 10**12])
 def test_a_client_of_another_version_is_told_both_versions_whatever_else_it_says(version: int) -> None:
-    rig = DeskRig()
+    rig = RequestHandlerRig()
     answer = rig.hand(json.dumps({"version": version, "id": "x", "op": "teleport", "to": []}).encode())
     assert refusal(answer) is Code.VERSION
     assert isinstance(answer, Refused)
@@ -126,23 +126,23 @@ def test_a_client_of_another_version_is_told_both_versions_whatever_else_it_says
 
 
 def test_a_client_without_a_version_is_told_so() -> None:
-    assert refusal(DeskRig().hand(b'{"cmd": "land"}')) is Code.VERSION
+    assert refusal(RequestHandlerRig().hand(b'{"cmd": "land"}')) is Code.VERSION
 
 
 def test_too_many_commands_are_held_back_but_never_land_and_stop() -> None:
-    rig = DeskRig()
+    rig = RequestHandlerRig()
     answers = [rig.order("pause") for _ in range(25)]
     assert sum(isinstance(answer, Accepted) for answer in answers) == 20
     assert refusal(answers[-1]) is Code.BUSY
     assert all(isinstance(rig.order("stop"), Accepted) for _ in range(50))
-    kinds = [command.kind for command in rig.desk.take_commands()]
+    kinds = [command.kind for command in rig.handler.take_commands()]
     assert kinds.count(CommandKind.STOP) == 1, "one stop at a tick is enough"
     rig.now_ns += 2 * S
     assert isinstance(rig.order("pause"), Accepted)
 
 
 def test_hello_tells_who_one_is_and_where_it_flies() -> None:
-    answer = DeskRig(picture_fps=2.0).hand(body("hello", client="test"), VIEWER)
+    answer = RequestHandlerRig(picture_fps=2.0).hand(body("hello", client="test"), VIEWER)
     assert isinstance(answer, Welcome)
     assert (answer.role, answer.client, answer.session) == (Role.VIEWER, "bob", SESSION)
     assert {node.id for node in answer.floor.nodes} == set(SITE.nodes)
@@ -151,14 +151,14 @@ def test_hello_tells_who_one_is_and_where_it_flies() -> None:
 
 
 def test_status_pictures_and_inventory_are_answered_as_far_as_they_are_there() -> None:
-    rig = DeskRig()
+    rig = RequestHandlerRig()
     status = rig.hand(body("status"), VIEWER)
     assert isinstance(status, StatusAnswer)
     assert status.status is not None
     assert status.status.phase is Phase.FOLLOW
     assert refusal(rig.hand(body("picture"))) is Code.UNAVAILABLE
     assert refusal(rig.hand(body("inventory"))) is Code.UNAVAILABLE
-    rich = DeskRig(picture_fps=1.0, inventory=lambda: [{"place": "A-1-1", "code": "123"}])
+    rich = RequestHandlerRig(picture_fps=1.0, inventory=lambda: [{"place": "A-1-1", "code": "123"}])
     assert isinstance(rich.hand(body("picture")), AskPicture)
     counted = rich.hand(body("inventory"))
     assert isinstance(counted, InventoryAnswer)
@@ -166,41 +166,41 @@ def test_status_pictures_and_inventory_are_answered_as_far_as_they_are_there() -
 
 
 def test_silence_counts_only_while_somebody_attends() -> None:
-    rig = DeskRig()
+    rig = RequestHandlerRig()
     rig.now_ns += 100 * S
-    assert rig.desk.silent_ns(rig.now_ns) == 0
+    assert rig.handler.silent_ns(rig.now_ns) == 0
     rig.hand(body("attend"))
     rig.now_ns += 7 * S
-    assert rig.desk.silent_ns(rig.now_ns) == 7 * S
+    assert rig.handler.silent_ns(rig.now_ns) == 7 * S
     rig.hand(body("attend"))
-    assert rig.desk.silent_ns(rig.now_ns) == 0
+    assert rig.handler.silent_ns(rig.now_ns) == 0
     rig.hand(body("attend", leave=True))
     rig.now_ns += 100 * S
-    assert rig.desk.silent_ns(rig.now_ns) == 0
+    assert rig.handler.silent_ns(rig.now_ns) == 0
 
 
 def test_who_takes_over_and_leaves_does_not_leave_the_lost_one_behind() -> None:
-    rig = DeskRig()
+    rig = RequestHandlerRig()
     again = Peer("ann", Role.OPERATOR, b"another connection")
     rig.hand(body("attend"))
     rig.now_ns += 10 * S
     rig.hand(body("attend"), again)
-    assert rig.desk.attending(rig.now_ns) == 1
+    assert rig.handler.attending(rig.now_ns) == 1
     rig.hand(body("attend", leave=True), again)
     rig.now_ns += 10 * S
-    assert rig.desk.silent_ns(rig.now_ns) == 0
+    assert rig.handler.silent_ns(rig.now_ns) == 0
 
 
 def test_memory_is_bounded_whatever_comes() -> None:
-    rig = DeskRig()
+    rig = RequestHandlerRig()
     for i in range(3000):
         rig.now_ns += S // 10
         rig.order("pause", Peer("ann", Role.OPERATOR, str(i).encode()))
         rig.hand(body("attend"), Peer(f"c{i}", Role.OPERATOR, str(i).encode()))
         if i % 5 == 0:
-            assert len(rig.desk.take_commands()) <= 32
-    assert len(rig.desk._done) <= 1024
-    assert len(rig.desk._heard_ns) <= 64
+            assert len(rig.handler.take_commands()) <= 32
+    assert len(rig.handler._done) <= 1024
+    assert len(rig.handler._heard_ns) <= 64
 
 
 def _mutated(random_: random.Random, seeds: list[bytes]) -> bytes:
@@ -229,7 +229,7 @@ def _mutated(random_: random.Random, seeds: list[bytes]) -> bytes:
 def test_twenty_thousand_damaged_requests_raise_nothing_and_let_none_in() -> None:
     """Damage may leave a whole request behind, but only one that its sender may make."""
     random_ = random.Random(20)
-    rig = DeskRig(picture_fps=1.0)
+    rig = RequestHandlerRig(picture_fps=1.0)
     seeds = [
         body("hello", client="fuzz"),
         body("command", command="goto", node="A2", session=SESSION),
@@ -248,18 +248,18 @@ def test_twenty_thousand_damaged_requests_raise_nothing_and_let_none_in() -> Non
         answer = rig.hand(request, VIEWER)
         if not isinstance(answer, AskPicture):
             answered += bool(encode(answer))
-    assert rig.desk.take_commands() == []
-    assert rig.desk.refused > 15_000
+    assert rig.handler.take_commands() == []
+    assert rig.handler.refused > 15_000
     assert answered > 15_000
     assert isinstance(rig.order("land"), Accepted), "and it works on"
 
 
 def test_the_operators_own_damaged_requests_become_known_commands_or_none() -> None:
     random_ = random.Random(21)
-    rig = DeskRig()
+    rig = RequestHandlerRig()
     seeds = [body("command", command="goto", node="A2"), body("command", command="home")]
     for _ in range(4000):
         rig.now_ns += 10**8
         rig.hand(_mutated(random_, seeds), OPERATOR)
-        for command in rig.desk.take_commands():
+        for command in rig.handler.take_commands():
             assert (command.node in SITE.nodes) if command.kind is CommandKind.GOTO else command.node == ""

@@ -1,4 +1,4 @@
-"""A desk with nothing around it, and the messages to hand in."""
+"""A request handler with nothing around it, and the messages to hand in."""
 
 from __future__ import annotations
 
@@ -61,18 +61,18 @@ def body(op: str, **fields: Any) -> bytes:
     return msgspec.json.encode({"version": VERSION, "id": f"request-{next(_ids)}", "op": op, **fields})
 
 
-class DeskRig:
-    """`hand` gives the desk's answer; what it wrote down is in `audit`."""
+class RequestHandlerRig:
+    """`hand` gives the handler's answer; what it wrote down is in `audit`."""
 
     def __init__(self, phase: Phase = Phase.FOLLOW, **more: Any) -> None:
         self.audit: list[AuditEntry] = []
-        self.desk = RequestHandler(SITE, SESSION, self.audit.append, **more)
-        self.desk.status = report(phase)
-        self.desk.possible = possible_in(phase)
+        self.handler = RequestHandler(SITE, SESSION, self.audit.append, **more)
+        self.handler.status = report(phase)
+        self.handler.possible = possible_in(phase)
         self.now_ns = 100 * S
 
     def hand(self, request: bytes, peer: Peer = OPERATOR) -> Answer | AskPicture:
-        return self.desk.answer(request, peer, self.now_ns)
+        return self.handler.answer(request, peer, self.now_ns)
 
     def order(self, command: str, peer: Peer = OPERATOR, **fields: Any) -> Answer | AskPicture:
         return self.hand(body("command", command=command, **fields), peer)
