@@ -216,7 +216,7 @@ class Pilot:
         """Telemetry first: a frame needs the attitude and height of its exposure.
 
         What was seen before arming says nothing: until then the drone may have been carried about.  The
-        flight starts on the pad, in the plan's heading.  Nor is anything reckoned on once it is disarmed.
+        flight starts on the pad, in the plan's heading.  Nor is anything dead-reckoned once it is disarmed.
         """
         armed = tick.vehicle is not None and tick.vehicle.armed
         if armed is not self._armed:
@@ -300,7 +300,7 @@ class Pilot:
         if guidance.guide is Guide.LEVEL or pose is None:
             wanted, age_s = control.level(now_ns, motion, reference, dt_s), 0.0
         elif guidance.guide is Guide.BRAKE:
-            wanted = control.rest(now_ns, motion, reference, dt_s, push, reckoned=guidance.dead_reckoned)
+            wanted = control.rest(now_ns, motion, reference, dt_s, push, dead_reckoned=guidance.dead_reckoned)
             age_s = min(inputs.telemetry_age_s, sight_s)
         else:
             wanted = control.step(now_ns, motion, reference, dt_s)

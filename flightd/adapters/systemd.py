@@ -49,7 +49,7 @@ class Notifier:
 
 
 class SystemdMonitor:
-    """`ports.Monitor`: READY=1 once the vehicle is heard and pictures come through the detector, WATCHDOG=1
+    """`ports.Monitor`: READY=1 once the vehicle is heard and frames come through the detector, WATCHDOG=1
     with the ticks' statuses, a line of STATUS for people.
 
     The watchdog's messages go out four times in the period that systemd asks for, so long as the control

@@ -55,7 +55,7 @@ from flightd.pilot import Pilot
 from flightd.ports import Camera, Clock, Ground, Interlock, Monitor, PoseTaker, Recorder, Vehicle
 from flightd.runtime.clock import Hold
 from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
-from flightd.site.site import UNTOLD_CEILING_M, Site
+from flightd.site.site import ASSUMED_CEILING_M, Site
 from flightd.vision.line_detector import Detector
 
 
@@ -230,7 +230,7 @@ def _demand_ceiling(config: Config, site: Site) -> None:
         view_m = max(_view_heights_m(config, site, math.inf))
         if view_m > highest_m:
             highest_m, key = view_m, "the highest view of a shelf (scan.max_height_m)"
-    if not site.ceiling_told and highest_m > UNTOLD_CEILING_M - CEILING_MARGIN_M:
+    if not site.ceiling_given and highest_m > ASSUMED_CEILING_M - CEILING_MARGIN_M:
         raise InputError(
             f"not given, and {key} is at {highest_m:.2g} m",
             file=f"site {site.name}",

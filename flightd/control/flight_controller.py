@@ -11,7 +11,7 @@ from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.core.types import AttitudeSetpoint
 
 _TRIM_MPS2 = 0.8
-"""The most that is leaned against a push when not even the velocity is reckoned any more: five degrees."""
+"""The most that is leaned against a push once not even the velocity is dead-reckoned: five degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,17 +87,17 @@ class FlightController:
         dt_s: float,
         push_mps2: tuple[float, float],
         *,
-        reckoned: bool,
+        dead_reckoned: bool,
     ) -> AttitudeSetpoint:
-        """Come to rest by the velocity alone (`reckoned`: it is known), then lean only against the steady
-        push as it was last known (grid axes), at most `_TRIM_MPS2`; straight, height held."""
+        """Come to rest by the velocity alone (`dead_reckoned`: it is known), then lean only against the
+        steady push as it was last known (grid axes), at most `_TRIM_MPS2`; straight, height held."""
         gains, most = self._gains, self._most_mps2
-        trim = most if reckoned else _TRIM_MPS2
+        trim = most if dead_reckoned else _TRIM_MPS2
         ax, ay = (-min(max(push, -trim), trim) for push in push_mps2)
         moving = (motion.vx_mps, motion.vy_mps, motion.yaw_rad)
         if not all(map(math.isfinite, moving)):
             return self.level(now_ns, motion, reference, dt_s)
-        if reckoned:
+        if dead_reckoned:
             ax = min(max(ax - gains.kd * motion.vx_mps, -most), most)
             ay = min(max(ay - gains.kd * motion.vy_mps, -most), most)
         cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)

@@ -59,9 +59,9 @@ def compare_stock(
     explained: set[tuple[str, str]] = set()
     for location in sorted(wanted):
         counted = known.get(location)
-        strangers = [t for t in (counted.texts if counted else ()) if t not in wanted_anywhere]
+        unexpected = [t for t in (counted.texts if counted else ()) if t not in wanted_anywhere]
         for text in sorted(wanted[location]):
-            line = _expected_code(location, text, counted, strangers, places[text], wanted, explained)
+            line = _expected_code(location, text, counted, unexpected, places[text], wanted, explained)
             explained |= {(line.location, text), (line.found_at, text), (location, line.found)}
             lines.append(line)
     lines += [
@@ -77,7 +77,7 @@ def _expected_code(
     location: str,
     text: str,
     record: LocationRecord | None,
-    strangers: list[str],
+    unexpected: list[str],
     places: Sequence[str],
     wanted: Mapping[str, frozenset[str]],
     explained: set[tuple[str, str]],
@@ -93,9 +93,9 @@ def _expected_code(
         return Difference(ComparisonOutcome.UNCOUNTED, location, text, confidence=confidence)
     if record.state is LocationState.EMPTY:
         return Difference(ComparisonOutcome.EMPTY_BUT_EXPECTED, location, text, confidence=confidence)
-    if strangers:
+    if unexpected:
         return Difference(
-            ComparisonOutcome.WRONG, location, text, found=strangers.pop(0), confidence=confidence
+            ComparisonOutcome.WRONG, location, text, found=unexpected.pop(0), confidence=confidence
         )
     return Difference(ComparisonOutcome.MISSING, location, text, confidence=confidence)
 

@@ -36,7 +36,7 @@ class Warnings:
     steering, `headroom_m` the way up to the ceiling's margin, `outside_m` how far outside the corridor, whose
     nearest line is at `line_m`; `tick_s` the mean time between ticks."""
 
-    picture_age_s: float = 0.0
+    frame_age_s: float = 0.0
     frozen_s: float = 0.0
     blank_s: float = 0.0
     heading_error_rad: float = 0.0

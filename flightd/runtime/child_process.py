@@ -1,6 +1,6 @@
 """Child processes that talk to this one over a channel; one kind answers a request at a time.
 
-Own code: a picture costs 0.2 ms on its way there and back, 0.3 ms in pebble 5.2 and 19 ms in loky 3.7; after
+Own code: a frame costs 0.2 ms on its way there and back, 0.3 ms in pebble 5.2 and 19 ms in loky 3.7; after
 a worker's death the next answer comes in 0.08 s, theirs in 0.11 to 0.19 s and 2.1 s (tools/bench_pools.py,
 on two loaded cores).  And here the loop itself waits for the channel, no thread does.
 """

@@ -1,4 +1,4 @@
-"""Datagrams of a camera process and the daemon: a picture lies in shared memory; an exposure is wanted."""
+"""Datagrams of a camera process and the daemon: a frame lies in shared memory; an exposure is wanted."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _T = TypeVar("_T")
 
 class FrameNotice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """`device_ns` is mid-exposure in the camera's own clock, `exposure` the part of the camera's usual one
-    that the picture was taken with; the rest says where the picture is."""
+    that the frame was taken with; the rest says where the frame is."""
 
     ring: str
     slots: int
@@ -47,11 +47,11 @@ def encode_notice(notice: FrameNotice) -> bytes:
 
 def decode_notice(datagram: bytes) -> FrameNotice:
     """Raises InputError for anything that is not a notice of this version."""
-    notice = _decoded(_DECODER, datagram, "a picture notice")
+    notice = _decoded(_DECODER, datagram, "a frame notice")
     if notice.version != VERSION:
-        raise InputError(f"picture notice of version {notice.version}, this is version {VERSION}")
+        raise InputError(f"frame notice of version {notice.version}, this is version {VERSION}")
     if not _is_part(notice.exposure):
-        raise InputError(f"not a picture notice: exposure {notice.exposure}")
+        raise InputError(f"not a frame notice: exposure {notice.exposure}")
     return notice
 
 

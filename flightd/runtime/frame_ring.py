@@ -1,8 +1,8 @@
-"""Pictures in shared memory: one writer fills slots in turn, readers look at them without a copy.
+"""Frames in shared memory: one writer fills slots in turn, readers look at them without a copy.
 
 A slot holds a header (sequence number, capture time) and the pixels.  The writer marks a slot as being
 written (sequence -1) before it touches the pixels; a reader checks the sequence before and after its
-work, so a picture that was overwritten meanwhile is noticed, never used by mistake.
+work, so a frame that was overwritten meanwhile is noticed, never used by mistake.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ _FOLDER = Path("/dev/shm")  # noqa: S108 - memory, not a temporary folder; names
 
 @dataclass(frozen=True, slots=True)
 class FrameTicket:
-    """Where a picture lies and when it was taken: all that the daemon's own process handles of it.
+    """Where a frame lies and when it was taken: all that the daemon's own process handles of it.
 
     `stamp_ns` is mid-exposure, `arrival_ns` the time at which it could first be read, both in the
-    daemon's clock; `exposure` the part of the camera's usual one that the picture was taken with.
+    daemon's clock; `exposure` the part of the camera's usual one that the frame was taken with.
     """
 
     ring: str
@@ -45,7 +45,7 @@ class FrameTicket:
 
 
 class FrameRing:
-    """Memory-mapped file of `slots` BGR pictures of one size; `create` owns it, `attach` reads it."""
+    """Memory-mapped file of `slots` BGR frames of one size; `create` owns it, `attach` reads it."""
 
     def __init__(self, path: Path, slots: int, width_px: int, height_px: int, owner: bool) -> None:
         self.name = path.name
@@ -59,17 +59,15 @@ class FrameRing:
         try:
             fd = os.open(path, os.O_RDWR | (os.O_CREAT | os.O_EXCL if owner else 0), 0o600)
         except OSError as err:
-            raise UnavailableError(f"shared picture memory {path.name}: {err.strerror}") from err
+            raise UnavailableError(f"shared frame memory {path.name}: {err.strerror}") from err
         try:
             if owner:
                 _reserve(fd, path, size)
             elif os.fstat(fd).st_size < size:
-                raise UnavailableError(f"shared picture memory {path.name} is smaller than {slots} pictures")
+                raise UnavailableError(f"shared frame memory {path.name} is smaller than {slots} frames")
             self._memory = mmap.mmap(fd, size)
         except OSError as err:
-            raise UnavailableError(
-                f"shared picture memory {path.name}, {size} bytes: {err.strerror}"
-            ) from err
+            raise UnavailableError(f"shared frame memory {path.name}, {size} bytes: {err.strerror}") from err
         finally:
             os.close(fd)
 
@@ -83,7 +81,7 @@ class FrameRing:
     @classmethod
     def attach(cls, name: str, slots: int, width_px: int, height_px: int) -> FrameRing:
         if not name.startswith("flightd-") or "/" in name:
-            raise UnavailableError(f"{name!r} is not the name of shared picture memory")
+            raise UnavailableError(f"{name!r} is not the name of shared frame memory")
         return cls(_FOLDER / name, slots, width_px, height_px, owner=False)
 
     def pixels(self, slot: int) -> Image:
@@ -105,10 +103,10 @@ class FrameRing:
     def check(self, slot: int, seq: int) -> None:
         """Raise TransientError when the slot does not hold frame `seq` (any more)."""
         if not 0 <= slot < self.slots:
-            raise TransientError(f"picture {seq}: slot {slot} outside the ring of {self.slots}")
+            raise TransientError(f"frame {seq}: slot {slot} outside the ring of {self.slots}")
         found, _ = _HEADER.unpack_from(self._memory, slot * self._stride)
         if found != seq:
-            raise TransientError(f"picture {seq} was overwritten before it was read")
+            raise TransientError(f"frame {seq} was overwritten before it was read")
 
     def close(self) -> None:
         """Forget the mapping (views must be gone) and, as owner, the file."""

@@ -54,7 +54,7 @@ def _keep_outs(site: Site) -> Iterator[tuple[str, str]]:
         key = f"keep_out[{i}]"
         if area.x1_m <= area.x0_m or area.y1_m <= area.y0_m:
             yield key, "is empty; x0_m < x1_m and y0_m < y1_m are required"
-        elif area.to_m <= area.from_m or (site.ceiling_told and area.from_m >= site.ceiling_m):
+        elif area.to_m <= area.from_m or (site.ceiling_given and area.from_m >= site.ceiling_m):
             yield (
                 f"{key}.from_m",
                 f"{area.from_m:g} m is not below to_m and the ceiling ({site.ceiling_m:g} m)",

@@ -84,7 +84,7 @@ class _Plan:
             f"{len(site.nodes)} nodes",
             f"route {site.length_m(site.serpentine_route()):.0f} m",
             f"{site.line_width_m * 1000:.0f} mm {site.line_colour} lines",
-            f"ceiling {site.ceiling_m:g} m" if site.ceiling_told else "ceiling not given",
+            f"ceiling {site.ceiling_m:g} m" if site.ceiling_given else "ceiling not given",
         ]
         return [
             f'<text class="title" x="24" y="38">{escape(site.name)}</text>',

@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Sequence
 from flightd.site.closures import mistakes
 from flightd.site.racks import RackError, place_locations
 from flightd.site.site import (
-    UNTOLD_CEILING_M,
+    ASSUMED_CEILING_M,
     Aisle,
     Edge,
     LineColour,
@@ -88,8 +88,8 @@ def lay_out(
         shelves=shelves,
         line_width_m=line_width_m,
         line_colour=line_colour,
-        ceiling_m=UNTOLD_CEILING_M if ceiling_m is None else ceiling_m,
-        ceiling_told=ceiling_m is not None,
+        ceiling_m=ASSUMED_CEILING_M if ceiling_m is None else ceiling_m,
+        ceiling_given=ceiling_m is not None,
         interlock=interlock,
         racks=tuple(racks),
         locations=locations,

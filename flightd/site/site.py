@@ -17,7 +17,7 @@ from flightd.core.errors import InputError
 from flightd.core.markers import MarkerDictionary, MarkerSet
 from flightd.site.ways import KEEP_OUT_CLEARANCE_M, KeepOut, NoWayError, OneWay, Ways
 
-UNTOLD_CEILING_M = 2.5
+ASSUMED_CEILING_M = 2.5
 """The ceiling of a site whose file gives none: half a metre below it, at 2 m, nobody needs to measure one."""
 PAD_REACH_M = 0.5
 """A pad further than this from its place on the map is not taken for it."""
@@ -200,8 +200,8 @@ class Site:
     markers: tuple[Marker, ...] = ()
     interlock: bool = False
     """Whether nothing may arm here unless an interlock says that the aisles are closed to people."""
-    ceiling_told: bool = True
-    """Whether the site file gives the ceiling; otherwise it is UNTOLD_CEILING_M."""
+    ceiling_given: bool = True
+    """Whether the site file gives the ceiling; otherwise it is ASSUMED_CEILING_M."""
 
     @cached_property
     def _ways(self) -> Ways:

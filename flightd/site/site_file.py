@@ -241,7 +241,7 @@ def site_toml(site: Site) -> str:
         f"line_width_m = {site.line_width_m!r}",
         f"line_colour = {_quoted(site.line_colour)}",
     ]
-    if site.ceiling_told:
+    if site.ceiling_given:
         parts.append(f"ceiling_m = {site.ceiling_m!r}")
     if site.interlock:
         parts.append("interlock = true")

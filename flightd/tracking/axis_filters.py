@@ -21,7 +21,7 @@ from flightd.tracking.kalman import KalmanFilter
 
 _GATE_SIGMAS = 4.0
 _UNSEEN_S = 0.1
-"""An axis without a line for so long is reckoned: the gust that was last felt on it fades."""
+"""An axis without a line for so long is dead-reckoned: the gust that was last felt on it fades."""
 _BIAS_GAIN, _BIASED = 0.25, 0.6
 """Innovations whose running mean is beyond this, in sigmas, all err to one side: the wind has changed."""
 

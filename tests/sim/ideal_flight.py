@@ -80,7 +80,7 @@ class Faults:
     battery: float | None = None
     stamps_refused: int = 0
     clock_error_s: float = 0.0
-    untold: bool = False
+    landing_unreported: bool = False
     endless: bool = False
     health: Health = HEALTHY
 
@@ -313,6 +313,7 @@ class IdealFlight:
             self._range = (round(read_m, 2), self._now_ns)
         if not faults.heartless:
             self._beat_ns = self._now_ns
+        standing = on_floor and not faults.landing_unreported
         battery = self.airframe.battery_frac if faults.battery is None else faults.battery
         self._told = VehicleState(
             attitude=self._attitude(),
@@ -322,7 +323,7 @@ class IdealFlight:
             mode="GUIDED_NOGPS",
             in_control=self._armed and self.in_control,
             armed=self._armed,
-            landed=LandedState.ON_GROUND if on_floor and not faults.untold else LandedState.IN_AIR,
+            landed=LandedState.ON_GROUND if standing else LandedState.IN_AIR,
             battery_frac=battery,
             battery_v=12.0,
             heartbeat_ns=self._beat_ns,

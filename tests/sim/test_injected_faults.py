@@ -150,11 +150,11 @@ def test_a_range_finder_without_a_signal_is_not_believed(in_flight: Any) -> None
 
 def test_a_battery_that_is_told_of_no_longer_or_not_known_is_as_told(in_flight: Any) -> None:
     async def test(rig: Rig, turn: Any) -> None:
-        turn(True, kind="charge_told")
+        turn(True, kind="charge_misreported")
         await rig.stream(2.5)
         assert math.isnan(rig.known().battery_frac)
         assert rig.known().battery_cells == 3
-        turn(False, kind="charge_told")
+        turn(False, kind="charge_misreported")
         turn(True, kind="battery_silent")
         told_ns = rig.known().battery_stamp_ns
         await rig.stream(3.0)

@@ -81,16 +81,16 @@ def capture(parent: ChildEnd, source: Source, ring_name: str, latency_ns: int) -
 
 
 def _reason_of_end(parent: ChildEnd, source: Source, ring: FrameRing, latency_ns: int) -> str:
-    reason, refused = "cannot be opened, or gives no picture", 0
+    reason, refused = "cannot be opened, or gives no frame", 0
     times = ExposureTimes(latency_ns, round(1e9 / source.fps)) if source.kind.is_live else None
     told: TimeSource | None = None
     good_ns: int | None = None
     with contextlib.closing(frames_of(source, parent)) as frames:
         for seq, frame in enumerate(frames):
-            reason = "no more pictures"
+            reason = "no more frames"
             if frame.bgr.shape != (source.height_px, source.width_px, 3) or frame.bgr.dtype != np.uint8:
                 size = f"{frame.bgr.shape[1]}x{frame.bgr.shape[0]}"
-                return f"pictures are {size}, the configuration says {source.width_px}x{source.height_px}"
+                return f"frames are {size}, the configuration says {source.width_px}x{source.height_px}"
             stamp_ns = _stamp_of(frame, times, latency_ns)
             if times is not None and times.source not in {None, told}:
                 told = times.source
@@ -143,7 +143,7 @@ def _of_device(source: Source, parent: ChildEnd) -> Iterator[Grabbed]:
     exposure = DeviceExposure(device)
     try:
         for frame in _grabbed(device):
-            part = exposure.of_next_picture()
+            part = exposure.of_next_frame()
             yield Grabbed(frame.bgr, frame.arrival_ns, frame.device_ns, part)
             while parent.has_news():
                 exposure.ask(parent.receive())

@@ -34,7 +34,7 @@ def connect_camera(
     """Make the adapter; nothing is opened until its `run`.  Raises InputError for a wrong address.
 
     `on_trouble` hears, now and then, in a line for a person, why frames are refused or of doubtful time.
-    `url` is where its pictures come from, unless that is the configuration's; time is held by `hold`
+    `url` is where its frames come from, unless that is the configuration's; time is held by `hold`
     while threads work."""
     url = config.url if url is None else url
     if url == ARDRONE_URL:

@@ -8,8 +8,8 @@ import cv2
 
 _MANUAL = 1.0
 """V4L2_EXPOSURE_MANUAL."""
-_LATE_PICTURES = 3
-"""Pictures that may still come with the exposure before, once another one is set."""
+_LATE_FRAMES = 3
+"""Frames that may still come with the exposure before, once another one is set."""
 _NEAR = 0.25
 """How far from what was asked for a driver's step may be, as a part of it."""
 
@@ -23,8 +23,8 @@ class Device(Protocol):
 
 
 class DeviceExposure:
-    """Sets a device's exposure and says which part of its usual one a picture has.  The usual one is what the
-    device had when it was opened, automatic or not; where it cannot be changed, pictures go on having it."""
+    """Sets a device's exposure and says which part of its usual one a frame has.  The usual one is what the
+    device had when it was opened, automatic or not; where it cannot be changed, frames go on having it."""
 
     def __init__(self, device: Device) -> None:
         self._device = device
@@ -34,19 +34,19 @@ class DeviceExposure:
         self._late = 0
 
     def ask(self, part: float) -> None:
-        """Take pictures with this part of the usual exposure from now on; 1.0 gives the usual one back."""
+        """Take frames with this part of the usual exposure from now on; 1.0 gives the usual one back."""
         if not self._usual > 0.0:
             return
         if part == 1.0:
             self._device.set(cv2.CAP_PROP_EXPOSURE, self._usual)
             self._device.set(cv2.CAP_PROP_AUTO_EXPOSURE, self._mode)
-            self._coming, self._late = 1.0, _LATE_PICTURES
+            self._coming, self._late = 1.0, _LATE_FRAMES
             return
         self._device.set(cv2.CAP_PROP_AUTO_EXPOSURE, _MANUAL)
         self._device.set(cv2.CAP_PROP_EXPOSURE, part * self._usual)
         found = self._device.get(cv2.CAP_PROP_EXPOSURE) / self._usual
         if abs(found - part) <= _NEAR * part:
-            self._coming, self._late = part, _LATE_PICTURES
+            self._coming, self._late = part, _LATE_FRAMES
         else:
             self.ask(1.0)
 
@@ -55,8 +55,8 @@ class DeviceExposure:
         if self._coming != 1.0:
             self.ask(1.0)
 
-    def of_next_picture(self) -> float:
-        """The part of the usual exposure that the picture read next has."""
+    def of_next_frame(self) -> float:
+        """The part of the usual exposure that the frame read next has."""
         if self._late:
             self._late -= 1
         else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 _STALE_NS = 1_000_000_000
-"""On top of the camera's own delay; far more than a flight bears (`hazards.latency_s`)."""
+"""On top of the camera's own delay; far more than a flight tolerates (`hazards.latency_s`)."""
 _TELL_NS = 5_000_000_000
 
 OUT_OF_ORDER = "a frame came out of order"

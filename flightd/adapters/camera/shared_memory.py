@@ -1,4 +1,4 @@
-"""A camera that is a process of its own: pictures in shared memory, one UDP notice for each."""
+"""A camera that is a process of its own: frames in shared memory, one UDP notice for each."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class SharedCamera(asyncio.DatagramProtocol):
             transport.close()
 
     def expose(self, part: float) -> None:
-        """Ask for pictures of this part of the usual exposure from now on."""
+        """Ask for frames of this part of the usual exposure from now on."""
         self._exposure = part
 
     def datagram_received(self, data: bytes, addr: Any) -> None:
@@ -89,7 +89,7 @@ class SharedCamera(asyncio.DatagramProtocol):
             return
         if (notice.width_px, notice.height_px) != self._size_px:
             wanted = "{}x{}".format(*self._size_px)
-            reason = f"pictures are {notice.width_px}x{notice.height_px}, the configuration says {wanted}"
+            reason = f"frames are {notice.width_px}x{notice.height_px}, the configuration says {wanted}"
             self._order.refuse(reason, arrival_ns)
             return
         line = self._transport

@@ -113,12 +113,12 @@ class StatusReport(msgspec.Struct, frozen=True):
     lines: Annotated[tuple[SeenLine, ...], Meta(description="lines tracked now")]
     lines_age_s: Annotated[float | None, Meta(description="since a line was last seen, s; null: never")]
     vehicle: Annotated[VehicleReport | None, Meta(description="null before it was heard")]
-    frames: Annotated[int, Meta(description="pictures delivered")]
+    frames: Annotated[int, Meta(description="frames delivered")]
     frames_dropped: Annotated[int, Meta(description="of these not looked at")]
-    fps: Annotated[float, Meta(description="pictures used in the last second")]
+    fps: Annotated[float, Meta(description="frames used in the last second")]
     latency_ms: Annotated[
         dict[str, float],
-        Meta(description="newest picture's stages: capture, transport, detection, track, wire; total"),
+        Meta(description="newest frame's stages: capture, transport, detection, track, wire; total"),
     ]
     link: Annotated[LinkReport, Meta(description="the ground link's counters")]
 

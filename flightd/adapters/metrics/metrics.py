@@ -26,7 +26,7 @@ class MetricsBook:
         Info("flightd", "version of the daemon", registry=registry).info({"version": __version__})
         self._stages = Histogram(
             "flightd_stage_seconds",
-            "time of each stage of a picture, mid-exposure to the setpoint on the wire",
+            "time of each stage of a frame, mid-exposure to the setpoint on the wire",
             ["stage"],
             buckets=_STAGE_S,
             registry=registry,
@@ -49,7 +49,7 @@ class MetricsBook:
                 ("battery_ratio", "charge, 0 to 1"),
                 ("battery_volts", "of the battery"),
                 ("height_meters", "above the floor"),
-                ("pictures_per_second", "pictures used in the last second"),
+                ("frames_per_second", "frames used in the last second"),
                 ("nodes_done", "planned nodes visited"),
                 ("nodes_planned", "nodes of the plan"),
                 ("telemetry_age_seconds", "age of the newest attitude"),
@@ -71,7 +71,7 @@ class MetricsBook:
         self._counts.take(snapshot)
         values = {
             "height_meters": snapshot.height_m,
-            "pictures_per_second": snapshot.fps,
+            "frames_per_second": snapshot.fps,
             "nodes_done": snapshot.nodes_done,
             "nodes_planned": snapshot.nodes_planned,
             "ground_silent_seconds": snapshot.ground_silent_s,
@@ -105,7 +105,7 @@ class _Counts(Collector):
         snapshot = self._newest
         if snapshot is None:
             return
-        yield _counter("flightd_pictures", "pictures delivered by the camera", {"": snapshot.frames}, "")
+        yield _counter("flightd_frames", "frames delivered by the camera", {"": snapshot.frames}, "")
         yield _counter("flightd_dropped", "what a queue or a lost worker cost", snapshot.dropped, "queue")
         yield _counter("flightd_restarts", "processes that died and were replaced", snapshot.restarts, "part")
         text = "setpoints level and straight because no tick made one"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Protocol, TypeAlias
 
-from flightd.app.detection.detector_pool import PicturePool, Work
+from flightd.app.detection.detector_pool import FramePool, Work
 from flightd.core.scanning import CodeSet, Place
 from flightd.core.types import Image
 from flightd.ports import Clock
@@ -24,7 +24,7 @@ _MOST_SETS = 50
 
 
 class Readers(Protocol):
-    """Pictures in, codes and places out, somewhere else."""
+    """Frames in, codes and places out, somewhere else."""
 
     async def read(self, ticket: FrameTicket, places: tuple[Place, ...]) -> Reading | None: ...
 
@@ -37,20 +37,20 @@ def _shelf_reader() -> Work[tuple[Place, ...], Reading]:
     return _read
 
 
-class ReaderPool(PicturePool[tuple[Place, ...], Reading]):
-    """Processes that read codes; one that dies or hangs is replaced, its picture counts as lost."""
+class ReaderPool(FramePool[tuple[Place, ...], Reading]):
+    """Processes that read codes; one that dies or hangs is replaced, its frame counts as lost."""
 
     def __init__(self, size: int, timeout_s: float, clock: Clock, hold: Hold = nullcontext) -> None:
         super().__init__(_shelf_reader, size, timeout_s, clock, "code reader", hold)
 
     async def read(self, ticket: FrameTicket, places: tuple[Place, ...]) -> Reading | None:
-        """Codes and places of one picture, or None when it was lost."""
+        """Codes and places of one frame, or None when it was lost."""
         return await self.ask(ticket, places)
 
 
 class ShelfWatch:
-    """Has the front camera's newest picture read while the mission wants one; all others are passed over
-    unread.  `places` says what a picture exposed at a time is wanted for."""
+    """Has the front camera's newest frame read while the mission wants one; all others are passed over
+    unread.  `places` says what a frame exposed at a time is wanted for."""
 
     def __init__(self, readers: Readers, places: Callable[[int], tuple[Place, ...]]) -> None:
         self._readers = readers
@@ -62,7 +62,7 @@ class ShelfWatch:
         self.lost = 0
 
     async def run(self) -> None:
-        """Read one picture after the other; as many of these may run as there are readers."""
+        """Read one frame after the other; as many of these may run as there are readers."""
         while True:
             ticket = await self.frames.get()
             places = self.places(ticket.stamp_ns)
@@ -80,7 +80,7 @@ class ShelfWatch:
                 self._evidence.popitem(last=False)
 
     def take(self) -> tuple[CodeSet, ...]:
-        """What was read since the last call, in the order of the pictures."""
+        """What was read since the last call, in the order of the frames."""
         sets, self._sets = sorted(self._sets, key=lambda codes: codes.stamp_ns), []
         return tuple(sets)
 

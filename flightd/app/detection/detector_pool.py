@@ -1,7 +1,7 @@
-"""Worker processes: each takes one picture at a time from shared memory and answers what it found in it.
+"""Worker processes: each takes one frame at a time from shared memory and answers what it found in it.
 
-A worker that dies or exceeds its time is killed and replaced; the picture it had counts as lost.  The
-pool never raises into its user: a lost picture is simply no answer (None).
+A worker that dies or exceeds its time is killed and replaced; the frame it had counts as lost.  The
+pool never raises into its user: a lost frame is simply no answer (None).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _HOPELESS = 8
 
 
 class Work(Protocol[AskT_contra, FoundT_co]):
-    """What runs in a worker: a picture and what is asked of it, the answer out."""
+    """What runs in a worker: a frame and what is asked of it, the answer out."""
 
     def __call__(self, bgr: Image, ticket: FrameTicket, ask: AskT_contra, /) -> FoundT_co: ...
 
@@ -49,7 +49,7 @@ class Detect(Protocol):
 
 
 class Detectors(Protocol):
-    """Pictures in, lines out, somewhere else."""
+    """Frames in, lines out, somewhere else."""
 
     @property
     def replaced(self) -> int:
@@ -71,7 +71,7 @@ class Detection:
 
 
 _Answer: TypeAlias = "tuple[Any] | str"
-"""What was found in the picture, or why nothing was."""
+"""What was found in the frame, or why nothing was."""
 
 
 class _Worker:
@@ -103,7 +103,7 @@ class _Worker:
         return ring
 
 
-class PicturePool(Generic[AskT, FoundT]):
+class FramePool(Generic[AskT, FoundT]):
     """`size` worker processes behind `ask`, replaced when they die.
 
     `make` builds the work inside each worker and must be picklable.  `timeout_s` is the time after which a
@@ -158,7 +158,7 @@ class PicturePool(Generic[AskT, FoundT]):
             worker.join(1.0)
 
     async def ready(self) -> None:
-        """Wait until every worker can take a picture.  UnavailableError when they die one after another."""
+        """Wait until every worker can take a frame.  UnavailableError when they die one after another."""
         with self._hold():
             while self._idle.qsize() < self._size:
                 if self._deaths >= _HOPELESS:
@@ -167,7 +167,7 @@ class PicturePool(Generic[AskT, FoundT]):
                 await self._changed.wait()
 
     async def ask(self, ticket: FrameTicket, ask: AskT) -> FoundT | None:
-        """What is found in one picture, or None when it was lost (counted in `lost`)."""
+        """What is found in one frame, or None when it was lost (counted in `lost`)."""
         worker = await self._take()
         answer: _Answer
         try:
@@ -193,7 +193,7 @@ class PicturePool(Generic[AskT, FoundT]):
                 await asyncio.wait([answer], timeout=self._timeout_s)
         except asyncio.CancelledError:
             answer.cancel()
-            worker.kill()  # its answer would be taken for the next picture's
+            worker.kill()  # its answer would be taken for the next frame's
             raise
         if not answer.done():
             worker.kill(f"the {self._name} process hung")
@@ -229,7 +229,7 @@ class PicturePool(Generic[AskT, FoundT]):
 
 
 class _DetectLines:
-    """Inside a detector process: lines, and the picture's JPEG if it is asked for."""
+    """Inside a detector process: lines, and the frame's JPEG if it is asked for."""
 
     def __init__(self, make: Callable[[], Detect]) -> None:
         self._detector = make()
@@ -239,7 +239,7 @@ class _DetectLines:
         return lines, cv2.imencode(".jpg", bgr)[1].tobytes() if ask else None
 
 
-class DetectorPool(PicturePool[bool, _Lines]):
+class DetectorPool(FramePool[bool, _Lines]):
     """Processes that find the lines; `make` builds the detector inside each and must be picklable."""
 
     def __init__(
@@ -253,7 +253,7 @@ class DetectorPool(PicturePool[bool, _Lines]):
         super().__init__(partial(_DetectLines, make), size, timeout_s, clock, "detector", hold)
 
     async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None:
-        """Lines of one picture (and its JPEG if wanted), or None when it was lost."""
+        """Lines of one frame (and its JPEG if wanted), or None when it was lost."""
         started_ns = self._clock.now_ns()
         found = await self.ask(ticket, with_jpeg)
         if found is None:

@@ -61,7 +61,7 @@ class LatencyBook:
         self._waiting.clear()
 
     def drain(self) -> tuple[dict[str, float], ...]:
-        """The stages' times in ms of each picture since the last call, oldest first."""
+        """The stages' times in ms of each frame since the last call, oldest first."""
         since, self._since = tuple(self._since), []
         return since
 

@@ -165,7 +165,7 @@ class HazardMonitor:
         return {
             Trigger.CAMERA_FROZEN: (w.frozen_s > tolerated_s, 0.0),
             Trigger.CAMERA_BLIND: (w.blank_s > tolerated_s, 0.0),
-            Trigger.FRAMES_STALE: (w.picture_age_s > tolerated_s, 0.0),
+            Trigger.FRAMES_STALE: (w.frame_age_s > tolerated_s, 0.0),
         }
 
     def _place(self, s: MissionInputs) -> _Conditions:

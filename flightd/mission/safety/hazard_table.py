@@ -45,7 +45,7 @@ PHASE_OF = {
 @dataclass(frozen=True, slots=True)
 class Hazard:
     """One row.  `trigger` is what tells the mission (None: answered below it), `test` where it is flown; the
-    shipped scenario that makes it happen bears its `name`."""
+    shipped scenario that makes it happen has its `name`."""
 
     name: str
     trigger: Trigger | None
@@ -186,7 +186,7 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
-        "landing_untold",
+        "landing_unreported",
         None,
         "down at the height that the range finder read on the floor, neither climbing nor turning over, while"
         " it sinks; or a landing that takes longer than twice its way's time and"
@@ -195,7 +195,7 @@ HAZARDS: tuple[Hazard, ...] = (
         "after 1.5 s level, after 2.5 s the autopilot's own landing, which disarms; then asked to disarm,"
         " never forced. By time: the autopilot's own landing, then given up with an error, still asked to"
         " land",
-        "tests/sim/test_landing_untold.py",
+        "tests/sim/test_landing_unreported.py",
     ),
     Hazard(
         "ceiling_left",

@@ -42,7 +42,7 @@ class PlausibilityMonitor:
         height_m: float,
         tracks: TrackSet | None,
         tracker: LineTracker,
-        pictures: FrameMonitor,
+        frames: FrameMonitor,
         health: Health,
         height_stuck: bool = False,
     ) -> Warnings:
@@ -60,9 +60,9 @@ class PlausibilityMonitor:
             if self._tells_side(pose, line_m):
                 outside_m = self._corridor.outside_m(pose.x_m, pose.y_m)
         return Warnings(
-            picture_age_s=pictures.age_s(now_ns),
-            frozen_s=pictures.frozen_s(now_ns),
-            blank_s=pictures.blank_s(now_ns),
+            frame_age_s=frames.age_s(now_ns),
+            frozen_s=frames.frozen_s(now_ns),
+            blank_s=frames.blank_s(now_ns),
             heading_error_rad=tracker.heading_error_rad,
             height_share=share,
             height_stuck=height_stuck,

@@ -37,7 +37,7 @@ def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason |
         (charge.frac < p.battery_start, StartChargeLow(charge.frac, p.battery_start)),
         (charge.cell_v < cell_v, CellsLow(charge.cell_v, cell_v)),
         (not s.frames_arrive, Plain.NO_PICTURE),
-        (s.warnings.picture_age_s > latency_s, LatePictures(latency_s)),
+        (s.warnings.frame_age_s > latency_s, LatePictures(latency_s)),
         (ground_silent, Plain.GROUND_SILENT),
         (not s.aisle_closed, Plain.AISLE_OPEN),
     )

@@ -1,7 +1,7 @@
 """Flying on without a view of the floor: down while the dead-reckoned position still holds.  Pure.
 
 What drifts unseen does so with the square of the time, so a drone whose camera shows nothing sinks at once,
-low enough to stand soon, high enough to find the lines again; one that sees pictures without lines climbs to
+low enough to stand soon, high enough to find the lines again; one that sees frames without lines climbs to
 see more, for a short while.
 """
 
@@ -35,7 +35,7 @@ class FloorViewMonitor:
         hold_s, w = self._params.lines_hold_s, s.warnings
         ages_s = s.x_age_s, s.y_age_s
         self.unseen_s = min(ages_s) if leg_along_x is None else ages_s[leg_along_x]
-        self.shows = max(w.picture_age_s, w.frozen_s, w.blank_s) <= hold_s
+        self.shows = max(w.frame_age_s, w.frozen_s, w.blank_s) <= hold_s
         # what is lost from view while it is not heard is the telemetry's hazard, with its own times
         heard = s.telemetry_age_s <= self._params.telemetry_hold_s
         if self.unseen_s <= hold_s or not heard:

@@ -121,7 +121,7 @@ class AutopilotPeer(abc.ABC):
         self.sticks = Sticks()
         self.arming_block = ""
         """A sensor fault: the reason with which arming is refused while it is not empty."""
-        self.tells_landed = True
+        self.reports_landed = True
         """Otherwise it reports to be in the air for ever."""
         self.texts: deque[str] = deque(maxlen=_TEXTS_KEPT)
         """What others gave it to show, newest last."""

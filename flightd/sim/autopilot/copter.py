@@ -247,7 +247,7 @@ class ArduCopterPeer(AutopilotPeer):
 
     def _refresh(self, now_ns: int) -> None:
         super()._refresh(now_ns)
-        if self.landed and self.tells_landed:
+        if self.landed and self.reports_landed:
             self.instruments.landed_state = LANDED_GROUND
         else:
             landing = self.mode == CopterMode.LAND

@@ -225,7 +225,7 @@ class Px4Peer(AutopilotPeer):
     def _refresh(self, now_ns: int) -> None:
         super()._refresh(now_ns)
         landing = LANDED_LANDING if self.mode == Px4Mode.AUTO_LAND else LANDED_AIR
-        self.instruments.landed_state = LANDED_GROUND if self.landed and self.tells_landed else landing
+        self.instruments.landed_state = LANDED_GROUND if self.landed and self.reports_landed else landing
 
     def _heartbeat(self) -> Message:
         active = dialect.MAV_STATE_ACTIVE if self.armed else dialect.MAV_STATE_STANDBY

@@ -19,7 +19,7 @@ class Expectation(Section):
     hazard: str = Field(min_length=1, max_length=40)
     found_s: float = Field(1.0, gt=0, le=600)
     ends: Literal["completed", "home", "landed", "handed over"]
-    bears: tuple[str, ...] = ()
+    tolerates: tuple[str, ...] = ()
 
     @field_validator("hazard")
     @classmethod
@@ -28,7 +28,7 @@ class Expectation(Section):
             raise ValueError(f"no such hazard: {name!r}; `flightd guide hazards` lists them")
         return name
 
-    @field_validator("bears")
+    @field_validator("tolerates")
     @classmethod
     def _known(cls, kinds: tuple[str, ...]) -> tuple[str, ...]:
         for kind in kinds:

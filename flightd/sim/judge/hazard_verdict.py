@@ -85,7 +85,7 @@ def judged_hazard(
 def _expected(expected: Expectation) -> frozenset[str]:
     """The kinds of fault that are none in this scenario."""
     mission = MISSION_KINDS if expected.ends != "completed" else frozenset()
-    return mission | frozenset(expected.bears)
+    return mission | frozenset(expected.tolerates)
 
 
 def _found_s(row: Hazard, events: Sequence[Event], from_ns: int) -> float | None:

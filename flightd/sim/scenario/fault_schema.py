@@ -141,11 +141,11 @@ class HeightQuality(_Fault):
     percent: int = Field(1, ge=0, le=100)
 
 
-class LandingUntold(_Fault):
+class LandingUnreported(_Fault):
     """The autopilot never reports that it stands."""
 
     by_vehicle = True
-    kind: Literal["landing_untold"]
+    kind: Literal["landing_unreported"]
 
 
 class BatteryDrop(_Fault):
@@ -154,11 +154,11 @@ class BatteryDrop(_Fault):
     charge: float = Field(ge=0, le=1)
 
 
-class ChargeTold(_Fault):
-    """The autopilot tells this charge whatever the battery holds; -1 says that it does not know."""
+class ChargeMisreported(_Fault):
+    """The autopilot reports this charge whatever the battery holds; -1 says that it does not know."""
 
     by_vehicle = True
-    kind: Literal["charge_told"]
+    kind: Literal["charge_misreported"]
     percent: int = Field(-1, ge=-1, le=100)
 
 
@@ -272,9 +272,9 @@ Fault: TypeAlias = Annotated[
     | HeightLost
     | HeightStuck
     | HeightQuality
-    | LandingUntold
+    | LandingUnreported
     | BatteryDrop
-    | ChargeTold
+    | ChargeMisreported
     | WindChange
     | VehicleFault
     | ClockJump

@@ -28,7 +28,7 @@ from flightd.sim.scenario.fault_schema import (
     CameraFault,
     CameraLate,
     CameraTurned,
-    ChargeTold,
+    ChargeMisreported,
     ClockJump,
     ClockRate,
     Fault,
@@ -36,7 +36,7 @@ from flightd.sim.scenario.fault_schema import (
     HeightLost,
     HeightQuality,
     HeightStuck,
-    LandingUntold,
+    LandingUnreported,
     LinkFault,
     VehicleFault,
     WindChange,
@@ -207,8 +207,8 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
         case LinkFault():
             kept = _WITHHELD[fault.kind]
             vehicle.link.withheld = vehicle.link.withheld | kept if on else vehicle.link.withheld - kept
-        case LandingUntold():
-            vehicle.tells_landed = not on
+        case LandingUnreported():
+            vehicle.reports_landed = not on
         case ClockRate():
             vehicle.pace_clock(fault.share * 1e6 if on else 0.0)
         case ClockJump():
@@ -235,5 +235,5 @@ def _mislead(wrong: SensorFault, fault: Fault, on: bool) -> None:
             wrong.range_quality_pc = fault.percent if on else 0
         case HeightStuck():
             wrong.range_stuck_m = fault.reading_m if on else None
-        case ChargeTold():
+        case ChargeMisreported():
             wrong.charge_pc = fault.percent if on else None

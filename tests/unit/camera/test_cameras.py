@@ -1,4 +1,4 @@
-"""Cameras: notices of shared pictures, recordings, and addresses that are wrong."""
+"""Cameras: notices of shared frames, recordings, and addresses that are wrong."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_notices_become_tickets_in_our_time_and_junk_is_counted() -> None:
     assert [t.seq for t in tickets] == [0, 1, 2]
     assert camera.refused == 5
     assert len(troubles) == 1, "told once, not for every datagram"
-    assert "not a picture notice" in troubles[0]
+    assert "not a frame notice" in troubles[0]
     assert all(abs(t.arrival_ns - t.stamp_ns - 50_000_000) < 10_000 for t in tickets)
 
 
@@ -170,7 +170,7 @@ def test_a_folder_is_played_in_order_and_its_end_is_told(tmp_path: Path) -> None
         source = parse_source(f"folder:{tmp_path}", 64, 36, 200.0)
         await CaptureCamera(source, 0.01, LoopClock(), tickets.append, print).run()
 
-    with pytest.raises(TransientError, match="no more pictures"):
+    with pytest.raises(TransientError, match="no more frames"):
         real(main())
     assert [t.seq for t in tickets] == [0, 1, 2, 3]
     assert all(t.stamp_ns < t.arrival_ns - 9_000_000 for t in tickets)
@@ -183,5 +183,5 @@ def test_pictures_of_another_size_are_refused_by_name(tmp_path: Path) -> None:
         source = parse_source(f"folder:{tmp_path}", 640, 360, 200.0)
         await CaptureCamera(source, 0.0, LoopClock(), lambda _: None, print).run()
 
-    with pytest.raises(TransientError, match="pictures are 64x36, the configuration says 640x360"):
+    with pytest.raises(TransientError, match="frames are 64x36, the configuration says 640x360"):
         real(main())

@@ -46,7 +46,7 @@ class Device:
 
 
 def told(exposure: DeviceExposure, count: int) -> list[float]:
-    return [exposure.of_next_picture() for _ in range(count)]
+    return [exposure.of_next_frame() for _ in range(count)]
 
 
 def test_a_part_is_set_by_hand_and_told_only_when_it_has_come_through() -> None:

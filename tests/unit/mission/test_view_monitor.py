@@ -16,7 +16,7 @@ PARAMS = configured()
 EXPERT = PARAMS.mission.expert
 
 
-def inputs(x_age_s: float, y_age_s: float, picture_age_s: float = 0.0) -> MissionInputs:
+def inputs(x_age_s: float, y_age_s: float, frame_age_s: float = 0.0) -> MissionInputs:
     return MissionInputs(
         now_ns=10**9,
         dt_s=0.02,
@@ -28,13 +28,13 @@ def inputs(x_age_s: float, y_age_s: float, picture_age_s: float = 0.0) -> Missio
         y_age_s=y_age_s,
         telemetry_age_s=0.0,
         vehicle=None,
-        warnings=replace(ALL_WELL, picture_age_s=picture_age_s),
+        warnings=replace(ALL_WELL, frame_age_s=frame_age_s),
     )
 
 
 def test_a_camera_that_shows_nothing_makes_it_sink_and_pictures_without_lines_do_not() -> None:
     monitor = FloorViewMonitor(PARAMS)
-    monitor.step(inputs(0.5, 0.5, picture_age_s=0.5), leg_along_x=True)
+    monitor.step(inputs(0.5, 0.5, frame_age_s=0.5), leg_along_x=True)
     assert monitor.is_blind
     assert monitor.sink_mps(1.6) > 0.0
     assert monitor.sink_mps(PARAMS.hazards.expert.blind_m) == 0.0

@@ -1,4 +1,4 @@
-"""Detector processes: pictures by shared memory, death and hanging survived, nothing stale believed."""
+"""Detector processes: frames by shared memory, death and hanging survived, nothing stale believed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from flightd.app.detection.detector_pool import Detection, DetectorPool, PicturePool, Work
+from flightd.app.detection.detector_pool import Detection, DetectorPool, FramePool, Work
 from flightd.app.simulation.lockstep import LockstepDetectors
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.core.types import Image, LineSet
@@ -24,7 +24,7 @@ from tests.rigs.waiting import until
 
 
 class MeanDetector:
-    """Answers the picture's mean as a method name; picture 13 hangs, 14 kills the process."""
+    """Answers the frame's mean as a method name; frame 13 hangs, 14 kills the process."""
 
     def detect(self, bgr: Image, seq: int = 0, stamp_ns: int = 0) -> LineSet:
         if seq == 13:
@@ -32,7 +32,7 @@ class MeanDetector:
         if seq == 14:
             os.kill(os.getpid(), signal.SIGKILL)
         if seq == 15:
-            raise ValueError("a picture of nothing")
+            raise ValueError("a frame of nothing")
         return LineSet(seq, stamp_ns, bgr.shape[1], bgr.shape[0], (), (), str(int(bgr.mean())))
 
 
@@ -182,10 +182,10 @@ def test_a_worker_stopped_or_killed_in_mid_answer_keeps_nothing_else_waiting(
 ) -> None:
     """Half of 8 MB has come: the control loop goes on, the worker is replaced within its time."""
 
-    async def main() -> tuple[bytes | None, PicturePool[bool, bytes], int]:
+    async def main() -> tuple[bytes | None, FramePool[bool, bytes], int]:
         ring, make = FrameRing.create(4, 64, 36), partial(large_answers, number)
         try:
-            with PicturePool(make, 1, 0.5, LoopClock(), "test") as pool:
+            with FramePool(make, 1, 0.5, LoopClock(), "test") as pool:
                 await pool.ready()
                 asked = asyncio.ensure_future(pool.ask(ticket(ring, 1, 7), True))
                 turns = await turns_until(asked, 0.005)
@@ -203,10 +203,10 @@ def test_a_worker_stopped_or_killed_in_mid_answer_keeps_nothing_else_waiting(
 
 
 def test_an_answer_that_waited_for_a_stalled_loop_is_taken_and_its_worker_lives() -> None:
-    async def main() -> tuple[bytes | None, PicturePool[bool, bytes]]:
+    async def main() -> tuple[bytes | None, FramePool[bool, bytes]]:
         ring, make = FrameRing.create(4, 64, 36), partial(large_answers, None)
         try:
-            with PicturePool(make, 1, 0.7, LoopClock(), "test") as pool:
+            with FramePool(make, 1, 0.7, LoopClock(), "test") as pool:
                 await pool.ready()
                 asked = asyncio.ensure_future(pool.ask(ticket(ring, 1, 7), True))
                 await asyncio.sleep(0)
@@ -224,7 +224,7 @@ def test_an_answer_of_8_mb_comes_whole_while_others_have_their_turn() -> None:
     async def main() -> tuple[bytes | None, int]:
         ring, make = FrameRing.create(4, 64, 36), partial(large_answers, None)
         try:
-            with PicturePool(make, 1, 20.0, LoopClock(), "test") as pool:
+            with FramePool(make, 1, 20.0, LoopClock(), "test") as pool:
                 await pool.ready()
                 asked = asyncio.ensure_future(pool.ask(ticket(ring, 1, 7), True))
                 turns = await turns_until(asked, 0.0)

@@ -51,12 +51,12 @@ def test_what_the_daemon_tells_can_be_scraped() -> None:
     assert found["flightd_dropped_total", "recorder"] == 7
     assert found["flightd_events_total", "warning,phase"] == 1
     assert found["flightd_battery_ratio", ""] == pytest.approx(0.81)
-    assert found["flightd_pictures_total", ""] == 300
+    assert found["flightd_frames_total", ""] == 300
 
 
 def test_before_the_first_tick_and_without_a_vehicle_it_can_be_scraped_too() -> None:
     book = MetricsBook()
-    assert ("flightd_pictures_total", "") not in scraped(book)
+    assert ("flightd_frames_total", "") not in scraped(book)
     book.tell(vitals(heard_ns=None))
     assert scraped(book)["flightd_armed", ""] == 0
 

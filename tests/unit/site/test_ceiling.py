@@ -20,13 +20,13 @@ TOLD = (CONFIGS / "site-racks.toml").read_text(encoding="utf-8")
 DEMO = (CONFIGS / "site-demo.toml").read_text(encoding="utf-8")
 
 
-def untold(text: str) -> Site:
+def without_ceiling(text: str) -> Site:
     kept = [line for line in text.splitlines() if not line.startswith("ceiling_m")]
     return parse_site("\n".join(kept), "site.toml")
 
 
 def test_it_is_demanded_by_its_key_where_the_legs_are_flown_above_two_metres() -> None:
-    site = untold(DEMO)
+    site = without_ceiling(DEMO)
     pilot_of(CONFIG, site)
     high = CONFIG.with_values(mission={"height_m": 2.2})
     for make in (pilot_of, plan_of):
@@ -40,13 +40,13 @@ def test_it_is_demanded_by_its_key_where_the_legs_are_flown_above_two_metres() -
 def test_it_is_demanded_where_a_shelf_is_looked_at_from_above_two_metres() -> None:
     config = load_config(CONFIGS / "sim.toml").with_values(front_camera={"url": "udp://127.0.0.1:5000"})
     with pytest.raises(InputError, match=r"site.ceiling_m: not given, and the highest view of a shelf"):
-        pilot_of(config, untold(TOLD))
-    pilot_of(config.with_values(scan={"max_height_m": 1.9}), untold(TOLD))
+        pilot_of(config, without_ceiling(TOLD))
+    pilot_of(config.with_values(scan={"max_height_m": 1.9}), without_ceiling(TOLD))
 
 
 def test_a_site_without_one_is_written_and_read_again_without_one() -> None:
-    site = untold(DEMO)
-    assert not site.ceiling_told
+    site = without_ceiling(DEMO)
+    assert not site.ceiling_given
     assert parse_site(site_toml(site), "again") == site
     assert "ceiling_m" not in site_toml(site)
 

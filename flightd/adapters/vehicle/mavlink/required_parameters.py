@@ -30,7 +30,7 @@ class Rule:
 @dataclass(frozen=True, slots=True)
 class Job:
     """What the daemon is configured to ask of the autopilot beyond flight by attitude.  `system_id` is the
-    vehicle's, which this computer bears as well."""
+    vehicle's, which this computer has as well."""
 
     system_id: int = 1
     guided: bool = False

@@ -68,7 +68,7 @@ class MavsdkTelemetry(NewestReadings):
             self._attitudes.append(self._attitude)
 
     def take_range(self, sensor: Any, now_ns: int) -> None:
-        """A DistanceSensor, metres along the body's axis.  It bears no number: two are told apart by their
+        """A DistanceSensor, metres along the body's axis.  It has no number: two are told apart by their
         limits."""
         distance_m = sensor.current_distance_m
         looks_down = abs(sensor.orientation.pitch_deg % 360.0 - _DOWN_DEG) < 1.0

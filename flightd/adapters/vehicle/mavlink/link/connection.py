@@ -73,7 +73,7 @@ class MavlinkLink:
 
     async def _beat(self) -> None:
         """Our HEARTBEAT four times a second while the connection stands: a failsafe of two seconds on the
-        autopilot's side bears seven lost ones."""
+        autopilot's side tolerates seven lost ones."""
         lost = self._reconnection.lost
         while not lost.is_set():
             self.send(

@@ -1,4 +1,4 @@
-"""A landing whose end nobody tells comes to its end all the same; and nothing is disarmed in the air."""
+"""A landing whose end nobody reports comes to its end all the same; and nothing is disarmed in the air."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def landing_s(flown: Flown) -> float:
 @pytest.mark.parametrize("seed", range(1, 4))
 def test_down_and_still_it_leans_no_more_and_is_disarmed(seed: int) -> None:
     flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=seed, wind=WindParams(0.8, 0.5))
-    flight.faults.untold = True
+    flight.faults.landing_unreported = True
     flown = flight.fly(120.0)
     assert flown.phase is Phase.DONE
     assert landing_s(flown) < 25.0
@@ -63,7 +63,7 @@ def test_the_autopilots_own_landing_ends_what_it_does_not_tell_of(make: Callable
 
     async def test() -> None:
         async with make() as rig:
-            rig.peer.tells_landed = False
+            rig.peer.reports_landed = False
             await rig.take_off(1.0)
             rig.vehicle.demand(Demand.LAND)
             clock, armed_s = LoopClock(), 0.0
