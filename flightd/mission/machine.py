@@ -33,6 +33,7 @@ class Intent(enum.Enum):
 
 _TERMINAL = frozenset({Phase.DONE, Phase.ABORTED, Phase.PILOT})
 _ON_GROUND = _TERMINAL | {Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP}
+_HALTED = frozenset({Phase.HOLD, Phase.RELOCATE})
 _WAITING = frozenset({Phase.PREFLIGHT, Phase.SWAP})
 FLYING = (
     Phase.TAKE_OFF, Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.CLIMB, Phase.SCAN, Phase.HOLD,
@@ -90,6 +91,11 @@ class State:
     def on_pad(self) -> bool:
         """Coming down on the pad of the stop that was flown to."""
         return self.phase is Phase.LAND and self.intent in _ON_WAY
+
+    @property
+    def halted(self) -> bool:
+        """Interrupted in the air, where it is, until that is over."""
+        return self.phase in _HALTED
 
     @property
     def stopped(self) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
-from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, LandedState, Phase
+from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, Phase
 from flightd.mission.battery.swap import BatterySwap
 from flightd.mission.event_log import EventLog
 from flightd.mission.flight.phase_progress import PhaseProgress
@@ -23,36 +23,27 @@ from flightd.mission.machine import (
     TABLE,
     Cause,
     Intent,
-    State,
     next_state,
     possible_commands,
     taken_in,
 )
-from flightd.mission.orders import StandingOrders, StartOrder
+from flightd.mission.orders import StandingOrders, refusal
+from flightd.mission.phase_reporter import PhaseReporter
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
-from flightd.mission.reasons import Happened, Paused, Plain, Reason, StartsIn, Unfit, VehicleRefuses, in_words
-from flightd.mission.safety.hazard_monitor import DebounceTimer, FlightContext, HazardMonitor
+from flightd.mission.reasons import Happened, Reason
+from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
 from flightd.mission.safety.hazard_table import ACTIONS, Action, triggers_of
-from flightd.mission.safety.readiness import not_fresh, not_ready
+from flightd.mission.safety.loss_actions import LossActions
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.shelf_scan import ShelfScan
+from flightd.mission.start_clearance import StartClearance
 from flightd.mission.triggers import Trigger
 from flightd.site.site import Site
 
-_DEMANDS = {
-    Phase.PREFLIGHT: Demand.STANDBY,
-    Phase.SWAP: Demand.STANDBY,
-    Phase.DONE: Demand.DISARM,
-    Phase.ABORTED: Demand.DISARM,
-    Phase.PILOT: Demand.HANDS_OFF,
-}
 _NEAR_FLOOR = {Phase.TAKE_OFF, Phase.LAND}
 """Where lines come and go."""
-_UNFIT_S = 3.0
-"""Parameters are still being read for about so long."""
-_HALTED = (Phase.HOLD, Phase.RELOCATE)
-_INTERRUPTED = (*_HALTED, Phase.ACQUIRE)
+_INTERRUPTED = (Phase.HOLD, Phase.RELOCATE, Phase.ACQUIRE)
 """Where a leg that was interrupted goes on from."""
 _OVER_PAD_M = 0.5
 """So near its centre a landing goes on onto the pad, whatever the position was taken for before."""
@@ -78,14 +69,11 @@ class Mission:
         autostart: bool | None = None,
     ) -> None:
         start = site.nodes[plan.start]
-        self._config = config
-        self._scanner = scanner
         self._events = EventLog()
         self._orders = StandingOrders()
-        self._start = StartOrder(config.mission)
-        self._obstacle: Reason | None = Plain.NO_TELEMETRY
-        self._unfit = DebounceTimer()
-        self._unfit_told: Reason | None = None
+        by_itself = config.mission.autostart if autostart is None else autostart
+        self._clearance = StartClearance(config, self._events, autostart=by_itself)
+        self._losses = LossActions(config, self._events)
         self._route = Itinerary(site, plan, policy, self._events)
         self._scan = ShelfScan(site, scanner)
         self._progress = PhaseProgress(config, self._route, self._scan, scanner)
@@ -95,12 +83,9 @@ class Mission:
             config, site.ceiling_m, self._monitor, self._relocator, (start.x_m, start.y_m, plan.start_yaw_rad)
         )
         self._charging = BatterySwap(site, policy, config, scanner, self._route, self._monitor)
+        self._reporter = PhaseReporter(self._events, self._route, self._scan)
         self.state = BEGIN
-        self._reason: Reason | None = None
-        self._cause: Reason | None = None
         self._leg_along_x: bool | None = None
-        self._ground_lost = False
-        self._autostart = config.mission.autostart if autostart is None else autostart
         self._await_start()
 
     @property
@@ -111,7 +96,7 @@ class Mission:
     @property
     def reason(self) -> str:
         """Why it does that, in words; empty before the first tick."""
-        return "" if self._reason is None else in_words(self._reason)
+        return self._reporter.reason
 
     @property
     def airborne(self) -> bool:
@@ -147,17 +132,18 @@ class Mission:
     def possible_commands(self) -> frozenset[CommandKind]:
         """What an operator may order now; no start before the flight is ready."""
         possible = possible_commands(self.state)
-        return possible - {CommandKind.START} if self.state.waiting and self._obstacle else possible
+        held = self.state.waiting and not self._clearance.is_ready
+        return possible - {CommandKind.START} if held else possible
 
     def drain_events(self) -> tuple[Event, ...]:
-        return (*self._events.drain(), *self._scanner.drain_events())
+        return (*self._events.drain(), *self._scan.drain_events())
 
     def command(self, command: Command, now_ns: int) -> None:
         """Take an operator's order; a landing or stop acts at the next step."""
         kind, trigger = command.kind, COMMANDS[command.kind]
         self._events.report(now_ns, EventLevel.INFO, "command", f"{kind.value} {command.node}".strip())
         if trigger not in taken_in(self.state):
-            self._refuse(command, now_ns)
+            self._events.report(now_ns, EventLevel.WARNING, "command", refusal(command, self.state))
             return
         if self.state.waiting and kind in {CommandKind.START, CommandKind.PAUSE}:
             self._take_start(trigger, now_ns)
@@ -170,19 +156,11 @@ class Mission:
 
     def _take_start(self, trigger: Trigger, now_ns: int) -> None:
         """Begin a start's count-down if nothing keeps the drone on the ground, or take it back."""
-        level, text = EventLevel.WARNING, "taken back"
         if trigger is Trigger.PAUSE:
-            self._start.withdraw()
-        elif self.state.intent is not Intent.WAIT:
+            self._clearance.take_back(now_ns)
+        elif self.state.intent is not Intent.WAIT or not self._clearance.give(now_ns):
             return
-        elif self._obstacle is not None:
-            self._events.report(now_ns, level, "command", f"start refused: {in_words(self._obstacle)}")
-            return
-        else:
-            self._start.give(now_ns)
-            text = in_words(StartsIn(self._start.left_s(now_ns)))
         self._turn(trigger)
-        self._events.report(now_ns, level, "start", text)
 
     def step(self, inputs: MissionInputs) -> Guidance:
         """Advance by one tick."""
@@ -204,29 +182,25 @@ class Mission:
     def _triggers(self, s: MissionInputs) -> set[Trigger]:
         """What has happened by this tick.  Turning back acts at once."""
         ready = self.state.waiting and self._grounded(s) is None
-        may_start = ready and not self._start.left_s(s.now_ns)
+        may_start = ready and self._clearance.counted_down(s.now_ns)
         found = self._progress.step(s, self.state, may_start=may_start)
         found |= self._orders.urgent
-        found |= self._ground(s)
+        if self._losses.ground_lost(s):
+            found |= self._lost(self._losses.of_ground_link, Trigger.GROUND_LOST, s.now_ns)
         if self._orders.paused:
             found.add(Trigger.HOLD)
         self._turn_back(self._charging.step(s, self.state))
-        if self._progress.timed_out(s.now_ns) and not self._lands_unheard(s):
+        if self._progress.timed_out(s, self.phase):
             found.add(Trigger.TIMED_OUT)
         if s.failed:
             found.add(Trigger.STEP_FAILED)
-        if self._start.is_void(s.now_ns) and Trigger.START_EXPIRED in taken_in(self.state):
+        if self._clearance.is_void(s.now_ns) and Trigger.START_EXPIRED in taken_in(self.state):
             found.add(Trigger.START_EXPIRED)
             self._void_start(s.now_ns)
         if Trigger.FOUND_FLYING in found:  # an order to land or stop stands until it may be obeyed
             found -= self._orders.urgent
         found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))
-        hazards = self._config.hazards
-        for lost, action in (
-            (Trigger.RECORD_LOST, hazards.record_lost),
-            (Trigger.BATTERY_UNKNOWN, hazards.battery_unknown),
-            (Trigger.AISLE_OPEN, hazards.aisle_open),
-        ):
+        for lost, action in self._losses.on_board.items():
             if lost in found:
                 found.remove(lost)
                 found |= self._lost(action, lost, s.now_ns)
@@ -234,25 +208,20 @@ class Mission:
             found.add(Trigger.AISLE_OPEN)
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
-        return found - {Trigger.PILOT_TOOK} if self._adopting(s) else found
+        return found - {Trigger.PILOT_TOOK} if self._progress.adopting(s, self.phase) else found
 
     def _void_start(self, now_ns: int) -> None:
         """A start that came to nothing is not kept for later."""
-        self._start.withdraw()
+        self._clearance.withdraw()
         if self.state.waiting:
-            why = "" if self._obstacle is None else f": {in_words(self._obstacle)}"
-            self._events.report(now_ns, EventLevel.WARNING, "start", f"{Trigger.START_EXPIRED.value}{why}")
+            self._clearance.report_void(now_ns)
             self._turn(Trigger.START_EXPIRED)
-
-    def _lands_unheard(self, s: MissionInputs) -> bool:
-        """A landing of a vehicle that is not heard ends when it is given up as vanished."""
-        return self.phase is Phase.LAND and s.telemetry_age_s > self._config.mission.telemetry_land_s
 
     def _landed(self) -> set[Trigger]:
         """What a landing on the pad is more than its end."""
         if self._charging.swaps:
             return {Trigger.DOWN_TO_SWAP}
-        return {Trigger.NOT_COUNTED} if self._scanner.blind else set()
+        return {Trigger.NOT_COUNTED} if self._scan.blind else set()
 
     def _lost(self, action: LossAction, trigger: Trigger, now_ns: int) -> set[Trigger]:
         """What the configured action makes of something lost."""
@@ -279,30 +248,10 @@ class Mission:
         at_height = self.airborne and self.phase not in _NEAR_FLOOR
         return FlightContext(self.airborne, paused, self._leg_along_x, self.phase is Phase.HOLD, at_height)
 
-    def _ground(self, s: MissionInputs) -> set[Trigger]:
-        """What a lost ground link asks for, by the configured action; the link's return ends a hold."""
-        action = self._config.ground.lost_action
-        lost = self._monitor.ground_lost(s)
-        if lost is not self._ground_lost:
-            self._ground_lost = lost
-            text = f"silent for {s.ground_silent_s:.1f} s: {action.value}" if lost else "heard again"
-            self._events.report(
-                s.now_ns, EventLevel.WARNING if lost else EventLevel.INFO, "ground_link", text
-            )
-        return self._lost(action, Trigger.GROUND_LOST, s.now_ns) if lost else set()
-
-    def _adopting(self, s: MissionInputs) -> bool:
-        """A vehicle found flying is given a moment to show that it obeys."""
-        return (
-            self.phase is Phase.RECOVER
-            and self._progress.phase_s(s.now_ns) < self._config.mission.expert.adopt_s
-        )
-
     def _grounded(self, s: MissionInputs) -> Reason | None:
         """Why it stays on the ground, None if nothing keeps it there."""
-        silent = self._ground_lost and self._config.ground.lost_action is not LossAction.CONTINUE
-        stale = not_fresh(s, self._config, len(self.remaining)) if self.phase is Phase.SWAP else None
-        return stale or not_ready(s, self._config, silent)
+        stops_left = len(self.remaining) if self.phase is Phase.SWAP else None
+        return self._clearance.obstacle(s, stops_left, self._losses.ground_silent)
 
     # Changing the intent of the phase in hand
 
@@ -311,18 +260,8 @@ class Mission:
         outcome = TABLE[self.state][trigger]
         if outcome is not None:
             self.state = outcome.state
-            self._cause = Happened(trigger) if outcome.cause is Cause.TRIGGER else self._cause
-
-    def _refuse(self, command: Command, now_ns: int) -> None:
-        """Say why an order has no effect."""
-        ordered = f"{command.kind.value} {command.node}".strip()
-        if command.kind in {CommandKind.HOME, CommandKind.GOTO} and not self.airborne:
-            text = f"{command.kind.value} refused: the drone does not fly"
-        elif command.kind is CommandKind.GOTO and self.state.returning:
-            text = f"{ordered} refused: on the way home"
-        else:
-            text = f"{ordered} refused: not in phase {self.phase.value}"
-        self._events.report(now_ns, EventLevel.WARNING, "command", text)
+            if outcome.cause is Cause.TRIGGER:
+                self._reporter.turn(trigger)
 
     def _go_home(self, trigger: Trigger, reason: Reason, now_ns: int) -> None:
         """Fly to the home pad; in need by the shortest way, against one-way lines too."""
@@ -337,7 +276,7 @@ class Mission:
 
     def _await_start(self) -> None:
         """On the ground before a flight: with autostart nobody has to order it."""
-        if self._autostart:
+        if self._clearance.autostart:
             self._turn(Trigger.START)
 
     # Changing phase
@@ -354,12 +293,8 @@ class Mission:
         if trigger is Trigger.DWELLED:
             self._go_on(s)
         self._anchor(s, trigger)
-        self._explain(s, trigger, outcome.cause, was_on_pad=before.on_pad)
-        if trigger is Trigger.TIMED_OUT and before.phase is Phase.LAND:
-            self._report_endless_landing(s)
-        level = EventLevel.WARNING if _alarming(before, self.state, trigger) else EventLevel.INFO
-        text = f"{before.phase.value} -> {self.phase.value}: {self.reason}"
-        self._events.report(s.now_ns, level, "phase", text)
+        phase_s = self._progress.phase_s(s.now_ns)
+        self._reporter.begin(s, before, self.state, trigger, outcome.cause, phase_s)
         self._progress.begin(s, self.phase)
         self._enter(s, trigger)
 
@@ -370,38 +305,14 @@ class Mission:
             self._steering.anchor = (self.goal.x_m, self.goal.y_m)
         elif self.phase is Phase.HOLD and s.localised:
             self._steering.anchor = s.warnings.line_m
-        elif self.phase in _HALTED or (self.phase is Phase.LAND and not self.state.on_pad):
+        elif self.state.halted or (self.phase is Phase.LAND and not self.state.on_pad):
             self._steering.anchor = here
-
-    def _explain(self, s: MissionInputs, trigger: Trigger, cause: Cause, *, was_on_pad: bool) -> None:
-        """Set the reason for the phase that begins; of an end on the pad, why it turned home."""
-        refused = s.vehicle is not None and trigger in {Trigger.TIMED_OUT, Trigger.START_EXPIRED}
-        refusal = s.vehicle.refusal if s.vehicle is not None and refused else ""
-        if trigger is Trigger.NOT_COUNTED and (blind := self._scanner.blind) is not None:
-            self._cause = blind
-            self._events.report(s.now_ns, EventLevel.ERROR, "not_counted", in_words(blind))
-        elif cause is Cause.LANDED:
-            self._cause = Plain.LANDED
-        elif cause is Cause.TRIGGER:
-            happened = Happened(trigger)
-            self._cause = VehicleRefuses(happened, refusal) if refusal else happened
-        elif self.state.over and was_on_pad:
-            self._cause = self._route.why_home or self._cause
-        self._reason = self._cause
-
-    def _report_endless_landing(self, s: MissionInputs) -> None:
-        """Say what becomes of a landing that does not come to its end."""
-        if self.state.over:
-            text = "not disarmed after all: see that the drone stands, and disarm it by hand"
-        else:
-            text = f"not down after {self._progress.phase_s(s.now_ns):.0f} s: the autopilot lands by itself"
-        self._events.report(s.now_ns, EventLevel.ERROR, "landing", text)
 
     def _enter(self, s: MissionInputs, trigger: Trigger) -> None:
         """What the phase that begins starts with."""
         match self.phase:
             case Phase.TAKE_OFF:
-                self._start.withdraw()
+                self._clearance.withdraw()
                 self._steering.take_off(s.height_m)
             case Phase.ACQUIRE if trigger is Trigger.POSITION_SURE:
                 self._rejoin(s)
@@ -434,7 +345,7 @@ class Mission:
         """Go on from where the drone turned out to be."""
         if s.pose is None:
             return
-        self._route.recount(s.now_ns, self._scanner.take_due(), returning=self.state.returning)
+        self._route.recount(s.now_ns, self._scan.take_due(), returning=self.state.returning)
         self._route.rejoin(s.now_ns, s.pose)
 
     def _correct(self, s: MissionInputs) -> None:
@@ -457,30 +368,16 @@ class Mission:
 
     def _guide(self, s: MissionInputs) -> Guidance:
         if self.state.waiting:
-            self._obstacle = self._grounded(s)
-            self._report_unfit(s.now_ns, self._obstacle)
-            left_s = self._start.left_s(s.now_ns)
-            self._reason = self._obstacle or (StartsIn(left_s) if left_s else Plain.AWAITS_START)
+            self._reporter.wait(self._clearance.wait(self._grounded(s), s.now_ns))
         if not self.airborne:
-            demand = _DEMANDS.get(self.phase, Demand.FLY)
-            return self._steering.on_ground(s, self.phase, _in_air(demand) if _flies(s) else demand)
+            return self._steering.on_ground(s, self.phase)
         guidance = self._steering.step(s, self._task(s.now_ns))
-        if self.phase in _HALTED and self._cause is not None:
-            held = self._orders.paused and self._cause != Happened(Trigger.HOLD)
-            self._reason = Paused(self._cause) if held else self._cause
+        if self.state.halted:
+            self._reporter.halt(paused=self._orders.paused)
         if self.phase is Phase.LAND:
-            refusal = s.vehicle.refusal if s.vehicle is not None else ""
-            self._reason = self._cause
-            if refusal and self._cause is not None and guidance.demand is Demand.DISARM:
-                self._reason = VehicleRefuses(self._cause, refusal)
+            disarms = s.vehicle is not None and guidance.demand is Demand.DISARM
+            self._reporter.land(s.vehicle.refusal if s.vehicle is not None and disarms else "")
         return guidance
-
-    def _report_unfit(self, now_ns: int, obstacle: Reason | None) -> None:
-        """Say once what was found against a flight, as soon as it is no passing matter."""
-        unfit_s = self._unfit.step(isinstance(obstacle, Unfit), now_ns)
-        if isinstance(obstacle, Unfit) and unfit_s > _UNFIT_S and obstacle != self._unfit_told:
-            self._unfit_told = obstacle
-            self._events.report(now_ns, EventLevel.WARNING, "unfit", obstacle.found)
 
     def _leads_along_x(self) -> bool:
         """The way to the goal is along its aisle, not from one aisle to another."""
@@ -492,24 +389,3 @@ class Mission:
         cruise = self.state.returning or not self.goal.visit or not self._leads_along_x()
         view = self._scan.view(self.phase)
         return ReferenceTask(self.state, self._progress.phase_s(now_ns), self.goal, view, cruise)
-
-
-def _flies(s: MissionInputs) -> bool:
-    """The vehicle says that it is in the air, whatever the mission is at."""
-    return s.vehicle is not None and s.vehicle.armed and s.vehicle.landed is LandedState.IN_AIR
-
-
-def _in_air(demand: Demand) -> Demand:
-    """Nothing disarms in the air."""
-    return Demand.LAND if demand is Demand.DISARM else demand
-
-
-def _alarming(before: State, after: State, trigger: Trigger) -> bool:
-    """Whether a change of phase is none of those that were planned."""
-    if after.phase is Phase.LAND:
-        return not after.on_pad
-    if trigger is Trigger.START_EXPIRED:
-        return True
-    if after.phase in {Phase.ABORTED, Phase.PILOT}:  # a landing has been reported already
-        return before.phase is not Phase.LAND or (before.stopped and trigger is not Trigger.DISARMED)
-    return after.phase in _HALTED

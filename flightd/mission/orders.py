@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from flightd.config.mission import MissionConfig
-from flightd.core.types import CommandKind
+from flightd.core.types import Command, CommandKind
+from flightd.mission.machine import State
 from flightd.mission.triggers import Trigger
 
 _URGENT = {CommandKind.LAND: Trigger.LAND_HERE, CommandKind.STOP: Trigger.STOP}
@@ -34,6 +35,16 @@ class StandingOrders:
     def urgent(self) -> set[Trigger]:
         """The landing or stop that stands."""
         return set() if self._urgent is None else {self._urgent}
+
+
+def refusal(command: Command, state: State) -> str:
+    """Why an order that means nothing in this state has no effect, in words."""
+    ordered = f"{command.kind.value} {command.node}".strip()
+    if command.kind in {CommandKind.HOME, CommandKind.GOTO} and not state.airborne:
+        return f"{command.kind.value} refused: the drone does not fly"
+    if command.kind is CommandKind.GOTO and state.returning:
+        return f"{ordered} refused: on the way home"
+    return f"{ordered} refused: not in phase {state.phase.value}"
 
 
 class StartOrder:

@@ -42,8 +42,15 @@ class PhaseProgress:
         """Time since the phase began."""
         return (now_ns - self._since_ns) * 1e-9
 
-    def timed_out(self, now_ns: int) -> bool:
-        return self.phase_s(now_ns) > self._limit_s
+    def timed_out(self, s: MissionInputs, phase: Phase) -> bool:
+        """It takes longer than it may.  A landing of a vehicle that is not heard ends when that is given up
+        as vanished."""
+        unheard = phase is Phase.LAND and s.telemetry_age_s > self._params.telemetry_land_s
+        return self.phase_s(s.now_ns) > self._limit_s and not unheard
+
+    def adopting(self, s: MissionInputs, phase: Phase) -> bool:
+        """A vehicle found flying is given a moment to show that it obeys."""
+        return phase is Phase.RECOVER and self.phase_s(s.now_ns) < self._params.expert.adopt_s
 
     def step(self, s: MissionInputs, state: State, *, may_start: bool) -> set[Trigger]:
         """The trigger by which the phase reaches its end, if it has; on the ground it ends when the mission

@@ -18,6 +18,14 @@ from flightd.mission.plan.flight_plan import Stop
 from flightd.mission.safety.hazard_monitor import HazardMonitor
 from flightd.mission.scan.views import View
 
+_DEMANDS = {
+    Phase.PREFLIGHT: Demand.STANDBY,
+    Phase.SWAP: Demand.STANDBY,
+    Phase.DONE: Demand.DISARM,
+    Phase.ABORTED: Demand.DISARM,
+    Phase.PILOT: Demand.HANDS_OFF,
+}
+"""Of the vehicle, while nothing is flown."""
 _BY_PAD = {Phase.TAKE_OFF, Phase.ACQUIRE, Phase.HOLD}
 _TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
 _SETTLE_S = 3.0
@@ -97,8 +105,11 @@ class ReferenceGenerator:
         """Start the reference at the drone, which is not where it was believed to be."""
         self._steers = False
 
-    def on_ground(self, s: MissionInputs, phase: Phase, demand: Demand) -> Guidance:
+    def on_ground(self, s: MissionInputs, phase: Phase) -> Guidance:
         """What is wanted while nothing is flown."""
+        demand = _DEMANDS.get(phase, Demand.FLY)
+        if demand is Demand.DISARM and _flies(s):  # nothing disarms in the air
+            demand = Demand.LAND
         if s.vehicle is not None and not s.vehicle.armed:
             self._standstill.stands(s.height_m)
         return Guidance(phase, Guide.NONE, self._reference(0.0), demand)
@@ -240,3 +251,8 @@ class ReferenceGenerator:
 def _target(s: MissionInputs, task: ReferenceTask) -> tuple[float, float] | None:
     """The pad to come down on; None while it lands on none."""
     return (s.pad_m or (task.goal.x_m, task.goal.y_m)) if task.state.on_pad else None
+
+
+def _flies(s: MissionInputs) -> bool:
+    """The vehicle says that it is in the air, whatever the mission is at."""
+    return s.vehicle is not None and s.vehicle.armed and s.vehicle.landed is LandedState.IN_AIR

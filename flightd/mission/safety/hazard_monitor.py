@@ -84,7 +84,6 @@ class HazardMonitor:
     def __init__(self, config: Config) -> None:
         self._params = config.mission
         self._hazards = config.hazards
-        self._ground_lost_s = config.ground.lost_s
         self._debounce: defaultdict[Trigger, DebounceTimer] = defaultdict(DebounceTimer)
         self._trouble = DebounceTimer()
         self._detectors, self._writers, self._stamps = Counted(), Counted(), Counted(_JUMPED)
@@ -109,9 +108,6 @@ class HazardMonitor:
         if self._trouble.step(bool(holding), s.now_ns) > self._params.lines_land_s:
             found.add(Trigger.HAZARD_LASTS)
         return found - {Trigger.LINES_FOUND} if holding else found
-
-    def ground_lost(self, s: MissionInputs) -> bool:
-        return s.ground_silent_s > self._ground_lost_s
 
     def battery_low(self, s: MissionInputs) -> bool:
         p, charge = self._params, s.charge

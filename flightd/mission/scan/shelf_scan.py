@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from flightd.core.types import Phase
+from flightd.core.types import Event, Phase
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.plan.flight_plan import Stop
+from flightd.mission.reasons import NothingRead
 from flightd.mission.scan.no_scan import AnyScanner
 from flightd.mission.scan.views import View
 from flightd.mission.triggers import Trigger
@@ -27,6 +28,19 @@ class ShelfScan:
         self._scanner = scanner
         self._scanned = ""
         self._apart_m = _least_apart_m(site)
+
+    @property
+    def blind(self) -> NothingRead | None:
+        """Why the count is none, if it is."""
+        return self._scanner.blind
+
+    def take_due(self) -> tuple[str, ...]:
+        """The nodes to fly to once more, as `Scanner.take_due`."""
+        return self._scanner.take_due()
+
+    def drain_events(self) -> list[Event]:
+        """What the scan has to report since the last call."""
+        return self._scanner.drain_events()
 
     def view(self, phase: Phase) -> View | None:
         """Where to look from, None in phases that do not scan."""

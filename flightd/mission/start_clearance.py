@@ -1,0 +1,89 @@
+"""What stands between a mission on the ground and its flight: the start order and the checks.  Pure."""
+
+from __future__ import annotations
+
+from flightd.config.schema import Config
+from flightd.core.types import EventLevel
+from flightd.mission.event_log import EventLog
+from flightd.mission.guidance import MissionInputs
+from flightd.mission.orders import StartOrder
+from flightd.mission.reasons import Plain, Reason, StartsIn, Unfit, in_words
+from flightd.mission.safety.hazard_monitor import DebounceTimer
+from flightd.mission.safety.readiness import not_fresh, not_ready
+from flightd.mission.triggers import Trigger
+
+_UNFIT_S = 3.0
+"""Parameters are still being read for about so long."""
+
+
+class StartClearance:
+    """Counts a start order down, and says what keeps the drone on the ground: call `wait` at each tick on
+    which it waits there.  With `autostart` nobody has to order a start."""
+
+    def __init__(self, config: Config, events: EventLog, *, autostart: bool) -> None:
+        self._config = config
+        self._events = events
+        self.autostart = autostart
+        self._order = StartOrder(config.mission)
+        self._obstacle: Reason | None = Plain.NO_TELEMETRY
+        self._unfit = DebounceTimer()
+        self._unfit_reported: Reason | None = None
+
+    @property
+    def is_ready(self) -> bool:
+        """Nothing kept the drone on the ground when it was last looked at."""
+        return self._obstacle is None
+
+    def obstacle(self, s: MissionInputs, stops_left: int | None, ground_silent: bool) -> Reason | None:
+        """What keeps the drone on the ground now, None if nothing does; `stops_left` where it waits for a
+        battery for them, `ground_silent` as in `not_ready`."""
+        stale = not_fresh(s, self._config, stops_left) if stops_left is not None else None
+        return stale or not_ready(s, self._config, ground_silent)
+
+    def counted_down(self, now_ns: int) -> bool:
+        """No count-down is under way."""
+        return not self._order.left_s(now_ns)
+
+    def give(self, now_ns: int) -> bool:
+        """A start is ordered: begin its count-down, or refuse it for what keeps the drone on the ground.
+        Whether it was taken."""
+        if self._obstacle is not None:
+            text = f"start refused: {in_words(self._obstacle)}"
+            self._events.report(now_ns, EventLevel.WARNING, "command", text)
+            return False
+        self._order.give(now_ns)
+        text = in_words(StartsIn(self._order.left_s(now_ns)))
+        self._events.report(now_ns, EventLevel.WARNING, "start", text)
+        return True
+
+    def take_back(self, now_ns: int) -> None:
+        """An operator takes the start back."""
+        self._order.withdraw()
+        self._events.report(now_ns, EventLevel.WARNING, "start", "taken back")
+
+    def withdraw(self) -> None:
+        """The start has done its work, or came to nothing: it is not kept for later."""
+        self._order.withdraw()
+
+    def is_void(self, now_ns: int) -> bool:
+        """The start has not armed in time."""
+        return self._order.is_void(now_ns)
+
+    def report_void(self, now_ns: int) -> None:
+        """Say that a start came to nothing, and for what."""
+        why = "" if self._obstacle is None else f": {in_words(self._obstacle)}"
+        self._events.report(now_ns, EventLevel.WARNING, "start", f"{Trigger.START_EXPIRED.value}{why}")
+
+    def wait(self, obstacle: Reason | None, now_ns: int) -> Reason:
+        """Keep what stands against a flight at this tick; why it waits."""
+        self._obstacle = obstacle
+        self._report_unfit(now_ns, obstacle)
+        left_s = self._order.left_s(now_ns)
+        return obstacle or (StartsIn(left_s) if left_s else Plain.AWAITS_START)
+
+    def _report_unfit(self, now_ns: int, obstacle: Reason | None) -> None:
+        """Say once what was found against a flight, as soon as it is no passing matter."""
+        unfit_s = self._unfit.step(isinstance(obstacle, Unfit), now_ns)
+        if isinstance(obstacle, Unfit) and unfit_s > _UNFIT_S and obstacle != self._unfit_reported:
+            self._unfit_reported = obstacle
+            self._events.report(now_ns, EventLevel.WARNING, "unfit", obstacle.found)
