@@ -9,9 +9,7 @@ nothing is ever booked on a wrong location; its locations are left to count, and
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass, field
 
 from flightd.config.scan import ScanConfig
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
@@ -19,23 +17,14 @@ from flightd.core.types import Event, EventLevel
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.reasons import NothingRead
 from flightd.mission.scan.code_assignment import Assigner, FrontSight, Sighting
+from flightd.mission.scan.label_checks import LabelChecks
 from flightd.mission.scan.node_scan import ScanTask
+from flightd.mission.scan.pending_findings import PendingFindings
 from flightd.mission.scan.views import View, ViewPlanner, views_s
 from flightd.site.site import Site
 
 _BLIND_NODES = 3
 """Scans in a row without a single picture after which the reader is taken to be dead."""
-_SAME_OFF_M = 0.3
-"""A label seen so near to where it was found to hang wrong still hangs there."""
-
-
-@dataclass(slots=True)
-class _Pending:
-    """What was found at one node and is not proven; `stops` counts the nodes reached since."""
-
-    node: str
-    locations: list[str] = field(default_factory=list)
-    stops: int = 0
 
 
 class Scanner:
@@ -55,19 +44,13 @@ class Scanner:
         self._planner = ViewPlanner(site, sight, self._assigner, params, highest_m, aside_per_height)
         self._planned = frozenset(site.locations)
         self._done: set[str] = set()
-        self._tasks: dict[str, ScanTask] = {}
         self._task: ScanTask | None = None
-        self._pending: list[_Pending] = []
+        self._pending = PendingFindings(params.confirm_stops, params.expert.revisits)
+        self._labels = LabelChecks()
         self._found: list[Finding] = []
-        self._settled: list[Settled] = []
         self._events: list[Event] = []
         self._sightings: list[Sighting] = []
-        self._contradicting: dict[str, float] = {}
-        self._dismissed: dict[str, float] = {}
-        self._unmapped: set[str] = set()
         self._begun = self._begun_blind = 0
-        self._due: list[str] = []
-        self._again: Counter[str] = Counter()
         self._relights = True
         self.doubted = False
 
@@ -127,8 +110,7 @@ class Scanner:
         views = self._planner.views(node, self._left(node), height_m, yaw_rad)
         self._task = ScanTask(node, views, self._planner, self._params, self._relights)
         self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
-        if not self._pending or self._pending[-1].node != node:
-            self._pending.append(_Pending(node))
+        self._pending.arrive(node)
 
     def begin(self, now_ns: int) -> None:
         """The view is reached and the drone at rest."""
@@ -152,16 +134,13 @@ class Scanner:
 
     def reached(self, node: str, certain: bool) -> None:
         """A node is reached: earlier findings are the surer for it, if the place is `certain`."""
-        if not certain or self.doubted:
-            return
-        for pending in self._pending:
-            pending.stops += pending.node != node
-        self._confirm([p for p in self._pending if p.stops >= self._params.confirm_stops])
+        if certain and not self.doubted:
+            self._pending.reached(node, self._present)
 
     def home(self, certain: bool) -> None:
         """The flight has come back to its pad over known lines: everything is where it should be."""
         if certain and not self.doubted:
-            self._confirm(self._pending)
+            self._pending.confirm_all(self._present)
 
     def doubt(self) -> None:
         """The place may be another one: assign nothing, and keep what is pending, until `trust`."""
@@ -171,29 +150,21 @@ class Scanner:
     def withdraw(self, now_ns: int, reason: str) -> None:
         """The place was or may have been another one: what is pending counts no more."""
         self.leave()
-        codes = [code for pending in self._pending for code in pending.locations]
-        if codes:
-            self._settled.append(Settled(tuple(codes), confirmed=False))
-            self._done.difference_update(codes)
-        self._due += [p.node for p in self._pending if p.locations and p.node not in self._due]
-        self._pending.clear()
-        if codes or (self._contradicting and not self.doubted):
+        codes = self._pending.withdraw()
+        self._done.difference_update(codes)
+        if codes or (self._labels.contradict and not self.doubted):
             text = f"{reason}; {len(codes)} findings withdrawn"
             self._events.append(Event(now_ns, EventLevel.WARNING, "map_contradiction", text))
 
     def trust(self) -> None:
         """The place is known again; labels that still contradict it hang wrong."""
         self.doubted = False
-        self._dismissed |= self._contradicting
-        self._contradicting.clear()
+        self._labels.trust()
 
     def take_due(self) -> tuple[str, ...]:
         """The nodes to fly to once more, their findings having been withdrawn, in the order of their first
         visit; each at most `revisits` times in a flight."""
-        due = [node for node in self._due if self._again[node] < self._params.expert.revisits]
-        self._again.update(due)
-        self._due.clear()
-        return tuple(due)
+        return self._pending.take_due()
 
     # What pictures bring
 
@@ -216,15 +187,12 @@ class Scanner:
             return
         look = self._assigner.look(codes, pose, (view.aisle, view.side))
         self._sightings += look.sightings
-        for text in look.unmapped:
-            if text not in self._unmapped:
-                self._unmapped.add(text)
-                words = f"label {text}, seen from {self._task.node}, is not on the map: not counted as stock"
-                self._events.append(Event(pose.stamp_ns, EventLevel.WARNING, "unknown_location", words))
-        against = [seen for seen in look.sightings if seen.contradicts and not self._is_dismissed(seen)]
-        if against:
-            self._contradicting = {seen.location: seen.off_m for seen in against}
-            text = f"label {against[0].location} seen {against[0].off_m:+.2f} m from its place"
+        for text in self._labels.new_unmapped(look.unmapped):
+            words = f"label {text}, seen from {self._task.node}, is not on the map: not counted as stock"
+            self._events.append(Event(pose.stamp_ns, EventLevel.WARNING, "unknown_location", words))
+        against = self._labels.against(look.sightings)
+        if against is not None:
+            text = f"label {against.location} seen {against.off_m:+.2f} m from its place"
             self.withdraw(pose.stamp_ns, f"at {self._task.node}: {text}")
             self.doubted = True
             return
@@ -232,18 +200,16 @@ class Scanner:
         self._task.take(look)
         self._gather()
         agreeing = [seen.location for seen in look.sightings if not seen.contradicts]
-        for location in agreeing:
-            self._dismissed.pop(location, None)
+        self._labels.agree(agreeing)
         if agreeing:
-            self._confirm([p for p in self._pending if p.node == self._task.node])
+            self._pending.confirm_at(self._task.node)
 
     # What goes out
 
     def drain(self) -> tuple[tuple[Finding, ...], tuple[Settled, ...]]:
         """New findings, and what has become of earlier ones."""
         found, self._found = tuple(self._found), []
-        settled, self._settled = tuple(self._settled), []
-        return found, settled
+        return found, self._pending.drain()
 
     def drain_events(self) -> list[Event]:
         events, self._events = self._events, []
@@ -254,10 +220,10 @@ class Scanner:
         sightings, self._sightings = tuple(self._sightings), []
         return sightings
 
-    def _is_dismissed(self, seen: Sighting) -> bool:
-        """Whether this label has contradicted in the same way before, and the place proved right."""
-        known_m = self._dismissed.get(seen.location)
-        return known_m is not None and abs(known_m - seen.off_m) < _SAME_OFF_M
+    @property
+    def _present(self) -> str:
+        """The node that is scanned now, empty if none is."""
+        return self._task.node if self._task else ""
 
     def _left(self, node: str) -> frozenset[str]:
         return frozenset(self._planner.locations(node)) - self._done
@@ -268,16 +234,7 @@ class Scanner:
         for found in self._task.drain():
             self._found.append(found)
             self._done.add(found.location)
-            self._pending[-1].locations.append(found.location)
-
-    def _confirm(self, proven: list[_Pending]) -> None:
-        codes = [code for pending in proven for code in pending.locations]
-        if codes:
-            self._settled.append(Settled(tuple(codes), confirmed=True))
-        for pending in proven:
-            pending.locations.clear()
-        present = self._task.node if self._task else ""
-        self._pending = [p for p in self._pending if p.locations or p.node == present]
+            self._pending.add(found.location)
 
 
 def nodes_to_count(site: Site, nodes: Iterable[str], counted: Collection[str]) -> tuple[str, ...]:

@@ -1,0 +1,53 @@
+"""Location labels against the map: contradicting the drone's place, hanging wrong, unmapped.  Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from flightd.mission.scan.code_assignment import Sighting
+
+_SAME_OFF_M = 0.3
+"""A label seen so near to where it was found to hang wrong still hangs there."""
+
+
+class LabelChecks:
+    """Contradicting labels put the place in doubt; where it proves right after all they hang wrong, and are
+    dismissed from then on."""
+
+    def __init__(self) -> None:
+        self._contradicting: dict[str, float] = {}
+        self._dismissed: dict[str, float] = {}
+        self._unmapped: set[str] = set()
+
+    @property
+    def contradict(self) -> bool:
+        """Labels contradict the place, and it has not been trusted since."""
+        return bool(self._contradicting)
+
+    def new_unmapped(self, texts: Iterable[str]) -> list[str]:
+        """Those of the labels without a place on the map that were not seen before."""
+        new = [text for text in dict.fromkeys(texts) if text not in self._unmapped]
+        self._unmapped.update(new)
+        return new
+
+    def against(self, sightings: Iterable[Sighting]) -> Sighting | None:
+        """The first of these labels to contradict the place; all that do are kept."""
+        found = [seen for seen in sightings if seen.contradicts and not self._is_dismissed(seen)]
+        if found:
+            self._contradicting = {seen.location: seen.off_m for seen in found}
+        return found[0] if found else None
+
+    def agree(self, locations: Iterable[str]) -> None:
+        """These labels hang where the map says."""
+        for location in locations:
+            self._dismissed.pop(location, None)
+
+    def trust(self) -> None:
+        """The place is known again; labels that still contradict it hang wrong."""
+        self._dismissed |= self._contradicting
+        self._contradicting.clear()
+
+    def _is_dismissed(self, seen: Sighting) -> bool:
+        """Whether this label has contradicted in the same way before, and the place proved right."""
+        known_m = self._dismissed.get(seen.location)
+        return known_m is not None and abs(known_m - seen.off_m) < _SAME_OFF_M

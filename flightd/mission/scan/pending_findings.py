@@ -1,0 +1,83 @@
+"""Findings that are not proven yet, by the node at which they were made.  Pure."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from flightd.core.scanning import Settled
+
+
+@dataclass(slots=True)
+class _AtNode:
+    """What was found at one node; `stops` counts the nodes reached since."""
+
+    node: str
+    locations: list[str] = field(default_factory=list)
+    stops: int = 0
+
+
+class PendingFindings:
+    """Call `arrive` at each node that is scanned, `add` for what is found there.  What is confirmed keeps the
+    node that is `present`: more may be found there."""
+
+    def __init__(self, confirm_stops: int, revisits: int) -> None:
+        """Proven by so many stops further on; a node is due again at most `revisits` times in a flight."""
+        self._confirm_stops = confirm_stops
+        self._revisits = revisits
+        self._nodes: list[_AtNode] = []
+        self._settled: list[Settled] = []
+        self._due: list[str] = []
+        self._again: Counter[str] = Counter()
+
+    def arrive(self, node: str) -> None:
+        """What is found from now on is found here."""
+        if not self._nodes or self._nodes[-1].node != node:
+            self._nodes.append(_AtNode(node))
+
+    def add(self, location: str) -> None:
+        """Something was found at the node arrived at."""
+        self._nodes[-1].locations.append(location)
+
+    def reached(self, node: str, present: str) -> None:
+        """Another certain stop: it proves what lies far enough back."""
+        for at in self._nodes:
+            at.stops += at.node != node
+        self._confirm([at for at in self._nodes if at.stops >= self._confirm_stops], present)
+
+    def confirm_at(self, node: str) -> None:
+        """A label proves the place at `node`, where the drone is."""
+        self._confirm([at for at in self._nodes if at.node == node], node)
+
+    def confirm_all(self, present: str) -> None:
+        """The whole way is proven."""
+        self._confirm(self._nodes, present)
+
+    def withdraw(self) -> tuple[str, ...]:
+        """Nothing of it counts; its nodes are due again.  The locations it was found at."""
+        codes = tuple(code for at in self._nodes for code in at.locations)
+        if codes:
+            self._settled.append(Settled(codes, confirmed=False))
+        self._due += [at.node for at in self._nodes if at.locations and at.node not in self._due]
+        self._nodes.clear()
+        return codes
+
+    def take_due(self) -> tuple[str, ...]:
+        """The nodes to fly to once more, in the order of their first visit."""
+        due = [node for node in self._due if self._again[node] < self._revisits]
+        self._again.update(due)
+        self._due.clear()
+        return tuple(due)
+
+    def drain(self) -> tuple[Settled, ...]:
+        """What was confirmed and withdrawn since the last call."""
+        settled, self._settled = tuple(self._settled), []
+        return settled
+
+    def _confirm(self, proven: list[_AtNode], present: str) -> None:
+        codes = [code for at in proven for code in at.locations]
+        if codes:
+            self._settled.append(Settled(tuple(codes), confirmed=True))
+        for at in proven:
+            at.locations.clear()
+        self._nodes = [at for at in self._nodes if at.locations or at.node == present]
