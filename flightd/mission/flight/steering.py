@@ -1,0 +1,65 @@
+"""What the mission wants, as a setpoint: by control, within the limits.  Pure."""
+
+from __future__ import annotations
+
+import math
+
+from flightd.config.control import ControlConfig
+from flightd.control.flight_controller import FlightController, Motion
+from flightd.control.limits import Limiter, Surroundings
+from flightd.core.types import AttitudeSetpoint, GridPose, Phase
+from flightd.mission.guidance import Guidance, Guide, MissionInputs
+from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
+
+_TOUCHDOWN_S = 2.0
+
+
+class Steering:
+    """Call `step` at each tick."""
+
+    def __init__(self, config: ControlConfig, plausibility: PlausibilityMonitor) -> None:
+        self._control = FlightController(config)
+        self._limiter = Limiter(config)
+        self._plausibility = plausibility
+        self._last_yaw: float | None = None
+        self._yaw_rate = 0.0
+
+    def step(
+        self, inputs: MissionInputs, guidance: Guidance, push: tuple[float, float], stand_yaw_rad: float
+    ) -> AttitudeSetpoint | None:
+        """What control makes of the guidance, within the limits; None when nothing may be sent.  `push` is
+        the acceleration that no lean explains, m/s2, grid axes; `stand_yaw_rad` the heading before there is a
+        pose."""
+        now_ns, dt_s, pose = inputs.now_ns, inputs.dt_s, inputs.pose
+        motion = self._motion(pose, self._plausibility.height_m(inputs.height_m), dt_s, stand_yaw_rad)
+        control, reference = self._control, guidance.reference
+        sight_s = min(inputs.x_age_s, inputs.y_age_s)
+        if guidance.guide is Guide.NONE:
+            control.reset()
+            return None
+        if guidance.guide is Guide.LEVEL or pose is None:
+            wanted, age_s = control.level(now_ns, motion, reference, dt_s), 0.0
+        elif guidance.guide is Guide.BRAKE:
+            wanted = control.rest(now_ns, motion, reference, dt_s, push, dead_reckoned=guidance.dead_reckoned)
+            age_s = min(inputs.telemetry_age_s, sight_s)
+        else:
+            wanted = control.step(now_ns, motion, reference, dt_s)
+            # above the pad the mission steers on without lines: by the mat, or the motion last known
+            by_mat = inputs.by_pad or (guidance.phase is Phase.LAND and sight_s < _TOUCHDOWN_S)
+            age_s = inputs.telemetry_age_s if by_mat else max(sight_s, inputs.telemetry_age_s)
+        around = Surroundings(
+            headroom_m=inputs.warnings.headroom_m,
+            back=self._plausibility.back(pose, inputs.warnings.line_m) if inputs.localised else None,
+            data_age_s=age_s,
+            at_once=guidance.at_once,
+        )
+        return self._limiter.apply(wanted, around)
+
+    def _motion(self, pose: GridPose | None, height_m: float, dt_s: float, stand_yaw_rad: float) -> Motion:
+        if pose is None:
+            return Motion(0.0, 0.0, 0.0, 0.0, stand_yaw_rad, 0.0, height_m)
+        if self._last_yaw is not None:
+            turned = math.remainder(pose.yaw_rad - self._last_yaw, math.tau)
+            self._yaw_rate += min(1.0, dt_s / 0.05) * (turned / dt_s - self._yaw_rate)
+        self._last_yaw = pose.yaw_rad
+        return Motion(pose.x_m, pose.y_m, pose.vx_mps, pose.vy_mps, pose.yaw_rad, self._yaw_rate, height_m)
