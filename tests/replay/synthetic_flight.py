@@ -105,123 +105,146 @@ def picture(lines: LineSet, rng: np.random.Generator) -> bytes:
     return jpeg.tobytes()
 
 
+class _Flown:
+    """The drone along the legs, with sway and noise of its own; records what a daemon would."""
+
+    def __init__(self, recorder: McapRecorder, site: Site, rng: np.random.Generator) -> None:
+        self._recorder = recorder
+        self._site = site
+        self._rng = rng
+        self._frames = 0
+        self._done = 0
+        self._sway = np.zeros(2)
+        self.t_s = 0.0
+        self.truths: list[Kinematics] = []
+
+    def fly(self, leg: Leg) -> None:
+        stamp_ns = self._stamp_ns()
+        self._event(stamp_ns, EventLevel.INFO, leg.phase, f"{leg.phase} at {leg.node}")
+        if leg.phase == Phase.TURN:
+            self._event(stamp_ns, EventLevel.WARNING, "wind", "gusts up to 1.9 m/s, slowing down")
+        for step in range(round(leg.seconds / TICK_S)):
+            self._tick(leg, step)
+            self.t_s += TICK_S
+        self._done += leg.phase == Phase.HOVER
+
+    def _tick(self, leg: Leg, step: int) -> None:
+        flying = leg.phase not in {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE}
+        at, velocity = self._motion(leg, step, flying)
+        battery = 1.0 - 0.0016 * self.t_s
+        self.truths.append(at)
+        self._vehicle(at, flying, battery)
+        if at.height_m > 0.4:
+            self._pose(at, velocity)
+        capture, detection = 60 + float(self._rng.gamma(4, 1.2)), float(self._rng.gamma(6, 0.5))
+        stages = {"capture": capture, "transport": 1.1, "detection": detection, "track": 0.4}
+        if step % 2 == 0 and at.height_m > 0.2:
+            self._frame(at)
+        self._status(leg, at, battery, stages | {"total": math.fsum(stages.values())})
+
+    def _motion(self, leg: Leg, step: int, flying: bool) -> tuple[Kinematics, tuple[float, float]]:
+        part = (1 - math.cos(math.pi * step * TICK_S / leg.seconds)) / 2
+        turn = math.pi / leg.seconds
+        pace = turn / 2 * math.sin(turn * step * TICK_S)
+        vx, vy, _ = ((b - a) * pace for a, b in zip(leg.start, leg.end, strict=True))
+        self._sway = 0.995 * self._sway + self._rng.normal(0, 0.002, 2) * flying
+        x, y, height = (a + (b - a) * part for a, b in zip(leg.start, leg.end, strict=True))
+        x, y = x + self._sway[0], y + self._sway[1]
+        roll = 0.03 * math.sin(self.t_s * 1.3) * flying + self._rng.normal(0, 0.004) * flying
+        pitch = 0.04 * math.sin(self.t_s * 0.9) * flying + self._rng.normal(0, 0.004) * flying
+        yaw = 0.02 * math.sin(self.t_s / 7)
+        at = Kinematics(self._stamp_ns(), x, y, height, 0.0, 0.0, 0.0, roll, pitch, yaw, 0.0, 0.0, 0.0)
+        return at, (vx, vy)
+
+    def _vehicle(self, at: Kinematics, flying: bool, battery: float) -> None:
+        state = VehicleState(
+            Attitude(at.stamp_ns, at.roll_rad, at.pitch_rad, at.yaw_rad),
+            at.height_m + self._rng.normal(0, 0.008),
+            at.stamp_ns,
+            0.0,
+            "GUIDED_NOGPS",
+            True,
+            flying,
+            LandedState.IN_AIR if at.height_m > 0.05 else LandedState.ON_GROUND,
+            battery,
+            16.4 - 2 * (1 - battery),
+            at.stamp_ns,
+        )
+        self._recorder.record(Topic.VEHICLE, at.stamp_ns, state)
+        setpoint = AttitudeSetpoint(at.stamp_ns, at.roll_rad * 0.9, at.pitch_rad * 0.9, 0.0, 0.0)
+        self._recorder.record(Topic.SETPOINT, at.stamp_ns, setpoint)
+
+    def _pose(self, at: Kinematics, velocity: tuple[float, float]) -> None:
+        nearest = self._site.nearest(at.x_m, at.y_m)
+        x, y = at.x_m + self._rng.normal(0, 0.006), at.y_m + self._rng.normal(0, 0.006)
+        covariance = (0.0001, 0.0, 0.0, 0.0, 0.0001, 0.0, 0.0, 0.0, 0.0001)
+        along, across = x - nearest.x_m, y - nearest.y_m
+        pose = GridPose(
+            at.stamp_ns,
+            nearest.id,
+            along,
+            across,
+            at.yaw_rad,
+            x,
+            y,
+            *velocity,
+            at.height_m,
+            covariance,
+            0.999,
+        )
+        self._recorder.record(Topic.POSE, at.stamp_ns, pose)
+
+    def _frame(self, at: Kinematics) -> None:
+        self._frames += 1
+        lines = seen_lines(self._frames, at.stamp_ns - 60_000_000, at.roll_rad, self._rng)
+        self._recorder.record(Topic.LINES, at.stamp_ns, lines)
+        if self._frames % 60 == 0:
+            self._recorder.image(Topic.FRAME, lines.stamp_ns, self._frames, picture(lines, self._rng))
+
+    def _status(self, leg: Leg, at: Kinematics, battery: float, stages: dict[str, float]) -> None:
+        status = Status(
+            at.stamp_ns,
+            leg.phase,
+            "",
+            leg.node,
+            leg.goal,
+            self._done,
+            12,
+            battery,
+            at.height_m,
+            self._frames,
+            self._frames // 400,
+            25.0,
+            stages,
+        )
+        self._recorder.record(Topic.STATUS, at.stamp_ns, status)
+
+    def _event(self, stamp_ns: int, level: EventLevel, name: str, text: str) -> None:
+        self._recorder.record(Topic.EVENT, stamp_ns, Event(stamp_ns, level, name, text))
+
+    def _stamp_ns(self) -> int:
+        return START_NS + round(self.t_s * NS)
+
+
 def write_flight(
     folder: Path, *, truth: bool = True, summary: bool = True, seed: int = 1, scans: bool = False
 ) -> Path:
     """Write `flight.mcap` (and `truth.mcap`, `summary.json`) to `folder`; returns the log's path."""
-    rng = np.random.default_rng(seed)
     site = parse_site(SITE_TOML, "demo")
     path = folder / "flight.mcap"
-    truths: list[Kinematics] = []
-    with McapRecorder(
-        path, when_full=wait_for_disk, metadata={"vehicle": "ardupilot", "site": site.name}
-    ) as recorder:
+    metadata = {"vehicle": "ardupilot", "site": site.name}
+    with McapRecorder(path, when_full=wait_for_disk, metadata=metadata) as recorder:
         recorder.record(Topic.MAP, 0, Document(SITE_TOML))  # stamps before the flight
         recorder.record(Topic.CONFIG, START_NS, Document('[vehicle]\nkind = "ardupilot"\n'))
-        t_s, frames, done, sway = 0.0, 0, 0, np.zeros(2)
-        plan = list(legs(site, scans))
-        for leg in plan:
-            stamp_ns = START_NS + round(t_s * NS)
-            recorder.record(
-                Topic.EVENT,
-                stamp_ns,
-                Event(stamp_ns, EventLevel.INFO, leg.phase, f"{leg.phase} at {leg.node}"),
-            )
-            if leg.phase == Phase.TURN:
-                gust = Event(stamp_ns, EventLevel.WARNING, "wind", "gusts up to 1.9 m/s, slowing down")
-                recorder.record(Topic.EVENT, stamp_ns, gust)
-            for step in range(round(leg.seconds / TICK_S)):
-                part = (1 - math.cos(math.pi * step * TICK_S / leg.seconds)) / 2
-                flying = leg.phase not in {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE}
-                turn = math.pi / leg.seconds
-                pace = turn / 2 * math.sin(turn * step * TICK_S)
-                vx, vy, _ = ((b - a) * pace for a, b in zip(leg.start, leg.end, strict=True))
-                sway = 0.995 * sway + rng.normal(0, 0.002, 2) * flying
-                x, y, height = (a + (b - a) * part for a, b in zip(leg.start, leg.end, strict=True))
-                x, y = x + sway[0], y + sway[1]
-                stamp_ns = START_NS + round(t_s * NS)
-                roll = 0.03 * math.sin(t_s * 1.3) * flying + rng.normal(0, 0.004) * flying
-                pitch = 0.04 * math.sin(t_s * 0.9) * flying + rng.normal(0, 0.004) * flying
-                yaw = 0.02 * math.sin(t_s / 7)
-                battery = 1.0 - 0.0016 * t_s
-                truths.append(
-                    Kinematics(stamp_ns, x, y, height, 0.0, 0.0, 0.0, roll, pitch, yaw, 0.0, 0.0, 0.0)
-                )
-                attitude = Attitude(stamp_ns, roll, pitch, yaw)
-                landed = LandedState.IN_AIR if height > 0.05 else LandedState.ON_GROUND
-                recorder.record(
-                    Topic.VEHICLE,
-                    stamp_ns,
-                    VehicleState(
-                        attitude,
-                        height + rng.normal(0, 0.008),
-                        stamp_ns,
-                        0.0,
-                        "GUIDED_NOGPS",
-                        True,
-                        flying,
-                        landed,
-                        battery,
-                        16.4 - 2 * (1 - battery),
-                        stamp_ns,
-                    ),
-                )
-                recorder.record(
-                    Topic.SETPOINT, stamp_ns, AttitudeSetpoint(stamp_ns, roll * 0.9, pitch * 0.9, 0.0, 0.0)
-                )
-                if height > 0.4:
-                    nearest = site.nearest(x, y)
-                    ex, ey = x + rng.normal(0, 0.006), y + rng.normal(0, 0.006)
-                    recorder.record(
-                        Topic.POSE,
-                        stamp_ns,
-                        GridPose(
-                            stamp_ns,
-                            nearest.id,
-                            ex - nearest.x_m,
-                            ey - nearest.y_m,
-                            yaw,
-                            ex,
-                            ey,
-                            vx,
-                            vy,
-                            height,
-                            (0.0001, 0.0, 0.0, 0.0, 0.0001, 0.0, 0.0, 0.0, 0.0001),
-                            0.999,
-                        ),
-                    )
-                capture, detection = 60 + float(rng.gamma(4, 1.2)), float(rng.gamma(6, 0.5))
-                stages = {"capture": capture, "transport": 1.1, "detection": detection, "track": 0.4}
-                if step % 2 == 0 and height > 0.2:
-                    frames += 1
-                    lines = seen_lines(frames, stamp_ns - 60_000_000, roll, rng)
-                    recorder.record(Topic.LINES, stamp_ns, lines)
-                    if frames % 60 == 0:
-                        recorder.image(Topic.FRAME, lines.stamp_ns, frames, picture(lines, rng))
-                status = Status(
-                    stamp_ns,
-                    leg.phase,
-                    "",
-                    leg.node,
-                    leg.goal,
-                    done,
-                    12,
-                    battery,
-                    height,
-                    frames,
-                    frames // 400,
-                    25.0,
-                    stages | {"total": math.fsum(stages.values())},
-                )
-                recorder.record(Topic.STATUS, stamp_ns, status)
-                t_s += TICK_S
-            done += leg.phase == Phase.HOVER
+        flown = _Flown(recorder, site, np.random.default_rng(seed))
+        for leg in legs(site, scans):
+            flown.fly(leg)
     if truth:
         with McapRecorder(folder / "truth.mcap", when_full=wait_for_disk) as recorder:
-            for kinematics in truths:
+            for kinematics in flown.truths:
                 recorder.record(Topic.TRUTH, kinematics.stamp_ns, asdict(kinematics))
     if summary:
-        (folder / "summary.json").write_text(json.dumps(SUMMARY | {"flight_time_s": t_s}))
+        (folder / "summary.json").write_text(json.dumps(SUMMARY | {"flight_time_s": flown.t_s}))
     return path
 
 
