@@ -8,7 +8,7 @@ from pydantic import Field, field_validator
 
 from flightd.config.section import Section
 from flightd.mission.safety.hazard_table import HAZARDS
-from flightd.sim.judge.verdict import KINDS
+from flightd.sim.judge.verdict import KINDS, SAFETY_KINDS
 
 _HAZARDS = frozenset(row.name for row in HAZARDS)
 
@@ -34,4 +34,6 @@ class Expectation(Section):
         for kind in kinds:
             if kind not in KINDS:
                 raise ValueError(f"no such fault: {kind!r}; one of {', '.join(KINDS)}")
+            if kind in SAFETY_KINDS:
+                raise ValueError(f"{kind!r} must never be, whatever goes wrong")
         return kinds

@@ -22,6 +22,7 @@ CONFIGS = Path(__file__).parents[3] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
 FLOOR = Kinematics(0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 FROZEN = '[[fault]]\nkind = "camera_frozen"\nat_s = 2.0\nduration_s = 1.0\n'
+EXPECT = FROZEN + '[expect]\nhazard = "camera_frozen"\nends = "landed"\n'
 
 
 def written(folder: Path, text: str, name: str = "s.toml") -> Path:
@@ -50,9 +51,12 @@ def test_every_hazard_has_a_shipped_scenario_and_every_shipped_scenario_names_a_
         ('[[fault]]\nkind = "bare_floor"\nat_s = 1\n', "at a place for good"),
         ('[[fault]]\nkind = "battery"\nat_s = 1\ncharge = 1.5\n', r"fault\.0\.battery\.charge"),
         ("fault = 3\n", "fault"),
+        (EXPECT + 'bears = ["left_leg"]\n', r"expect\.bears"),
+        (EXPECT + 'tolerates = ["gremlin"]\n', r"expect\.tolerates: .*no such fault: 'gremlin'"),
+        (EXPECT + 'tolerates = ["hit_rack"]\n', "'hit_rack' must never be, whatever goes wrong"),
     ],
 )
-def test_a_fault_that_is_none_is_one_clear_line(tmp_path: Path, text: str, told: str) -> None:
+def test_a_scenario_that_is_none_is_refused_in_one_clear_line(tmp_path: Path, text: str, told: str) -> None:
     with pytest.raises(InputError, match=told) as refused:
         load_scenario(written(tmp_path, text))
     assert "\n" not in str(refused.value)
