@@ -23,7 +23,7 @@ from flightd.guide import pages
 from flightd.mission.safety import hazard_table
 from flightd.sim.judge.verdict import KINDS
 from flightd.site.site_file import SiteFile
-from tools import reference_tables, safety_case
+from tools import command_table, reference_tables, safety_case
 from tools.command_help import help_pages
 from tools.layer_picture import layers, picture
 
@@ -77,6 +77,7 @@ PARTS: Mapping[str, Callable[[], str]] = {
     "configuration": lambda: reference_tables.markdown(Config),
     "site-file": lambda: reference_tables.markdown(SiteFile),
     "commands": _commands,
+    "command-phases": command_table.markdown,
     "protocol": protocol_text.markdown,
     "hazards": hazard_table.markdown,
     "faults": _faults,

@@ -305,8 +305,3 @@ def taken_in(state: State) -> frozenset[Trigger]:
 def possible_commands(state: State) -> frozenset[CommandKind]:
     """What an operator may order now; everything else has no effect and is refused."""
     return frozenset(kind for kind, trigger in COMMANDS.items() if TABLE[state][trigger] is not None)
-
-
-def possible_in(phase: Phase) -> frozenset[CommandKind]:
-    """What an operator may order in a phase, as far as that can be said without its intent."""
-    return frozenset().union(*(possible_commands(state) for state in STATES if state.phase is phase))

@@ -25,9 +25,9 @@ from flightd.core.types import (
     Phase,
     VehicleState,
 )
-from flightd.mission.machine import possible_in
 from flightd.runtime.clock import LoopClock
 from flightd.site.site_file import load_site
+from tests.rigs.possible_commands import possible_in
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")
 

@@ -19,8 +19,8 @@ from flightd.adapters.ground_link.protocol import (
 )
 from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
 from flightd.core.types import Phase
-from flightd.mission.machine import possible_in
 from flightd.site.site_file import load_site
+from tests.rigs.possible_commands import possible_in
 
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
 OPERATOR = Peer("ann", Role.OPERATOR, b"1", "127.0.0.1")

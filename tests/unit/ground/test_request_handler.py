@@ -22,7 +22,7 @@ from flightd.adapters.ground_link.protocol import (
 )
 from flightd.adapters.ground_link.request_handler import Peer
 from flightd.core.types import CommandKind, Phase
-from flightd.mission.machine import possible_in
+from tests.rigs.possible_commands import possible_in
 from tests.unit.ground.request_handler_rig import OPERATOR, SESSION, SITE, VIEWER, RequestHandlerRig, S, body
 
 OVER = (Phase.DONE, Phase.ABORTED, Phase.PILOT)

@@ -19,10 +19,10 @@ from flightd.mission.machine import (
     State,
     next_state,
     possible_commands,
-    possible_in,
 )
 from flightd.mission.safety.hazard_table import Action, triggers_of
 from flightd.mission.triggers import Trigger
+from tests.rigs.possible_commands import possible_in
 
 AIRBORNE = [state for state in STATES if state.airborne]
 UNREACHABLE = {

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from flightd.core.types import CommandKind, Phase
-from flightd.mission.machine import possible_in
 from flightd.replay.report.charts import PHASE_TONE
+from tests.rigs.possible_commands import possible_in
 
 
 def test_the_report_has_a_colour_for_every_phase() -> None:
