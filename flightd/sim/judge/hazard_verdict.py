@@ -98,10 +98,15 @@ def _found_s(row: Hazard, events: Sequence[Event], from_ns: int) -> float | None
 
 
 def _down_s(row: Hazard, flight: FlightEvidence, from_ns: int, found_s: float | None) -> float | None:
-    """From the finding (unfound: from the fault) until it flies no more; None where the row does not land."""
+    """From the finding until it flies no more; None where the row does not land.  Unfound: from the fault;
+    but where the daemon itself finds nothing, and lands, from when it does."""
     if row.action not in {Action.LAND, Action.STOP} or not len(flight.in_air):
         return None
-    since_s = from_ns * 1e-9 + (found_s or 0.0)
+    landing = (s.stamp_ns for s in flight.statuses if s.stamp_ns >= from_ns and s.phase is Phase.LAND)
+    if row.trigger is None and (landing_ns := next(landing, None)) is not None:
+        since_s = landing_ns * 1e-9
+    else:
+        since_s = from_ns * 1e-9 + (found_s or 0.0)
     return max(0.0, float(flight.in_air.stamp_s[-1]) - since_s)
 
 

@@ -2,58 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from flightd.config.mission import Heading
-from flightd.core.types import Event, EventLevel, Phase, Status
-from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
+from flightd.core.types import Event, EventLevel, Phase
 from flightd.sim.judge.evidence import FlightEvidence
 from flightd.sim.judge.flight_score import score
 from flightd.sim.judge.verdict import KINDS, judged
-from flightd.sim.plant.kinematics import ArmedChange, Kinematics
-from flightd.site.site_file import load_site
+from flightd.sim.plant.kinematics import ArmedChange
 from flightd.site.ways import KeepOut
-
-SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
-PLAN = make_plan(SITE, ["A2"], "A1", "A1", HeadingPolicy(Heading.ALONG))
-MS = 1_000_000
-S = 1_000_000_000
-
-
-def at(
-    stamp_ns: int, x_m: float = 1.5, y_m: float = 0.0, height_m: float = 1.6, climb: float = 0.0
-) -> Kinematics:
-    return Kinematics(stamp_ns, x_m, y_m, height_m, 0.0, 0.0, climb, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-def status(
-    stamp_ns: int, phase: Phase = Phase.FOLLOW, node: str = "A2", goal: str = "A2", height_m: float = 1.6
-) -> Status:
-    return Status(stamp_ns, phase, "", node, goal, 0, 1, 1.0, 1.6, 1, 0, 30.0, {}, height_m)
-
-
-def evidence(
-    truth: Iterable[Kinematics],
-    statuses: Sequence[Status],
-    events: Sequence[Event] = (),
-    armed: Sequence[ArmedChange] | None = None,
-    setpoints_ns: Sequence[int] = (),
-) -> FlightEvidence:
-    return FlightEvidence(SITE, PLAN, statuses, events, list(truth), setpoints_ns, armed)
+from tests.rigs.flight_evidence import MS, SITE, S, at, evidence, landed, status
 
 
 def kinds(flight: FlightEvidence) -> dict[str, float]:
     return {fault.kind: fault.value for fault in judged(flight, score(flight))}
-
-
-def landed(*flown: Kinematics) -> list[Kinematics]:
-    """What was flown, from the pad and back to it."""
-    last = flown[-1].stamp_ns
-    return [at(0, 0.0, height_m=0.1), *flown, at(last + S, 0.0, height_m=0.1)]
 
 
 DONE = status(8 * S, Phase.DONE, "A1", "A1")
