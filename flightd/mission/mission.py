@@ -376,7 +376,7 @@ class Mission:
     def _explain(self, s: MissionInputs, trigger: Trigger, cause: Cause, *, was_on_pad: bool) -> None:
         """Set the reason for the phase that begins; of an end on the pad, why it turned home."""
         refused = s.vehicle is not None and trigger in {Trigger.TIMED_OUT, Trigger.START_EXPIRED}
-        refusal = s.vehicle.refusal if s.vehicle is not None and refused else ""
+        refusal = s.vehicle.refusal if s.vehicle is not None and refused else None
         if trigger is Trigger.NOT_COUNTED and (blind := self._scanner.blind) is not None:
             self._cause = blind
             self._events.report(s.now_ns, EventLevel.ERROR, "not_counted", in_words(blind))
@@ -469,7 +469,7 @@ class Mission:
             held = self._orders.paused and self._cause != Happened(Trigger.HOLD)
             self._reason = Paused(self._cause) if held else self._cause
         if self.phase is Phase.LAND:
-            refusal = s.vehicle.refusal if s.vehicle is not None else ""
+            refusal = s.vehicle.refusal if s.vehicle is not None else None
             self._reason = self._cause
             if refusal and self._cause is not None and guidance.demand is Demand.DISARM:
                 self._reason = Refused(self._cause, refusal)
@@ -480,7 +480,7 @@ class Mission:
         unfit_s = self._unfit.step(isinstance(obstacle, Unfit), now_ns)
         if isinstance(obstacle, Unfit) and unfit_s > _UNFIT_S and obstacle != self._unfit_told:
             self._unfit_told = obstacle
-            self._events.report(now_ns, EventLevel.WARNING, "unfit", obstacle.found)
+            self._events.report(now_ns, EventLevel.WARNING, "unfit", str(obstacle.found))
 
     def _leads_along_x(self) -> bool:
         """The way to the goal is along its aisle, not from one aisle to another."""
