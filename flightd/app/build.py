@@ -38,6 +38,7 @@ from flightd.config.mission import HEIGHT_ROOM_M
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError
 from flightd.core.flight_order import FlightOrder
+from flightd.core.refusal import Refusal
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TICK_S
 from flightd.core.topics import Topic
@@ -91,7 +92,7 @@ def build(
     hold: Hold = nullcontext,
     startup_fault: FlightdError | None = None,
     interlock: Interlock | None = None,
-    unfit: str = "",
+    unfit: Refusal | None = None,
 ) -> Flight:
     """Compose the flight that `order` asks for.  `peers` are those of the configuration unless given;
     `opener` opens sockets and time is held by `hold` while threads work, as the event loop wants it;

@@ -9,6 +9,7 @@ from typing import Any, Protocol, TypeAlias
 from flightd.adapters.store.progress import LeftOver
 from flightd.app.publishers import TelemetryPublishers
 from flightd.core.errors import FlightdError
+from flightd.core.refusal import Refusal
 from flightd.core.scanning import CodeSet
 from flightd.core.tick import TickOutput
 from flightd.core.types import AttitudeSetpoint, GridPose, LineSet
@@ -114,7 +115,7 @@ class Flight:
 
     `share_pose` gives the vehicle's own estimator the pose, where it can use it.  `startup_fault` is what
     the daemon should not fly with: on the ground it ends with that; a vehicle that it finds flying is looked
-    after all the same.  `unfit` is what the check of this computer found against a flight, "" for nothing."""
+    after all the same.  `unfit` is what the check of this computer found against a flight."""
 
     clock: Clock
     pilot: Pilot
@@ -131,4 +132,4 @@ class Flight:
     share_pose: Callable[[GridPose], None]
     interlock: Interlock
     startup_fault: FlightdError | None = None
-    unfit: str = ""
+    unfit: Refusal | None = None

@@ -26,7 +26,7 @@ from flightd.config.schema import Config
 from flightd.core.errors import InputError, TransientError
 from flightd.core.snapshot import Snapshot
 from flightd.doctor.calibration import check_calibration
-from flightd.doctor.check import CheckLevel
+from flightd.doctor.check import CheckLevel, FailedChecks
 from flightd.doctor.machine import check_clock, check_disk, check_processor
 from flightd.ports import Recorder
 from flightd.runtime.clock import LoopClock
@@ -111,17 +111,17 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
             return await daemon.fly()
 
 
-def unfit_here(config: Config, site: Site) -> str:
-    """What the doctor finds against a flight on this computer without moving or asking anything, in one line;
-    what only deserves a look is logged."""
+def unfit_here(config: Config, site: Site) -> FailedChecks | None:
+    """What the doctor finds against a flight on this computer without moving or asking anything; what only
+    deserves a look is logged."""
     camera, height_m = config.camera, config.mission.height_m
     checks = [check_clock(), check_disk(config.recorder), *check_processor(config.vision.workers)]
     checks += check_calibration(camera, site, height_m)
     for check in checks:
         if check.level is CheckLevel.WARNING:
             _LOG.warning("%s: %s; %s", check.name, check.text, check.remedy)
-    wrong = (check for check in checks if check.level is CheckLevel.ERROR)
-    return "; ".join(f"{check.text} ({check.remedy})" for check in wrong)
+    failed = tuple(check for check in checks if check.level is CheckLevel.ERROR)
+    return FailedChecks(failed) if failed else None
 
 
 @asynccontextmanager

@@ -5,6 +5,7 @@ from __future__ import annotations
 import traceback
 from dataclasses import dataclass, field
 
+from flightd.core.refusal import Refusal
 from flightd.core.scanning import CodeSet, Finding, Settled
 from flightd.core.tracks import TrackSet
 from flightd.core.types import (
@@ -31,7 +32,7 @@ class TickInput:
     """What arrived since the last tick, oldest first.  `vehicle` is the newest state, None until there
     is one; `ground_silent_s` the time since an attending ground station was heard, 0 if none attends;
     `counted` names locations that an earlier flight of the same count has booked.  `unfit` is what the check
-    of this computer before the flight found against it, "" for nothing; `aisle_closed` what the interlock of
+    of this computer before the flight found against it; `aisle_closed` what the interlock of
     the aisle says, where one is demanded."""
 
     now_ns: int
@@ -43,7 +44,7 @@ class TickInput:
     codes: tuple[CodeSet, ...] = ()
     counted: tuple[str, ...] = ()
     health: Health = HEALTHY
-    unfit: str = ""
+    unfit: Refusal | None = None
     aisle_closed: bool = True
 
 

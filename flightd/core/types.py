@@ -15,6 +15,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from flightd.core.refusal import Refusal
+
 Image: TypeAlias = NDArray[np.uint8]
 """(H, W, 3) BGR or (H, W) single channel, uint8."""
 
@@ -219,8 +221,8 @@ class VehicleState:
     `battery_frac` is NaN while the vehicle does not know it, `battery_stamp_ns` the time at which it last
     told anything of its battery (0: it gives none), `battery_a` the current and `battery_cells` the cells in
     series (NaN and 0: not told).
-    `unfit` is why the adapter would not arm it, as far as can be asked while it stands; "" where nothing is
-    against it.
+    `refusal` is why it does not do what is demanded, `unfit` why the adapter would not arm it, as far as can
+    be asked while it stands; None where nothing is against it.
     """
 
     attitude: Attitude
@@ -234,13 +236,13 @@ class VehicleState:
     battery_frac: float
     battery_v: float
     heartbeat_ns: int
-    refusal: str = ""
+    refusal: Refusal | None = None
     stamps_refused: int = 0
     clock_error_s: float = 0.0
     battery_stamp_ns: int = 0
     battery_a: float = math.nan
     battery_cells: int = 0
-    unfit: str = ""
+    unfit: Refusal | None = None
 
 
 class Demand(enum.StrEnum):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from flightd.core.refusal import Refusal
+
 
 class CheckLevel(StrEnum):
     """OK, WARNING (flies, but look at it) or ERROR (not fit to fly)."""
@@ -22,6 +24,16 @@ class Check:
     level: CheckLevel
     text: str
     remedy: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FailedChecks(Refusal):
+    """What speaks against a flight: checks that came out as errors."""
+
+    checks: tuple[Check, ...]
+
+    def __str__(self) -> str:
+        return "; ".join(f"{check.text} ({check.remedy})" for check in self.checks)
 
 
 def ok(name: str, text: str) -> Check:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from flightd.config.mission import MissionConfig
 from flightd.control.flight_controller import Reference
+from flightd.core.refusal import Refusal
 from flightd.core.types import HEALTHY, Demand, GridPose, Health, Phase, VehicleState
 from flightd.tracking.battery_charge import Charge, told_charge
 
@@ -83,7 +84,7 @@ class MissionInputs:
     warnings: Warnings = ALL_WELL
     judged_charge: Charge | None = None
     failed: bool = False
-    unfit: str = ""
+    unfit: Refusal | None = None
     aisle_closed: bool = True
 
     @property

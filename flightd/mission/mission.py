@@ -376,7 +376,7 @@ class Mission:
             self._reporter.halt(paused=self._orders.paused)
         if self.phase is Phase.LAND:
             disarms = s.vehicle is not None and guidance.demand is Demand.DISARM
-            self._reporter.land(s.vehicle.refusal if s.vehicle is not None and disarms else "")
+            self._reporter.land(s.vehicle.refusal if s.vehicle is not None and disarms else None)
         return guidance
 
     def _leads_along_x(self) -> bool:

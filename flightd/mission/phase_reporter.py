@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flightd.core.refusal import Refusal
 from flightd.core.types import EventLevel, Phase
 from flightd.mission.event_log import EventLog
 from flightd.mission.guidance import MissionInputs
@@ -52,8 +53,8 @@ class PhaseReporter:
             held = paused and self._cause != Happened(Trigger.HOLD)
             self._reason = Paused(self._cause) if held else self._cause
 
-    def land(self, refusal: str) -> None:
-        """It lands; `refusal` is what the vehicle says to being asked to disarm, empty if nothing."""
+    def land(self, refusal: Refusal | None) -> None:
+        """It lands; `refusal` is what the vehicle says to being asked to disarm, None if nothing."""
         self._reason = self._cause
         if refusal and self._cause is not None:
             self._reason = VehicleRefuses(self._cause, refusal)
@@ -61,7 +62,7 @@ class PhaseReporter:
     def _explain(self, s: MissionInputs, before: State, after: State, trigger: Trigger, cause: Cause) -> None:
         """Set the reason for the phase that begins; of an end on the pad, why it turned home."""
         refused = s.vehicle is not None and trigger in {Trigger.TIMED_OUT, Trigger.START_EXPIRED}
-        refusal = s.vehicle.refusal if s.vehicle is not None and refused else ""
+        refusal = s.vehicle.refusal if s.vehicle is not None and refused else None
         if trigger is Trigger.NOT_COUNTED and (blind := self._scan.blind) is not None:
             self._cause = blind
             self._events.report(s.now_ns, EventLevel.ERROR, "not_counted", in_words(blind))

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from flightd.core.refusal import Refusal
 from flightd.mission.triggers import Trigger
 from flightd.tracking.battery_charge import ChargeDoubt
 
@@ -36,7 +37,7 @@ class VehicleRefuses:
     """As `why`, and the vehicle says what it refuses."""
 
     why: Reason
-    refusal: str
+    refusal: Refusal
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +80,9 @@ class ClockUnsure:
 
 @dataclass(frozen=True, slots=True)
 class Unfit:
-    """What the check before the flight found, in the words of who found it."""
+    """What the check before the flight found."""
 
-    found: str
+    found: Refusal
 
 
 @dataclass(frozen=True, slots=True)

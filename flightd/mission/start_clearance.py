@@ -86,4 +86,4 @@ class StartClearance:
         unfit_s = self._unfit.step(isinstance(obstacle, Unfit), now_ns)
         if isinstance(obstacle, Unfit) and unfit_s > _UNFIT_S and obstacle != self._unfit_reported:
             self._unfit_reported = obstacle
-            self._events.report(now_ns, EventLevel.WARNING, "unfit", obstacle.found)
+            self._events.report(now_ns, EventLevel.WARNING, "unfit", str(obstacle.found))

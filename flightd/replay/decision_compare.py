@@ -17,7 +17,7 @@ import numpy as np
 from flightd.core.errors import InputError
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
-from flightd.replay.log import FlightLog, with_nan
+from flightd.replay.log import FlightLog, converted, with_nan
 
 Step: TypeAlias = Callable[[TickInput], TickOutput]
 
@@ -133,7 +133,7 @@ def _tick(log: FlightLog, message: object) -> TickInput:
     if isinstance(message, dict):  # null is "no vehicle yet" at the top and "no number" further in
         message = {key: value if value is None else with_nan(value) for key, value in message.items()}
     try:
-        return msgspec.convert(message, TickInput)
+        return converted(message, TickInput)
     except msgspec.ValidationError as err:
         told = f"a message on {Topic.TICK} is not what this version records ({err})"
         raise InputError(f"{log.path}: {told}") from None

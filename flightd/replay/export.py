@@ -13,6 +13,7 @@ import msgspec
 
 from flightd.core.csv_text import inert
 from flightd.core.errors import UnavailableError
+from flightd.core.refusal import Refusal
 from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.core.types import LineSet
 from flightd.replay.log import Entry, FlightLog
@@ -83,7 +84,9 @@ def _fields(message: object) -> Mapping[str, object]:
 
 def _flat(fields: Mapping[str, object], prefix: str = "") -> Iterable[tuple[str, object]]:
     for name, value in fields.items():
-        if isinstance(value, dict) or dataclasses.is_dataclass(value):
+        if isinstance(value, Refusal):
+            yield prefix + name, inert(str(value))
+        elif isinstance(value, dict) or dataclasses.is_dataclass(value):
             yield from _flat(_fields(value), f"{prefix}{name}.")
         elif isinstance(value, tuple | list):
             yield prefix + name, msgspec.json.encode(value).decode()

@@ -17,6 +17,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Metadata
 
 from flightd.core.errors import InputError
+from flightd.core.refusal import RecordedRefusal, Refusal
 from flightd.core.topics import MESSAGE_TYPES, RecordedFrame
 from flightd.core.types import Event, EventLevel
 from flightd.runtime.mcap_scan import (
@@ -37,6 +38,7 @@ _MESSAGE_HEAD = struct.Struct("<HIQQ")
 
 _Message: TypeAlias = tuple[int, int, bytes]
 _CUT = "cut off before its end"
+_REASONS = frozenset({"refusal", "unfit"})
 _LEVELS = {2: EventLevel.INFO, 3: EventLevel.WARNING, 4: EventLevel.ERROR}
 
 
@@ -175,7 +177,7 @@ def _decoder(kind: type) -> Decoder:
         try:
             return strict.decode(payload)
         except msgspec.ValidationError:
-            return msgspec.convert(with_nan(msgspec.json.decode(payload)), kind)
+            return converted(with_nan(msgspec.json.decode(payload)), kind)
 
     return decode
 
@@ -189,6 +191,25 @@ def with_nan(value: object) -> object:
     if isinstance(value, list):
         return [with_nan(item) for item in value]
     return value
+
+
+def converted(value: object, kind: type[MessageT]) -> MessageT:
+    """JSON values as the message that they were recorded of; msgspec.ValidationError if they are none."""
+    return msgspec.convert(_without_empty_reasons(value), kind, dec_hook=_recorded_reason)
+
+
+def _without_empty_reasons(value: object) -> object:
+    """A reason is recorded in words, and as an empty text where there was none."""
+    if not isinstance(value, dict):
+        return value
+    told = {key: item for key, item in value.items() if item != "" or key not in _REASONS}
+    return told | {"vehicle": _without_empty_reasons(told["vehicle"])} if "vehicle" in told else told
+
+
+def _recorded_reason(kind: type, value: object) -> object:
+    if kind is Refusal and isinstance(value, str):
+        return RecordedRefusal(value)
+    raise NotImplementedError(f"a {kind.__name__} is not read from a log")
 
 
 def _event(payload: bytes) -> Event:

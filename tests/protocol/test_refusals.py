@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from flightd.core.refusal import words
 from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import PeerConfig
@@ -140,14 +141,14 @@ def test_every_answer_but_acceptance_is_told_and_tried_again(
             await asyncio.sleep(4.0)
             state = vehicle.state()
             assert state is not None
-            assert state.refusal == f"{what}: {text}"
+            assert words(state.refusal) == f"{what}: {text}"
             assert not state.armed
             assert len(autopilot.commands(command)) > 1
             autopilot.results[command] = 0
             await asyncio.sleep(4.0)
             state = vehicle.state()
             assert state is not None
-            assert (state.in_control, state.armed, state.refusal) == (True, True, "")
+            assert (state.in_control, state.armed, words(state.refusal)) == (True, True, "")
 
     virtual(test())
 

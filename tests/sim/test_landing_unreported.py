@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from flightd.config.schema import load_config
+from flightd.core.refusal import words
 from flightd.core.types import AttitudeSetpoint, Demand, EventLevel, Phase
 from flightd.runtime.clock import LoopClock
 from flightd.sim.plant.wind import WindParams
@@ -88,6 +89,6 @@ def test_an_autopilot_that_would_disarm_in_the_air_is_not_asked_to(make: Callabl
                 rig.peer.landed = True
                 await rig.stream(0.1, climb_mps=0.05)
             assert rig.peer.armed
-            assert "disarming: 1." in rig.known().refusal
+            assert "disarming: 1." in words(rig.known().refusal)
 
     virtual(test())

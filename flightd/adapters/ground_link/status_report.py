@@ -13,6 +13,7 @@ from flightd.adapters.ground_link.protocol import (
     VehicleReport,
     finite,
 )
+from flightd.core.refusal import words
 from flightd.core.snapshot import Snapshot
 from flightd.core.tracks import TrackSet
 from flightd.core.types import GridPose, VehicleState
@@ -75,5 +76,5 @@ def _vehicle(state: VehicleState, now_ns: int) -> VehicleReport:
         battery_v=finite(state.battery_v),
         telemetry_age_s=(now_ns - state.attitude.stamp_ns) * 1e-9,
         heartbeat_age_s=(now_ns - state.heartbeat_ns) * 1e-9,
-        refusal=state.refusal,
+        refusal=words(state.refusal),
     )

@@ -2,7 +2,7 @@
 
 Events are `foxglove.Log`, pictures `foxglove.CompressedImage`, line sets and poses are our fields and
 those of the Foxglove schema that fits; the rest are the fields of the dataclasses by name.  A float
-that is not a number is written as null.
+that is not a number is written as null, a reason as its words.
 """
 
 from __future__ import annotations
@@ -15,12 +15,17 @@ import numpy as np
 
 from flightd.adapters.recorder import foxglove
 from flightd.adapters.recorder.foxglove import JsonObject
-from flightd.core.types import Event, EventLevel, LineSet
+from flightd.core.refusal import Refusal, words
+from flightd.core.tick import TickInput
+from flightd.core.types import Event, EventLevel, LineSet, VehicleState
 
 _FOXGLOVE_LEVEL = {EventLevel.INFO: 2, EventLevel.WARNING: 3, EventLevel.ERROR: 4}
 
 _POSE_FIELDS = frozenset({"x_m", "y_m", "height_m", "yaw_rad"})
 """A message with these is a pose on the map."""
+
+_IN_WORDS: JsonObject = {"type": "string"}
+"""The schema of a reason."""
 
 
 def picture_schema() -> tuple[str, JsonObject]:
@@ -35,7 +40,7 @@ def schema_of(message: object) -> tuple[str, JsonObject]:
     if not dataclasses.is_dataclass(message):
         return "flightd.Object", {"type": "object"}
     kind = type(message)
-    schema = msgspec.json.schema(kind)
+    schema = msgspec.json.schema(kind, schema_hook=_schema_of_reason)
     inlined = _inline(schema, schema.get("$defs", {}))
     assert isinstance(inlined, dict)
     if isinstance(message, LineSet):
@@ -49,8 +54,16 @@ def _schema(name: str, ours: JsonObject) -> JsonObject:
     return {"title": name, "type": "object", "properties": ours | foxglove.PROPERTIES[name]}
 
 
+def _schema_of_reason(kind: type) -> JsonObject:
+    if kind is Refusal:
+        return _IN_WORDS
+    raise NotImplementedError(f"a {kind.__name__} has no schema")
+
+
 def _inline(node: object, definitions: JsonObject) -> object:
     if isinstance(node, dict):
+        if _IN_WORDS in node.get("anyOf", ()):  # or none, which is an empty text
+            return _IN_WORDS | {"default": ""}
         if "$ref" in node:
             return _inline(definitions[node["$ref"].rpartition("/")[2]], definitions)
         return {key: _inline(value, definitions) for key, value in node.items() if key != "$defs"}
@@ -81,4 +94,15 @@ def encode(message: object) -> bytes:
                 "line": 0,
             }
         )
+    if isinstance(message, TickInput | VehicleState):
+        return _encode(_in_words(message))
     return _encode(message)
+
+
+def _in_words(message: TickInput | VehicleState) -> JsonObject:
+    """The fields of a message that holds reasons, those as their words."""
+    fields = {field.name: getattr(message, field.name) for field in dataclasses.fields(message)}
+    if isinstance(message, VehicleState):
+        return fields | {"refusal": words(message.refusal), "unfit": words(message.unfit)}
+    vehicle = message.vehicle and _in_words(message.vehicle)
+    return fields | {"vehicle": vehicle, "unfit": words(message.unfit)}

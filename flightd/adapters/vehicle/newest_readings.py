@@ -7,6 +7,7 @@ from collections import deque
 from typing import Protocol
 
 from flightd.adapters.vehicle.range_finders import RangeFinders, RangeSample
+from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _ATTITUDES_MAX = 512
@@ -81,7 +82,7 @@ class NewestReadings:
         return self._landed if now_ns - self._landed_ns <= _LANDED_STALE_NS else LandedState.UNKNOWN
 
     def _state(
-        self, now_ns: int, mode: str, *, in_control: bool, refusal: str, stamps_refused: int = 0
+        self, now_ns: int, mode: str, *, in_control: bool, refusal: Refusal | None, stamps_refused: int = 0
     ) -> VehicleState | None:
         """Everything at one glance; None until heartbeat and attitude were heard."""
         if self._attitude is None or not self.heartbeat_ns:

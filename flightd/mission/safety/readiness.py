@@ -17,7 +17,6 @@ from flightd.mission.reasons import (
     StartChargeLow,
     Unfit,
 )
-from flightd.tracking.battery_charge import ChargeDoubt
 
 
 def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason | None:
@@ -28,20 +27,21 @@ def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason |
         return Plain.NO_TELEMETRY
     charge, battery = s.charge, config.battery
     cell_v = battery.cell_home_v if charge.loaded else battery.cell_start_v
-    checks: tuple[tuple[bool, Reason], ...] = (
-        (v.armed, Plain.ARMED_ALREADY),
-        (not v.clock_error_s <= clock_s, ClockUnsure(v.clock_error_s, clock_s)),
-        (bool(s.unfit or v.unfit), Unfit(s.unfit or v.unfit)),
-        (math.isnan(s.height_m), Plain.NO_HEIGHT),
-        (charge.doubt is not None, ChargeUnknown(charge.doubt or ChargeDoubt.UNKNOWN)),
-        (charge.frac < p.battery_start, StartChargeLow(charge.frac, p.battery_start)),
-        (charge.cell_v < cell_v, CellsLow(charge.cell_v, cell_v)),
-        (not s.frames_arrive, Plain.NO_PICTURE),
-        (s.warnings.frame_age_s > latency_s, LatePictures(latency_s)),
-        (ground_silent, Plain.GROUND_SILENT),
-        (not s.aisle_closed, Plain.AISLE_OPEN),
+    found = s.unfit or v.unfit
+    checks: tuple[Reason | None, ...] = (
+        Plain.ARMED_ALREADY if v.armed else None,
+        None if v.clock_error_s <= clock_s else ClockUnsure(v.clock_error_s, clock_s),
+        Unfit(found) if found else None,
+        Plain.NO_HEIGHT if math.isnan(s.height_m) else None,
+        ChargeUnknown(charge.doubt) if charge.doubt else None,
+        StartChargeLow(charge.frac, p.battery_start) if charge.frac < p.battery_start else None,
+        CellsLow(charge.cell_v, cell_v) if charge.cell_v < cell_v else None,
+        None if s.frames_arrive else Plain.NO_PICTURE,
+        LatePictures(latency_s) if s.warnings.frame_age_s > latency_s else None,
+        Plain.GROUND_SILENT if ground_silent else None,
+        None if s.aisle_closed else Plain.AISLE_OPEN,
     )
-    return next((reason for failed, reason in checks if failed), None)
+    return next((reason for reason in checks if reason is not None), None)
 
 
 def not_fresh(s: MissionInputs, config: Config, stops_left: int) -> Reason | None:

@@ -10,6 +10,7 @@ import pytest
 
 from flightd.adapters.vehicle.ardrone.navdata import DroneState
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
+from flightd.core.refusal import words
 from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.runtime.clock import LoopClock
 from flightd.sim.ardrone.at_commands import DroneCommand
@@ -234,11 +235,11 @@ def test_a_weak_battery_refuses_in_silence_and_the_adapter_says_so() -> None:
             await b.configured()
             b.vehicle.demand(Demand.FLY)
             await b.until(lambda: b.state.refusal)
-            assert "stays landed" in b.state.refusal
-            assert "15 %" in b.state.refusal
+            assert "stays landed" in words(b.state.refusal)
+            assert "15 %" in words(b.state.refusal)
             b.drone.airframe.battery_frac = 0.9
             await b.until(lambda: b.state.mode == "hovering")
-            assert b.state.refusal == ""
+            assert b.state.refusal is None
 
     virtual(main())
 
@@ -249,7 +250,7 @@ def test_a_drone_that_lands_by_itself_is_not_sent_up_again() -> None:
             await b.hovering()
             b.drone.airframe.battery_frac = 0.04
             await b.until(lambda: not b.state.in_control)
-            assert "landed by itself, battery at 4 %" in b.state.refusal
+            assert "landed by itself, battery at 4 %" in words(b.state.refusal)
             await b.until(lambda: not b.state.armed)
             b.drone.airframe.battery_frac = 0.9
             await asyncio.sleep(3.0)
@@ -268,7 +269,7 @@ def test_an_emergency_in_flight_is_told_and_not_cleared_by_itself() -> None:
             b.drone.faults = BIT_CUTOUT
             await b.until(lambda: b.state.mode == "emergency")
             assert (b.state.armed, b.state.in_control) == (False, False)
-            assert "a propeller was blocked" in b.state.refusal
+            assert "a propeller was blocked" in words(b.state.refusal)
             b.drone.faults = 0
             await asyncio.sleep(3.0)
             assert b.drone.emergency
@@ -308,7 +309,7 @@ def test_a_lasting_fault_is_pressed_again_and_told() -> None:
             pressed = [bool(bits & 0x100) for bits in ref_bits(ear.named("REF"))]
             edges = sum(1 for a, c in itertools.pairwise(pressed) if c and not a)
             assert 3 <= edges <= 4
-            assert "cut-out" in b.state.refusal
+            assert "cut-out" in words(b.state.refusal)
             drone.faults = 0
             await b.until(lambda: b.state.mode == "hovering")
 
@@ -354,7 +355,7 @@ def test_a_drone_found_flying_that_nobody_asks_for_is_held_then_landed() -> None
             seen.append(drone.major)
             state = vehicle.state()
             assert state is not None
-            assert "nothing demanded" in state.refusal
+            assert "nothing demanded" in words(state.refusal)
             await asyncio.sleep(8.0)
             seen.append(drone.major)
             assert seen == [MajorState.HOVERING, MajorState.HOVERING, MajorState.LANDING, MajorState.LANDED]

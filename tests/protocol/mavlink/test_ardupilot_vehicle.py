@@ -10,6 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, ArduPilotVehicle
+from flightd.core.refusal import words
 from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import PeerConfig
@@ -124,7 +125,7 @@ def test_before_the_meaning_of_thrust_is_known_it_is_not_flown() -> None:
         async with scripted(autopilot) as (_, vehicle):
             vehicle.demand(Demand.FLY)
             await asyncio.sleep(3.0)
-            assert known(vehicle).refusal == "GUID_OPTIONS not read yet"
+            assert words(known(vehicle).refusal) == "GUID_OPTIONS not read yet"
             assert not autopilot.commands(ARM)
             assert not autopilot.commands(SET_MODE)
             assert not vehicle.send(AttitudeSetpoint(0))
@@ -141,7 +142,7 @@ def test_thrust_that_means_something_else_than_configured_is_not_flown(options: 
             async with scripted(autopilot, raw_thrust=configured) as (_, vehicle):
                 vehicle.demand(Demand.FLY)
                 await asyncio.sleep(3.0)
-                refused = "vehicle.raw_thrust" in known(vehicle).refusal
+                refused = "vehicle.raw_thrust" in words(known(vehicle).refusal)
                 assert refused is (configured is not None)
                 assert bool(autopilot.commands(ARM)) is not refused
 
@@ -155,13 +156,13 @@ def test_a_vehicle_found_flying_is_not_steered_before_the_meaning_of_thrust_is_k
         async with scripted(autopilot) as (_, vehicle):
             vehicle.demand(Demand.KEEP)
             await asyncio.sleep(1.0)
-            assert known(vehicle).refusal == "GUID_OPTIONS not read yet"
+            assert words(known(vehicle).refusal) == "GUID_OPTIONS not read yet"
             assert not known(vehicle).in_control
             assert not vehicle.send(AttitudeSetpoint(0))
             await asyncio.sleep(10.0)  # however often an answer is lost
             autopilot.parameters = WAY_DOWN | {"GUID_OPTIONS": 8}
             await asyncio.sleep(0.6)
-            assert (known(vehicle).in_control, known(vehicle).refusal) == (True, "")
+            assert (known(vehicle).in_control, words(known(vehicle).refusal)) == (True, "")
             assert vehicle.send(AttitudeSetpoint(0))
 
     virtual(test())
@@ -205,7 +206,7 @@ def test_another_firmware_is_recognised_and_not_flown() -> None:
         async with scripted(autopilot) as (_, vehicle):
             vehicle.demand(Demand.FLY)
             await asyncio.sleep(2.0)
-            assert known(vehicle).refusal == "the autopilot is PX4, the configuration says ARDUPILOT"
+            assert words(known(vehicle).refusal) == "the autopilot is PX4, the configuration says ARDUPILOT"
             assert not autopilot.commands(SET_MODE)
 
     virtual(test())
@@ -229,7 +230,7 @@ def test_guided_flies_a_vehicle_that_knows_its_position_and_no_other(has_positio
         else:
             vehicle.demand(Demand.FLY)
             await asyncio.sleep(4.0)
-            assert rig.known().refusal == "arming: failed (PreArm: Need Position Estimate)"
+            assert words(rig.known().refusal) == "arming: failed (PreArm: Need Position Estimate)"
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)

@@ -258,7 +258,7 @@ def test_nothing_in_a_damaged_stream_escapes_the_vehicle() -> None:
         crc.accumulate(bytes([kind.crc_extra]))
         (message,) = FrameParser(Codec(1)).datagram(bytes(frame) + crc.crc.to_bytes(2, "little"))
         telemetry.take(message, i * 1_000_000)
-        state = telemetry.state(i * 1_000_000, "", in_control=False, refusal="")
+        state = telemetry.state(i * 1_000_000, "", in_control=False, refusal=None)
         if state is not None:
             angles = (state.attitude.roll_rad, state.attitude.pitch_rad, state.attitude.yaw_rad)
             assert all(abs(angle) < 10.0 for angle in angles)

@@ -16,6 +16,7 @@ from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.services.statustext import TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.core.geometry import wrap_pi
+from flightd.core.refusal import words
 from flightd.core.types import Demand, Event, EventLevel, GridPose
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.radio import RadioParams
@@ -217,7 +218,7 @@ def test_a_reason_in_chunks_is_told_whole() -> None:
             autopilot.after = explain
             vehicle.demand(Demand.FLY)
             await asyncio.sleep(2.0)
-            assert known(vehicle).refusal == "arming: failed (PreArm: " + "y" * 42 + "z" * 10 + ")"
+            assert words(known(vehicle).refusal) == "arming: failed (PreArm: " + "y" * 42 + "z" * 10 + ")"
 
     virtual(test())
 

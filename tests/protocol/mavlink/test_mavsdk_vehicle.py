@@ -29,6 +29,7 @@ from flightd.adapters.vehicle.mavsdk.telemetry import MavsdkTelemetry
 from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import UnavailableError
+from flightd.core.refusal import words
 from flightd.core.types import Attitude, Demand, LandedState
 from flightd.ports import CountsDrops
 from flightd.runtime.clock import LoopClock
@@ -189,7 +190,7 @@ def test_whatever_the_library_hands_over_nothing_raises_and_nothing_absurd_is_be
         readings.take_range(sensor, now_ns)
         readings.take_velocity(SimpleNamespace(velocity=some("down_m_s")), now_ns)
         readings.take_battery(some("id", "voltage_v", "remaining_percent"), now_ns)
-        state = readings.state(now_ns, in_control=False, refusal="")
+        state = readings.state(now_ns, in_control=False, refusal=None)
         if state is not None:
             assert abs(state.attitude.roll_rad) < 10.0
             assert not state.height_m < 0.0
@@ -285,7 +286,7 @@ class _Companion:
 
 
 def _refusal_of(rig: Rig) -> str:
-    return rig.known().refusal
+    return words(rig.known().refusal)
 
 
 def test_arducopter_is_refused_with_the_reason() -> None:
@@ -309,7 +310,7 @@ def test_a_refused_arming_is_told_with_the_autopilots_words_and_tried_again() ->
             await rig.until(lambda: "arming" in _refusal_of(rig) and "uncalibrated" in _refusal_of(rig), 20.0)
             rig.peer.arming_block = ""
             await rig.until(lambda: rig.known().armed)
-            assert rig.known().refusal == ""
+            assert rig.known().refusal is None
 
     patient(test())
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.core.refusal import words
 from flightd.core.types import AttitudeSetpoint, Demand, LandedState
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.px4 import Px4Mode
@@ -75,7 +76,8 @@ def test_arming_refusals_carry_px4s_words() -> None:
             rig.vehicle.demand(Demand.FLY)
             await asyncio.sleep(3.0)
             assert (
-                rig.known().refusal == "arming: temporarily rejected (Preflight Fail: system power unstable)"
+                words(rig.known().refusal)
+                == "arming: temporarily rejected (Preflight Fail: system power unstable)"
             )
             await rig.until(lambda: rig.known().armed)
 

@@ -24,7 +24,7 @@ def told(*messages: Any, telemetry: MavlinkTelemetry | None = None, now_ns: int 
     telemetry = telemetry or MavlinkTelemetry(ClockSync())
     for message in (dialect.MAVLink_heartbeat_message(2, 3, 1, 20, 4, 3), attitude(), *messages):
         telemetry.take(message, now_ns)
-    state = telemetry.state(now_ns, "", in_control=False, refusal="")
+    state = telemetry.state(now_ns, "", in_control=False, refusal=None)
     assert state is not None
     return state
 
@@ -61,7 +61,7 @@ def heights(*messages: Any, armed: bool = False, telemetry: MavlinkTelemetry | N
 def test_nothing_is_known_before_heartbeat_and_attitude() -> None:
     telemetry = MavlinkTelemetry(ClockSync())
     telemetry.take(attitude(), NOW_NS)
-    assert telemetry.state(NOW_NS, "", in_control=False, refusal="") is None
+    assert telemetry.state(NOW_NS, "", in_control=False, refusal=None) is None
     state = told()
     assert math.isnan(state.height_m)
     assert math.isnan(state.climb_mps)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from flightd.core.refusal import RecordedRefusal
 from flightd.core.types import Command, CommandKind, Demand, LandedState, Phase
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import Flight
@@ -89,7 +90,7 @@ def test_an_arming_that_is_refused_for_five_seconds_voids_it() -> None:
     flight.order(CommandKind.START)
     flight.run(0.1, follow=False)
     assert flight.mission.state.phase is Phase.ARMING
-    flight.set(refusal="arming: failed (PreArm: gyros)")
+    flight.set(refusal=RecordedRefusal("arming: failed (PreArm: gyros)"))
     flight.run(5.2, follow=False)
     assert flight.phase is Phase.PREFLIGHT
     told = [event.text for event in flight.mission.drain_events() if event.name == "phase"]

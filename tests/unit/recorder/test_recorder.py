@@ -17,7 +17,10 @@ import pytest
 from flightd.adapters.recorder.mcap_repair import is_whole
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.adapters.recorder.schemas import schema_of
+from flightd.adapters.vehicle.mavlink.refusal import OffFloor
 from flightd.core.errors import UnavailableError
+from flightd.core.refusal import RecordedRefusal
+from flightd.core.tick import TickInput
 from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.core.types import (
     Attitude,
@@ -37,7 +40,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.ports import Recorder
-from flightd.replay.log import read_log
+from flightd.replay.log import converted, read_log
 from tests.rigs.event_loops import real
 from tests.rigs.waiting import until
 
@@ -66,7 +69,7 @@ VEHICLE = VehicleState(
     0.8,
     15.2,
     9,
-    "no",
+    RecordedRefusal("no"),
 )
 STATUS = Status(12, Phase.FOLLOW, "", "A1", "A2", 1, 6, 0.8, 1.5, 300, 2, 29.9, {"total": 71.0})
 
@@ -117,6 +120,27 @@ def test_a_height_nobody_measured_comes_back_as_nan(tmp_path: Path) -> None:
     (vehicle,) = read_log(tmp_path / "flight.mcap").messages(VehicleState)
     assert math.isnan(vehicle.height_m)
     assert vehicle.battery_v == 15.0
+
+
+def test_a_reason_is_kept_in_words_and_none_as_an_empty_text(tmp_path: Path) -> None:
+    state = dataclasses.replace(VEHICLE, refusal=None, unfit=OffFloor(1.25), battery_a=2.0)
+    path = tmp_path / "flight.mcap"
+    with McapRecorder(path) as recorder:
+        recorder.record(Topic.VEHICLE, 1, state)
+        recorder.record(Topic.TICK, 2, TickInput(2, vehicle=state, unfit=RecordedRefusal("disk full")))
+        recorder.record("/waiting", 3, TickInput(3))
+    told = {"refusal": "", "unfit": "disarming: 1.2 m high"}
+    assert _json(path, Topic.VEHICLE).items() >= told.items()
+    assert _json(path, Topic.TICK)["vehicle"].items() >= told.items()
+    assert _json(path, Topic.TICK)["unfit"] == "disk full"
+    assert _json(path, "/waiting")["vehicle"] is None
+    _, schema = schema_of(state)
+    assert schema["properties"]["refusal"] == {"type": "string", "default": ""}
+    known = dataclasses.replace(state, unfit=RecordedRefusal(told["unfit"]))
+    assert read_log(path).messages(VehicleState) == [known]
+    assert converted(_json(path, Topic.TICK), TickInput) == TickInput(
+        2, vehicle=known, unfit=RecordedRefusal("disk full")
+    )
 
 
 def test_numpy_numbers_are_written_as_numbers(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from flightd.app.build import interlock_of
 from flightd.app.run import unfit_here
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
+from flightd.core.refusal import RecordedRefusal, words
 from flightd.core.types import CommandKind, Phase
 from flightd.runtime.clock import LoopClock
 from flightd.site.site_file import load_site, parse_site, site_toml
@@ -80,7 +81,7 @@ def test_with_an_open_aisle_nothing_starts_or_arms() -> None:
 
 def test_what_the_check_before_the_flight_finds_keeps_it_on_the_ground_and_is_told() -> None:
     flight = Flight(configured(autostart=True))
-    flight.set(unfit="FS_GCS_ENABLE is 0, expected 5")
+    flight.set(unfit=RecordedRefusal("FS_GCS_ENABLE is 0, expected 5"))
     flight.run(10.0, follow=False)
     assert flight.phase is Phase.PREFLIGHT
     assert flight.mission.reason == "not fit to fly: FS_GCS_ENABLE is 0, expected 5"
@@ -91,4 +92,4 @@ def test_what_the_check_before_the_flight_finds_keeps_it_on_the_ground_and_is_to
 def test_this_computer_is_looked_at_without_waiting(tmp_path: Path) -> None:
     lost = CONFIG.with_values(recorder={"folder": tmp_path / "file" / "folder"})
     (tmp_path / "file").write_text("no folder")
-    assert "file" in unfit_here(lost, SITE)
+    assert "file" in words(unfit_here(lost, SITE))

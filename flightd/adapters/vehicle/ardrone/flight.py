@@ -36,7 +36,7 @@ from flightd.adapters.vehicle.ardrone.refusal import (
 )
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
-from flightd.adapters.vehicle.refusal import Refusal
+from flightd.core.refusal import Refusal
 from flightd.core.types import AttitudeSetpoint, Demand
 
 _TRIM_REPEATS = 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flightd.adapters.vehicle.ardrone.navdata import DroneState
-from flightd.adapters.vehicle.refusal import Refusal
+from flightd.core.refusal import Refusal
 
 EMERGENCY_CAUSES = {
     DroneState.CUTOUT: "cut-out, a propeller was blocked",

@@ -13,7 +13,6 @@ from flightd.adapters.vehicle.ardrone.link import ArDroneLink
 from flightd.adapters.vehicle.ardrone.navdata import DroneState, Major, Navdata
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, DroneCamera
 from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
-from flightd.adapters.vehicle.refusal import words
 from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, LandedState, VehicleState
 from flightd.ports import Clock
 
@@ -100,7 +99,7 @@ class ArDroneVehicle:
             battery_stamp_ns=telemetry.flight_ns,
             battery_cells=_CELLS,
             heartbeat_ns=telemetry.arrival_ns,
-            refusal=words(self._flight.refusal(now_ns)),
+            refusal=self._flight.refusal(now_ns),
         )
 
     def attitudes(self) -> list[Attitude]:

@@ -12,7 +12,7 @@ from flightd.adapters.vehicle.mavlink.refusal import ParameterUnread, ThrustMism
 from flightd.adapters.vehicle.mavlink.services.estimator_origin import Origin
 from flightd.adapters.vehicle.mavlink.setpoint import climb_thrust
 from flightd.adapters.vehicle.mavlink.vehicle import DEFAULTS, MavlinkOptions, MavlinkVehicle
-from flightd.adapters.vehicle.refusal import Refusal
+from flightd.core.refusal import Refusal
 from flightd.core.types import AttitudeSetpoint
 from flightd.ports import Clock
 

@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.mavlink.authority import Authority
 from flightd.adapters.vehicle.mavlink.refusal import CommandRefused, ExplainedRefusal, OffFloor, TakenOver
 from flightd.adapters.vehicle.mavlink.services.commands import Answer
-from flightd.adapters.vehicle.refusal import Refusal
+from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, Demand, LandedState
 from flightd.ports import Clock
 

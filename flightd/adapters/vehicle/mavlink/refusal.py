@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
 from flightd.adapters.vehicle.mavlink.services.commands import Answer
-from flightd.adapters.vehicle.refusal import Refusal
+from flightd.core.refusal import Refusal
 
 
 @dataclass(frozen=True, slots=True)

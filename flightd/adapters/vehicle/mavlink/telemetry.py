@@ -12,6 +12,7 @@ from flightd.adapters.vehicle.mavlink.link.codec import Message
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.newest_readings import NewestReadings
 from flightd.adapters.vehicle.range_finders import RangeSample
+from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _HEIGHTS_MAX = 64
@@ -120,7 +121,9 @@ class MavlinkTelemetry(NewestReadings):
                 pass
         return False
 
-    def state(self, now_ns: int, mode: str, *, in_control: bool, refusal: str) -> VehicleState | None:
+    def state(
+        self, now_ns: int, mode: str, *, in_control: bool, refusal: Refusal | None
+    ) -> VehicleState | None:
         """Everything at one glance; None until heartbeat and attitude were heard."""
         refused = self._stamps_refused
         return self._state(now_ns, mode, in_control=in_control, refusal=refusal, stamps_refused=refused)

@@ -30,7 +30,7 @@ from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource, MavlinkTelemetry
-from flightd.adapters.vehicle.refusal import Refusal, words
+from flightd.core.refusal import Refusal
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -149,9 +149,9 @@ class MavlinkVehicle(abc.ABC):
             now_ns,
             "" if mode is None else self.mode_name(mode),
             in_control=self._modes.in_control,
-            refusal=words(self._modes.refusal),
+            refusal=self._modes.refusal,
         )
-        return state and replace(state, unfit=words(self._modes.unfit))
+        return state and replace(state, unfit=self._modes.unfit)
 
     def attitudes(self) -> list[Attitude]:
         return self._telemetry.attitudes()

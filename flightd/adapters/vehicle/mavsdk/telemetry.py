@@ -11,6 +11,7 @@ from mavsdk.plugins.telemetry import LandedState as SdkLanded
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.newest_readings import NewestReadings
 from flightd.adapters.vehicle.range_finders import RangeSample
+from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _CLIMB_STALE_NS = 500_000_000
@@ -94,7 +95,7 @@ class MavsdkTelemetry(NewestReadings):
     def take_landed(self, state: int, now_ns: int) -> None:
         self._landed, self._landed_ns = _LANDED.get(state, LandedState.UNKNOWN), now_ns
 
-    def state(self, now_ns: int, *, in_control: bool, refusal: str) -> VehicleState | None:
+    def state(self, now_ns: int, *, in_control: bool, refusal: Refusal | None) -> VehicleState | None:
         """Everything at one glance; None until heartbeat and attitude were heard."""
         mode = "" if self.mode is None else self.mode.name
         return self._state(now_ns, mode, in_control=in_control, refusal=refusal)

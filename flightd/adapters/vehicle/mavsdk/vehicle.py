@@ -37,7 +37,7 @@ from flightd.adapters.vehicle.mavsdk.connection import MavsdkConnection
 from flightd.adapters.vehicle.mavsdk.gate import SetpointGate
 from flightd.adapters.vehicle.mavsdk.library import Library, Plugins, whole_fields
 from flightd.adapters.vehicle.mavsdk.telemetry import MavsdkTelemetry
-from flightd.adapters.vehicle.refusal import Refusal, words
+from flightd.core.refusal import Refusal
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -146,10 +146,8 @@ class MavsdkVehicle:
 
     def state(self) -> VehicleState | None:
         modes = self._modes
-        state = self._readings.state(
-            self._clock.now_ns(), in_control=modes.in_control, refusal=words(modes.refusal)
-        )
-        return state and replace(state, unfit=words(modes.unfit))
+        state = self._readings.state(self._clock.now_ns(), in_control=modes.in_control, refusal=modes.refusal)
+        return state and replace(state, unfit=modes.unfit)
 
     def attitudes(self) -> list[Attitude]:
         return self._readings.attitudes()
