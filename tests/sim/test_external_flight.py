@@ -22,7 +22,7 @@ from tests.rigs.event_loops import real
 from tests.rigs.vehicles import Rig
 
 ROOT = Path(__file__).parents[2]
-SHORT = 'mission.nodes=["A1", "A2"]'
+SHORT = ("--set", 'mission.nodes=["A2"]', "--set", "mission.dwell_s=0.5")
 
 
 def flown(folder: Path, *options: str) -> dict[str, Any]:
@@ -32,8 +32,7 @@ def flown(folder: Path, *options: str) -> dict[str, Any]:
         "flightd",
         "sim",
         "--json",
-        "--set",
-        SHORT,
+        *SHORT,
         "--out",
         str(folder),
         *options,
@@ -48,7 +47,7 @@ def is_sound(summary: dict[str, Any]) -> bool:
     """Looser than in lockstep: here the machine's load is part of the flight."""
     return bool(
         summary["mission"] == "completed"
-        and (summary["nodes_visited"], summary["nodes_miscounted"]) == (2, 0)
+        and (summary["nodes_visited"], summary["nodes_miscounted"]) == (1, 0)
         and summary["cross_track_rms_m"] <= 0.10
         and summary["hover_error_p95_m"] <= 0.20
         and summary["landed_error_m"] <= 0.20

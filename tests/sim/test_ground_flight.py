@@ -17,7 +17,6 @@ from tests.rigs.event_loops import in_real_time
 from tests.rigs.free_ports import free_ports
 
 ROOT = Path(__file__).parents[2]
-SPEED = "0.5"
 
 
 @pytest.mark.realtime
@@ -35,7 +34,7 @@ async def test_a_flight_is_started_watched_and_landed_from_the_ground(tmp_path: 
     options = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
     process = await asyncio.create_subprocess_exec(
         sys.executable,
-        *("-m", "flightd", "sim", "--speed", SPEED, "--out", str(tmp_path), *options),
+        *("-m", "flightd", "sim", "--speed", "1", "--out", str(tmp_path), *options),
         cwd=ROOT,
         stderr=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.DEVNULL,

@@ -33,7 +33,7 @@ from tests.sim.test_ideal_scan import CONFIG, scan_flight
 from tests.unit.mission.shelves import SITE
 
 PACKAGE = str(Path(flightd.__file__).parent)
-MANY = int(os.environ.get("FLIGHTD_FAILURES", "16"))
+MANY = int(os.environ.get("FLIGHTD_FAILURES", "10"))
 APART = {Pilot.step.__code__, LastResort.step.__code__}
 """What catches, and what flies then."""
 TICK_NS = 20_000_000
