@@ -31,7 +31,7 @@ from flightd.core.types import Attitude, AttitudeSetpoint, CommandKind, Demand, 
 from flightd.pilot import Pilot
 from flightd.runtime.clock import LoopClock
 from flightd.site.site_file import load_site
-from tests.sim.ideal_flight import IdealFlight
+from tests.sim.ideal.ideal_flight import IdealFlight
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 TICK_S = 0.02

@@ -30,7 +30,7 @@ from flightd.core.topics import Topic
 from flightd.core.types import LineSet
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.site.site_file import load_site
-from tests.sim.ideal_flight import IdealFlight
+from tests.sim.ideal.ideal_flight import IdealFlight
 
 ROOT = Path(__file__).parents[1]
 Step: TypeAlias = Callable[[TickInput], TickOutput]

@@ -21,7 +21,7 @@ from flightd.replay.log import read_log
 from flightd.site.site import Site
 from flightd.site.site_file import load_site, site_toml
 from tests.command import Command
-from tests.sim.ideal_flight import IdealFlight
+from tests.sim.ideal.ideal_flight import IdealFlight
 
 ROOT = Path(__file__).parents[2]
 

@@ -20,7 +20,7 @@ from flightd.replay.report.page import render
 from flightd.replay.smoothed_flight import smooth
 from flightd.site.site_file import load_site
 from tests.replay.synthetic_flight import write_flight
-from tests.sim.ideal_flight import IdealFlight
+from tests.sim.ideal.ideal_flight import IdealFlight
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 TICK_NS = 20_000_000

@@ -55,7 +55,7 @@ class Hazard:
     test: str
 
 
-_FAST = "tests/sim/test_hazards.py"
+_FAST = "tests/sim/hazards/test_hazards.py"
 _HOLD = "brake, hold; on when it is over; land after `mission.lines_land_s`"
 _BLIND = (
     "brake by dead reckoning and sink to `hazards.expert.blind_m` at once; up and on when it is over; land"
@@ -130,7 +130,7 @@ HAZARDS: tuple[Hazard, ...] = (
         " commanded",
         Action.LAND,
         "the height is not believed again in this flight: no climb; down by the lines",
-        "tests/sim/test_stuck_height.py",
+        "tests/sim/hazards/test_stuck_height.py",
     ),
     Hazard(
         "height_wrong",
@@ -195,7 +195,7 @@ HAZARDS: tuple[Hazard, ...] = (
         "after 1.5 s level, after 2.5 s the autopilot's own landing, which disarms; then asked to disarm,"
         " never forced. By time: the autopilot's own landing, then given up with an error, still asked to"
         " land",
-        "tests/sim/test_landing_unreported.py",
+        "tests/sim/hazards/test_landing_unreported.py",
     ),
     Hazard(
         "ceiling_left",
@@ -281,7 +281,7 @@ HAZARDS: tuple[Hazard, ...] = (
         "a frame exposed before one that was delivered already, or more than a second ago",
         Action.REPORT,
         "refused and counted, never flown by; the times of the others stay as they are",
-        "tests/sim/test_camera_times.py",
+        "tests/sim/hazards/test_camera_times.py",
     ),
     Hazard(
         "detector_killed",
@@ -323,7 +323,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Action.HOLD,
         "frames and attitudes that waited keep the time at which they were true, what is old is refused; on"
         " when nothing is missing",
-        "tests/sim/test_camera_times.py",
+        "tests/sim/hazards/test_camera_times.py",
     ),
     Hazard(
         "clock_unsure",
@@ -342,7 +342,7 @@ HAZARDS: tuple[Hazard, ...] = (
         "stop, climb up to 1 m to see more, move along the line to where the possible places differ; on from"
         " the right node when sure; land after `mission.relocate_s`, or where no open line leads on from that"
         " node; no node counts as visited meanwhile",
-        "tests/sim/test_carried.py",
+        "tests/sim/ideal/test_carried.py",
     ),
     Hazard(
         "step_failed",
@@ -351,7 +351,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Action.LAND,
         "level at the same tick; the next one lands, by the lines; where that fails too, level and down by"
         " the autopilot's own landing; the error is an event, its traceback is in the flight log",
-        "tests/sim/test_step_failures.py",
+        "tests/sim/hazards/test_step_failures.py",
     ),
     Hazard(
         "disk_full",

@@ -14,7 +14,7 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.random_sites import random_site
 from flightd.tracking.axis_filters import AxisTracker, LineMeasurement
 from flightd.tracking.line_tracker import LineTracker
-from tests.sim.ideal_sight import EyeErrors, IdealEye
+from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
 
 LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)
 HEIGHT_M = 1.6

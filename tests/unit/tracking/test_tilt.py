@@ -15,7 +15,7 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.random_sites import random_site
 from flightd.site.site import PaintedLine, Site
 from flightd.tracking.tilt_compensation import FloorView, GroundLine, ground_lines
-from tests.sim.ideal_sight import EyeErrors, IdealEye
+from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
 
 LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)
 PERFECT = EyeErrors(0.0, 0.0)

@@ -1,0 +1,155 @@
+"""Camera to setpoint and back: short missions through pictures, processes and sockets."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flightd.app.build import detector_pool
+from flightd.app.detection.detector_pool import DetectorPool
+from flightd.app.simulation import launch as simulate
+from flightd.app.simulation.simulation import Simulation
+from flightd.config.schema import Config, load_config
+from flightd.core.snapshot import Snapshot
+from flightd.core.types import Phase
+from flightd.sim.scenario.scenario import Scenario
+from flightd.site.site_file import load_site
+from tests.command import Command
+
+ROOT = Path(__file__).parents[3]
+CONFIG = ROOT / "configs" / "sim.toml"
+BRIEF = ("--set", 'mission.nodes=["A2"]', "--set", "mission.dwell_s=0.5")
+"""One leg; longer flights and other things are looked at elsewhere."""
+WALL = {"wall_time_s"}
+
+
+def process(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "flightd", *arguments]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=280, check=False)
+
+
+def flown(folder: Path, *options: str) -> dict[str, Any]:
+    done = process("sim", "--json", "--out", str(folder), *BRIEF, *options)
+    assert done.returncode == 0, done.stderr
+    summary: dict[str, Any] = json.loads(done.stdout)
+    assert summary == json.loads((folder / "summary.json").read_text())
+    return summary
+
+
+def test_the_same_seed_flies_the_same_flight(tmp_path: Path) -> None:
+    first, second = (flown(tmp_path / name, "--seed", "5") for name in ("a", "b"))
+    assert {k: v for k, v in first.items() if k not in WALL} == {
+        k: v for k, v in second.items() if k not in WALL
+    }
+    assert first["mission"] == "completed"
+    assert (first["nodes_visited"], first["nodes_miscounted"]) == (1, 0)
+    assert first["cross_track_rms_m"] <= 0.05
+    assert first["hover_error_p95_m"] <= 0.10
+    assert first["landed_error_m"] <= 0.15
+    assert first["frames_dropped"] == 0
+    for name in ("flight.mcap", "truth.mcap", "report.html", "inventory.csv"):
+        assert (tmp_path / "a" / name).stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (["--config", "no-such.toml"], "no-such.toml"),
+        (["--warehouse", "no-such-site.toml"], "no-such-site.toml"),
+        (["--warehouse", "random:x"], "random:SEED"),
+        (["--speed", "fast"], "--speed"),
+        (["--speed", "-1"], "--speed"),
+        (["--set", "mission.hight_m=2"], "mission.hight_m"),
+        (["--set", "mission.height_m=200"], "mission.height_m"),
+        (["--set", "nonsense"], "--set nonsense"),
+        (["--set", "vision.profile=mauve"], "mauve"),
+        (["--scenario", "no-such-scenario.toml"], "no-such-scenario.toml"),
+        (["--out", "/proc/nowhere"], "/proc/nowhere"),
+        (["--vehicle", "zeppelin"], "vehicle.kind"),
+        (["--vehicle", "mavsdk", "--speed", "max"], "leave --speed out"),
+        (["--vehicle", "mavsdk", "--speed", "3"], "--speed 1"),
+    ],
+)
+def test_wrong_input_is_one_line_that_names_it(
+    flightd: Command, options: list[str], word: str, tmp_path: Path
+) -> None:
+    done = flightd("sim", *(options if "--out" in options else [*options, "--out", str(tmp_path)]))
+    assert done.returncode == 2, done.stderr
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 1, done.stderr
+    assert word in lines[0]
+
+
+def test_a_node_that_the_site_lacks_is_one_line(tmp_path: Path) -> None:
+    done = process("sim", "--out", str(tmp_path), "--set", 'mission.nodes=["Z9"]')
+    assert done.returncode == 2
+    (line,) = done.stderr.strip().splitlines()
+    assert "Z9" in line
+
+
+def test_a_taken_camera_port_is_one_line(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        config = tmp_path / "flightd.toml"
+        site = ROOT / "configs" / "site-demo.toml"
+        config.write_text(
+            f'[mission]\nsite = "{site}"\nautostart = true\n[camera]\nurl = "udp://127.0.0.1:{port}"\n'
+        )
+        done = process("run", "--config", str(config))
+    assert done.returncode == 2
+    errors = [line for line in done.stderr.splitlines() if line.startswith("flightd:")]
+    assert len(errors) == 1
+    assert str(port) in errors[0]
+    assert "Traceback" not in done.stderr
+
+
+def short_flight(folder: Path, speed: float, observer: Any) -> Simulation:
+    config = load_config(CONFIG)
+    mission = config.mission.model_copy(update={"nodes": ("A1", "A2")})
+    vision = config.vision.model_copy(update={"workers": 2})
+    config = _with_sim_lens(config.model_copy(update={"mission": mission, "vision": vision}))
+    return Simulation(config, load_site(mission.site), Scenario(), 2, speed, folder, observer)
+
+
+def _with_sim_lens(config: Config) -> Config:
+    lens = Scenario().camera.camera().lens
+    return config.model_copy(
+        update={
+            "camera": config.camera.model_copy(
+                update={"fx_px": lens.fx_px, "fy_px": lens.fy_px, "distortion": lens.distortion}
+            )
+        }
+    )
+
+
+@pytest.mark.realtime
+def test_detectors_killed_in_flight_are_replaced_and_the_mission_completes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In real time, over UDP, with the world in a process of its own."""
+    pools: list[DetectorPool] = []
+    make = detector_pool
+
+    def watched(*args: Any) -> DetectorPool:
+        pools.append(make(*args))
+        return pools[-1]
+
+    def kill_once(status: Snapshot) -> None:
+        if status.phase is Phase.FOLLOW and status.goal == "A2" and not pools[0].replaced:
+            for pid in pools[0].pids:
+                os.kill(pid, signal.SIGKILL)
+
+    monkeypatch.setattr("flightd.app.simulation.launch.detector_pool", watched)
+    result = simulate.fly(short_flight(tmp_path, 1.0, kill_once))
+    assert pools[0].replaced >= 2
+    assert result.phase is Phase.DONE
+    assert result.visited == ("A1", "A2")

@@ -1,0 +1,57 @@
+"""The flying daemon gives the autopilot's estimator its pose, and shows the pad where it lands."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flightd.app.simulation import launch as simulate
+from flightd.app.simulation.simulation import Simulation
+from flightd.config.schema import load_config
+from flightd.core.types import Phase
+from flightd.sim.autopilot.autopilot import AutopilotPeer
+from flightd.sim.scenario.scenario import Scenario
+from flightd.site.site_file import load_site
+
+CONFIG = Path(__file__).parents[3] / "configs" / "sim.toml"
+
+
+@pytest.mark.slow
+def test_a_flight_shares_its_pose_at_thirty_hertz_and_the_pad_while_near(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard: dict[str, list[tuple[Any, Any]]] = {"ODOMETRY": [], "LANDING_TARGET": []}
+    receive = AutopilotPeer.received
+
+    def listen(self: AutopilotPeer, channel: Any, message: Any) -> None:
+        if message.get_type() in heard and self.armed:
+            heard[message.get_type()].append((message, self.truth()))
+        receive(self, channel, message)
+
+    monkeypatch.setattr(AutopilotPeer, "received", listen)
+    config = load_config(CONFIG)
+    config = config.model_copy(
+        update={
+            "mission": config.mission.model_copy(update={"nodes": ("A2",), "dwell_s": 0.5}),
+            "vehicle": config.vehicle.model_copy(update={"pose_output": "odometry", "landing_target": True}),
+        }
+    )
+    site = load_site(config.mission.site)
+    result = simulate.fly(Simulation(config, site, Scenario(), 2, None, tmp_path, lambda _: None))
+    assert result.phase is Phase.DONE
+    poses, targets = heard["ODOMETRY"], heard["LANDING_TARGET"]
+    span_s = (poses[-1][0].time_usec - poses[0][0].time_usec) * 1e-6
+    assert len(poses) / span_s == pytest.approx(30.0, rel=0.1)
+    errors_m = sorted(
+        math.hypot(message.x - truth.x_m, message.y - truth.y_m)
+        for message, truth in poses
+        if truth.height_m > 1.0
+    )
+    assert errors_m[len(errors_m) // 2] < 0.1
+    pad = site.nodes[site.home.node]
+    away_m = [math.hypot(truth.x_m - pad.x_m, truth.y_m - pad.y_m) for _, truth in targets]
+    assert 0 < len(targets) < len(poses)
+    assert max(away_m) < 1.3

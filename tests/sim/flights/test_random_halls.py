@@ -1,0 +1,17 @@
+"""Halls that nobody tuned anything for are flown to their first scan; `random_halls` flies more of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.sim.flights.random_halls import fly_to_first_scan
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize("seed", [3, 10, 24, 38])
+def test_a_random_hall_is_flown_to_its_first_scan(seed: int, tmp_path: Path) -> None:
+    flown = fly_to_first_scan(seed, tmp_path)
+    assert flown.scanned, f"{flown.ended}; flightd map new {flown.options}"

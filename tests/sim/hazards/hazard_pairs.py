@@ -1,0 +1,137 @@
+"""Random pairs of faults at random moments, flown whole: camera, adapter, autopilot, judged by the truth.
+
+python -m tests.sim.hazards.hazard_pairs 500 flies the first five hundred and prints how each ended, then the
+worst distances; exit 1 where one was unsafe.  `--from 7` begins with another one, `--keep DIR` keeps the logs
+of the unsafe ones.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import random
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from flightd.app.simulation.judgement import judge_flight
+from flightd.app.simulation.launch import fly
+from flightd.app.simulation.prepare import SimOptions, prepare
+from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
+from flightd.cli.scenario_sweep import faults_in_words
+from flightd.core.errors import RunError
+from flightd.sim.judge.flight_score import FlightScore
+from flightd.sim.judge.verdict import SAFETY_KINDS, JudgedFault
+from flightd.sim.scenario.scenario import Scenario
+
+_MOMENTS_S = (0.0, 22.0)
+"""From lift-off until the drone is back above its pad, undisturbed."""
+_LASTS_S = (0.2, 15.0)
+_KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
+    lambda draw: {"kind": "camera_frozen"},
+    lambda draw: {"kind": draw.choice(["camera_black", "camera_white"])},
+    lambda draw: {"kind": "camera_gone"},
+    lambda draw: {"kind": "camera_late", "delay_s": round(draw.uniform(0.2, 1.5), 2)},
+    lambda draw: {"kind": "camera_turned", "turn_deg": round(draw.choice([-1, 1]) * draw.uniform(5, 30), 1)},
+    lambda draw: {"kind": "telemetry_silent"},
+    lambda draw: {"kind": "heartbeat_silent"},
+    lambda draw: {"kind": "companion_dead", "duration_s": math.inf},
+    lambda draw: {
+        "kind": "attitude_biased",
+        "yaw_deg": round(draw.choice([-1, 1]) * draw.uniform(10, 40), 1),
+    },
+    lambda draw: {"kind": "attitude_biased", "roll_deg": round(draw.choice([-1, 1]) * draw.uniform(1, 4), 1)},
+    lambda draw: {"kind": "height_biased", "offset_m": round(draw.uniform(-1.0, 3.0), 2)},
+    lambda draw: {"kind": "height_lost"},
+    lambda draw: {"kind": "height_stuck", "reading_m": round(draw.uniform(0.05, 2.0), 2)},
+    lambda draw: {"kind": "battery", "charge": round(draw.uniform(0.03, 0.3), 2)},
+    lambda draw: {"kind": "wind", "mean_y_mps": round(draw.uniform(-3.5, 3.5), 2)},
+    lambda draw: {"kind": "wind", "mean_x_mps": round(draw.uniform(-3.5, 3.5), 2)},
+    lambda draw: {"kind": "pilot"},
+    lambda draw: {"kind": "clock_jump", "jump_s": round(draw.uniform(-5.0, 5.0), 2)},
+    lambda draw: {"kind": "detector_killed"},
+)
+"""All that a lockstep flight can have, each as strong as the table of hazards claims to bear."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlownPair:
+    """What went wrong, how it ended, and what was unsafe about it."""
+
+    seed: int
+    faults: str
+    ended: str
+    score: FlightScore
+    unsafe: tuple[JudgedFault, ...]
+
+    def __str__(self) -> str:
+        words = faults_in_words(map(asdict, self.unsafe)) or "safe"
+        return f"{self.seed}: {self.faults}: {self.ended}: {words}"
+
+
+def draw_pair(seed: int) -> Scenario:
+    """Two different kinds of fault, each for good or for a while."""
+    draw = random.Random(seed)
+    faults = []
+    for make in draw.sample(_KINDS, 2):
+        lasts_s = math.inf if draw.random() < 0.5 else round(draw.uniform(*_LASTS_S), 2)
+        faults.append({"at_s": round(draw.uniform(*_MOMENTS_S), 2), "duration_s": lasts_s} | make(draw))
+    return Scenario.model_validate({"fault": faults})
+
+
+def fly_pair(seed: int, folder: Path, vehicle: str) -> FlownPair:
+    """Fly it on the demo site, with wind and sensors of the same seed."""
+    scenario = draw_pair(seed)
+    options = SimOptions(seed=seed, vehicle=vehicle)
+    simulation = prepare(options, scenario, folder, lambda _: None, sweep_route=SHORT_ROUTE)
+    ended = ""
+    try:
+        fly(simulation)
+    except RunError as err:
+        ended = str(err)
+    judgement = judge_flight(simulation)
+    unsafe = [fault for fault in judgement.faults if fault.kind in SAFETY_KINDS]
+    if ended:
+        unsafe.append(JudgedFault("stayed_up", 0.0, 0.0))
+    words = "; ".join(
+        " ".join(
+            f"{value}" for key, value in fault.model_dump(exclude_defaults=True).items() if key != "camera"
+        )
+        for fault in scenario.fault
+    )
+    return FlownPair(seed, words, ended or judgement.score.reason, judgement.score, tuple(unsafe))
+
+
+def main(arguments: Sequence[str]) -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("flights", type=int, nargs="?", default=20)
+    parser.add_argument("--from", dest="first", type=int, default=1)
+    parser.add_argument("--vehicle", choices=["ardupilot", "px4"], default="ardupilot")
+    parser.add_argument("--keep", type=Path)
+    options = parser.parse_args(arguments)
+    flown = []
+    for seed in range(options.first, options.first + options.flights):
+        with tempfile.TemporaryDirectory() as made:
+            folder = Path(made)
+            pair = fly_pair(seed, folder, options.vehicle)
+            if pair.unsafe and options.keep is not None:
+                shutil.copytree(folder, options.keep / str(seed), dirs_exist_ok=True)
+        flown.append(pair)
+        print(pair, flush=True)
+    unsafe = [pair.seed for pair in flown if pair.unsafe]
+    clearances = [pair.score.min_clearance_m for pair in flown if pair.score.min_clearance_m is not None]
+    above = [pair.score.max_overshoot_m for pair in flown if pair.score.max_overshoot_m is not None]
+    print(
+        f"{len(flown)} flights, {len(unsafe)} unsafe {unsafe};"
+        f" nearest {min(clearances, default=math.nan):.2f} m,"
+        f" highest above the command {max(above, default=math.nan):.2f} m"
+    )
+    return 1 if unsafe else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

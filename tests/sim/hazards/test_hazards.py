@@ -1,0 +1,182 @@
+"""Every hazard of the table, by ideal sight: found in time, answered as the table says, ended safely.
+
+`FLIGHTD_SEEDS=20` flies each row with so many winds, sensors and eyes.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from flightd.config.schema import load_config
+from flightd.core.types import Command, CommandKind, Health, Phase
+from flightd.mission.safety.hazard_table import HAZARDS, PHASE_OF, Action, Hazard
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.wind import Wind, WindParams
+from flightd.site.corridor import Corridor
+from flightd.site.site_file import load_site
+from tests.sim.ideal.ideal_flight import Flown, IdealFlight
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+CONFIG = load_config(CONFIGS / "sim.toml")
+SITE = load_site(CONFIGS / "site-demo.toml")
+VISITS = ("A2", "A4")
+SEEDS = range(1, 1 + int(os.environ.get("FLIGHTD_SEEDS", "1")))
+BODY_M = 0.3
+"""Half the width of the drone, with its propellers."""
+WAY_M = 0.9
+"""The free way to both sides of the line: the shelves less the drone."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What goes wrong on the leg to A4, for how long, and within what time it must be found."""
+
+    begin: Callable[[IdealFlight], None]
+    end: Callable[[IdealFlight], None] | None = None
+    lasts_s: float = math.inf
+    found_s: float = 0.5
+    ends: Phase = Phase.ABORTED
+    gust_mps: float = 0.3
+    way_m: float = WAY_M
+
+
+def fault(**values: object) -> Callable[[IdealFlight], None]:
+    def begin(flight: IdealFlight) -> None:
+        for key, value in values.items():
+            assert hasattr(flight.faults, key)
+            setattr(flight.faults, key, value)
+
+    return begin
+
+
+def blow(x_mps: float, y_mps: float) -> Callable[[IdealFlight], None]:
+    def begin(flight: IdealFlight) -> None:
+        flight.airframe.wind = Wind(WindParams(x_mps, y_mps, correlation_s=0.3), 7)
+
+    return begin
+
+
+def order(kind: CommandKind) -> Callable[[IdealFlight], None]:
+    return lambda flight: flight.commands.append(Command("1", kind))
+
+
+def pilot(flight: IdealFlight) -> None:
+    flight.in_control = False
+
+
+def open_aisle(flight: IdealFlight) -> None:
+    flight.aisle_closed = False
+
+
+def silence(flight: IdealFlight) -> None:
+    flight.ground_silent_s = 60.0
+
+
+TRIALS: dict[str, Trial] = {
+    "pilot": Trial(pilot, found_s=0.1),
+    "stop": Trial(order(CommandKind.STOP), found_s=0.05),
+    "telemetry_stale": Trial(fault(silent=True), fault(silent=False), 1.5, ends=Phase.DONE),
+    "telemetry_lost": Trial(fault(silent=True), fault(silent=False), 4.0, found_s=3.2),
+    "heartbeat_lost": Trial(fault(heartless=True), fault(heartless=False), 8.0, found_s=5.2),
+    "height_lost": Trial(fault(rangeless=True), found_s=4.4),
+    "height_wrong": Trial(fault(height_m=-0.7), found_s=1.0),
+    "attitude_wrong": Trial(fault(yaw_rad=math.radians(25.0)), found_s=1.0),
+    "battery_low": Trial(fault(battery=0.15), found_s=0.05, ends=Phase.SWAP),
+    "battery_critical": Trial(fault(battery=0.05), found_s=0.05),
+    "battery_unknown": Trial(fault(battery=math.nan), found_s=3.2),
+    "wind": Trial(blow(0.0, 3.5), found_s=9.0),
+    "ceiling_left": Trial(fault(height_m=4.2), found_s=0.6),
+    "corridor_left": Trial(blow(0.0, 5.4), blow(0.0, 0.0), 1.0, found_s=2.5, ends=Phase.DONE),
+    "ground_lost": Trial(silence, found_s=0.05, ends=Phase.DONE),
+    "aisle_open": Trial(open_aisle, found_s=0.05),
+    "lines_lost": Trial(fault(bare=True)),
+    "camera_frozen": Trial(fault(frozen=True)),
+    "camera_blind": Trial(fault(blank=True)),
+    "frames_stale": Trial(fault(late_ns=900_000_000)),
+    "camera_gone": Trial(fault(blind=True), fault(blind=False), 1.0, ends=Phase.DONE),
+    "detector_killed": Trial(fault(health=Health(0.08, 1)), ends=Phase.DONE, found_s=0.05),
+    "detector_hung": Trial(fault(health=Health(0.08, 2)), ends=Phase.DONE, found_s=0.05),
+    "overload": Trial(fault(health=Health(0.4)), found_s=3.2),
+    "clock_jump": Trial(fault(stamps_refused=40), ends=Phase.DONE, found_s=0.05),
+    "loop_stalled": Trial(fault(stall_ns=700_000_000), ends=Phase.DONE, found_s=0.75),
+    "clock_unsure": Trial(
+        fault(clock_error_s=0.1), fault(clock_error_s=0.0), 2.0, ends=Phase.DONE, found_s=1.1
+    ),
+    "disk_full": Trial(fault(health=Health(0.08, 0, 0, "No space left on device")), found_s=0.05),
+    "recorder_dead": Trial(fault(health=Health(0.08, 0, 1)), ends=Phase.DONE, found_s=0.05),
+}
+
+
+def fly(trial: Trial, seed: int) -> tuple[Flown, float]:
+    """The flight and the time at which the fault began, s of its clock."""
+    flight = IdealFlight(
+        SITE,
+        CONFIG,
+        visits=VISITS,
+        seed=seed,
+        wind=WindParams(gust_rms_mps=trial.gust_mps),
+    )
+    step, begun_ns, over = flight.pilot.step, [0], [False]
+
+    def watch(tick):  # type: ignore[no-untyped-def]
+        k = flight.airframe.kinematics(tick.now_ns)
+        mission = flight.pilot.mission
+        if not begun_ns[0] and mission.phase is Phase.FOLLOW and mission.goal.node == "A4" and k.x_m > 1.9:
+            begun_ns[0] = tick.now_ns
+            trial.begin(flight)
+        elif begun_ns[0] and not over[0] and (tick.now_ns - begun_ns[0]) * 1e-9 > trial.lasts_s:
+            over[0] = True
+            assert trial.end is not None
+            trial.end(flight)
+        return step(tick)
+
+    flight.pilot.step = watch  # type: ignore[method-assign]
+    flown = flight.fly(100)
+    assert begun_ns[0], "the fault never began"
+    return flown, begun_ns[0] * 1e-9
+
+
+def shelf_distance_m(k: Kinematics) -> float:
+    return min(
+        math.hypot(max(s.x0_m - k.x_m, 0.0, k.x_m - s.x1_m), k.y_m - s.y_m)
+        for s in SITE.shelves
+        if k.height_m < s.height_m
+    )
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("row", [row for row in HAZARDS if row.name in TRIALS], ids=lambda row: row.name)
+def test_a_hazard_is_found_answered_and_ends_safely(row: Hazard, seed: int) -> None:
+    trial = TRIALS[row.name]
+    flown, begun_s = fly(trial, seed)
+    assert row.trigger is not None
+    told = [e for e in flown.events if e.name == "hazard" and e.stamp_ns * 1e-9 >= begun_s]
+    said = [e for e in told if e.text.startswith(row.trigger.value)]
+    assert said, [e.text for e in flown.events]
+    assert said[0].stamp_ns * 1e-9 - begun_s <= trial.found_s
+    after = {o.phase for o in flown.outputs if o.setpoint is None or o.setpoint.stamp_ns * 1e-9 > begun_s}
+    if row.action in PHASE_OF:
+        assert PHASE_OF[row.action] in after
+    if row.action is Action.HANDS_OFF:
+        assert flown.phase is Phase.PILOT
+        return
+    assert flown.phase is trial.ends, flown.reason
+    truth = [k for _, k in flown.truth]
+    assert truth[-1].height_m < 0.2
+    assert min(map(shelf_distance_m, truth)) > BODY_M
+    corridor = Corridor(SITE, WAY_M)
+    assert max(corridor.nearest(k.x_m, k.y_m).distance_m for k in truth) <= trial.way_m
+
+
+def test_a_drone_that_is_not_heard_comes_to_rest_by_the_pictures() -> None:
+    flown, begun_s = fly(TRIALS["telemetry_lost"], 5)
+    silent = [k for _, k in flown.truth if 0.0 < k.stamp_ns * 1e-9 - begun_s < 4.0]
+    assert max(math.hypot(k.vx_mps, k.vy_mps) for k in silent) > 0.6
+    assert math.hypot(silent[-1].x_m - silent[0].x_m, silent[-1].y_m - silent[0].y_m) < 1.0
+    assert math.hypot(silent[-1].vx_mps, silent[-1].vy_mps) < 0.15

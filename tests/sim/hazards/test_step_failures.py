@@ -1,0 +1,211 @@
+"""Whatever fails in a control tick, the drone is levelled and landed, and the record is whole.
+
+Every public function that the pilot's step reaches is made to raise, at a random moment of a flight, once or
+for ever.  FLIGHTD_FAILURES says how many of these are flown, drawn by a fixed seed.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import random
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from types import CodeType, FrameType
+from typing import Any
+
+import pytest
+
+import flightd
+from flightd.core.snapshot import Snapshot
+from flightd.core.tick import TickInput, TickOutput
+from flightd.core.topics import Topic
+from flightd.core.types import EventLevel, Phase
+from flightd.mission.guidance import Guidance, MissionInputs
+from flightd.mission.reasons import in_words
+from flightd.mission.safety.last_resort import LastResort
+from flightd.pilot import Pilot
+from tests.sim.ideal.ideal_flight import Flown, IdealFlight
+from tests.sim.ideal.test_ideal_scan import CONFIG, scan_flight
+from tests.unit.mission.shelves import SITE
+
+PACKAGE = str(Path(flightd.__file__).parent)
+MANY = int(os.environ.get("FLIGHTD_FAILURES", "10"))
+APART = {Pilot.step.__code__, LastResort.step.__code__}
+"""What catches, and what flies then."""
+TICK_NS = 20_000_000
+
+
+class InjectedError(Exception):
+    """What no part ever raises."""
+
+
+@contextmanager
+def profiled(profile: Callable[[FrameType, str, Any], None]) -> Iterator[None]:
+    sys.setprofile(profile)
+    try:
+        yield
+    finally:
+        sys.setprofile(None)
+
+
+def name_of(code: CodeType) -> str:
+    return f"{Path(code.co_filename).relative_to(PACKAGE).with_suffix('')}:{code.co_qualname}"
+
+
+def reached() -> dict[str, CodeType]:
+    """The public functions that the steps of a whole flight call, by name."""
+    found: set[CodeType] = set()
+
+    def note(frame: FrameType, event: str, _: Any) -> None:
+        if event == "call":
+            found.add(frame.f_code)
+
+    flight = scan_flight(("A2",))
+    step = flight.pilot.step
+
+    def noted(tick: TickInput) -> TickOutput:
+        with profiled(note):
+            return step(tick)
+
+    flight.pilot.step = noted  # type: ignore[method-assign]
+    assert flight.fly().phase is Phase.DONE
+    return {
+        name_of(code): code
+        for code in found - APART
+        if code.co_filename.startswith(PACKAGE) and not code.co_name.startswith(("_", "<"))
+    }
+
+
+def fly_with(code: CodeType, at_s: float, *, once: bool) -> tuple[Flown, list[tuple[str, Any]], int]:
+    """A flight in which the function raises from that time after arming on, all that was recorded of it, and
+    the tick in which it first raised, 0 for none."""
+    kept: list[tuple[str, Any]] = []
+    flight: IdealFlight = scan_flight(("A2",))
+    flight.on_record = lambda topic, _stamp_ns, message: kept.append((topic, message))
+    step, raised = _failing(flight.pilot.step, code, at_s, once=once)
+    flight.pilot.step = step  # type: ignore[method-assign,assignment]
+    flown = flight.fly(120.0)
+    return flown, kept, raised[0] if raised else 0
+
+
+def _failing(
+    step: Callable[[TickInput], TickOutput], code: CodeType, at_s: float, *, once: bool
+) -> tuple[Callable[[TickInput], TickOutput], list[int]]:
+    raised: list[int] = []
+    armed_ns: list[int] = []
+
+    def failing(tick: TickInput) -> TickOutput:
+        if tick.vehicle is not None and tick.vehicle.armed and not armed_ns:
+            armed_ns.append(tick.now_ns)
+        due = armed_ns and (tick.now_ns - armed_ns[0]) * 1e-9 >= at_s and not (once and raised)
+
+        def fail(frame: FrameType, event: str, _: Any) -> None:
+            if event == "call" and frame.f_code is code:
+                raised.append(tick.now_ns)
+                raise InjectedError(code.co_qualname)
+
+        if not due:
+            return step(tick)
+        with profiled(fail):
+            return step(tick)
+
+    return failing, raised
+
+
+@cache
+def trials() -> list[tuple[str, CodeType, bool, float]]:
+    """Each function once and for ever, from a time drawn; the first of them are flown."""
+    draw = random.Random(14)
+    found = [
+        (name, code, once, draw.uniform(0.0, 24.0))
+        for name, code in sorted(reached().items())
+        for once in (True, False)
+    ]
+    draw.shuffle(found)
+    return found
+
+
+@pytest.mark.parametrize("number", range(MANY))
+def test_whatever_a_step_raises_the_drone_is_levelled_and_landed(number: int) -> None:
+    if number >= len(trials()):
+        pytest.skip("every function has been tried")
+    name, code, once, at_s = trials()[number]
+    print(f"{name} raises {'once' if once else 'for ever'} from {at_s:.1f} s on")
+    flown, kept, raised_ns = fly_with(code, at_s, once=once)
+    ticks = [message.now_ns for topic, message in kept if topic == Topic.TICK]
+    assert len(ticks) == len(flown.outputs)
+    assert all(0 < b - a <= TICK_NS for a, b in itertools.pairwise(ticks)), "a tick is missing in the record"
+    if not raised_ns:  # it is not called so late in a flight
+        assert flown.phase is Phase.DONE
+        return
+    outputs = dict(zip(ticks, flown.outputs, strict=True))
+    is_level_and_comes_down(flown, outputs, raised_ns)
+    told = [event for event in flown.events if event.name == "step_failed"]
+    assert told
+    assert all(event.level is EventLevel.ERROR and "InjectedError" in event.text for event in told)
+    assert told == [message for topic, message in kept if topic == Topic.EVENT and message in told]
+    failures = [message for topic, message in kept if topic == Topic.FAILURE]
+    assert [failure.stamp_ns for failure in failures] == [event.stamp_ns for event in told]
+    assert all("Traceback" in failure.traceback for failure in failures)
+    assert all(name.split(":")[1] in failure.error for failure in failures)
+
+
+def is_level_and_comes_down(flown: Flown, outputs: Mapping[int, TickOutput], raised_ns: int) -> None:
+    failed = outputs[raised_ns]
+    if failed.setpoint is not None:
+        assert (failed.setpoint.roll_rad, failed.setpoint.pitch_rad) == (0.0, 0.0)
+        assert failed.setpoint.climb_mps <= 0.0
+    after = [output.phase for stamp_ns, output in outputs.items() if stamp_ns > raised_ns]
+    assert set(after) <= {Phase.LAND, Phase.DONE, Phase.ABORTED}
+    assert len(after) * TICK_NS < 20_000_000_000
+    assert flown.phase in {Phase.DONE, Phase.ABORTED}
+    assert flown.truth[-1][1].height_m < 0.2
+
+
+class Broken:
+    """Somebody who is told of a flight, and fails at it."""
+
+    def __init__(self) -> None:
+        self.told = 0
+
+    def __call__(self, snapshot: Snapshot) -> None:
+        self.told += 1
+        raise InjectedError("no display")
+
+
+def test_whoever_fails_at_being_told_ends_no_flight_and_is_named_once() -> None:
+    display, kept = Broken(), list[tuple[str, Any]]()
+    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=5, observers=[display])
+    flight.on_record = lambda topic, _stamp_ns, message: kept.append((topic, message))
+    assert flight.fly(120.0).phase is Phase.DONE
+    assert display.told > 100
+    assert [message.error for topic, message in kept if topic == Topic.FAILURE] == [
+        "display: InjectedError: no display"
+    ]
+    assert [
+        message.text for topic, message in kept if topic == Topic.EVENT and message.name == "failure"
+    ] == ["display: InjectedError: no display"]
+
+
+def test_the_words_for_a_failure_may_fail_too() -> None:
+    flown, _, raised_ns = fly_with(in_words.__code__, 16.4, once=False)
+    assert raised_ns
+    assert flown.phase is Phase.ABORTED
+    assert flown.truth[-1][1].height_m < 0.2
+
+
+def test_a_mission_that_is_given_up_takes_no_command() -> None:
+    pilot = IdealFlight(SITE, CONFIG, visits=("A2",), seed=5).pilot
+
+    def fail(_: MissionInputs) -> Guidance:
+        raise ValueError("broken")
+
+    assert pilot.possible_commands
+    pilot.mission.__dict__["step"] = fail
+    for now_ns in (20_000_000, 40_000_000):
+        pilot.step(TickInput(now_ns))
+    assert not pilot.possible_commands

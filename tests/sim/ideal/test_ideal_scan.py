@@ -1,0 +1,195 @@
+"""Whole missions that count shelves, flown by ideal sight and an ideal code reader."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from flightd.config.mission import Heading
+from flightd.config.schema import load_config
+from flightd.core.inventory import LocationState
+from flightd.core.scanning import Finding
+from flightd.core.types import Command, CommandKind, EventLevel, Phase
+from flightd.mission.plan.flight_plan import HeadingPolicy
+from flightd.mission.scan.scanner import Scanner
+from flightd.site.site_file import load_site
+from tests.sim.ideal.ideal_flight import Flown, IdealFlight
+from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
+from tests.unit.mission.shelves import SIGHT, SITE
+
+CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml")
+NODES = ("A2", "A3")
+PLACES = [place.code for place in SITE.locations.values() if place.node in NODES]
+EMPTY, TORN, COVERED, TWO, *READ = PLACES
+LABELS = {code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in [*READ, TORN]}
+STOCK = Stock(
+    LABELS | {TWO: [Label("FRONT", -0.1), Label("SECOND", 0.1)]},
+    frozenset({EMPTY}),
+    frozenset({TORN}),
+    frozenset({COVERED}),
+)
+
+
+def scan_flight(visits: tuple[str, ...] = NODES, seed: int = 5) -> IdealFlight:
+    scanner = Scanner(SITE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
+    front = IdealFront(SITE, SIGHT, STOCK)
+    return IdealFlight(SITE, CONFIG, visits=visits, seed=seed, scanner=scanner, front=front)
+
+
+def findings(flown: Flown) -> dict[str, Finding]:
+    found = [finding for output in flown.outputs for finding in output.findings]
+    assert len({finding.location for finding in found}) == len(found), "one state for each location"
+    return {finding.location: finding for finding in found}
+
+
+def test_a_flight_counts_every_location_of_its_nodes_and_proves_them_at_home() -> None:
+    flown = scan_flight().fly()
+    assert (flown.phase, flown.visited) == (Phase.DONE, list(NODES))
+    found = findings(flown)
+    assert {code: finding.state for code, finding in found.items()} == {
+        EMPTY: LocationState.EMPTY,
+        TORN: LocationState.UNREADABLE,
+        COVERED: LocationState.OCCLUDED,
+        TWO: LocationState.SEVERAL,
+    } | dict.fromkeys(READ, LocationState.READ)
+    for code in READ:
+        assert [read.text for read in found[code].reads] == [f"PALLET {code}"]
+    confirmed = {c for output in flown.outputs for s in output.settled if s.confirmed for c in s.locations}
+    assert confirmed == set(PLACES)
+    assert Counter(output.phase for output in flown.outputs)[Phase.SCAN] > 0
+
+
+def test_a_pause_amid_a_scan_loses_and_doubles_nothing() -> None:
+    flight = scan_flight(("A2",))
+    paused: list[int] = []
+
+    def order(phase: Phase, now_ns: int) -> None:
+        mission = flight.pilot.mission
+        if phase is Phase.SCAN and not paused:
+            mission.command(Command("1", CommandKind.PAUSE), now_ns)
+            paused.append(now_ns)
+        elif phase is Phase.HOLD and now_ns - paused[0] > 3_000_000_000:
+            mission.command(Command("2", CommandKind.RESUME), now_ns)
+
+    flight.on_tick = order
+    flown = flight.fly()
+    assert flown.phase is Phase.DONE
+    assert set(findings(flown)) == {code for code in PLACES if SITE.locations[code].node == "A2"}
+
+
+def test_going_home_ends_the_scan_at_once() -> None:
+    flight = scan_flight()
+
+    def order(phase: Phase, now_ns: int) -> None:
+        if phase is Phase.SCAN and flight.pilot.mission.goal.visit:
+            flight.pilot.mission.command(Command("1", CommandKind.HOME), now_ns)
+            flight.on_tick = lambda _phase, _now_ns: None
+
+    flight.on_tick = order
+    flown = flight.fly()
+    assert flown.phase is Phase.ABORTED
+    assert len(findings(flown)) < len(PLACES)
+
+
+def test_locations_counted_before_are_not_looked_at_again() -> None:
+    flight = scan_flight()
+    flight.counted = tuple(PLACES[:-1])
+    flown = flight.fly()
+    assert flown.visited == list(NODES)
+    assert set(findings(flown)) == {PLACES[-1]}
+
+
+def test_without_racks_the_drone_hovers_and_goes_on() -> None:
+    bare = replace(SITE, racks=(), locations={})
+    scanner = Scanner(bare, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
+    flown = IdealFlight(bare, CONFIG, visits=("A2",), seed=5, scanner=scanner).fly()
+    assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
+    assert Phase.SCAN not in {output.phase for output in flown.outputs}
+
+
+def test_with_the_nose_to_the_shelf_no_leg_begins_with_half_a_turn() -> None:
+    scanner = Scanner(SITE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
+    front, policy = IdealFront(SITE, SIGHT, STOCK), HeadingPolicy(Heading.SHELF)
+    flight = IdealFlight(SITE, CONFIG, policy=policy, visits=NODES, seed=5, scanner=scanner, front=front)
+    flown = flight.fly()
+    assert set(findings(flown)) == set(PLACES)
+    sides = [phase for phase, k in flown.truth if phase is Phase.TURN]
+    assert len(sides) * 0.02 < 0.5 * len(NODES) * math.pi / CONFIG.mission.turn_rate_radps
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_from_aisle_to_aisle_it_flies_where_it_sees_both(seed: int) -> None:
+    """The last view of a node is a low one, from which a line 3.4 m off is long out of sight."""
+    site = load_site(Path(__file__).parents[3] / "configs" / "site-racks-small.toml")
+    scanner = Scanner(site, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
+    front = IdealFront(site, SIGHT, Stock())
+    visits = ("A4", "B4")
+    flown = IdealFlight(site, CONFIG, visits=visits, seed=seed, scanner=scanner, front=front).fly()
+    assert (flown.phase, flown.visited) == (Phase.DONE, list(visits))
+    between = [k.height_m for phase, k in flown.truth if phase is Phase.FOLLOW and 1.2 < k.y_m < 2.2]
+    assert min(between) > CONFIG.mission.height_m - 0.3
+    assert Phase.RELOCATE not in {output.phase for output in flown.outputs}
+
+
+@pytest.mark.parametrize("phase", [Phase.CLIMB, Phase.SCAN])
+@pytest.mark.parametrize("seed", range(1, 1 + int(os.environ.get("FLIGHTD_SEEDS", "2"))))
+def test_going_blind_in_front_of_a_shelf_is_down_before_it_drifts_there(phase: Phase, seed: int) -> None:
+    flight = scan_flight(("A2",), seed)
+
+    def blind(now: Phase, _now_ns: int) -> None:
+        flight.faults.blank |= now is phase and flight.airframe.height_m > 1.0
+
+    flight.on_tick = blind
+    flown = flight.fly(60)
+    assert flight.faults.blank
+    assert flown.phase is Phase.ABORTED
+    assert flown.truth[-1][1].height_m < 0.2
+    nearest = min(
+        math.hypot(max(s.x0_m - k.x_m, 0.0, k.x_m - s.x1_m), k.y_m - s.y_m)
+        for s in SITE.shelves
+        for _, k in flown.truth
+    )
+    assert nearest > 0.3, "half the width of the drone"
+    events = [event.text for event in flown.events if event.name == "hazard"]
+    assert any("camera" in text for text in events), events
+
+
+@pytest.mark.parametrize("elsewhere", [False, True])
+def test_a_doubt_on_the_way_costs_no_location(elsewhere: bool) -> None:
+    """It ends where it began and all stays, or it ends elsewhere and what is withdrawn is counted again."""
+    scanner, doubted = Scanner(SITE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height), list[str]()
+    front = IdealFront(SITE, SIGHT, STOCK)
+    flight = IdealFlight(SITE, CONFIG, visits=NODES, seed=5, scanner=scanner, front=front)
+
+    def doubt(phase: Phase, now_ns: int) -> None:
+        visited = flight.pilot.mission.visited
+        if phase is Phase.FOLLOW and visited and not doubted:
+            doubted.append(visited[0])
+            scanner.doubt()
+            if elsewhere:
+                scanner.withdraw(now_ns, "elsewhere")
+
+    flight.on_tick = doubt
+    flown = flight.fly()
+    assert (flown.phase, set(flown.visited), len(flown.visited)) == (Phase.DONE, set(NODES), len(NODES))
+    settled = [s for output in flown.outputs for s in output.settled]
+    assert {code for s in settled if s.confirmed for code in s.locations} == set(PLACES)
+    assert any(not s.confirmed for s in settled) is elsewhere
+    visits = [event.text for event in flown.events if event.name == "visited"]
+    assert visits.count(doubted[0]) == 1 + elsewhere
+
+
+def test_a_reader_that_never_answers_is_no_completed_count() -> None:
+    scanner = Scanner(SITE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
+    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=5, scanner=scanner)
+    flown = flight.fly()
+    assert flown.phase is Phase.ABORTED
+    assert "no picture of a shelf was read" in flown.reason
+    assert [event.level for event in flown.events if event.name == "not_counted"] == [EventLevel.ERROR]
+    pad = flown.truth[-1][1]
+    assert math.hypot(pad.x_m, pad.y_m) < 0.3, "it comes home all the same"
