@@ -193,14 +193,18 @@ def test_who_takes_over_and_leaves_does_not_leave_the_lost_one_behind() -> None:
 
 def test_memory_is_bounded_whatever_comes() -> None:
     rig = RequestHandlerRig()
-    for i in range(3000):
+    orders = [body("command", command="pause") for _ in range(3000)]
+    for i, order in enumerate(orders):
         rig.now_ns += S // 10
-        rig.order("pause", Peer("ann", Role.OPERATOR, str(i).encode()))
+        rig.hand(order, Peer("ann", Role.OPERATOR, str(i).encode()))
         rig.hand(body("attend"), Peer(f"c{i}", Role.OPERATOR, str(i).encode()))
         if i % 5 == 0:
             assert len(rig.handler.take_commands()) <= 32
-    assert len(rig.handler._done) <= 1024
-    assert len(rig.handler._heard_ns) <= 64
+    assert rig.handler.attending(0) <= 64, "all that ever attended and are still known"
+    rig.handler.take_commands()
+    rig.now_ns += 10 * S
+    known = [rig.hand(order) for order in (orders[0], orders[-1])]
+    assert [answer.repeated for answer in known if isinstance(answer, Accepted)] == [False, True]
 
 
 def _mutated(random_: random.Random, seeds: list[bytes]) -> bytes:

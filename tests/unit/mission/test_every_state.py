@@ -65,6 +65,17 @@ def what_follows(flight: Flight, stimulus: Stimulus) -> tuple[State, str]:
     return before, ""
 
 
+def follows_from_another(state: State, after: State, reason: str, trigger: Trigger) -> bool:
+    """A change is that of a trigger that the stimulus has as well, by the table's row for it."""
+    return any(
+        outcome is not None
+        and outcome.state == after
+        and (not outcome.begins or outcome.cause is not Cause.TRIGGER or reason.startswith(other.value))
+        for other, outcome in TABLE[state].items()
+        if other is not trigger
+    )
+
+
 def is_as_the_table_says(state: State, trigger: Trigger) -> bool:
     flight, outcome = flight_for(state, trigger), TABLE[state][trigger]
     if outcome is not None and not outcome.begins and trigger in _ORDERS:
@@ -73,7 +84,7 @@ def is_as_the_table_says(state: State, trigger: Trigger) -> bool:
         return flight.mission.state == outcome.state and not refused
     after, reason = what_follows(flight, STIMULI[trigger])
     if outcome is None:
-        return reason != trigger.value
+        return after == state or follows_from_another(state, after, reason, trigger)
     if trigger is Trigger.NOT_COUNTED:
         return after == outcome.state and reason.startswith("no picture of a shelf")
     named = outcome.begins and outcome.cause is Cause.TRIGGER

@@ -12,9 +12,11 @@ from flightd.config.scan import ScanConfig
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, Finding, Light, Occupancy
 from flightd.core.types import CodeRead
+from flightd.mission.scan.code_assignment import Assigner
 from flightd.mission.scan.scanner import Scanner, nodes_to_count
-from flightd.mission.scan.views import View
+from flightd.mission.scan.views import View, ViewPlanner
 from flightd.site.racks import code_form
+from flightd.site.site import Site
 from flightd.site.ways import KeepOut
 from tests.unit.mission.shelves import SIGHT, SITE, picture, pose, read
 
@@ -24,11 +26,19 @@ ASIDE_PER_HEIGHT = 0.4
 STEP_NS = 250_000_000
 
 
+def planner(site: Site, params: ScanConfig = PARAMS) -> ViewPlanner:
+    """As a scanner's own."""
+    assigner = Assigner(site, SIGHT, params.expert.least_probability)
+    return ViewPlanner(site, SIGHT, assigner, params, math.inf, ASIDE_PER_HEIGHT)
+
+
 class Hover:
     """A scan of A2: answers each picture of the present view until the node is over."""
 
     def __init__(self, params: ScanConfig = PARAMS) -> None:
         self.scanner = Scanner(SITE, SIGHT, params, aside_per_height=ASIDE_PER_HEIGHT)
+        self.assigner = Assigner(SITE, SIGHT, params.expert.least_probability)
+        self.planner = planner(SITE, params)
         self.scanner.arrive("A2", 1.0, -math.pi / 2)
         self.now_ns = 10**9
         self.seq = 0
@@ -54,7 +64,7 @@ class Hover:
         self.now_ns += STEP_NS
         self.seq += 1
         here = pose(self.now_ns, x_m=view.x_m, y_m=view.y_m, height_m=view.height_m, yaw_rad=view.yaw_rad)
-        codes = [self._code(here, code, text) for code, texts in (reads or {}).items() for text in texts]
+        codes = [self.code(here, code, text) for code, texts in (reads or {}).items() for text in texts]
         places = {code: seen for code, seen in show.items() if code in view.locations}
         shown = picture(self.seq, tuple(codes), places, self.now_ns)
         cut = tuple(replace(place, share=share) for place in shown.places)
@@ -77,7 +87,7 @@ class Hover:
                 here = pose(self.now_ns, **at)
                 seen = reads if light is Light.FAIR else {}
                 codes = [
-                    self._code(here, c, t) for c, texts in seen.items() if c in view.locations for t in texts
+                    self.code(here, c, t) for c, texts in seen.items() if c in view.locations for t in texts
                 ]
                 places = dict.fromkeys(view.locations, Occupancy.UNSURE)
                 shown = picture(self.seq, tuple(codes), places, self.now_ns, exposure, light)
@@ -85,8 +95,8 @@ class Hover:
                 over = self.scanner.step(self.now_ns)
                 self.gather()
 
-    def _code(self, here: BodyPose, code: str, text: str) -> CodeRead:
-        (place,) = self.scanner._assigner.places(here, [code])
+    def code(self, here: BodyPose, code: str, text: str) -> CodeRead:
+        (place,) = self.assigner.places(here, [code])
         xs, ys = zip(*place.quad_px, strict=True)
         # a second label of a place beside the first
         aside = 0.2 * (max(xs) - min(xs)) * (1 if text.endswith("2") else 0)
@@ -138,7 +148,7 @@ def test_one_read_without_a_checksum_is_never_believed() -> None:
     code = LOCATIONS[0]
     hover.at_view()
     here = pose(hover.now_ns + 1)
-    guess = replace(hover._code(here, code, "GUESS"), sure=False)
+    guess = replace(hover.code(here, code, "GUESS"), sure=False)
     hover.scanner.take(picture(1, (guess,), {code: Occupancy.GOODS}, hover.now_ns + 1), here)
     hover.run(GOODS, {})
     assert hover.found[code].state is LocationState.UNREADABLE
@@ -152,7 +162,7 @@ def test_two_texts_of_one_label_cancel_each_other() -> None:
         hover.seq += 1
         hover.now_ns += STEP_NS
         here = pose(hover.now_ns)
-        label = replace(hover._code(here, code, "same place"), text=text)
+        label = replace(hover.code(here, code, "same place"), text=text)
         hover.scanner.take(picture(hover.seq, (label,), {code: Occupancy.GOODS}, hover.now_ns), here)
     hover.run(GOODS, {})
     assert hover.found[code].state is LocationState.UNREADABLE
@@ -190,7 +200,7 @@ def test_pictures_exposed_on_the_way_tell_nothing() -> None:
 
 
 def test_no_height_of_a_side_is_flown_twice() -> None:
-    views = Hover().scanner._planner.views("A2", frozenset(LOCATIONS), 1.0, -math.pi / 2)
+    views = Hover().planner.views("A2", frozenset(LOCATIONS), 1.0, -math.pi / 2)
     heights = [(view.side, view.height_m) for view in views]
     assert len(heights) == len(set(heights))
     assert [view.height_m for view in views] == sorted(view.height_m for view in views[:2]) + sorted(
@@ -258,7 +268,7 @@ def test_a_code_that_may_be_its_own_is_no_empty_place() -> None:
     hover = Hover(PARAMS.with_values(retakes=0))
     code = LOCATIONS[0]
     hover.at_view()
-    border = hover.scanner._assigner.cells[code].x0_m
+    border = hover.assigner.cells[code].x0_m
     for _ in range(5):
         hover.seq += 1
         hover.now_ns += STEP_NS
@@ -298,7 +308,7 @@ def test_a_re_take_at_the_end_of_an_aisle_stays_over_its_line(offset_m: float) -
     scanner.arrive("A1", 1.0, -math.pi / 2)
     view = scanner.view
     assert view is not None
-    shifted = scanner._planner.retake(replace(view, x_m=view.x_m + offset_m), view.locations)
+    shifted = planner(SITE).retake(replace(view, x_m=view.x_m + offset_m), view.locations)
     assert shifted is not None
     assert shifted.x_m >= SITE.nodes["A1"].x_m
 
@@ -307,10 +317,11 @@ def test_re_takes_stay_clear_of_keep_outs() -> None:
     node = SITE.nodes["A2"]
 
     def retakes(*areas: KeepOut) -> list[View]:
-        scanner = Scanner(replace(SITE, keep_outs=areas), SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
+        site = replace(SITE, keep_outs=areas)
+        scanner = Scanner(site, SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
         scanner.arrive("A2", 1.0, -math.pi / 2)
         found, view = [], scanner.view
-        while view is not None and (view := scanner._planner.retake(view, view.locations)) is not None:
+        while view is not None and (view := planner(site).retake(view, view.locations)) is not None:
             found.append(view)
         return found
 
@@ -415,7 +426,7 @@ def test_what_is_lit_wrongly_is_looked_at_from_the_same_place_with_another_expos
     camera: Callable[[float], tuple[float, Light]], part: float
 ) -> None:
     hover = Hover()
-    codes = hover.scanner._planner.locations("A2")
+    codes = hover.planner.locations("A2")
     hover.lit(camera, {code: (f"P-{code}",) for code in codes})
     assert {hover.found[code].state for code in codes} == {LocationState.READ}
     relit = [view for view in hover.views if view.exposure != 1.0]
@@ -453,7 +464,7 @@ def test_a_place_is_empty_after_looks_in_a_row_unless_goods_were_ever_seen() -> 
     ):
         hover = Hover()
         hover.at_view()
-        codes = hover.scanner._planner.locations("A2")
+        codes = hover.planner.locations("A2")
         hover.look(dict.fromkeys(codes, before))
         hover.run(dict.fromkeys(codes, Occupancy.EMPTY), {})
         first = hover.views[0].locations
@@ -462,7 +473,7 @@ def test_a_place_is_empty_after_looks_in_a_row_unless_goods_were_ever_seen() -> 
 
 def test_a_single_doubtful_look_leaves_a_place_empty_that_no_picture_shows_whole() -> None:
     hover = Hover(PARAMS.with_values(retakes=0))
-    codes = hover.scanner._planner.locations("A2")
+    codes = hover.planner.locations("A2")
     while hover.scanner.view is not None:
         hover.at_view()
         over = False
