@@ -27,7 +27,7 @@ _TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 class Needs:
     """What a promise about time assumes of the machine."""
 
-    cores: float = 1.5
+    cores: float = 1.0
     """Processors' worth of time that nobody else takes."""
     pause_s: float = 0.25
     """The longest time for which the machine may stop everything."""
