@@ -1,7 +1,7 @@
-"""Whether the height that is told stands still while the vehicle climbs or sinks.
+"""Whether the height that is told follows the climb of the vehicle.
 
-A range finder with a leg, a cable or a label in its beam goes on telling one height, and a climb that waits
-for a greater one never ends.
+A range finder with a leg, a cable or a label in its beam goes on telling one height, or swings between a few,
+or follows the climb by a part of it only; and a climb that waits for a greater one never ends.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from typing import NamedTuple
 _MOVED_M, _WINDOW_NS = 0.4, 1_500_000_000
 """What the autopilot says to have climbed within so long, without a change of the height, is too much: a
 climb of 0.6 m/s is found after 0.7 s.  Barometers err by less within that time."""
+_AHEAD_M, _AHEAD_NS = 0.5, 3_000_000_000
+"""So much more climbed than the height followed, within so long, is too much, however the height moves."""
 _WANTED_M, _WANTED_NS = 3.0, 8_000_000_000
 """The same of what was commanded, for an autopilot that tells no climb: thrust is raised for up to 2 s
 before a vehicle leaves the floor."""
@@ -36,31 +38,38 @@ class StuckHeight:
         self.found = False
         """Stays so until the end of the flight: what stuck once is not believed again."""
         self._samples: deque[_Sample] = deque()
-        self._last = _Sample(0, math.nan, 0.0, 0.0)
+        self._last_ns: int | None = None
+        self._climbed_m = 0.0
+        self._wanted_m = 0.0
 
     def step(self, now_ns: int, height_m: float, climb_mps: float, wanted_mps: float) -> bool:
         """Take the newest height (m), climb rate and commanded climb rate (m/s, + up; NaN: not known)."""
+        dt_s = 0.0 if self._last_ns is None else (now_ns - self._last_ns) * 1e-9
+        self._last_ns = now_ns
+        self._climbed_m += 0.0 if math.isnan(climb_mps) else climb_mps * dt_s
+        self._wanted_m += wanted_mps * dt_s
         if math.isnan(height_m):
-            self._samples.clear()
             return self.found
-        last = self._last if self._samples else _Sample(now_ns, height_m, 0.0, 0.0)
-        dt_s = (now_ns - last.stamp_ns) * 1e-9
-        climbed_m = last.climbed_m + (0.0 if math.isnan(climb_mps) else climb_mps * dt_s)
-        new = _Sample(now_ns, height_m, climbed_m, last.wanted_m + wanted_mps * dt_s)
-        self._last = new
+        new = _Sample(now_ns, height_m, self._climbed_m, self._wanted_m)
         if not self._samples or now_ns - self._samples[-1].stamp_ns >= _KEPT_EVERY_NS:
             self._samples.append(new)
         while now_ns - self._samples[0].stamp_ns > _WANTED_NS:
             self._samples.popleft()
-        self.found = self.found or self._stands_still(new)
+        self.found = self.found or self._contradicts(new)
         return self.found
 
-    def _stands_still(self, new: _Sample) -> bool:
+    def _contradicts(self, new: _Sample) -> bool:
+        stands_still, drop_m, later = True, 0.0, new
         for old in reversed(self._samples):
-            moved_m, wanted_m = new.climbed_m - old.climbed_m, new.wanted_m - old.wanted_m
-            if abs(new.height_m - old.height_m) >= _SHARE * _MOVED_M:
-                return False
-            recent = new.stamp_ns - old.stamp_ns <= _WINDOW_NS
-            if (recent and abs(moved_m) > _MOVED_M) or wanted_m > _WANTED_M:
+            age_ns = new.stamp_ns - old.stamp_ns
+            rose_m, climbed_m = new.height_m - old.height_m, new.climbed_m - old.climbed_m
+            drop_m, later = min(drop_m, later.height_m - old.height_m), old
+            followed_m = max(rose_m - drop_m, 0.0)  # one drop may be goods that came below
+            stands_still = stands_still and abs(rose_m) < _SHARE * _MOVED_M
+            if stands_still and age_ns <= _WINDOW_NS and abs(climbed_m) > _MOVED_M:
+                return True
+            if age_ns <= _AHEAD_NS and climbed_m - followed_m > _AHEAD_M:
+                return True
+            if new.wanted_m - old.wanted_m - followed_m > _WANTED_M:
                 return True
         return False

@@ -125,12 +125,22 @@ class HeightLost(_Fault):
     kind: Literal["height_lost"]
 
 
+class HeightScaled(_Fault):
+    """The range finder reads this share of the height."""
+
+    by_vehicle = True
+    kind: Literal["height_scaled"]
+    share: float = Field(0.5, ge=0.1, le=3)
+
+
 class HeightStuck(_Fault):
-    """Something hangs in the range finder's beam: it reads that, whatever the height."""
+    """Something hangs in the range finder's beam: it reads that, whatever the height; and what swings there
+    makes it read up to `swing_m` more."""
 
     by_vehicle = True
     kind: Literal["height_stuck"]
     reading_m: float = Field(0.1, ge=0.05, le=8)
+    swing_m: float = Field(0.0, ge=0, le=2)
 
 
 class HeightQuality(_Fault):
@@ -270,6 +280,7 @@ Fault: TypeAlias = Annotated[
     | AttitudeBiased
     | HeightBiased
     | HeightLost
+    | HeightScaled
     | HeightStuck
     | HeightQuality
     | LandingUnreported

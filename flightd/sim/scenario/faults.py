@@ -35,6 +35,7 @@ from flightd.sim.scenario.fault_schema import (
     HeightBiased,
     HeightLost,
     HeightQuality,
+    HeightScaled,
     HeightStuck,
     LandingUnreported,
     LinkFault,
@@ -235,5 +236,8 @@ def _mislead(wrong: SensorFault, fault: Fault, on: bool) -> None:
             wrong.range_quality_pc = fault.percent if on else 0
         case HeightStuck():
             wrong.range_stuck_m = fault.reading_m if on else None
+            wrong.range_swing_m = fault.swing_m
+        case HeightScaled():
+            wrong.range_share = fault.share if on else 1.0
         case ChargeMisreported():
             wrong.charge_pc = fault.percent if on else None

@@ -43,6 +43,10 @@ class SensorFault:
     range_lost: bool = False
     range_stuck_m: float | None = None
     """What the range finder reads whatever is below it; None: it measures."""
+    range_swing_m: float = 0.0
+    """How much more than that it reads at times."""
+    range_share: float = 1.0
+    """What it reads for a metre."""
     charge_pc: int | None = None
     """What is told of the charge whatever the battery holds; None: it is measured."""
     range_quality_pc: int = 0
@@ -103,11 +107,12 @@ class Sensors:
         """One range finder sample along the body's z axis, quantised; 0 when nothing came back."""
         p = self.params
         if self.fault.range_stuck_m is not None:
-            return self.fault.range_stuck_m
+            return self.fault.range_stuck_m + self._rng.uniform(0.0, self.fault.range_swing_m)
         tilt_cos = airframe.tilt_cos
         if tilt_cos < 0.3 or self._rng.random() < p.range_dropout or self.fault.range_lost:
             return 0.0
-        distance = airframe.height_m / tilt_cos + self._rng.gauss(0.0, p.range_noise_m) + self.fault.range_m
+        true_m = airframe.height_m / tilt_cos + self._rng.gauss(0.0, p.range_noise_m)
+        distance = true_m * self.fault.range_share + self.fault.range_m
         if not p.range_min_m <= distance <= p.range_max_m:
             return 0.0
         return round(distance / p.range_step_m) * p.range_step_m

@@ -28,8 +28,8 @@ from flightd.sim.judge.flight_score import FlightScore
 from flightd.sim.judge.verdict import SAFETY_KINDS, JudgedFault
 from flightd.sim.scenario.scenario import Scenario
 
-_MOMENTS_S = (0.0, 22.0)
-"""From lift-off until the drone is back above its pad, undisturbed."""
+_MOMENTS_S = (0.0, 34.0)
+"""From lift-off until the drone has landed, undisturbed."""
 _LASTS_S = (0.2, 15.0)
 _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
     lambda draw: {"kind": "camera_frozen"},
@@ -47,13 +47,24 @@ _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
     lambda draw: {"kind": "attitude_biased", "roll_deg": round(draw.choice([-1, 1]) * draw.uniform(1, 4), 1)},
     lambda draw: {"kind": "height_biased", "offset_m": round(draw.uniform(-1.0, 3.0), 2)},
     lambda draw: {"kind": "height_lost"},
-    lambda draw: {"kind": "height_stuck", "reading_m": round(draw.uniform(0.05, 2.0), 2)},
+    lambda draw: {
+        "kind": "height_stuck",
+        "reading_m": round(draw.uniform(0.05, 2.0), 2),
+        "swing_m": draw.choice([0.0, 0.12, 0.4]),
+    },
+    lambda draw: {"kind": "height_scaled", "share": round(draw.uniform(0.3, 1.5), 2)},
     lambda draw: {"kind": "battery", "charge": round(draw.uniform(0.03, 0.3), 2)},
     lambda draw: {"kind": "wind", "mean_y_mps": round(draw.uniform(-3.5, 3.5), 2)},
     lambda draw: {"kind": "wind", "mean_x_mps": round(draw.uniform(-3.5, 3.5), 2)},
     lambda draw: {"kind": "pilot"},
     lambda draw: {"kind": "clock_jump", "jump_s": round(draw.uniform(-5.0, 5.0), 2)},
     lambda draw: {"kind": "detector_killed"},
+    lambda draw: {"kind": "step_fails"},
+    lambda draw: {"kind": "landing_unreported"},
+    lambda draw: {"kind": "battery_silent"},
+    lambda draw: {"kind": "charge_misreported", "percent": draw.randint(0, 100)},
+    lambda draw: {"kind": "timesync_silent"},
+    lambda draw: {"kind": "camera_disordered", "delay_s": round(draw.uniform(0.05, 0.2), 2)},
 )
 """All that a lockstep flight can have, each as strong as the table of hazards claims to bear."""
 

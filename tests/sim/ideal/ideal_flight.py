@@ -74,7 +74,8 @@ class Faults:
     silent: bool = False
     heartless: bool = False
     rangeless: bool = False
-    stuck_m: float | None = None
+    misread: Callable[[float], float] = lambda height_m: height_m
+    """What the range finder makes of the height (m)."""
     yaw_rad: float = 0.0
     height_m: float = 0.0
     battery: float | None = None
@@ -309,8 +310,7 @@ class IdealFlight:
         on_floor = self.airframe.on_floor
         if not faults.rangeless:
             measured_m = self.airframe.height_m + faults.height_m
-            read_m = measured_m if faults.stuck_m is None else faults.stuck_m
-            self._range = (round(read_m, 2), self._now_ns)
+            self._range = (round(faults.misread(measured_m), 2), self._now_ns)
         if not faults.heartless:
             self._beat_ns = self._now_ns
         standing = on_floor and not faults.landing_unreported

@@ -53,3 +53,20 @@ def test_what_stuck_once_is_not_believed_again() -> None:
     for i in range(100):
         check.step(i * TICK_NS, 0.1, 0.6, 0.6)
     assert check.step(101 * TICK_NS, 1.4, 0.6, 0.6)
+
+
+@pytest.mark.parametrize("readings_m", [(0.1, 0.22), (0.1, 0.15, 0.3, 0.1), (0.4, 0.1)])
+@pytest.mark.parametrize("ticks", [1, 3, 10])
+def test_a_height_that_swings_in_place_is_found_soon_too(readings_m: tuple[float, ...], ticks: int) -> None:
+    heights = [readings_m[i // ticks % len(readings_m)] for i in range(400)]
+    after_s = found_after(heights, [0.6] * 400)
+    assert after_s is not None
+    assert 0.6 * after_s < 1.0, "metres climbed until then"
+
+
+@pytest.mark.parametrize("share", [0.1, 0.35, 0.5, 0.6])
+def test_a_height_that_follows_in_part_is_found_before_it_matters(share: float) -> None:
+    climbed = [0.6 * 0.02 * i for i in range(400)]
+    after_s = found_after([0.1 + share * metres for metres in climbed], [0.6] * 400)
+    assert after_s is not None
+    assert 0.6 * after_s * (1.0 - share) < 0.7, "metres that the drone was higher than it was told"
