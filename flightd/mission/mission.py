@@ -7,6 +7,7 @@ reference are led along, and events are reported.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
@@ -212,7 +213,7 @@ class Mission:
 
     def _void_start(self, now_ns: int) -> None:
         """A start that came to nothing is not kept for later."""
-        self._clearance.withdraw()
+        self._clearance.void(now_ns)
         if self.state.waiting:
             self._clearance.report_void(now_ns)
             self._turn(Trigger.START_EXPIRED)
@@ -370,7 +371,9 @@ class Mission:
         if self.state.waiting:
             self._reporter.wait(self._clearance.wait(self._grounded(s), s.now_ns))
         if not self.airborne:
-            return self._steering.on_ground(s, self.phase)
+            guidance = self._steering.on_ground(s, self.phase)
+            disarms = self.state.waiting and self._clearance.disarms(s)
+            return replace(guidance, demand=Demand.DISARM) if disarms else guidance
         guidance = self._steering.step(s, self._task(s.now_ns))
         if self.state.halted:
             self._reporter.halt(paused=self._orders.paused)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flightd.config.schema import Config
-from flightd.core.types import EventLevel
+from flightd.core.types import EventLevel, LandedState
 from flightd.mission.event_log import EventLog
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.orders import StartOrder
@@ -12,6 +12,8 @@ from flightd.mission.safety.hazard_monitor import DebounceTimer
 from flightd.mission.safety.readiness import not_fresh, not_ready
 from flightd.mission.triggers import Trigger
 
+_AFTER_VOID_NS = 10_000_000_000
+"""An arming that was asked for may succeed so long after it was given up."""
 _UNFIT_S = 3.0
 """Parameters are still being read for about so long."""
 
@@ -26,6 +28,7 @@ class StartClearance:
         self.autostart = autostart
         self._order = StartOrder(config.mission)
         self._obstacle: Reason | None = Plain.NO_TELEMETRY
+        self._void_ns: int | None = None
         self._unfit = DebounceTimer()
         self._unfit_reported: Reason | None = None
 
@@ -65,6 +68,11 @@ class StartClearance:
         """The start has done its work, or came to nothing: it is not kept for later."""
         self._order.withdraw()
 
+    def void(self, now_ns: int) -> None:
+        """The start came to nothing."""
+        self._order.withdraw()
+        self._void_ns = now_ns
+
     def is_void(self, now_ns: int) -> bool:
         """The start has not armed in time."""
         return self._order.is_void(now_ns)
@@ -73,6 +81,13 @@ class StartClearance:
         """Say that a start came to nothing, and for what."""
         why = "" if self._obstacle is None else f": {in_words(self._obstacle)}"
         self._events.report(now_ns, EventLevel.WARNING, "start", f"{Trigger.START_EXPIRED.value}{why}")
+
+    def disarms(self, s: MissionInputs) -> bool:
+        """A vehicle that stands and was armed after all, when its start had come to nothing: by nobody else,
+        for its mode is still the commanded one (the adapter sees to that)."""
+        v = s.vehicle
+        late = self._void_ns is not None and s.now_ns - self._void_ns < _AFTER_VOID_NS
+        return late and v is not None and v.armed and v.landed is LandedState.ON_GROUND
 
     def wait(self, obstacle: Reason | None, now_ns: int) -> Reason:
         """Keep what stands against a flight at this tick; why it waits."""

@@ -107,7 +107,7 @@ class LastResort:
         if self._end is not None or vehicle is None:
             return Fallback(self._end or Phase.ABORTED, _ended(vehicle), None)
         sinking = AttitudeSetpoint(now_ns, climb_mps=-self._sink_mps)
-        if not vehicle.in_control:
+        if not vehicle.in_control and before is Phase.RECOVER:
             return Fallback(before, Demand.KEEP, sinking)
         standing = heard and vehicle.landed is LandedState.ON_GROUND
         return Fallback(Phase.LAND, Demand.DISARM if standing else Demand.LAND, sinking)
@@ -123,7 +123,7 @@ class LastResort:
 
 
 def _ended(vehicle: VehicleState | None) -> Demand:
-    flies = vehicle is not None and vehicle.armed and vehicle.landed is LandedState.IN_AIR
+    flies = vehicle is not None and vehicle.armed and vehicle.landed is not LandedState.ON_GROUND
     return Demand.LAND if flies else Demand.DISARM
 
 

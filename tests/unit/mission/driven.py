@@ -64,6 +64,12 @@ class Flight:
     def phase(self) -> Phase:
         return self.mission.phase
 
+    @property
+    def demand(self) -> Demand:
+        """What was asked of the vehicle last."""
+        assert self.guidance is not None
+        return self.guidance.demand
+
     def set(self, **changes: object) -> None:
         vehicle = {k: v for k, v in changes.items() if k in VehicleState.__slots__ and k != "height_m"}
         other = {k: v for k, v in changes.items() if k not in vehicle}

@@ -17,6 +17,7 @@ from tests.unit.mission.driven import POLICY, SITE
 from tests.unit.mission.test_readiness import VEHICLE
 
 NOW_NS = 10**9
+LONG_AGO = replace(VEHICLE.attitude, stamp_ns=NOW_NS - 4 * 10**9)
 FLYING = replace(VEHICLE, armed=True, in_control=True, landed=LandedState.IN_AIR, height_m=1.5)
 
 
@@ -36,6 +37,8 @@ def answers(vehicle: VehicleState | None, before: Phase = Phase.FOLLOW) -> tuple
         (replace(FLYING, landed=LandedState.ON_GROUND), Phase.LAND, (Phase.LAND, Demand.DISARM, True)),
         (replace(FLYING, in_control=False), Phase.FOLLOW, (Phase.PILOT, Demand.HANDS_OFF, False)),
         (FLYING, Phase.PILOT, (Phase.PILOT, Demand.HANDS_OFF, False)),
+        # nothing is heard any more, not even in which mode it is: landed unheard
+        (replace(FLYING, in_control=False, attitude=LONG_AGO), Phase.LAND, (Phase.LAND, Demand.LAND, True)),
         (replace(FLYING, in_control=False), Phase.RECOVER, (Phase.RECOVER, Demand.KEEP, True)),
         (replace(FLYING, heartbeat_ns=0), Phase.FOLLOW, (Phase.LAND, Demand.LAND, True)),
         (VEHICLE, Phase.PREFLIGHT, (Phase.ABORTED, Demand.DISARM, False)),

@@ -99,6 +99,19 @@ def test_an_arming_that_is_refused_for_five_seconds_voids_it() -> None:
     assert flight.phase is Phase.PREFLIGHT
 
 
+def test_an_arming_that_comes_after_all_is_taken_back() -> None:
+    flight = waiting(start_countdown_s=0.0)
+    flight.order(CommandKind.START)
+    flight.run(5.4, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+    flight.set(armed=True)
+    flight.run(0.04, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+    assert flight.demand is Demand.DISARM
+    flight.run(20.0, follow=False)
+    assert flight.demand is Demand.STANDBY, "whoever arms it later means it"
+
+
 def test_one_that_starts_by_itself_waits_for_what_it_lacks_without_a_count_down() -> None:
     flight = Flight(configured(autostart=True, start_countdown_s=3.0))
     flight.set(battery_frac=0.1)
