@@ -20,6 +20,7 @@ class Plain(enum.Enum):
     NO_TELEMETRY = "no telemetry from the vehicle"
     ARMED_ALREADY = "the vehicle is armed already: disarm it first"
     NO_HEIGHT = "no height from the vehicle's range finder"
+    NO_CLIMB = "no climb rate from the vehicle"
     NO_PICTURE = "no picture from the down camera"
     AISLE_OPEN = "the aisle is not closed"
     GROUND_SILENT = "the ground station that attends this flight fell silent"

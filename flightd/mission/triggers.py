@@ -19,6 +19,7 @@ class Trigger(enum.Enum):
     HEARTBEAT_LOST = "heartbeat lost"
     HEIGHT_STUCK = "the height does not follow the climb"
     HEIGHT_LOST = "height lost"
+    CLIMB_LOST = "climb rate lost"
     CEILING_LEFT = "too near the ceiling"
     ATTITUDE_WRONG = "attitude disagrees with the picture"
     BATTERY_CRITICAL = "battery critical"

@@ -187,9 +187,12 @@ class ReferenceGenerator:
             rate = self._blind.rate_mps(s.height_m)
         self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
         deaf = s.telemetry_age_s > p.telemetry_land_s
+        unsteered = v is not None and math.isnan(v.climb_mps)
         standing = v is not None and v.landed is LandedState.ON_GROUND and not deaf
         standing = standing or self._still_s > _DISARM_S
-        by_itself = deaf or task.state.adopted or self._by_itself or self._still_s > _OWN_LANDING_S
+        by_itself = (
+            deaf or unsteered or task.state.adopted or self._by_itself or self._still_s > _OWN_LANDING_S
+        )
         return -rate, Demand.DISARM if standing else Demand.LAND if by_itself else Demand.FLY
 
     def _steer(self, s: MissionInputs, task: ReferenceTask) -> bool:

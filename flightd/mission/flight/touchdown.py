@@ -59,6 +59,8 @@ class Standstill:
         return (s.now_ns - self._since[0]) * 1e-9
 
     def _is_down(self, height_m: float, climb_mps: float) -> bool:
+        if math.isnan(height_m) and math.isnan(climb_mps):
+            return False
         return not (height_m > self._floor_m + _NEAR_FLOOR_M or abs(climb_mps) > _STILL_MPS)  # NaN: unknown
 
 

@@ -124,6 +124,14 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "climb_lost",
+        Trigger.CLIMB_LOST,
+        "no climb rate from the autopilot for a second, and then for `mission.telemetry_hold_s`",
+        Action.LAND,
+        "the autopilot's own landing: it cannot be steered unmeasured; nothing is armed without a climb rate",
+        _FAST,
+    ),
+    Hazard(
         "height_stuck",
         Trigger.HEIGHT_STUCK,
         "the height stands still while the autopilot tells of 0.4 m of climb within 1.5 s, or 3 m of it were"

@@ -33,6 +33,7 @@ def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason |
         None if v.clock_error_s <= clock_s else ClockUnsure(v.clock_error_s, clock_s),
         Unfit(found) if found else None,
         Plain.NO_HEIGHT if math.isnan(s.height_m) else None,
+        Plain.NO_CLIMB if math.isnan(v.climb_mps) else None,
         ChargeUnknown(charge.doubt) if charge.doubt else None,
         StartChargeLow(charge.frac, p.battery_start) if charge.frac < p.battery_start else None,
         CellsLow(charge.cell_v, cell_v) if charge.cell_v < cell_v else None,

@@ -92,11 +92,16 @@ class BareFloor(_Fault):
 
 class LinkFault(_Fault):
     """What the autopilot tells no longer arrives (nothing at all, no heartbeats, no answers about its clock,
-    nothing of its battery); or nothing passes either way, as when the companion computer is dead."""
+    nothing of its climb, of its battery); or nothing passes either way: the companion computer is dead."""
 
     by_vehicle = True
     kind: Literal[
-        "telemetry_silent", "heartbeat_silent", "timesync_silent", "battery_silent", "companion_dead"
+        "telemetry_silent",
+        "heartbeat_silent",
+        "timesync_silent",
+        "climb_silent",
+        "battery_silent",
+        "companion_dead",
     ]
 
 

@@ -50,6 +50,13 @@ _LOOKS_S = 0.01
 _WITHHELD: Mapping[str, frozenset[int]] = {
     "heartbeat_silent": frozenset({dialect.MAVLINK_MSG_ID_HEARTBEAT}),
     "timesync_silent": frozenset({dialect.MAVLINK_MSG_ID_TIMESYNC}),
+    "climb_silent": frozenset(
+        {
+            dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+            dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+            dialect.MAVLINK_MSG_ID_VFR_HUD,
+        }
+    ),
     "battery_silent": frozenset({dialect.MAVLINK_MSG_ID_BATTERY_STATUS, dialect.MAVLINK_MSG_ID_SYS_STATUS}),
 }
 """Which messages a fault of the link keeps back."""

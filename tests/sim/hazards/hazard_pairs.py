@@ -62,6 +62,7 @@ _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
     lambda draw: {"kind": "step_fails"},
     lambda draw: {"kind": "landing_unreported"},
     lambda draw: {"kind": "battery_silent"},
+    lambda draw: {"kind": "climb_silent"},
     lambda draw: {"kind": "charge_misreported", "percent": draw.randint(0, 100)},
     lambda draw: {"kind": "timesync_silent"},
     lambda draw: {"kind": "camera_disordered", "delay_s": round(draw.uniform(0.05, 0.2), 2)},

@@ -85,6 +85,7 @@ TRIALS: dict[str, Trial] = {
     "telemetry_lost": Trial(fault(silent=True), fault(silent=False), 4.0, found_s=3.2),
     "heartbeat_lost": Trial(fault(heartless=True), fault(heartless=False), 8.0, found_s=5.2),
     "height_lost": Trial(fault(rangeless=True), found_s=4.4),
+    "climb_lost": Trial(fault(climbless=True), found_s=1.2),
     "height_wrong": Trial(fault(height_m=-0.7), found_s=1.0),
     "attitude_wrong": Trial(fault(yaw_rad=math.radians(25.0)), found_s=1.0),
     "battery_low": Trial(fault(battery=0.15), found_s=0.05, ends=Phase.SWAP),

@@ -74,6 +74,7 @@ class Faults:
     silent: bool = False
     heartless: bool = False
     rangeless: bool = False
+    climbless: bool = False
     misread: Callable[[float], float] = lambda height_m: height_m
     """What the range finder makes of the height (m)."""
     yaw_rad: float = 0.0
@@ -319,7 +320,7 @@ class IdealFlight:
             attitude=self._attitude(),
             height_m=math.nan if self._now_ns - self._range[1] > 10**9 else self._range[0],
             height_stamp_ns=self._range[1],
-            climb_mps=self.sensors.climb_mps,
+            climb_mps=math.nan if faults.climbless else self.sensors.climb_mps,
             mode="GUIDED_NOGPS",
             in_control=self._armed and self.in_control,
             armed=self._armed,

@@ -14,7 +14,13 @@ from tests.unit.mission.states import PARAMS, STIMULI, Stimulus, fresh
 
 _AT_NODE = (Phase.HOVER, Phase.CLIMB, Phase.SCAN)
 _BACK = (Intent.RETURN, Intent.HOME)
-_SLOW = (Trigger.HEIGHT_LOST, Trigger.CLOCK_UNSURE, Trigger.TIMED_OUT, Trigger.POSITION_DOUBTED)
+_SLOW = (
+    Trigger.CLIMB_LOST,
+    Trigger.HEIGHT_LOST,
+    Trigger.CLOCK_UNSURE,
+    Trigger.TIMED_OUT,
+    Trigger.POSITION_DOUBTED,
+)
 SHADOWED = {
     # on the way back nothing is done at a node: it goes on before anything that takes time
     *((State(phase, intent), trigger) for phase in _AT_NODE for intent in _BACK for trigger in _SLOW),
