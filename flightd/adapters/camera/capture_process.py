@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -125,13 +125,27 @@ def frames_of(source: Source, parent: ChildEnd) -> Generator[Grabbed, None, None
         video = _grabbed(cv2.VideoCapture(source.place))
         yield from _paced((frame.bgr for frame in video), source.fps)
     elif source.kind is SourceKind.STREAM:
-        os.environ.update(_FFMPEG)
         patience = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, _OPEN_MS, cv2.CAP_PROP_READ_TIMEOUT_MSEC, _READ_MS]
-        yield from _grabbed(
-            cv2.VideoCapture(source.place, cv2.CAP_FFMPEG, [*patience, cv2.CAP_PROP_N_THREADS, 1])
-        )
+        with _environment(_FFMPEG):
+            stream = cv2.VideoCapture(source.place, cv2.CAP_FFMPEG, [*patience, cv2.CAP_PROP_N_THREADS, 1])
+        yield from _grabbed(stream)
     else:
         yield from _of_device(source, parent)
+
+
+@contextlib.contextmanager
+def _environment(settings: Mapping[str, str]) -> Iterator[None]:
+    """These meanwhile; whatever else this process opens later is opened as before."""
+    before = {name: os.environ.get(name) for name in settings}
+    os.environ.update(settings)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def _of_device(source: Source, parent: ChildEnd) -> Iterator[Grabbed]:
