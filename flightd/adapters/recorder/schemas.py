@@ -99,9 +99,15 @@ def encode(message: object) -> bytes:
     return _encode(message)
 
 
+_FIELDS = {
+    kind: tuple(field.name for field in dataclasses.fields(kind)) for kind in (TickInput, VehicleState)
+}
+"""Of the messages that hold reasons, and are recorded at each tick."""
+
+
 def _in_words(message: TickInput | VehicleState) -> JsonObject:
     """The fields of a message that holds reasons, those as their words."""
-    fields = {field.name: getattr(message, field.name) for field in dataclasses.fields(message)}
+    fields = {name: getattr(message, name) for name in _FIELDS[type(message)]}
     if isinstance(message, VehicleState):
         return fields | {"refusal": words(message.refusal), "unfit": words(message.unfit)}
     vehicle = message.vehicle and _in_words(message.vehicle)
