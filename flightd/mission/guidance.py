@@ -32,7 +32,7 @@ class Warnings:
 
     Pictures: age of the newest, and since when they are the same or show nothing.  `heading_error_rad` is
     what the lines say against the vehicle's heading, `height_share` the lines' width against the map's
-    (1: they agree), `height_stuck` that the height stands still while the vehicle climbs or sinks,
+    (1: they agree), `height_stuck` that the height does not follow the climb of the vehicle,
     `push_mps2` the acceleration that no lean explains, `off_m` the distance from the reference while
     steering, `headroom_m` the way up to the ceiling's margin, `outside_m` how far outside the corridor, whose
     nearest line is at `line_m`; `tick_s` the mean time between ticks."""

@@ -134,8 +134,9 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "height_stuck",
         Trigger.HEIGHT_STUCK,
-        "the height stands still while the autopilot tells of 0.4 m of climb within 1.5 s, or 3 m of it were"
-        " commanded",
+        "the height does not follow the climb that the autopilot tells: it stands still for 0.4 m within"
+        " 1.5 s, or stays 0.5 m behind within 3 s, one drop over goods left out; or stays 3 m behind what was"
+        " commanded within 8 s",
         Action.LAND,
         "the height is not believed again in this flight: no climb; down by the lines",
         "tests/sim/hazards/test_stuck_height.py",
