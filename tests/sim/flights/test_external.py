@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
@@ -157,33 +159,41 @@ class Sitl(asyncio.Protocol):
             await asyncio.sleep(0.01)
 
 
-def test_the_link_is_opened_followed_and_found_again() -> None:
-    async def test() -> None:
-        Sitl.connections, Sitl.climbed_m = [], 0.0
-        loop, clock = asyncio.get_running_loop(), LoopClock()
-        server = await loop.create_server(Sitl, "127.0.0.1", 0)
-        port = server.sockets[0].getsockname()[1]
-        vehicle = ExternalVehicle(f"tcp:127.0.0.1:{port}", clock, PAD)
-        flying = asyncio.create_task(Sitl.fly(20.0))
-        assert await vehicle.open() == ("127.0.0.1", port)
-        running = asyncio.create_task(vehicle.run())
-        await asyncio.sleep(4.0)
-        start = vehicle.truth().height_m
-        assert 1.5 < start < 2.6
-        earlier = vehicle.truth_at(clock.now_ns() - 500_000_000).height_m
-        assert start - earlier == pytest.approx(0.25, abs=0.02)
-        Sitl.connections[0].transport.abort()
-        await asyncio.sleep(5.0)
-        assert len(Sitl.connections) == 2
-        assert vehicle.truth().height_m - start == pytest.approx(2.5, abs=0.05)  # the pad has not moved
-        running.cancel()
-        flying.cancel()
-        await asyncio.gather(running, flying, return_exceptions=True)
-        for sitl in Sitl.connections:
-            sitl.transport.abort()
+@asynccontextmanager
+async def sitl() -> AsyncIterator[int]:
+    """The simulator's side, listening; its port."""
+    Sitl.connections, Sitl.climbed_m = [], 0.0
+    server = await asyncio.get_running_loop().create_server(Sitl, "127.0.0.1", 0)
+    try:
+        yield server.sockets[0].getsockname()[1]
+    finally:
+        for connection in Sitl.connections:
+            connection.transport.abort()
         server.close()
         await server.wait_closed()
         await asyncio.sleep(0.01)
+
+
+def test_the_link_is_opened_followed_and_found_again() -> None:
+    async def test() -> None:
+        async with sitl() as port:
+            clock = LoopClock()
+            vehicle = ExternalVehicle(f"tcp:127.0.0.1:{port}", clock, PAD)
+            flying = asyncio.create_task(Sitl.fly(20.0))
+            assert await vehicle.open() == ("127.0.0.1", port)
+            running = asyncio.create_task(vehicle.run())
+            await asyncio.sleep(4.0)
+            start = vehicle.truth().height_m
+            assert 1.5 < start < 2.6
+            earlier = vehicle.truth_at(clock.now_ns() - 500_000_000).height_m
+            assert start - earlier == pytest.approx(0.25, abs=0.02)
+            Sitl.connections[0].transport.abort()
+            await asyncio.sleep(5.0)
+            assert len(Sitl.connections) == 2
+            assert vehicle.truth().height_m - start == pytest.approx(2.5, abs=0.05)  # the pad has not moved
+            running.cancel()
+            flying.cancel()
+            await asyncio.gather(running, flying, return_exceptions=True)
 
     virtual(test())
 
@@ -242,49 +252,37 @@ def test_a_simulator_on_udp_is_heard_and_told_the_distance_to_our_floor() -> Non
 
 def test_what_a_stalled_simulator_does_not_read_is_not_piled_up() -> None:
     async def test() -> None:
-        Sitl.connections, Sitl.climbed_m = [], 0.0
-        loop = asyncio.get_running_loop()
-        server = await loop.create_server(Sitl, "127.0.0.1", 0)
-        vehicle = ExternalVehicle(f"tcp:127.0.0.1:{server.sockets[0].getsockname()[1]}", LoopClock(), PAD)
-        opening = asyncio.create_task(vehicle.open())
-        await Sitl.fly(0.5)
-        await opening
-        Sitl.connections[0].transport.pause_reading()
-        for _ in range(100_000):  # far more than the sockets hold
-            vehicle.ask_streams()
-        assert 0 < vehicle.unsent_bytes < 5000
-        await vehicle.close()
-        Sitl.connections[0].transport.abort()
-        server.close()
-        await server.wait_closed()
-        await asyncio.sleep(0.01)
+        async with sitl() as port:
+            vehicle = ExternalVehicle(f"tcp:127.0.0.1:{port}", LoopClock(), PAD)
+            opening = asyncio.create_task(vehicle.open())
+            await Sitl.fly(0.5)
+            await opening
+            Sitl.connections[0].transport.pause_reading()
+            for _ in range(100_000):  # far more than the sockets hold
+                vehicle.ask_streams()
+            assert 0 < vehicle.unsent_bytes < 5000
+            await vehicle.close()
 
     virtual(test())
 
 
 def test_between_samples_the_motion_goes_on_for_a_moment() -> None:
     async def test() -> None:
-        Sitl.connections, Sitl.climbed_m = [], 0.0
-        loop, clock = asyncio.get_running_loop(), LoopClock()
-        server = await loop.create_server(Sitl, "127.0.0.1", 0)
-        vehicle = ExternalVehicle(f"tcp:127.0.0.1:{server.sockets[0].getsockname()[1]}", clock, PAD)
-        opening = asyncio.create_task(vehicle.open())
-        await Sitl.fly(4.0)  # and falls silent
-        await opening
-        now_ns = clock.now_ns()
-        newest_m = vehicle.truth_at(now_ns - 20_000_000).height_m
-        assert vehicle.truth_at(now_ns + 40_000_000).height_m - newest_m == pytest.approx(0.03, abs=0.008)
-        later_m = vehicle.truth_at(now_ns + 10_000_000_000).height_m
-        assert later_m - newest_m < 0.08
-        running = asyncio.create_task(vehicle.run())
-        await asyncio.sleep(0.01)
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
-        for sitl in Sitl.connections:
-            sitl.transport.abort()
-        server.close()
-        await server.wait_closed()
-        await asyncio.sleep(0.01)
+        async with sitl() as port:
+            clock = LoopClock()
+            vehicle = ExternalVehicle(f"tcp:127.0.0.1:{port}", clock, PAD)
+            opening = asyncio.create_task(vehicle.open())
+            await Sitl.fly(4.0)  # and falls silent
+            await opening
+            now_ns = clock.now_ns()
+            newest_m = vehicle.truth_at(now_ns - 20_000_000).height_m
+            assert vehicle.truth_at(now_ns + 40_000_000).height_m - newest_m == pytest.approx(0.03, abs=0.008)
+            later_m = vehicle.truth_at(now_ns + 10_000_000_000).height_m
+            assert later_m - newest_m < 0.08
+            running = asyncio.create_task(vehicle.run())
+            await asyncio.sleep(0.01)
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
 
     virtual(test())
 
