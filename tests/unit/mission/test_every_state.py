@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -191,3 +192,10 @@ def test_a_mission_that_ends_early_on_its_pad_says_why_it_came_home() -> None:
     flight = fresh(State(Phase.LAND, Intent.HOME))
     assert down(flight) == "aborted-end"
     assert flight.mission.reason == Trigger.GO_HOME.value
+
+
+def test_a_vehicle_that_is_silent_as_a_whole_has_not_lost_its_climb_rate_alone() -> None:
+    flight = fresh(State(Phase.FOLLOW, Intent.VISIT))
+    flight.set(climb_mps=math.nan, telemetry_age_s=0.2)
+    flight.run(0.8, follow=False)
+    assert flight.phase is Phase.HOLD
