@@ -78,6 +78,11 @@ class Pilot:
         return self._mission
 
     @property
+    def scanner(self) -> AnyScanner:
+        """What counts the shelves."""
+        return self._scanner
+
+    @property
     def possible_commands(self) -> frozenset[CommandKind]:
         """What an operator may order now; nothing once the mission is not stepped any more."""
         return frozenset() if self._last_resort.given_up else self._mission.possible_commands

@@ -29,7 +29,7 @@ from flightd.app.counting.count import Counting
 from flightd.app.counting.flight_count import counts_shelves
 from flightd.app.detection.detector_pool import DetectorPool, Detectors
 from flightd.app.detection.pipeline import DetectionPipeline
-from flightd.app.flight import Flight
+from flightd.app.flight import Count, Flight, SetpointSink, Vision
 from flightd.app.flight_orders import configured_order
 from flightd.app.publishers import TelemetryPublishers
 from flightd.app.setpoint_pump import SetpointPump
@@ -94,11 +94,10 @@ def build(
     interlock: Interlock | None = None,
     unfit: Refusal | None = None,
 ) -> Flight:
-    """Compose the flight that `order` asks for.  `peers` are those of the configuration unless given;
-    `opener` opens sockets and time is held by `hold` while threads work, as the event loop wants it;
-    `interlock` is the configured one unless given, `unfit` what speaks against a flight on this computer;
-    `keep_progress`: the stops left over are kept in `mission.progress`, if that names a file.  InputError
-    where configuration, map and order contradict each other."""
+    """Connect the vehicle and the cameras and compose the flight that `order` asks for.  `peers` are those of
+    the configuration unless given; `opener` opens sockets and time is held by `hold` while threads work, as
+    the event loop wants it; the rest as `assemble`.  InputError where configuration, map and order
+    contradict each other."""
     peers = peers or configured_peers(config)
     pilot = pilot_of(config, site, order)
     vehicle = connect_vehicle(config.vehicle, clock, config.control, url=peers.vehicle, opener=opener)
@@ -111,16 +110,59 @@ def build(
     if counting is not None:
         counting.read_for(pilot.places)
         front_camera = connect(config.front_camera, on_frame=counting.frame, url=peers.front_camera)
+    return assemble(
+        config,
+        site,
+        pilot,
+        vehicle=vehicle,
+        setpoints=SetpointPump(vehicle, clock, _noted(vision, recorder), TICK_S),
+        vision=vision,
+        publishers=publishers,
+        clock=clock,
+        recorder=recorder,
+        ground=ground,
+        cameras=(camera, front_camera),
+        counting=NO_COUNTING if counting is None else counting,
+        keep_progress=keep_progress,
+        startup_fault=startup_fault,
+        interlock=interlock,
+        unfit=unfit,
+    )
+
+
+def assemble(
+    config: Config,
+    site: Site,
+    pilot: Pilot,
+    *,
+    vehicle: Vehicle,
+    setpoints: SetpointSink,
+    vision: Vision,
+    publishers: TelemetryPublishers,
+    clock: Clock,
+    recorder: Recorder = NO_RECORDER,
+    ground: Ground = NO_GROUND,
+    cameras: tuple[Camera, Camera] = (NO_CAMERA, NO_CAMERA),
+    counting: Count = NO_COUNTING,
+    keep_progress: bool = False,
+    startup_fault: FlightdError | None = None,
+    interlock: Interlock | None = None,
+    unfit: Refusal | None = None,
+) -> Flight:
+    """Put a flight together from what is connected already.  `cameras` are the down and the front one;
+    `keep_progress`: the stops left over are kept in `mission.progress`, if that names a file; `interlock` is
+    the configured one unless given, `unfit` what speaks against a flight on this computer."""
     kept = config.mission.progress if keep_progress else None
+    camera, front_camera = cameras
     return Flight(
         clock=clock,
         pilot=pilot,
         vehicle=vehicle,
-        setpoints=SetpointPump(vehicle, clock, _noted(vision, recorder), TICK_S),
+        setpoints=setpoints,
         camera=camera,
         front_camera=front_camera,
         vision=vision,
-        counting=NO_COUNTING if counting is None else counting,
+        counting=counting,
         recorder=recorder,
         ground=ground,
         progress=NO_PROGRESS if kept is None else ProgressFile(kept, site.name),

@@ -106,5 +106,5 @@ def test_a_node_to_which_the_route_comes_twice_is_one_node() -> None:
     flight = IdealFlight(site, config, visits=("A1", "A2", "A1"), observers=[told.append])
     flown = flight.fly(120)
     assert flown.visited == ["A1", "A2", "A1"]
-    assert flight.plan.nodes == 2, "what the summary counts"
+    assert flight.pilot.plan.nodes == 2, "what the summary counts"
     assert (told[-1].nodes_done, told[-1].nodes_planned) == (2, 2), "and what all others are told"

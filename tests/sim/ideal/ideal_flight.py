@@ -7,12 +7,12 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from flightd.app.absent_parts import NO_CAMERA, NO_PROGRESS, keep_pose
+from flightd.app.build import assemble, pilot_of
 from flightd.app.flight import Flight
 from flightd.app.publishers import TelemetryPublishers
 from flightd.app.tick import Tick
-from flightd.config.mission import Heading
 from flightd.config.schema import Config
+from flightd.core.flight_order import FlightOrder
 from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import CodeSet
 from flightd.core.snapshot import Snapshot
@@ -31,9 +31,6 @@ from flightd.core.types import (
     PictureCheck,
     VehicleState,
 )
-from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
-from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
-from flightd.pilot import Pilot
 from flightd.sim.autopilot.climb_loop import ClimbLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
 from flightd.sim.plant.battery_swapper import BatterySwapper
@@ -110,7 +107,6 @@ class IdealFlight:
         site: Site,
         config: Config,
         *,
-        policy: HeadingPolicy | None = None,
         visits: tuple[str, ...] = (),
         seed: int = 1,
         wind: WindParams | None = None,
@@ -118,17 +114,14 @@ class IdealFlight:
         delay_ns: int = 68_000_000,
         airframe: AirframeParams | None = None,
         swap_s: float = 0.0,
-        scanner: AnyScanner = NO_SCAN,
         front: IdealFront | None = None,
         world: Site | None = None,
         carried_to: str = "",
         observers: Sequence[Callable[[Snapshot], None]] = (),
     ) -> None:
         self._observers = observers
-        policy = policy or HeadingPolicy(Heading.ALONG)
-        pad = site.home.node
-        self.plan: FlightPlan = make_plan(site, visits or site.serpentine_route(), pad, pad, policy)
-        self.pilot = Pilot(site, self.plan, policy, config, scanner, site.overhead_m)
+        self._config, self._site = config, site
+        self.pilot = pilot_of(config, site, FlightOrder(visits, autostart=config.mission.autostart))
         self._front = front
         self._looked: deque[tuple[int, CodeSet]] = deque()
         self._exposed: deque[Kinematics] = deque()
@@ -168,20 +161,18 @@ class IdealFlight:
         """The daemon's own tick flies it, with these behind its ports."""
         recorder = IdealRecorder(lambda: self.faults.health, self.on_record)
         ground = IdealGround(self._take_commands, lambda: self.ground_silent_s)
-        return Flight(
-            clock=self,
-            pilot=self.pilot,
+        return assemble(
+            self._config,
+            self._site,
+            self.pilot,
             vehicle=vehicle,
             setpoints=setpoints,
-            camera=NO_CAMERA,
-            front_camera=NO_CAMERA,
             vision=vision,
-            counting=IdealCount(self._codes, self._take_counted),
+            publishers=TelemetryPublishers(self, vehicle, recorder, ground, observers=self._observers),
+            clock=self,
             recorder=recorder,
             ground=ground,
-            progress=NO_PROGRESS,
-            publishers=TelemetryPublishers(self, vehicle, recorder, ground, observers=self._observers),
-            share_pose=keep_pose,
+            counting=IdealCount(self._codes, self._take_counted),
             interlock=IdealInterlock(lambda: self.aisle_closed),
         )
 

@@ -9,15 +9,14 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.core.inventory import LocationState
 from flightd.core.types import Phase
-from flightd.mission.scan.scanner import Scanner
 from flightd.site.site import Site
 from flightd.site.site_file import parse_site
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.sim.ideal.test_carried import wrong_visits
-from tests.unit.mission.shelves import SIGHT
+from tests.unit.mission.shelves import FITTED, SIGHT
 
-CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml")
+CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(front_camera=FITTED)
 ALIKE = parse_site(
     """
 [site]
@@ -62,12 +61,9 @@ def stock(
 
 
 def fly(visits: tuple[str, ...], carried_to: str, goods: Stock) -> Flown:
-    scanner = Scanner(ALIKE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
     config = CONFIG.with_values(localisation=SURE)
     front = IdealFront(ALIKE, SIGHT, goods)
-    flight = IdealFlight(
-        ALIKE, config, visits=visits, seed=6, scanner=scanner, front=front, carried_to=carried_to
-    )
+    flight = IdealFlight(ALIKE, config, visits=visits, seed=6, front=front, carried_to=carried_to)
     return flight.fly(300)
 
 

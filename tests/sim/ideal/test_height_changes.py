@@ -11,13 +11,12 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.core.tracks import TrackSet
 from flightd.core.types import Phase
-from flightd.mission.scan.scanner import Scanner
 from flightd.site.site_file import parse_site
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
-from tests.unit.mission.shelves import SIGHT
+from tests.unit.mission.shelves import FITTED, SIGHT
 
-CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml")
+CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(front_camera=FITTED)
 SITE = parse_site(
     """
 [site]
@@ -50,9 +49,8 @@ LOW_M, HIGH_M = 0.9, 2.9
 @pytest.fixture(scope="module")
 def flown() -> Flown:
     labels = {code: [Label(f"PALLET {code}")] for code in SITE.locations}
-    scanner = Scanner(SITE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
     front = IdealFront(SITE, SIGHT, Stock(labels))
-    flight = IdealFlight(SITE, CONFIG, visits=NODES, seed=4, scanner=scanner, front=front)
+    flight = IdealFlight(SITE, CONFIG, visits=NODES, seed=4, front=front)
     return flight.fly(300)
 
 

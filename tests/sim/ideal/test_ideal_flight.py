@@ -10,7 +10,6 @@ import pytest
 from flightd.config.mission import Heading
 from flightd.config.schema import load_config
 from flightd.core.types import Phase
-from flightd.mission.plan.flight_plan import HeadingPolicy
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.random_sites import random_site
 from flightd.site.site_file import load_site
@@ -30,7 +29,7 @@ def landed_error(flown: Flown) -> float:
 
 @pytest.mark.parametrize("heading", list(Heading))
 def test_a_mission_visits_every_node_on_the_line_and_lands_on_the_pad(heading: Heading) -> None:
-    flight = IdealFlight(DEMO, CONFIG, policy=HeadingPolicy(heading), seed=11)
+    flight = IdealFlight(DEMO, CONFIG.with_values(mission={"heading": heading}), seed=11)
     flown = flight.fly()
     assert (flown.phase, flown.reason) == (Phase.DONE, "landed on the pad")
     assert flown.visited == list(DEMO.serpentine_route())

@@ -15,14 +15,12 @@ from flightd.config.schema import load_config
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import Finding
 from flightd.core.types import Command, CommandKind, EventLevel, Phase
-from flightd.mission.plan.flight_plan import HeadingPolicy
-from flightd.mission.scan.scanner import Scanner
 from flightd.site.site_file import load_site
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
-from tests.unit.mission.shelves import SIGHT, SITE
+from tests.unit.mission.shelves import FITTED, SIGHT, SITE
 
-CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml")
+CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(front_camera=FITTED)
 NODES = ("A2", "A3")
 PLACES = [place.code for place in SITE.locations.values() if place.node in NODES]
 EMPTY, TORN, COVERED, TWO, *READ = PLACES
@@ -36,9 +34,8 @@ STOCK = Stock(
 
 
 def scan_flight(visits: tuple[str, ...] = NODES, seed: int = 5) -> IdealFlight:
-    scanner = Scanner(SITE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
     front = IdealFront(SITE, SIGHT, STOCK)
-    return IdealFlight(SITE, CONFIG, visits=visits, seed=seed, scanner=scanner, front=front)
+    return IdealFlight(SITE, CONFIG, visits=visits, seed=seed, front=front)
 
 
 def findings(flown: Flown) -> dict[str, Finding]:
@@ -106,16 +103,15 @@ def test_locations_counted_before_are_not_looked_at_again() -> None:
 
 def test_without_racks_the_drone_hovers_and_goes_on() -> None:
     bare = replace(SITE, racks=(), locations={})
-    scanner = Scanner(bare, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
-    flown = IdealFlight(bare, CONFIG, visits=("A2",), seed=5, scanner=scanner).fly()
+    flown = IdealFlight(bare, CONFIG, visits=("A2",), seed=5).fly()
     assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
     assert Phase.SCAN not in {output.phase for output in flown.outputs}
 
 
 def test_with_the_nose_to_the_shelf_no_leg_begins_with_half_a_turn() -> None:
-    scanner = Scanner(SITE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
-    front, policy = IdealFront(SITE, SIGHT, STOCK), HeadingPolicy(Heading.SHELF)
-    flight = IdealFlight(SITE, CONFIG, policy=policy, visits=NODES, seed=5, scanner=scanner, front=front)
+    front = IdealFront(SITE, SIGHT, STOCK)
+    config = CONFIG.with_values(mission={"heading": Heading.SHELF})
+    flight = IdealFlight(SITE, config, visits=NODES, seed=5, front=front)
     flown = flight.fly()
     assert set(findings(flown)) == set(PLACES)
     sides = [phase for phase, k in flown.truth if phase is Phase.TURN]
@@ -126,10 +122,9 @@ def test_with_the_nose_to_the_shelf_no_leg_begins_with_half_a_turn() -> None:
 def test_from_aisle_to_aisle_it_flies_where_it_sees_both(seed: int) -> None:
     """The last view of a node is a low one, from which a line 3.4 m off is long out of sight."""
     site = load_site(Path(__file__).parents[3] / "configs" / "site-racks-small.toml")
-    scanner = Scanner(site, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
     front = IdealFront(site, SIGHT, Stock())
     visits = ("A4", "B4")
-    flown = IdealFlight(site, CONFIG, visits=visits, seed=seed, scanner=scanner, front=front).fly()
+    flown = IdealFlight(site, CONFIG, visits=visits, seed=seed, front=front).fly()
     assert (flown.phase, flown.visited) == (Phase.DONE, list(visits))
     between = [k.height_m for phase, k in flown.truth if phase is Phase.FOLLOW and 1.2 < k.y_m < 2.2]
     assert min(between) > CONFIG.mission.height_m - 0.3
@@ -162,17 +157,17 @@ def test_going_blind_in_front_of_a_shelf_is_down_before_it_drifts_there(phase: P
 @pytest.mark.parametrize("elsewhere", [False, True])
 def test_a_doubt_on_the_way_costs_no_location(elsewhere: bool) -> None:
     """It ends where it began and all stays, or it ends elsewhere and what is withdrawn is counted again."""
-    scanner, doubted = Scanner(SITE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height), list[str]()
+    doubted = list[str]()
     front = IdealFront(SITE, SIGHT, STOCK)
-    flight = IdealFlight(SITE, CONFIG, visits=NODES, seed=5, scanner=scanner, front=front)
+    flight = IdealFlight(SITE, CONFIG, visits=NODES, seed=5, front=front)
 
     def doubt(phase: Phase, now_ns: int) -> None:
         visited = flight.pilot.mission.visited
         if phase is Phase.FOLLOW and visited and not doubted:
             doubted.append(visited[0])
-            scanner.doubt()
+            flight.pilot.scanner.doubt()
             if elsewhere:
-                scanner.withdraw(now_ns, "elsewhere")
+                flight.pilot.scanner.withdraw(now_ns, "elsewhere")
 
     flight.on_tick = doubt
     flown = flight.fly()
@@ -185,8 +180,7 @@ def test_a_doubt_on_the_way_costs_no_location(elsewhere: bool) -> None:
 
 
 def test_a_reader_that_never_answers_is_no_completed_count() -> None:
-    scanner = Scanner(SITE, SIGHT, CONFIG.scan, 4.0, CONFIG.camera.aside_per_height)
-    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=5, scanner=scanner)
+    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=5)
     flown = flight.fly()
     assert flown.phase is Phase.ABORTED
     assert "no picture of a shelf was read" in flown.reason

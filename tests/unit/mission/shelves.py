@@ -33,6 +33,8 @@ size_m = 0.5
 """,
     "shelves",
 )
+FITTED = {"url": "udp://127.0.0.1:0"}
+"""A front camera, whose pictures reach the tests another way."""
 SIGHT = FrontSight(FrontCameraConfig().lens(), FrontCameraConfig().mount())
 
 
