@@ -22,6 +22,13 @@ class VehicleConfig(Section):
         "udpin://127.0.0.1:14550", description="udpin://, udpout://, tcp://HOST:PORT or serial:///dev/X:BAUD"
     )
     system_id: int = Field(1, ge=1, le=255, description="MAVLink system id of the vehicle")
+    own_system_id: int = Field(
+        191,
+        ge=1,
+        le=255,
+        description="MAVLink system id of this computer, which nothing else on the vehicle may have: "
+        "ArduCopter lands when it does not hear it any more (its SYSID_MYGCS)",
+    )
     flying_mode: Literal["guided_nogps", "guided"] = Field(
         "guided_nogps",
         description="ArduCopter: the mode to fly in; guided only where it estimates its position",
@@ -61,6 +68,11 @@ class VehicleConfig(Section):
 
     @model_validator(mode="after")
     def _only_what_the_adapter_can(self) -> Self:
+        if self.own_system_id == self.system_id:
+            raise ValueError(
+                f"own_system_id {self.own_system_id} is the vehicle's system_id: a gimbal or a bridge that has "
+                "it, too, would keep the autopilot from landing when this computer dies; give another"
+            )
         if self.kind != "ardupilot" and self.flying_mode != "guided_nogps":
             raise ValueError('flying_mode is ArduCopter\'s: take it out, or set kind = "ardupilot"')
         if self.kind != "ardupilot" and self.raw_thrust is not None:

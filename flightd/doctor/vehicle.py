@@ -48,7 +48,7 @@ async def examine(
     InputError for a wrong address or signing key."""
     signing = signing_of(config, clock)
     job = Job(
-        system_id=config.system_id,
+        own_system_id=config.own_system_id,
         guided=config.flying_mode == "guided",
         raw_thrust=config.raw_thrust,
         shares_pose=config.shares_pose,

@@ -67,6 +67,7 @@ def signing_of(config: VehicleConfig, clock: Clock) -> Signing | None:
 def _options(config: VehicleConfig, clock: Clock, opener: OpenDatagrams) -> MavlinkOptions:
     return MavlinkOptions(
         system_id=config.system_id,
+        own_system_id=config.own_system_id,
         signing=signing_of(config, clock),
         pose_form=PoseForm(config.pose_output) if config.shares_pose else None,
         raw_thrust=config.raw_thrust,

@@ -12,7 +12,7 @@ from flightd.sim.autopilot.link import Message
 
 COPTER_PARAMETERS: dict[str, float] = {
     "SYSID_THISMAV": 1,
-    "SYSID_MYGCS": 1,
+    "SYSID_MYGCS": 191,
     "AHRS_EKF_TYPE": 3,
     "EK2_ENABLE": 0,
     "EK3_ENABLE": 1,

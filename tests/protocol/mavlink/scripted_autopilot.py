@@ -27,7 +27,7 @@ def known(vehicle: Any) -> VehicleState:
     return VehicleState(**{name: getattr(state, name) for name in VehicleState.__slots__})
 
 
-WAY_DOWN: dict[str, float] = {"FS_GCS_ENABLE": 5, "FS_GCS_TIMEOUT": 2, "SYSID_MYGCS": 1}
+WAY_DOWN: dict[str, float] = {"FS_GCS_ENABLE": 5, "FS_GCS_TIMEOUT": 2, "SYSID_MYGCS": 191}
 """Without these nothing is armed."""
 
 
@@ -93,7 +93,7 @@ class ScriptedAutopilot:
                 self.armed = message.param1 == 1
         if planned is not None:
             self.link.send(
-                channel, dialect.MAVLink_command_ack_message(message.command, planned, 0, 0, 1, 191)
+                channel, dialect.MAVLink_command_ack_message(message.command, planned, 0, 0, 191, 191)
             )
         self.after(message)
 

@@ -42,7 +42,7 @@ def test_we_are_an_onboard_computer_and_beat_four_times_a_second() -> None:
             beats = autopilot.all("HEARTBEAT")
             assert 40 <= len(beats) <= 48
             assert {(b.type, b.autopilot, b.get_srcSystem(), b.get_srcComponent()) for b in beats} == {
-                (18, 8, 1, 191)
+                (18, 8, 191, 191)
             }
 
     virtual(test())

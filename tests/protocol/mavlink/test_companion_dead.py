@@ -8,7 +8,9 @@ from functools import partial
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.adapters.vehicle.mavlink.link.codec import Codec
 from flightd.core.refusal import words
 from flightd.core.types import Demand
 from flightd.sim.autopilot.autopilot import PeerConfig
@@ -31,12 +33,39 @@ def test_it_lands_and_disarms_by_itself(make: Callable[[], Any]) -> None:
     virtual(test())
 
 
+async def _gimbal(address: tuple[str, int]) -> None:
+    """Another component of the vehicle, with its system id, which goes on beating."""
+    loop, codec = asyncio.get_running_loop(), Codec(1, dialect.MAV_COMP_ID_GIMBAL)
+    socket, _ = await loop.create_datagram_endpoint(asyncio.DatagramProtocol, remote_addr=address)
+    try:
+        while True:
+            kind, none = dialect.MAV_TYPE_GIMBAL, dialect.MAV_AUTOPILOT_INVALID
+            socket.sendto(codec.pack(dialect.MAVLink_heartbeat_message(kind, none, 0, 0, 4, 3)))
+            await asyncio.sleep(0.5)
+    finally:
+        socket.close()
+
+
+def test_what_else_beats_on_the_vehicle_does_not_keep_it_in_the_air(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def test() -> None:
+        async with ardupilot_rig(_SHIPPED) as rig, asyncio.TaskGroup() as tasks:
+            beating = tasks.create_task(_gimbal((rig.vehicle.link.endpoint.host, rig.vehicle.link.endpoint.port)))
+            await rig.take_off()
+            monkeypatch.setattr(rig.vehicle.link, "send", lambda _message: True)  # nothing leaves it any more
+            await rig.until(lambda: not rig.peer.armed, 15.0)
+            assert rig.peer.truth().height_m < 0.15
+            beating.cancel()
+
+    virtual(test())
+
+
 @pytest.mark.parametrize(
     ("make", "name", "value"),
     [
         (ardupilot_rig, "FS_GCS_ENABLE", 0.0),
         (ardupilot_rig, "FS_GCS_TIMEOUT", 30.0),
         (ardupilot_rig, "SYSID_MYGCS", 255.0),
+        (ardupilot_rig, "SYSID_MYGCS", 1.0),
         (px4_rig, "COM_OBL_RC_ACT", 0),
         (px4_rig, "COM_OF_LOSS_T", 20.0),
     ],

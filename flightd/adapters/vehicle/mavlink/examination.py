@@ -61,7 +61,8 @@ class Examination:
         self._system_id = system_id
         self._job = job or Job()
         transport = make_transport(parse_endpoint(url))
-        self._link = MavlinkLink(transport, Codec(system_id, signing=signing), clock, system_id, self._take)
+        codec = Codec(self._job.own_system_id, signing=signing)
+        self._link = MavlinkLink(transport, codec, clock, system_id, self._take)
         self._commander = Commander(self._link, system_id)
         self._parameters = Parameters(self._link, system_id, bytewise=False)
         self._heard = asyncio.Event()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.config.vehicle import VehicleConfig
 
 Names: TypeAlias = tuple[str, ...]
 """One parameter under the names it has had, oldest first."""
@@ -29,10 +30,10 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What the daemon is configured to ask of the autopilot beyond flight by attitude.  `system_id` is the
-    vehicle's, which this computer has as well."""
+    """What the daemon is configured to ask of the autopilot beyond flight by attitude.  `own_system_id` is
+    this computer's, which nothing else on the vehicle has."""
 
-    system_id: int = 1
+    own_system_id: int = VehicleConfig().own_system_id
     guided: bool = False
     """ArduCopter flies in GUIDED, which wants an estimate of its motion."""
     raw_thrust: bool | None = None
@@ -272,13 +273,13 @@ def _cells_of(cells: int) -> Rule:
     )
 
 
-def _supervised(system_id: int) -> Rule:
+def _supervised(own_system_id: int) -> Rule:
     return Rule(
         ("SYSID_MYGCS", "MAV_GCS_SYSID"),
-        _one_of(system_id),
-        f"{system_id} (vehicle.system_id)",
-        "FS_GCS_ENABLE watches the heartbeats of that system, which must be this computer's",
-        system_id,
+        _one_of(own_system_id),
+        f"{own_system_id} (vehicle.own_system_id)",
+        "FS_GCS_ENABLE watches the heartbeats of that system, which must be this computer's alone",
+        own_system_id,
     )
 
 
@@ -289,7 +290,7 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
     """The firmware's table, with the rules that the job adds or makes stricter in their places."""
     extra: tuple[Rule, ...] = ()
     if firmware is Firmware.ARDUPILOT:
-        extra += (_supervised(job.system_id),)
+        extra += (_supervised(job.own_system_id),)
         if job.cells is not None:
             extra += (_low_volt(job.cells),)
         if job.guided:
@@ -314,10 +315,10 @@ _LANDS = frozenset({"FS_GCS_ENABLE", "SYSID_MYGCS", "COM_OBL_RC_ACT"})
 _LANDS_WITHIN = {Firmware.ARDUPILOT: "FS_GCS_TIMEOUT", Firmware.PX4: "COM_OF_LOSS_T"}
 
 
-def way_down_rules(firmware: Firmware, system_id: int) -> tuple[Rule, ...]:
+def way_down_rules(firmware: Firmware, own_system_id: int) -> tuple[Rule, ...]:
     """What must be so before a flight begins: the autopilot itself lands when this computer dies.  How soon
     it had better do so is for the doctor to say."""
-    table = rules_for(firmware, Job(system_id))
+    table = rules_for(firmware, Job(own_system_id))
     within = Rule(
         (_LANDS_WITHIN[firmware],),
         _within(0.1, 10.0),

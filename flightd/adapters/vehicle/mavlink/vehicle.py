@@ -30,6 +30,7 @@ from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource, MavlinkTelemetry
+from flightd.config.vehicle import VehicleConfig
 from flightd.core.refusal import Refusal
 from flightd.core.types import (
     Attitude,
@@ -62,11 +63,12 @@ _PAD_NEAR_M = 1.0
 
 @dataclass(frozen=True, slots=True)
 class MavlinkOptions:
-    """The vehicle's `system_id`, the key of a signed link, the form in which the grid pose is given to
+    """The vehicle's `system_id` and this computer's own, the key of a signed link, the form in which the grid pose is given to
     the autopilot's estimator (None: not at all); what ArduCopter's GUID_OPTIONS must say of thrust (raw,
     a climb rate, or None: either), and latitude and longitude for an estimator that has to have some."""
 
     system_id: int = 1
+    own_system_id: int = VehicleConfig().own_system_id
     signing: Signing | None = None
     pose_form: PoseForm | None = None
     raw_thrust: bool | None = None
@@ -109,7 +111,7 @@ class MavlinkVehicle(abc.ABC):
         self._telemetry = MavlinkTelemetry(self._sync, self.climb_from, options.range_finder)
         self._pose_output = None if options.pose_form is None else PoseOutput(options.pose_form)
         transport = make_transport(parse_endpoint(url), options.opener)
-        codec = Codec(system_id, signing=options.signing)
+        codec = Codec(options.own_system_id, signing=options.signing)
         self.link = MavlinkLink(transport, codec, clock, system_id, self._received)
         self._commander = Commander(self.link, system_id)
         self._modes = ModeArmingManager(self, self._commander, self._telemetry, clock)
@@ -118,7 +120,7 @@ class MavlinkVehicle(abc.ABC):
         self.parameters = Parameters(self.link, system_id, bytewise=self.firmware is Firmware.PX4)
         self._texts = TextAssembler()
         self._text_id = 0
-        self._way_down = way_down_rules(self.firmware, system_id)
+        self._way_down = way_down_rules(self.firmware, options.own_system_id)
         self._heard = asyncio.Event()
         self._beats = Beats(_BEATS_WINDOW_S)
         self._poll = BeatPoll()

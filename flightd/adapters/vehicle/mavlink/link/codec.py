@@ -44,6 +44,11 @@ class Codec:
         if signing is not None:
             signing.attach(self._mav)
 
+    @property
+    def system_id(self) -> int:
+        """Ours, from which everything comes."""
+        return int(self._mav.srcSystem)
+
     def pack(self, message: Message) -> bytes:
         """One MAVLink 2 frame; the sequence number counts modulo 256 (pymavlink's `pack` does not)."""
         mav = self._mav

@@ -32,7 +32,8 @@ _FIRMWARES = {firmware.value: firmware for firmware in Firmware}
 
 
 class MavlinkLink:
-    """Sends and receives as the companion (component 191) of one vehicle.
+    """Sends and receives as the companion (component 191, with the system id of the `codec`) of one vehicle,
+    which has the `system_id`.
 
     `on_message(message, now_ns)` gets every sound message of that vehicle's autopilot, its HEARTBEAT
     included; what others say (ground stations, gimbals, other vehicles) is not passed on.
@@ -62,6 +63,10 @@ class MavlinkLink:
         """What no line could take."""
         self.received = 0
         transport.received = self._received
+
+    @property
+    def own_system_id(self) -> int:
+        return self._codec.system_id
 
     @property
     def endpoint(self) -> Endpoint:
