@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable
 
 from flightd.core.types import AttitudeSetpoint
 from flightd.ports import Clock, Vehicle
 from flightd.runtime.bounded_series import Series
+
+_LOG = logging.getLogger(__name__)
 
 
 class SetpointPump:
@@ -35,6 +38,8 @@ class SetpointPump:
         self._fresh = asyncio.Event()
         self._last_ns: int | None = None
         self.stale = 0
+        self.failed = 0
+        """Setpoints at which the adapter failed."""
         self.intervals_ms = Series()
 
     def set(self, setpoint: AttitudeSetpoint | None) -> None:
@@ -69,7 +74,7 @@ class SetpointPump:
             setpoint = AttitudeSetpoint(now_ns)
             self.stale += 1
             fresh = False
-        if not self._vehicle.send(setpoint):
+        if not self._sent(setpoint):
             self._last_ns = None
             return
         if self._last_ns is not None:
@@ -77,3 +82,14 @@ class SetpointPump:
         self._last_ns = now_ns
         if fresh:
             self._on_sent(setpoint, now_ns)
+
+    def _sent(self, setpoint: AttitudeSetpoint) -> bool:
+        """Whether it is on the wire.  What an adapter fails at with one setpoint is tried with the next: the
+        vehicle must not be left with none."""
+        try:
+            return self._vehicle.send(setpoint)
+        except Exception:  # noqa: BLE001 - whatever it is, the next setpoint has to go out
+            self.failed += 1
+            if self.failed == 1:
+                _LOG.exception("a setpoint was not sent")
+            return False

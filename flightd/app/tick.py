@@ -84,6 +84,7 @@ class Tick:
         lost = sum(dropped.values())
         dropped["recorder"] = flight.recorder.dropped
         dropped["refused"] = flight.camera.refused + flight.front_camera.refused
+        dropped["setpoints"] = flight.setpoints.failed
         if isinstance(flight.vehicle, CountsDrops):
             dropped["vehicle"] = flight.vehicle.dropped
         return Snapshot(

@@ -1,7 +1,7 @@
 """Keys that stood elsewhere once, and where they stand now.
 
 A file with such a key is refused with the name of the new one.  The configuration that a flight log keeps
-is carried over, so that recordings made before still replay.
+is carried over, so that recordings made before still replay, with the values that they were flown with.
 """
 
 from __future__ import annotations
@@ -29,6 +29,10 @@ MOVED: dict[str, str] = {
 """The new name of each key that moved."""
 
 
+BEFORE: dict[str, Any] = {"mission.autostart_countdown_s": 0.0}
+"""What a recording that was made before a key existed was flown with, where today's default is another."""
+
+
 def moved_keys(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """The keys of a configuration that stand where they no longer belong, each with its new name."""
     return ((old, new) for old, new in MOVED.items() if _holder(document, old) is not None)
@@ -41,12 +45,20 @@ def migrated(document: dict[str, Any]) -> dict[str, Any]:
     for old, new in list(moved_keys(document)):
         holder = _holder(document, old)
         value = holder.pop(old.rpartition(".")[2]) if holder is not None else None
-        *tables, key = new.split(".")
-        place = document
-        for table in tables:
-            place = place.setdefault(table, {})
-        place[key] = value
+        _put(document, new, value)
+    for name, value in BEFORE.items():
+        if name.split(".")[0] in document and _holder(document, name) is None:
+            _put(document, name, value)
     return document
+
+
+def _put(document: dict[str, Any], name: str, value: Any) -> None:
+    """Give the key of that full name a value."""
+    *tables, key = name.split(".")
+    place = document
+    for table in tables:
+        place = place.setdefault(table, {})
+    place[key] = value
 
 
 def _holder(document: dict[str, Any], name: str) -> dict[str, Any] | None:

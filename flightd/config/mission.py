@@ -150,6 +150,12 @@ class MissionConfig(Section):
         le=60,
         description="from a start command to arming, told to everybody; pause takes the start back",
     )
+    autostart_countdown_s: float = Field(
+        3.0,
+        ge=0,
+        le=60,
+        description="the same before a start by itself, once nothing keeps the drone on the ground any more",
+    )
     recover_s: float = Field(
         2.0,
         ge=1.5,

@@ -70,8 +70,8 @@ class VehicleConfig(Section):
     def _only_what_the_adapter_can(self) -> Self:
         if self.own_system_id == self.system_id:
             raise ValueError(
-                f"own_system_id {self.own_system_id} is the vehicle's system_id: a gimbal or a bridge that has "
-                "it, too, would keep the autopilot from landing when this computer dies; give another"
+                f"own_system_id {self.own_system_id} is the vehicle's system_id: a gimbal or a bridge that "
+                "has it, too, would keep the autopilot from landing when this computer dies; give another"
             )
         if self.kind != "ardupilot" and self.flying_mode != "guided_nogps":
             raise ValueError('flying_mode is ArduCopter\'s: take it out, or set kind = "ardupilot"')

@@ -244,6 +244,11 @@ class VehicleState:
     battery_cells: int = 0
     unfit: Refusal | None = None
 
+    @property
+    def may_fly(self) -> bool:
+        """It is armed and does not say that it stands: what is not known to stand is landed, not disarmed."""
+        return self.armed and self.landed is not LandedState.ON_GROUND
+
 
 class Demand(enum.StrEnum):
     """What the mission wants of the vehicle; the adapter works towards it and retries by itself.

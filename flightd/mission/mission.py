@@ -183,6 +183,8 @@ class Mission:
     def _triggers(self, s: MissionInputs) -> set[Trigger]:
         """What has happened by this tick.  Turning back acts at once."""
         ready = self.state.waiting and self._grounded(s) is None
+        if ready and self._clearance.autostart and self.state.intent is Intent.VISIT:
+            self._clearance.begin_by_itself(s.now_ns)
         may_start = ready and self._clearance.counted_down(s.now_ns)
         found = self._progress.step(s, self.state, may_start=may_start)
         found |= self._orders.urgent
@@ -217,6 +219,7 @@ class Mission:
         if self.state.waiting:
             self._clearance.report_void(now_ns)
             self._turn(Trigger.START_EXPIRED)
+            self._await_start()
 
     def _landed(self) -> set[Trigger]:
         """What a landing on the pad is more than its end."""
@@ -312,6 +315,8 @@ class Mission:
     def _enter(self, s: MissionInputs, trigger: Trigger) -> None:
         """What the phase that begins starts with."""
         match self.phase:
+            case Phase.PREFLIGHT:
+                self._await_start()
             case Phase.TAKE_OFF:
                 self._clearance.withdraw()
                 self._steering.take_off(s.height_m)

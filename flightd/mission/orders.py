@@ -51,13 +51,14 @@ class StartOrder:
     """A start command: counted down, and void a while after, so that it never arms by surprise."""
 
     def __init__(self, params: MissionConfig) -> None:
-        self._countdown_s = params.start_countdown_s
+        self._countdown_s = 0.0
         self._expires_s = params.expert.start_expires_s
         self._given_ns: int | None = None
 
-    def give(self, now_ns: int) -> None:
-        """The command comes; again, it changes nothing."""
-        self._given_ns = self._given_ns or now_ns
+    def give(self, now_ns: int, countdown_s: float) -> None:
+        """The command comes, to be counted down for so long; again, it changes nothing."""
+        if self._given_ns is None:
+            self._given_ns, self._countdown_s = now_ns, countdown_s
 
     def withdraw(self) -> None:
         """It stands no longer."""
@@ -65,7 +66,7 @@ class StartOrder:
 
     @property
     def given(self) -> bool:
-        """A command stands; without one a mission starts by itself, if at all."""
+        """A command stands."""
         return self._given_ns is not None
 
     def left_s(self, now_ns: int) -> int:

@@ -20,7 +20,8 @@ _UNFIT_S = 3.0
 
 class StartClearance:
     """Counts a start order down, and says what keeps the drone on the ground: call `wait` at each tick on
-    which it waits there.  With `autostart` nobody has to order a start."""
+    which it waits there.  With `autostart` nobody has to order a start, until an operator has taken one
+    back."""
 
     def __init__(self, config: Config, events: EventLog, *, autostart: bool) -> None:
         self._config = config
@@ -54,13 +55,24 @@ class StartClearance:
             text = f"start refused: {in_words(self._obstacle)}"
             self._events.report(now_ns, EventLevel.WARNING, "command", text)
             return False
-        self._order.give(now_ns)
-        text = in_words(StartsIn(self._order.left_s(now_ns)))
-        self._events.report(now_ns, EventLevel.WARNING, "start", text)
+        self._order.give(now_ns, self._config.mission.start_countdown_s)
+        self._report_countdown(now_ns)
         return True
 
+    def begin_by_itself(self, now_ns: int) -> None:
+        """Nothing keeps the drone on the ground any more, and nobody has to order its start."""
+        if not self._order.given:
+            self._order.give(now_ns, self._config.mission.autostart_countdown_s)
+            if not self.counted_down(now_ns):
+                self._report_countdown(now_ns)
+
+    def _report_countdown(self, now_ns: int) -> None:
+        text = in_words(StartsIn(self._order.left_s(now_ns)))
+        self._events.report(now_ns, EventLevel.WARNING, "start", text)
+
     def take_back(self, now_ns: int) -> None:
-        """An operator takes the start back."""
+        """An operator takes the start back; the next one is his, too."""
+        self.autostart = False
         self._order.withdraw()
         self._events.report(now_ns, EventLevel.WARNING, "start", "taken back")
 

@@ -108,7 +108,7 @@ class ReferenceGenerator:
     def on_ground(self, s: MissionInputs, phase: Phase) -> Guidance:
         """What is wanted while nothing is flown."""
         demand = _DEMANDS.get(phase, Demand.FLY)
-        if demand is Demand.DISARM and _flies(s):  # nothing disarms in the air
+        if demand is Demand.DISARM and s.vehicle is not None and s.vehicle.may_fly:
             demand = Demand.LAND
         if s.vehicle is not None and not s.vehicle.armed:
             self._standstill.stands(s.height_m)
@@ -254,8 +254,3 @@ class ReferenceGenerator:
 def _target(s: MissionInputs, task: ReferenceTask) -> tuple[float, float] | None:
     """The pad to come down on; None while it lands on none."""
     return (s.pad_m or (task.goal.x_m, task.goal.y_m)) if task.state.on_pad else None
-
-
-def _flies(s: MissionInputs) -> bool:
-    """The vehicle says that it is in the air, whatever the mission is at."""
-    return s.vehicle is not None and s.vehicle.armed and s.vehicle.landed is LandedState.IN_AIR

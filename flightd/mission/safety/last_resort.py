@@ -123,8 +123,7 @@ class LastResort:
 
 
 def _ended(vehicle: VehicleState | None) -> Demand:
-    flies = vehicle is not None and vehicle.armed and vehicle.landed is not LandedState.ON_GROUND
-    return Demand.LAND if flies else Demand.DISARM
+    return Demand.LAND if vehicle is not None and vehicle.may_fly else Demand.DISARM
 
 
 def _rescued(drain: Callable[[], _T], otherwise: _T) -> _T:

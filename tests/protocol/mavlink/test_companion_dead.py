@@ -49,9 +49,10 @@ async def _gimbal(address: tuple[str, int]) -> None:
 def test_what_else_beats_on_the_vehicle_does_not_keep_it_in_the_air(monkeypatch: pytest.MonkeyPatch) -> None:
     async def test() -> None:
         async with ardupilot_rig(_SHIPPED) as rig, asyncio.TaskGroup() as tasks:
-            beating = tasks.create_task(_gimbal((rig.vehicle.link.endpoint.host, rig.vehicle.link.endpoint.port)))
+            vehicle: Any = rig.vehicle
+            beating = tasks.create_task(_gimbal((vehicle.link.endpoint.host, vehicle.link.endpoint.port)))
             await rig.take_off()
-            monkeypatch.setattr(rig.vehicle.link, "send", lambda _message: True)  # nothing leaves it any more
+            monkeypatch.setattr(vehicle.link, "send", lambda _message: True)  # nothing leaves it any more
             await rig.until(lambda: not rig.peer.armed, 15.0)
             assert rig.peer.truth().height_m < 0.15
             beating.cancel()

@@ -23,7 +23,7 @@ from flightd.core.types import (
 class HeldSetpoint:
     """`app.flight.SetpointSink`: the newest setpoint, for the airframe to follow."""
 
-    stale = 0
+    stale = failed = 0
 
     def __init__(self) -> None:
         self.newest: AttitudeSetpoint | None = None

@@ -67,3 +67,9 @@ def test_a_document_that_is_no_configuration_is_left_to_the_check() -> None:
 def test_the_whole_tree_goes_to_json_and_back() -> None:
     config = Config.model_validate({"mission": {"site": "site.toml"}})
     assert Config.model_validate_json(config.model_dump_json()) == config
+
+
+def test_what_an_older_recording_does_not_say_is_what_it_was_flown_with() -> None:
+    assert recorded_config({"mission": {"site": "s"}}, LOG).mission.autostart_countdown_s == 0.0
+    told = {"mission": {"site": "s", "autostart_countdown_s": 4.0}}
+    assert recorded_config(told, LOG).mission.autostart_countdown_s == 4.0

@@ -12,5 +12,5 @@ from flightd.config.schema import Config
 
 def configured(battery: BatteryConfig | None = None, **mission: Any) -> Config:
     """What is shipped, started without a command, with other keys of the mission where they are given."""
-    keys = {"site": Path("site.toml"), "autostart": True, **mission}
+    keys = {"site": Path("site.toml"), "autostart": True, "autostart_countdown_s": 0.0, **mission}
     return Config(mission=MissionConfig(**keys), battery=battery or BatteryConfig())

@@ -113,14 +113,52 @@ def test_an_arming_that_comes_after_all_is_taken_back() -> None:
     assert demands == [Demand.DISARM, Demand.STANDBY], "whoever arms it later means it"
 
 
-def test_one_that_starts_by_itself_waits_for_what_it_lacks_without_a_count_down() -> None:
-    flight = Flight(configured(autostart=True, start_countdown_s=3.0))
+def starting_by_itself() -> Flight:
+    """It lacked charge for a while, and has it now."""
+    flight = Flight(configured(autostart=True, autostart_countdown_s=3.0))
     flight.set(battery_frac=0.1)
     flight.run(30.0, follow=False)
-    assert str(flight.mission.phase) == "preflight"
+    assert flight.phase is Phase.PREFLIGHT
     flight.set(battery_frac=1.0)
-    flight.run(0.04, follow=False)
-    assert str(flight.mission.phase) == "arming"
+    flight.run(1.1, follow=False)
+    return flight
+
+
+def test_one_that_starts_by_itself_counts_down_once_it_has_what_it_lacked() -> None:
+    flight = starting_by_itself()
+    assert "arms in 2 s" in flight.mission.reason
+    assert said(flight)[-1] == "arms in 3 s; pause takes the start back"
+    flight.run(1.9, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+    flight.run(0.2, follow=False)
+    assert flight.phase.value == "arming"
+
+
+def test_a_start_by_itself_that_an_operator_takes_back_is_his_from_then_on() -> None:
+    flight = starting_by_itself()
+    flight.order(CommandKind.PAUSE)
+    flight.run(60.0, follow=False)
+    assert (flight.phase, flight.mission.reason) == (Phase.PREFLIGHT, "waiting for the start command")
+    flight.order(CommandKind.START)
+    flight.run(3.2, follow=False)
+    assert flight.phase is Phase.ARMING
+
+
+def test_a_start_by_itself_that_came_to_nothing_is_counted_down_anew() -> None:
+    flight = starting_by_itself()
+    flight.set(battery_frac=0.1)
+    flight.run(10.0, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+    flight.set(battery_frac=1.0)
+    flight.run(1.1, follow=False)
+    assert "arms in 2 s" in flight.mission.reason
+
+
+def test_a_vehicle_that_does_not_arm_is_asked_again_only_after_another_count_down() -> None:
+    flight = starting_by_itself()
+    flight.run(7.2, follow=False)  # armed by nobody
+    assert flight.phase is Phase.PREFLIGHT
+    assert "arms in" in flight.mission.reason
 
 
 @pytest.mark.parametrize("kind", [CommandKind.STOP, CommandKind.LAND])

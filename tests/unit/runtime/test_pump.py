@@ -19,6 +19,7 @@ class Wire:
     def __init__(self, clock: LoopClock) -> None:
         self._clock = clock
         self.sent: list[tuple[int, AttitudeSetpoint]] = []
+        self.broken = False
 
     async def run(self) -> None: ...
 
@@ -31,6 +32,8 @@ class Wire:
     def demand(self, demand: Demand) -> None: ...
 
     def send(self, setpoint: AttitudeSetpoint) -> bool:
+        if self.broken:
+            raise ValueError("it does not fit a message")
         self.sent.append((self._clock.now_ns(), setpoint))
         return True
 
@@ -73,3 +76,21 @@ def test_a_fresh_set_point_leaves_at_once() -> None:
 def test_hands_off_means_silence() -> None:
     sent = virtual(pumped(0.2, 1.0, silence=True))
     assert max(at for at, _ in sent) <= 200 * MS
+
+
+def test_a_setpoint_at_which_the_adapter_fails_is_counted_and_the_next_goes_out() -> None:
+    async def test() -> None:
+        clock = LoopClock()
+        wire = Wire(clock)
+        pump = SetpointPump(wire, clock, lambda *_: None)
+        running = asyncio.ensure_future(pump.run())
+        for wire.broken in (False, True, False):
+            sent = len(wire.sent)
+            pump.set(AttitudeSetpoint(clock.now_ns()))
+            await asyncio.sleep(0.01)
+            assert (len(wire.sent) == sent) is wire.broken
+        assert pump.failed == 1
+        running.cancel()
+        await asyncio.wait([running])
+
+    virtual(test())

@@ -211,7 +211,7 @@ class ModeArmingManager:
         if demand not in _ENGAGED or self._demand not in _ENGAGED:
             self._authority.release()
         if demand is Demand.FLY:
-            self._was_armed = False
+            self._was_armed = self._telemetry.armed and self._authority.held == self._firmware.flying_mode
         self._demand = demand
         self._refused = None
         self._wake.set()
@@ -281,12 +281,21 @@ class ModeArmingManager:
                 await self._ask("arming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
             case Demand.LAND if held is not None and held != firmware.landing_mode:
                 await self._ask_mode(firmware.landing_mode)
-            case Demand.DISARM if held is not None and armed and (off_m := self.off_floor_m) is not None:
-                self._refuse(OffFloor(off_m))
             case Demand.DISARM if held is not None and armed:
-                await self._ask("disarming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+                await self._disarm(held)
             case _:
                 pass
+
+    async def _disarm(self, held: int) -> None:
+        """Stop the motors on the floor.  Where the range finder has it off the floor, rightly or not, the
+        autopilot lands it and disarms by itself."""
+        off_m = self.off_floor_m
+        if off_m is None:
+            await self._ask("disarming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+            return
+        if held != self._firmware.landing_mode:
+            await self._ask_mode(self._firmware.landing_mode)
+        self._refuse(OffFloor(off_m))
 
     def _land_unheard(self) -> None:
         """Bring down a vehicle that may hear us: by setpoints first, where they can sink it, for they brake

@@ -63,9 +63,10 @@ _PAD_NEAR_M = 1.0
 
 @dataclass(frozen=True, slots=True)
 class MavlinkOptions:
-    """The vehicle's `system_id` and this computer's own, the key of a signed link, the form in which the grid pose is given to
-    the autopilot's estimator (None: not at all); what ArduCopter's GUID_OPTIONS must say of thrust (raw,
-    a climb rate, or None: either), and latitude and longitude for an estimator that has to have some."""
+    """The vehicle's `system_id` and this computer's own, the key of a signed link, the form in which the grid
+    pose is given to the autopilot's estimator (None: not at all); what ArduCopter's GUID_OPTIONS must say of
+    thrust (raw, a climb rate, or None: either), and latitude and longitude for an estimator that has to have
+    some."""
 
     system_id: int = 1
     own_system_id: int = VehicleConfig().own_system_id

@@ -127,7 +127,8 @@ class Commander:
 
     def acknowledged(self, ack: Message) -> None:
         """Take a COMMAND_ACK; those for other clients are left alone."""
-        if ack.target_system not in {0, self._link.own_system_id} or ack.target_component not in {0, COMPANION}:
+        systems, components = {0, self._link.own_system_id}, {0, COMPANION}
+        if ack.target_system not in systems or ack.target_component not in components:
             return
         waiting = self._waiting.get(ack.command)
         if waiting is not None and not waiting.done():
