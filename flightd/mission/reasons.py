@@ -21,6 +21,7 @@ class Plain(enum.Enum):
     ARMED_ALREADY = "the vehicle is armed already: disarm it first"
     NO_HEIGHT = "no height from the vehicle's range finder"
     NO_CLIMB = "no climb rate from the vehicle"
+    NO_CELLS = "how many cells the battery has is not known: set battery.cells"
     NO_PICTURE = "no picture from the down camera"
     AISLE_OPEN = "the aisle is not closed"
     GROUND_SILENT = "the ground station that attends this flight fell silent"

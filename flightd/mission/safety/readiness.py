@@ -35,6 +35,7 @@ def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason |
         Plain.NO_HEIGHT if math.isnan(s.height_m) else None,
         Plain.NO_CLIMB if math.isnan(v.climb_mps) else None,
         ChargeUnknown(charge.doubt) if charge.doubt else None,
+        Plain.NO_CELLS if v.battery_stamp_ns and math.isnan(charge.cell_v) else None,
         StartChargeLow(charge.frac, p.battery_start) if charge.frac < p.battery_start else None,
         CellsLow(charge.cell_v, cell_v) if charge.cell_v < cell_v else None,
         None if s.frames_arrive else Plain.NO_PICTURE,

@@ -405,3 +405,26 @@ def test_without_the_library_one_line_says_what_to_install(monkeypatch: pytest.M
             connect_vehicle(config, LoopClock())
 
     real(test())
+
+
+@pytest.mark.parametrize(("name", "value"), [("COM_OBL_RC_ACT", 0), ("COM_OF_LOSS_T", 20.0)])
+def test_nothing_is_armed_by_the_library_either_that_would_stay_in_the_air(name: str, value: float) -> None:
+    async def test() -> None:
+        async with mavsdk_rig(PeerConfig(ready_s=0.5, parameters={name: value})) as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            await rig.until(
+                lambda: name in words(rig.known().unfit) and "expected" in words(rig.known().unfit)
+            )
+            rig.vehicle.demand(Demand.FLY)
+            await asyncio.sleep(4.0)
+            assert not rig.known().armed
+
+    patient(test())
+
+
+def test_the_cells_of_the_battery_are_counted_though_the_library_adds_them_up() -> None:
+    async def test() -> None:
+        async with mavsdk_rig() as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None and rig.known().battery_cells == 3)
+
+    patient(test())

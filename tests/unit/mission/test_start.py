@@ -6,6 +6,7 @@ import pytest
 
 from flightd.core.refusal import RecordedRefusal
 from flightd.core.types import Command, CommandKind, Demand, LandedState, Phase
+from flightd.tracking.battery_charge import Charge
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import Flight
 
@@ -186,3 +187,14 @@ def test_a_mission_that_ended_before_its_vehicle_was_heard_disarms_nothing_in_th
     flight.run(0.1, follow=False)
     assert flight.guidance is not None
     assert flight.guidance.demand is Demand.LAND
+
+
+def test_without_the_number_of_cells_nothing_starts() -> None:
+    flight = waiting()
+    flight.set(battery_stamp_ns=flight.now_ns)
+    flight.run(0.1, follow=False)
+    flight.order(CommandKind.START)
+    assert said(flight)[-1].startswith("start refused: how many cells the battery has is not known")
+    flight.set(judged_charge=Charge(1.0, cell_v=4.1))
+    flight.run(0.1, follow=False)
+    assert CommandKind.START in flight.mission.possible_commands

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
+from flightd.adapters.vehicle.mavlink.required_parameters import Names, ParameterFinding, Rule, judge
 from flightd.adapters.vehicle.mavlink.services.commands import Answer
 from flightd.core.refusal import Refusal
 
@@ -56,6 +57,18 @@ class NoWayDown(Refusal):
 
     def __str__(self) -> str:
         return f"{self.finding} (flightd doctor --fix sets it)"
+
+
+def no_way_down(rules: Sequence[Rule], read: Callable[[Names], tuple[str, float] | None]) -> Refusal | None:
+    """Why the vehicle would stay in the air if this computer died, by what is `read` of its parameters; None
+    where it would land."""
+    for rule in rules:
+        found = read(rule.names)
+        if found is None:
+            return ParameterUnread(rule.names[0])
+        if finding := judge(rule, found):
+            return NoWayDown(finding)
+    return None
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections import deque
+from collections.abc import Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -59,7 +60,12 @@ def range_sample(message: Message) -> RangeSample | None:
 
 def cells_told(message: Message) -> int:
     """The cells of a BATTERY_STATUS, which has their voltages; 0 where it has only that of them all."""
-    cells = sum(mv != _NO_CELL_MV for mv in message.voltages)
+    return cells_of(message.voltages)
+
+
+def cells_of(volts_mv: Sequence[int]) -> int:
+    """The cells whose voltages these are, mV; 0 where one of them is that of the whole battery."""
+    cells = sum(mv != _NO_CELL_MV for mv in volts_mv)
     return cells if cells > 1 else 0
 
 

@@ -19,8 +19,8 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
-from flightd.adapters.vehicle.mavlink.refusal import NoWayDown, ParameterUnread, WrongFirmware
-from flightd.adapters.vehicle.mavlink.required_parameters import Names, judge, way_down_rules
+from flightd.adapters.vehicle.mavlink.refusal import WrongFirmware, no_way_down
+from flightd.adapters.vehicle.mavlink.required_parameters import Names, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, BeatPoll, Beats, too_slow
@@ -207,13 +207,7 @@ class MavlinkVehicle(abc.ABC):
 
     def no_way_down(self) -> Refusal | None:
         """Why the vehicle would stay in the air if this computer died; None where it would land."""
-        for rule in self._way_down:
-            found = self.parameters.get(rule.names)
-            if found is None:
-                return ParameterUnread(rule.names[0])
-            if finding := judge(rule, found):
-                return NoWayDown(finding)
-        return None
+        return no_way_down(self._way_down, self.parameters.get)
 
     def sinks_unmeasured(self) -> bool:
         """Whether the autopilot itself keeps a setpoint's climb rate; not where our own height loop does."""

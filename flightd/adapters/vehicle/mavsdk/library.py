@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import functools
 import json
 import logging
@@ -14,6 +15,7 @@ from mavsdk.asyncio import System
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
+from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.server_utility import ServerUtilityAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.exceptions import MavsdkError
@@ -60,6 +62,14 @@ def whole_fields(document: str, *names: str) -> tuple[int, ...] | None:
         return None
 
 
+def whole_list(document: str, name: str) -> tuple[int, ...] | None:
+    """A list of whole numbers out of such a message; None if it has none of that name."""
+    try:
+        return tuple(map(int, json.loads(document)[name]))
+    except (ValueError, TypeError, KeyError, OverflowError):
+        return None
+
+
 class Plugins:
     """What the adapter uses of the library, for one vehicle."""
 
@@ -70,6 +80,7 @@ class Plugins:
         self.offboard = OffboardAsync(system)
         self.direct = MavlinkDirectAsync(system)
         self.texts = ServerUtilityAsync(system)
+        self.parameters = ParamAsync(system)
 
 
 class Library:
@@ -132,6 +143,14 @@ class Library:
         """Any message to the autopilot."""
         fields = {"target_system": self._system_id, "target_component": 1, **fields}
         return MavlinkMessage(name, 0, 0, self._system_id, 1, json.dumps(fields))
+
+    async def parameter(self, name: str) -> float | None:
+        """A parameter of the autopilot, whatever its type; None where it is not told."""
+        parameters = (await self.vehicle()).parameters
+        for ask in (parameters.get_param_int, parameters.get_param_float):
+            with contextlib.suppress(MavsdkError):
+                return float(await self.call(ask(name)))
+        return None
 
     async def close(self) -> None:
         """Wait for calls under way (bounded), then take the library down."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from mavsdk.plugins.telemetry import FlightMode
 from mavsdk.plugins.telemetry import LandedState as SdkLanded
 
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
+from flightd.adapters.vehicle.mavlink.telemetry import cells_of
 from flightd.adapters.vehicle.newest_readings import NewestReadings
 from flightd.adapters.vehicle.range_finders import RangeSample
 from flightd.core.refusal import Refusal
@@ -39,6 +41,7 @@ class MavsdkTelemetry(NewestReadings):
     def __init__(self, sync: ClockSync) -> None:
         super().__init__(sync)
         self._boot_us = 0
+        self._cells = 0
         self.mode: FlightMode | None = None
 
     @property
@@ -87,7 +90,12 @@ class MavsdkTelemetry(NewestReadings):
     def take_battery(self, battery: Any, now_ns: int) -> None:
         """A Battery: volts and per cent, NaN or negative where they are not known."""
         if battery.id == 0:
-            self._set_battery(now_ns, frac=battery.remaining_percent / 100.0, volts=float(battery.voltage_v))
+            frac, volts = battery.remaining_percent / 100.0, float(battery.voltage_v)
+            self._set_battery(now_ns, frac=frac, volts=volts, cells=self._cells)
+
+    def take_cells(self, volts_mv: Sequence[int]) -> None:
+        """The voltages of a BATTERY_STATUS, mV, which the library adds up."""
+        self._cells = cells_of(volts_mv)
 
     def take_armed(self, armed: bool, _now_ns: int) -> None:
         self.armed = bool(armed)

@@ -24,10 +24,12 @@ from mavsdk.plugins.server_utility import StatusTextType
 from mavsdk.plugins.telemetry import FlightMode
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
-from flightd.adapters.vehicle.mavlink.refusal import BeyondLibrary, WrongSystemId
+from flightd.adapters.vehicle.mavlink.refusal import BeyondLibrary, WrongSystemId, no_way_down
+from flightd.adapters.vehicle.mavlink.required_parameters import way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BeatPoll
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
@@ -35,7 +37,7 @@ from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavsdk.commands import SdkCommander
 from flightd.adapters.vehicle.mavsdk.connection import MavsdkConnection
 from flightd.adapters.vehicle.mavsdk.gate import SetpointGate
-from flightd.adapters.vehicle.mavsdk.library import Library, Plugins, whole_fields
+from flightd.adapters.vehicle.mavsdk.library import Library, Plugins, whole_fields, whole_list
 from flightd.adapters.vehicle.mavsdk.telemetry import MavsdkTelemetry
 from flightd.core.refusal import Refusal
 from flightd.core.types import (
@@ -80,6 +82,8 @@ _YAW_LEAD_S = 0.2
 """The library sends no yaw rate to feed forward, so the heading leads by what the yaw loop lags."""
 
 _IDLE_PERIOD_S = 0.05
+_UNREAD_S, _READ_AGAIN_S = 1.0, 30.0
+"""Between two readings of the autopilot's parameters, while some are missing and afterwards."""
 _PUMP_SILENT_NS = 150_000_000
 
 
@@ -109,6 +113,8 @@ class MavsdkVehicle:
         self._text_waits = asyncio.Event()
         self._sent_ns = 0
         self._unfit: Refusal | None = None
+        self._way_down = way_down_rules(Firmware.PX4, system_id)
+        self._parameters: dict[str, tuple[str, float]] = {}
 
     # The port
 
@@ -192,8 +198,8 @@ class MavsdkVehicle:
         return self._unfit
 
     def no_way_down(self) -> Refusal | None:
-        """The library tells no parameters: `flightd doctor` looks at them."""
-        return None
+        """Why the vehicle would stay in the air if this computer died; None where it would land."""
+        return no_way_down(self._way_down, lambda names: self._parameters.get(names[0]))
 
     def sinks_unmeasured(self) -> bool:
         """PX4 takes raw thrust, which our own height loop makes of measured climb rates."""
@@ -234,10 +240,12 @@ class MavsdkVehicle:
             (telemetry.subscribe_battery(), dialect.MAVLINK_MSG_ID_BATTERY_STATUS, readings.take_battery),
             (telemetry.subscribe_status_text(), None, self._say),
             (plugins.direct.subscribe_message("TIMESYNC"), None, self._compare),
+            (plugins.direct.subscribe_message("BATTERY_STATUS"), None, self._take_cells),
         ]
         for source, message_id, take in sources:
             tasks.create_task(self._take(source, streams, message_id, take), name=f"mavsdk {message_id}")
         tasks.create_task(streams.run(), name="mavsdk streams")
+        tasks.create_task(self._read_parameters(library), name="mavsdk parameters")
         tasks.create_task(self._compare_clocks(library, plugins), name="mavsdk timesync")
         tasks.create_task(self._poll_beats(), name="mavsdk heartbeat poll")
         tasks.create_task(self._pass_on(library, plugins), name="mavsdk setpoints")
@@ -269,6 +277,22 @@ class MavsdkVehicle:
         fields = whole_fields(message.fields_json, "tc1", "ts1")
         if fields is not None and fields[0] != 0:
             self._sync.answered(fields[1], fields[0], now_ns)
+
+    def _take_cells(self, message: Any, _now_ns: int) -> None:
+        volts_mv = whole_list(message.fields_json, "voltages")
+        if volts_mv is not None:
+            self._readings.take_cells(volts_mv)
+
+    async def _read_parameters(self, library: Library) -> None:
+        """Those without which nothing is armed, again and again: somebody may change them."""
+        while self._unfit is None:
+            for rule in self._way_down:
+                name = rule.names[0]
+                value = await library.parameter(name)
+                if value is not None:
+                    self._parameters[name] = (name, value)
+            missing = len(self._parameters) < len(self._way_down)
+            await asyncio.sleep(_UNREAD_S if missing else _READ_AGAIN_S)
 
     async def _poll_beats(self) -> None:
         poll, beat = BeatPoll(), dialect.MAVLINK_MSG_ID_HEARTBEAT
