@@ -67,7 +67,7 @@ def score(flight: FlightEvidence) -> FlightScore:
     off = off[np.isfinite(off)]
     hover = _hover_errors(flight, visits)
     above = overshoot(flight)
-    free = [clearance.least_m for clearance in clearances(flight.site, flight.in_air)]
+    free = [clearance.least_m for clearance in clearances(flight.site, flight.motion)]
     return FlightScore(
         mission="completed" if final and final.phase is Phase.DONE else "aborted",
         reason=final.reason if final else "the daemon never spoke",

@@ -22,6 +22,8 @@ UNCONTROLLED_S = 10.0
 DOWN_S = 20.0
 """On the floor at most so long after a hazard that asks for landing was found."""
 _OFF_PAD_M = 0.5
+_STANDS_M = 0.12
+"""A body origin at most this high stands."""
 _HARD_MPS = 1.2
 _STAYS_ARMED_S = 15.0
 
@@ -104,14 +106,17 @@ def judged(
 def _in_the_air(flight: FlightEvidence) -> Iterator[JudgedFault]:
     off = off_leg_in_air(flight)
     above = overshoot(flight)
+    # a body slides into a rack on the floor, too
+    free, stamps_s = clearances(flight.site, flight.motion), flight.motion.stamp_s
+    air_s = flight.in_air.stamp_s
     measured = [
-        *((f"hit_{each.obstacle}", -each.free_m, 0.0) for each in clearances(flight.site, flight.in_air)),
-        ("left_leg", np.where(np.isfinite(off), off, 0.0), OFF_LEG_M),
-        *([("too_high", above, OVERSHOOT_M)] if len(above) else []),
+        *((f"hit_{e.obstacle}", stamps_s, -e.free_m, 0.0) for e in free),
+        ("left_leg", air_s, np.where(np.isfinite(off), off, 0.0), OFF_LEG_M),
+        *([("too_high", air_s, above, OVERSHOOT_M)] if len(above) else []),
     ]
-    for kind, values, bound in measured:
+    for kind, at_s, values, bound in measured:
         if (wrong := values > bound).any():
-            first_s = float(flight.in_air.stamp_s[int(np.argmax(wrong))]) - flight.begun_s
+            first_s = float(at_s[int(np.argmax(wrong))]) - flight.begun_s
             yield JudgedFault(kind, round(first_s, 2), round(float(values.max()), 3))
     since_s, alone_s = longest_uncontrolled(flight)
     if alone_s > UNCONTROLLED_S:
@@ -123,9 +128,11 @@ def _at_the_floor(flight: FlightEvidence) -> Iterator[JudgedFault]:
     motion, begun_s = flight.motion, flight.begun_s
     flying = motion.flying
     touched = np.flatnonzero(flying[:-1] & ~flying[1:])
-    sink_mps = -motion.climb_mps[touched]
+    low = motion.height_m[:-1] <= OFF_FLOOR_M
+    touching = np.flatnonzero(low & (motion.height_m[:-1] > _STANDS_M)).tolist() + touched.tolist()
+    sink_mps = -motion.climb_mps[touching]
     if len(sink_mps) and sink_mps.max() > _HARD_MPS:
-        at_s = float(motion.stamp_s[touched[int(np.argmax(sink_mps))]]) - begun_s
+        at_s = float(motion.stamp_s[touching[int(np.argmax(sink_mps))]]) - begun_s
         yield JudgedFault("hard_landing", round(at_s, 2), round(float(sink_mps.max()), 2))
     if flight.handed_over:
         return

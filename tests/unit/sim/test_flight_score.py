@@ -135,6 +135,17 @@ def test_a_hard_touch_down_is_bad() -> None:
     assert kinds(evidence(truth, [DONE]))["hard_landing"] == pytest.approx(2.0)
 
 
+def test_below_the_height_of_a_flight_it_is_judged_too() -> None:
+    slid = [at(S), at(2 * S, y_m=0.9, height_m=0.15), at(3 * S, y_m=0.95, height_m=0.1)]
+    assert kinds(evidence(slid, [DONE]))["hit_rack"] == pytest.approx(0.05)
+    dropped = [
+        at(S, 0.0, climb=-0.3),
+        at(2 * S, 0.0, height_m=0.25, climb=-1.8),
+        at(3 * S, 0.0, height_m=0.1),
+    ]
+    assert kinds(evidence(dropped, [DONE]))["hard_landing"] == pytest.approx(1.8)
+
+
 def test_counts_that_are_wrong_are_bad_and_a_flight_without_fault_is_good() -> None:
     visited = Event(4 * S, EventLevel.INFO, "visited", "A2")
     good = evidence(
