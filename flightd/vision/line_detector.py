@@ -19,6 +19,7 @@ from flightd.vision.lines import band_evidence as evidence
 from flightd.vision.lines import centroid, junctions, naive, skeleton
 from flightd.vision.lines import fusion as combine
 from flightd.vision.lines.band import Band
+from flightd.vision.lines.band_ends import lengthen
 from flightd.vision.lines.band_refinement import refine
 from flightd.vision.lines.colour_profile import ColourProfile, classify, grow, load_profile
 from flightd.vision.lines.sampling import Grid, coarsened, grid_for, sample
@@ -143,8 +144,9 @@ class Detector:
             if not thinned:
                 thinned = True
                 guesses += _weighed(bands + self._ridges(mask, grid, plane, bands), mask, grid, plane)
+        found = lengthen(frame, combine.without_repeats(found), plane)
         mark("refine")
-        return combine.without_repeats(found)
+        return found
 
     def _ridges(self, mask: Image, grid: Grid, plane: Plane, bands: list[Band]) -> list[Band]:
         """What the skeleton shows, along the `bands` that are known and elsewhere."""

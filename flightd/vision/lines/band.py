@@ -69,6 +69,17 @@ class Band:
     def length_px(self) -> float:
         return (self.u1 - self.u0) / self.cosine
 
+    def run(self, width_px: float, height_px: float) -> tuple[float, float]:
+        """From where to where along u its centre line is inside a picture of that size."""
+        half_u, half_v = width_px / 2, height_px / 2
+        if self.steep:
+            half_u, half_v = half_v, half_u
+        a, b = self.centre.a, self.centre.b
+        slope = b if abs(b) > 1e-9 else 1e-9
+        one, other = (-half_v - a) / slope, (half_v - a) / slope
+        u0, u1 = max(-half_u, min(one, other)), min(half_u, max(one, other))
+        return u0, max(u0 + 1.0, u1)
+
     def to_line(self) -> Line:
         """The same band as a message: Hessian normal form, its covariance carried over to first order."""
         a, b = self.centre.a, self.centre.b

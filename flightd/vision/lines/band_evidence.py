@@ -69,7 +69,7 @@ def weigh(strips: list[Band], mask: Image, grid: Grid, plane: Plane) -> list[Evi
     """The evidence for each guess that shows any paint."""
     if not strips:
         return []
-    runs = [_run(strip, plane) for strip in strips]
+    runs = [strip.run(plane.width_px, plane.height_px) for strip in strips]
     laws = [_across(strip, grid.step, run) for strip, run in zip(strips, runs, strict=True)]
     found = _looks(mask, strips, runs, laws, grid, plane)
     looks = np.empty((2, *found.shape), np.float32)
@@ -97,18 +97,6 @@ def weigh(strips: list[Band], mask: Image, grid: Grid, plane: Plane) -> list[Evi
         length = clear * stations * pace / strip.cosine
         evidence.append(Evidence(new, length, length * min(new.width_px, length)))
     return evidence
-
-
-def _run(strip: Band, plane: Plane) -> _Run:
-    """From where to where the centre line runs inside the picture."""
-    half_u, half_v = plane.width_px / 2, plane.height_px / 2
-    if strip.steep:
-        half_u, half_v = half_v, half_u
-    a, b = strip.centre.a, strip.centre.b
-    slope = b if abs(b) > 1e-9 else 1e-9
-    one, other = (-half_v - a) / slope, (half_v - a) / slope
-    u0, u1 = max(-half_u, min(one, other)), min(half_u, max(one, other))
-    return u0, max(u0 + 1.0, u1)
 
 
 def _across(strip: Band, step: int, run: _Run) -> _Laws:
