@@ -10,6 +10,8 @@ from flightd.core.types import AttitudeSetpoint
 from flightd.ports import Clock, Vehicle
 from flightd.runtime.bounded_series import Series
 
+_FAILS_S = 0.3
+"""An adapter that fails at each setpoint for so long is given up."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -38,6 +40,7 @@ class SetpointPump:
         self._fresh = asyncio.Event()
         self._last_ns: int | None = None
         self.stale = 0
+        self._failures = 0
         self.failed = 0
         """Setpoints at which the adapter failed."""
         self.intervals_ms = Series()
@@ -84,12 +87,17 @@ class SetpointPump:
             self._on_sent(setpoint, now_ns)
 
     def _sent(self, setpoint: AttitudeSetpoint) -> bool:
-        """Whether it is on the wire.  What an adapter fails at with one setpoint is tried with the next: the
-        vehicle must not be left with none."""
+        """Whether it is on the wire.  What an adapter fails at with one setpoint is tried with the next; one
+        that goes on failing ends the daemon, which hands the vehicle back to land: else heartbeats would
+        go on, and nobody would know that it is not steered."""
         try:
-            return self._vehicle.send(setpoint)
-        except Exception:  # noqa: BLE001 - whatever it is, the next setpoint has to go out
+            sent = self._vehicle.send(setpoint)
+        except Exception:
             self.failed += 1
-            if self.failed == 1:
-                _LOG.exception("a setpoint was not sent")
+            self._failures += 1
+            if self._failures * self._period_s > _FAILS_S:
+                raise
+            _LOG.exception("a setpoint was not sent")
             return False
+        self._failures = 0
+        return sent

@@ -37,7 +37,10 @@ class BatteryConfig(Section):
         json_schema_extra=unit("share of full"),
     )
     cells: int | None = Field(
-        None, ge=1, le=14, description="cells in series; left out: as the vehicle tells, if it does"
+        None,
+        ge=1,
+        le=14,
+        description="cells in series; left out: as the vehicle tells; where neither does, nothing starts",
     )
     cell_start_v: float = Field(
         3.6, ge=2.5, le=4.3, description="least voltage of a cell to start", json_schema_extra=unit("V")

@@ -9,6 +9,9 @@ from pydantic import Field, model_validator
 
 from flightd.config.section import Section
 
+_STATIONS = frozenset({245, 255})
+"""System ids by which ground stations and their libraries go."""
+
 
 class VehicleConfig(Section):
     """The link to the autopilot, and what it is given besides setpoints."""
@@ -26,8 +29,8 @@ class VehicleConfig(Section):
         191,
         ge=1,
         le=255,
-        description="MAVLink system id of this computer, which nothing else on the vehicle may have: "
-        "ArduCopter lands when it does not hear it any more (its SYSID_MYGCS)",
+        description="ArduCopter: MAVLink system id of this computer's heartbeats, which nobody else may have:"
+        " it lands when it does not hear them any more (its SYSID_MYGCS)",
     )
     flying_mode: Literal["guided_nogps", "guided"] = Field(
         "guided_nogps",
@@ -68,7 +71,14 @@ class VehicleConfig(Section):
 
     @model_validator(mode="after")
     def _only_what_the_adapter_can(self) -> Self:
-        if self.own_system_id == self.system_id:
+        if "own_system_id" in self.model_fields_set and self.kind != "ardupilot":
+            raise ValueError('own_system_id is for ArduCopter: take it out, or set kind = "ardupilot"')
+        if self.own_system_id in _STATIONS:
+            raise ValueError(
+                f"own_system_id {self.own_system_id} is what ground stations have: one that is left running "
+                "would keep the drone in the air when this computer dies; give another"
+            )
+        if self.kind == "ardupilot" and self.own_system_id == self.system_id:
             raise ValueError(
                 f"own_system_id {self.own_system_id} is the vehicle's system_id: a gimbal or a bridge that "
                 "has it, too, would keep the autopilot from landing when this computer dies; give another"

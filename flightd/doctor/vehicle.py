@@ -124,7 +124,7 @@ def _judge_range(config: VehicleConfig, report: ExaminationReport) -> Check:
 def _judge_cells(cells: int | None, report: ExaminationReport) -> Check:
     told = report.cells
     if cells is None and not told:
-        return warning("battery", "its cells are not known: its volts decide nothing", "give battery.cells")
+        return error("battery", "how many cells it has is not known: nothing starts", "give battery.cells")
     if cells is not None and told and cells != told:
         text = f"battery.cells = {cells}, the autopilot tells of {told}"
         return error("battery", text, "one of them is wrong, and with it every low voltage")

@@ -159,7 +159,10 @@ class Mission:
         """Begin a start's count-down if nothing keeps the drone on the ground, or take it back."""
         if trigger is Trigger.PAUSE:
             self._clearance.take_back(now_ns)
-        elif self.state.intent is not Intent.WAIT or not self._clearance.give(now_ns):
+        elif self.state.intent is not Intent.WAIT:
+            self._clearance.report_waiting(now_ns)
+            return
+        elif not self._clearance.give(now_ns):
             return
         self._turn(trigger)
 
@@ -182,10 +185,7 @@ class Mission:
 
     def _triggers(self, s: MissionInputs) -> set[Trigger]:
         """What has happened by this tick.  Turning back acts at once."""
-        ready = self.state.waiting and self._grounded(s) is None
-        if ready and self._clearance.autostart and self.state.intent is Intent.VISIT:
-            self._clearance.begin_by_itself(s.now_ns)
-        may_start = ready and self._clearance.counted_down(s.now_ns)
+        may_start = self.state.waiting and self._may_start(s)
         found = self._progress.step(s, self.state, may_start=may_start)
         found |= self._orders.urgent
         if self._losses.ground_lost(s):
@@ -197,7 +197,8 @@ class Mission:
             found.add(Trigger.TIMED_OUT)
         if s.failed:
             found.add(Trigger.STEP_FAILED)
-        if self._clearance.is_void(s.now_ns) and Trigger.START_EXPIRED in taken_in(self.state):
+        void = self._clearance.is_void(s.now_ns) or self._aisle_opened(s)
+        if void and Trigger.START_EXPIRED in taken_in(self.state):
             found.add(Trigger.START_EXPIRED)
             self._void_start(s.now_ns)
         if Trigger.FOUND_FLYING in found:  # an order to land or stop stands until it may be obeyed
@@ -213,13 +214,22 @@ class Mission:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._progress.adopting(s, self.phase) else found
 
+    def _may_start(self, s: MissionInputs) -> bool:
+        """Nothing keeps it on the ground, and its start is counted down."""
+        obstacle = self._grounded(s)
+        self._clearance.look_again(s.now_ns, obstacle, ordered=self.state.intent is Intent.VISIT)
+        return obstacle is None and self._clearance.counted_down(s.now_ns)
+
+    def _aisle_opened(self, s: MissionInputs) -> bool:
+        """During the count-down of an order."""
+        return self.state.waiting and self._clearance.ends_order(self._grounded(s))
+
     def _void_start(self, now_ns: int) -> None:
         """A start that came to nothing is not kept for later."""
         self._clearance.void(now_ns)
         if self.state.waiting:
             self._clearance.report_void(now_ns)
             self._turn(Trigger.START_EXPIRED)
-            self._await_start()
 
     def _landed(self) -> set[Trigger]:
         """What a landing on the pad is more than its end."""
@@ -315,8 +325,6 @@ class Mission:
     def _enter(self, s: MissionInputs, trigger: Trigger) -> None:
         """What the phase that begins starts with."""
         match self.phase:
-            case Phase.PREFLIGHT:
-                self._await_start()
             case Phase.TAKE_OFF:
                 self._clearance.withdraw()
                 self._steering.take_off(s.height_m)
@@ -377,7 +385,7 @@ class Mission:
             self._reporter.wait(self._clearance.wait(self._grounded(s), s.now_ns))
         if not self.airborne:
             guidance = self._steering.on_ground(s, self.phase)
-            disarms = self.state.waiting and self._clearance.disarms(s)
+            disarms = self.state.waiting and self._clearance.disarms(s.now_ns)
             return replace(guidance, demand=Demand.DISARM) if disarms else guidance
         guidance = self._steering.step(s, self._task(s.now_ns))
         if self.state.halted:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flightd.config.schema import Config
-from flightd.core.types import EventLevel, LandedState
+from flightd.core.types import EventLevel
 from flightd.mission.event_log import EventLog
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.orders import StartOrder
@@ -14,6 +14,7 @@ from flightd.mission.triggers import Trigger
 
 _AFTER_VOID_NS = 10_000_000_000
 """An arming that was asked for may succeed so long after it was given up."""
+_TOLD_AGAIN_NS = 10_000_000_000
 _UNFIT_S = 3.0
 """Parameters are still being read for about so long."""
 
@@ -30,6 +31,7 @@ class StartClearance:
         self._order = StartOrder(config.mission)
         self._obstacle: Reason | None = Plain.NO_TELEMETRY
         self._void_ns: int | None = None
+        self._told_ns: int | None = None
         self._unfit = DebounceTimer()
         self._unfit_reported: Reason | None = None
 
@@ -59,14 +61,34 @@ class StartClearance:
         self._report_countdown(now_ns)
         return True
 
-    def begin_by_itself(self, now_ns: int) -> None:
-        """Nothing keeps the drone on the ground any more, and nobody has to order its start."""
-        if not self._order.given:
-            self._order.give(now_ns, self._config.mission.autostart_countdown_s)
+    def look_again(self, now_ns: int, obstacle: Reason | None, *, ordered: bool) -> None:
+        """With autostart the count-down begins once no `obstacle` keeps the drone on the ground, and anew
+        after one: at each tick on which it waits, its start `ordered` or not."""
+        if not (self.autostart and ordered):
+            return
+        if obstacle is not None:
+            self._order.withdraw()
+        elif not self._order.given:
+            self._order.give(now_ns, self._config.mission.autostart_countdown_s, expires=False)
             if not self.counted_down(now_ns):
                 self._report_countdown(now_ns)
 
+    def ends_order(self, obstacle: Reason | None) -> bool:
+        """An order does not outlast an open aisle: whoever closes it behind himself must not start the
+        drone."""
+        ends = self._order.given and not self.autostart and obstacle is Plain.AISLE_OPEN
+        self._obstacle = obstacle if ends else self._obstacle
+        return ends
+
+    def report_waiting(self, now_ns: int) -> None:
+        """A start is ordered where one is under way: say what it waits for."""
+        waits = StartsIn(self._order.left_s(now_ns)) if self._obstacle is None else self._obstacle
+        self._events.report(now_ns, EventLevel.INFO, "command", f"starts already: {in_words(waits)}")
+
     def _report_countdown(self, now_ns: int) -> None:
+        if self._told_ns is not None and now_ns - self._told_ns < _TOLD_AGAIN_NS:
+            return  # what comes and goes must not flood the events; the status shows each second
+        self._told_ns = now_ns
         text = in_words(StartsIn(self._order.left_s(now_ns)))
         self._events.report(now_ns, EventLevel.WARNING, "start", text)
 
@@ -94,12 +116,10 @@ class StartClearance:
         why = "" if self._obstacle is None else f": {in_words(self._obstacle)}"
         self._events.report(now_ns, EventLevel.WARNING, "start", f"{Trigger.START_EXPIRED.value}{why}")
 
-    def disarms(self, s: MissionInputs) -> bool:
-        """A vehicle that stands and was armed after all, when its start had come to nothing: by nobody else,
-        for its mode is still the commanded one (the adapter sees to that)."""
-        v = s.vehicle
-        late = self._void_ns is not None and s.now_ns - self._void_ns < _AFTER_VOID_NS
-        return late and v is not None and v.armed and v.landed is LandedState.ON_GROUND
+    def disarms(self, now_ns: int) -> bool:
+        """A start has just come to nothing: what was asked for may still arm the vehicle, and until then the
+        adapter must not let go of it."""
+        return self._void_ns is not None and now_ns - self._void_ns < _AFTER_VOID_NS
 
     def wait(self, obstacle: Reason | None, now_ns: int) -> Reason:
         """Keep what stands against a flight at this tick; why it waits."""

@@ -51,8 +51,8 @@ _TAKEN_OVER_NS = 3_000_000_000
 """Who attends but was silent for so long has been taken over from, once somebody else attends."""
 
 _URGENT = frozenset({CommandKind.LAND, CommandKind.STOP})
-_WAITING = frozenset({Phase.PREFLIGHT, Phase.SWAP})
 """Never held back for being too many."""
+_WAITING = frozenset({Phase.PREFLIGHT, Phase.SWAP})
 
 
 @dataclass(frozen=True, slots=True)

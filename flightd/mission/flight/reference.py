@@ -77,6 +77,7 @@ class ReferenceGenerator:
         self._standstill = Standstill(p)
         self._still_s = 0.0
         self._by_itself = False
+        self._stood = False
         self.anchor = (start[0], start[1])
         """Where it holds when no stop is flown to."""
         self._steers = False
@@ -100,6 +101,7 @@ class ReferenceGenerator:
         self._standstill.begin()
         self._still_s = 0.0
         self._by_itself = by_itself
+        self._stood = False
 
     def begin_anew(self) -> None:
         """Start the reference at the drone, which is not where it was believed to be."""
@@ -190,8 +192,14 @@ class ReferenceGenerator:
         unsteered = v is not None and math.isnan(v.climb_mps)
         standing = v is not None and v.landed is LandedState.ON_GROUND and not deaf
         standing = standing or self._still_s > _DISARM_S
+        self._stood |= standing  # from then on nothing takes it out of its own landing any more
         by_itself = (
-            deaf or unsteered or task.state.adopted or self._by_itself or self._still_s > _OWN_LANDING_S
+            deaf
+            or unsteered
+            or task.state.adopted
+            or self._by_itself
+            or self._stood
+            or self._still_s > _OWN_LANDING_S
         )
         return -rate, Demand.DISARM if standing else Demand.LAND if by_itself else Demand.FLY
 

@@ -93,7 +93,7 @@ class ScriptedAutopilot:
                 self.armed = message.param1 == 1
         if planned is not None:
             self.link.send(
-                channel, dialect.MAVLink_command_ack_message(message.command, planned, 0, 0, 191, 191)
+                channel, dialect.MAVLink_command_ack_message(message.command, planned, 0, 0, 1, 191)
             )
         self.after(message)
 

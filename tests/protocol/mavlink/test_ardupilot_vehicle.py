@@ -10,8 +10,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, ArduPilotVehicle
+from flightd.adapters.vehicle.mavlink.link.codec import Codec
 from flightd.core.refusal import words
-from flightd.core.types import AttitudeSetpoint, Demand, LandedState
+from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, LandedState
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
@@ -322,6 +323,71 @@ def test_an_accepted_mode_that_never_shows_is_not_held_for_long() -> None:
             await asyncio.sleep(1.0)
             assert not known(vehicle).in_control
             assert not vehicle.send(AttitudeSetpoint(0))
+
+    virtual(test())
+
+
+def test_heartbeats_come_from_a_system_of_their_own_and_texts_from_the_vehicles() -> None:
+    """The failsafe watches the first; a ground station shows only the second."""
+
+    async def test() -> None:
+        async with scripted() as (autopilot, vehicle):
+            await asyncio.sleep(0.5)
+            vehicle.notify(Event(0, EventLevel.WARNING, "start", "arms in 3 s"))
+            await asyncio.sleep(0.2)
+            heard = {(m.get_type(), m.get_srcSystem()) for _, m in autopilot.heard}
+            assert {("HEARTBEAT", 191), ("STATUSTEXT", 1)} <= heard
+            assert ("HEARTBEAT", 1) not in heard
+
+    virtual(test())
+
+
+def test_nothing_is_armed_while_somebody_else_beats_as_the_system_that_the_failsafe_watches() -> None:
+    async def test() -> None:
+        async with scripted() as (autopilot, vehicle):
+            await asyncio.sleep(1.5)
+            assert known(vehicle).unfit is None
+            station = Codec(191, dialect.MAV_COMP_ID_MISSIONPLANNER)
+            kind, none = dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID
+            frame = station.pack(dialect.MAVLink_heartbeat_message(kind, none, 0, 0, 4, 3))
+            for address in autopilot.link.channels:
+                autopilot.link.transmit(frame, address)
+            await asyncio.sleep(0.2)
+            assert "somebody else sends heartbeats as system 191" in words(known(vehicle).unfit)
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(2.0)
+            assert autopilot.commands(ARM) == []
+
+    virtual(test())
+
+
+def test_nothing_is_armed_where_a_range_of_systems_holds_off_the_landing() -> None:
+    async def test() -> None:
+        autopilot = ScriptedAutopilot()
+        autopilot.parameters["MAV_GCS_SYSID_HI"] = 255
+        async with scripted(autopilot) as (_, vehicle):
+            await asyncio.sleep(2.0)
+            assert "MAV_GCS_SYSID_HI" in words(known(vehicle).unfit)
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(2.0)
+            assert autopilot.commands(ARM) == []
+
+    virtual(test())
+
+
+def test_an_arming_that_comes_after_its_start_is_void_is_taken_back() -> None:
+    async def test() -> None:
+        async with scripted() as (autopilot, vehicle):
+            autopilot.results[ARM] = None
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(2.5)
+            autopilot.results[ARM] = 0
+            vehicle.demand(Demand.DISARM)  # what the mission demands when a start has come to nothing
+            autopilot.armed = True
+            down = dialect.MAV_SENSOR_ROTATION_PITCH_270
+            autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, 10, 0, 1, down, 0))
+            await asyncio.sleep(1.0)
+            assert autopilot.commands(ARM)[-1].param1 == 0
 
     virtual(test())
 

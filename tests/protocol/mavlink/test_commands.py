@@ -62,7 +62,7 @@ def test_in_progress_is_waited_for_and_strange_results_are_refusals() -> None:
 
             def finish(message: Any) -> None:
                 if message.command == SET_MODE:
-                    ack = dialect.MAVLink_command_ack_message(SET_MODE, 0, 0, 0, 191, 191)
+                    ack = dialect.MAVLink_command_ack_message(SET_MODE, 0, 0, 0, 1, 191)
                     asyncio.get_running_loop().call_later(2.0, autopilot.say, ack)
 
             autopilot.after = finish
@@ -90,7 +90,7 @@ def test_a_command_that_stays_in_progress_is_given_up_and_never_holds_back_a_lan
 
             def still_busy(message: Any) -> None:
                 if message.command == ARM:
-                    busy = dialect.MAVLink_command_ack_message(ARM, 5, 0, 0, 191, 191)
+                    busy = dialect.MAVLink_command_ack_message(ARM, 5, 0, 0, 1, 191)
                     for second in range(1, 60):
                         asyncio.get_running_loop().call_later(second, autopilot.say, busy)
 

@@ -177,7 +177,7 @@ class StreamAutopilot(asyncio.Protocol):
         for message in self.parser.stream(data):
             StreamAutopilot.frames.append(message)
             if message.get_type() == "COMMAND_LONG":
-                self.say(dialect.MAVLink_command_ack_message(message.command, 0, 0, 0, 191, 191))
+                self.say(dialect.MAVLink_command_ack_message(message.command, 0, 0, 0, 1, 191))
 
     def say(self, message: Any) -> None:
         self.transport.write(self.codec.pack(message))

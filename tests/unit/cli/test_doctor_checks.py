@@ -191,7 +191,7 @@ def test_the_range_finder_as_the_vehicle_stands(
 @pytest.mark.parametrize(
     ("cells", "told", "level"),
     [
-        (None, 0, CheckLevel.WARNING),
+        (None, 0, CheckLevel.ERROR),
         (4, 3, CheckLevel.ERROR),
         (4, 0, CheckLevel.OK),
         (None, 3, CheckLevel.OK),

@@ -28,6 +28,8 @@ def parsed(folder: Path, **vehicle: Any) -> Config:
         ({"kind": "px4", "flying_mode": "guided"}, "flying_mode is ArduCopter's"),
         ({"kind": "px4", "raw_thrust": True}, "raw_thrust is ArduCopter's"),
         ({"own_system_id": 1}, "own_system_id 1 is the vehicle's system_id"),
+        ({"own_system_id": 255}, "own_system_id 255 is what ground stations have"),
+        ({"kind": "px4", "own_system_id": 190}, "own_system_id is for ArduCopter"),
         ({"kind": "ardrone", "pose_output": "odometry"}, 'pose_output needs kind = "ardupilot" or "px4"'),
         ({"kind": "mavsdk", "signing_key": "a.key"}, 'signing_key needs kind = "ardupilot" or "px4"'),
         ({"signing_stamp": "a"}, "signing_stamp without signing_key"),

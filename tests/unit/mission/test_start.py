@@ -105,13 +105,14 @@ def test_an_arming_that_comes_after_all_is_taken_back() -> None:
     flight.order(CommandKind.START)
     flight.run(5.4, follow=False)
     assert flight.phase is Phase.PREFLIGHT
+    demands = [flight.demand]
     flight.set(armed=True)
     flight.run(0.04, follow=False)
     assert flight.phase is Phase.PREFLIGHT
-    demands = [flight.demand]
+    demands.append(flight.demand)
     flight.run(20.0, follow=False)
     demands.append(flight.demand)
-    assert demands == [Demand.DISARM, Demand.STANDBY], "whoever arms it later means it"
+    assert demands == [Demand.DISARM, Demand.DISARM, Demand.STANDBY], "whoever arms it later means it"
 
 
 def starting_by_itself() -> Flight:
@@ -145,21 +146,56 @@ def test_a_start_by_itself_that_an_operator_takes_back_is_his_from_then_on() -> 
     assert flight.phase is Phase.ARMING
 
 
-def test_a_start_by_itself_that_came_to_nothing_is_counted_down_anew() -> None:
+@pytest.mark.parametrize("open_s", [0.5, 6.0, 60.0])
+def test_a_start_by_itself_is_counted_down_anew_after_what_comes_between(open_s: float) -> None:
+    """Whoever closes an aisle behind himself is not armed at."""
+    flight = starting_by_itself()
+    flight.set(aisle_closed=False)
+    flight.run(open_s, follow=False)
+    flight.set(aisle_closed=True)
+    flight.run(2.9, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+    flight.run(0.2, follow=False)
+    assert flight.phase.value == "arming"
+
+
+def test_what_comes_and_goes_does_not_flood_the_events() -> None:
+    flight = starting_by_itself()
+    said(flight)
+    for _ in range(100):
+        flight.set(frames_arrive=False)
+        flight.run(0.04, follow=False)
+        flight.set(frames_arrive=True)
+        flight.run(0.04, follow=False)
+    assert len(said(flight)) <= 1
+    assert flight.phase is Phase.PREFLIGHT
+
+
+@pytest.mark.parametrize("open_s", [0.1, 4.0])
+def test_an_open_aisle_ends_an_ordered_start(open_s: float) -> None:
+    flight = waiting()
+    flight.order(CommandKind.START)
+    flight.run(1.0, follow=False)
+    flight.set(aisle_closed=False)
+    flight.run(open_s, follow=False)
+    flight.set(aisle_closed=True)
+    flight.run(30.0, follow=False)
+    assert (flight.phase, flight.mission.reason) == (Phase.PREFLIGHT, "waiting for the start command")
+    assert said(flight)[-1] == "the start command is void: the aisle is not closed"
+
+
+def test_who_orders_a_start_that_comes_by_itself_is_told_what_it_waits_for() -> None:
     flight = starting_by_itself()
     flight.set(battery_frac=0.1)
-    flight.run(10.0, follow=False)
-    assert flight.phase is Phase.PREFLIGHT
-    flight.set(battery_frac=1.0)
-    flight.run(1.1, follow=False)
-    assert "arms in 2 s" in flight.mission.reason
+    flight.run(0.1, follow=False)
+    flight.order(CommandKind.START)
+    assert said(flight)[-1] == "starts already: battery at 10%, 30% needed to start"
 
 
-def test_a_vehicle_that_does_not_arm_is_asked_again_only_after_another_count_down() -> None:
+def test_a_vehicle_that_does_not_arm_by_itself_is_given_up_for_good() -> None:
     flight = starting_by_itself()
-    flight.run(7.2, follow=False)  # armed by nobody
-    assert flight.phase is Phase.PREFLIGHT
-    assert "arms in" in flight.mission.reason
+    flight.run(70.0, follow=False)  # armed by nobody
+    assert flight.phase is Phase.ABORTED
 
 
 @pytest.mark.parametrize("kind", [CommandKind.STOP, CommandKind.LAND])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import itertools
 
+import pytest
+
 from flightd.app.setpoint_pump import SetpointPump
 from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, VehicleState
 from flightd.runtime.clock import LoopClock
@@ -92,5 +94,20 @@ def test_a_setpoint_at_which_the_adapter_fails_is_counted_and_the_next_goes_out(
         assert pump.failed == 1
         running.cancel()
         await asyncio.wait([running])
+
+    virtual(test())
+
+
+def test_an_adapter_that_goes_on_failing_is_not_left_alone_with_the_vehicle() -> None:
+    """Its heartbeats would go on: the daemon ends, and hands the vehicle back to land."""
+
+    async def test() -> None:
+        clock = LoopClock()
+        wire = Wire(clock)
+        wire.broken = True
+        pump = SetpointPump(wire, clock, lambda *_: None)
+        pump.set(AttitudeSetpoint(clock.now_ns()))
+        with pytest.raises(ValueError, match="does not fit"):
+            await asyncio.wait_for(pump.run(), 1.0)
 
     virtual(test())

@@ -39,6 +39,7 @@ class ArduPilotVehicle(MavlinkVehicle):
     the height would then be half of full power."""
 
     firmware = Firmware.ARDUPILOT
+    watches_beats = True
     flying_mode: int = GUIDED_NOGPS
     landing_mode = LAND
     parameter_names = (_GUID_OPTIONS, _SPEED_UP, _SPEED_DOWN)

@@ -61,7 +61,7 @@ class Examination:
         self._system_id = system_id
         self._job = job or Job()
         transport = make_transport(parse_endpoint(url))
-        codec = Codec(self._job.own_system_id, signing=signing)
+        codec = Codec(system_id, signing=signing)  # it is not the daemon, which the failsafe watches
         self._link = MavlinkLink(transport, codec, clock, system_id, self._take)
         self._commander = Commander(self._link, system_id)
         self._parameters = Parameters(self._link, system_id, bytewise=False)

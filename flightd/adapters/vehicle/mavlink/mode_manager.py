@@ -211,7 +211,7 @@ class ModeArmingManager:
         if demand not in _ENGAGED or self._demand not in _ENGAGED:
             self._authority.release()
         if demand is Demand.FLY:
-            self._was_armed = self._telemetry.armed and self._authority.held == self._firmware.flying_mode
+            self._was_armed = self._telemetry.armed and self._authority.held is not None
         self._demand = demand
         self._refused = None
         self._wake.set()
@@ -288,14 +288,17 @@ class ModeArmingManager:
 
     async def _disarm(self, held: int) -> None:
         """Stop the motors on the floor.  Where the range finder has it off the floor, rightly or not, the
-        autopilot lands it and disarms by itself."""
+        autopilot is told to land: it disarms once its own detector finds the floor (ArduCopter's does not
+        while a healthy range finder reads more than 2 m)."""
         off_m = self.off_floor_m
         if off_m is None:
             await self._ask("disarming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
             return
+        self._refuse(OffFloor(off_m))
         if held != self._firmware.landing_mode:
             await self._ask_mode(self._firmware.landing_mode)
-        self._refuse(OffFloor(off_m))
+            if self._refused is None and self._still(Demand.DISARM):
+                self._refuse(OffFloor(off_m))
 
     def _land_unheard(self) -> None:
         """Bring down a vehicle that may hear us: by setpoints first, where they can sink it, for they brake

@@ -50,6 +50,16 @@ class ParameterUnread(Refusal):
 
 
 @dataclass(frozen=True, slots=True)
+class SharedSystemId(Refusal):
+    """Another sender's heartbeats would keep the vehicle in the air if this computer died."""
+
+    own_system_id: int
+
+    def __str__(self) -> str:
+        return f"somebody else sends heartbeats as system {self.own_system_id} (vehicle.own_system_id)"
+
+
+@dataclass(frozen=True, slots=True)
 class NoWayDown(Refusal):
     """A parameter by which the vehicle would stay in the air if this computer died."""
 
@@ -64,6 +74,8 @@ def no_way_down(rules: Sequence[Rule], read: Callable[[Names], tuple[str, float]
     where it would land."""
     for rule in rules:
         found = read(rule.names)
+        if found is None and rule.optional:
+            continue
         if found is None:
             return ParameterUnread(rule.names[0])
         if finding := judge(rule, found):

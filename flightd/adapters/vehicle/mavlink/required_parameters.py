@@ -26,6 +26,8 @@ class Rule:
     expected: str
     reason: str
     better: float | None = None
+    optional: bool = False
+    """Versions that do not have it do as they should."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,6 +285,18 @@ def _supervised(own_system_id: int) -> Rule:
     )
 
 
+def _alone(own_system_id: int) -> Rule:
+    return Rule(
+        ("MAV_GCS_SYSID_HI",),
+        lambda value: value <= own_system_id,
+        "0",
+        "above MAV_GCS_SYSID all systems up to it count as this computer: a ground station would hold off"
+        " the landing",
+        0,
+        optional=True,
+    )
+
+
 RULES: dict[Firmware, tuple[Rule, ...]] = {Firmware.ARDUPILOT: _ARDUPILOT, Firmware.PX4: _PX4}
 
 
@@ -290,7 +304,7 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
     """The firmware's table, with the rules that the job adds or makes stricter in their places."""
     extra: tuple[Rule, ...] = ()
     if firmware is Firmware.ARDUPILOT:
-        extra += (_supervised(job.own_system_id),)
+        extra += (_supervised(job.own_system_id), _alone(job.own_system_id))
         if job.cells is not None:
             extra += (_low_volt(job.cells),)
         if job.guided:
@@ -311,7 +325,7 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
     return (*table, *stricter.values())
 
 
-_LANDS = frozenset({"FS_GCS_ENABLE", "SYSID_MYGCS", "COM_OBL_RC_ACT"})
+_LANDS = frozenset({"FS_GCS_ENABLE", "SYSID_MYGCS", "MAV_GCS_SYSID_HI", "COM_OBL_RC_ACT"})
 _LANDS_WITHIN = {Firmware.ARDUPILOT: "FS_GCS_TIMEOUT", Firmware.PX4: "COM_OF_LOSS_T"}
 
 

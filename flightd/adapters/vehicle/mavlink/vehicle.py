@@ -19,7 +19,7 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
-from flightd.adapters.vehicle.mavlink.refusal import WrongFirmware, no_way_down
+from flightd.adapters.vehicle.mavlink.refusal import SharedSystemId, WrongFirmware, no_way_down
 from flightd.adapters.vehicle.mavlink.required_parameters import Names, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
@@ -103,17 +103,20 @@ class MavlinkVehicle(abc.ABC):
     """Those of them without which it is not flown."""
     rates_hz: ClassVar[dict[int, float]] = RATES_HZ
     climb_from: ClassVar[ClimbSource] = ClimbSource.GLOBAL_POSITION
+    watches_beats: ClassVar[bool] = False
+    """Whether its failsafe goes by the heartbeats of one system, which has to be this computer alone."""
 
     def __init__(self, url: str, clock: Clock, options: MavlinkOptions = DEFAULTS) -> None:
         system_id = options.system_id
         self._clock = clock
-        self._system_id = system_id
+        self._system_id, self._own_system_id = system_id, options.own_system_id
         self._sync = ClockSync()
         self._telemetry = MavlinkTelemetry(self._sync, self.climb_from, options.range_finder)
         self._pose_output = None if options.pose_form is None else PoseOutput(options.pose_form)
         transport = make_transport(parse_endpoint(url), options.opener)
-        codec = Codec(options.own_system_id, signing=options.signing)
-        self.link = MavlinkLink(transport, codec, clock, system_id, self._received)
+        codec = Codec(system_id, signing=options.signing)
+        beats = Codec(options.own_system_id, signing=options.signing) if self.watches_beats else codec
+        self.link = MavlinkLink(transport, codec, clock, system_id, self._received, beats)
         self._commander = Commander(self.link, system_id)
         self._modes = ModeArmingManager(self, self._commander, self._telemetry, clock)
         self._steering = SetpointShaper(self._modes, self._telemetry)
@@ -207,6 +210,8 @@ class MavlinkVehicle(abc.ABC):
 
     def no_way_down(self) -> Refusal | None:
         """Why the vehicle would stay in the air if this computer died; None where it would land."""
+        if self.link.hears_namesake(self._clock.now_ns()):
+            return SharedSystemId(self._own_system_id)
         return no_way_down(self._way_down, self.parameters.get)
 
     def sinks_unmeasured(self) -> bool:
@@ -275,7 +280,7 @@ class MavlinkVehicle(abc.ABC):
         await work()
 
     async def _read_parameters(self) -> None:
-        way_down = tuple(rule.names for rule in self._way_down)
+        way_down = tuple(rule.names for rule in sorted(self._way_down, key=lambda rule: rule.optional))
         await self.parameters.keep((*self.parameter_names, *way_down), self.required_names)
 
     async def _mind_beats(self) -> None:

@@ -280,7 +280,8 @@ class MavsdkVehicle:
 
     def _take_cells(self, message: Any, _now_ns: int) -> None:
         volts_mv = whole_list(message.fields_json, "voltages")
-        if volts_mv is not None:
+        ours = message.system_id == self._system_id and whole_fields(message.fields_json, "id") == (0,)
+        if ours and volts_mv is not None:
             self._readings.take_cells(volts_mv)
 
     async def _read_parameters(self, library: Library) -> None:

@@ -8,7 +8,7 @@ from enum import Enum
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser, Message
+from flightd.adapters.vehicle.mavlink.link.codec import COMPANION, Codec, FrameParser, Message
 from flightd.adapters.vehicle.mavlink.link.endpoint import Endpoint
 from flightd.adapters.vehicle.mavlink.link.reconnection import Reconnection
 from flightd.adapters.vehicle.mavlink.link.transport import Source, Transport
@@ -16,6 +16,7 @@ from flightd.ports import Clock
 
 _HEARTBEAT_S = 0.25
 _PARSERS_MAX = 16
+_NAMESAKE_NS = 5_000_000_000
 _LATE_MAX, _LATE_RUN_MAX = 64, 16
 _STATES = frozenset({"HEARTBEAT", "EXTENDED_SYS_STATE"})
 """Messages of which only the newest counts and which carry no time stamp of their own."""
@@ -32,8 +33,9 @@ _FIRMWARES = {firmware.value: firmware for firmware in Firmware}
 
 
 class MavlinkLink:
-    """Sends and receives as the companion (component 191, with the system id of the `codec`) of one vehicle,
-    which has the `system_id`.
+    """Sends and receives as the companion (component 191) of one vehicle.  Heartbeats are packed by `beats`,
+    whose system id may be one that the autopilot's failsafe watches; everything else comes from the `codec`,
+    with the vehicle's, else no ground station would show it.
 
     `on_message(message, now_ns)` gets every sound message of that vehicle's autopilot, its HEARTBEAT
     included; what others say (ground stations, gimbals, other vehicles) is not passed on.
@@ -46,9 +48,12 @@ class MavlinkLink:
         clock: Clock,
         system_id: int,
         on_message: Callable[[Message, int], None],
+        beats: Codec | None = None,
     ) -> None:
         self._transport = transport
         self._codec = codec
+        self._beats = beats or codec
+        self._namesake_ns: int | None = None
         self._clock = clock
         self._system_id = system_id
         self._on_message = on_message
@@ -64,9 +69,9 @@ class MavlinkLink:
         self.received = 0
         transport.received = self._received
 
-    @property
-    def own_system_id(self) -> int:
-        return self._codec.system_id
+    def hears_namesake(self, now_ns: int) -> bool:
+        """Somebody else has just sent heartbeats with the system id of ours."""
+        return self._namesake_ns is not None and now_ns - self._namesake_ns < _NAMESAKE_NS
 
     @property
     def endpoint(self) -> Endpoint:
@@ -81,16 +86,15 @@ class MavlinkLink:
         autopilot's side tolerates seven lost ones."""
         lost = self._reconnection.lost
         while not lost.is_set():
-            self.send(
-                dialect.MAVLink_heartbeat_message(
-                    dialect.MAV_TYPE_ONBOARD_CONTROLLER,
-                    dialect.MAV_AUTOPILOT_INVALID,
-                    0,
-                    0,
-                    self.system_status,
-                    3,
-                )
+            beat = dialect.MAVLink_heartbeat_message(
+                dialect.MAV_TYPE_ONBOARD_CONTROLLER,
+                dialect.MAV_AUTOPILOT_INVALID,
+                0,
+                0,
+                self.system_status,
+                3,
             )
+            self._pass(self._beats.pack(beat))
             try:
                 async with asyncio.timeout(_HEARTBEAT_S):
                     await lost.wait()
@@ -100,7 +104,10 @@ class MavlinkLink:
 
     def send(self, message: Message) -> bool:
         """Pack and hand over one message; False when the line could not take it."""
-        out = self._transport.send(self._codec.pack(message))
+        return self._pass(self._codec.pack(message))
+
+    def _pass(self, frame: bytes) -> bool:
+        out = self._transport.send(frame)
         self.sent += out
         self.dropped += not out
         return out
@@ -129,8 +136,17 @@ class MavlinkLink:
         self._late += 1
         return message.get_type() in _STATES
 
+    def _is_namesake(self, message: Message) -> bool:
+        """A heartbeat by which the autopilot would believe us alive; not our own, come back by a router."""
+        own = self._beats.system_id
+        if own == self._system_id or message.get_type() != "HEARTBEAT" or message.get_srcSystem() != own:
+            return False
+        return bool(message.get_srcComponent() != COMPANION)
+
     def _sort(self, message: Message, source: Source, now_ns: int) -> None:
         header = message.get_header()
+        if self._is_namesake(message):
+            self._namesake_ns = now_ns
         if header.srcSystem != self._system_id or header.srcComponent != dialect.MAV_COMP_ID_AUTOPILOT1:
             return
         if message.get_type() == "HEARTBEAT":

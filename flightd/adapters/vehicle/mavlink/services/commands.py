@@ -127,8 +127,7 @@ class Commander:
 
     def acknowledged(self, ack: Message) -> None:
         """Take a COMMAND_ACK; those for other clients are left alone."""
-        systems, components = {0, self._link.own_system_id}, {0, COMPANION}
-        if ack.target_system not in systems or ack.target_component not in components:
+        if ack.target_system not in {0, self._system_id} or ack.target_component not in {0, COMPANION}:
             return
         waiting = self._waiting.get(ack.command)
         if waiting is not None and not waiting.done():
