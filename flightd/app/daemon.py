@@ -15,12 +15,11 @@ from flightd.app.flight import Flight, Tasks
 from flightd.app.tick import Tick
 from flightd.core.errors import FlightdError, TransientError, UnavailableError
 from flightd.core.tick import TICK_S
-from flightd.core.types import Command, Phase
+from flightd.core.types import OVER, Command, Phase
 from flightd.runtime.supervisor import restarted
 
 _FIRST_HEARD_S = 2.0
 _TICK_NS = round(TICK_S * 1e9)
-_OVER = {Phase.DONE, Phase.ABORTED, Phase.PILOT}
 _SILENT_NS = 30_000_000_000
 """A vehicle that nobody heard for so long after the mission's end is not waited for."""
 _LINGER_NS = 1_500_000_000
@@ -102,7 +101,7 @@ class Daemon:
             late_s = (now_ns - due_ns) * 1e-9
             due_ns = max(due_ns, now_ns - _TICK_NS)  # late: leave ticks out, never bunch them
             output = self._tick.run(now_ns, late_s)
-            if output.phase not in _OVER:
+            if output.phase not in OVER:
                 continue
             over_ns = over_ns or now_ns
             state = vehicle.state()

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from flightd.core.tick import StepFailure, TickInput, TickOutput
 from flightd.core.types import CommandKind, Phase, Status, VehicleState
 
-_WAITING = frozenset({Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.HOLD, Phase.RELOCATE})
+_REASON_SHOWN = frozenset({Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.HOLD, Phase.RELOCATE})
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class Snapshot:
     @property
     def waits(self) -> bool:
         """It stands on the ground or holds, and the reason says what for."""
-        return self.phase in _WAITING
+        return self.phase in _REASON_SHOWN
 
     @property
     def height_m(self) -> float:

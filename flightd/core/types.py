@@ -375,6 +375,14 @@ class Phase(enum.StrEnum):
     PILOT = "pilot"
 
 
+OVER = frozenset({Phase.DONE, Phase.ABORTED, Phase.PILOT})
+"""Nothing leads on from these."""
+WAITING = frozenset({Phase.PREFLIGHT, Phase.SWAP})
+"""On the floor before a flight."""
+AT_STOP = frozenset({Phase.HOVER, Phase.CLIMB, Phase.SCAN})
+"""At a node that is visited: a scan's views are all straight above it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Status:
     """A `core.snapshot.Snapshot` as the flight log keeps it.

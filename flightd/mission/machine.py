@@ -13,7 +13,7 @@ import enum
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from flightd.core.types import CommandKind, Phase
+from flightd.core.types import OVER, WAITING, CommandKind, Phase
 from flightd.mission.safety.hazard_table import ACTIONS, PHASE_OF, Action, triggers_of
 from flightd.mission.triggers import Trigger
 
@@ -31,10 +31,8 @@ class Intent(enum.Enum):
     ADOPTED_STOP = "found flying, and down at once"
 
 
-_TERMINAL = frozenset({Phase.DONE, Phase.ABORTED, Phase.PILOT})
-_ON_GROUND = _TERMINAL | {Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP}
+_ON_GROUND = OVER | {Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP}
 _HALTED = frozenset({Phase.HOLD, Phase.RELOCATE})
-_WAITING = frozenset({Phase.PREFLIGHT, Phase.SWAP})
 FLYING = (
     Phase.TAKE_OFF, Phase.ACQUIRE, Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.CLIMB, Phase.SCAN, Phase.HOLD,
     Phase.RELOCATE,
@@ -52,7 +50,7 @@ _INTENTS: Mapping[Phase, tuple[Intent, ...]] = {
     **dict.fromkeys(FLYING, _ON_WAY),
     Phase.LAND: (*_ON_WAY, Intent.END, Intent.STOP, *_ADOPTED),
     Phase.SWAP: (Intent.WAIT, Intent.VISIT),
-    **dict.fromkeys(_TERMINAL, (Intent.END,)),
+    **dict.fromkeys(OVER, (Intent.END,)),
 }
 
 
@@ -75,12 +73,12 @@ class State:
     @property
     def over(self) -> bool:
         """Nothing leads on from here."""
-        return self.phase in _TERMINAL
+        return self.phase in OVER
 
     @property
     def waiting(self) -> bool:
         """On the floor before a flight."""
-        return self.phase in _WAITING
+        return self.phase in WAITING
 
     @property
     def returning(self) -> bool:
@@ -211,7 +209,7 @@ _OVER_PAD: Mapping[tuple[Trigger, Intent], tuple[Phase, Cause]] = {
 
 _ANY = {intent: intent for intent in Intent}
 _TURNS: Mapping[Trigger, tuple[Collection[Phase], Mapping[Intent, Intent]]] = {
-    Trigger.START: (_WAITING, {Intent.WAIT: Intent.VISIT, Intent.VISIT: Intent.VISIT}),
+    Trigger.START: (WAITING, {Intent.WAIT: Intent.VISIT, Intent.VISIT: Intent.VISIT}),
     Trigger.PAUSE: (FLYING, _ANY),
     Trigger.RESUME: (FLYING, _ANY),
     Trigger.GOTO: (FLYING, {Intent.VISIT: Intent.VISIT}),
@@ -256,9 +254,9 @@ def _begins(state: State, trigger: Trigger) -> Outcome | None:
 
 def _intent_of(state: State, phase: Phase, trigger: Trigger) -> Intent:
     """What a phase is for that a trigger begins."""
-    if phase in _TERMINAL:
+    if phase in OVER:
         return Intent.END
-    if phase in _WAITING:
+    if phase in WAITING:
         return Intent.WAIT
     if phase is Phase.RECOVER:
         return Intent.ADOPTED

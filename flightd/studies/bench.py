@@ -29,9 +29,8 @@ from flightd.runtime.undisturbed_start import undisturbed
 from flightd.sim.dataset.generate import generate
 from flightd.studies.baselines import BASELINES
 from flightd.studies.progress_bar import track
-from flightd.vision.line_detector import Detector
+from flightd.vision.line_detector import METHODS, Detector
 
-METHODS = ("centroid", "skeleton", "combined", "naive")
 SIZES = ((1920, 1080), (640, 360))
 LEVEL, FIRST_SEED, FRAMES = "perturbed", 700, 6
 UNIT = "cvtColor"

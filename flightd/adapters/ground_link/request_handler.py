@@ -38,7 +38,7 @@ from flightd.adapters.ground_link.protocol import (
     decode_envelope,
     decode_request,
 )
-from flightd.core.types import Command, CommandKind, Phase
+from flightd.core.types import WAITING, Command, CommandKind, Phase
 from flightd.mission.machine import BEGIN, possible_commands
 from flightd.site.site import Site
 
@@ -52,7 +52,6 @@ _TAKEN_OVER_NS = 3_000_000_000
 
 _URGENT = frozenset({CommandKind.LAND, CommandKind.STOP})
 """Never held back for being too many."""
-_WAITING = frozenset({Phase.PREFLIGHT, Phase.SWAP})
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,7 +225,7 @@ class RequestHandler:
 
     def _impossible(self, kind: CommandKind, phase: Phase) -> str:
         """Why the mission does not take an order now."""
-        if kind is CommandKind.START and phase in _WAITING and self.status is not None:
+        if kind is CommandKind.START and phase in WAITING and self.status is not None:
             return f"cannot {kind}: {self.status.reason}"
         return f"cannot {kind} in phase {phase}"
 

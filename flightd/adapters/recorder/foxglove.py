@@ -18,6 +18,8 @@ from typing import Any, TypeAlias
 
 import msgspec
 
+from flightd.core.types import VERTICAL_LIMIT_RAD
+
 JsonObject: TypeAlias = dict[str, Any]
 
 NS_PER_S = 1_000_000_000
@@ -32,7 +34,6 @@ _HORIZONTAL = {"r": 1.0, "g": 0.3, "b": 0.85, "a": 1.0}
 _WHITE = {"r": 1.0, "g": 1.0, "b": 1.0, "a": 1.0}
 _CLEAR = {"r": 0.0, "g": 0.0, "b": 0.0, "a": 0.0}
 _LINE_LOOP, _LINE_LIST = 2, 4
-_VERTICAL_LIMIT_RAD = math.radians(30.0)
 
 
 def _object(**properties: JsonObject) -> JsonObject:
@@ -199,7 +200,7 @@ def _stroke(
         }
         for along, across in corners
     ]
-    horizontal = _VERTICAL_LIMIT_RAD <= line.theta_rad <= math.pi - _VERTICAL_LIMIT_RAD
+    horizontal = VERTICAL_LIMIT_RAD <= line.theta_rad <= math.pi - VERTICAL_LIMIT_RAD
     return {
         "timestamp": time,
         "type": kind,

@@ -75,11 +75,12 @@ def _lay(table: dict[str, Any], key: str, value: object) -> None:
 
 
 def _value(key: str, text: str) -> object:
-    """A TOML value; a bare word is text, or a list of it where the key holds a list of texts."""
+    """A TOML value; a bare word is text, and words between commas are a list where the key holds a list of
+    texts."""
     try:
         return tomllib.loads(f"v = {text}")["v"]
     except tomllib.TOMLDecodeError:
-        return [text] if _is_list_of_texts(key) else text
+        return [word.strip() for word in text.split(",")] if _is_list_of_texts(key) else text
 
 
 def _is_list_of_texts(key: str) -> bool:

@@ -9,7 +9,16 @@ from typing import TypeVar
 from flightd.config.mission import MissionConfig
 from flightd.core.scanning import Finding, Settled
 from flightd.core.tick import StepFailure, TickInput, TickOutput
-from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, LandedState, Phase, VehicleState
+from flightd.core.types import (
+    OVER,
+    AttitudeSetpoint,
+    Demand,
+    Event,
+    EventLevel,
+    LandedState,
+    Phase,
+    VehicleState,
+)
 from flightd.mission.safety.hazard_table import ACTIONS
 from flightd.mission.triggers import Trigger
 
@@ -20,7 +29,6 @@ _GIVE_UP_NS = 60_000_000_000
 # constants: what is answered here calls as little as possible of what may have failed
 _WHY = Trigger.STEP_FAILED.value
 _ACTION = ACTIONS[Trigger.STEP_FAILED].value
-_OVER = frozenset({Phase.DONE, Phase.ABORTED, Phase.PILOT})
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +101,7 @@ class LastResort:
 
     def step(self, now_ns: int, vehicle: VehicleState | None, before: Phase) -> Fallback:
         """Level and down; `before` is the phase answered last."""
-        if before in _OVER:
+        if before in OVER:
             self._end = self._end or before
         silent_ns = _GIVE_UP_NS if vehicle is None else now_ns - vehicle.attitude.stamp_ns
         heard = silent_ns <= self._hold_ns

@@ -14,7 +14,16 @@ import numpy as np
 
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.topics import FOR_PEOPLE, RETAINED, Document, Topic
-from flightd.core.types import AttitudeSetpoint, Event, GridPose, LineSet, Phase, Status, VehicleState
+from flightd.core.types import (
+    AT_STOP,
+    AttitudeSetpoint,
+    Event,
+    GridPose,
+    LineSet,
+    Phase,
+    Status,
+    VehicleState,
+)
 from flightd.replay.log import FlightLog, read_log
 from flightd.replay.report.flight import (
     NS_PER_S,
@@ -34,7 +43,6 @@ from flightd.site.site_file import parse_site
 
 _SHORTEST_STOP_S = 0.2
 """A hover that the mission leaves at once is no stop."""
-_AT_STOP = {Phase.HOVER, Phase.CLIMB, Phase.SCAN}
 
 
 def load_flight(path: Path) -> RecordedFlight:
@@ -203,7 +211,7 @@ def _visits(
 ) -> Iterator[Visit]:
     """The stops: a hover, and the scan of the shelves there with all its views."""
     numbers = itertools.count(1)
-    for stops, grouped in itertools.groupby(statuses, key=lambda status: status.phase in _AT_STOP):
+    for stops, grouped in itertools.groupby(statuses, key=lambda status: status.phase in AT_STOP):
         run = list(grouped)
         seconds = [(status.stamp_ns - start_ns) / NS_PER_S for status in run]
         if not stops or seconds[-1] - seconds[0] < _SHORTEST_STOP_S:

@@ -280,8 +280,8 @@ class AutopilotPeer(abc.ABC):
             self._on_disarmed()
 
     @abc.abstractmethod
-    def _arming_refusal(self) -> str:
-        """What is against arming, as the autopilot says it; an empty text for nothing."""
+    def _arming_refusal(self) -> str | None:
+        """What is against arming, as the autopilot says it; None where nothing is."""
 
     @abc.abstractmethod
     def _on_armed(self) -> None: ...

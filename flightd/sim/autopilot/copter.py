@@ -132,7 +132,7 @@ class ArduCopterPeer(AutopilotPeer):
         self.say(dialect.MAV_SEVERITY_INFO, "Arming motors")
         self.link.broadcast(self._heartbeat())
 
-    def _arming_refusal(self) -> str:
+    def _arming_refusal(self) -> str | None:
         if not self.is_ready:
             return "PreArm: Gyros still settling"
         if self.arming_block:
@@ -143,7 +143,7 @@ class ArduCopterPeer(AutopilotPeer):
             return f"Arm: {self.mode.name} mode not armable"
         if self.mode in _NEEDS_POSITION and not self._config.has_position:
             return "PreArm: Need Position Estimate"
-        return ""
+        return None
 
     def _on_disarmed(self) -> None:
         self.say(dialect.MAV_SEVERITY_INFO, "Disarming motors")

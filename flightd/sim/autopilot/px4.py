@@ -136,7 +136,7 @@ class Px4Peer(AutopilotPeer):
         self.instruments.home_m = -self._config.home_leap_m
         self.say(dialect.MAV_SEVERITY_INFO, "Armed by external command")
 
-    def _arming_refusal(self) -> str:
+    def _arming_refusal(self) -> str | None:
         if not self.is_ready:
             return "Preflight Fail: system power unstable"
         if self.arming_block:
@@ -145,7 +145,7 @@ class Px4Peer(AutopilotPeer):
             return "Arming denied: no offboard signal"
         if self.mode == Px4Mode.AUTO_LAND:
             return "Arming denied: mode not armable"
-        return ""
+        return None
 
     def _on_disarmed(self) -> None:
         self.say(dialect.MAV_SEVERITY_INFO, "Disarmed")

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from flightd.core.types import Event, EventLevel, Phase
+from flightd.core.types import AT_STOP, Event, EventLevel, Phase
 from flightd.sim.judge.clearance import clearances
 from flightd.sim.judge.evidence import FlightEvidence
 from flightd.sim.judge.meant_leg import off_leg
@@ -23,8 +23,6 @@ from flightd.sim.judge.motion import OFF_FLOOR_M, TrueMotion, Values
 
 _AT_NODE_M = 0.5
 """A node counts as visited rightly when the drone was within this of it (less than half a cell)."""
-_AT_STOP = {Phase.HOVER, Phase.CLIMB, Phase.SCAN}
-"""A scan's views are all straight above the node."""
 _LAND_BEGINS = re.compile(r"(?!land )\w+ -> land: .*")
 """An event of this phase is a warning where the landing is not the plan's."""
 _CONTROL_GAP_S = 0.5
@@ -161,7 +159,7 @@ def _hover_errors(flight: FlightEvidence, visits: Iterable[Event]) -> list[float
 
 
 def _stops_at(flight: FlightEvidence, stamp_s: float) -> bool:
-    return flight.phase_at(round(stamp_s * 1e9)) in _AT_STOP
+    return flight.phase_at(round(stamp_s * 1e9)) in AT_STOP
 
 
 def _flight_time_s(motion: TrueMotion) -> float:

@@ -392,26 +392,6 @@ def test_an_arming_that_comes_after_its_start_is_void_is_taken_back() -> None:
     virtual(test())
 
 
-def test_what_is_not_disarmed_off_the_floor_is_landed_by_its_autopilot() -> None:
-    async def test() -> None:
-        async with scripted() as (autopilot, vehicle):
-            vehicle.demand(Demand.FLY)
-            await asyncio.sleep(2.5)
-            down = dialect.MAV_SENSOR_ROTATION_PITCH_270
-            autopilot.say(
-                dialect.MAVLink_distance_sensor_message(0, 5, 800, 90, 0, 1, down, 0)
-            )  # stuck, or not
-            autopilot.say(dialect.MAVLink_extended_sys_state_message(0, 1))
-            await asyncio.sleep(0.1)
-            vehicle.demand(Demand.DISARM)
-            await asyncio.sleep(0.5)
-            assert [m.param1 for m in autopilot.commands(ARM)] == [1]
-            assert autopilot.commands(SET_MODE)[-1].param2 == LAND
-            assert "0.9 m" in words(known(vehicle).refusal)
-
-    virtual(test())
-
-
 @pytest.mark.parametrize(("distance_cm", "disarms"), [(10, True), (150, False), (None, False)])
 def test_leaving_it_disarms_only_what_the_range_finder_too_has_on_the_floor(
     distance_cm: int | None, disarms: bool

@@ -29,8 +29,7 @@ from flightd.mission.reasons import in_words
 from flightd.mission.safety.last_resort import LastResort
 from flightd.pilot import Pilot
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
-from tests.sim.ideal.test_ideal_scan import CONFIG, scan_flight
-from tests.unit.mission.shelves import SITE
+from tests.sim.ideal.test_ideal_scan import scan_flight
 
 PACKAGE = str(Path(flightd.__file__).parent)
 MANY = int(os.environ.get("FLIGHTD_FAILURES", "10"))
@@ -179,7 +178,7 @@ class Broken:
 
 def test_whoever_fails_at_being_told_ends_no_flight_and_is_named_once() -> None:
     display, kept = Broken(), list[tuple[str, Any]]()
-    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=5, observers=[display])
+    flight = scan_flight(("A2",), observers=[display])
     flight.on_record = lambda topic, _stamp_ns, message: kept.append((topic, message))
     assert flight.fly(120.0).phase is Phase.DONE
     assert display.told > 100
@@ -199,7 +198,7 @@ def test_the_words_for_a_failure_may_fail_too() -> None:
 
 
 def test_a_mission_that_is_given_up_takes_no_command() -> None:
-    pilot = IdealFlight(SITE, CONFIG, visits=("A2",), seed=5).pilot
+    pilot = scan_flight(("A2",)).pilot
 
     def fail(_: MissionInputs) -> Guidance:
         raise ValueError("broken")

@@ -7,6 +7,7 @@ import os
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -33,9 +34,9 @@ STOCK = Stock(
 )
 
 
-def scan_flight(visits: tuple[str, ...] = NODES, seed: int = 5) -> IdealFlight:
+def scan_flight(visits: tuple[str, ...] = NODES, seed: int = 5, **others: Any) -> IdealFlight:
     front = IdealFront(SITE, SIGHT, STOCK)
-    return IdealFlight(SITE, CONFIG, visits=visits, seed=seed, front=front)
+    return IdealFlight(SITE, CONFIG, visits=visits, seed=seed, front=front, **others)
 
 
 def findings(flown: Flown) -> dict[str, Finding]:

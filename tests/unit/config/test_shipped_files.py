@@ -47,7 +47,7 @@ def test_every_file_of_configs_is_in_the_wheel(installed: Path) -> None:
 
 def test_what_is_in_the_package_beside_its_code_is_in_the_wheel(installed: Path) -> None:
     package = ROOT / "flightd"
-    suffixes = {".npz", ".html", ".css", ".js", ".md", ".typed", ".toml"}
+    suffixes = {".npz", ".html", ".css", ".js", ".md", ".typed", ".toml", ".svg", ".json"}
     beside = {path.relative_to(package) for path in package.rglob("*") if path.suffix in suffixes}
     missing = {path for path in beside if not (installed / "flightd" / path).is_file()}
     assert not missing

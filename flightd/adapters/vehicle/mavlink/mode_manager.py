@@ -248,6 +248,8 @@ class ModeArmingManager:
         params = self._firmware.mode_params(self._firmware.landing_mode)
         if self.stands and self._telemetry.height_m(self._clock.now_ns()) < _FLOOR_M:  # not when unknown
             command, params = dialect.MAV_CMD_COMPONENT_ARM_DISARM, (0.0,)
+        else:
+            self._authority.ask(self._firmware.landing_mode, self._telemetry.custom_mode)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_HAND_BACK_S):
                 await self._commander.send(command, *params, patience_s=_HAND_BACK_ANSWER_S)
@@ -281,24 +283,12 @@ class ModeArmingManager:
                 await self._ask("arming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
             case Demand.LAND if held is not None and held != firmware.landing_mode:
                 await self._ask_mode(firmware.landing_mode)
+            case Demand.DISARM if held is not None and armed and (off_m := self.off_floor_m) is not None:
+                self._refuse(OffFloor(off_m))
             case Demand.DISARM if held is not None and armed:
-                await self._disarm(held)
+                await self._ask("disarming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
             case _:
                 pass
-
-    async def _disarm(self, held: int) -> None:
-        """Stop the motors on the floor.  Where the range finder has it off the floor, rightly or not, the
-        autopilot is told to land: it disarms once its own detector finds the floor (ArduCopter's does not
-        while a healthy range finder reads more than 2 m)."""
-        off_m = self.off_floor_m
-        if off_m is None:
-            await self._ask("disarming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
-            return
-        self._refuse(OffFloor(off_m))
-        if held != self._firmware.landing_mode:
-            await self._ask_mode(self._firmware.landing_mode)
-            if self._refused is None and self._still(Demand.DISARM):
-                self._refuse(OffFloor(off_m))
 
     def _land_unheard(self) -> None:
         """Bring down a vehicle that may hear us: by setpoints first, where they can sink it, for they brake
