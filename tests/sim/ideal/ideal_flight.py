@@ -120,6 +120,7 @@ class IdealFlight:
         observers: Sequence[Callable[[Snapshot], None]] = (),
     ) -> None:
         self._observers = observers
+        config = config.with_values(mission={"autostart_countdown_s": 0.0})  # it has tests of its own
         self._config, self._site = config, site
         self.pilot = pilot_of(config, site, FlightOrder(visits, autostart=config.mission.autostart))
         self._front = front
