@@ -185,7 +185,8 @@ class Mission:
 
     def _triggers(self, s: MissionInputs) -> set[Trigger]:
         """What has happened by this tick.  Turning back acts at once."""
-        may_start = self.state.waiting and self._may_start(s)
+        obstacle = self._grounded(s) if self.state.waiting else None
+        may_start = self.state.waiting and self._may_start(s.now_ns, obstacle)
         found = self._progress.step(s, self.state, may_start=may_start)
         found |= self._orders.urgent
         if self._losses.ground_lost(s):
@@ -197,10 +198,9 @@ class Mission:
             found.add(Trigger.TIMED_OUT)
         if s.failed:
             found.add(Trigger.STEP_FAILED)
-        void = self._clearance.is_void(s.now_ns) or self._aisle_opened(s)
-        if void and Trigger.START_EXPIRED in taken_in(self.state):
+        if self._clearance.is_void(s.now_ns, obstacle) and Trigger.START_EXPIRED in taken_in(self.state):
             found.add(Trigger.START_EXPIRED)
-            self._void_start(s.now_ns)
+            self._void_start(s.now_ns, obstacle)
         if Trigger.FOUND_FLYING in found:  # an order to land or stop stands until it may be obeyed
             found -= self._orders.urgent
         found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))
@@ -214,21 +214,16 @@ class Mission:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._progress.adopting(s, self.phase) else found
 
-    def _may_start(self, s: MissionInputs) -> bool:
+    def _may_start(self, now_ns: int, obstacle: Reason | None) -> bool:
         """Nothing keeps it on the ground, and its start is counted down."""
-        obstacle = self._grounded(s)
-        self._clearance.look_again(s.now_ns, obstacle, ordered=self.state.intent is Intent.VISIT)
-        return obstacle is None and self._clearance.counted_down(s.now_ns)
+        self._clearance.look_again(now_ns, obstacle, ordered=self.state.intent is Intent.VISIT)
+        return obstacle is None and self._clearance.counted_down(now_ns)
 
-    def _aisle_opened(self, s: MissionInputs) -> bool:
-        """During the count-down of an order."""
-        return self.state.waiting and self._clearance.ends_order(self._grounded(s))
-
-    def _void_start(self, now_ns: int) -> None:
+    def _void_start(self, now_ns: int, obstacle: Reason | None) -> None:
         """A start that came to nothing is not kept for later."""
         self._clearance.void(now_ns)
         if self.state.waiting:
-            self._clearance.report_void(now_ns)
+            self._clearance.report_void(now_ns, obstacle)
             self._turn(Trigger.START_EXPIRED)
 
     def _landed(self) -> set[Trigger]:

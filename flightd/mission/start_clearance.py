@@ -73,13 +73,6 @@ class StartClearance:
             if not self.counted_down(now_ns):
                 self._report_countdown(now_ns)
 
-    def ends_order(self, obstacle: Reason | None) -> bool:
-        """An order does not outlast an open aisle: whoever closes it behind himself must not start the
-        drone."""
-        ends = self._order.given and not self.autostart and obstacle is Plain.AISLE_OPEN
-        self._obstacle = obstacle if ends else self._obstacle
-        return ends
-
     def report_waiting(self, now_ns: int) -> None:
         """A start is ordered where one is under way: say what it waits for."""
         waits = StartsIn(self._order.left_s(now_ns)) if self._obstacle is None else self._obstacle
@@ -107,13 +100,15 @@ class StartClearance:
         self._order.withdraw()
         self._void_ns = now_ns
 
-    def is_void(self, now_ns: int) -> bool:
-        """The start has not armed in time."""
-        return self._order.is_void(now_ns)
+    def is_void(self, now_ns: int, obstacle: Reason | None) -> bool:
+        """The start has not armed in time; or it was ordered and an aisle opened: whoever closes it behind
+        himself must not start the drone."""
+        opened = self._order.given and not self.autostart and obstacle is Plain.AISLE_OPEN
+        return opened or self._order.is_void(now_ns)
 
-    def report_void(self, now_ns: int) -> None:
+    def report_void(self, now_ns: int, obstacle: Reason | None) -> None:
         """Say that a start came to nothing, and for what."""
-        why = "" if self._obstacle is None else f": {in_words(self._obstacle)}"
+        why = "" if obstacle is None else f": {in_words(obstacle)}"
         self._events.report(now_ns, EventLevel.WARNING, "start", f"{Trigger.START_EXPIRED.value}{why}")
 
     def disarms(self, now_ns: int) -> bool:
