@@ -120,6 +120,21 @@ def test_the_rate_of_heartbeats_is_measured_and_a_slow_one_is_named() -> None:
     virtual(test())
 
 
+@pytest.mark.parametrize(
+    ("make_peer", "name"), [(ArduCopterPeer, "EK3_SRC1_POSZ"), (Px4Peer, "EKF2_HGT_REF")]
+)
+def test_a_climb_rate_that_comes_from_the_range_finder_is_named(
+    make_peer: type[ArduCopterPeer | Px4Peer], name: str
+) -> None:
+    async def test() -> None:
+        async with examined(make_peer, **{name: 2}) as (_, examination):
+            (finding,) = [one for one in (await examination.report()).findings if one.name == name]
+            assert "barometer" in finding.expected
+            assert "sticks" in finding.reason
+
+    virtual(test())
+
+
 def test_an_armed_vehicle_is_left_alone() -> None:
     async def test() -> None:
         async with examined(ArduCopterPeer) as (peer, examination):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -87,10 +88,23 @@ def test_jitter_leaves_the_mapped_time_within_the_least_delay_seen(offset: int, 
         taken = i * 33_000_000
         stamp = clock.to_ours(taken + offset, taken + 60_000_000 + delay)
         assert stamp is not None
-        assert 0 <= stamp - taken < 200_000  # drift allowance only: 50 ppm
+        assert 0 <= stamp - taken < 700_000  # what two clocks may drift apart, 300 ppm
 
 
 MS = 1_000_000
+
+
+@pytest.mark.parametrize("ppm", [-200, 200])
+def test_frames_of_a_clock_that_drifts_grow_no_older_in_ten_minutes(ppm: int) -> None:
+    clock = DeviceClock(latency_ns=60 * MS)
+    jitter = np.random.default_rng(3).integers(0, 10 * MS, 18_000)
+    errors = []
+    for k, late_ns in enumerate(jitter.tolist()):
+        taken = k * 33 * MS
+        stamp = clock.to_ours(round(taken * (1.0 + ppm * 1e-6)), taken + 60 * MS + late_ns)
+        assert stamp is not None
+        errors.append(stamp - taken)
+    assert np.percentile(np.abs(errors[300:]), 99) < 2 * MS
 
 
 def test_a_message_that_comes_late_and_out_of_order_has_no_time_and_moves_nothing() -> None:
@@ -101,14 +115,14 @@ def test_a_message_that_comes_late_and_out_of_order_has_no_time_and_moves_nothin
     assert clock.to_ours(2 * 33 * MS + 10**12, 7 * 33 * MS) is None, "150 ms late"
     assert clock.to_ours(6 * 33 * MS + 10**12, 7 * 33 * MS) is None, "a second time"
     stamp = clock.to_ours(8 * 33 * MS + 10**12, 8 * 33 * MS + 5 * MS)
-    assert stamp == pytest.approx(8 * 33 * MS, abs=10_000)
+    assert stamp == pytest.approx(8 * 33 * MS, abs=30_000)
 
 
 def test_a_lone_straggler_after_a_long_silence_is_no_device_that_counts_anew() -> None:
     clock = DeviceClock(latency_ns=0)
     clock.to_ours(10_000 * MS, 0)
     assert clock.to_ours(9_900 * MS, 3_000 * MS) is None
-    assert clock.to_ours(13_033 * MS, 3_033 * MS) == pytest.approx(3_033 * MS, abs=200_000)
+    assert clock.to_ours(13_033 * MS, 3_033 * MS) == pytest.approx(3_033 * MS, abs=MS)
     assert clock.to_ours(9_933 * MS, 6_000 * MS) is None
     assert clock.to_ours(9_966 * MS, 6_001 * MS) is None
 
@@ -130,4 +144,4 @@ def test_whatever_the_order_of_arrival_stamps_only_grow_and_are_true(order: list
     stamps = [(k, stamp) for k, stamp in taken if stamp is not None]
     assert [k for k, _ in stamps] == sorted(k for k, _ in stamps)
     first_delay = (400 - order[0] * 30) * MS
-    assert all(stamp <= k * 30 * MS + first_delay + 100_000 for k, stamp in stamps)
+    assert all(stamp <= k * 30 * MS + first_delay + 200_000 for k, stamp in stamps)

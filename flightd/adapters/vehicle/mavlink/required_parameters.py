@@ -72,6 +72,8 @@ def _has_bits(bits: int) -> Callable[[float], bool]:
     return lambda value: int(value) & bits == bits
 
 
+_CLIMB = "the climb rate shows a range finder that sticks: it must not come from the same one"
+
 _ARDUPILOT: tuple[Rule, ...] = (
     Rule(
         ("GUID_TIMEOUT",),
@@ -137,9 +139,9 @@ _ARDUPILOT: tuple[Rule, ...] = (
     ),
     Rule(
         ("EK3_SRC1_POSZ",),
-        _one_of(1, 2, 6),
-        "1 (barometer), 2 (range finder) or 6 (external)",
-        "there is no GPS in the hall",
+        _one_of(1),
+        "1 (barometer)",
+        _CLIMB,
         1,
     ),
     Rule(("EK3_SRC1_VELZ",), _one_of(0, 6), "0 (none) or 6 (external)", "there is no GPS in the hall", 0),
@@ -211,9 +213,9 @@ _PX4: tuple[Rule, ...] = (
     Rule(("EKF2_GPS_CTRL",), _one_of(0), "0", "indoors a GPS reports nonsense", 0),
     Rule(
         ("EKF2_HGT_REF",),
-        _one_of(0, 2, 3),
-        "0 (barometer), 2 (range finder) or 3 (vision)",
-        "there is no GPS in the hall",
+        _one_of(0),
+        "0 (barometer)",
+        _CLIMB,
         0,
     ),
     Rule(("MPC_THR_HOVER",), _within(0.1, 0.8), "0.1 to 0.8", "the first guess of the hover thrust"),
