@@ -34,6 +34,11 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_PATIENCE] = Patience(float(config.getini("realtime_patience_s")))
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whole flights first: one that began last would keep one core busy while the others wait."""
+    items.sort(key=lambda item: (item.get_closest_marker("slow") is None, "/sim/" not in item.nodeid))
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     """A test that flies by the clock is skipped on a machine too busy for it; in CI it flies all the same.

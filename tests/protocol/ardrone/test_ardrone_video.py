@@ -285,6 +285,7 @@ def test_each_picture_goes_to_the_camera_it_shows_and_none_during_the_switch() -
                 0.0,
                 b.clock,
                 {kind: taken.append for kind, taken in tickets.items()},
+                held,
             )
             task = asyncio.create_task(camera.run())
             await b.configured()
