@@ -6,9 +6,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Generator
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
+from xdist.scheduler.loadscope import LoadScopeScheduling
 
 from tests.command import Command
 from tests.rigs.machine import Meter, Needs, Patience
@@ -18,6 +20,13 @@ settings.register_profile(
 )
 settings.load_profile("flightd")
 
+_COSTLY = {
+    "tests/bench/test_vision_cost.py",
+    "tests/sim/flights/test_scan_flight.py",
+    "tests/sim/ideal/test_height_changes.py",
+    "tests/sim/pictures/test_shelf_reading.py",
+    "tests/unit/cli/test_vision_commands.py",
+}
 _IN_CI = os.environ.get("CI", "") == "true"
 _PATIENCE = pytest.StashKey[Patience]()
 
@@ -35,8 +44,21 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whole flights first: one that began last would keep one core busy while the others wait."""
+    """Whole flights first: one that began last would keep one core busy while the other waits."""
     items.sort(key=lambda item: (item.get_closest_marker("slow") is None, "/sim/" not in item.nodeid))
+
+
+class _CostlyTogether(LoadScopeScheduling):  # type: ignore[misc]  # its library has no types
+    """The tests of a module that share what took long to make stay on one worker; others go anywhere."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        module = nodeid.partition("::")[0]
+        return module if module in _COSTLY else nodeid
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
+    return _CostlyTogether(config, log)
 
 
 @pytest.hookimpl(wrapper=True)

@@ -9,8 +9,6 @@ import pytest
 
 from flightd.studies.bench import UNIT, Timing, bench
 
-pytestmark = pytest.mark.xdist_group("vision cost")
-
 LIMITS = {"centroid": 1.6, "skeleton": 1.6, "combined": 2.5}
 """Ceilings against a slow change creeping in; what is reached is about half of them."""
 

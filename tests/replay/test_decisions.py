@@ -23,8 +23,6 @@ from flightd.site.site_file import load_site, site_toml
 from tests.command import Command
 from tests.sim.ideal.ideal_flight import IdealFlight
 
-pytestmark = pytest.mark.xdist_group("decisions")
-
 ROOT = Path(__file__).parents[2]
 
 

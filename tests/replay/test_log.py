@@ -15,8 +15,6 @@ from flightd.core.topics import Document, Topic
 from flightd.core.types import AttitudeSetpoint, Event, EventLevel
 from flightd.replay.log import read_log
 
-pytestmark = pytest.mark.xdist_group("log")
-
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:

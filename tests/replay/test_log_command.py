@@ -13,8 +13,6 @@ from flightd.core.types import AttitudeSetpoint
 from tests.command import Command
 from tests.replay.synthetic_flight import write_flight
 
-pytestmark = pytest.mark.xdist_group("log command")
-
 ROOT = Path(__file__).parents[2]
 
 

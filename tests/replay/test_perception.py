@@ -17,8 +17,6 @@ from flightd.replay.perception_compare import replay_pictures
 from flightd.vision.line_detector import Detector
 from tests.replay.synthetic_flight import picture, seen_lines
 
-pytestmark = pytest.mark.xdist_group("perception")
-
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:

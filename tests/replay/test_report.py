@@ -23,8 +23,6 @@ from flightd.site.site_file import parse_site
 from tests.command import Command
 from tests.replay.synthetic_flight import SITE_TOML, SUMMARY, legs, write_flight
 
-pytestmark = pytest.mark.xdist_group("report")
-
 ROOT = Path(__file__).parents[2]
 
 

@@ -28,8 +28,6 @@ from flightd.studies.counted_stock import counted_beside
 from tests.replay.synthetic_count import site_with_racks, state_of, write_count, write_stock
 from tests.replay.synthetic_flight import SITE_TOML, write_flight
 
-pytestmark = pytest.mark.xdist_group("report inventory")
-
 
 @pytest.fixture(scope="module")
 def site() -> Site:

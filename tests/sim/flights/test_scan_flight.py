@@ -15,7 +15,7 @@ from flightd.adapters.store.sqlite import SqliteStore
 
 ROOT = Path(__file__).parents[3]
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("scan flight")]
+pytestmark = pytest.mark.slow
 
 
 def flightd(*arguments: str) -> subprocess.CompletedProcess[str]:

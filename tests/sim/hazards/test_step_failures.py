@@ -32,7 +32,7 @@ from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.test_ideal_scan import scan_flight
 
 PACKAGE = str(Path(flightd.__file__).parent)
-MANY = int(os.environ.get("FLIGHTD_FAILURES", "10"))
+MANY = int(os.environ.get("FLIGHTD_FAILURES", "6"))
 APART = {Pilot.step.__code__, LastResort.step.__code__}
 """What catches, and what flies then."""
 TICK_NS = 20_000_000

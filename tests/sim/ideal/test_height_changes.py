@@ -16,8 +16,6 @@ from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import FITTED, SIGHT
 
-pytestmark = pytest.mark.xdist_group("height changes")
-
 CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(front_camera=FITTED)
 SITE = parse_site(
     """

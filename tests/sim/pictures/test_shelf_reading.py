@@ -20,8 +20,6 @@ from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, picture_name
 from flightd.vision.shelf.shelf_look import read_shelf
 from tests.sim.pictures.shelf_pictures import shelf_pictures
 
-pytestmark = pytest.mark.xdist_group("shelf reading")
-
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-racks-small.toml")
 CAMERA = FrontCamera()
 SIGHT = FrontSight(CAMERA.lens, CAMERA.mount)

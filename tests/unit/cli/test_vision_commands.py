@@ -18,8 +18,6 @@ from flightd.cli.main import app
 from flightd.core.errors import InputError, UnavailableError
 from flightd.sim.dataset.generate import generate, write_dataset
 
-pytestmark = pytest.mark.xdist_group("vision commands")
-
 RUNNER = CliRunner()
 
 
