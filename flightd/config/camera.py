@@ -67,12 +67,15 @@ class CameraConfig(OpticsSection):
     fx_px: FocalX = 381.4  # 80 deg across 640 px
     fy_px: FocalY = 381.4
     mount_yaw_deg: float = Field(0.0, ge=-180, le=180, description="turn of the camera, clockwise from above")
+    mount_roll_deg: float = Field(0.0, ge=-20, le=20, description="the camera rolled, its right side down")
+    mount_pitch_deg: float = Field(0.0, ge=-20, le=20, description="the camera pitched, its front up")
     latency_s: float = Field(
         0.060, ge=0, le=1, description="from mid-exposure to arrival, least delay of the path"
     )
 
     def mount(self) -> Mount:
-        return Mount(math.radians(self.mount_yaw_deg), self.mount_offset_m)
+        turned = (math.radians(one) for one in (self.mount_roll_deg, self.mount_pitch_deg))
+        return Mount(math.radians(self.mount_yaw_deg), self.mount_offset_m, *turned)
 
     @property
     def _turned(self) -> bool:

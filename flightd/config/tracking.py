@@ -30,10 +30,48 @@ class MotionNoise(Section):
     steady_s: float = Field(10.0, gt=0, le=600, description="time over which the steady part is averaged")
 
 
+class SensorPriors(Section):
+    """What may be wrong with a drone's own sensors before the lines have told, as sigmas."""
+
+    attitude_deg: float = Field(0.7, gt=0, le=10, description="wandering error of the told roll and pitch")
+    attitude_s: float = Field(8.0, gt=0, le=600, description="time within which that error wanders")
+    mount_deg: float = Field(1.5, gt=0, le=10, description="roll and pitch of the camera in the airframe")
+    delay_s: float = Field(0.03, gt=0, le=0.5, description="camera.latency_s")
+    scale_share: float = Field(
+        0.005, gt=0, le=0.5, description="focal length and height", json_schema_extra=unit("share")
+    )
+    heading_degps: float = Field(0.1, gt=0, le=5, description="drift of the vehicle's heading")
+    shake_deg: float = Field(0.15, gt=0, le=5, description="picture against attitude, frame by frame")
+    most_shake_deg: float = Field(1.5, gt=0, le=10, description="the most that is believed of it")
+
+    @property
+    def attitude_rad(self) -> float:
+        return math.radians(self.attitude_deg)
+
+    @property
+    def mount_rad(self) -> float:
+        return math.radians(self.mount_deg)
+
+    @property
+    def heading_radps(self) -> float:
+        return math.radians(self.heading_degps)
+
+    @property
+    def shake_rad(self) -> float:
+        return math.radians(self.shake_deg)
+
+    @property
+    def shake_bounds_rad(self) -> tuple[float, float]:
+        """The least and the most that is believed of the shaking."""
+        return math.radians(0.03), math.radians(self.most_shake_deg)
+
+
 class TrackingExpert(Section):
     """How far the down camera's lines are trusted."""
 
-    sigma_tilt_deg: float = Field(0.3, gt=0, le=10, description="sigma of the measured roll and pitch")
+    sigma_tilt_deg: float = Field(
+        0.3, gt=0, le=10, description="sigma of the tilt where it is not compensated"
+    )
     min_sigma_m: float = Field(0.004, gt=0, le=0.1, description="least sigma of a line's offset")
     width_share: tuple[_WidthShare, _WidthShare] = Field(
         (0.55, 1.7),
@@ -46,6 +84,7 @@ class TrackingExpert(Section):
         5.0, gt=0, le=45, description="sigma of the heading on the pad, and after a compass is contradicted"
     )
     noise: MotionNoise = MotionNoise()
+    priors: SensorPriors = SensorPriors()
 
     @property
     def sigma_tilt_rad(self) -> float:

@@ -96,15 +96,19 @@ class Lens:
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """How the down camera sits in the body: turned by `yaw_rad` (clockwise from above), its centre at
-    `offset_m` (forward, right, down) from the point whose height the vehicle reports."""
+    """How the down camera sits in the body: turned by `yaw_rad` (clockwise from above), then rolled and
+    pitched as the body is (right side down, nose up), its centre at `offset_m` (forward, right, down) from
+    the point whose height the vehicle reports."""
 
     yaw_rad: float = 0.0
     offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
 
     def body_from_image(self) -> Matrix:
         """(3, 3) rotation from image axes (right, down, optical) to body axes."""
-        rotation: Matrix = heading_rotation(self.yaw_rad) @ _IMAGE_TO_BODY
+        tilt = level_from_body(self.roll_rad, self.pitch_rad)
+        rotation: Matrix = tilt @ heading_rotation(self.yaw_rad) @ _IMAGE_TO_BODY
         return rotation
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from flightd.config.schema import Config
+from flightd.core.geometry import Matrix
 from flightd.core.tick import TickInput
 from flightd.core.tracks import TrackSet
 from flightd.core.types import AttitudeSetpoint, GridPose, VehicleState
@@ -42,6 +44,7 @@ class StateEstimator:
         self._heights = HeightHistory()
         self._extrapolation = AttitudeExtrapolation()
         self.frames = FrameMonitor()
+        self._learnt: Callable[[], tuple[Matrix, Matrix] | None] = lambda: None
         self.begin(stand, armed=False)
 
     def begin(self, stand: tuple[str, float], *, armed: bool) -> None:
@@ -59,7 +62,9 @@ class StateEstimator:
             yaw_rad,
             control.tilt_compensation,
             self._config.tracking,
+            self._learnt(),
         )
+        self._learnt = self.tracker.learnt
         view = camera.floor_reach(control.max_tilt_rad)
         self.localiser = GridLocaliser(self._site, node, view, self._config.localisation)
         self.poses = PoseHistory(self._least_integrity)

@@ -40,6 +40,7 @@ from flightd.sim.scenario.faults import FaultListener, WorldFaults, bare_boxes
 from flightd.sim.sensors.camera import CameraPeer
 from flightd.sim.sensors.instruments import SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
+from flightd.sim.unknowns import Shaken, Unknowns
 from flightd.site.site import Site
 
 _TRUTH_PERIOD_S = 0.02
@@ -87,6 +88,7 @@ class WorldSpec:
     truth_url: str = ""
     faults: tuple[Fault, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
+    unknowns: Unknowns = Unknowns()
 
 
 class VehiclePeer(Protocol):
@@ -123,7 +125,7 @@ class World:
         self._recorder = recorder
         start = _placement(spec)
         airframe = Airframe(
-            AirframeParams(battery_capacity_ah=spec.battery_ah),
+            spec.unknowns.airframe(AirframeParams(battery_capacity_ah=spec.battery_ah)),
             wind=spec.wind,
             seed=spec.seed,
             x_m=start.x_m,
@@ -211,7 +213,7 @@ def _autopilot(spec: WorldSpec, airframe: Airframe, clock: Clock) -> AutopilotPe
         radio=spec.radio,
         parameters=parameters,
         clock_ppm=spec.clock_ppm,
-        sensors=SensorParams(range_min_m=spec.range_least_m),
+        sensors=spec.unknowns.sensors(SensorParams(range_min_m=spec.range_least_m)),
         second_range_m=spec.second_range_m,
     )
     return Px4Peer(clock, airframe, config) if is_px4 else ArduCopterPeer(clock, airframe, config)
@@ -225,9 +227,13 @@ def _down_camera(
     hold: Hold,
 ) -> CameraPeer:
     bare = bare_boxes(spec.faults, spec.site)
-    make = partial(Renderer, spec.site, spec.camera, spec.appearance, spec.seed, bare)
+    camera = spec.unknowns.camera(spec.camera)
+    make = partial(Renderer, spec.site, camera, spec.appearance, spec.seed, bare)
     seed, address = f"camera {spec.seed}", spec.camera_address
-    return CameraPeer(spec.camera, make, seed, address, vehicle.truth_at, clock, show, hold=hold)
+    shaken = Shaken(spec.unknowns.shake_rad, spec.seed)
+    return CameraPeer(
+        camera, make, seed, address, lambda ns: shaken(vehicle.truth_at(ns)), clock, show, hold=hold
+    )
 
 
 def _front_camera(

@@ -15,22 +15,39 @@ from typing import TypeVar
 
 from flightd.config.control import TiltCompensation
 from flightd.config.tracking import TrackingConfig
-from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount, wrap_pi
+from flightd.core.geometry import Lens, Matrix, Mount, wrap_pi
 from flightd.core.tracks import FloorJunction, MarkerOffset, PadOffset, TrackedLine, TrackSet
 from flightd.core.types import Attitude, LineSet, MarkerSight, PadSight
 from flightd.tracking.attitude_history import AttitudeHistory
-from flightd.tracking.axis_filters import AxisTracker, HeadingTracker, LineMeasurement
+from flightd.tracking.floor_filter import (
+    DELAY,
+    MOUNT_PITCH,
+    MOUNT_ROLL,
+    PITCH,
+    PSI,
+    ROLL,
+    SCALE,
+    VX,
+    VY,
+    FloorFilter,
+    LineSight,
+    Rates,
+)
 from flightd.tracking.ground_junctions import floor_junctions
 from flightd.tracking.tilt_compensation import (
     FloorView,
     GroundLine,
     ground_lines,
     ground_point,
+    tilt_effects,
 )
 
 _STEP_NS = 20_000_000
 _ASSUMED_TILT_RAD = math.radians(2.0)
 _PARALLEL_RAD = math.radians(20.0)
+_LEAST_THETA_RAD = math.radians(0.2)
+_RATE_NS = 20_000_000
+"""The told attitude's rates are taken over so long before and after."""
 _WIDTH_GAIN = 0.15
 _AGREEING, _DOUBTED = 0.15, 0.2
 _SAME_RAD = math.radians(3.0)
@@ -53,20 +70,23 @@ class LineTracker:
         start_yaw_rad: float,
         compensation: TiltCompensation = TiltCompensation.EXACT,
         config: TrackingConfig = _DEFAULTS,
+        learnt: tuple[Matrix, Matrix] | None = None,
     ) -> None:
+        """`learnt` is what another tracker has learnt of the same sensors."""
         params = config.expert
         self._lens, self._mount, self._compensation = lens, mount, compensation
         self._line_width_m = line_width_m
         self._params = params
         self._start_yaw_rad = start_yaw_rad
         self._history = AttitudeHistory()
-        self._heading: HeadingTracker | None = None
+        self._headed = False
         forget_ns = round(params.forget_s * 1e9)
-        self._x = AxisTracker(params.noise, params.gate_m, forget_ns)
-        self._y = AxisTracker(params.noise, params.gate_m, forget_ns)
+        self._filter = FloorFilter(params.noise, params.priors, params.gate_m, forget_ns)
+        if learnt is not None:
+            self._filter.begin_with(learnt)
         self._forget_ns = forget_ns
         self._lines_ns = 0
-        self._stamp_ns = 0
+        self._stamp_ns = self._told_ns = 0
         self._pads: tuple[PadOffset, ...] = ()
         self._junctions: tuple[FloorJunction, ...] = ()
         self._markers: tuple[MarkerOffset, ...] = ()
@@ -81,68 +101,68 @@ class LineTracker:
         """What all lines lately said against the vehicle's heading; 0 while any of them agrees."""
         return self._dispute.error_rad
 
+    def learnt(self) -> tuple[Matrix, Matrix]:
+        """What is known of the sensors, for the tracker after this one."""
+        return self._filter.learnt()
+
     def assume(self, sample: Attitude) -> None:
         """Take an attitude that is only assumed, while the vehicle is silent."""
         self._history.assume(sample)
 
     def attitude(self, sample: Attitude) -> None:
         self._history.add(sample)
-        if self._heading is None:
+        if not self._headed:
+            self._headed = True
             offset = wrap_pi(self._start_yaw_rad - sample.yaw_rad)
-            self._heading = HeadingTracker(offset, self._params.start_yaw_sigma_rad)
+            self._filter.turn_to(offset, self._params.start_yaw_sigma_rad)
 
     def frame(self, lines: LineSet, height_m: float) -> bool:
         """Take the lines of one frame seen at `height_m`; False when it could not be used (older than
         the last, no attitude at its exposure, no height)."""
-        attitude = self._history.at(lines.stamp_ns)
-        height_m = self._believed_height_m(lines, height_m)
-        if attitude is None or self._heading is None or not height_m > 0 or lines.stamp_ns <= self._stamp_ns:
+        stamp_ns = lines.stamp_ns + round(self._filter.mean(DELAY) * 1e9)
+        attitude = self._history.at(stamp_ns)
+        height_m = self._believed_height_m(lines, height_m) * (1.0 + self._filter.mean(SCALE))
+        if attitude is None or not self._headed or not height_m > 0 or lines.stamp_ns <= self._told_ns:
             self.rejected += 1
             return False
-        self._advance(lines.stamp_ns)
+        self._told_ns = lines.stamp_ns
+        self._advance(stamp_ns)
         params = self._params
-        assumed = self._history.is_assumed(lines.stamp_ns)
-        sigma_tilt_rad = _ASSUMED_TILT_RAD if assumed else params.sigma_tilt_rad
-        view = FloorView(self._lens, self._mount, attitude, height_m, self._compensation, sigma_tilt_rad)
+        blind = self._compensation is TiltCompensation.NONE
+        sigma_tilt_rad = params.sigma_tilt_rad if blind else 0.0
+        if self._history.is_assumed(stamp_ns):
+            sigma_tilt_rad = _ASSUMED_TILT_RAD
+        view = FloorView(
+            self._lens, self._mount, self._corrected(attitude), height_m, self._compensation, sigma_tilt_rad
+        )
         low, high = (share * self._line_width_m for share in params.width_share)
         seen = ground_lines(lines.lines, view)
         on_floor = [line for line in seen if low <= line.width_m <= high]
-        yaw = self._turn(on_floor, attitude)
-        across_x: list[LineMeasurement] = []
-        across_y: list[LineMeasurement] = []
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        for line in on_floor:
-            sigma = max(line.sigma_m, params.min_sigma_m)
-            x = cos * line.forward_m - sin * line.right_m
-            y = sin * line.forward_m + cos * line.right_m
-            direction = line.theta_rad + yaw
-            if abs(math.sin(direction)) < math.sin(_PARALLEL_RAD):
-                spread = math.hypot(sigma, x * self._heading.sigma_rad)
-                ends = sorted(cos * forward - sin * right for forward, right in line.ends_m)
-                across_y.append(LineMeasurement(y, spread, line.width_m, ends[0], ends[1]))
-            elif abs(math.cos(direction)) < math.sin(_PARALLEL_RAD):
-                spread = math.hypot(sigma, y * self._heading.sigma_rad)
-                ends = sorted(sin * forward + cos * right for forward, right in line.ends_m)
-                across_x.append(LineMeasurement(x, spread, line.width_m, ends[0], ends[1]))
+        self._settle_dispute(on_floor, attitude)
+        yaw = attitude.yaw_rad + self._filter.mean(PSI)
+        sights = [
+            sight for line in on_floor if (sight := self._sight(line, yaw, height_m, blind)) is not None
+        ]
+        self._filter.update(sights, self._rates(stamp_ns), stamp_ns)
+        yaw = attitude.yaw_rad + self._filter.mean(PSI)
         self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in _placed(lines.pads, view, yaw))
         marks = _placed(lines.markers, view, yaw)
         self._markers = tuple(MarkerOffset(mark.id, x, y, side) for mark, x, y, side in marks)
-        self._x.update(across_x, lines.stamp_ns)
-        self._y.update(across_y, lines.stamp_ns)
         self._junctions = floor_junctions(lines.junctions, view, yaw)
-        if across_x or across_y:
-            self._lines_ns = lines.stamp_ns
+        if sights:
+            self._lines_ns = stamp_ns
         return True
 
     def at(self, now_ns: int) -> TrackSet | None:
         """The tracks carried on to `now_ns`, or None before the first frame."""
-        if self._heading is None or self._stamp_ns == 0:
+        if not self._headed or self._stamp_ns == 0:
             return None
         newest = self._history.at(now_ns) or self._history.newest
         assert newest is not None
-        yaw = wrap_pi(newest.yaw_rad + self._heading.offset_rad)
+        held = self._filter
+        yaw = wrap_pi(newest.yaw_rad + held.mean(PSI))
         moved_x = moved_y = 0.0
-        vx, vy = self._x.velocity_mps, self._y.velocity_mps
+        vx, vy, drag = held.mean(VX), held.mean(VY), self._params.noise.drag_per_s
         ax = ay = 0.0
         known_ns = now_ns - self._forget_ns  # a longer blindness is not bridged by prediction
         stamp_ns = max(self._stamp_ns, known_ns)
@@ -151,8 +171,8 @@ class LineTracker:
             ax, ay = self._accel(stamp_ns + step_ns // 2)
             dt_s = step_ns * 1e-9
             ahead_s = (stamp_ns + step_ns // 2 - self._stamp_ns) * 1e-9
-            ax += self._x.disturbance_after(ahead_s) - self._x.drag_per_s * vx
-            ay += self._y.disturbance_after(ahead_s) - self._y.drag_per_s * vy
+            ax += held.push_after(0, ahead_s) - drag * vx
+            ay += held.push_after(1, ahead_s) - drag * vy
             moved_x += vx * dt_s + 0.5 * ax * dt_s * dt_s
             moved_y += vy * dt_s + 0.5 * ay * dt_s * dt_s
             vx += ax * dt_s
@@ -162,71 +182,129 @@ class LineTracker:
             now_ns,
             self._lines_ns,
             yaw,
-            self._heading.sigma_rad,
+            held.sigma(PSI),
             vx,
             vy,
             ax,
             ay,
-            tuple(_moved(line, moved_x, moved_y) for line in self._x.lines() if line.seen_ns > known_ns),
-            tuple(_moved(line, moved_y, moved_x) for line in self._y.lines() if line.seen_ns > known_ns),
+            tuple(_moved(line, moved_x, moved_y) for line in self._lines(0) if line.seen_ns > known_ns),
+            tuple(_moved(line, moved_y, moved_x) for line in self._lines(1) if line.seen_ns > known_ns),
             tuple(replace(pad, x_m=pad.x_m - moved_x, y_m=pad.y_m - moved_y) for pad in self._pads),
             self._stamp_ns,
             tuple(
                 replace(seen, dx_m=seen.dx_m - moved_x, dy_m=seen.dy_m - moved_y) for seen in self._junctions
             ),
             self._stamp_ns,
-            push_x_mps2=self._x.disturbance_after((now_ns - self._stamp_ns) * 1e-9),
-            push_y_mps2=self._y.disturbance_after((now_ns - self._stamp_ns) * 1e-9),
+            push_x_mps2=held.push_after(0, (now_ns - self._stamp_ns) * 1e-9),
+            push_y_mps2=held.push_after(1, (now_ns - self._stamp_ns) * 1e-9),
             markers=tuple(
                 replace(mark, x_m=mark.x_m - moved_x, y_m=mark.y_m - moved_y) for mark in self._markers
             ),
         )
 
+    def _lines(self, axis: int) -> list[TrackedLine]:
+        """All lines held across an axis, nearest to the drone first."""
+        held = [
+            TrackedLine(
+                line.id,
+                *self._filter.offset(at),
+                line.width_m,
+                line.seen_ns,
+                line.hits,
+                line.from_m,
+                line.to_m,
+            )
+            for at, line in enumerate(self._filter.held)
+            if line.axis == axis
+        ]
+        return sorted(held, key=lambda line: abs(line.offset_m))
+
     def _advance(self, stamp_ns: int) -> None:
-        """Carry the filters from the last frame to this one."""
-        assert self._heading is not None
+        """Carry the filter from the last frame to this one."""
         if stamp_ns - self._stamp_ns > self._forget_ns:
-            self._x.forget()
-            self._y.forget()
+            self._filter.forget()
         elif self._stamp_ns:
             while self._stamp_ns < stamp_ns:
                 step_ns = min(2 * _STEP_NS, stamp_ns - self._stamp_ns)
-                ax, ay = self._accel(self._stamp_ns + step_ns // 2)
-                self._x.predict(step_ns * 1e-9, ax)
-                self._y.predict(step_ns * 1e-9, ay)
-                self._heading.predict(step_ns * 1e-9)
+                told = self._attitude_at(self._stamp_ns + step_ns // 2)
+                self._filter.predict(step_ns * 1e-9, told.roll_rad, told.pitch_rad, told.yaw_rad)
                 self._stamp_ns += step_ns
-        self._stamp_ns = stamp_ns
+        self._stamp_ns = max(stamp_ns, self._stamp_ns)
+
+    def _attitude_at(self, stamp_ns: int) -> Attitude:
+        attitude = self._history.at(stamp_ns) or self._history.newest
+        assert attitude is not None
+        return attitude
 
     def _accel(self, stamp_ns: int) -> tuple[float, float]:
         """Acceleration along the grid axes that the attitude makes at constant height, g tan(tilt)."""
-        attitude = self._history.at(stamp_ns) or self._history.newest
-        assert attitude is not None
-        assert self._heading is not None
-        yaw = attitude.yaw_rad + self._heading.offset_rad
-        forward = -GRAVITY_MPS2 * math.tan(attitude.pitch_rad)
-        right = GRAVITY_MPS2 * math.tan(attitude.roll_rad)
-        return math.cos(yaw) * forward - math.sin(yaw) * right, math.sin(yaw) * forward + math.cos(
-            yaw
-        ) * right
+        told = self._attitude_at(stamp_ns)
+        return self._filter.accel(told.roll_rad, told.pitch_rad, told.yaw_rad)
 
-    def _turn(self, on_floor: list[GroundLine], attitude: Attitude) -> float:
-        """Correct the heading by every line near a grid direction; return the yaw at exposure."""
-        assert self._heading is not None
-        told: list[float] = []
-        agreed = False
-        for line in on_floor:
-            yaw = attitude.yaw_rad + self._heading.offset_rad
-            # a line of the grid has direction -yaw or 90 deg - yaw in the level frame
-            innovation = (-line.theta_rad - yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4
-            sigma = max(line.sigma_theta_rad, math.radians(0.2))
-            if abs(innovation) < max(math.radians(4.0), 4.0 * math.hypot(self._heading.sigma_rad, sigma)):
-                self._heading.update(innovation, sigma)
-                agreed = True
-            told.append(innovation)
+    def _corrected(self, told: Attitude) -> Attitude:
+        """The camera's attitude, by what has been learnt of it."""
+        held = self._filter
+        roll_rad = told.roll_rad + held.mean(ROLL) + held.mean(MOUNT_ROLL)
+        pitch_rad = told.pitch_rad + held.mean(PITCH) + held.mean(MOUNT_PITCH)
+        return replace(told, roll_rad=roll_rad, pitch_rad=pitch_rad)
+
+    def _rates(self, stamp_ns: int) -> Rates:
+        before, after = self._history.at(stamp_ns - _RATE_NS), self._history.at(stamp_ns + _RATE_NS)
+        here = self._attitude_at(stamp_ns)
+        first, last = before or here, after or here
+        dt_s = (last.stamp_ns - first.stamp_ns) * 1e-9
+        if not dt_s > 0:
+            return Rates(0.0, 0.0, 0.0)
+        return Rates(
+            (last.roll_rad - first.roll_rad) / dt_s,
+            (last.pitch_rad - first.pitch_rad) / dt_s,
+            wrap_pi(last.yaw_rad - first.yaw_rad) / dt_s,
+        )
+
+    def _sight(self, line: GroundLine, yaw: float, height_m: float, blind: bool) -> LineSight | None:
+        """The line as the filter takes it; None for one that runs along no axis of the grid."""
+        direction = line.theta_rad + yaw
+        across_x = abs(math.cos(direction)) < math.sin(_PARALLEL_RAD)
+        if not across_x and abs(math.sin(direction)) >= math.sin(_PARALLEL_RAD):
+            return None
+        forward, right = line.forward_m, line.right_m
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        x, y = cos * forward - sin * right, sin * forward + cos * right
+        if across_x:
+            offset, along = x, y
+            ends = sorted(sin * forward + cos * right for forward, right in line.ends_m)
+        else:
+            offset, along = y, x
+            ends = sorted(cos * forward - sin * right for forward, right in line.ends_m)
+        shifts, turns = tilt_effects(line, height_m)
+        on_axis = (cos, -sin) if across_x else (sin, cos)
+        by_roll, by_pitch = (on_axis[0] * shift[0] + on_axis[1] * shift[1] for shift in shifts)
+        turn = (direction + math.pi / 4) % (math.pi / 2) - math.pi / 4
+        sigma_theta = max(line.sigma_theta_rad, _LEAST_THETA_RAD)
+        gate = max(math.radians(4.0), 4.0 * math.hypot(self._filter.sigma(PSI), sigma_theta))
+        return LineSight(
+            0 if across_x else 1,
+            offset,
+            along,
+            turn if abs(turn) < gate else math.nan,
+            max(line.sigma_m, self._params.min_sigma_m),
+            sigma_theta,
+            line.width_m,
+            ends[0],
+            ends[1],
+            (0.0, 0.0) if blind else (by_roll, by_pitch),
+            (0.0, 0.0) if blind else turns,
+        )
+
+    def _settle_dispute(self, on_floor: list[GroundLine], attitude: Attitude) -> None:
+        """Believe lines that all contradict the heading for long."""
+        yaw = attitude.yaw_rad + self._filter.mean(PSI)
+        told = [(-line.theta_rad - yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4 for line in on_floor]
+        gate = max(math.radians(4.0), 4.0 * math.hypot(self._filter.sigma(PSI), _LEAST_THETA_RAD))
+        agreed = any(abs(error) < gate for error in told)
         if self._dispute.step(told, agreed, attitude.stamp_ns):
-            self._heading.restart(self._dispute.error_rad, self._params.start_yaw_sigma_rad)
-        return attitude.yaw_rad + self._heading.offset_rad
+            offset = self._filter.mean(PSI) + self._dispute.error_rad
+            self._filter.turn_to(offset, self._params.start_yaw_sigma_rad)
 
     def _believed_height_m(self, lines: LineSet, told_m: float) -> float:
         """The height told, unless there is none or the width of the lines contradicts it: then theirs."""

@@ -14,6 +14,7 @@ from flightd.config.schema import Config
 from flightd.core.errors import InputError
 from flightd.sim.external.external_simulator import truth_address
 from flightd.sim.scenario.scenario import Scenario
+from flightd.sim.unknowns import WorldKind, unknowns_of
 
 _FACTORS = 0.05, 50.0
 
@@ -30,6 +31,7 @@ class SimOptions:
     settings: Sequence[str] = ()
     truth_url: str = ""
     vehicle_url: str = ""
+    world: WorldKind = WorldKind.IDEAL
 
     def check(self) -> None:
         """InputError where options contradict each other."""
@@ -65,7 +67,15 @@ def prepare(
     _make_folder(folder, going_on=bool(config.inventory.run))
     order = going_on(configured_order(config), config.inventory.run, site, folder)
     return Simulation(
-        config, site, scenario, options.seed, factor, folder, truth_url=options.truth_url, order=order
+        config,
+        site,
+        scenario,
+        options.seed,
+        factor,
+        folder,
+        truth_url=options.truth_url,
+        order=order,
+        unknowns=unknowns_of(options.world, options.seed),
     )
 
 

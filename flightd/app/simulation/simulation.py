@@ -17,6 +17,7 @@ from flightd.core.snapshot import Snapshot
 from flightd.mission.plan.flight_plan import FlightPlan
 from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
 from flightd.sim.scenario.scenario import Scenario
+from flightd.sim.unknowns import Unknowns
 from flightd.sim.world import FrontSpec, WorldSpec
 from flightd.site.site import Site
 
@@ -36,6 +37,7 @@ class Simulation:
     """An external simulator's truth link; the configuration says where its vehicle is flown."""
     order: FlightOrder | None = None
     """What this flight is to do; None: what the configuration says."""
+    unknowns: Unknowns = Unknowns()
 
     @property
     def flight_log(self) -> Path:
@@ -76,11 +78,12 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
         battery_ah=scenario.vehicle.battery_ah,
         swap_s=scenario.vehicle.swap_s,
         radio=scenario.vehicle.radio(),
-        clock_ppm=scenario.vehicle.clock_ppm,
+        clock_ppm=scenario.vehicle.clock_ppm + simulation.unknowns.clock_ppm - 20.0,
         range_least_m=scenario.vehicle.range_least_m,
         second_range_m=scenario.vehicle.second_range_m,
         truth_url=simulation.truth_url,
         faults=scenario.fault,
+        unknowns=simulation.unknowns,
     )
 
 

@@ -6,7 +6,7 @@ import math
 import random
 from dataclasses import dataclass
 
-from flightd.core.geometry import wrap_pi
+from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.sim.plant.airframe import Airframe
 
 
@@ -21,7 +21,12 @@ class SensorParams:
     yaw_drift_radps: float = math.radians(0.03)
     yaw_noise_rad: float = math.radians(0.1)
     tilt_bias_rad: float = math.radians(0.3)
+    tilt_bias: tuple[float, float] | None = None
+    """Roll and pitch told too large (rad); None: drawn within `tilt_bias_rad`."""
     tilt_wander_rad: float = math.radians(0.1)
+    leak_s: float = math.inf
+    """An estimator without a position takes what its accelerometers feel for the vertical: within this time
+    its tilt leaks to the one that they feel, nearly level in any steady flight."""
     baro_wander_m: float = 0.01
     climb_noise_mps: float = 0.02
     wander_s: float = 20.0
@@ -62,6 +67,9 @@ class Sensors:
         self._rng = rng = random.Random(seed)
         self._roll_bias = rng.uniform(-p.tilt_bias_rad, p.tilt_bias_rad)
         self._pitch_bias = rng.uniform(-p.tilt_bias_rad, p.tilt_bias_rad)
+        if p.tilt_bias is not None:
+            self._roll_bias, self._pitch_bias = p.tilt_bias
+        self._roll_leak = self._pitch_leak = 0.0
         self._yaw_drift = rng.uniform(-p.yaw_drift_radps, p.yaw_drift_radps)
         self._yaw_error = p.heading_offset_rad
         self._roll_wander = self._pitch_wander = self._baro_wander = self._climb_error = 0.0
@@ -71,11 +79,11 @@ class Sensors:
     @property
     def roll_error_rad(self) -> float:
         """Estimate minus truth."""
-        return self._roll_bias + self._roll_wander + self.fault.roll_rad
+        return self._roll_bias + self._roll_wander + self._roll_leak + self.fault.roll_rad
 
     @property
     def pitch_error_rad(self) -> float:
-        return self._pitch_bias + self._pitch_wander + self.fault.pitch_rad
+        return self._pitch_bias + self._pitch_wander + self._pitch_leak + self.fault.pitch_rad
 
     @property
     def yaw_error_rad(self) -> float:
@@ -93,11 +101,25 @@ class Sensors:
         fast = dt_s / 0.2
         self._climb_error += -self._climb_error * fast + gauss(0.0, p.climb_noise_mps * math.sqrt(2.0 * fast))
         self._yaw_error += self._yaw_drift * dt_s
+        self._leak(dt_s, airframe)
         self.roll_rad = airframe.roll_rad + self.roll_error_rad
         self.pitch_rad = airframe.pitch_rad + self.pitch_error_rad
         self.yaw_rad = wrap_pi(airframe.yaw_rad + self.yaw_error_rad)
         self.height_m = airframe.height_m - airframe.params.rest_height_m + self._baro_wander
         self.climb_mps = airframe.climb_mps + self._climb_error
+
+    def _leak(self, dt_s: float, airframe: Airframe) -> None:
+        """Rotors push along the body's axis, so the accelerometers feel level, but for the drag."""
+        if math.isinf(self.params.leak_s) or airframe.on_floor:
+            self._roll_leak = self._pitch_leak = 0.0
+            return
+        cos, sin = math.cos(airframe.yaw_rad), math.sin(airframe.yaw_rad)
+        wind, share = airframe.wind, airframe.params.drag_per_s / GRAVITY_MPS2
+        east, south = airframe.vx_mps - wind.x_mps, airframe.vy_mps - wind.y_mps
+        felt_pitch, felt_roll = -share * (cos * east + sin * south), share * (-sin * east + cos * south)
+        part = dt_s / self.params.leak_s
+        self._roll_leak -= part * (airframe.roll_rad + self._roll_leak - felt_roll)
+        self._pitch_leak -= part * (airframe.pitch_rad + self._pitch_leak - felt_pitch)
 
     def noisy_yaw_rad(self) -> float:
         """The yaw estimate as a telemetry sample: with its noise."""

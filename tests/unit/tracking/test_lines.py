@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
 
 import pytest
 
@@ -12,7 +11,6 @@ from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount
 from flightd.core.types import Attitude, Line, LineSet
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.random_sites import random_site
-from flightd.tracking.axis_filters import AxisTracker, LineMeasurement
 from flightd.tracking.line_tracker import LineTracker
 from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
 
@@ -103,59 +101,3 @@ def test_a_line_of_another_width_is_not_paint() -> None:
     assert tracks is not None
     assert not tracks.across_y
     assert tracks.lines_ns == 0
-
-
-def test_tracked_sigmas_are_honest() -> None:
-    """Normalised errors of one axis over many runs have a spread near one."""
-    noise = MotionNoise()
-    errors: list[float] = []
-    for seed in range(300):
-        rng = random.Random(seed)
-        axis = AxisTracker(noise, gate_m=0.35, forget_ns=10**10)
-        x = 0.0
-        v, push = rng.gauss(0, noise.start_velocity_mps), rng.gauss(0, noise.start_disturbance_mps2)
-        dt = 1 / 30
-        for step in range(60):
-            if step:
-                accel = rng.gauss(0, noise.accel_mps2 / dt**0.5)
-                push += rng.gauss(0, noise.disturbance_mps2 * dt**0.5)
-                x += v * dt + 0.5 * (accel + push) * dt * dt
-                v += (accel + push - noise.drag_per_s * v) * dt
-                axis.predict(dt, 0.0)
-            if step < 40:
-                axis.update([LineMeasurement(0.5 - x + rng.gauss(0, 0.01), 0.01, 0.075)], step)
-        (line,) = axis.lines()
-        errors.append((line.offset_m - (0.5 - x)) / line.sigma_m)
-    spread = (sum(e * e for e in errors) / len(errors)) ** 0.5
-    assert 0.8 < spread < 1.25
-
-
-def test_wind_that_sets_in_is_soon_known_and_calm_air_stays_calm() -> None:
-    rng = random.Random(1)
-    axis = AxisTracker(MotionNoise(drag_per_s=0.0), gate_m=0.35, forget_ns=10**10)
-    dt = 1 / 30
-    x = v = 0.0
-    felt = []
-    for step in range(120):
-        push = 0.9 if step >= 90 else 0.0
-        x += v * dt + 0.5 * push * dt * dt
-        v += push * dt
-        axis.predict(dt, 0.0)
-        axis.update([LineMeasurement(0.5 - x + rng.gauss(0, 0.004), 0.005, 0.075)], step * FRAME_NS)
-        felt.append(axis.disturbance_mps2)
-    assert max(map(abs, felt[30:90])) < 0.2
-    assert max(felt[:107]) > 0.6, "half a second after it began"
-    assert 0.7 < felt[-1] < 1.1
-
-
-def test_a_false_line_nearby_starts_a_track_of_its_own() -> None:
-    axis = AxisTracker(MotionNoise(), gate_m=0.35, forget_ns=10**9)
-    for step in range(20):
-        axis.predict(1 / 30, 0.0)
-        axis.update([LineMeasurement(0.2, 0.005, 0.075), LineMeasurement(0.9, 0.005, 0.075)], step * FRAME_NS)
-    first = axis.lines()
-    axis.update([LineMeasurement(0.2, 0.005, 0.075), LineMeasurement(0.5, 0.005, 0.075)], 21 * FRAME_NS)
-    assert [round(line.offset_m, 2) for line in first] == [0.2, 0.9]
-    assert len(axis.lines()) == 3
-    axis.update([], 10**10)
-    assert axis.lines() == [], "lines not seen for long are forgotten"

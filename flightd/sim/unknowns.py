@@ -1,0 +1,201 @@
+"""What a stranger's drone keeps from its computer: drawn anew for each flight, told to the judge alone.
+
+Three worlds.  In the ideal one the configuration knows the drone exactly; the usual one has the errors of a
+drone that was built with care, the rough one those of a bad day.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import random
+from dataclasses import dataclass, replace
+
+from flightd.sim.plant.airframe import AirframeParams
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.sensors.instruments import SensorParams
+from flightd.sim.sensors.optics import SimCamera
+
+
+class WorldKind(enum.StrEnum):
+    """How much the simulated world keeps to itself."""
+
+    IDEAL = "ideal"
+    USUAL = "usual"
+    ROUGH = "rough"
+
+
+@dataclass(frozen=True, slots=True)
+class Unknowns:
+    """What is true of one drone and not in its configuration; all differences are true less configured."""
+
+    camera_delay_s: float = 0.0
+    camera_jitter_s: float = 0.0
+    mount_roll_rad: float = 0.0
+    mount_pitch_rad: float = 0.0
+    mount_yaw_rad: float = 0.0
+    focal_share: float = 1.0
+    shake_rad: float = 0.0
+    """Rms of roll and pitch of each frame against the airframe."""
+    tilt_bias_rad: tuple[float, float] | None = None
+    """Roll and pitch told too large; None: the simulated autopilot's own small ones."""
+    tilt_wander_rad: float = math.radians(0.1)
+    leak_s: float = math.inf
+    """Time within which the told attitude leaks towards level."""
+    clock_ppm: float = 20.0
+    path_s: float = 0.0
+    path_jitter_s: float = 0.0
+    range_noise_m: float = 0.005
+    range_dropout: float = 0.005
+    range_min_m: float = 0.05
+    baro_wander_m: float = 0.01
+    hover_share: float = 1.0
+    gust_mps: float = 0.3
+
+    def camera(self, configured: SimCamera) -> SimCamera:
+        """The down camera as it really is."""
+        lens, mount = configured.lens, configured.mount
+        return replace(
+            configured,
+            lens=replace(lens, fx_px=lens.fx_px * self.focal_share, fy_px=lens.fy_px * self.focal_share),
+            mount=replace(
+                mount,
+                yaw_rad=mount.yaw_rad + self.mount_yaw_rad,
+                roll_rad=mount.roll_rad + self.mount_roll_rad,
+                pitch_rad=mount.pitch_rad + self.mount_pitch_rad,
+            ),
+            capture_delay_s=max(configured.capture_delay_s + self.camera_delay_s, 0.005),
+            jitter_s=configured.jitter_s + self.camera_jitter_s,
+        )
+
+    def sensors(self, configured: SensorParams) -> SensorParams:
+        """The autopilot's sensors as they really are."""
+        return replace(
+            configured,
+            tilt_bias=self.tilt_bias_rad,
+            tilt_wander_rad=self.tilt_wander_rad,
+            leak_s=self.leak_s,
+            range_noise_m=self.range_noise_m,
+            range_dropout=self.range_dropout,
+            range_min_m=max(self.range_min_m, configured.range_min_m),
+            baro_wander_m=self.baro_wander_m,
+        )
+
+    def airframe(self, configured: AirframeParams) -> AirframeParams:
+        """The airframe as it really is."""
+        return replace(configured, hover_collective=configured.hover_collective * self.hover_share)
+
+
+@dataclass(frozen=True, slots=True)
+class _Spread:
+    """The largest differences of one world."""
+
+    delay_s: float
+    jitter_s: float
+    mount_deg: float
+    mount_yaw_deg: float
+    focal_share: float
+    shake_deg: float
+    tilt_deg: float
+    tilt_wander_deg: float
+    leak_s: float
+    clock_ppm: float
+    path_s: float
+    path_jitter_s: float
+    range_noise_m: float
+    range_dropout: float
+    range_min_m: float
+    baro_m: float
+    hover_share: float
+    gust_mps: float
+
+
+_SPREADS = {
+    WorldKind.USUAL: _Spread(
+        0.025,
+        0.005,
+        1.0,
+        2.0,
+        0.01,
+        0.15,
+        0.5,
+        0.15,
+        6.0,
+        50.0,
+        0.010,
+        0.005,
+        0.010,
+        0.01,
+        0.10,
+        0.1,
+        0.10,
+        0.3,
+    ),
+    WorldKind.ROUGH: _Spread(
+        0.050,
+        0.020,
+        2.5,
+        4.0,
+        0.04,
+        0.5,
+        0.5,
+        1.0,
+        2.0,
+        20_000.0,
+        0.060,
+        0.030,
+        0.04,
+        0.08,
+        0.30,
+        0.4,
+        0.25,
+        0.5,
+    ),
+}
+
+
+def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
+    """What is drawn for one flight; the same kind and seed draw the same."""
+    if kind is WorldKind.IDEAL:
+        return Unknowns()
+    most, rng = _SPREADS[kind], random.Random(f"unknowns {kind} {seed}")
+
+    def within(limit: float) -> float:
+        return rng.uniform(-limit, limit)
+
+    return Unknowns(
+        camera_delay_s=within(most.delay_s),
+        camera_jitter_s=most.jitter_s,
+        mount_roll_rad=math.radians(within(most.mount_deg)),
+        mount_pitch_rad=math.radians(within(most.mount_deg)),
+        mount_yaw_rad=math.radians(within(most.mount_yaw_deg)),
+        focal_share=1.0 + within(most.focal_share),
+        shake_rad=math.radians(most.shake_deg),
+        tilt_bias_rad=(math.radians(within(most.tilt_deg)), math.radians(within(most.tilt_deg))),
+        tilt_wander_rad=math.radians(most.tilt_wander_deg),
+        leak_s=most.leak_s,
+        clock_ppm=within(most.clock_ppm),
+        path_s=most.path_s,
+        path_jitter_s=most.path_jitter_s,
+        range_noise_m=most.range_noise_m,
+        range_dropout=most.range_dropout,
+        range_min_m=most.range_min_m,
+        baro_wander_m=most.baro_m,
+        hover_share=1.0 + within(most.hover_share),
+        gust_mps=most.gust_mps,
+    )
+
+
+class Shaken:
+    """The airframe's truth as the camera on its soft mount sees it."""
+
+    def __init__(self, rms_rad: float, seed: int) -> None:
+        self._rms_rad = rms_rad
+        self._rng = random.Random(f"shake {seed}")
+
+    def __call__(self, truth: Kinematics) -> Kinematics:
+        if not self._rms_rad:
+            return truth
+        gauss = self._rng.gauss
+        roll_rad = truth.roll_rad + gauss(0.0, self._rms_rad)
+        return replace(truth, roll_rad=roll_rad, pitch_rad=truth.pitch_rad + gauss(0.0, self._rms_rad))

@@ -1,0 +1,392 @@
+"""One Kalman filter for the drone's motion over the lines and for what it does not know of its own sensors.
+
+An extended filter with the state
+
+    heading offset and its drift | velocity, disturbance of both grid axes | error of the told attitude
+    | mount of the camera | delay of its frames | scale of lengths | offsets of all lines held
+
+Lines stand still, so all of them move with the one velocity; the control input is the acceleration that the
+attitude makes, g tan(tilt).  What is wrong with the told attitude shows twice, in the acceleration and in the
+picture; what is wrong with the mount shows in the picture alone; a wrong delay shows whenever the drone tilts
+or turns, as the attitude of another moment.  So a frame in which the drone turns says more of the delay than
+of the position, and the filter weighs it so: what is not known yet cannot make the position loop swing.
+
+The measurement is taken in implicit form, g(state, picture) = 0 (Jazwinski, Stochastic Processes and Filtering
+Theory, 1970, 8.3; Joseph's form of the update).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from flightd.config.tracking import MotionNoise, SensorPriors
+from flightd.core.geometry import GRAVITY_MPS2, Matrix
+
+PSI, PSI_RATE, VX, VY, PUSH_X, PUSH_Y, ROLL, PITCH, MOUNT_ROLL, MOUNT_PITCH, DELAY, SCALE = range(12)
+FIRST_LINE = 12
+
+_GATE_SIGMAS = 4.0
+_UNSEEN_S = 0.1
+"""An axis without a line for so long is dead-reckoned: the gust that was last felt on it fades."""
+_BIAS_GAIN, _BIASED = 0.25, 0.6
+"""Innovations whose running mean is beyond this, in sigmas, all err to one side: the wind has changed."""
+_SHAKE_GAIN = 0.03
+_ROUGH_GAIN, _LEAST_ROUGH, _MOST_ROUGH = 0.02, 0.15, 1.5
+"""How soon, and between which shares of the configured density, the noise of the motion is adapted: successive
+innovations of a filter that believes too much in it contradict each other, of one that believes too little they
+agree (Mehra, IEEE Trans. Automatic Control 15, 1970)."""
+
+
+class Axis(NamedTuple):
+    """Where one grid axis stands in the state."""
+
+    velocity: int
+    push: int
+
+
+AXES = Axis(VX, PUSH_X), Axis(VY, PUSH_Y)
+
+
+class LineSight(NamedTuple):
+    """One line of a frame, across the grid axis `axis`: where it was seen from the drone along that axis and
+    along itself, what its direction says of the heading, its width and its visible part, with the standard
+    deviations of offset and direction; what a tilt (roll, pitch) would change of the two."""
+
+    axis: int
+    offset_m: float
+    along_m: float
+    turn_rad: float
+    sigma_m: float
+    sigma_theta_rad: float
+    width_m: float
+    from_m: float
+    to_m: float
+    offset_per_tilt: tuple[float, float]
+    turn_per_tilt: tuple[float, float]
+
+
+class Rates(NamedTuple):
+    """How fast the told attitude changed at an exposure."""
+
+    roll_radps: float
+    pitch_radps: float
+    yaw_radps: float
+
+
+@dataclass(slots=True)
+class HeldLine:
+    """A line that is followed."""
+
+    id: int
+    axis: int
+    width_m: float
+    seen_ns: int
+    from_m: float
+    to_m: float
+    hits: int = 1
+
+
+class FloorFilter:
+    """Call `predict` up to each exposure, then `update` with what was seen in it."""
+
+    def __init__(
+        self, noise: MotionNoise, priors: SensorPriors, gate_m: float, forget_ns: int, max_lines: int = 16
+    ) -> None:
+        self._noise, self._priors = noise, priors
+        self._gate_m, self._forget_ns, self._max_lines = gate_m, forget_ns, max_lines
+        self._next_id = 0
+        self.held: list[HeldLine] = []
+        sigmas = np.zeros(FIRST_LINE)
+        sigmas[[PSI, PSI_RATE]] = math.radians(5.0), 0.005
+        sigmas[[VX, VY]] = noise.start_velocity_mps
+        sigmas[[PUSH_X, PUSH_Y]] = noise.start_disturbance_mps2
+        sigmas[[ROLL, PITCH]] = priors.attitude_rad
+        sigmas[[MOUNT_ROLL, MOUNT_PITCH]] = priors.mount_rad
+        sigmas[DELAY], sigmas[SCALE] = priors.delay_s, priors.scale_share
+        self._x: Matrix = np.zeros(FIRST_LINE)
+        self._p: Matrix = np.diag(sigmas**2)
+        self._steady = [0.0, 0.0]
+        self._unseen_s = [0.0, 0.0]
+        self._bias = [0.0, 0.0]
+        self._last = [0.0, 0.0]
+        self.rough = 1.0
+        """The noise of the motion as a share of the configured one."""
+        self.shake_rad = priors.shake_rad
+        """How far the picture shakes against the told attitude from frame to frame, as the lines say."""
+
+    # What is known
+
+    def mean(self, index: int) -> float:
+        return float(self._x[index])
+
+    def sigma(self, index: int) -> float:
+        return math.sqrt(max(float(self._p[index, index]), 0.0))
+
+    def offset(self, line: int) -> tuple[float, float]:
+        """Of the line held at that place: its offset from the drone, and sigma."""
+        return self.mean(FIRST_LINE + line), self.sigma(FIRST_LINE + line)
+
+    def push_after(self, axis: int, ahead_s: float) -> float:
+        """What is expected of the disturbance so much later: the gust in it fades."""
+        steady = self._steady[axis]
+        return steady + (self.mean(AXES[axis].push) - steady) * math.exp(-ahead_s / self._noise.gust_s)
+
+    def learnt(self) -> tuple[Matrix, Matrix]:
+        """What is known of the sensors: (6,) means and (6, 6) covariance from `ROLL` to `SCALE`."""
+        sensors = slice(ROLL, FIRST_LINE)
+        return self._x[sensors].copy(), self._p[sensors, sensors].copy()
+
+    def begin_with(self, learnt: tuple[Matrix, Matrix]) -> None:
+        """Begin with what another filter has learnt of the same sensors; the wandering part of the attitude's
+        error is another one by now."""
+        sensors = slice(ROLL, FIRST_LINE)
+        self._x[sensors], self._p[sensors, sensors] = learnt
+        wandering = [ROLL, PITCH]
+        self._x[wandering] = 0.0
+        self._p[wandering, :] = 0.0
+        self._p[:, wandering] = 0.0
+        self._p[wandering, wandering] = self._priors.attitude_rad**2
+
+    # What happens
+
+    def turn_to(self, offset_rad: float, sigma_rad: float) -> None:
+        """The heading offset is another one, and all that it was correlated with is no longer."""
+        self._x[[PSI, PSI_RATE]] = offset_rad, 0.0
+        self._p[[PSI, PSI_RATE], :] = 0.0
+        self._p[:, [PSI, PSI_RATE]] = 0.0
+        self._p[PSI, PSI], self._p[PSI_RATE, PSI_RATE] = sigma_rad**2, 0.005**2
+
+    def forget(self) -> None:
+        """Know no line and no motion any more; what was learnt of the sensors stays."""
+        noise = self._noise
+        self._drop(range(len(self.held)))
+        moving = [VX, VY, PUSH_X, PUSH_Y]
+        self._x[moving] = 0.0
+        self._p[moving, :] = 0.0
+        self._p[:, moving] = 0.0
+        variances = [noise.start_velocity_mps**2] * 2 + [noise.start_disturbance_mps2**2] * 2
+        self._p[moving, moving] = variances
+        self._bias = [0.0, 0.0]
+
+    def predict(self, dt_s: float, roll_rad: float, pitch_rad: float, yaw_rad: float) -> None:
+        """Advance by `dt_s` in the told attitude; `yaw_rad` is the vehicle's own."""
+        noise, priors, x = self._noise, self._priors, self._x
+        n = len(x)
+        (ax, ay), by_roll, by_pitch = self._lean(roll_rad, pitch_rad, yaw_rad)
+        drag = noise.drag_per_s
+        accel = np.array([ax + x[PUSH_X] - drag * x[VX], ay + x[PUSH_Y] - drag * x[VY]])
+        jacobian = np.eye(n)
+        jacobian[PSI, PSI_RATE] = dt_s
+        for axis, (velocity, push) in enumerate(AXES):
+            jacobian[velocity, velocity] = 1.0 - drag * dt_s
+            jacobian[velocity, push] = dt_s
+            jacobian[velocity, ROLL] = by_roll[axis] * dt_s
+            jacobian[velocity, PITCH] = by_pitch[axis] * dt_s
+        jacobian[VX, PSI], jacobian[VY, PSI] = -ay * dt_s, ax * dt_s
+        keep = math.exp(-dt_s / priors.attitude_s)
+        jacobian[ROLL, ROLL] = jacobian[PITCH, PITCH] = keep
+        reach = np.zeros((n, 2))
+        reach[VX, 0] = reach[VY, 1] = dt_s
+        moved = x[[VX, VY]] * dt_s + 0.5 * accel * dt_s * dt_s
+        for row, line in enumerate(self.held, FIRST_LINE):
+            velocity, _ = AXES[line.axis]
+            jacobian[row] -= 0.5 * dt_s * jacobian[velocity]
+            jacobian[row, velocity] -= 0.5 * dt_s
+            reach[row, line.axis] = -0.5 * dt_s * dt_s
+            x[row] -= moved[line.axis]
+        x[PSI] += x[PSI_RATE] * dt_s
+        x[[VX, VY]] += accel * dt_s
+        x[[ROLL, PITCH]] *= keep
+        p = jacobian @ self._p @ jacobian.T
+        p += reach @ reach.T * ((self.rough * noise.accel_mps2) ** 2 / dt_s)
+        drift = np.zeros(n)
+        drift[PSI], drift[PSI_RATE] = priors.heading_radps, 0.1 * priors.heading_radps
+        drift[ROLL] = drift[PITCH] = priors.attitude_rad * math.sqrt(2.0 / priors.attitude_s)
+        drift[MOUNT_ROLL] = drift[MOUNT_PITCH] = priors.mount_rad * 0.002
+        drift[DELAY], drift[SCALE] = priors.delay_s * 0.01, priors.scale_share * 0.01
+        for axis, (_, push) in enumerate(AXES):
+            changed = abs(self._bias[axis]) > _BIASED
+            drift[push] = noise.changed_mps2 if changed else noise.disturbance_mps2
+        p[np.diag_indices(n)] += drift**2 * dt_s
+        self._p = (p + p.T) / 2
+        self._fade(dt_s)
+
+    def update(self, sights: list[LineSight], rates: Rates, stamp_ns: int) -> None:
+        """Take the lines of one frame; those that belong to none held start new ones."""
+        known, fresh = self._associate(sights)
+        rows: list[Matrix] = []
+        errors: list[float] = []
+        variances: list[float] = []
+        by_tilt: list[tuple[float, float]] = []
+        offsets: list[tuple[int, int]] = []
+        for sight, line in known:
+            offsets.append((len(rows), sight.axis))
+            rows.append(self._offset_row(sight, rates, FIRST_LINE + line))
+            errors.append(sight.offset_m - self.mean(FIRST_LINE + line))
+            variances.append(sight.sigma_m**2)
+            by_tilt.append(sight.offset_per_tilt)
+        for sight in sights:
+            if not math.isnan(sight.turn_rad):
+                rows.append(self._turn_row(sight, rates))
+                errors.append(sight.turn_rad)
+                variances.append(sight.sigma_theta_rad**2)
+                by_tilt.append(sight.turn_per_tilt)
+        if rows:
+            told = self._correct(np.array(rows), np.array(errors), np.array(variances), np.array(by_tilt))
+            self._mind(told, offsets)
+        for sight, line in known:
+            held = self.held[line]
+            held.seen_ns, held.hits = stamp_ns, held.hits + 1
+            held.width_m += 0.2 * (sight.width_m - held.width_m)
+            held.from_m, held.to_m = sight.from_m, sight.to_m
+        for sight in fresh:
+            self._add(sight, rates, stamp_ns)
+        self._forget_old(stamp_ns)
+
+    # How
+
+    def _lean(
+        self, roll_rad: float, pitch_rad: float, yaw_rad: float
+    ) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
+        """Acceleration along x and y that the attitude makes, and what a radian more of roll and of pitch
+        would make."""
+        roll, pitch = roll_rad + self.mean(ROLL), pitch_rad + self.mean(PITCH)
+        yaw = yaw_rad + self.mean(PSI)
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        forward, right = -GRAVITY_MPS2 * math.tan(pitch), GRAVITY_MPS2 * math.tan(roll)
+        per_roll, per_pitch = GRAVITY_MPS2 / math.cos(roll) ** 2, -GRAVITY_MPS2 / math.cos(pitch) ** 2
+        accel = cos * forward - sin * right, sin * forward + cos * right
+        return accel, (-sin * per_roll, cos * per_roll), (cos * per_pitch, sin * per_pitch)
+
+    def accel(self, roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[float, float]:
+        """Acceleration along the grid axes that the told attitude makes at constant height."""
+        return self._lean(roll_rad, pitch_rad, yaw_rad)[0]
+
+    def _fade(self, dt_s: float) -> None:
+        for axis, (_, push) in enumerate(AXES):
+            limit = self._noise.max_disturbance_mps2
+            self._x[push] = min(max(self._x[push], -limit), limit)
+            if self._unseen_s[axis] > _UNSEEN_S:
+                self._x[push] = self.push_after(axis, dt_s)
+            else:
+                share = min(dt_s / self._noise.steady_s, 1.0)
+                self._steady[axis] += share * (self.mean(push) - self._steady[axis])
+            self._unseen_s[axis] += dt_s
+
+    def _offset_row(self, sight: LineSight, rates: Rates, column: int) -> Matrix:
+        """d(seen offset - held offset) / d state."""
+        row = np.zeros(len(self._x))
+        self._fill_sight(row, sight, rates)
+        row[column] = -1.0
+        # as held, not as seen: what is seen has the noise in it that is weighed here, and scale would shrink
+        row[SCALE] = self.mean(column)
+        return row
+
+    def _fill_sight(self, row: Matrix, sight: LineSight, rates: Rates) -> None:
+        by_roll, by_pitch = sight.offset_per_tilt
+        by_yaw = -sight.along_m if sight.axis == 0 else sight.along_m
+        row[[ROLL, MOUNT_ROLL]] = by_roll
+        row[[PITCH, MOUNT_PITCH]] = by_pitch
+        row[PSI] = by_yaw
+        velocity = self.mean(AXES[sight.axis].velocity)
+        row[DELAY] = (
+            by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + by_yaw * rates.yaw_radps + velocity
+        )
+        row[SCALE] = sight.offset_m
+
+    def _turn_row(self, sight: LineSight, rates: Rates) -> Matrix:
+        """d(heading told less heading held) / d state, negative: of the implicit g."""
+        row = np.zeros(len(self._x))
+        by_roll, by_pitch = sight.turn_per_tilt
+        row[PSI] = 1.0
+        row[[ROLL, MOUNT_ROLL]] = by_roll
+        row[[PITCH, MOUNT_PITCH]] = by_pitch
+        row[DELAY] = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + rates.yaw_radps
+        return row
+
+    def _correct(self, rows: Matrix, errors: Matrix, variances: Matrix, by_tilt: Matrix) -> Matrix:
+        """Bring g to 0; the errors in units of their sigmas.  What shakes shakes all lines of a frame alike."""
+        noise = np.diag(variances) + by_tilt @ by_tilt.T * self.shake_rad**2
+        crossed = self._p @ rows.T
+        spread = rows @ crossed + noise
+        gain = np.linalg.solve(spread, crossed.T).T
+        told: Matrix = errors / np.sqrt(np.diag(spread))
+        self._x = self._x - gain @ errors
+        kept = np.eye(len(self._x)) - gain @ rows
+        p = kept @ self._p @ kept.T + gain @ noise @ gain.T
+        self._p = (p + p.T) / 2
+        return told
+
+    def _mind(self, told: Matrix, offsets: list[tuple[int, int]]) -> None:
+        """Learn from normalised errors whether the wind has changed and how much the picture shakes."""
+        for axis in range(2):
+            mine = [-float(told[row]) for row, of in offsets if of == axis]
+            if mine:
+                self._unseen_s[axis] = 0.0
+                mean = sum(mine) / len(mine)
+                self._bias[axis] += _BIAS_GAIN * (mean - self._bias[axis])
+                agree = min(max(mean * self._last[axis], -1.0), 1.0)
+                rough = self.rough * (1.0 + _ROUGH_GAIN * agree)
+                self.rough, self._last[axis] = min(max(rough, _LEAST_ROUGH), _MOST_ROUGH), mean
+        ratio = min(float(np.mean(told**2)), 9.0)
+        low, high = self._priors.shake_bounds_rad
+        self.shake_rad = min(max(self.shake_rad * (1.0 + _SHAKE_GAIN * (ratio - 1.0)), low), high)
+
+    def _associate(self, sights: list[LineSight]) -> tuple[list[tuple[LineSight, int]], list[LineSight]]:
+        known: list[tuple[LineSight, int]] = []
+        fresh: list[LineSight] = []
+        taken: set[int] = set()
+        for sight in sorted(sights, key=lambda seen: seen.sigma_m):
+            line = self._nearest(sight, taken)
+            if line is None:
+                fresh.append(sight)
+            else:
+                taken.add(line)
+                known.append((sight, line))
+        return known, fresh
+
+    def _nearest(self, sight: LineSight, taken: set[int]) -> int | None:
+        best, best_m = None, self._gate_m
+        for line, held in enumerate(self.held):
+            if line in taken or held.axis != sight.axis:
+                continue
+            offset_m, sigma_m = self.offset(line)
+            distance_m = abs(sight.offset_m - offset_m)
+            spread_m = math.hypot(sigma_m, sight.sigma_m)
+            if distance_m < best_m and distance_m < max(_GATE_SIGMAS * spread_m, 0.3 * self._gate_m):
+                best, best_m = line, distance_m
+        return best
+
+    def _add(self, sight: LineSight, rates: Rates, stamp_ns: int) -> None:
+        """A line where it was seen, as wrong as everything by which it was placed."""
+        n = len(self._x)
+        row = np.zeros(n)
+        self._fill_sight(row, sight, rates)
+        grown = np.zeros((n + 1, n + 1))
+        grown[:n, :n] = self._p
+        grown[n, :n] = grown[:n, n] = self._p @ row
+        by_roll, by_pitch = sight.offset_per_tilt
+        shaken = (by_roll**2 + by_pitch**2) * self.shake_rad**2
+        grown[n, n] = row @ self._p @ row + sight.sigma_m**2 + shaken
+        self._x, self._p = np.append(self._x, sight.offset_m), grown
+        self.held.append(
+            HeldLine(self._next_id, sight.axis, sight.width_m, stamp_ns, sight.from_m, sight.to_m)
+        )
+        self._next_id += 1
+
+    def _forget_old(self, stamp_ns: int) -> None:
+        order = sorted(range(len(self.held)), key=lambda line: -self.held[line].seen_ns)
+        old = {line for line in order if stamp_ns - self.held[line].seen_ns > self._forget_ns}
+        self._drop(old | set(order[self._max_lines :]))
+
+    def _drop(self, lines: set[int] | range) -> None:
+        if not lines:
+            return
+        kept = [line for line in range(len(self.held)) if line not in lines]
+        rows = [*range(FIRST_LINE), *(FIRST_LINE + line for line in kept)]
+        self._x, self._p = self._x[rows], self._p[np.ix_(rows, rows)]
+        self.held = [self.held[line] for line in kept]
