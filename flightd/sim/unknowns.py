@@ -86,6 +86,10 @@ class Unknowns:
         return replace(configured, hover_collective=configured.hover_collective * self.hover_share)
 
 
+NOTHING = Unknowns()
+"""The configuration knows it all."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Spread:
     """The largest differences of one world."""
@@ -157,7 +161,7 @@ _SPREADS = {
 def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
     """What is drawn for one flight; the same kind and seed draw the same."""
     if kind is WorldKind.IDEAL:
-        return Unknowns()
+        return NOTHING
     most, rng = _SPREADS[kind], random.Random(f"unknowns {kind} {seed}")
 
     def within(limit: float) -> float:

@@ -40,7 +40,7 @@ from flightd.sim.scenario.faults import FaultListener, WorldFaults, bare_boxes
 from flightd.sim.sensors.camera import CameraPeer
 from flightd.sim.sensors.instruments import SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
-from flightd.sim.unknowns import Shaken, Unknowns
+from flightd.sim.unknowns import NOTHING, Shaken, Unknowns
 from flightd.site.site import Site
 
 _TRUTH_PERIOD_S = 0.02
@@ -88,7 +88,7 @@ class WorldSpec:
     truth_url: str = ""
     faults: tuple[Fault, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
-    unknowns: Unknowns = Unknowns()
+    unknowns: Unknowns = NOTHING
 
 
 class VehiclePeer(Protocol):

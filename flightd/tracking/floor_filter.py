@@ -11,34 +11,28 @@ picture; what is wrong with the mount shows in the picture alone; a wrong delay 
 or turns, as the attitude of another moment.  So a frame in which the drone turns says more of the delay than
 of the position, and the filter weighs it so: what is not known yet cannot make the position loop swing.
 
-The measurement is taken in implicit form, g(state, picture) = 0 (Jazwinski, Stochastic Processes and Filtering
-Theory, 1970, 8.3; Joseph's form of the update).
+The measurement is taken in implicit form, g(state, picture) = 0 (Jazwinski, Stochastic Processes and
+Filtering Theory, 1970, 8.3), with Joseph's form of the update.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from flightd.config.tracking import MotionNoise, SensorPriors
 from flightd.core.geometry import GRAVITY_MPS2, Matrix
+from flightd.tracking.held_lines import HeldLine, associate
+from flightd.tracking.innovations import Innovations
+from flightd.tracking.line_sight import LineSight, Rates
 
 PSI, PSI_RATE, VX, VY, PUSH_X, PUSH_Y, ROLL, PITCH, MOUNT_ROLL, MOUNT_PITCH, DELAY, SCALE = range(12)
 FIRST_LINE = 12
 
-_GATE_SIGMAS = 4.0
 _UNSEEN_S = 0.1
 """An axis without a line for so long is dead-reckoned: the gust that was last felt on it fades."""
-_BIAS_GAIN, _BIASED = 0.25, 0.6
-"""Innovations whose running mean is beyond this, in sigmas, all err to one side: the wind has changed."""
-_SHAKE_GAIN = 0.03
-_ROUGH_GAIN, _LEAST_ROUGH, _MOST_ROUGH = 0.02, 0.15, 1.5
-"""How soon, and between which shares of the configured density, the noise of the motion is adapted: successive
-innovations of a filter that believes too much in it contradict each other, of one that believes too little they
-agree (Mehra, IEEE Trans. Automatic Control 15, 1970)."""
 
 
 class Axis(NamedTuple):
@@ -49,45 +43,6 @@ class Axis(NamedTuple):
 
 
 AXES = Axis(VX, PUSH_X), Axis(VY, PUSH_Y)
-
-
-class LineSight(NamedTuple):
-    """One line of a frame, across the grid axis `axis`: where it was seen from the drone along that axis and
-    along itself, what its direction says of the heading, its width and its visible part, with the standard
-    deviations of offset and direction; what a tilt (roll, pitch) would change of the two."""
-
-    axis: int
-    offset_m: float
-    along_m: float
-    turn_rad: float
-    sigma_m: float
-    sigma_theta_rad: float
-    width_m: float
-    from_m: float
-    to_m: float
-    offset_per_tilt: tuple[float, float]
-    turn_per_tilt: tuple[float, float]
-
-
-class Rates(NamedTuple):
-    """How fast the told attitude changed at an exposure."""
-
-    roll_radps: float
-    pitch_radps: float
-    yaw_radps: float
-
-
-@dataclass(slots=True)
-class HeldLine:
-    """A line that is followed."""
-
-    id: int
-    axis: int
-    width_m: float
-    seen_ns: int
-    from_m: float
-    to_m: float
-    hits: int = 1
 
 
 class FloorFilter:
@@ -111,12 +66,7 @@ class FloorFilter:
         self._p: Matrix = np.diag(sigmas**2)
         self._steady = [0.0, 0.0]
         self._unseen_s = [0.0, 0.0]
-        self._bias = [0.0, 0.0]
-        self._last = [0.0, 0.0]
-        self.rough = 1.0
-        """The noise of the motion as a share of the configured one."""
-        self.shake_rad = priors.shake_rad
-        """How far the picture shakes against the told attitude from frame to frame, as the lines say."""
+        self._innovations = Innovations(priors.shake_rad, priors.shake_bounds_rad)
 
     # What is known
 
@@ -125,6 +75,11 @@ class FloorFilter:
 
     def sigma(self, index: int) -> float:
         return math.sqrt(max(float(self._p[index, index]), 0.0))
+
+    @property
+    def shake_rad(self) -> float:
+        """How far the picture shakes against the told attitude from frame to frame, as the lines say."""
+        return self._innovations.shake_rad
 
     def offset(self, line: int) -> tuple[float, float]:
         """Of the line held at that place: its offset from the drone, and sigma."""
@@ -170,7 +125,7 @@ class FloorFilter:
         self._p[:, moving] = 0.0
         variances = [noise.start_velocity_mps**2] * 2 + [noise.start_disturbance_mps2**2] * 2
         self._p[moving, moving] = variances
-        self._bias = [0.0, 0.0]
+        self._innovations.forget()
 
     def predict(self, dt_s: float, roll_rad: float, pitch_rad: float, yaw_rad: float) -> None:
         """Advance by `dt_s` in the told attitude; `yaw_rad` is the vehicle's own."""
@@ -202,14 +157,14 @@ class FloorFilter:
         x[[VX, VY]] += accel * dt_s
         x[[ROLL, PITCH]] *= keep
         p = jacobian @ self._p @ jacobian.T
-        p += reach @ reach.T * ((self.rough * noise.accel_mps2) ** 2 / dt_s)
+        p += reach @ reach.T * ((self._innovations.rough * noise.accel_mps2) ** 2 / dt_s)
         drift = np.zeros(n)
         drift[PSI], drift[PSI_RATE] = priors.heading_radps, 0.1 * priors.heading_radps
         drift[ROLL] = drift[PITCH] = priors.attitude_rad * math.sqrt(2.0 / priors.attitude_s)
         drift[MOUNT_ROLL] = drift[MOUNT_PITCH] = priors.mount_rad * 0.002
         drift[DELAY], drift[SCALE] = priors.delay_s * 0.01, priors.scale_share * 0.01
         for axis, (_, push) in enumerate(AXES):
-            changed = abs(self._bias[axis]) > _BIASED
+            changed = self._innovations.one_sided(axis)
             drift[push] = noise.changed_mps2 if changed else noise.disturbance_mps2
         p[np.diag_indices(n)] += drift**2 * dt_s
         self._p = (p + p.T) / 2
@@ -217,7 +172,8 @@ class FloorFilter:
 
     def update(self, sights: list[LineSight], rates: Rates, stamp_ns: int) -> None:
         """Take the lines of one frame; those that belong to none held start new ones."""
-        known, fresh = self._associate(sights)
+        offsets_m = [self.offset(line) for line in range(len(self.held))]
+        known, fresh = associate(sights, self.held, offsets_m, self._gate_m)
         rows: list[Matrix] = []
         errors: list[float] = []
         variances: list[float] = []
@@ -309,8 +265,8 @@ class FloorFilter:
         return row
 
     def _correct(self, rows: Matrix, errors: Matrix, variances: Matrix, by_tilt: Matrix) -> Matrix:
-        """Bring g to 0; the errors in units of their sigmas.  What shakes shakes all lines of a frame alike."""
-        noise = np.diag(variances) + by_tilt @ by_tilt.T * self.shake_rad**2
+        """Bring g to 0; returns the errors in units of their sigmas.  What shakes moves all lines alike."""
+        noise = np.diag(variances) + by_tilt @ by_tilt.T * self._innovations.shake_rad**2
         crossed = self._p @ rows.T
         spread = rows @ crossed + noise
         gain = np.linalg.solve(spread, crossed.T).T
@@ -322,44 +278,12 @@ class FloorFilter:
         return told
 
     def _mind(self, told: Matrix, offsets: list[tuple[int, int]]) -> None:
-        """Learn from normalised errors whether the wind has changed and how much the picture shakes."""
         for axis in range(2):
             mine = [-float(told[row]) for row, of in offsets if of == axis]
             if mine:
                 self._unseen_s[axis] = 0.0
-                mean = sum(mine) / len(mine)
-                self._bias[axis] += _BIAS_GAIN * (mean - self._bias[axis])
-                agree = min(max(mean * self._last[axis], -1.0), 1.0)
-                rough = self.rough * (1.0 + _ROUGH_GAIN * agree)
-                self.rough, self._last[axis] = min(max(rough, _LEAST_ROUGH), _MOST_ROUGH), mean
-        ratio = min(float(np.mean(told**2)), 9.0)
-        low, high = self._priors.shake_bounds_rad
-        self.shake_rad = min(max(self.shake_rad * (1.0 + _SHAKE_GAIN * (ratio - 1.0)), low), high)
-
-    def _associate(self, sights: list[LineSight]) -> tuple[list[tuple[LineSight, int]], list[LineSight]]:
-        known: list[tuple[LineSight, int]] = []
-        fresh: list[LineSight] = []
-        taken: set[int] = set()
-        for sight in sorted(sights, key=lambda seen: seen.sigma_m):
-            line = self._nearest(sight, taken)
-            if line is None:
-                fresh.append(sight)
-            else:
-                taken.add(line)
-                known.append((sight, line))
-        return known, fresh
-
-    def _nearest(self, sight: LineSight, taken: set[int]) -> int | None:
-        best, best_m = None, self._gate_m
-        for line, held in enumerate(self.held):
-            if line in taken or held.axis != sight.axis:
-                continue
-            offset_m, sigma_m = self.offset(line)
-            distance_m = abs(sight.offset_m - offset_m)
-            spread_m = math.hypot(sigma_m, sight.sigma_m)
-            if distance_m < best_m and distance_m < max(_GATE_SIGMAS * spread_m, 0.3 * self._gate_m):
-                best, best_m = line, distance_m
-        return best
+                self._innovations.take(axis, sum(mine) / len(mine))
+        self._innovations.shaken(float(np.mean(told**2)))
 
     def _add(self, sight: LineSight, rates: Rates, stamp_ns: int) -> None:
         """A line where it was seen, as wrong as everything by which it was placed."""
@@ -370,7 +294,7 @@ class FloorFilter:
         grown[:n, :n] = self._p
         grown[n, :n] = grown[:n, n] = self._p @ row
         by_roll, by_pitch = sight.offset_per_tilt
-        shaken = (by_roll**2 + by_pitch**2) * self.shake_rad**2
+        shaken = (by_roll**2 + by_pitch**2) * self._innovations.shake_rad**2
         grown[n, n] = row @ self._p @ row + sight.sigma_m**2 + shaken
         self._x, self._p = np.append(self._x, sight.offset_m), grown
         self.held.append(

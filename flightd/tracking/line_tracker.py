@@ -30,22 +30,18 @@ from flightd.tracking.floor_filter import (
     VX,
     VY,
     FloorFilter,
-    LineSight,
-    Rates,
 )
 from flightd.tracking.ground_junctions import floor_junctions
+from flightd.tracking.line_sight import Rates, agrees, line_sight, turn_of
 from flightd.tracking.tilt_compensation import (
     FloorView,
     GroundLine,
     ground_lines,
     ground_point,
-    tilt_effects,
 )
 
 _STEP_NS = 20_000_000
 _ASSUMED_TILT_RAD = math.radians(2.0)
-_PARALLEL_RAD = math.radians(20.0)
-_LEAST_THETA_RAD = math.radians(0.2)
 _RATE_NS = 20_000_000
 """The told attitude's rates are taken over so long before and after."""
 _WIDTH_GAIN = 0.15
@@ -140,9 +136,9 @@ class LineTracker:
         on_floor = [line for line in seen if low <= line.width_m <= high]
         self._settle_dispute(on_floor, attitude)
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
-        sights = [
-            sight for line in on_floor if (sight := self._sight(line, yaw, height_m, blind)) is not None
-        ]
+        sigma_yaw, least_m = self._filter.sigma(PSI), params.min_sigma_m
+        placed = (line_sight(line, yaw, sigma_yaw, height_m, least_m, tilts=not blind) for line in on_floor)
+        sights = [sight for sight in placed if sight is not None]
         self._filter.update(sights, self._rates(stamp_ns), stamp_ns)
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
         self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in _placed(lines.pads, view, yaw))
@@ -261,50 +257,16 @@ class LineTracker:
             wrap_pi(last.yaw_rad - first.yaw_rad) / dt_s,
         )
 
-    def _sight(self, line: GroundLine, yaw: float, height_m: float, blind: bool) -> LineSight | None:
-        """The line as the filter takes it; None for one that runs along no axis of the grid."""
-        direction = line.theta_rad + yaw
-        across_x = abs(math.cos(direction)) < math.sin(_PARALLEL_RAD)
-        if not across_x and abs(math.sin(direction)) >= math.sin(_PARALLEL_RAD):
-            return None
-        forward, right = line.forward_m, line.right_m
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        x, y = cos * forward - sin * right, sin * forward + cos * right
-        if across_x:
-            offset, along = x, y
-            ends = sorted(sin * forward + cos * right for forward, right in line.ends_m)
-        else:
-            offset, along = y, x
-            ends = sorted(cos * forward - sin * right for forward, right in line.ends_m)
-        shifts, turns = tilt_effects(line, height_m)
-        on_axis = (cos, -sin) if across_x else (sin, cos)
-        by_roll, by_pitch = (on_axis[0] * shift[0] + on_axis[1] * shift[1] for shift in shifts)
-        turn = (direction + math.pi / 4) % (math.pi / 2) - math.pi / 4
-        sigma_theta = max(line.sigma_theta_rad, _LEAST_THETA_RAD)
-        gate = max(math.radians(4.0), 4.0 * math.hypot(self._filter.sigma(PSI), sigma_theta))
-        return LineSight(
-            0 if across_x else 1,
-            offset,
-            along,
-            turn if abs(turn) < gate else math.nan,
-            max(line.sigma_m, self._params.min_sigma_m),
-            sigma_theta,
-            line.width_m,
-            ends[0],
-            ends[1],
-            (0.0, 0.0) if blind else (by_roll, by_pitch),
-            (0.0, 0.0) if blind else turns,
-        )
-
     def _settle_dispute(self, on_floor: list[GroundLine], attitude: Attitude) -> None:
         """Believe lines that all contradict the heading for long."""
-        yaw = attitude.yaw_rad + self._filter.mean(PSI)
-        told = [(-line.theta_rad - yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4 for line in on_floor]
-        gate = max(math.radians(4.0), 4.0 * math.hypot(self._filter.sigma(PSI), _LEAST_THETA_RAD))
-        agreed = any(abs(error) < gate for error in told)
-        if self._dispute.step(told, agreed, attitude.stamp_ns):
-            offset = self._filter.mean(PSI) + self._dispute.error_rad
-            self._filter.turn_to(offset, self._params.start_yaw_sigma_rad)
+        held = self._filter
+        yaw, sigma = attitude.yaw_rad + held.mean(PSI), held.sigma(PSI)
+        turns = [turn_of(line, yaw) for line in on_floor]
+        agreed = any(
+            agrees(turn, line.sigma_theta_rad, sigma) for turn, line in zip(turns, on_floor, strict=True)
+        )
+        if self._dispute.step([-turn for turn in turns], agreed, attitude.stamp_ns):
+            held.turn_to(held.mean(PSI) + self._dispute.error_rad, self._params.start_yaw_sigma_rad)
 
     def _believed_height_m(self, lines: LineSet, told_m: float) -> float:
         """The height told, unless there is none or the width of the lines contradicts it: then theirs."""

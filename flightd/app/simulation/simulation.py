@@ -17,7 +17,7 @@ from flightd.core.snapshot import Snapshot
 from flightd.mission.plan.flight_plan import FlightPlan
 from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
 from flightd.sim.scenario.scenario import Scenario
-from flightd.sim.unknowns import Unknowns
+from flightd.sim.unknowns import NOTHING, Unknowns
 from flightd.sim.world import FrontSpec, WorldSpec
 from flightd.site.site import Site
 
@@ -37,7 +37,7 @@ class Simulation:
     """An external simulator's truth link; the configuration says where its vehicle is flown."""
     order: FlightOrder | None = None
     """What this flight is to do; None: what the configuration says."""
-    unknowns: Unknowns = Unknowns()
+    unknowns: Unknowns = NOTHING
 
     @property
     def flight_log(self) -> Path:

@@ -5,16 +5,9 @@ from __future__ import annotations
 import math
 import random
 
-import pytest
-
-from flightd.config.tracking import MotionNoise, SensorPriors, TrackingConfig, TrackingExpert
-from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount
-from flightd.core.types import Attitude, LineSet
-from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.random_sites import random_site
-from flightd.tracking.floor_filter import FIRST_LINE, PUSH_X, VX, FloorFilter, LineSight, Rates
-from flightd.tracking.line_tracker import LineTracker
-from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
+from flightd.config.tracking import MotionNoise, SensorPriors
+from flightd.tracking.floor_filter import FIRST_LINE, PUSH_X, VX, FloorFilter
+from flightd.tracking.line_sight import LineSight, Rates
 
 FRAME_NS = 33_333_333
 STILL = Rates(0.0, 0.0, 0.0)

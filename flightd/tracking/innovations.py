@@ -1,0 +1,46 @@
+"""What a filter's innovations say of the noise that it assumes: the noise follows them, within bounds."""
+
+from __future__ import annotations
+
+_BIAS_GAIN, _BIASED = 0.25, 0.6
+"""Innovations whose running mean is beyond this, in sigmas, all err to one side: the wind has changed."""
+_SHAKE_GAIN = 0.03
+_ROUGH_GAIN, _LEAST_ROUGH, _MOST_ROUGH = 0.02, 0.15, 1.5
+"""How soon, and between which shares of the configured density, the noise of the motion is adapted:
+successive innovations of a filter that assumes too much of it contradict each other, of one that assumes too
+little they agree (Mehra, IEEE Trans. Automatic Control 15, 1970)."""
+_MOST_RATIO = 9.0
+
+
+class Innovations:
+    """Give `take` each frame's mean innovation along an axis and `shaken` the mean square of all, both in
+    units of their standard deviation."""
+
+    def __init__(self, shake_rad: float, bounds_rad: tuple[float, float]) -> None:
+        self._bounds_rad = bounds_rad
+        self._bias = [0.0, 0.0]
+        self._last = [0.0, 0.0]
+        self.rough = 1.0
+        """The noise of the motion as a share of the configured one."""
+        self.shake_rad = shake_rad
+        """How far the picture shakes against the told attitude from frame to frame."""
+
+    def forget(self) -> None:
+        """The lines are others now."""
+        self._bias = [0.0, 0.0]
+        self._last = [0.0, 0.0]
+
+    def one_sided(self, axis: int) -> bool:
+        """Whether all lines across the axis err to one side lately."""
+        return abs(self._bias[axis]) > _BIASED
+
+    def take(self, axis: int, mean: float) -> None:
+        self._bias[axis] += _BIAS_GAIN * (mean - self._bias[axis])
+        agree = min(max(mean * self._last[axis], -1.0), 1.0)
+        self.rough = min(max(self.rough * (1.0 + _ROUGH_GAIN * agree), _LEAST_ROUGH), _MOST_ROUGH)
+        self._last[axis] = mean
+
+    def shaken(self, ratio: float) -> None:
+        low, high = self._bounds_rad
+        shake_rad = self.shake_rad * (1.0 + _SHAKE_GAIN * (min(ratio, _MOST_RATIO) - 1.0))
+        self.shake_rad = min(max(shake_rad, low), high)

@@ -1,0 +1,91 @@
+"""A line of one frame as the filter of motion and sensors takes it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from flightd.tracking.tilt_compensation import GroundLine, tilt_effects
+
+_PARALLEL_RAD = math.radians(20.0)
+"""A line further than this from both grid axes is none of the grid."""
+_LEAST_SIGMA_RAD = math.radians(0.2)
+_GATE_RAD, _GATE_SIGMAS = math.radians(4.0), 4.0
+
+
+class LineSight(NamedTuple):
+    """One line of a frame, across the grid axis `axis`: where it was seen from the drone along that axis and
+    along itself, what its direction says of the heading, its width and its visible part, with the standard
+    deviations of offset and direction; what a tilt (roll, pitch) would change of the two."""
+
+    axis: int
+    offset_m: float
+    along_m: float
+    turn_rad: float
+    sigma_m: float
+    sigma_theta_rad: float
+    width_m: float
+    from_m: float
+    to_m: float
+    offset_per_tilt: tuple[float, float]
+    turn_per_tilt: tuple[float, float]
+
+
+class Rates(NamedTuple):
+    """How fast the told attitude changed at an exposure."""
+
+    roll_radps: float
+    pitch_radps: float
+    yaw_radps: float
+
+
+def turn_of(line: GroundLine, yaw_rad: float) -> float:
+    """By how much the line contradicts the heading, -45 to 45 degrees: the heading held less the one told."""
+    return (line.theta_rad + yaw_rad + math.pi / 4) % (math.pi / 2) - math.pi / 4
+
+
+def agrees(turn_rad: float, sigma_theta_rad: float, sigma_yaw_rad: float) -> bool:
+    """Whether a line that contradicts the heading by so much may still be a line of the grid."""
+    sigma = math.hypot(sigma_yaw_rad, max(sigma_theta_rad, _LEAST_SIGMA_RAD))
+    return abs(turn_rad) < max(_GATE_RAD, _GATE_SIGMAS * sigma)
+
+
+def line_sight(
+    line: GroundLine,
+    yaw_rad: float,
+    sigma_yaw_rad: float,
+    height_m: float,
+    least_sigma_m: float,
+    *,
+    tilts: bool,
+) -> LineSight | None:
+    """The line seen by a drone that heads `yaw_rad` on the grid; None for one that runs along no axis of it.
+    `tilts` says that the attitude was used to place it."""
+    direction = line.theta_rad + yaw_rad
+    across_x = abs(math.cos(direction)) < math.sin(_PARALLEL_RAD)
+    if not across_x and abs(math.sin(direction)) >= math.sin(_PARALLEL_RAD):
+        return None
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    to_x, to_y = (cos, -sin), (sin, cos)
+    across, along = (to_x, to_y) if across_x else (to_y, to_x)
+
+    def on(axis: tuple[float, float], point: tuple[float, float]) -> float:
+        return axis[0] * point[0] + axis[1] * point[1]
+
+    middle = line.forward_m, line.right_m
+    shifts, turns = tilt_effects(line, height_m)
+    turn_rad = turn_of(line, yaw_rad)
+    from_m, to_m = sorted(on(along, end) for end in line.ends_m)
+    return LineSight(
+        axis=0 if across_x else 1,
+        offset_m=on(across, middle),
+        along_m=on(along, middle),
+        turn_rad=turn_rad if agrees(turn_rad, line.sigma_theta_rad, sigma_yaw_rad) else math.nan,
+        sigma_m=max(line.sigma_m, least_sigma_m),
+        sigma_theta_rad=max(line.sigma_theta_rad, _LEAST_SIGMA_RAD),
+        width_m=line.width_m,
+        from_m=from_m,
+        to_m=to_m,
+        offset_per_tilt=(on(across, shifts[0]), on(across, shifts[1])) if tilts else (0.0, 0.0),
+        turn_per_tilt=turns if tilts else (0.0, 0.0),
+    )
