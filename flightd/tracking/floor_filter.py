@@ -26,6 +26,7 @@ from flightd.config.tracking import MotionNoise, SensorPriors
 from flightd.core.geometry import GRAVITY_MPS2, Matrix
 from flightd.tracking.held_lines import HeldLine, associate
 from flightd.tracking.innovations import Innovations
+from flightd.tracking.kalman import corrected, predicted
 from flightd.tracking.line_sight import LineSight, Rates
 
 PSI, PSI_RATE, VX, VY, PUSH_X, PUSH_Y, ROLL, PITCH, MOUNT_ROLL, MOUNT_PITCH, DELAY, SCALE = range(12)
@@ -156,8 +157,8 @@ class FloorFilter:
         x[PSI] += x[PSI_RATE] * dt_s
         x[[VX, VY]] += accel * dt_s
         x[[ROLL, PITCH]] *= keep
-        p = jacobian @ self._p @ jacobian.T
-        p += reach @ reach.T * ((self._innovations.rough * noise.accel_mps2) ** 2 / dt_s)
+        rough = self._innovations.rough
+        noise_q = reach @ reach.T * ((rough * noise.accel_mps2) ** 2 / dt_s)
         drift = np.zeros(n)
         drift[PSI], drift[PSI_RATE] = priors.heading_radps, 0.1 * priors.heading_radps
         drift[ROLL] = drift[PITCH] = priors.attitude_rad * math.sqrt(2.0 / priors.attitude_s)
@@ -166,8 +167,8 @@ class FloorFilter:
         for axis, (_, push) in enumerate(AXES):
             changed = self._innovations.one_sided(axis)
             drift[push] = noise.changed_mps2 if changed else noise.disturbance_mps2
-        p[np.diag_indices(n)] += drift**2 * dt_s
-        self._p = (p + p.T) / 2
+        noise_q[np.diag_indices(n)] += drift**2 * dt_s
+        self._p = predicted(self._p, jacobian, noise_q)
         self._fade(dt_s)
 
     def update(self, sights: list[LineSight], rates: Rates, stamp_ns: int) -> None:
@@ -267,14 +268,8 @@ class FloorFilter:
     def _correct(self, rows: Matrix, errors: Matrix, variances: Matrix, by_tilt: Matrix) -> Matrix:
         """Bring g to 0; returns the errors in units of their sigmas.  What shakes moves all lines alike."""
         noise = np.diag(variances) + by_tilt @ by_tilt.T * self._innovations.shake_rad**2
-        crossed = self._p @ rows.T
-        spread = rows @ crossed + noise
-        gain = np.linalg.solve(spread, crossed.T).T
+        self._x, self._p, spread = corrected(self._x, self._p, rows, errors, noise)
         told: Matrix = errors / np.sqrt(np.diag(spread))
-        self._x = self._x - gain @ errors
-        kept = np.eye(len(self._x)) - gain @ rows
-        p = kept @ self._p @ kept.T + gain @ noise @ gain.T
-        self._p = (p + p.T) / 2
         return told
 
     def _mind(self, told: Matrix, offsets: list[tuple[int, int]]) -> None:

@@ -1,4 +1,4 @@
-"""The linear Kalman filter, in the covariance form that stays positive (Joseph).
+"""The steps of a Kalman filter, in the covariance form that stays positive (Joseph).
 
 Written out, for the usual library for it imports half of scipy: seconds that a daemon which is started
 anew in the air does not have.
@@ -11,29 +11,23 @@ import numpy as np
 from flightd.core.geometry import Matrix
 
 
-class KalmanFilter:
-    """State `x` (n, 1) with covariance `P` (n, n); model `F` (n, n), `B` (n, k), `Q` (n, n); `H` (m, n)."""
+def predicted(p: Matrix, transition: Matrix, noise: Matrix) -> Matrix:
+    """(n, n) covariance after a step with the (n, n) `transition` and the (n, n) `noise` of the model."""
+    moved: Matrix = transition @ p @ transition.T + noise
+    return (moved + moved.T) / 2
 
-    def __init__(self, x: Matrix, P: Matrix) -> None:  # noqa: N803 - the field's letters
-        n = len(x)
-        self.x = x
-        self.P = P
-        self.F: Matrix = np.eye(n)
-        self.B: Matrix | None = None
-        self.Q: Matrix = np.eye(n)
-        self.H: Matrix = np.zeros((1, n))
 
-    def predict(self, u: Matrix | None = None) -> None:
-        """x = F x + B u, P = F P F' + Q."""
-        self.x = self.F @ self.x
-        if self.B is not None and u is not None:
-            self.x = self.x + self.B @ u
-        self.P = self.F @ self.P @ self.F.T + self.Q
+def corrected(
+    x: Matrix, p: Matrix, rows: Matrix, errors: Matrix, noise: Matrix
+) -> tuple[Matrix, Matrix, Matrix]:
+    """(n,) state and (n, n) covariance that bring m measured errors to 0, and the (m, m) covariance that the
+    errors were expected to have.
 
-    def update(self, z: Matrix, R: Matrix) -> None:  # noqa: N803
-        """Take the measurement `z` (m, 1) with covariance `R` (m, m)."""
-        crossed = self.P @ self.H.T
-        gain = crossed @ np.linalg.inv(self.H @ crossed + R)
-        self.x = self.x + gain @ (z - self.H @ self.x)
-        kept = np.eye(len(self.x)) - gain @ self.H
-        self.P = kept @ self.P @ kept.T + gain @ R @ gain.T
+    `errors` (m,) are h(x) - z, or any g(x) that is 0 where state and measurement agree, `rows` (m, n) their
+    derivative by the state, `noise` (m, m) the covariance of what was measured."""
+    crossed = p @ rows.T
+    spread: Matrix = rows @ crossed + noise
+    gain = np.linalg.solve(spread, crossed.T).T
+    kept = np.eye(len(x)) - gain @ rows
+    after = kept @ p @ kept.T + gain @ noise @ gain.T
+    return x - gain @ errors, (after + after.T) / 2, spread

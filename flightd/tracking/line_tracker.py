@@ -32,6 +32,7 @@ from flightd.tracking.floor_filter import (
     FloorFilter,
 )
 from flightd.tracking.ground_junctions import floor_junctions
+from flightd.tracking.heading_dispute import HeadingDispute
 from flightd.tracking.line_sight import Rates, agrees, line_sight, turn_of
 from flightd.tracking.tilt_compensation import (
     FloorView,
@@ -46,8 +47,6 @@ _RATE_NS = 20_000_000
 """The told attitude's rates are taken over so long before and after."""
 _WIDTH_GAIN = 0.15
 _AGREEING, _DOUBTED = 0.15, 0.2
-_SAME_RAD = math.radians(3.0)
-_DISPUTE_NS, _SHOWN_NS = 600_000_000, 1_500_000_000
 _DEFAULTS = TrackingConfig()
 _Square = TypeVar("_Square", PadSight, MarkerSight)
 
@@ -90,7 +89,7 @@ class LineTracker:
         self.height_share = 1.0
         """The height told lately against that by the lines' width; 1 when they agree."""
         self._widths_agreed = False
-        self._dispute = _Dispute()
+        self._dispute = HeadingDispute()
 
     @property
     def heading_error_rad(self) -> float:
@@ -282,34 +281,6 @@ class LineTracker:
             return told_m
         self.height_share += _WIDTH_GAIN * (told_m / by_width_m - self.height_share)
         return by_width_m if abs(self.height_share - 1.0) > _DOUBTED else told_m
-
-
-class _Dispute:
-    """Lines that all contradict the vehicle's heading, and by the same angle, frame after frame."""
-
-    def __init__(self) -> None:
-        self.error_rad = 0.0
-        self._since_ns = 0
-        self._settled_ns: int | None = None
-
-    def step(self, told: list[float], agreed: bool, stamp_ns: int) -> bool:
-        """Take what one frame's lines say; True when the lines have it.  The error is then shown for a
-        while longer, so that nobody overlooks it."""
-        if self._settled_ns is not None:
-            if stamp_ns - self._settled_ns > _SHOWN_NS:
-                self._settled_ns, self.error_rad = None, 0.0
-            return False
-        if agreed or not told:
-            self.error_rad = 0.0
-            return False
-        error = median(told)
-        if not self.error_rad or abs(error - self.error_rad) > _SAME_RAD:
-            self._since_ns = stamp_ns
-        self.error_rad = error
-        if stamp_ns - self._since_ns < _DISPUTE_NS:
-            return False
-        self._settled_ns = stamp_ns
-        return True
 
 
 def _placed(
