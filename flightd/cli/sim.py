@@ -27,6 +27,7 @@ EXAMPLES = """Examples:
   flightd sim --truth-url tcp:127.0.0.1:5762 --vehicle-url tcp:127.0.0.1:5760   ArduCopter's SITL flies
   flightd sim --scenario camera_frozen --scenario wind.toml    what goes wrong, by name or file
   flightd sim --scenario all                   every hazard in turn, and one table
+  flightd sim --world rough                    a drone that is not as its configuration says
   flightd sim --seeds 10                       ten flights, seeds 1 to 10, and one table
   flightd sim --set mission.heading=shelf --set control.tilt_compensation=none
 """
@@ -60,6 +61,12 @@ def sim(
         list[str] | None,
         typer.Option(help="Name or file of a scenario; several are laid over each other; all: each in turn."),
     ] = None,
+    world: Annotated[
+        str,
+        typer.Option(
+            help="How much of itself the drone keeps from its computer: ideal (nothing), usual or rough."
+        ),
+    ] = "usual",
     out: Annotated[Path, typer.Option(help="Folder for log, report and summary.")] = Path("out/sim"),
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE over the configuration.")
@@ -79,7 +86,7 @@ def sim(
     from flightd.app.simulation.prepare import SimOptions
 
     options = SimOptions(
-        config, warehouse, seed, vehicle, speed, tuple(settings or ()), truth_url, vehicle_url
+        config, warehouse, seed, vehicle, speed, tuple(settings or ()), truth_url, vehicle_url, world
     )
     options.check()
     _fly_all(options, scenario or [], seeds, out, as_json=as_json)

@@ -22,7 +22,7 @@ from flightd.core.types import (
 
 
 class Topic(enum.StrEnum):
-    """Names of the streams in `flight.mcap`; TRUTH, SCENARIO, FAULT and ARMED are in the simulator's
+    """Names of the streams in `flight.mcap`; TRUTH, UNKNOWNS, FAULT and ARMED are in the simulator's
     `truth.mcap`.
 
     TICK and DECISION are all that the pilot was given and all that it answered (`core.tick.TickInput`,
@@ -50,6 +50,7 @@ class Topic(enum.StrEnum):
     SCENARIO = "/scenario"
     FAULT = "/fault"
     ARMED = "/armed"
+    UNKNOWNS = "/unknowns"
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +92,7 @@ MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(
         Topic.MAP: Document,
         Topic.ORDER: FlightOrder,
         Topic.SCENARIO: Document,
+        Topic.UNKNOWNS: Document,
     }
 )
 """What a topic's messages are decoded to; a topic not named here holds plain JSON objects."""

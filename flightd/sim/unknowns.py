@@ -11,6 +11,7 @@ import math
 import random
 from dataclasses import dataclass, replace
 
+from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.instruments import SensorParams
@@ -29,6 +30,7 @@ class WorldKind(enum.StrEnum):
 class Unknowns:
     """What is true of one drone and not in its configuration; all differences are true less configured."""
 
+    kind: WorldKind = WorldKind.IDEAL
     camera_delay_s: float = 0.0
     camera_jitter_s: float = 0.0
     mount_roll_rad: float = 0.0
@@ -40,10 +42,11 @@ class Unknowns:
     tilt_bias_rad: tuple[float, float] | None = None
     """Roll and pitch told too large; None: the simulated autopilot's own small ones."""
     tilt_wander_rad: float = math.radians(0.1)
-    leak_s: float = math.inf
-    """Time within which the told attitude leaks towards level."""
+    leak_s: float | None = None
+    """Time within which the told attitude leaks towards level; None: it does not."""
     clock_ppm: float = 20.0
-    path_s: float = 0.0
+    path_s: tuple[float, float] = (0.0, 0.0)
+    """Least delay of telemetry, and of what is sent to the autopilot."""
     path_jitter_s: float = 0.0
     range_noise_m: float = 0.005
     range_dropout: float = 0.005
@@ -80,6 +83,14 @@ class Unknowns:
             range_min_m=max(self.range_min_m, configured.range_min_m),
             baro_wander_m=self.baro_wander_m,
         )
+
+    def radio(self, configured: RadioParams) -> tuple[RadioParams, RadioParams]:
+        """The line from the autopilot and to it as they really are; a radio is worse than any line."""
+        if configured != PERFECT or not self.path_jitter_s:
+            return configured, configured
+        down_s, up_s = self.path_s
+        down = RadioParams(delay_s=down_s, jitter_s=self.path_jitter_s, in_order=True)
+        return down, replace(down, delay_s=up_s)
 
     def airframe(self, configured: AirframeParams) -> AirframeParams:
         """The airframe as it really is."""
@@ -167,7 +178,9 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
     def within(limit: float) -> float:
         return rng.uniform(-limit, limit)
 
+    uneven_s = within(0.3 * most.path_s)
     return Unknowns(
+        kind=kind,
         camera_delay_s=within(most.delay_s),
         camera_jitter_s=most.jitter_s,
         mount_roll_rad=math.radians(within(most.mount_deg)),
@@ -179,7 +192,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         tilt_wander_rad=math.radians(most.tilt_wander_deg),
         leak_s=most.leak_s,
         clock_ppm=within(most.clock_ppm),
-        path_s=most.path_s,
+        path_s=(most.path_s + uneven_s, most.path_s - uneven_s),
         path_jitter_s=most.path_jitter_s,
         range_noise_m=most.range_noise_m,
         range_dropout=most.range_dropout,

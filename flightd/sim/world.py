@@ -6,15 +6,16 @@ It knows nothing of the daemon but the address that its camera reports to.
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Literal, Protocol
 
 from flightd.core.errors import FlightdError, RunError, UnavailableError
 from flightd.core.extras import missing_extra
-from flightd.core.topics import Topic
+from flightd.core.topics import Document, Topic
 from flightd.core.types import Image
 from flightd.ports import Clock, Recorder
 from flightd.runtime.clock import Hold
@@ -64,7 +65,8 @@ class WorldSpec:
     stands `start_offset_m` (x, y) away from the start pad's centre.
     `faults` go wrong on the way.  A MAVLink autopilot is set up as the shipped parameter file says, but for
     `parameters`; its clock runs `clock_ppm` fast, its range finder measures from `range_least_m` on, and one
-    beside it reads `second_range_m` more (None: there is none)."""
+    beside it reads `second_range_m` more (None: there is none).  `unknowns` are what no configuration
+    tells of it all."""
 
     site: Site
     seed: int
@@ -123,6 +125,7 @@ class World:
         being drawn.  InputError for a fault at an unknown node."""
         self._clock = clock
         self._recorder = recorder
+        self._unknowns = spec.unknowns
         start = _placement(spec)
         airframe = Airframe(
             spec.unknowns.airframe(AirframeParams(battery_capacity_ah=spec.battery_ah)),
@@ -164,6 +167,8 @@ class World:
         is known then, so that it can be drawn).  UnavailableError as for `open`; RunError when a peer fails:
         the world ends with it."""
         await self.open()
+        told = Document(json.dumps(asdict(self._unknowns), indent=1))
+        self._recorder.record(Topic.UNKNOWNS, self._clock.now_ns(), told)
         try:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self.vehicle.run(), name="autopilot")
@@ -207,10 +212,12 @@ def _autopilot(spec: WorldSpec, airframe: Airframe, clock: Clock) -> AutopilotPe
     is_px4 = spec.vehicle == "px4"
     known = PX4_PARAMETERS if is_px4 else COPTER_PARAMETERS
     parameters = {**shipped_parameters("px4" if is_px4 else "ardupilot", known), **spec.parameters}
+    down, up = spec.unknowns.radio(spec.radio)
     config = PeerConfig(
         port=port,
         seed=spec.seed,
-        radio=spec.radio,
+        radio=down,
+        radio_up=up,
         parameters=parameters,
         clock_ppm=spec.clock_ppm,
         sensors=spec.unknowns.sensors(SensorParams(range_min_m=spec.range_least_m)),
@@ -271,7 +278,7 @@ def _ardrone(
         from flightd.sim.ardrone.video import VideoChannel  # noqa: PLC0415
     except ModuleNotFoundError as err:
         raise missing_extra("ardrone", "simulating an AR.Drone") from err
-    drone = Drone(airframe, Sensors(seed=spec.seed))
+    drone = Drone(airframe, Sensors(spec.unknowns.sensors(SensorParams()), seed=spec.seed))
     ports = DronePorts("127.0.0.1", *spec.vehicle_ports)
     server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)
     appearance = spec.front.appearance if spec.front is not None else RackAppearance()

@@ -31,10 +31,13 @@ class SimOptions:
     settings: Sequence[str] = ()
     truth_url: str = ""
     vehicle_url: str = ""
-    world: WorldKind = WorldKind.IDEAL
+    world: str = WorldKind.USUAL
 
     def check(self) -> None:
         """InputError where options contradict each other."""
+        if self.world not in list(WorldKind):
+            kinds = ", ".join(WorldKind)
+            raise InputError(f"--world {self.world}: no such world; give one of {kinds}")
         if bool(self.truth_url) is not bool(self.vehicle_url):
             raise InputError("--truth-url and --vehicle-url belong together: give both or neither")
 
@@ -75,7 +78,7 @@ def prepare(
         folder,
         truth_url=options.truth_url,
         order=order,
-        unknowns=unknowns_of(options.world, options.seed),
+        unknowns=unknowns_of(WorldKind(options.world), options.seed),
     )
 
 

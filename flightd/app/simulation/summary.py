@@ -35,6 +35,7 @@ def write_results(
         "setpoint_interval_ms": result.setpoint_interval_ms,
         "wall_time_s": round(wall_s, 2),
         "seed": simulation.seed,
+        "world": simulation.unknowns.kind,
         "vehicle": simulation.config.vehicle.kind,
         **judgement.stock,
     }

@@ -49,7 +49,8 @@ class PeerConfig:
 
     `remotes` are addresses it talks to unasked (a companion that only listens).  `ready_s` after boot
     it can be armed (a real one takes about 20 s).  Its boot clock runs `clock_ppm` fast.
-    It has no estimate of its position unless `has_position`.  `radio` lies between it and the companion.
+    It has no estimate of its position unless `has_position`.  `radio` lies between it and the companion,
+    `radio_up` on the way to it where that is another.
     """
 
     host: str = "127.0.0.1"
@@ -69,6 +70,7 @@ class PeerConfig:
     none."""
     signing_key: bytes | None = None
     radio: RadioParams = PERFECT
+    radio_up: RadioParams | None = None
     parameters: dict[str, float] = field(default_factory=dict)
 
 
@@ -106,7 +108,8 @@ class AutopilotPeer(abc.ABC):
         self.link = UdpLink(
             config.system_id, dialect.MAV_COMP_ID_AUTOPILOT1, self.received, config.signing_key, config.seed
         )
-        self.link.down.params = self.link.up.params = config.radio
+        self.link.down.params = config.radio
+        self.link.up.params = config.radio if config.radio_up is None else config.radio_up
         self._config = config
         self._clock = clock
         self._now_ns = self._boot_ns = clock.now_ns()

@@ -24,9 +24,9 @@ class SensorParams:
     tilt_bias: tuple[float, float] | None = None
     """Roll and pitch told too large (rad); None: drawn within `tilt_bias_rad`."""
     tilt_wander_rad: float = math.radians(0.1)
-    leak_s: float = math.inf
+    leak_s: float | None = None
     """An estimator without a position takes what its accelerometers feel for the vertical: within this time
-    its tilt leaks to the one that they feel, nearly level in any steady flight."""
+    its tilt leaks to the one that they feel, nearly level in any steady flight.  None: it does not."""
     baro_wander_m: float = 0.01
     climb_noise_mps: float = 0.02
     wander_s: float = 20.0
@@ -110,14 +110,15 @@ class Sensors:
 
     def _leak(self, dt_s: float, airframe: Airframe) -> None:
         """Rotors push along the body's axis, so the accelerometers feel level, but for the drag."""
-        if math.isinf(self.params.leak_s) or airframe.on_floor:
+        leak_s = self.params.leak_s
+        if leak_s is None or airframe.on_floor:
             self._roll_leak = self._pitch_leak = 0.0
             return
         cos, sin = math.cos(airframe.yaw_rad), math.sin(airframe.yaw_rad)
         wind, share = airframe.wind, airframe.params.drag_per_s / GRAVITY_MPS2
         east, south = airframe.vx_mps - wind.x_mps, airframe.vy_mps - wind.y_mps
         felt_pitch, felt_roll = -share * (cos * east + sin * south), share * (-sin * east + cos * south)
-        part = dt_s / self.params.leak_s
+        part = dt_s / leak_s
         self._roll_leak -= part * (airframe.roll_rad + self._roll_leak - felt_roll)
         self._pitch_leak -= part * (airframe.pitch_rad + self._pitch_leak - felt_pitch)
 
