@@ -22,6 +22,7 @@ from flightd.config.schema import Config
 from flightd.guide import pages
 from flightd.mission.safety import hazard_table
 from flightd.sim.judge.verdict import KINDS
+from flightd.sim.unknowns import SPREADS, WorldKind
 from flightd.site.site_file import SiteFile
 from tools import command_table, reference_tables, safety_case
 from tools.command_help import help_pages
@@ -63,6 +64,35 @@ def _faults() -> str:
     return "\n".join(lines) + "\n"
 
 
+def _worlds() -> str:
+    usual, rough = SPREADS[WorldKind.USUAL], SPREADS[WorldKind.ROUGH]
+    lines = ["| what the configuration does not know | `usual` | `rough` |", "|---|---|---|"]
+    rows = (
+        ("camera: delay off by up to", "delay_s", 1e3, "ms"),
+        ("camera: jitter added, up to", "jitter_s", 1e3, "ms"),
+        ("camera: roll and pitch of the mount, up to", "mount_deg", 1, "deg"),
+        ("camera: yaw of the mount, up to", "mount_yaw_deg", 1, "deg"),
+        ("camera: focal length off by up to", "focal_share", 1e2, "%"),
+        ("camera: shakes against the attitude, rms", "shake_deg", 1, "deg"),
+        ("attitude: constant error, up to", "tilt_deg", 1, "deg"),
+        ("attitude: error that wanders, rms", "tilt_wander_deg", 1, "deg"),
+        ("attitude: leaks to level within", "leak_s", 1, "s"),
+        ("autopilot's clock fast or slow by up to", "clock_ppm", 1, "ppm"),
+        ("telemetry: least delay, either way up to 30 % longer", "path_s", 1e3, "ms"),
+        ("telemetry: jitter, exponential", "path_jitter_s", 1e3, "ms"),
+        ("range finder: noise, rms", "range_noise_m", 1e2, "cm"),
+        ("range finder: readings lost", "range_dropout", 1e2, "%"),
+        ("range finder: measures from", "range_min_m", 1, "m"),
+        ("barometer: wanders, rms", "baro_m", 1, "m"),
+        ("hover thrust off by up to", "hover_share", 1e2, "%"),
+    )
+    lines += [
+        f"| {what} | {getattr(usual, name) * factor:g} {unit} | {getattr(rough, name) * factor:g} {unit} |"
+        for what, name, factor, unit in rows
+    ]
+    return "\n".join(lines) + "\n"
+
+
 def _is_in(rule: Rule, usual: set[Rule]) -> bool:
     return any((rule.names, rule.expected) == (other.names, other.expected) for other in usual)
 
@@ -81,6 +111,7 @@ PARTS: Mapping[str, Callable[[], str]] = {
     "protocol": protocol_text.markdown,
     "hazards": hazard_table.markdown,
     "faults": _faults,
+    "worlds": _worlds,
     "safety-case": safety_case.markdown,
     "parameters-ardupilot": lambda: _parameters(Firmware.ARDUPILOT),
     "parameters-px4": lambda: _parameters(Firmware.PX4),

@@ -50,6 +50,28 @@ class MarkerOffset:
 
 
 @dataclass(frozen=True, slots=True)
+class SensorEstimate:
+    """What the lines say of the drone's own sensors, beyond the configuration, with standard deviations.
+
+    Frames are exposed `delay_s` later than their stamps say: the camera's delay is that much shorter than
+    configured, against the attitude's.  The camera sits rolled and pitched by `mount` more than configured,
+    the told roll and pitch are too small by `tilt`, lengths are longer by `scale_share`.  `shake_rad` is what
+    the picture shakes against the attitude from frame to frame (rms)."""
+
+    delay_s: float
+    delay_sigma_s: float
+    mount_roll_rad: float
+    mount_pitch_rad: float
+    mount_sigma_rad: float
+    tilt_roll_rad: float
+    tilt_pitch_rad: float
+    tilt_sigma_rad: float
+    scale_share: float
+    scale_sigma: float
+    shake_rad: float
+
+
+@dataclass(frozen=True, slots=True)
 class TrackSet:
     """The tracks at one time, in grid axes (x along the aisles, y to the right of x).
 
@@ -77,3 +99,5 @@ class TrackSet:
     push_x_mps2: float = 0.0
     push_y_mps2: float = 0.0
     markers: tuple[MarkerOffset, ...] = ()
+    sensors: SensorEstimate | None = None
+    """None in logs that do not tell it."""

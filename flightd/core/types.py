@@ -389,7 +389,8 @@ class Status:
 
     `latency_ms` are the newest frame's stages: capture, transport, detection, track (each from its
     predecessor), and total (mid-exposure to setpoint on the wire).  `height_goal_m` is the commanded height
-    above the floor, None in logs that do not tell it.
+    above the floor, None in logs that do not tell it; `sensors` what the lines say of the drone's own sensors
+    (`core.tracks.SensorEstimate`), None before they were seen.
     """
 
     stamp_ns: int
@@ -406,3 +407,4 @@ class Status:
     fps: float
     latency_ms: dict[str, float]
     height_goal_m: float | None = None
+    sensors: dict[str, float] | None = None

@@ -53,7 +53,6 @@ class Unknowns:
     range_min_m: float = 0.05
     baro_wander_m: float = 0.01
     hover_share: float = 1.0
-    gust_mps: float = 0.3
 
     def camera(self, configured: SimCamera) -> SimCamera:
         """The down camera as it really is."""
@@ -102,8 +101,8 @@ NOTHING = Unknowns()
 
 
 @dataclass(frozen=True, slots=True)
-class _Spread:
-    """The largest differences of one world."""
+class Spread:
+    """One world's largest differences, drawn evenly within them; jitter, noise and dropouts are as here."""
 
     delay_s: float
     jitter_s: float
@@ -122,63 +121,62 @@ class _Spread:
     range_min_m: float
     baro_m: float
     hover_share: float
-    gust_mps: float
 
 
-_SPREADS = {
-    WorldKind.USUAL: _Spread(
-        0.025,
-        0.005,
-        1.0,
-        2.0,
-        0.01,
-        0.15,
-        0.5,
-        0.15,
-        6.0,
-        50.0,
-        0.010,
-        0.005,
-        0.010,
-        0.01,
-        0.10,
-        0.1,
-        0.10,
-        0.3,
+SPREADS = {
+    WorldKind.USUAL: Spread(
+        delay_s=0.025,
+        jitter_s=0.005,
+        mount_deg=1.0,
+        mount_yaw_deg=2.0,
+        focal_share=0.01,
+        shake_deg=0.15,
+        tilt_deg=0.5,
+        tilt_wander_deg=0.15,
+        leak_s=6.0,
+        clock_ppm=50.0,
+        path_s=0.010,
+        path_jitter_s=0.005,
+        range_noise_m=0.010,
+        range_dropout=0.01,
+        range_min_m=0.10,
+        baro_m=0.1,
+        hover_share=0.10,
     ),
-    WorldKind.ROUGH: _Spread(
-        0.050,
-        0.020,
-        2.5,
-        4.0,
-        0.04,
-        0.5,
-        0.5,
-        1.0,
-        2.0,
-        20_000.0,
-        0.060,
-        0.030,
-        0.04,
-        0.08,
-        0.30,
-        0.4,
-        0.25,
-        0.5,
+    WorldKind.ROUGH: Spread(
+        delay_s=0.050,
+        jitter_s=0.020,
+        mount_deg=2.5,
+        mount_yaw_deg=4.0,
+        focal_share=0.04,
+        shake_deg=0.5,
+        tilt_deg=0.5,
+        tilt_wander_deg=1.0,
+        leak_s=2.0,
+        clock_ppm=20_000.0,
+        path_s=0.060,
+        path_jitter_s=0.030,
+        range_noise_m=0.04,
+        range_dropout=0.08,
+        range_min_m=0.30,
+        baro_m=0.4,
+        hover_share=0.25,
     ),
 }
+_UNEVEN = 0.3
+"""Share of the path's delay by which one way may be longer than the other."""
 
 
 def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
     """What is drawn for one flight; the same kind and seed draw the same."""
     if kind is WorldKind.IDEAL:
         return NOTHING
-    most, rng = _SPREADS[kind], random.Random(f"unknowns {kind} {seed}")
+    most, rng = SPREADS[kind], random.Random(f"unknowns {kind} {seed}")
 
     def within(limit: float) -> float:
         return rng.uniform(-limit, limit)
 
-    uneven_s = within(0.3 * most.path_s)
+    uneven_s = within(_UNEVEN * most.path_s)
     return Unknowns(
         kind=kind,
         camera_delay_s=within(most.delay_s),
@@ -199,7 +197,6 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         range_min_m=most.range_min_m,
         baro_wander_m=most.baro_m,
         hover_share=1.0 + within(most.hover_share),
-        gust_mps=most.gust_mps,
     )
 
 

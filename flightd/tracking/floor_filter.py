@@ -24,6 +24,7 @@ import numpy as np
 
 from flightd.config.tracking import MotionNoise, SensorPriors
 from flightd.core.geometry import GRAVITY_MPS2, Matrix
+from flightd.core.tracks import SensorEstimate
 from flightd.tracking.held_lines import HeldLine, associate
 from flightd.tracking.innovations import Innovations
 from flightd.tracking.kalman import corrected, predicted
@@ -77,11 +78,6 @@ class FloorFilter:
     def sigma(self, index: int) -> float:
         return math.sqrt(max(float(self._p[index, index]), 0.0))
 
-    @property
-    def shake_rad(self) -> float:
-        """How far the picture shakes against the told attitude from frame to frame, as the lines say."""
-        return self._innovations.shake_rad
-
     def offset(self, line: int) -> tuple[float, float]:
         """Of the line held at that place: its offset from the drone, and sigma."""
         return self.mean(FIRST_LINE + line), self.sigma(FIRST_LINE + line)
@@ -90,6 +86,22 @@ class FloorFilter:
         """What is expected of the disturbance so much later: the gust in it fades."""
         steady = self._steady[axis]
         return steady + (self.mean(AXES[axis].push) - steady) * math.exp(-ahead_s / self._noise.gust_s)
+
+    def sensors(self) -> SensorEstimate:
+        """What is known of the sensors, for people."""
+        return SensorEstimate(
+            delay_s=self.mean(DELAY),
+            delay_sigma_s=self.sigma(DELAY),
+            mount_roll_rad=self.mean(MOUNT_ROLL),
+            mount_pitch_rad=self.mean(MOUNT_PITCH),
+            mount_sigma_rad=max(self.sigma(MOUNT_ROLL), self.sigma(MOUNT_PITCH)),
+            tilt_roll_rad=self.mean(ROLL),
+            tilt_pitch_rad=self.mean(PITCH),
+            tilt_sigma_rad=max(self.sigma(ROLL), self.sigma(PITCH)),
+            scale_share=self.mean(SCALE),
+            scale_sigma=self.sigma(SCALE),
+            shake_rad=self._innovations.shake_rad,
+        )
 
     def learnt(self) -> tuple[Matrix, Matrix]:
         """What is known of the sensors: (6,) means and (6, 6) covariance from `ROLL` to `SCALE`."""

@@ -190,6 +190,7 @@ class LineTracker:
                 replace(seen, dx_m=seen.dx_m - moved_x, dy_m=seen.dy_m - moved_y) for seen in self._junctions
             ),
             self._stamp_ns,
+            sensors=held.sensors(),
             push_x_mps2=held.push_after(0, (now_ns - self._stamp_ns) * 1e-9),
             push_y_mps2=held.push_after(1, (now_ns - self._stamp_ns) * 1e-9),
             markers=tuple(

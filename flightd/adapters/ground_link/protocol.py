@@ -95,6 +95,20 @@ class LinkReport(msgspec.Struct, frozen=True):
     dropped: Annotated[int, Meta(description="answers, events and audit lines lost: a queue was full")]
 
 
+class SensorReport(msgspec.Struct, frozen=True):
+    """The drone's own sensors, beyond their configuration; each with its standard deviation."""
+
+    delay_ms: Annotated[float, Meta(description="frames are exposed so much later than their stamps say, ms")]
+    delay_sigma_ms: float
+    mount_roll_deg: Annotated[float, Meta(description="the camera rolled, its right side down")]
+    mount_pitch_deg: Annotated[float, Meta(description="the camera pitched, its front up")]
+    mount_sigma_deg: float
+    tilt_roll_deg: Annotated[float, Meta(description="the roll that is told is too small by this")]
+    tilt_pitch_deg: Annotated[float, Meta(description="the pitch that is told is too small by this")]
+    tilt_sigma_deg: float
+    shake_deg: Annotated[float, Meta(description="the picture against the attitude, frame by frame, rms")]
+
+
 class StatusReport(msgspec.Struct, frozen=True):
     """Topic `status`, ten times a second and at each change of phase; also the answer to `status`."""
 
@@ -121,6 +135,9 @@ class StatusReport(msgspec.Struct, frozen=True):
         Meta(description="newest frame's stages: capture, transport, detection, track, wire; total"),
     ]
     link: Annotated[LinkReport, Meta(description="the ground link's counters")]
+    sensors: Annotated[
+        SensorReport | None, Meta(description="what the lines say of them; null before they were seen")
+    ] = None
 
 
 class EventReport(msgspec.Struct, frozen=True):

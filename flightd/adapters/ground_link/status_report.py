@@ -9,13 +9,14 @@ from flightd.adapters.ground_link.protocol import (
     LinkReport,
     Position,
     SeenLine,
+    SensorReport,
     StatusReport,
     VehicleReport,
     finite,
 )
 from flightd.core.refusal import words
 from flightd.core.snapshot import Snapshot
-from flightd.core.tracks import TrackSet
+from flightd.core.tracks import SensorEstimate, TrackSet
 from flightd.core.types import GridPose, VehicleState
 
 
@@ -45,6 +46,24 @@ def status_report(snapshot: Snapshot, session: str, seq: int, link: LinkReport) 
         fps=snapshot.fps,
         latency_ms={stage: round(ms, 2) for stage, ms in snapshot.latency_ms.items()},
         link=link,
+        sensors=_sensors(snapshot.sensors) if snapshot.sensors is not None else None,
+    )
+
+
+def _sensors(known: SensorEstimate) -> SensorReport:
+    def degrees(angle_rad: float) -> float:
+        return round(math.degrees(angle_rad), 3)
+
+    return SensorReport(
+        delay_ms=round(known.delay_s * 1e3, 2),
+        delay_sigma_ms=round(known.delay_sigma_s * 1e3, 2),
+        mount_roll_deg=degrees(known.mount_roll_rad),
+        mount_pitch_deg=degrees(known.mount_pitch_rad),
+        mount_sigma_deg=degrees(known.mount_sigma_rad),
+        tilt_roll_deg=degrees(known.tilt_roll_rad),
+        tilt_pitch_deg=degrees(known.tilt_pitch_rad),
+        tilt_sigma_deg=degrees(known.tilt_sigma_rad),
+        shake_deg=degrees(known.shake_rad),
     )
 
 

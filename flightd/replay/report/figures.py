@@ -64,6 +64,7 @@ def key_figures(flight: RecordedFlight) -> tuple[Figure, ...]:
         _codes(flight.summary),
         _flight_time(flight),
         _latency(flight),
+        _delay(flight),
         _frames(flight),
         _battery(flight),
     )
@@ -207,6 +208,18 @@ def _latency(flight: RecordedFlight) -> Figure | None:
         return None
     note = "p99, picture to setpoint" if p50 is None else f"p99; p50 {number(p50, 1)} ms"
     return Figure("Latency", number(p99, 1), "ms", note)
+
+
+def _delay(flight: RecordedFlight) -> Figure | None:
+    """The camera's delay as the lines have it, against the configured one."""
+    if not flight.sensors:
+        return None
+    delay_ms, sigma_ms = (flight.sensors[key] * 1e3 for key in ("delay_s", "delay_sigma_s"))
+    mount = " and ".join(
+        number(math.degrees(flight.sensors[key]), 1) for key in ("mount_roll_rad", "mount_pitch_rad")
+    )
+    note = f"± {number(sigma_ms, 1)}, later than configured; mounted {mount}° off in roll and pitch"
+    return Figure("Camera delay", f"{-delay_ms:+.0f}", "ms", note)
 
 
 def _frames(flight: RecordedFlight) -> Figure | None:

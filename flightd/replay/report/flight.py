@@ -6,6 +6,7 @@ Times are seconds since the first message that the flight clock stamped.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -115,7 +116,8 @@ class Latency:
 @dataclass(frozen=True, slots=True)
 class RecordedFlight:
     """A flight as the report shows it.  `truth` and `summary` are there if their files are; `smoothed` is the
-    estimate judged afterwards, or why there is none."""
+    estimate judged afterwards, or why there is none.  `sensors` is what the lines said last of the drone's
+    own sensors (`core.tracks.SensorEstimate`), empty where nothing is told."""
 
     log: FlightLog
     start_ns: int
@@ -132,6 +134,7 @@ class RecordedFlight:
     latency: Latency
     events: tuple[Event, ...]
     last_status: Status | None
+    sensors: Mapping[str, float]
     line_sets: dict[int, LineSet]
     config: str
     summary: Summary

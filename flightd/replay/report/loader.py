@@ -77,6 +77,7 @@ def load_flight(path: Path) -> RecordedFlight:
         latency=_latency(statuses, seconds),
         events=tuple(log.messages(Event)),
         last_status=statuses[-1] if statuses else None,
+        sensors=next((status.sensors for status in reversed(statuses) if status.sensors), {}),
         line_sets={lines.frame_seq: lines for lines in log.messages(LineSet)},
         config="\n".join(document.text for document in log.messages(Document, Topic.CONFIG)),
         summary=_summary(path.with_name("summary.json")),
