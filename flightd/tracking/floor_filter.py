@@ -197,13 +197,13 @@ class FloorFilter:
             rows.append(self._offset_row(sight, rates, FIRST_LINE + line))
             errors.append(sight.offset_m - self.mean(FIRST_LINE + line))
             variances.append(sight.sigma_m**2)
-            by_tilt.append(sight.offset_per_tilt)
+            by_tilt.append(sight.offset_per_mount)
         for sight in sights:
             if not math.isnan(sight.turn_rad):
                 rows.append(self._turn_row(sight, rates))
                 errors.append(sight.turn_rad)
                 variances.append(sight.sigma_theta_rad**2)
-                by_tilt.append(sight.turn_per_tilt)
+                by_tilt.append(sight.turn_per_mount)
         if rows:
             told = self._correct(np.array(rows), np.array(errors), np.array(variances), np.array(by_tilt))
             self._mind(told, offsets)
@@ -258,8 +258,8 @@ class FloorFilter:
     def _fill_sight(self, row: Matrix, sight: LineSight, rates: Rates) -> None:
         by_roll, by_pitch = sight.offset_per_tilt
         by_yaw = -sight.along_m if sight.axis == 0 else sight.along_m
-        row[[ROLL, MOUNT_ROLL]] = by_roll
-        row[[PITCH, MOUNT_PITCH]] = by_pitch
+        row[[ROLL, PITCH]] = by_roll, by_pitch
+        row[[MOUNT_ROLL, MOUNT_PITCH]] = sight.offset_per_mount
         row[PSI] = by_yaw
         velocity = self.mean(AXES[sight.axis].velocity)
         row[DELAY] = (
@@ -272,8 +272,8 @@ class FloorFilter:
         row = np.zeros(len(self._x))
         by_roll, by_pitch = sight.turn_per_tilt
         row[PSI] = 1.0
-        row[[ROLL, MOUNT_ROLL]] = by_roll
-        row[[PITCH, MOUNT_PITCH]] = by_pitch
+        row[[ROLL, PITCH]] = by_roll, by_pitch
+        row[[MOUNT_ROLL, MOUNT_PITCH]] = sight.turn_per_mount
         row[DELAY] = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + rates.yaw_radps
         return row
 
@@ -300,7 +300,7 @@ class FloorFilter:
         grown = np.zeros((n + 1, n + 1))
         grown[:n, :n] = self._p
         grown[n, :n] = grown[:n, n] = self._p @ row
-        by_roll, by_pitch = sight.offset_per_tilt
+        by_roll, by_pitch = sight.offset_per_mount
         shaken = (by_roll**2 + by_pitch**2) * self._innovations.shake_rad**2
         grown[n, n] = row @ self._p @ row + sight.sigma_m**2 + shaken
         self._x, self._p = np.append(self._x, sight.offset_m), grown

@@ -16,7 +16,8 @@ _GATE_RAD, _GATE_SIGMAS = math.radians(4.0), 4.0
 class LineSight(NamedTuple):
     """One line of a frame, across the grid axis `axis`: where it was seen from the drone along that axis and
     along itself, what its direction says of the heading, its width and its visible part, with the standard
-    deviations of offset and direction; what a tilt (roll, pitch) would change of the two."""
+    deviations of offset and direction; what a radian more of roll, and of pitch, would change of the two, in
+    the attitude and in the mount."""
 
     axis: int
     offset_m: float
@@ -29,6 +30,8 @@ class LineSight(NamedTuple):
     to_m: float
     offset_per_tilt: tuple[float, float]
     turn_per_tilt: tuple[float, float]
+    offset_per_mount: tuple[float, float]
+    turn_per_mount: tuple[float, float]
 
 
 class Rates(NamedTuple):
@@ -54,13 +57,12 @@ def line_sight(
     line: GroundLine,
     yaw_rad: float,
     sigma_yaw_rad: float,
+    tilt_rad: tuple[float, float],
     height_m: float,
     least_sigma_m: float,
-    *,
-    tilts: bool,
 ) -> LineSight | None:
-    """The line seen by a drone that heads `yaw_rad` on the grid; None for one that runs along no axis of it.
-    `tilts` says that the attitude was used to place it."""
+    """The line seen by a drone that heads `yaw_rad` on the grid, rolled and pitched by `tilt_rad`; None for
+    one that runs along no axis of the grid."""
     direction = line.theta_rad + yaw_rad
     across_x = abs(math.cos(direction)) < math.sin(_PARALLEL_RAD)
     if not across_x and abs(math.sin(direction)) >= math.sin(_PARALLEL_RAD):
@@ -73,19 +75,35 @@ def line_sight(
         return axis[0] * point[0] + axis[1] * point[1]
 
     middle = line.forward_m, line.right_m
-    shifts, turns = tilt_effects(line, height_m)
+    offset_m, along_m = on(across, middle), on(along, middle)
+    by_yaw = -along_m if across_x else along_m
+    shifts, (turn_by_roll, turn_by_pitch) = tilt_effects(line, height_m)
+    by_roll, by_pitch = (on(across, shift) for shift in shifts)
+    # who rolls while pitched, or is mounted pitched and rolls, turns a little, too
+    turned_by_roll, turned_by_mount = -math.sin(tilt_rad[1]), math.sin(tilt_rad[0])
+    by_roll, turn_by_roll = by_roll + by_yaw * turned_by_roll, turn_by_roll + turned_by_roll
     turn_rad = turn_of(line, yaw_rad)
     from_m, to_m = sorted(on(along, end) for end in line.ends_m)
     return LineSight(
         axis=0 if across_x else 1,
-        offset_m=on(across, middle),
-        along_m=on(along, middle),
+        offset_m=offset_m,
+        along_m=along_m,
         turn_rad=turn_rad if agrees(turn_rad, line.sigma_theta_rad, sigma_yaw_rad) else math.nan,
         sigma_m=max(line.sigma_m, least_sigma_m),
         sigma_theta_rad=max(line.sigma_theta_rad, _LEAST_SIGMA_RAD),
         width_m=line.width_m,
         from_m=from_m,
         to_m=to_m,
-        offset_per_tilt=(on(across, shifts[0]), on(across, shifts[1])) if tilts else (0.0, 0.0),
-        turn_per_tilt=turns if tilts else (0.0, 0.0),
+        offset_per_tilt=(by_roll, by_pitch),
+        turn_per_tilt=(turn_by_roll, turn_by_pitch),
+        offset_per_mount=(by_roll, by_pitch + by_yaw * turned_by_mount),
+        turn_per_mount=(turn_by_roll, turn_by_pitch + turned_by_mount),
+    )
+
+
+def placed_without_tilt(sight: LineSight) -> LineSight:
+    """The same line, placed as if the drone were level: no error of a tilt shows in it."""
+    level = (0.0, 0.0)
+    return sight._replace(
+        offset_per_tilt=level, turn_per_tilt=level, offset_per_mount=level, turn_per_mount=level
     )

@@ -33,7 +33,7 @@ from flightd.tracking.floor_filter import (
 )
 from flightd.tracking.ground_junctions import floor_junctions
 from flightd.tracking.heading_dispute import HeadingDispute
-from flightd.tracking.line_sight import Rates, agrees, line_sight, turn_of
+from flightd.tracking.line_sight import Rates, agrees, line_sight, placed_without_tilt, turn_of
 from flightd.tracking.tilt_compensation import (
     FloorView,
     GroundLine,
@@ -128,16 +128,21 @@ class LineTracker:
         if self._history.is_assumed(stamp_ns):
             sigma_tilt_rad = _ASSUMED_TILT_RAD
         view = FloorView(
-            self._lens, self._mount, self._corrected(attitude), height_m, self._compensation, sigma_tilt_rad
+            self._lens,
+            self._corrected_mount(),
+            self._corrected(attitude),
+            height_m,
+            self._compensation,
+            sigma_tilt_rad,
         )
         low, high = (share * self._line_width_m for share in params.width_share)
         seen = ground_lines(lines.lines, view)
         on_floor = [line for line in seen if low <= line.width_m <= high]
         self._settle_dispute(on_floor, attitude)
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
-        sigma_yaw, least_m = self._filter.sigma(PSI), params.min_sigma_m
-        placed = (line_sight(line, yaw, sigma_yaw, height_m, least_m, tilts=not blind) for line in on_floor)
-        sights = [sight for sight in placed if sight is not None]
+        sigma_yaw, tilt = self._filter.sigma(PSI), (view.attitude.roll_rad, view.attitude.pitch_rad)
+        placed = (line_sight(line, yaw, sigma_yaw, tilt, height_m, params.min_sigma_m) for line in on_floor)
+        sights = [placed_without_tilt(sight) if blind else sight for sight in placed if sight is not None]
         self._filter.update(sights, self._rates(stamp_ns), stamp_ns)
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
         self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in _placed(lines.pads, view, yaw))
@@ -238,11 +243,20 @@ class LineTracker:
         return self._filter.accel(told.roll_rad, told.pitch_rad, told.yaw_rad)
 
     def _corrected(self, told: Attitude) -> Attitude:
-        """The camera's attitude, by what has been learnt of it."""
+        """The attitude, by what has been learnt of it."""
         held = self._filter
-        roll_rad = told.roll_rad + held.mean(ROLL) + held.mean(MOUNT_ROLL)
-        pitch_rad = told.pitch_rad + held.mean(PITCH) + held.mean(MOUNT_PITCH)
-        return replace(told, roll_rad=roll_rad, pitch_rad=pitch_rad)
+        return replace(
+            told, roll_rad=told.roll_rad + held.mean(ROLL), pitch_rad=told.pitch_rad + held.mean(PITCH)
+        )
+
+    def _corrected_mount(self) -> Mount:
+        """The camera's mount, by what has been learnt of it."""
+        held, mount = self._filter, self._mount
+        return replace(
+            mount,
+            roll_rad=mount.roll_rad + held.mean(MOUNT_ROLL),
+            pitch_rad=mount.pitch_rad + held.mean(MOUNT_PITCH),
+        )
 
     def _rates(self, stamp_ns: int) -> Rates:
         before, after = self._history.at(stamp_ns - _RATE_NS), self._history.at(stamp_ns + _RATE_NS)

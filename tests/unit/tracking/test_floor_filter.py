@@ -19,7 +19,7 @@ SURE = SensorPriors(
 
 def sight(offset_m: float, sigma_m: float = 0.005) -> LineSight:
     """A line across x, straight below."""
-    return LineSight(0, offset_m, 0.0, math.nan, sigma_m, 0.01, 0.075, -0.5, 0.5, (0.0, 0.0), (0.0, 0.0))
+    return LineSight(0, offset_m, 0.0, math.nan, sigma_m, 0.01, 0.075, -0.5, 0.5, *[(0.0, 0.0)] * 4)
 
 
 def floor_filter(noise: MotionNoise, forget_ns: int = 10**10) -> FloorFilter:
@@ -84,7 +84,7 @@ def test_a_false_line_nearby_starts_a_track_of_its_own() -> None:
 
 def test_who_knows_no_line_any_more_still_knows_his_sensors() -> None:
     floor = FloorFilter(MotionNoise(), SensorPriors(), gate_m=0.35, forget_ns=10**9)
-    tilted = sight(0.2)._replace(offset_per_tilt=(-1.6, 0.0))
+    tilted = sight(0.2)._replace(offset_per_tilt=(-1.6, 0.0), offset_per_mount=(-1.6, 0.0))
     for step in range(60):
         floor.predict(1 / 30, 0.0, 0.0, 0.0)
         floor.update([tilted], STILL, step * FRAME_NS)

@@ -1,0 +1,95 @@
+"""What the lines tell of the drone's own sensors while it swings about over a crossing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import pytest
+
+from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount
+from flightd.core.tracks import SensorEstimate
+from flightd.core.types import Attitude
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.random_sites import random_site
+from flightd.tracking.line_tracker import LineTracker
+from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
+
+LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)
+HEIGHT_M = 1.6
+SITE = random_site(3)
+TICK_S, FRAME_S, ARRIVES_S = 0.02, 1 / 30, 0.1
+AMPLITUDE_M, DRAG_PER_S = 0.2, 0.25
+X_RADPS, Y_RADPS = 2.6, 2.1
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is wrong with the drone: true less told."""
+
+    delay_s: float = 0.0
+    mount_roll_deg: float = 0.0
+    mount_pitch_deg: float = 0.0
+    told_roll_deg: float = 0.0
+
+
+def swinging(t: float) -> Kinematics:
+    """To and fro along both axes, leaned as that needs, with drag."""
+    node = SITE.nodes["A2"]
+    x, y = AMPLITUDE_M * math.sin(X_RADPS * t), AMPLITUDE_M * math.sin(Y_RADPS * t + 1.0)
+    vx = AMPLITUDE_M * X_RADPS * math.cos(X_RADPS * t)
+    vy = AMPLITUDE_M * Y_RADPS * math.cos(Y_RADPS * t + 1.0)
+    ax, ay = -(X_RADPS**2) * x + DRAG_PER_S * vx, -(Y_RADPS**2) * y + DRAG_PER_S * vy
+    roll, pitch = math.atan(ay / GRAVITY_MPS2), -math.atan(ax / GRAVITY_MPS2)
+    at = round(t * 1e9)
+    return Kinematics(at, node.x_m + x, node.y_m + y, HEIGHT_M, vx, vy, 0.0, roll, pitch, 0.0, 0.0, 0.0, 0.0)
+
+
+def told(truth: Truth, seed: int, seconds: float = 20.0) -> SensorEstimate:
+    """What the tracker says after so long."""
+    tracker = LineTracker(LENS, Mount(), SITE.line_width_m, 0.0)
+    turned = map(math.radians, (truth.mount_roll_deg, truth.mount_pitch_deg))
+    eye = IdealEye(SITE, LENS, Mount(0.0, (0.0, 0.0, 0.0), *turned), EyeErrors(), seed)
+    waiting = []
+    frame_s = 0.0
+    for n in range(round(seconds / TICK_S)):
+        t = n * TICK_S
+        k = swinging(t)
+        roll_rad = k.roll_rad - math.radians(truth.told_roll_deg)
+        tracker.attitude(Attitude(k.stamp_ns, roll_rad, k.pitch_rad, k.yaw_rad))
+        if t >= frame_s:
+            frame_s += FRAME_S
+            waiting.append((t + ARRIVES_S, eye.see(k, n, round((t - truth.delay_s) * 1e9))))
+        while waiting and waiting[0][0] <= t:
+            tracker.frame(waiting.pop(0)[1], HEIGHT_M)
+    tracks = tracker.at(round(seconds * 1e9))
+    assert tracks is not None
+    assert tracks.sensors is not None
+    return tracks.sensors
+
+
+@pytest.mark.parametrize("delay_ms", [-40, 0, 25, 50])
+def test_the_delay_is_found_and_its_sigma_is_honest(delay_ms: int) -> None:
+    errors_ms, sigmas_ms = [], []
+    for seed in range(4):
+        sensors = told(Truth(delay_s=delay_ms / 1e3), seed)
+        errors_ms.append(sensors.delay_s * 1e3 - delay_ms)
+        sigmas_ms.append(sensors.delay_sigma_s * 1e3)
+    assert max(sigmas_ms) < 6.0
+    assert abs(sum(errors_ms) / len(errors_ms)) < 5.0
+    assert all(abs(error) < 3.0 * sigma for error, sigma in zip(errors_ms, sigmas_ms, strict=True))
+
+
+@pytest.mark.parametrize(("roll_deg", "pitch_deg"), [(1.5, 0.0), (0.0, -1.5), (-1.0, 2.0)])
+def test_a_tilted_mount_is_found(roll_deg: float, pitch_deg: float) -> None:
+    sensors = told(Truth(mount_roll_deg=roll_deg, mount_pitch_deg=pitch_deg), 1)
+    roll = math.degrees(sensors.mount_roll_rad + sensors.tilt_roll_rad)
+    pitch = math.degrees(sensors.mount_pitch_rad + sensors.tilt_pitch_rad)
+    assert roll == pytest.approx(roll_deg, abs=0.2)
+    assert pitch == pytest.approx(pitch_deg, abs=0.2)
+
+
+def test_a_wrong_attitude_is_found_with_the_mount() -> None:
+    sensors = told(Truth(mount_roll_deg=1.0, told_roll_deg=0.5), 1)
+    roll = math.degrees(sensors.mount_roll_rad + sensors.tilt_roll_rad)
+    assert roll == pytest.approx(1.5, abs=0.2)
