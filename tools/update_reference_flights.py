@@ -38,7 +38,7 @@ class Reference:
 
 
 REFERENCES = (
-    Reference("along", ("--seed", "11", "--set", 'mission.nodes=["A1", "A2"]')),
+    Reference("along", ("--seed", "14", "--set", 'mission.nodes=["A1", "A2"]')),
     Reference("shelf", ("--seed", "12", "--set", 'mission.nodes=["A2"]', "--set", "mission.heading=shelf")),
     Reference(
         "first-order",

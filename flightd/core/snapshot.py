@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
 from flightd.core.tick import StepFailure, TickInput, TickOutput
-from flightd.core.tracks import SensorEstimate
+from flightd.core.tracks import NOT_SEEN, SensorEstimate
 from flightd.core.types import CommandKind, Phase, Status, VehicleState
 
 _REASON_SHOWN = frozenset({Phase.PREFLIGHT, Phase.ARMING, Phase.SWAP, Phase.HOLD, Phase.RELOCATE})
@@ -91,9 +91,9 @@ class Snapshot:
         return self.output.pose.height_m if self.output.pose else 0.0
 
     @property
-    def sensors(self) -> SensorEstimate | None:
-        """What the lines say of the drone's own sensors; None before they were seen."""
-        return self.output.tracks.sensors if self.output.tracks is not None else None
+    def sensors(self) -> SensorEstimate:
+        """What the lines say of the drone's own sensors."""
+        return self.output.tracks.sensors if self.output.tracks is not None else NOT_SEEN
 
     @property
     def ground_silent_s(self) -> float:
@@ -116,5 +116,5 @@ class Snapshot:
             fps=self.fps,
             latency_ms=dict(self.latency_ms),
             height_goal_m=self.height_goal_m,
-            sensors=None if self.sensors is None else asdict(self.sensors),
+            sensors=self.sensors,
         )

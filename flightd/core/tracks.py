@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -58,17 +59,26 @@ class SensorEstimate:
     the told roll and pitch are too small by `tilt`, lengths are longer by `scale_share`.  `shake_rad` is what
     the picture shakes against the attitude from frame to frame (rms)."""
 
-    delay_s: float
-    delay_sigma_s: float
-    mount_roll_rad: float
-    mount_pitch_rad: float
-    mount_sigma_rad: float
-    tilt_roll_rad: float
-    tilt_pitch_rad: float
-    tilt_sigma_rad: float
-    scale_share: float
-    scale_sigma: float
-    shake_rad: float
+    delay_s: float = math.nan
+    delay_sigma_s: float = math.nan
+    mount_roll_rad: float = math.nan
+    mount_pitch_rad: float = math.nan
+    mount_sigma_rad: float = math.nan
+    tilt_roll_rad: float = math.nan
+    tilt_pitch_rad: float = math.nan
+    tilt_sigma_rad: float = math.nan
+    scale_share: float = math.nan
+    scale_sigma: float = math.nan
+    shake_rad: float = math.nan
+
+    @property
+    def is_known(self) -> bool:
+        """Whether any line was seen; all numbers are NaN before."""
+        return not math.isnan(self.delay_s)
+
+
+NOT_SEEN = SensorEstimate()
+"""Nothing is known yet, or a log does not tell it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,5 +109,4 @@ class TrackSet:
     push_x_mps2: float = 0.0
     push_y_mps2: float = 0.0
     markers: tuple[MarkerOffset, ...] = ()
-    sensors: SensorEstimate | None = None
-    """None in logs that do not tell it."""
+    sensors: SensorEstimate = NOT_SEEN

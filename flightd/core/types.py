@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.refusal import Refusal
+from flightd.core.tracks import NOT_SEEN, SensorEstimate
 
 Image: TypeAlias = NDArray[np.uint8]
 """(H, W, 3) BGR or (H, W) single channel, uint8."""
@@ -390,7 +391,7 @@ class Status:
     `latency_ms` are the newest frame's stages: capture, transport, detection, track (each from its
     predecessor), and total (mid-exposure to setpoint on the wire).  `height_goal_m` is the commanded height
     above the floor, None in logs that do not tell it; `sensors` what the lines say of the drone's own sensors
-    (`core.tracks.SensorEstimate`), None before they were seen.
+    (`core.tracks.SensorEstimate`).
     """
 
     stamp_ns: int
@@ -407,4 +408,4 @@ class Status:
     fps: float
     latency_ms: dict[str, float]
     height_goal_m: float | None = None
-    sensors: dict[str, float] | None = None
+    sensors: SensorEstimate = NOT_SEEN

@@ -197,13 +197,13 @@ class FloorFilter:
             rows.append(self._offset_row(sight, rates, FIRST_LINE + line))
             errors.append(sight.offset_m - self.mean(FIRST_LINE + line))
             variances.append(sight.sigma_m**2)
-            by_tilt.append(sight.offset_per_mount)
+            by_tilt.append(sight.offset_per_tilt)
         for sight in sights:
             if not math.isnan(sight.turn_rad):
                 rows.append(self._turn_row(sight, rates))
                 errors.append(sight.turn_rad)
                 variances.append(sight.sigma_theta_rad**2)
-                by_tilt.append(sight.turn_per_mount)
+                by_tilt.append(sight.turn_per_tilt)
         if rows:
             told = self._correct(np.array(rows), np.array(errors), np.array(variances), np.array(by_tilt))
             self._mind(told, offsets)
@@ -300,7 +300,7 @@ class FloorFilter:
         grown = np.zeros((n + 1, n + 1))
         grown[:n, :n] = self._p
         grown[n, :n] = grown[:n, n] = self._p @ row
-        by_roll, by_pitch = sight.offset_per_mount
+        by_roll, by_pitch = sight.offset_per_tilt
         shaken = (by_roll**2 + by_pitch**2) * self._innovations.shake_rad**2
         grown[n, n] = row @ self._p @ row + sight.sigma_m**2 + shaken
         self._x, self._p = np.append(self._x, sight.offset_m), grown

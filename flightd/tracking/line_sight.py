@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from flightd.config.control import TiltCompensation
 from flightd.tracking.tilt_compensation import GroundLine, tilt_effects
 
 _PARALLEL_RAD = math.radians(20.0)
 """A line further than this from both grid axes is none of the grid."""
 _LEAST_SIGMA_RAD = math.radians(0.2)
+_LEVEL = (0.0, 0.0)
 _GATE_RAD, _GATE_SIGMAS = math.radians(4.0), 4.0
 
 
@@ -101,9 +103,15 @@ def line_sight(
     )
 
 
-def placed_without_tilt(sight: LineSight) -> LineSight:
-    """The same line, placed as if the drone were level: no error of a tilt shows in it."""
-    level = (0.0, 0.0)
-    return sight._replace(
-        offset_per_tilt=level, turn_per_tilt=level, offset_per_mount=level, turn_per_mount=level
-    )
+def as_compensated(sight: LineSight, compensation: TiltCompensation) -> LineSight:
+    """The same line as a compensation that is not exact leaves it: the paper's, of the first order, turns no
+    line, so that a mount cannot be told by it; without one no tilt is told by where the lines are."""
+    match compensation:
+        case TiltCompensation.EXACT:
+            return sight
+        case TiltCompensation.FIRST_ORDER:
+            return sight._replace(turn_per_tilt=_LEVEL, offset_per_mount=_LEVEL, turn_per_mount=_LEVEL)
+        case TiltCompensation.NONE:
+            return sight._replace(
+                offset_per_tilt=_LEVEL, turn_per_tilt=_LEVEL, offset_per_mount=_LEVEL, turn_per_mount=_LEVEL
+            )

@@ -33,7 +33,7 @@ from flightd.tracking.floor_filter import (
 )
 from flightd.tracking.ground_junctions import floor_junctions
 from flightd.tracking.heading_dispute import HeadingDispute
-from flightd.tracking.line_sight import Rates, agrees, line_sight, placed_without_tilt, turn_of
+from flightd.tracking.line_sight import Rates, agrees, as_compensated, line_sight, turn_of
 from flightd.tracking.tilt_compensation import (
     FloorView,
     GroundLine,
@@ -123,8 +123,7 @@ class LineTracker:
         self._told_ns = lines.stamp_ns
         self._advance(stamp_ns)
         params = self._params
-        blind = self._compensation is TiltCompensation.NONE
-        sigma_tilt_rad = params.sigma_tilt_rad if blind else 0.0
+        sigma_tilt_rad = 0.0 if self._compensation is TiltCompensation.EXACT else params.sigma_tilt_rad
         if self._history.is_assumed(stamp_ns):
             sigma_tilt_rad = _ASSUMED_TILT_RAD
         view = FloorView(
@@ -142,7 +141,7 @@ class LineTracker:
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
         sigma_yaw, tilt = self._filter.sigma(PSI), (view.attitude.roll_rad, view.attitude.pitch_rad)
         placed = (line_sight(line, yaw, sigma_yaw, tilt, height_m, params.min_sigma_m) for line in on_floor)
-        sights = [placed_without_tilt(sight) if blind else sight for sight in placed if sight is not None]
+        sights = [as_compensated(sight, self._compensation) for sight in placed if sight is not None]
         self._filter.update(sights, self._rates(stamp_ns), stamp_ns)
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
         self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in _placed(lines.pads, view, yaw))

@@ -46,7 +46,7 @@ def status_report(snapshot: Snapshot, session: str, seq: int, link: LinkReport) 
         fps=snapshot.fps,
         latency_ms={stage: round(ms, 2) for stage, ms in snapshot.latency_ms.items()},
         link=link,
-        sensors=_sensors(snapshot.sensors) if snapshot.sensors is not None else None,
+        sensors=_sensors(snapshot.sensors) if snapshot.sensors.is_known else None,
     )
 
 

@@ -212,14 +212,13 @@ def _latency(flight: RecordedFlight) -> Figure | None:
 
 def _delay(flight: RecordedFlight) -> Figure | None:
     """The camera's delay as the lines have it, against the configured one."""
-    if not flight.sensors:
+    seen = flight.sensors
+    if not seen.is_known:
         return None
-    delay_ms, sigma_ms = (flight.sensors[key] * 1e3 for key in ("delay_s", "delay_sigma_s"))
-    mount = " and ".join(
-        number(math.degrees(flight.sensors[key]), 1) for key in ("mount_roll_rad", "mount_pitch_rad")
-    )
-    note = f"± {number(sigma_ms, 1)}, later than configured; mounted {mount}° off in roll and pitch"
-    return Figure("Camera delay", f"{-delay_ms:+.0f}", "ms", note)
+    mount = " and ".join(number(math.degrees(a), 1) for a in (seen.mount_roll_rad, seen.mount_pitch_rad))
+    sigma = number(seen.delay_sigma_s * 1e3, 1)
+    note = f"± {sigma}, more than configured; mounted {mount}° off in roll and pitch"
+    return Figure("Camera delay", f"{-seen.delay_s * 1e3:+.0f}", "ms", note)
 
 
 def _frames(flight: RecordedFlight) -> Figure | None:

@@ -6,7 +6,6 @@ Times are seconds since the first message that the flight clock stamped.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.errors import UnavailableError
+from flightd.core.tracks import SensorEstimate
 from flightd.core.types import Event, LineSet, Phase, Status
 from flightd.replay.log import FlightLog
 from flightd.site.site import Site
@@ -117,7 +117,7 @@ class Latency:
 class RecordedFlight:
     """A flight as the report shows it.  `truth` and `summary` are there if their files are; `smoothed` is the
     estimate judged afterwards, or why there is none.  `sensors` is what the lines said last of the drone's
-    own sensors (`core.tracks.SensorEstimate`), empty where nothing is told."""
+    own sensors."""
 
     log: FlightLog
     start_ns: int
@@ -134,7 +134,7 @@ class RecordedFlight:
     latency: Latency
     events: tuple[Event, ...]
     last_status: Status | None
-    sensors: Mapping[str, float]
+    sensors: SensorEstimate
     line_sets: dict[int, LineSet]
     config: str
     summary: Summary

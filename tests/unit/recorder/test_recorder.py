@@ -22,6 +22,7 @@ from flightd.core.errors import UnavailableError
 from flightd.core.refusal import RecordedRefusal
 from flightd.core.tick import TickInput
 from flightd.core.topics import Document, RecordedFrame, Topic
+from flightd.core.tracks import SensorEstimate
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -71,7 +72,10 @@ VEHICLE = VehicleState(
     9,
     RecordedRefusal("no"),
 )
-STATUS = Status(12, Phase.FOLLOW, "", "A1", "A2", 1, 6, 0.8, 1.5, 300, 2, 29.9, {"total": 71.0})
+SENSORS = SensorEstimate(0.01, 0.002, 0.02, -0.01, 0.005, 0.001, 0.0, 0.01, 0.0, 0.005, 0.003)
+STATUS = Status(
+    12, Phase.FOLLOW, "", "A1", "A2", 1, 6, 0.8, 1.5, 300, 2, 29.9, {"total": 71.0}, sensors=SENSORS
+)
 
 MESSAGES = [
     (Topic.LINES, 1, LINES),
