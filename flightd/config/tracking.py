@@ -35,10 +35,12 @@ class SensorPriors(Section):
 
     attitude_deg: float = Field(0.7, gt=0, le=10, description="wandering error of the told roll and pitch")
     attitude_s: float = Field(8.0, gt=0, le=600, description="time within which that error wanders")
-    mount_deg: float = Field(1.5, gt=0, le=10, description="roll and pitch of the camera in the airframe")
-    delay_s: float = Field(0.03, gt=0, le=0.5, description="camera.latency_s")
+    mount_deg: float = Field(
+        1.5, gt=0, le=10, description="error of the camera's roll and pitch in the airframe"
+    )
+    delay_s: float = Field(0.03, gt=0, le=0.5, description="error of camera.latency_s")
     scale_share: float = Field(
-        0.005, gt=0, le=0.5, description="focal length and height", json_schema_extra=unit("share")
+        0.005, gt=0, le=0.5, description="error of focal length and height", json_schema_extra=unit("share")
     )
     heading_degps: float = Field(0.1, gt=0, le=5, description="drift of the vehicle's heading")
     shake_deg: float = Field(0.15, gt=0, le=5, description="picture against attitude, frame by frame")

@@ -63,6 +63,7 @@ class StateEstimator:
             control.tilt_compensation,
             self._config.tracking,
             self._learnt(),
+            camera.latency_s,
         )
         self._learnt = self.tracker.learnt
         view = camera.floor_reach(control.max_tilt_rad)
@@ -94,7 +95,7 @@ class StateEstimator:
             self._mind_height(tick.now_ns, v, commanded)
         for lines in tick.lines:
             if self.frames.take(lines) and self.armed:
-                self.tracker.frame(lines, self._heights.at(lines.stamp_ns))
+                self.tracker.frame(lines, self._heights.at(self.tracker.exposed_ns(lines)))
 
     def step(self, now_ns: int) -> Estimate:
         """The motion now."""

@@ -37,6 +37,14 @@ _UNSEEN_S = 0.1
 """An axis without a line for so long is dead-reckoned: the gust that was last felt on it fades."""
 
 
+_LASTING = slice(MOUNT_ROLL, FIRST_LINE)
+"""What is learnt for good."""
+_MOST_SIGMAS = 4.0
+"""A delay further off than so many sigmas of what was thought possible is not believed."""
+_BETWEEN = 0.3
+"""Share of what was thought possible by which a sensor can have changed between two flights."""
+
+
 class Axis(NamedTuple):
     """Where one grid axis stands in the state."""
 
@@ -51,8 +59,16 @@ class FloorFilter:
     """Call `predict` up to each exposure, then `update` with what was seen in it."""
 
     def __init__(
-        self, noise: MotionNoise, priors: SensorPriors, gate_m: float, forget_ns: int, max_lines: int = 16
+        self,
+        noise: MotionNoise,
+        priors: SensorPriors,
+        gate_m: float,
+        forget_ns: int,
+        latency_s: float = math.inf,
+        max_lines: int = 16,
     ) -> None:
+        """`latency_s` is the delay that the frames' stamps assume."""
+        self._latency_s = latency_s
         self._noise, self._priors = noise, priors
         self._gate_m, self._forget_ns, self._max_lines = gate_m, forget_ns, max_lines
         self._next_id = 0
@@ -109,10 +125,17 @@ class FloorFilter:
         return self._x[sensors].copy(), self._p[sensors, sensors].copy()
 
     def begin_with(self, learnt: tuple[Matrix, Matrix]) -> None:
-        """Begin with what another filter has learnt of the same sensors; the wandering part of the attitude's
-        error is another one by now."""
+        """Begin with what another filter has learnt of the same sensors: less surely, for a mount can have
+        been knocked since, and with another error of the attitude.  What is no number is ignored."""
+        means, covariance = learnt
+        if not (np.isfinite(means).all() and np.isfinite(covariance).all()):
+            return
         sensors = slice(ROLL, FIRST_LINE)
-        self._x[sensors], self._p[sensors, sensors] = learnt
+        self._x[sensors], self._p[sensors, sensors] = means, covariance
+        priors = self._priors
+        between = np.array([priors.mount_rad, priors.mount_rad, priors.delay_s, priors.scale_share])
+        lasting = np.arange(MOUNT_ROLL, FIRST_LINE)
+        self._p[lasting, lasting] += (_BETWEEN * between) ** 2
         wandering = [ROLL, PITCH]
         self._x[wandering] = 0.0
         self._p[wandering, :] = 0.0
@@ -183,8 +206,10 @@ class FloorFilter:
         self._p = predicted(self._p, jacobian, noise_q)
         self._fade(dt_s)
 
-    def update(self, sights: list[LineSight], rates: Rates, stamp_ns: int) -> None:
-        """Take the lines of one frame; those that belong to none held start new ones."""
+    def update(self, sights: list[LineSight], rates: Rates, stamp_ns: int, *, assumed: bool = False) -> None:
+        """Take the lines of one frame; those that belong to none held start new ones.  Of an attitude that is
+        only `assumed` nothing is learnt for good."""
+        before = self._x[:FIRST_LINE].copy()
         offsets_m = [self.offset(line) for line in range(len(self.held))]
         known, fresh = associate(sights, self.held, offsets_m, self._gate_m)
         rows: list[Matrix] = []
@@ -205,15 +230,15 @@ class FloorFilter:
                 variances.append(sight.sigma_theta_rad**2)
                 by_tilt.append(sight.turn_per_tilt)
         if rows:
-            told = self._correct(np.array(rows), np.array(errors), np.array(variances), np.array(by_tilt))
-            self._mind(told, offsets)
+            measured = np.array(rows), np.array(errors), np.array(variances), np.array(by_tilt)
+            self._mind(self._correct(*measured, _LASTING if assumed else None), offsets)
         for sight, line in known:
             held = self.held[line]
             held.seen_ns, held.hits = stamp_ns, held.hits + 1
             held.width_m += 0.2 * (sight.width_m - held.width_m)
             held.from_m, held.to_m = sight.from_m, sight.to_m
         for sight in fresh:
-            self._add(sight, rates, stamp_ns)
+            self._add(sight, rates, stamp_ns, before)
         self._forget_old(stamp_ns)
 
     # How
@@ -237,8 +262,6 @@ class FloorFilter:
 
     def _fade(self, dt_s: float) -> None:
         for axis, (_, push) in enumerate(AXES):
-            limit = self._noise.max_disturbance_mps2
-            self._x[push] = min(max(self._x[push], -limit), limit)
             if self._unseen_s[axis] > _UNSEEN_S:
                 self._x[push] = self.push_after(axis, dt_s)
             else:
@@ -277,12 +300,22 @@ class FloorFilter:
         row[DELAY] = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + rates.yaw_radps
         return row
 
-    def _correct(self, rows: Matrix, errors: Matrix, variances: Matrix, by_tilt: Matrix) -> Matrix:
+    def _correct(
+        self, rows: Matrix, errors: Matrix, variances: Matrix, by_tilt: Matrix, unmoved: slice | None
+    ) -> Matrix:
         """Bring g to 0; returns the errors in units of their sigmas.  What shakes moves all lines alike."""
         noise = np.diag(variances) + by_tilt @ by_tilt.T * self._innovations.shake_rad**2
-        self._x, self._p, spread = corrected(self._x, self._p, rows, errors, noise)
+        self._x, self._p, spread = corrected(self._x, self._p, rows, errors, noise, unmoved)
+        self._bound(PUSH_X, self._noise.max_disturbance_mps2)
+        self._bound(PUSH_Y, self._noise.max_disturbance_mps2)
+        most_s = _MOST_SIGMAS * self._priors.delay_s
+        self._bound(DELAY, most_s, min(most_s, self._latency_s))  # no frame arrives before it is exposed
         told: Matrix = errors / np.sqrt(np.diag(spread))
         return told
+
+    def _bound(self, index: int, least: float, most: float | None = None) -> None:
+        """Keep a state above -`least` and below `most` (None: `least`)."""
+        self._x[index] = min(max(self._x[index], -least), least if most is None else most)
 
     def _mind(self, told: Matrix, offsets: list[tuple[int, int]]) -> None:
         for axis in range(2):
@@ -292,8 +325,9 @@ class FloorFilter:
                 self._innovations.take(axis, sum(mine) / len(mine))
         self._innovations.shaken(float(np.mean(told**2)))
 
-    def _add(self, sight: LineSight, rates: Rates, stamp_ns: int) -> None:
-        """A line where it was seen, as wrong as everything by which it was placed."""
+    def _add(self, sight: LineSight, rates: Rates, stamp_ns: int, before: Matrix) -> None:
+        """A line where it was seen, as wrong as everything by which it was placed; moved by what the frame
+        has corrected of that, for it was placed with the state `before`."""
         n = len(self._x)
         row = np.zeros(n)
         self._fill_sight(row, sight, rates)
@@ -303,7 +337,8 @@ class FloorFilter:
         by_roll, by_pitch = sight.offset_per_tilt
         shaken = (by_roll**2 + by_pitch**2) * self._innovations.shake_rad**2
         grown[n, n] = row @ self._p @ row + sight.sigma_m**2 + shaken
-        self._x, self._p = np.append(self._x, sight.offset_m), grown
+        offset_m = sight.offset_m + float(row[:FIRST_LINE] @ (self._x[:FIRST_LINE] - before))
+        self._x, self._p = np.append(self._x, offset_m), grown
         self.held.append(
             HeldLine(self._next_id, sight.axis, sight.width_m, stamp_ns, sight.from_m, sight.to_m)
         )

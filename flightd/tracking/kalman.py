@@ -18,16 +18,19 @@ def predicted(p: Matrix, transition: Matrix, noise: Matrix) -> Matrix:
 
 
 def corrected(
-    x: Matrix, p: Matrix, rows: Matrix, errors: Matrix, noise: Matrix
+    x: Matrix, p: Matrix, rows: Matrix, errors: Matrix, noise: Matrix, unmoved: slice | None = None
 ) -> tuple[Matrix, Matrix, Matrix]:
     """(n,) state and (n, n) covariance that bring m measured errors to 0, and the (m, m) covariance that the
     errors were expected to have.
 
     `errors` (m,) are h(x) - z, or any g(x) that is 0 where state and measurement agree, `rows` (m, n) their
-    derivative by the state, `noise` (m, m) the covariance of what was measured."""
+    derivative by the state, `noise` (m, m) the covariance of what was measured.  States that are `unmoved`
+    learn nothing of them (Schmidt's filter: they are considered, not corrected)."""
     crossed = p @ rows.T
     spread: Matrix = rows @ crossed + noise
     gain = np.linalg.solve(spread, crossed.T).T
+    if unmoved is not None:
+        gain[unmoved] = 0.0
     kept = np.eye(len(x)) - gain @ rows
     after = kept @ p @ kept.T + gain @ noise @ gain.T
     return x - gain @ errors, (after + after.T) / 2, spread

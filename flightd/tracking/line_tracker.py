@@ -1,6 +1,6 @@
 """Line tracks on the floor: from each frame's lines to smooth offsets, velocities and heading.
 
-The filters live at the capture time of the newest frame, where the measured attitude of that moment is
+The filter lives at the capture time of the newest frame, where the measured attitude of that moment is
 known; `at` carries them on to the present with the attitude flown since.  So a late picture costs
 prediction, never truth.
 """
@@ -16,7 +16,7 @@ from typing import TypeVar
 from flightd.config.control import TiltCompensation
 from flightd.config.tracking import TrackingConfig
 from flightd.core.geometry import Lens, Matrix, Mount, wrap_pi
-from flightd.core.tracks import FloorJunction, MarkerOffset, PadOffset, TrackedLine, TrackSet
+from flightd.core.tracks import NOT_SEEN, FloorJunction, MarkerOffset, PadOffset, TrackedLine, TrackSet
 from flightd.core.types import Attitude, LineSet, MarkerSight, PadSight
 from flightd.tracking.attitude_history import AttitudeHistory
 from flightd.tracking.floor_filter import (
@@ -66,8 +66,10 @@ class LineTracker:
         compensation: TiltCompensation = TiltCompensation.EXACT,
         config: TrackingConfig = _DEFAULTS,
         learnt: tuple[Matrix, Matrix] | None = None,
+        latency_s: float = math.inf,
     ) -> None:
-        """`learnt` is what another tracker has learnt of the same sensors."""
+        """`learnt` is what another tracker has learnt of the same sensors, `latency_s` the delay that the
+        frames' stamps assume."""
         params = config.expert
         self._lens, self._mount, self._compensation = lens, mount, compensation
         self._line_width_m = line_width_m
@@ -76,7 +78,7 @@ class LineTracker:
         self._history = AttitudeHistory()
         self._headed = False
         forget_ns = round(params.forget_s * 1e9)
-        self._filter = FloorFilter(params.noise, params.priors, params.gate_m, forget_ns)
+        self._filter = FloorFilter(params.noise, params.priors, params.gate_m, forget_ns, latency_s)
         if learnt is not None:
             self._filter.begin_with(learnt)
         self._forget_ns = forget_ns
@@ -111,10 +113,14 @@ class LineTracker:
             offset = wrap_pi(self._start_yaw_rad - sample.yaw_rad)
             self._filter.turn_to(offset, self._params.start_yaw_sigma_rad)
 
+    def exposed_ns(self, lines: LineSet) -> int:
+        """When the frame was exposed, by what has been learnt of the camera's delay."""
+        return lines.stamp_ns + round(self._filter.mean(DELAY) * 1e9)
+
     def frame(self, lines: LineSet, height_m: float) -> bool:
         """Take the lines of one frame seen at `height_m`; False when it could not be used (older than
         the last, no attitude at its exposure, no height)."""
-        stamp_ns = lines.stamp_ns + round(self._filter.mean(DELAY) * 1e9)
+        stamp_ns = self.exposed_ns(lines)
         attitude = self._history.at(stamp_ns)
         height_m = self._believed_height_m(lines, height_m) * (1.0 + self._filter.mean(SCALE))
         if attitude is None or not self._headed or not height_m > 0 or lines.stamp_ns <= self._told_ns:
@@ -124,7 +130,8 @@ class LineTracker:
         self._advance(stamp_ns)
         params = self._params
         sigma_tilt_rad = 0.0 if self._compensation is TiltCompensation.EXACT else params.sigma_tilt_rad
-        if self._history.is_assumed(stamp_ns):
+        assumed = self._history.is_assumed(stamp_ns)
+        if assumed:
             sigma_tilt_rad = _ASSUMED_TILT_RAD
         view = FloorView(
             self._lens,
@@ -142,7 +149,7 @@ class LineTracker:
         sigma_yaw, tilt = self._filter.sigma(PSI), (view.attitude.roll_rad, view.attitude.pitch_rad)
         placed = (line_sight(line, yaw, sigma_yaw, tilt, height_m, params.min_sigma_m) for line in on_floor)
         sights = [as_compensated(sight, self._compensation) for sight in placed if sight is not None]
-        self._filter.update(sights, self._rates(stamp_ns), stamp_ns)
+        self._filter.update(sights, self._rates(stamp_ns), stamp_ns, assumed=assumed)
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
         self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in _placed(lines.pads, view, yaw))
         marks = _placed(lines.markers, view, yaw)
@@ -194,7 +201,7 @@ class LineTracker:
                 replace(seen, dx_m=seen.dx_m - moved_x, dy_m=seen.dy_m - moved_y) for seen in self._junctions
             ),
             self._stamp_ns,
-            sensors=held.sensors(),
+            sensors=held.sensors() if self._lines_ns else NOT_SEEN,
             push_x_mps2=held.push_after(0, (now_ns - self._stamp_ns) * 1e-9),
             push_y_mps2=held.push_after(1, (now_ns - self._stamp_ns) * 1e-9),
             markers=tuple(

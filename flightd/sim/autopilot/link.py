@@ -77,6 +77,8 @@ class UdpLink(asyncio.DatagramProtocol):
         self._key = key
         self._transport: asyncio.DatagramTransport | None = None
         self.channels: dict[Address, MavlinkChannel] = {}
+        self.silent = False
+        """Nothing goes out any more, what comes in is heard."""
         self.muted = False
         """A cut cable: nothing goes out, nothing comes in."""
         self.withheld: set[int] = set()
@@ -122,7 +124,7 @@ class UdpLink(asyncio.DatagramProtocol):
 
     def transmit(self, frame: bytes, address: Address) -> None:
         """Put one packed frame on the wire."""
-        if self._transport is not None and not self.muted:
+        if self._transport is not None and not (self.muted or self.silent):
             self._transport.sendto(frame, address)
 
     def datagram_received(self, data: bytes, addr: Any) -> None:

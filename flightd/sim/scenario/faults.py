@@ -15,7 +15,6 @@ from flightd.core.errors import InputError
 from flightd.core.topics import Topic
 from flightd.ports import Clock, Recorder
 from flightd.sim.autopilot.autopilot import AutopilotPeer
-from flightd.sim.autopilot.radio import RadioParams
 from flightd.sim.floor.floor import Box
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.plant.kinematics import Kinematics
@@ -209,7 +208,7 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
     """What goes wrong in an autopilot, or between it and its companion."""
     match fault:
         case LinkFault(kind="telemetry_silent"):
-            vehicle.link.down.params = RadioParams(loss=1.0) if on else vehicle.link.up.params
+            vehicle.link.silent = on
         case LinkFault(kind="companion_dead"):
             vehicle.link.muted = on
         case LinkFault():

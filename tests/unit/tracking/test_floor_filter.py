@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import random
 
+import pytest
+
 from flightd.config.tracking import MotionNoise, SensorPriors
-from flightd.tracking.floor_filter import FIRST_LINE, PUSH_X, VX, FloorFilter
+from flightd.tracking.floor_filter import DELAY, FIRST_LINE, MOUNT_ROLL, PSI, PUSH_X, VX, FloorFilter
 from flightd.tracking.line_sight import LineSight, Rates
 
 FRAME_NS = 33_333_333
@@ -93,3 +95,73 @@ def test_who_knows_no_line_any_more_still_knows_his_sensors() -> None:
     assert floor.mean(VX) == 0.0
     assert [floor.mean(state) for state in range(PUSH_X + 2, FIRST_LINE)] == before
     assert floor.held == []
+
+
+def test_a_line_is_placed_by_the_heading_that_its_own_frame_has_corrected() -> None:
+    """Five degrees wrong on the pad; the first frame tells.  What it places is not moved by the next."""
+    wrong = math.radians(5.0)
+    floor = FloorFilter(MotionNoise(), SensorPriors(), gate_m=0.35, forget_ns=10**9)
+    floor.turn_to(wrong, math.radians(5.0))
+    along_m = 0.6
+    for step in range(3):
+        held_rad = floor.mean(PSI)
+        turned = sight(0.2 - along_m * held_rad)._replace(
+            along_m=along_m, turn_rad=held_rad, sigma_theta_rad=0.004
+        )
+        floor.predict(1 / 30, 0.0, 0.0, 0.0)
+        floor.update([turned], STILL, step * FRAME_NS)
+        offset_m, sigma_m = floor.offset(0)
+        assert abs(offset_m - 0.2) < 3.0 * sigma_m
+        assert abs(floor.mean(VX)) < 0.05
+
+
+def test_lines_dropped_leave_the_others_and_a_covariance_that_is_one() -> None:
+    floor = floor_filter(MotionNoise(), forget_ns=10**9)
+    for step in range(10):
+        floor.predict(1 / 30, 0.0, 0.0, 0.0)
+        floor.update([sight(-0.8), sight(0.1), sight(0.9)], STILL, step * FRAME_NS)
+    for step in range(10, 60):
+        floor.predict(1 / 30, 0.0, 0.0, 0.0)
+        floor.update([sight(-0.8), sight(0.9)], STILL, step * FRAME_NS)
+    assert sorted(round(floor.offset(line)[0], 2) for line in range(len(floor.held))) == [-0.8, 0.9]
+    assert all(floor.sigma(state) > 0.0 for state in range(FIRST_LINE + 2))
+
+
+def test_a_delay_is_never_believed_beyond_what_can_be() -> None:
+    floor = FloorFilter(MotionNoise(), SensorPriors(), gate_m=0.35, forget_ns=10**9, latency_s=0.04)
+    for step in range(200):
+        floor.predict(1 / 30, 0.0, 0.0, 0.0)
+        swing = math.sin(step * 0.3)
+        seen = sight(0.2 + 0.3 * swing)._replace(offset_per_tilt=(-1.6, 0.0), sigma_m=0.001)
+        floor.update([seen], Rates(-3.0 * swing, 0.0, 0.0), step * FRAME_NS)
+        assert -0.12 <= floor.mean(DELAY) <= 0.04
+        assert abs(floor.mean(PUSH_X)) <= MotionNoise().max_disturbance_mps2
+
+
+def test_what_was_learnt_is_begun_with_but_less_surely() -> None:
+    first = FloorFilter(MotionNoise(), SensorPriors(), gate_m=0.35, forget_ns=10**9)
+    for step in range(60):
+        off = 0.8 * (first.mean(MOUNT_ROLL) - 0.02)
+        left = sight(0.4)._replace(turn_per_mount=(0.8, 0.0), turn_rad=off)
+        right = sight(-0.4)._replace(turn_per_mount=(-0.8, 0.0), turn_rad=-off)
+        first.predict(1 / 30, 0.0, 0.0, 0.0)
+        first.update([left, right], STILL, step * FRAME_NS)
+    assert first.mean(MOUNT_ROLL) == pytest.approx(0.02, abs=0.002)
+    second = FloorFilter(MotionNoise(), SensorPriors(), gate_m=0.35, forget_ns=10**9)
+    second.begin_with(first.learnt())
+    assert second.mean(MOUNT_ROLL) == first.mean(MOUNT_ROLL) != 0.0
+    assert first.sigma(MOUNT_ROLL) < second.sigma(MOUNT_ROLL) < SensorPriors().mount_rad
+    means, covariance = first.learnt()
+    third = FloorFilter(MotionNoise(), SensorPriors(), gate_m=0.35, forget_ns=10**9)
+    third.begin_with((means * math.nan, covariance))
+    assert third.mean(MOUNT_ROLL) == 0.0, "what is no number is not begun with"
+
+
+def test_of_an_attitude_that_is_only_assumed_nothing_is_learnt_for_good() -> None:
+    floor = FloorFilter(MotionNoise(), SensorPriors(), gate_m=0.35, forget_ns=10**9)
+    for step in range(30):
+        floor.predict(1 / 30, 0.0, 0.0, 0.0)
+        told = sight(0.2 + 0.01 * step)._replace(offset_per_mount=(-1.6, 0.0))
+        floor.update([told], Rates(1.0, 0.0, 0.0), step * FRAME_NS, assumed=True)
+    assert [floor.mean(state) for state in (MOUNT_ROLL, DELAY)] == [0.0, 0.0]
+    assert floor.mean(VX) != 0.0

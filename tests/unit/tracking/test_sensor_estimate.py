@@ -64,7 +64,7 @@ def told(truth: Truth, seed: int, seconds: float = 20.0) -> SensorEstimate:
             tracker.frame(waiting.pop(0)[1], HEIGHT_M)
     tracks = tracker.at(round(seconds * 1e9))
     assert tracks is not None
-    assert tracks.sensors is not None
+    assert tracks.sensors.is_known
     return tracks.sensors
 
 

@@ -1,0 +1,38 @@
+"""What is drawn of a drone: within its world's bounds, the same for the same seed, nothing in the ideal."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from flightd.sim.plant.airframe import AirframeParams
+from flightd.sim.sensors.instruments import SensorParams
+from flightd.sim.sensors.optics import SimCamera
+from flightd.sim.unknowns import NOTHING, SPREADS, WorldKind, unknowns_of
+
+
+def test_the_ideal_world_keeps_nothing_to_itself() -> None:
+    assert unknowns_of(WorldKind.IDEAL, 7) == NOTHING
+    assert NOTHING.camera(SimCamera()) == SimCamera()
+    assert NOTHING.sensors(SensorParams()) == SensorParams()
+    assert NOTHING.airframe(AirframeParams()) == AirframeParams()
+
+
+@pytest.mark.parametrize("kind", [WorldKind.USUAL, WorldKind.ROUGH])
+def test_what_is_drawn_stays_within_its_world_and_reaches_what_it_is_of(kind: WorldKind) -> None:
+    most = SPREADS[kind]
+    drawn = [unknowns_of(kind, seed) for seed in range(200)]
+    assert drawn == [unknowns_of(kind, seed) for seed in range(200)]
+    delays = [one.camera_delay_s for one in drawn]
+    assert max(map(abs, delays)) <= most.delay_s
+    assert max(delays) > 0.8 * most.delay_s
+    assert min(delays) < -0.8 * most.delay_s
+    for one in drawn:
+        camera = one.camera(SimCamera())
+        assert camera.capture_delay_s == pytest.approx(max(0.060 + one.camera_delay_s, 0.005))
+        assert abs(math.degrees(camera.mount.roll_rad)) <= most.mount_deg
+        assert abs(camera.lens.fx_px / SimCamera().lens.fx_px - 1.0) <= most.focal_share
+        assert one.sensors(SensorParams()).leak_s == most.leak_s
+        down_s, up_s = one.path_s
+        assert down_s + up_s == pytest.approx(2.0 * most.path_s)
