@@ -22,7 +22,7 @@ from flightd.config.schema import Config
 from flightd.guide import pages
 from flightd.mission.safety import hazard_table
 from flightd.sim.judge.verdict import KINDS
-from flightd.sim.unknowns import SPREADS, WorldKind
+from flightd.sim.unknowns import SPREADS, UNEVEN, WorldKind
 from flightd.site.site_file import SiteFile
 from tools import command_table, reference_tables, safety_case
 from tools.command_help import help_pages
@@ -78,7 +78,7 @@ def _worlds() -> str:
         ("attitude: error that wanders, rms", "tilt_wander_deg", 1, "deg"),
         ("attitude: leaks to level within", "leak_s", 1, "s"),
         ("autopilot's clock fast or slow by up to", "clock_ppm", 1, "ppm"),
-        ("telemetry: least delay, either way up to 30 % longer", "path_s", 1e3, "ms"),
+        (f"telemetry: least delay, either way up to {UNEVEN * 100:g} % longer", "path_s", 1e3, "ms"),
         ("telemetry: jitter, exponential", "path_jitter_s", 1e3, "ms"),
         ("range finder: noise, rms", "range_noise_m", 1e2, "cm"),
         ("range finder: readings lost", "range_dropout", 1e2, "%"),

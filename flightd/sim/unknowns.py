@@ -26,6 +26,9 @@ class WorldKind(enum.StrEnum):
     ROUGH = "rough"
 
 
+_SENSORS = SensorParams()
+
+
 @dataclass(frozen=True, slots=True)
 class Unknowns:
     """What is true of one drone and not in its configuration; all differences are true less configured."""
@@ -41,17 +44,17 @@ class Unknowns:
     """Rms of roll and pitch of each frame against the airframe."""
     tilt_bias_rad: tuple[float, float] | None = None
     """Roll and pitch told too large; None: the simulated autopilot's own small ones."""
-    tilt_wander_rad: float = math.radians(0.1)
+    tilt_wander_rad: float = _SENSORS.tilt_wander_rad
     leak_s: float | None = None
     """Time within which the told attitude leaks towards level; None: it does not."""
     clock_ppm: float = 20.0
     path_s: tuple[float, float] = (0.0, 0.0)
     """Least delay of telemetry, and of what is sent to the autopilot."""
     path_jitter_s: float = 0.0
-    range_noise_m: float = 0.005
-    range_dropout: float = 0.005
-    range_min_m: float = 0.05
-    baro_wander_m: float = 0.01
+    range_noise_m: float = _SENSORS.range_noise_m
+    range_dropout: float = _SENSORS.range_dropout
+    range_min_m: float = _SENSORS.range_min_m
+    baro_wander_m: float = _SENSORS.baro_wander_m
     hover_share: float = 1.0
 
     def camera(self, configured: SimCamera) -> SimCamera:
@@ -163,7 +166,7 @@ SPREADS = {
         hover_share=0.25,
     ),
 }
-_UNEVEN = 0.3
+UNEVEN = 0.3
 """Share of the path's delay by which one way may be longer than the other."""
 
 
@@ -176,7 +179,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
     def within(limit: float) -> float:
         return rng.uniform(-limit, limit)
 
-    uneven_s = within(_UNEVEN * most.path_s)
+    uneven_s = within(UNEVEN * most.path_s)
     return Unknowns(
         kind=kind,
         camera_delay_s=within(most.delay_s),

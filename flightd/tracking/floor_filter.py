@@ -35,10 +35,10 @@ FIRST_LINE = 12
 
 _UNSEEN_S = 0.1
 """An axis without a line for so long is dead-reckoned: the gust that was last felt on it fades."""
-
-
-_LASTING = slice(MOUNT_ROLL, FIRST_LINE)
-"""What is learnt for good."""
+_SENSORS, _LASTING = slice(ROLL, FIRST_LINE), slice(MOUNT_ROLL, FIRST_LINE)
+"""What is wrong with the sensors, and what of it is learnt for good."""
+_YAW_SIGMA_RAD, _YAW_RATE_SIGMA_RADPS = math.radians(5.0), 0.005
+"""Of the heading before it is told at all, and of its drift whenever it is."""
 _MOST_SIGMAS = 4.0
 """A delay further off than so many sigmas of what was thought possible is not believed."""
 _BETWEEN = 0.3
@@ -74,14 +74,21 @@ class FloorFilter:
         self._next_id = 0
         self.held: list[HeldLine] = []
         sigmas = np.zeros(FIRST_LINE)
-        sigmas[[PSI, PSI_RATE]] = math.radians(5.0), 0.005
+        sigmas[[PSI, PSI_RATE]] = _YAW_SIGMA_RAD, _YAW_RATE_SIGMA_RADPS
         sigmas[[VX, VY]] = noise.start_velocity_mps
         sigmas[[PUSH_X, PUSH_Y]] = noise.start_disturbance_mps2
         sigmas[[ROLL, PITCH]] = priors.attitude_rad
         sigmas[[MOUNT_ROLL, MOUNT_PITCH]] = priors.mount_rad
         sigmas[DELAY], sigmas[SCALE] = priors.delay_s, priors.scale_share
+        self._first_sigmas = sigmas
         self._x: Matrix = np.zeros(FIRST_LINE)
         self._p: Matrix = np.diag(sigmas**2)
+        drift = np.zeros(FIRST_LINE)
+        drift[[PSI, PSI_RATE]] = priors.heading_radps, 0.1 * priors.heading_radps
+        drift[[ROLL, PITCH]] = priors.attitude_rad * math.sqrt(2.0 / priors.attitude_s)
+        drift[[MOUNT_ROLL, MOUNT_PITCH]] = priors.mount_rad * 0.002
+        drift[DELAY], drift[SCALE] = priors.delay_s * 0.01, priors.scale_share * 0.01
+        self._drift = drift
         self._steady = [0.0, 0.0]
         self._unseen_s = [0.0, 0.0]
         self._innovations = Innovations(priors.shake_rad, priors.shake_bounds_rad)
@@ -121,8 +128,7 @@ class FloorFilter:
 
     def learnt(self) -> tuple[Matrix, Matrix]:
         """What is known of the sensors: (6,) means and (6, 6) covariance from `ROLL` to `SCALE`."""
-        sensors = slice(ROLL, FIRST_LINE)
-        return self._x[sensors].copy(), self._p[sensors, sensors].copy()
+        return self._x[_SENSORS].copy(), self._p[_SENSORS, _SENSORS].copy()
 
     def begin_with(self, learnt: tuple[Matrix, Matrix]) -> None:
         """Begin with what another filter has learnt of the same sensors: less surely, for a mount can have
@@ -130,37 +136,22 @@ class FloorFilter:
         means, covariance = learnt
         if not (np.isfinite(means).all() and np.isfinite(covariance).all()):
             return
-        sensors = slice(ROLL, FIRST_LINE)
-        self._x[sensors], self._p[sensors, sensors] = means, covariance
-        priors = self._priors
-        between = np.array([priors.mount_rad, priors.mount_rad, priors.delay_s, priors.scale_share])
-        lasting = np.arange(MOUNT_ROLL, FIRST_LINE)
-        self._p[lasting, lasting] += (_BETWEEN * between) ** 2
-        wandering = [ROLL, PITCH]
-        self._x[wandering] = 0.0
-        self._p[wandering, :] = 0.0
-        self._p[:, wandering] = 0.0
-        self._p[wandering, wandering] = self._priors.attitude_rad**2
+        self._x[_SENSORS], self._p[_SENSORS, _SENSORS] = means, covariance
+        lasting = np.arange(FIRST_LINE)[_LASTING]
+        self._p[lasting, lasting] += (_BETWEEN * self._first_sigmas[_LASTING]) ** 2
+        self._begin_anew([ROLL, PITCH])
 
     # What happens
 
     def turn_to(self, offset_rad: float, sigma_rad: float) -> None:
         """The heading offset is another one, and all that it was correlated with is no longer."""
-        self._x[[PSI, PSI_RATE]] = offset_rad, 0.0
-        self._p[[PSI, PSI_RATE], :] = 0.0
-        self._p[:, [PSI, PSI_RATE]] = 0.0
-        self._p[PSI, PSI], self._p[PSI_RATE, PSI_RATE] = sigma_rad**2, 0.005**2
+        self._begin_anew([PSI, PSI_RATE])
+        self._x[PSI], self._p[PSI, PSI] = offset_rad, sigma_rad**2
 
     def forget(self) -> None:
         """Know no line and no motion any more; what was learnt of the sensors stays."""
-        noise = self._noise
         self._drop(range(len(self.held)))
-        moving = [VX, VY, PUSH_X, PUSH_Y]
-        self._x[moving] = 0.0
-        self._p[moving, :] = 0.0
-        self._p[:, moving] = 0.0
-        variances = [noise.start_velocity_mps**2] * 2 + [noise.start_disturbance_mps2**2] * 2
-        self._p[moving, moving] = variances
+        self._begin_anew([VX, VY, PUSH_X, PUSH_Y])
         self._innovations.forget()
 
     def predict(self, dt_s: float, roll_rad: float, pitch_rad: float, yaw_rad: float) -> None:
@@ -194,15 +185,10 @@ class FloorFilter:
         x[[ROLL, PITCH]] *= keep
         rough = self._innovations.rough
         noise_q = reach @ reach.T * ((rough * noise.accel_mps2) ** 2 / dt_s)
-        drift = np.zeros(n)
-        drift[PSI], drift[PSI_RATE] = priors.heading_radps, 0.1 * priors.heading_radps
-        drift[ROLL] = drift[PITCH] = priors.attitude_rad * math.sqrt(2.0 / priors.attitude_s)
-        drift[MOUNT_ROLL] = drift[MOUNT_PITCH] = priors.mount_rad * 0.002
-        drift[DELAY], drift[SCALE] = priors.delay_s * 0.01, priors.scale_share * 0.01
         for axis, (_, push) in enumerate(AXES):
             changed = self._innovations.one_sided(axis)
-            drift[push] = noise.changed_mps2 if changed else noise.disturbance_mps2
-        noise_q[np.diag_indices(n)] += drift**2 * dt_s
+            self._drift[push] = noise.changed_mps2 if changed else noise.disturbance_mps2
+        noise_q[np.diag_indices(FIRST_LINE)] += self._drift**2 * dt_s
         self._p = predicted(self._p, jacobian, noise_q)
         self._fade(dt_s)
 
@@ -243,6 +229,13 @@ class FloorFilter:
 
     # How
 
+    def _begin_anew(self, states: list[int]) -> None:
+        """These are as unknown as at first, and nothing that is known says anything of them."""
+        self._x[states] = 0.0
+        self._p[states, :] = 0.0
+        self._p[:, states] = 0.0
+        self._p[states, states] = self._first_sigmas[states] ** 2
+
     def _lean(
         self, roll_rad: float, pitch_rad: float, yaw_rad: float
     ) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
@@ -279,8 +272,7 @@ class FloorFilter:
         return row
 
     def _fill_sight(self, row: Matrix, sight: LineSight, rates: Rates) -> None:
-        by_roll, by_pitch = sight.offset_per_tilt
-        by_yaw = -sight.along_m if sight.axis == 0 else sight.along_m
+        (by_roll, by_pitch), by_yaw = sight.offset_per_tilt, sight.offset_per_yaw
         row[[ROLL, PITCH]] = by_roll, by_pitch
         row[[MOUNT_ROLL, MOUNT_PITCH]] = sight.offset_per_mount
         row[PSI] = by_yaw
@@ -291,7 +283,7 @@ class FloorFilter:
         row[SCALE] = sight.offset_m
 
     def _turn_row(self, sight: LineSight, rates: Rates) -> Matrix:
-        """d(heading told less heading held) / d state, negative: of the implicit g."""
+        """d(heading held - heading told) / d state."""
         row = np.zeros(len(self._x))
         by_roll, by_pitch = sight.turn_per_tilt
         row[PSI] = 1.0
@@ -306,16 +298,15 @@ class FloorFilter:
         """Bring g to 0; returns the errors in units of their sigmas.  What shakes moves all lines alike."""
         noise = np.diag(variances) + by_tilt @ by_tilt.T * self._innovations.shake_rad**2
         self._x, self._p, spread = corrected(self._x, self._p, rows, errors, noise, unmoved)
-        self._bound(PUSH_X, self._noise.max_disturbance_mps2)
-        self._bound(PUSH_Y, self._noise.max_disturbance_mps2)
-        most_s = _MOST_SIGMAS * self._priors.delay_s
-        self._bound(DELAY, most_s, min(most_s, self._latency_s))  # no frame arrives before it is exposed
+        push, delay_s = self._noise.max_disturbance_mps2, _MOST_SIGMAS * self._priors.delay_s
+        self._bound(PUSH_X, -push, push)
+        self._bound(PUSH_Y, -push, push)
+        self._bound(DELAY, -delay_s, min(delay_s, self._latency_s))  # no frame arrives before it is exposed
         told: Matrix = errors / np.sqrt(np.diag(spread))
         return told
 
-    def _bound(self, index: int, least: float, most: float | None = None) -> None:
-        """Keep a state above -`least` and below `most` (None: `least`)."""
-        self._x[index] = min(max(self._x[index], -least), least if most is None else most)
+    def _bound(self, index: int, least: float, most: float) -> None:
+        self._x[index] = min(max(self._x[index], least), most)
 
     def _mind(self, told: Matrix, offsets: list[tuple[int, int]]) -> None:
         for axis in range(2):

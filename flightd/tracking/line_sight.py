@@ -16,20 +16,20 @@ _GATE_RAD, _GATE_SIGMAS = math.radians(4.0), 4.0
 
 
 class LineSight(NamedTuple):
-    """One line of a frame, across the grid axis `axis`: where it was seen from the drone along that axis and
-    along itself, what its direction says of the heading, its width and its visible part, with the standard
-    deviations of offset and direction; what a radian more of roll, and of pitch, would change of the two, in
-    the attitude and in the mount."""
+    """One line of a frame, across the grid axis `axis`: where it was seen from the drone along that axis, what
+    its direction says of the heading, its width and its visible part, with the standard deviations of offset
+    and direction; what a radian more of yaw would change of the offset, and one of roll, and of pitch, of the
+    two, in the attitude and in the mount."""
 
     axis: int
     offset_m: float
-    along_m: float
     turn_rad: float
     sigma_m: float
     sigma_theta_rad: float
     width_m: float
     from_m: float
     to_m: float
+    offset_per_yaw: float
     offset_per_tilt: tuple[float, float]
     turn_per_tilt: tuple[float, float]
     offset_per_mount: tuple[float, float]
@@ -77,8 +77,7 @@ def line_sight(
         return axis[0] * point[0] + axis[1] * point[1]
 
     middle = line.forward_m, line.right_m
-    offset_m, along_m = on(across, middle), on(along, middle)
-    by_yaw = -along_m if across_x else along_m
+    by_yaw = -on(along, middle) if across_x else on(along, middle)
     shifts, (turn_by_roll, turn_by_pitch) = tilt_effects(line, height_m)
     by_roll, by_pitch = (on(across, shift) for shift in shifts)
     # who rolls while pitched, or is mounted pitched and rolls, turns a little, too
@@ -88,14 +87,14 @@ def line_sight(
     from_m, to_m = sorted(on(along, end) for end in line.ends_m)
     return LineSight(
         axis=0 if across_x else 1,
-        offset_m=offset_m,
-        along_m=along_m,
+        offset_m=on(across, middle),
         turn_rad=turn_rad if agrees(turn_rad, line.sigma_theta_rad, sigma_yaw_rad) else math.nan,
         sigma_m=max(line.sigma_m, least_sigma_m),
         sigma_theta_rad=max(line.sigma_theta_rad, _LEAST_SIGMA_RAD),
         width_m=line.width_m,
         from_m=from_m,
         to_m=to_m,
+        offset_per_yaw=by_yaw,
         offset_per_tilt=(by_roll, by_pitch),
         turn_per_tilt=(turn_by_roll, turn_by_pitch),
         offset_per_mount=(by_roll, by_pitch + by_yaw * turned_by_mount),
@@ -112,6 +111,4 @@ def as_compensated(sight: LineSight, compensation: TiltCompensation) -> LineSigh
         case TiltCompensation.FIRST_ORDER:
             return sight._replace(turn_per_tilt=_LEVEL, offset_per_mount=_LEVEL, turn_per_mount=_LEVEL)
         case TiltCompensation.NONE:
-            return sight._replace(
-                offset_per_tilt=_LEVEL, turn_per_tilt=_LEVEL, offset_per_mount=_LEVEL, turn_per_mount=_LEVEL
-            )
+            return as_compensated(sight, TiltCompensation.FIRST_ORDER)._replace(offset_per_tilt=_LEVEL)

@@ -21,7 +21,7 @@ SURE = SensorPriors(
 
 def sight(offset_m: float, sigma_m: float = 0.005) -> LineSight:
     """A line across x, straight below."""
-    return LineSight(0, offset_m, 0.0, math.nan, sigma_m, 0.01, 0.075, -0.5, 0.5, *[(0.0, 0.0)] * 4)
+    return LineSight(0, offset_m, math.nan, sigma_m, 0.01, 0.075, -0.5, 0.5, 0.0, *[(0.0, 0.0)] * 4)
 
 
 def floor_filter(noise: MotionNoise, forget_ns: int = 10**10) -> FloorFilter:
@@ -106,7 +106,7 @@ def test_a_line_is_placed_by_the_heading_that_its_own_frame_has_corrected() -> N
     for step in range(3):
         held_rad = floor.mean(PSI)
         turned = sight(0.2 - along_m * held_rad)._replace(
-            along_m=along_m, turn_rad=held_rad, sigma_theta_rad=0.004
+            offset_per_yaw=-along_m, turn_rad=held_rad, sigma_theta_rad=0.004
         )
         floor.predict(1 / 30, 0.0, 0.0, 0.0)
         floor.update([turned], STILL, step * FRAME_NS)

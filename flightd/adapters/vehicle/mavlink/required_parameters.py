@@ -137,13 +137,7 @@ _ARDUPILOT: tuple[Rule, ...] = (
         "there is no GPS in the hall",
         0,
     ),
-    Rule(
-        ("EK3_SRC1_POSZ",),
-        _one_of(1),
-        "1 (barometer)",
-        _CLIMB,
-        1,
-    ),
+    Rule(("EK3_SRC1_POSZ",), _one_of(1), "1 (barometer)", _CLIMB, 1),
     Rule(("EK3_SRC1_VELZ",), _one_of(0, 6), "0 (none) or 6 (external)", "there is no GPS in the hall", 0),
     Rule(
         ("EK3_SRC1_YAW",),
@@ -211,13 +205,7 @@ _PX4: tuple[Rule, ...] = (
     Rule(("MAV_FWDEXTSP",), _one_of(1), "1", "without it setpoints are not passed on", 1),
     Rule(("COM_ARM_WO_GPS",), lambda value: value != 0, "1 or 2", "there is no GPS in the hall", 1),
     Rule(("EKF2_GPS_CTRL",), _one_of(0), "0", "indoors a GPS reports nonsense", 0),
-    Rule(
-        ("EKF2_HGT_REF",),
-        _one_of(0),
-        "0 (barometer)",
-        _CLIMB,
-        0,
-    ),
+    Rule(("EKF2_HGT_REF",), _one_of(0), "0 (barometer)", _CLIMB, 0),
     Rule(("MPC_THR_HOVER",), _within(0.1, 0.8), "0.1 to 0.8", "the first guess of the hover thrust"),
 )
 
