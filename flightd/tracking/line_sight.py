@@ -16,10 +16,10 @@ _GATE_RAD, _GATE_SIGMAS = math.radians(4.0), 4.0
 
 
 class LineSight(NamedTuple):
-    """One line of a frame, across the grid axis `axis`: where it was seen from the drone along that axis, what
-    its direction says of the heading, its width and its visible part, with the standard deviations of offset
-    and direction; what a radian more of yaw would change of the offset, and one of roll, and of pitch, of the
-    two, in the attitude and in the mount."""
+    """One line of a frame, across the grid axis `axis`: where it was seen from the drone along that axis,
+    what its direction says of the heading, its width and its visible part, with the standard deviations of
+    offset and direction; what a radian more of yaw would change of the offset, and one of roll, and of pitch,
+    of both, in the attitude and in the mount."""
 
     axis: int
     offset_m: float
