@@ -172,7 +172,8 @@ class Pilot:
     def _inputs(self, tick: TickInput, dt_s: float, known: Estimate) -> MissionInputs:
         now_ns, v, pose = tick.now_ns, tick.vehicle, known.pose
         estimator, localiser = self._estimator, self._estimator.localiser
-        x_ns, y_ns = localiser.seen_ns
+        x_ns, y_ns = localiser.told_ns
+        features_ns = known.tracks.features_ns if known.tracks is not None else 0
         max_sigma_m = self._config.localisation.expert.max_sigma_m
         precise = pose is not None and max(pose.covariance[0], pose.covariance[4]) < max_sigma_m**2
         seeking = self._mission.phase is Phase.RELOCATE
@@ -186,6 +187,7 @@ class Pilot:
             frames_arrive=estimator.frames.age_s(now_ns) < _FRAMES_ARRIVE_S,
             x_age_s=(now_ns - x_ns) * 1e-9 if x_ns else math.inf,
             y_age_s=(now_ns - y_ns) * 1e-9 if y_ns else math.inf,
+            features_age_s=(now_ns - features_ns) * 1e-9 if features_ns else math.inf,
             telemetry_age_s=math.inf if v is None else (now_ns - v.attitude.stamp_ns) * 1e-9,
             vehicle=v,
             judged_charge=self._charge.step(now_ns, v, flying=self._mission.airborne),

@@ -22,6 +22,9 @@ class LocalisationExpert(Section):
     carried_m: float = Field(
         3.0, gt=0, le=100, description="at this distance from the start node those odds have halved"
     )
+    by_features_m: float = Field(
+        3.0, ge=0, le=20, description="so far features of the floor may carry the position on without lines"
+    )
     most_places: int = Field(48, ge=4, le=1000, description="places that are told apart at once, at most")
     slip: float = Field(
         2e-4,

@@ -35,6 +35,9 @@ class SensorPriors(Section):
 
     attitude_deg: float = Field(0.7, gt=0, le=10, description="wandering error of the told roll and pitch")
     attitude_s: float = Field(8.0, gt=0, le=600, description="time within which that error wanders")
+    leak_per_s: float = Field(
+        0.1, gt=0, le=1, description="rate at which that attitude leaks towards what accelerometers feel"
+    )
     mount_deg: float = Field(
         1.5, gt=0, le=10, description="error of the camera's roll and pitch in the airframe"
     )
@@ -75,6 +78,9 @@ class TrackingExpert(Section):
         0.3, gt=0, le=10, description="sigma of the tilt where it is not compensated"
     )
     min_sigma_m: float = Field(0.004, gt=0, le=0.1, description="least sigma of a line's offset")
+    feature_sigma_m: float = Field(
+        0.004, gt=0, le=0.1, description="sigma of the place of a feature of the floor"
+    )
     width_share: tuple[_WidthShare, _WidthShare] = Field(
         (0.55, 1.7),
         description="least and largest width of a guide line against the site's line_width_m",

@@ -110,3 +110,5 @@ class TrackSet:
     push_y_mps2: float = 0.0
     markers: tuple[MarkerOffset, ...] = ()
     sensors: SensorEstimate = NOT_SEEN
+    features_ns: int = 0
+    """Capture time of the newest frame in which the motion was told by features of the floor, too."""

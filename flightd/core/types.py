@@ -147,10 +147,20 @@ class MarkerSight:
 
 
 @dataclass(frozen=True, slots=True)
+class FloorFeature:
+    """A point of the floor that was followed from another frame: the number that it keeps from frame to
+    frame, and where it is in centred image coordinates of a distortion-free camera."""
+
+    id: int
+    x_px: float
+    y_px: float
+
+
+@dataclass(frozen=True, slots=True)
 class LineSet:
     """What vision saw in one frame.  Lines are in pixels of a distortion-free pinhole camera when a
-    lens was given to the detector.  `timings_ms` names each stage's time.  Pads are only looked for, and the
-    picture only checked, by a detector that is in flight."""
+    lens was given to the detector.  `timings_ms` names each stage's time.  Pads are only looked for, features
+    only followed, and the picture only checked, by a detector that is in flight."""
 
     frame_seq: int
     stamp_ns: int
@@ -163,6 +173,7 @@ class LineSet:
     pads: tuple[PadSight, ...] = ()
     picture: PictureCheck = UNCHECKED
     markers: tuple[MarkerSight, ...] = ()
+    features: tuple[FloorFeature, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

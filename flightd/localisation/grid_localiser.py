@@ -53,6 +53,10 @@ _JUDGE_NS = 100_000_000
 """What was passed and what is left to match is looked at so often."""
 _SWITCH = 1.5
 """Another place is believed when it is so much likelier."""
+_SEEN_NS = 200_000_000
+"""A line seen so lately counts as in view."""
+_CARRIED_NS = 400_000_000
+"""So lately features of the floor must have been followed to carry a position on."""
 _GAP_S = 0.6
 """Without a line for so long, the count may have slipped."""
 
@@ -82,6 +86,8 @@ class GridLocaliser:
         self._fixes = FixBook(site)
         self._judged: tuple[list[float], list[float]] = ([], [])
         self._seen_ns = [0, 0]
+        self._told_ns = [0, 0]
+        self._carried_m = [0.0, 0.0]
         self._ever_matched = [False, False]
         self._stamp_ns: int | None = None
         self._judge_ns = 0
@@ -93,9 +99,10 @@ class GridLocaliser:
         self._start(start_node)
 
     @property
-    def seen_ns(self) -> tuple[int, int]:
-        """When a line of the map was last seen that tells x, and y; 0 before the first."""
-        return self._seen_ns[0], self._seen_ns[1]
+    def told_ns(self) -> tuple[int, int]:
+        """When x, and y, was last told: by a line of the map, or by features of the floor that carried it on
+        for no more than `by_features_m`; 0 before the first line."""
+        return self._told_ns[0], self._told_ns[1]
 
     @property
     def ever_matched(self) -> tuple[bool, bool]:
@@ -130,11 +137,13 @@ class GridLocaliser:
         self._stamp_ns = now_ns
         reach_m = max(1.5 * height_m, 0.3)
         due = now_ns - self._judge_ns >= _JUDGE_NS
+        carried = now_ns - tracks.features_ns < _CARRIED_NS
         for axis, velocity in ((0, tracks.vx_mps), (1, tracks.vy_mps)):
             lines = tracks.across_y if axis else tracks.across_x
-            places.move(axis, velocity, dt_s)
+            places.move(axis, velocity, dt_s, carried=carried)
             self._match(axis, lines, reach_m, due)
-            places.settle(axis, lines, now_ns)
+            places.settle(axis, lines, now_ns, tracks.features_ns)
+            self._carry(axis, tracks, dt_s)
         if tracks.junctions_ns > self._junctions_ns:
             self._junctions_ns = tracks.junctions_ns
             self._see(tracks, height_m)
@@ -157,6 +166,17 @@ class GridLocaliser:
             self._fix(known.x_m - dx_m, known.y_m - dy_m, sigma_m)
 
     # The parts of a step
+
+    def _carry(self, axis: int, tracks: TrackSet, dt_s: float) -> None:
+        """Count how far features of the floor have carried the position on since a line told it."""
+        seen_ns = self._seen_ns[axis]
+        if tracks.stamp_ns - seen_ns < _SEEN_NS:
+            self._carried_m[axis] = 0.0
+        else:
+            self._carried_m[axis] += math.hypot(tracks.vx_mps, tracks.vy_mps) * dt_s
+        carries = seen_ns > 0 and self._carried_m[axis] < self._params.by_features_m
+        told_ns = max(seen_ns, tracks.features_ns) if carries else seen_ns
+        self._told_ns[axis] = max(self._told_ns[axis], told_ns)
 
     def _start(self, node: str) -> None:
         """Believe in the start node, and a little in every other, the less the further."""
@@ -236,7 +256,8 @@ class GridLocaliser:
             for axis in (0, 1):
                 near = float(here[axis])
                 self._judged[axis][:] = [at for at in self._judged[axis] if abs(at - near) < leave_m]
-        self._gap |= max(self._seen_ns) > 0 and lines_age_s > _GAP_S
+        told_s = (tracks.stamp_ns - max(self._told_ns)) * 1e-9
+        self._gap |= max(self._seen_ns) > 0 and min(lines_age_s, told_s) > _GAP_S
         if self._gap and lines_age_s < 0.3:
             self._gap = False
             self._leak(params.slip_in_gap)

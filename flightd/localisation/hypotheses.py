@@ -18,8 +18,8 @@ from flightd.localisation.observation_model import Flags, Indices, SensorModel, 
 from flightd.site.painted_lines import AxisLines, PaintMap
 
 _FAR_M = 1e7
-_DRIFT_MPS = 0.15
-"""Growth of a position's sigma while no line is seen."""
+_DRIFT_MPS, _CARRIED_MPS = 0.15, 0.03
+"""Growth of a position's sigma while no line is seen, and while features of the floor tell the motion."""
 _RIVAL = 0.01
 """Another map line is considered too where it explains the track so well, against the nearest one."""
 _MATCH_SIGMAS = 4.0
@@ -72,13 +72,15 @@ class Places:
 
     # Motion
 
-    def move(self, axis: int, velocity_mps: float, dt_s: float) -> None:
-        """Carry all places on by the odometry."""
+    def move(self, axis: int, velocity_mps: float, dt_s: float, *, carried: bool = False) -> None:
+        """Carry all places on by the odometry, which is better while features of the floor have `carried`
+        it."""
         self.at_m[1:, axis] += velocity_mps * dt_s
-        self.sigma_m[:, axis] += _DRIFT_MPS * dt_s
+        self.sigma_m[:, axis] += (_CARRIED_MPS if carried else _DRIFT_MPS) * dt_s
 
-    def settle(self, axis: int, tracks: Sequence[TrackedLine], now_ns: int) -> None:
-        """Take each place's position from the lines that it has matched; forget tracks that are gone."""
+    def settle(self, axis: int, tracks: Sequence[TrackedLine], now_ns: int, carried_ns: int = 0) -> None:
+        """Take each place's position from the lines that it has matched; forget tracks that are gone.  Until
+        `carried_ns` features of the floor have told where lines out of sight are."""
         held = {track.id: track for track in tracks}
         matches = self._matches[axis]
         for gone in [id_ for id_ in matches if id_ not in held]:
@@ -90,7 +92,8 @@ class Places:
         total: Matrix = np.zeros(len(self))
         for id_, index in matches.items():
             track = held[id_]
-            unseen_m = _DRIFT_MPS * max((now_ns - track.seen_ns) * 1e-9 - _FRESH_S, 0.0)
+            told_ns = max(track.seen_ns, carried_ns)
+            unseen_m = _DRIFT_MPS * max((now_ns - told_ns) * 1e-9 - _FRESH_S, 0.0)
             told = 1.0 / (track.sigma_m**2 + _SURVEY_SIGMA_M**2 + unseen_m**2)
             share = np.where(index >= 0, told, 0.0)
             weight += share

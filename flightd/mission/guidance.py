@@ -60,6 +60,8 @@ class MissionInputs:
     """All that the mission knows at one tick.  `pose` is None before the floor was seen; ages in
     seconds, infinite when there never was any.  `ground_silent_s` is 0 while no ground station attends.
     `pad_m` is the centre of the goal's pad on the map, as seen or else as drawn; None where there is none.
+    `features_age_s` is the age of the newest frame in which features of the floor told the motion, `x_age_s`
+    and `y_age_s` that of the newest line, or of features that stand in for it.
     `by_pad` says that the pose is only that over the pad: enough to climb straight up.
     While the position is sought again, `rivals` are the nodes where the drone may be with their
     probability, and `way_out` a move that is safe at all of them.  `failed`: a step before this one raised
@@ -86,6 +88,12 @@ class MissionInputs:
     failed: bool = False
     unfit: Refusal | None = None
     aisle_closed: bool = True
+    features_age_s: float = math.inf
+
+    @property
+    def sight_s(self) -> float:
+        """Age of the newest sight of the floor by which the motion is known."""
+        return min(self.x_age_s, self.y_age_s, self.features_age_s)
 
     @property
     def charge(self) -> Charge:

@@ -1,15 +1,10 @@
 """One Kalman filter for the drone's motion over the lines and for what it does not know of its own sensors.
 
-An extended filter with the state
-
-    heading offset and its drift | velocity, disturbance of both grid axes | error of the told attitude
-    | mount of the camera | delay of its frames | scale of lengths | offsets of all lines held
-
-Lines stand still, so all of them move with the one velocity; the control input is the acceleration that the
-attitude makes, g tan(tilt).  What is wrong with the told attitude shows twice, in the acceleration and in the
-picture; what is wrong with the mount shows in the picture alone; a wrong delay shows whenever the drone tilts
-or turns, as the attitude of another moment.  So a frame in which the drone turns says more of the delay than
-of the position, and the filter weighs it so: what is not known yet cannot make the position loop swing.
+Its state, and how that goes on, is the `motion_model`.  What is wrong with the told attitude shows twice,
+in the acceleration and in the picture; what is wrong with the mount shows in the picture alone; a wrong delay
+shows whenever the drone tilts or turns, as the attitude of another moment.  So a frame in which the drone
+turns says more of the delay than of the position, and the filter weighs it so: what is not known yet cannot
+make the position loop swing.
 
 The measurement is taken in implicit form, g(state, picture) = 0 (Jazwinski, Stochastic Processes and
 Filtering Theory, 1970, 8.3), with Joseph's form of the update.
@@ -18,41 +13,59 @@ Filtering Theory, 1970, 8.3), with Joseph's form of the update.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 
 from flightd.config.tracking import MotionNoise, SensorPriors
-from flightd.core.geometry import GRAVITY_MPS2, Matrix
+from flightd.core.geometry import Matrix
 from flightd.core.tracks import SensorEstimate
+from flightd.tracking.frame_measurement import FrameMeasurement, offset_error, placed
 from flightd.tracking.held_lines import HeldLine, associate
 from flightd.tracking.innovations import Innovations
 from flightd.tracking.kalman import corrected, predicted
-from flightd.tracking.line_sight import LineSight, Rates
-
-PSI, PSI_RATE, VX, VY, PUSH_X, PUSH_Y, ROLL, PITCH, MOUNT_ROLL, MOUNT_PITCH, DELAY, SCALE = range(12)
-FIRST_LINE = 12
+from flightd.tracking.line_sight import FeatureSight, LineSight, Rates
+from flightd.tracking.motion_model import (
+    DELAY,
+    FIRST_LINE,
+    LEAK,
+    MOUNT_PITCH,
+    MOUNT_ROLL,
+    PITCH,
+    PSI,
+    PSI_RATE,
+    PUSH,
+    PUSH_X,
+    PUSH_Y,
+    ROLL,
+    SCALE,
+    VX,
+    VY,
+    Told,
+    lean,
+    moved,
+)
 
 _UNSEEN_S = 0.1
 """An axis without a line for so long is dead-reckoned: the gust that was last felt on it fades."""
-_SENSORS, _LASTING = slice(ROLL, FIRST_LINE), slice(MOUNT_ROLL, FIRST_LINE)
+_SENSORS, _LASTING = slice(ROLL, FIRST_LINE), slice(LEAK, FIRST_LINE)
 """What is wrong with the sensors, and what of it is learnt for good."""
+_BUT_MOTION = [PSI, PSI_RATE, *range(LEAK, FIRST_LINE)]
 _YAW_SIGMA_RAD, _YAW_RATE_SIGMA_RADPS = math.radians(5.0), 0.005
 """Of the heading before it is told at all, and of its drift whenever it is."""
+_MOST_LEAK_PER_S = 1.0
 _MOST_SIGMAS = 4.0
 """A delay further off than so many sigmas of what was thought possible is not believed."""
+_OUTLIER_SIGMAS = 3.0
+"""What errs by more is weighed less (Huber)."""
+_FEATURES, _FEATURE_SIGMAS, _FEATURE_NS = 3, 4.0, 200_000_000
+"""So many features are held across an axis at once; none that errs by more, or is not seen for so long."""
+_SURE_HITS, _GLIMPSE_NS = 3, 250_000_000
+"""A line seen less often is forgotten so soon: what only shows now and then is none."""
+_CARRIED_M = 0.12
+"""A line whose place features of the floor have told this well is held on, however long it is not seen."""
 _BETWEEN = 0.3
 """Share of what was thought possible by which a sensor can have changed between two flights."""
-
-
-class Axis(NamedTuple):
-    """Where one grid axis stands in the state."""
-
-    velocity: int
-    push: int
-
-
-AXES = Axis(VX, PUSH_X), Axis(VY, PUSH_Y)
 
 
 class FloorFilter:
@@ -78,14 +91,17 @@ class FloorFilter:
         sigmas[[VX, VY]] = noise.start_velocity_mps
         sigmas[[PUSH_X, PUSH_Y]] = noise.start_disturbance_mps2
         sigmas[[ROLL, PITCH]] = priors.attitude_rad
+        sigmas[LEAK] = priors.leak_per_s
         sigmas[[MOUNT_ROLL, MOUNT_PITCH]] = priors.mount_rad
         sigmas[DELAY], sigmas[SCALE] = priors.delay_s, priors.scale_share
         self._first_sigmas = sigmas
         self._x: Matrix = np.zeros(FIRST_LINE)
+        self._x[LEAK] = priors.leak_per_s
         self._p: Matrix = np.diag(sigmas**2)
         drift = np.zeros(FIRST_LINE)
         drift[[PSI, PSI_RATE]] = priors.heading_radps, 0.1 * priors.heading_radps
         drift[[ROLL, PITCH]] = priors.attitude_rad * math.sqrt(2.0 / priors.attitude_s)
+        drift[LEAK] = priors.leak_per_s * 0.02
         drift[[MOUNT_ROLL, MOUNT_PITCH]] = priors.mount_rad * 0.002
         drift[DELAY], drift[SCALE] = priors.delay_s * 0.01, priors.scale_share * 0.01
         self._drift = drift
@@ -108,7 +124,7 @@ class FloorFilter:
     def push_after(self, axis: int, ahead_s: float) -> float:
         """What is expected of the disturbance so much later: the gust in it fades."""
         steady = self._steady[axis]
-        return steady + (self.mean(AXES[axis].push) - steady) * math.exp(-ahead_s / self._noise.gust_s)
+        return steady + (self.mean(PUSH[axis]) - steady) * math.exp(-ahead_s / self._noise.gust_s)
 
     def sensors(self) -> SensorEstimate:
         """What is known of the sensors, for people."""
@@ -156,76 +172,64 @@ class FloorFilter:
 
     def predict(self, dt_s: float, roll_rad: float, pitch_rad: float, yaw_rad: float) -> None:
         """Advance by `dt_s` in the told attitude; `yaw_rad` is the vehicle's own."""
-        noise, priors, x = self._noise, self._priors, self._x
-        n = len(x)
-        (ax, ay), by_roll, by_pitch = self._lean(roll_rad, pitch_rad, yaw_rad)
-        drag = noise.drag_per_s
-        accel = np.array([ax + x[PUSH_X] - drag * x[VX], ay + x[PUSH_Y] - drag * x[VY]])
-        jacobian = np.eye(n)
-        jacobian[PSI, PSI_RATE] = dt_s
-        for axis, (velocity, push) in enumerate(AXES):
-            jacobian[velocity, velocity] = 1.0 - drag * dt_s
-            jacobian[velocity, push] = dt_s
-            jacobian[velocity, ROLL] = by_roll[axis] * dt_s
-            jacobian[velocity, PITCH] = by_pitch[axis] * dt_s
-        jacobian[VX, PSI], jacobian[VY, PSI] = -ay * dt_s, ax * dt_s
-        keep = math.exp(-dt_s / priors.attitude_s)
-        jacobian[ROLL, ROLL] = jacobian[PITCH, PITCH] = keep
-        reach = np.zeros((n, 2))
-        reach[VX, 0] = reach[VY, 1] = dt_s
-        moved = x[[VX, VY]] * dt_s + 0.5 * accel * dt_s * dt_s
-        for row, line in enumerate(self.held, FIRST_LINE):
-            velocity, _ = AXES[line.axis]
-            jacobian[row] -= 0.5 * dt_s * jacobian[velocity]
-            jacobian[row, velocity] -= 0.5 * dt_s
-            reach[row, line.axis] = -0.5 * dt_s * dt_s
-            x[row] -= moved[line.axis]
-        x[PSI] += x[PSI_RATE] * dt_s
-        x[[VX, VY]] += accel * dt_s
-        x[[ROLL, PITCH]] *= keep
+        noise = self._noise
+        axes = [line.axis for line in self.held]
+        told = Told(roll_rad, pitch_rad, yaw_rad)
+        step = moved(self._x, axes, told, dt_s, noise.drag_per_s, self._priors.attitude_s)
+        self._x, by_accel = step.state, step.by_accel
         rough = self._innovations.rough
-        noise_q = reach @ reach.T * ((rough * noise.accel_mps2) ** 2 / dt_s)
-        for axis, (_, push) in enumerate(AXES):
+        noise_q = by_accel @ by_accel.T * ((rough * noise.accel_mps2) ** 2 / dt_s)
+        for axis, push in enumerate(PUSH):
             changed = self._innovations.one_sided(axis)
             self._drift[push] = noise.changed_mps2 if changed else noise.disturbance_mps2
         noise_q[np.diag_indices(FIRST_LINE)] += self._drift**2 * dt_s
-        self._p = predicted(self._p, jacobian, noise_q)
+        self._p = predicted(self._p, step.jacobian, noise_q)
         self._fade(dt_s)
 
-    def update(self, sights: list[LineSight], rates: Rates, stamp_ns: int, *, assumed: bool = False) -> None:
-        """Take the lines of one frame; those that belong to none held start new ones.  Of an attitude that is
-        only `assumed` nothing is learnt for good."""
+    def update(
+        self,
+        sights: list[LineSight],
+        rates: Rates,
+        stamp_ns: int,
+        features: Sequence[FeatureSight] = (),
+        *,
+        assumed: bool = False,
+    ) -> bool:
+        """Take the lines of one frame, and the features of the floor; those that belong to none held start
+        new ones.  Of an attitude that is only `assumed` nothing is learnt for good.  Whether the motion was
+        told by features, too."""
         before = self._x[:FIRST_LINE].copy()
-        offsets_m = [self.offset(line) for line in range(len(self.held))]
-        known, fresh = associate(sights, self.held, offsets_m, self._gate_m)
-        rows: list[Matrix] = []
-        errors: list[float] = []
-        variances: list[float] = []
-        by_tilt: list[tuple[float, float]] = []
-        offsets: list[tuple[int, int]] = []
+        known, fresh = associate(
+            sights, self.held, lambda sight, line: self._innovation(sight, line, rates), self._gate_m
+        )
+        bare = [axis for axis in range(2) if all(sight.axis != axis for sight, _ in known)]
+        followed, strange = self._followed([seen.across[axis] for axis in bare for seen in features], rates)
+        told = FrameMeasurement()
         for sight, line in known:
-            offsets.append((len(rows), sight.axis))
-            rows.append(self._offset_row(sight, rates, FIRST_LINE + line))
-            errors.append(sight.offset_m - self.mean(FIRST_LINE + line))
-            variances.append(sight.sigma_m**2)
-            by_tilt.append(sight.offset_per_tilt)
+            told.add_offset(sight, line, self._x, rates)
         for sight in sights:
             if not math.isnan(sight.turn_rad):
-                rows.append(self._turn_row(sight, rates))
-                errors.append(sight.turn_rad)
-                variances.append(sight.sigma_theta_rad**2)
-                by_tilt.append(sight.turn_per_tilt)
-        if rows:
-            measured = np.array(rows), np.array(errors), np.array(variances), np.array(by_tilt)
-            self._mind(self._correct(*measured, _LASTING if assumed else None), offsets)
-        for sight, line in known:
+                told.add_turn(sight, self._x, rates)
+        self._take(told, _LASTING if assumed else None)
+        carried = FrameMeasurement()
+        for sight, line in followed:
+            carried.add_offset(sight, line, self._x, rates)
+        # a feature lives too short to tell more than the motion
+        self._take(carried, _BUT_MOTION, minded=False)
+        for sight, line in known + followed:
             held = self.held[line]
+            self._unseen_s[held.axis] = 0.0
             held.seen_ns, held.hits = stamp_ns, held.hits + 1
             held.width_m += 0.2 * (sight.width_m - held.width_m)
             held.from_m, held.to_m = sight.from_m, sight.to_m
         for sight in fresh:
             self._add(sight, rates, stamp_ns, before)
-        self._forget_old(stamp_ns)
+        for axis in bare:
+            room = _FEATURES - sum(held.axis == axis and held.feature is not None for held in self.held)
+            for sight in [sight for sight in strange if sight.axis == axis][: max(room, 0)]:
+                self._add(sight, rates, stamp_ns, before)
+        self._forget_old(stamp_ns, carried=bool(followed))
+        return bool(followed)
 
     # How
 
@@ -236,25 +240,12 @@ class FloorFilter:
         self._p[:, states] = 0.0
         self._p[states, states] = self._first_sigmas[states] ** 2
 
-    def _lean(
-        self, roll_rad: float, pitch_rad: float, yaw_rad: float
-    ) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
-        """Acceleration along x and y that the attitude makes, and what a radian more of roll and of pitch
-        would make."""
-        roll, pitch = roll_rad + self.mean(ROLL), pitch_rad + self.mean(PITCH)
-        yaw = yaw_rad + self.mean(PSI)
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        forward, right = -GRAVITY_MPS2 * math.tan(pitch), GRAVITY_MPS2 * math.tan(roll)
-        per_roll, per_pitch = GRAVITY_MPS2 / math.cos(roll) ** 2, -GRAVITY_MPS2 / math.cos(pitch) ** 2
-        accel = cos * forward - sin * right, sin * forward + cos * right
-        return accel, (-sin * per_roll, cos * per_roll), (cos * per_pitch, sin * per_pitch)
-
-    def accel(self, roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[float, float]:
+    def accel(self, told: Told) -> tuple[float, float]:
         """Acceleration along the grid axes that the told attitude makes at constant height."""
-        return self._lean(roll_rad, pitch_rad, yaw_rad)[0]
+        return lean(self._x, told)[0]
 
     def _fade(self, dt_s: float) -> None:
-        for axis, (_, push) in enumerate(AXES):
+        for axis, push in enumerate(PUSH):
             if self._unseen_s[axis] > _UNSEEN_S:
                 self._x[push] = self.push_after(axis, dt_s)
             else:
@@ -262,57 +253,64 @@ class FloorFilter:
                 self._steady[axis] += share * (self.mean(push) - self._steady[axis])
             self._unseen_s[axis] += dt_s
 
-    def _offset_row(self, sight: LineSight, rates: Rates, column: int) -> Matrix:
-        """d(seen offset - held offset) / d state."""
-        row = np.zeros(len(self._x))
-        self._fill_sight(row, sight, rates)
-        row[column] = -1.0
-        # as held, not as seen: what is seen has the noise in it that is weighed here, and scale would shrink
-        row[SCALE] = self.mean(column)
-        return row
+    def _innovation(self, sight: LineSight, line: int, rates: Rates) -> tuple[float, float]:
+        """How far the line held is from the sight, and the standard deviation of that."""
+        row, apart_m = offset_error(sight, line, self._x, rates)
+        by_roll, by_pitch = sight.offset_per_tilt
+        shaken = (by_roll**2 + by_pitch**2) * self._innovations.shake_rad**2
+        return apart_m, math.sqrt(max(float(row @ self._p @ row), 0.0) + sight.sigma_m**2 + shaken)
 
-    def _fill_sight(self, row: Matrix, sight: LineSight, rates: Rates) -> None:
-        (by_roll, by_pitch), by_yaw = sight.offset_per_tilt, sight.offset_per_yaw
-        row[[ROLL, PITCH]] = by_roll, by_pitch
-        row[[MOUNT_ROLL, MOUNT_PITCH]] = sight.offset_per_mount
-        row[PSI] = by_yaw
-        velocity = self.mean(AXES[sight.axis].velocity)
-        row[DELAY] = (
-            by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + by_yaw * rates.yaw_radps + velocity
-        )
-        row[SCALE] = sight.offset_m
+    def _followed(
+        self, sights: Sequence[LineSight], rates: Rates
+    ) -> tuple[list[tuple[LineSight, int]], list[LineSight]]:
+        """The features that are held across their axis, and those that are not.  One that is not where it
+        should be was no point of the floor: it is dropped."""
+        places = {(held.feature, held.axis): line for line, held in enumerate(self.held)}
+        known: list[tuple[LineSight, int]] = []
+        strange: list[LineSight] = []
+        for sight in sights:
+            line = places.get((sight.feature, sight.axis))
+            if line is None:
+                strange.append(sight)
+                continue
+            apart_m, sigma_m = self._innovation(sight, line, rates)
+            if abs(apart_m) < _FEATURE_SIGMAS * sigma_m:
+                known.append((sight, line))
+            else:
+                self.held[line].seen_ns = 0
+        return known, strange
 
-    def _turn_row(self, sight: LineSight, rates: Rates) -> Matrix:
-        """d(heading held - heading told) / d state."""
-        row = np.zeros(len(self._x))
-        by_roll, by_pitch = sight.turn_per_tilt
-        row[PSI] = 1.0
-        row[[ROLL, PITCH]] = by_roll, by_pitch
-        row[[MOUNT_ROLL, MOUNT_PITCH]] = sight.turn_per_mount
-        row[DELAY] = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + rates.yaw_radps
-        return row
-
-    def _correct(
-        self, rows: Matrix, errors: Matrix, variances: Matrix, by_tilt: Matrix, unmoved: slice | None
-    ) -> Matrix:
-        """Bring g to 0; returns the errors in units of their sigmas.  What shakes moves all lines alike."""
-        noise = np.diag(variances) + by_tilt @ by_tilt.T * self._innovations.shake_rad**2
+    def _take(
+        self, measured: FrameMeasurement, unmoved: slice | list[int] | None, *, minded: bool = True
+    ) -> None:
+        """Bring g to 0, but for the states that are `unmoved`.  What shakes moves all lines alike.  The noise
+        follows what is `minded`."""
+        if not measured.rows:
+            return
+        rows, errors, by_tilt = map(np.array, (measured.rows, measured.errors, measured.by_tilt))
+        shake_rad = self._innovations.shake_rad
+        if not minded:  # what is least believed of a line's offset covers it, but not what features share
+            shake_rad = max(shake_rad, self._priors.shake_rad)
+        noise = np.diag(measured.variances) + by_tilt @ by_tilt.T * shake_rad**2
+        expected = np.einsum("ij,jk,ik->i", rows, self._p, rows) + np.diag(noise)
+        outlying = np.maximum(np.abs(errors) / np.sqrt(expected) / _OUTLIER_SIGMAS, 1.0)
+        noise[np.diag_indices(len(noise))] += (outlying - 1.0) * expected
         self._x, self._p, spread = corrected(self._x, self._p, rows, errors, noise, unmoved)
         push, delay_s = self._noise.max_disturbance_mps2, _MOST_SIGMAS * self._priors.delay_s
         self._bound(PUSH_X, -push, push)
         self._bound(PUSH_Y, -push, push)
+        self._bound(LEAK, 0.0, _MOST_LEAK_PER_S)
         self._bound(DELAY, -delay_s, min(delay_s, self._latency_s))  # no frame arrives before it is exposed
-        told: Matrix = errors / np.sqrt(np.diag(spread))
-        return told
+        if minded:
+            self._mind(errors / np.sqrt(np.diag(spread)), measured.axes)
 
     def _bound(self, index: int, least: float, most: float) -> None:
         self._x[index] = min(max(self._x[index], least), most)
 
-    def _mind(self, told: Matrix, offsets: list[tuple[int, int]]) -> None:
+    def _mind(self, told: Matrix, axes: list[int | None]) -> None:
         for axis in range(2):
-            mine = [-float(told[row]) for row, of in offsets if of == axis]
+            mine = [-float(error) for error, of in zip(told, axes, strict=True) if of == axis]
             if mine:
-                self._unseen_s[axis] = 0.0
                 self._innovations.take(axis, sum(mine) / len(mine))
         self._innovations.shaken(float(np.mean(told**2)))
 
@@ -320,8 +318,7 @@ class FloorFilter:
         """A line where it was seen, as wrong as everything by which it was placed; moved by what the frame
         has corrected of that, for it was placed with the state `before`."""
         n = len(self._x)
-        row = np.zeros(n)
-        self._fill_sight(row, sight, rates)
+        row = placed(sight, self._x, rates)
         grown = np.zeros((n + 1, n + 1))
         grown[:n, :n] = self._p
         grown[n, :n] = grown[:n, n] = self._p @ row
@@ -331,14 +328,34 @@ class FloorFilter:
         offset_m = sight.offset_m + float(row[:FIRST_LINE] @ (self._x[:FIRST_LINE] - before))
         self._x, self._p = np.append(self._x, offset_m), grown
         self.held.append(
-            HeldLine(self._next_id, sight.axis, sight.width_m, stamp_ns, sight.from_m, sight.to_m)
+            HeldLine(
+                self._next_id,
+                sight.axis,
+                sight.width_m,
+                stamp_ns,
+                sight.from_m,
+                sight.to_m,
+                feature=sight.feature,
+            )
         )
         self._next_id += 1
 
-    def _forget_old(self, stamp_ns: int) -> None:
-        order = sorted(range(len(self.held)), key=lambda line: -self.held[line].seen_ns)
-        old = {line for line in order if stamp_ns - self.held[line].seen_ns > self._forget_ns}
-        self._drop(old | set(order[self._max_lines :]))
+    def _forget_old(self, stamp_ns: int, *, carried: bool) -> None:
+        """Drop what was not seen for long; lines not, where features have `carried` them on well."""
+        old, lines = set[int](), list[int]()
+        for line, held in enumerate(self.held):
+            unseen_ns = stamp_ns - held.seen_ns
+            if held.feature is not None:
+                if unseen_ns > _FEATURE_NS:
+                    old.add(line)
+                continue
+            lines.append(line)
+            glimpsed = held.hits < _SURE_HITS and unseen_ns > _GLIMPSE_NS
+            held_on = carried and self.offset(line)[1] < _CARRIED_M
+            if glimpsed or (unseen_ns > self._forget_ns and not held_on):
+                old.add(line)
+        lines.sort(key=lambda line: -self.held[line].seen_ns)
+        self._drop(old | set(lines[self._max_lines :]))
 
     def _drop(self, lines: set[int] | range) -> None:
         if not lines:

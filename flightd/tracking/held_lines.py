@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from flightd.tracking.line_sight import LineSight
@@ -15,7 +14,8 @@ _LEAST_SHARE = 0.3
 
 @dataclass(slots=True)
 class HeldLine:
-    """A line that is followed."""
+    """A line that is followed, or what a point of the floor, the `feature` of that number, is across the
+    axis."""
 
     id: int
     axis: int
@@ -24,29 +24,29 @@ class HeldLine:
     from_m: float
     to_m: float
     hits: int = 1
+    feature: int | None = None
 
 
 def associate(
     sights: Sequence[LineSight],
     held: Sequence[HeldLine],
-    offsets_m: Sequence[tuple[float, float]],
+    innovation: Callable[[LineSight, int], tuple[float, float]],
     gate_m: float,
 ) -> tuple[list[tuple[LineSight, int]], list[LineSight]]:
     """Each sight with the line held that it is, and those that are none; the surest sights choose first.
-    `offsets_m` are the offset of each line held and its sigma, `gate_m` the farthest that is looked for."""
+    `innovation` says of a sight and a line how far they are apart and the standard deviation of that;
+    `gate_m` is the farthest that is looked for."""
     known: list[tuple[LineSight, int]] = []
     fresh: list[LineSight] = []
     taken: set[int] = set()
     for sight in sorted(sights, key=lambda seen: seen.sigma_m):
         best, best_m = None, gate_m
         for line, one in enumerate(held):
-            if line in taken or one.axis != sight.axis:
+            if line in taken or one.axis != sight.axis or one.feature is not None:
                 continue
-            offset_m, sigma_m = offsets_m[line]
-            distance_m = abs(sight.offset_m - offset_m)
-            spread_m = math.hypot(sigma_m, sight.sigma_m)
-            if distance_m < best_m and distance_m < max(_GATE_SIGMAS * spread_m, _LEAST_SHARE * gate_m):
-                best, best_m = line, distance_m
+            apart_m, sigma_m = innovation(sight, line)
+            if abs(apart_m) < min(best_m, max(_GATE_SIGMAS * sigma_m, _LEAST_SHARE * gate_m)):
+                best, best_m = line, abs(apart_m)
         if best is None:
             fresh.append(sight)
         else:

@@ -18,7 +18,12 @@ def predicted(p: Matrix, transition: Matrix, noise: Matrix) -> Matrix:
 
 
 def corrected(
-    x: Matrix, p: Matrix, rows: Matrix, errors: Matrix, noise: Matrix, unmoved: slice | None = None
+    x: Matrix,
+    p: Matrix,
+    rows: Matrix,
+    errors: Matrix,
+    noise: Matrix,
+    unmoved: slice | list[int] | None = None,
 ) -> tuple[Matrix, Matrix, Matrix]:
     """(n,) state and (n, n) covariance that bring m measured errors to 0, and the (m, m) covariance that the
     errors were expected to have.

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from flightd.config.control import TiltCompensation
-from flightd.tracking.tilt_compensation import GroundLine, tilt_effects
+from flightd.tracking.tilt_compensation import GroundLine, point_tilt_effects, tilt_effects
 
 _PARALLEL_RAD = math.radians(20.0)
 """A line further than this from both grid axes is none of the grid."""
@@ -34,6 +34,13 @@ class LineSight(NamedTuple):
     turn_per_tilt: tuple[float, float]
     offset_per_mount: tuple[float, float]
     turn_per_mount: tuple[float, float]
+    feature: int | None = None
+
+
+class FeatureSight(NamedTuple):
+    """A point of the floor as two sights, one across each grid axis; they have its number as `feature`."""
+
+    across: tuple[LineSight, LineSight]
 
 
 class Rates(NamedTuple):
@@ -100,6 +107,45 @@ def line_sight(
         offset_per_mount=(by_roll, by_pitch + by_yaw * turned_by_mount),
         turn_per_mount=(turn_by_roll, turn_by_pitch + turned_by_mount),
     )
+
+
+def feature_sight(
+    id_: int,
+    point: tuple[float, float],
+    yaw_rad: float,
+    tilt_rad: tuple[float, float],
+    height_m: float,
+    sigma_m: float,
+) -> FeatureSight:
+    """The point of the floor seen at `point` (forward, right)."""
+    forward, right = point
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    to_axis = (cos, -sin), (sin, cos)
+    x_m, y_m = (axis[0] * forward + axis[1] * right for axis in to_axis)
+    shifts = point_tilt_effects(forward, right, height_m)
+    turned_by_roll, turned_by_mount = -math.sin(tilt_rad[1]), math.sin(tilt_rad[0])
+
+    def across(axis: int, offset_m: float, by_yaw: float) -> LineSight:
+        by_roll, by_pitch = (to_axis[axis][0] * shift[0] + to_axis[axis][1] * shift[1] for shift in shifts)
+        by_roll += by_yaw * turned_by_roll
+        return LineSight(
+            axis=axis,
+            offset_m=offset_m,
+            turn_rad=math.nan,
+            sigma_m=sigma_m,
+            sigma_theta_rad=math.nan,
+            width_m=0.0,
+            from_m=0.0,
+            to_m=0.0,
+            offset_per_yaw=by_yaw,
+            offset_per_tilt=(by_roll, by_pitch),
+            turn_per_tilt=_LEVEL,
+            offset_per_mount=(by_roll, by_pitch + by_yaw * turned_by_mount),
+            turn_per_mount=_LEVEL,
+            feature=id_,
+        )
+
+    return FeatureSight((across(0, x_m, -y_m), across(1, y_m, x_m)))
 
 
 def as_compensated(sight: LineSight, compensation: TiltCompensation) -> LineSight:

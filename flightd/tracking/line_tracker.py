@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from statistics import median
 from typing import TypeVar
 
 from flightd.config.control import TiltCompensation
@@ -19,7 +18,19 @@ from flightd.core.geometry import Lens, Matrix, Mount, wrap_pi
 from flightd.core.tracks import NOT_SEEN, FloorJunction, MarkerOffset, PadOffset, TrackedLine, TrackSet
 from flightd.core.types import Attitude, LineSet, MarkerSight, PadSight
 from flightd.tracking.attitude_history import AttitudeHistory
-from flightd.tracking.floor_filter import (
+from flightd.tracking.floor_filter import FloorFilter
+from flightd.tracking.ground_junctions import floor_junctions
+from flightd.tracking.heading_dispute import HeadingDispute
+from flightd.tracking.line_sight import (
+    FeatureSight,
+    Rates,
+    agrees,
+    as_compensated,
+    feature_sight,
+    line_sight,
+    turn_of,
+)
+from flightd.tracking.motion_model import (
     DELAY,
     MOUNT_PITCH,
     MOUNT_ROLL,
@@ -29,24 +40,21 @@ from flightd.tracking.floor_filter import (
     SCALE,
     VX,
     VY,
-    FloorFilter,
+    Told,
 )
-from flightd.tracking.ground_junctions import floor_junctions
-from flightd.tracking.heading_dispute import HeadingDispute
-from flightd.tracking.line_sight import Rates, agrees, as_compensated, line_sight, turn_of
 from flightd.tracking.tilt_compensation import (
     FloorView,
     GroundLine,
+    floor_points,
     ground_lines,
     ground_point,
 )
+from flightd.tracking.width_heights import WidthHeights
 
 _STEP_NS = 20_000_000
 _ASSUMED_TILT_RAD = math.radians(2.0)
 _RATE_NS = 20_000_000
 """The told attitude's rates are taken over so long before and after."""
-_WIDTH_GAIN = 0.15
-_AGREEING, _DOUBTED = 0.15, 0.2
 _DEFAULTS = TrackingConfig()
 _Square = TypeVar("_Square", PadSight, MarkerSight)
 
@@ -82,21 +90,24 @@ class LineTracker:
         if learnt is not None:
             self._filter.begin_with(learnt)
         self._forget_ns = forget_ns
-        self._lines_ns = 0
+        self._lines_ns = self._features_ns = 0
         self._stamp_ns = self._told_ns = 0
         self._pads: tuple[PadOffset, ...] = ()
         self._junctions: tuple[FloorJunction, ...] = ()
         self._markers: tuple[MarkerOffset, ...] = ()
         self.rejected = 0
-        self.height_share = 1.0
-        """The height told lately against that by the lines' width; 1 when they agree."""
-        self._widths_agreed = False
+        self._widths = WidthHeights()
         self._dispute = HeadingDispute()
 
     @property
     def heading_error_rad(self) -> float:
         """What all lines lately said against the vehicle's heading; 0 while any of them agrees."""
         return self._dispute.error_rad
+
+    @property
+    def height_share(self) -> float:
+        """The height told lately against that by the lines' width; 1 when they agree, or tell none."""
+        return self._widths.share
 
     def learnt(self) -> tuple[Matrix, Matrix]:
         """What is known of the sensors, for the tracker after this one."""
@@ -122,7 +133,9 @@ class LineTracker:
         the last, no attitude at its exposure, no height)."""
         stamp_ns = self.exposed_ns(lines)
         attitude = self._history.at(stamp_ns)
-        height_m = self._believed_height_m(lines, height_m) * (1.0 + self._filter.mean(SCALE))
+        scale = self._line_width_m * self._lens.fx_px
+        widths_m = [scale / line.width_px for line in lines.lines if line.width_px > 0]
+        height_m = self._widths.believed_m(widths_m, height_m) * (1.0 + self._filter.mean(SCALE))
         if attitude is None or not self._headed or not height_m > 0 or lines.stamp_ns <= self._told_ns:
             self.rejected += 1
             return False
@@ -149,7 +162,9 @@ class LineTracker:
         sigma_yaw, tilt = self._filter.sigma(PSI), (view.attitude.roll_rad, view.attitude.pitch_rad)
         placed = (line_sight(line, yaw, sigma_yaw, tilt, height_m, params.min_sigma_m) for line in on_floor)
         sights = [as_compensated(sight, self._compensation) for sight in placed if sight is not None]
-        self._filter.update(sights, self._rates(stamp_ns), stamp_ns, assumed=assumed)
+        features = self._features(lines, view, yaw)
+        if self._filter.update(sights, self._rates(stamp_ns), stamp_ns, features, assumed=assumed):
+            self._features_ns = stamp_ns
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
         self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in _placed(lines.pads, view, yaw))
         marks = _placed(lines.markers, view, yaw)
@@ -193,8 +208,8 @@ class LineTracker:
             vy,
             ax,
             ay,
-            tuple(_moved(line, moved_x, moved_y) for line in self._lines(0) if line.seen_ns > known_ns),
-            tuple(_moved(line, moved_y, moved_x) for line in self._lines(1) if line.seen_ns > known_ns),
+            tuple(_moved(line, moved_x, moved_y) for line in self._lines(0) if self._stamp_ns > known_ns),
+            tuple(_moved(line, moved_y, moved_x) for line in self._lines(1) if self._stamp_ns > known_ns),
             tuple(replace(pad, x_m=pad.x_m - moved_x, y_m=pad.y_m - moved_y) for pad in self._pads),
             self._stamp_ns,
             tuple(
@@ -207,7 +222,19 @@ class LineTracker:
             markers=tuple(
                 replace(mark, x_m=mark.x_m - moved_x, y_m=mark.y_m - moved_y) for mark in self._markers
             ),
+            features_ns=self._features_ns,
         )
+
+    def _features(self, lines: LineSet, view: FloorView, yaw_rad: float) -> list[FeatureSight]:
+        """The features of one frame.  Without an exact compensation they do not move as its lines do."""
+        if not lines.features or self._compensation is not TiltCompensation.EXACT:
+            return []
+        tilt, sigma_m = (view.attitude.roll_rad, view.attitude.pitch_rad), self._params.feature_sigma_m
+        points = floor_points([(seen.x_px, seen.y_px) for seen in lines.features], view)
+        return [
+            feature_sight(seen.id, point, yaw_rad, tilt, view.height_m, sigma_m)
+            for seen, point in zip(lines.features, points, strict=bool(points))
+        ]
 
     def _lines(self, axis: int) -> list[TrackedLine]:
         """All lines held across an axis, nearest to the drone first."""
@@ -222,7 +249,7 @@ class LineTracker:
                 line.to_m,
             )
             for at, line in enumerate(self._filter.held)
-            if line.axis == axis
+            if line.axis == axis and line.feature is None
         ]
         return sorted(held, key=lambda line: abs(line.offset_m))
 
@@ -246,7 +273,7 @@ class LineTracker:
     def _accel(self, stamp_ns: int) -> tuple[float, float]:
         """Acceleration along the grid axes that the attitude makes at constant height, g tan(tilt)."""
         told = self._attitude_at(stamp_ns)
-        return self._filter.accel(told.roll_rad, told.pitch_rad, told.yaw_rad)
+        return self._filter.accel(Told(told.roll_rad, told.pitch_rad, told.yaw_rad))
 
     def _corrected(self, told: Attitude) -> Attitude:
         """The attitude, by what has been learnt of it."""
@@ -287,21 +314,6 @@ class LineTracker:
         )
         if self._dispute.step([-turn for turn in turns], agreed, attitude.stamp_ns):
             held.turn_to(held.mean(PSI) + self._dispute.error_rad, self._params.start_yaw_sigma_rad)
-
-    def _believed_height_m(self, lines: LineSet, told_m: float) -> float:
-        """The height told, unless there is none or the width of the lines contradicts it: then theirs."""
-        if not lines.lines:
-            return told_m
-        scale = self._line_width_m * self._lens.fx_px
-        heights_m = [scale / line.width_px for line in lines.lines if line.width_px > 0]
-        if not told_m > 0 or not heights_m:
-            return median(heights_m) if heights_m else told_m
-        by_width_m = min(heights_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
-        self._widths_agreed |= abs(told_m / by_width_m - 1.0) < _AGREEING
-        if not self._widths_agreed:  # then it is the line that is another
-            return told_m
-        self.height_share += _WIDTH_GAIN * (told_m / by_width_m - self.height_share)
-        return by_width_m if abs(self.height_share - 1.0) > _DOUBTED else told_m
 
 
 def _placed(

@@ -141,13 +141,17 @@ def tilt_effects(
     """What a radian more of roll, and of pitch, would make of a line that was placed from `height_m`: shifts
     of its middle (forward, right), and turns of its direction; first order in the tilt."""
     f, r, h = line.forward_m, line.right_m, height_m
-    by_roll = -f * r / h, -(h + r * r / h)
-    by_pitch = h + f * f / h, f * r / h
     cos, sin = math.cos(line.theta_rad), math.sin(line.theta_rad)
     sheared = (cos * r + f * sin) / h
     turn_by_roll = sin * sheared - cos * 2.0 * r * sin / h
     turn_by_pitch = -sin * 2.0 * f * cos / h + cos * sheared
-    return (by_roll, by_pitch), (turn_by_roll, turn_by_pitch)
+    return point_tilt_effects(f, r, h), (turn_by_roll, turn_by_pitch)
+
+
+def point_tilt_effects(f: float, r: float, h: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """What a radian more of roll, and of pitch, would shift (forward, right) a point that was placed at
+    (`f`, `r`) from the height `h`."""
+    return (-f * r / h, -(h + r * r / h)), (h + f * f / h, f * r / h)
 
 
 def floor_points(points_px: Sequence[tuple[float, float]], view: FloorView) -> list[tuple[float, float]]:

@@ -11,8 +11,9 @@ import numpy as np
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
 from flightd.core.markers import MarkerSet
-from flightd.core.types import UNCHECKED, Image, LineSet, MarkerSight, PadSight
+from flightd.core.types import UNCHECKED, FloorFeature, Image, LineSet, MarkerSight, PadSight
 from flightd.vision.floor import pad_detection as pads
+from flightd.vision.floor.feature_tracking import FeatureTracker
 from flightd.vision.floor.floor_markers import MarkerFinder
 from flightd.vision.floor.frame_check import check_picture
 from flightd.vision.lines import band_evidence as evidence
@@ -43,8 +44,9 @@ class Detector:
 
     `method` is one of METHODS; `profile` a colour profile or the name of one.  With a `lens` the lines
     are those of a distortion-free camera.  Floor markers are looked for when `markers` says
-    which.  When `in_flight`, charge pads are looked for, too, and the picture's fingerprint and exposure
-    are taken.  `now_ns`, when given, times the stages.  Not thread-safe: one detector for each worker.
+    which.  When `in_flight`, charge pads are looked for, too, features of the floor are followed from frame
+    to frame, and the picture's fingerprint and exposure are taken.  `now_ns`, when given, times the stages.
+    Not thread-safe: one detector for each worker.
     """
 
     def __init__(
@@ -65,7 +67,7 @@ class Detector:
         self._lens = lens
         self._zhang_suen = zhang_suen
         self._markers = MarkerFinder(markers) if markers is not None else None
-        self._in_flight = in_flight
+        self._features = FeatureTracker() if in_flight else None
         self._now_ns = now_ns or _no_clock
         _keep_freed_memory()
 
@@ -95,16 +97,21 @@ class Detector:
         mark("junctions")
         mats: tuple[PadSight, ...] = ()
         picture = UNCHECKED
-        if self._in_flight:
+        followed: tuple[FloorFeature, ...] = ()
+        if self._features is not None:
             coarse, coarse_grid = coarsened(small, grid)
             mats, picture = pads.find(coarse, lines, coarse_grid, plane), check_picture(coarse)
             mark("pads")
+            followed = self._features.find(small, grid, seq, stamp_ns, plane)
+            mark("features")
         signs: tuple[MarkerSight, ...] = ()
         if self._markers is not None:
             signs = self._markers.find(small, grid, plane)
             mark("markers")
         timings = {name: (end - begin) / 1e6 for (_, begin), (name, end) in pairwise(marks)}
-        return LineSet(seq, stamp_ns, width, height, lines, found, self.method, timings, mats, picture, signs)
+        return LineSet(
+            seq, stamp_ns, width, height, lines, found, self.method, timings, mats, picture, signs, followed
+        )
 
     def _plane(self, width: int, height: int) -> Plane:
         lens = self._lens

@@ -140,7 +140,7 @@ class ReferenceGenerator:
         guide = Guide.STEER if self._steers else Guide.BRAKE if self._may_brake(s, task) else Guide.LEVEL
         if task.phase is Phase.LAND and self._still_s > _FADE_S:
             guide = Guide.LEVEL
-        dead_reckoned = min(s.x_age_s, s.y_age_s) < self._hazards.expert.brake_s
+        dead_reckoned = s.sight_s < self._hazards.expert.brake_s
         return Guidance(task.phase, guide, self._reference(climb), demand, dead_reckoned, task.state.stopped)
 
     def _climb_mps(self, s: MissionInputs, task: ReferenceTask) -> float:
@@ -161,7 +161,7 @@ class ReferenceGenerator:
         the other way round, with a view to brake by while the vehicle is not heard."""
         p = self._params
         heard = s.telemetry_age_s <= p.telemetry_hold_s
-        seen = min(s.x_age_s, s.y_age_s) <= p.lines_hold_s
+        seen = s.sight_s <= p.lines_hold_s
         known = (heard or seen) and s.pose is not None and not task.state.adopted
         return known and not task.state.stopped and task.phase is not Phase.TAKE_OFF
 

@@ -41,7 +41,7 @@ class Steering:
             wanted, age_s = control.level(now_ns, motion, reference, dt_s), 0.0
         elif guidance.guide is Guide.BRAKE:
             wanted = control.rest(now_ns, motion, reference, dt_s, push, dead_reckoned=guidance.dead_reckoned)
-            age_s = min(inputs.telemetry_age_s, sight_s)
+            age_s = min(inputs.telemetry_age_s, inputs.sight_s)
         else:
             wanted = control.step(now_ns, motion, reference, dt_s)
             # above the pad the mission steers on without lines: by the mat, or the motion last known

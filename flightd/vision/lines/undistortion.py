@@ -11,7 +11,7 @@ import numpy as np
 from flightd.core.geometry import Lens
 from flightd.vision.lines.band import Array
 
-_ROUNDS = 4
+_ROUNDS, _CLOSE_PX = 4, 1e-4
 NOWHERE_PX = 1e5
 """Where points lie that the lens model cannot have from anywhere."""
 
@@ -49,7 +49,10 @@ class Plane:
         with np.errstate(over="ignore", invalid="ignore"):
             for _ in range(_ROUNDS):
                 raw_x, raw_y = self.raw(ideal_x, ideal_y)
-                ideal_x, ideal_y = ideal_x + (x - raw_x), ideal_y + (y - raw_y)
+                off_x, off_y = x - raw_x, y - raw_y
+                if max(np.abs(off_x).max(), np.abs(off_y).max()) < _CLOSE_PX:
+                    break
+                ideal_x, ideal_y = ideal_x + off_x, ideal_y + off_y
             there = (np.abs(ideal_x) < NOWHERE_PX) & (np.abs(ideal_y) < NOWHERE_PX)
         return np.where(there, ideal_x, NOWHERE_PX), np.where(there, ideal_y, NOWHERE_PX)
 

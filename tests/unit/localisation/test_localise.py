@@ -97,3 +97,31 @@ def test_what_the_lines_ahead_look_like_makes_it_sure() -> None:
         pose = localiser.step(replace(told, across_x=tuple(now[:-1]), across_y=(now[-1],)), 1.6)
     assert pose.node == "A2"
     assert pose.integrity > 0.95
+
+
+def test_features_of_the_floor_carry_the_position_on_for_as_far_as_they_may() -> None:
+    localiser = GridLocaliser(SITE, "A1", FloorReach())
+    for tick in range(1, 20):
+        here = replace(line(0, 0.0), seen_ns=tick * TICK_NS)
+        localiser.step(tracks(tick, [here], [here]), 1.6)
+    seen_ns = localiser.told_ns
+    told_m = 0.0
+    for tick in range(20, 400):
+        moving = tracks(tick, [], [], vx=0.8)
+        pose = localiser.step(replace(moving, features_ns=moving.stamp_ns - 100_000_000), 1.6)
+        if min(localiser.told_ns) == moving.stamp_ns - 100_000_000:
+            told_m = pose.x_m - A1.x_m
+    assert 2.9 < told_m < 3.3
+    assert min(localiser.told_ns) > max(seen_ns)
+    alone = GridLocaliser(SITE, "A1", FloorReach())
+    for tick in range(1, 400):
+        drifting = alone.step(tracks(tick, [line(0, 0.0)] if tick < 20 else [], [], vx=0.0), 1.6)
+    assert pose.covariance[0] < 0.5 * drifting.covariance[0]
+
+
+def test_features_alone_tell_no_position() -> None:
+    localiser = GridLocaliser(SITE, "A1", FloorReach())
+    for tick in range(1, 20):
+        seen = tracks(tick, [], [])
+        localiser.step(replace(seen, features_ns=seen.stamp_ns), 1.6)
+    assert localiser.told_ns == (0, 0)

@@ -8,20 +8,28 @@ import random
 import pytest
 
 from flightd.config.tracking import MotionNoise, SensorPriors
-from flightd.tracking.floor_filter import DELAY, FIRST_LINE, MOUNT_ROLL, PSI, PUSH_X, VX, FloorFilter
-from flightd.tracking.line_sight import LineSight, Rates
+from flightd.tracking.floor_filter import FloorFilter
+from flightd.tracking.line_sight import FeatureSight, LineSight, Rates, feature_sight
+from flightd.tracking.motion_model import DELAY, FIRST_LINE, MOUNT_ROLL, PSI, PUSH_X, VX
 
 FRAME_NS = 33_333_333
 STILL = Rates(0.0, 0.0, 0.0)
 SURE = SensorPriors(
-    attitude_deg=1e-4, mount_deg=1e-4, delay_s=1e-6, scale_share=1e-6, shake_deg=0.03, most_shake_deg=0.031
+    attitude_deg=1e-4,
+    leak_per_s=1e-6,
+    mount_deg=1e-4,
+    delay_s=1e-6,
+    scale_share=1e-6,
+    shake_deg=0.03,
+    most_shake_deg=0.031,
 )
 """Nothing is unknown of the sensors."""
 
 
 def sight(offset_m: float, sigma_m: float = 0.005) -> LineSight:
     """A line across x, straight below."""
-    return LineSight(0, offset_m, math.nan, sigma_m, 0.01, 0.075, -0.5, 0.5, 0.0, *[(0.0, 0.0)] * 4)
+    level = (0.0, 0.0)
+    return LineSight(0, offset_m, math.nan, sigma_m, 0.01, 0.075, -0.5, 0.5, 0.0, level, level, level, level)
 
 
 def floor_filter(noise: MotionNoise, forget_ns: int = 10**10) -> FloorFilter:
@@ -165,3 +173,58 @@ def test_of_an_attitude_that_is_only_assumed_nothing_is_learnt_for_good() -> Non
         floor.update([told], Rates(1.0, 0.0, 0.0), step * FRAME_NS, assumed=True)
     assert [floor.mean(state) for state in (MOUNT_ROLL, DELAY)] == [0.0, 0.0]
     assert floor.mean(VX) != 0.0
+
+
+def feature(id_: int, x_m: float, y_m: float) -> FeatureSight:
+    return feature_sight(id_, (x_m, y_m), 0.0, (0.0, 0.0), 1.6, 0.004)
+
+
+def blown(carried: bool, lines_until: int = 60, frames: int = 150) -> tuple[float, FloorFilter, int]:
+    """A filter that has seen a line, then none while a gust pushes the drone: the error of its offset."""
+    rng, dt, x, v, ids = random.Random(4), 1 / 30, 0.0, 0.0, 0
+    floor = FloorFilter(MotionNoise(drag_per_s=0.0), SURE, gate_m=0.35, forget_ns=2_500_000_000)
+    points = [(n, rng.uniform(-0.6, 3.0), rng.uniform(-0.5, 0.5)) for n in range(40)]
+    for step in range(frames):
+        push = 0.4 if step > lines_until else 0.0
+        x, v = x + v * dt + 0.5 * push * dt * dt, v + push * dt
+        if step:
+            floor.predict(dt, 0.0, 0.0, 0.0)
+        sights = [sight(0.5 - x + rng.gauss(0, 0.005))] if step < lines_until else []
+        near = [
+            feature(n, px - x + rng.gauss(0, 0.003), py + rng.gauss(0, 0.003))
+            for n, px, py in points
+            if abs(px - x) < 0.6
+        ]
+        ids += floor.update(sights, STILL, step * FRAME_NS, near[:6] if carried else [])
+    lines = [n for n, held in enumerate(floor.held) if held.feature is None]
+    return (abs(floor.offset(lines[0])[0] - (0.5 - x)) if lines else math.inf), floor, ids
+
+
+def test_features_carry_a_line_that_is_no_longer_seen() -> None:
+    error_m, floor, _ = blown(carried=True)
+    (line,) = [n for n, held in enumerate(floor.held) if held.feature is None]
+    assert error_m < 0.06
+    assert error_m < 3.0 * floor.offset(line)[1]
+    alone_m, *_ = blown(carried=False)
+    assert alone_m > 10 * error_m  # forgotten, or far off
+
+
+def test_a_feature_that_is_no_point_of_the_floor_is_dropped() -> None:
+    floor = floor_filter(MotionNoise())
+    told = []
+    for step in range(40):
+        if step:
+            floor.predict(1 / 30, 0.0, 0.0, 0.0)
+        jumps = 0.3 if step == 20 else 0.0
+        told.append(floor.update([], STILL, step * FRAME_NS, [feature(1, 0.2, 0.1), feature(2, jumps, -0.2)]))
+    assert all(told[1:])
+    assert abs(floor.mean(VX)) < 0.05
+
+
+def test_what_only_shows_now_and_then_is_no_line() -> None:
+    floor = floor_filter(MotionNoise())
+    for step in range(90):
+        if step:
+            floor.predict(1 / 30, 0.0, 0.0, 0.0)
+        floor.update([sight(0.4)] if step % 12 == 0 else [], STILL, step * FRAME_NS)
+        assert all(held.hits < 3 for held in floor.held)

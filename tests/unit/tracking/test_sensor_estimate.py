@@ -19,8 +19,10 @@ LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)
 HEIGHT_M = 1.6
 SITE = random_site(3)
 TICK_S, FRAME_S, ARRIVES_S = 0.02, 1 / 30, 0.1
-AMPLITUDE_M, DRAG_PER_S = 0.2, 0.25
-X_RADPS, Y_RADPS = 2.6, 2.1
+DRAG_PER_S = 0.25
+WAVES_X = ((0.15, 2.6, 0.0), (0.15, 1.1, 0.5), (0.05, 4.1, 2.0))
+WAVES_Y = ((0.15, 2.1, 1.0), (0.15, 0.9, 2.5), (0.05, 3.7, 0.3))
+"""Amplitude (m), rate (rad/s) and phase: of one rate alone a leaking attitude looks like a late one."""
 
 
 @dataclass(frozen=True)
@@ -31,15 +33,21 @@ class Truth:
     mount_roll_deg: float = 0.0
     mount_pitch_deg: float = 0.0
     told_roll_deg: float = 0.0
+    leak_per_s: float = 0.0
+
+
+def swung(waves: tuple[tuple[float, float, float], ...], t: float) -> tuple[float, float, float]:
+    """Place, speed, and the acceleration that the lean has to make of it against the drag."""
+    x = sum(a * math.sin(w * t + p) for a, w, p in waves)
+    v = sum(a * w * math.cos(w * t + p) for a, w, p in waves)
+    accel = sum(-a * w * w * math.sin(w * t + p) for a, w, p in waves)
+    return x, v, accel + DRAG_PER_S * v
 
 
 def swinging(t: float) -> Kinematics:
     """To and fro along both axes, leaned as that needs, with drag."""
     node = SITE.nodes["A2"]
-    x, y = AMPLITUDE_M * math.sin(X_RADPS * t), AMPLITUDE_M * math.sin(Y_RADPS * t + 1.0)
-    vx = AMPLITUDE_M * X_RADPS * math.cos(X_RADPS * t)
-    vy = AMPLITUDE_M * Y_RADPS * math.cos(Y_RADPS * t + 1.0)
-    ax, ay = -(X_RADPS**2) * x + DRAG_PER_S * vx, -(Y_RADPS**2) * y + DRAG_PER_S * vy
+    (x, vx, ax), (y, vy, ay) = swung(WAVES_X, t), swung(WAVES_Y, t)
     roll, pitch = math.atan(ay / GRAVITY_MPS2), -math.atan(ax / GRAVITY_MPS2)
     at = round(t * 1e9)
     return Kinematics(at, node.x_m + x, node.y_m + y, HEIGHT_M, vx, vy, 0.0, roll, pitch, 0.0, 0.0, 0.0, 0.0)
@@ -52,11 +60,14 @@ def told(truth: Truth, seed: int, seconds: float = 20.0) -> SensorEstimate:
     eye = IdealEye(SITE, LENS, Mount(0.0, (0.0, 0.0, 0.0), *turned), EyeErrors(), seed)
     waiting = []
     frame_s = 0.0
+    leaked_roll = leaked_pitch = 0.0
     for n in range(round(seconds / TICK_S)):
         t = n * TICK_S
         k = swinging(t)
-        roll_rad = k.roll_rad - math.radians(truth.told_roll_deg)
-        tracker.attitude(Attitude(k.stamp_ns, roll_rad, k.pitch_rad, k.yaw_rad))
+        leaked_roll -= truth.leak_per_s * TICK_S * (k.roll_rad + leaked_roll)
+        leaked_pitch -= truth.leak_per_s * TICK_S * (k.pitch_rad + leaked_pitch)
+        roll_rad = k.roll_rad + leaked_roll - math.radians(truth.told_roll_deg)
+        tracker.attitude(Attitude(k.stamp_ns, roll_rad, k.pitch_rad + leaked_pitch, k.yaw_rad))
         if t >= frame_s:
             frame_s += FRAME_S
             waiting.append((t + ARRIVES_S, eye.see(k, n, round((t - truth.delay_s) * 1e9))))

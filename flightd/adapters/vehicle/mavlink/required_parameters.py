@@ -156,7 +156,13 @@ _ARDUPILOT: tuple[Rule, ...] = (
     Rule(("RNGFND1_ORIENT",), _one_of(25), "25 (down)", "the height above the floor comes from it", 25),
     Rule(("ARMING_CHECK",), lambda value: value != 0, "1 (all)", "arming unchecked hides faults", 1),
     Rule(("ARMING_SKIPCHK",), _one_of(0), "0 (none skipped)", "arming unchecked hides faults", 0),
-    Rule(("LAND_SPEED",), _within(20, 70), "20 to 70 cm/s", "a landing of last resort is blind", 40),
+    Rule(
+        ("LAND_SPEED",),
+        _within(40, 80),
+        "40 to 80 cm/s",
+        "a landing of last resort is blind: it drifts for as long as it takes",
+        60,
+    ),
 )
 
 _PX4: tuple[Rule, ...] = (

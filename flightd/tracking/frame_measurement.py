@@ -1,0 +1,78 @@
+"""What the sights of one frame measure of the filter's state, as rows of the measurement."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flightd.core.geometry import Matrix
+from flightd.tracking.line_sight import LineSight, Rates
+from flightd.tracking.motion_model import (
+    DELAY,
+    FIRST_LINE,
+    MOUNT_PITCH,
+    MOUNT_ROLL,
+    PITCH,
+    PSI,
+    ROLL,
+    SCALE,
+    VELOCITY,
+)
+
+
+class FrameMeasurement:
+    """Errors that the state should bring to 0, with their derivative by the state (n,) and variances."""
+
+    def __init__(self) -> None:
+        self.rows: list[Matrix] = []
+        self.errors: list[float] = []
+        self.variances: list[float] = []
+        self.by_tilt: list[tuple[float, float]] = []
+        self.axes: list[int | None] = []
+        """Across which axis an offset was seen; None for a direction."""
+
+    def add_offset(self, sight: LineSight, line: int, x: Matrix, rates: Rates) -> None:
+        """The offset seen less that of the line held."""
+        row, error_m = offset_error(sight, line, x, rates)
+        self._add(row, error_m, sight.sigma_m, sight.offset_per_tilt, sight.axis)
+
+    def add_turn(self, sight: LineSight, x: Matrix, rates: Rates) -> None:
+        """The heading held less the one that the line's direction tells."""
+        row = np.zeros(len(x))
+        by_roll, by_pitch = sight.turn_per_tilt
+        row[PSI] = 1.0
+        row[[ROLL, PITCH]] = by_roll, by_pitch
+        row[[MOUNT_ROLL, MOUNT_PITCH]] = sight.turn_per_mount
+        row[DELAY] = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + rates.yaw_radps
+        self._add(row, sight.turn_rad, sight.sigma_theta_rad, sight.turn_per_tilt, None)
+
+    def _add(
+        self, row: Matrix, error: float, sigma: float, by_tilt: tuple[float, float], axis: int | None
+    ) -> None:
+        self.rows.append(row)
+        self.errors.append(error)
+        self.variances.append(sigma**2)
+        self.by_tilt.append(by_tilt)
+        self.axes.append(axis)
+
+
+def offset_error(sight: LineSight, line: int, x: Matrix, rates: Rates) -> tuple[Matrix, float]:
+    """d(seen offset - held offset) / d state, and that error; the line is the one held at place `line`."""
+    column = FIRST_LINE + line
+    row = placed(sight, x, rates)
+    row[column] = -1.0
+    # as held, not as seen: what is seen has the noise in it that is weighed here, and scale would shrink
+    row[SCALE] = x[column]
+    return row, sight.offset_m - float(x[column])
+
+
+def placed(sight: LineSight, x: Matrix, rates: Rates) -> Matrix:
+    """d(seen offset) / d state: (n,)."""
+    row = np.zeros(len(x))
+    (by_roll, by_pitch), by_yaw = sight.offset_per_tilt, sight.offset_per_yaw
+    row[[ROLL, PITCH]] = by_roll, by_pitch
+    row[[MOUNT_ROLL, MOUNT_PITCH]] = sight.offset_per_mount
+    row[PSI] = by_yaw
+    turning = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + by_yaw * rates.yaw_radps
+    row[DELAY] = turning + x[VELOCITY[sight.axis]]
+    row[SCALE] = sight.offset_m
+    return row

@@ -1,0 +1,119 @@
+"""How the drone's motion over the lines, and what it does not know of its sensors, go on from one moment to
+the next: the state of the filter of both, and its transition.  Pure.
+
+The state is
+
+    heading offset and its drift | velocity, disturbance of both grid axes | error of the told attitude
+    | rate of its leak | mount of the camera | delay of its frames | scale of lengths | offsets of all
+    lines and features of the floor held
+
+Lines and features stand still, so all of them move with the one velocity; the control input is the
+acceleration that the attitude makes, g tan(tilt).  An autopilot without a position takes what its
+accelerometers feel for the vertical, so that while it accelerates its attitude leaks towards the one at which
+it would not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from flightd.core.geometry import GRAVITY_MPS2, Matrix
+
+PSI, PSI_RATE, VX, VY, PUSH_X, PUSH_Y, ROLL, PITCH, LEAK, MOUNT_ROLL, MOUNT_PITCH, DELAY, SCALE = range(13)
+FIRST_LINE = 13
+VELOCITY, PUSH = (VX, VY), (PUSH_X, PUSH_Y)
+"""By grid axis, x and y."""
+
+
+class Told(NamedTuple):
+    """The attitude that the vehicle tells, its own yaw included."""
+
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+
+
+class Step(NamedTuple):
+    """A step of the state: (n,) where it ends, its (n, n) derivative by where it began, and (n, 2) what an
+    acceleration along each grid axis would add to it."""
+
+    state: Matrix
+    jacobian: Matrix
+    by_accel: Matrix
+
+
+def lean(x: Matrix, told: Told) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
+    """Acceleration along the grid axes (m/s2) that the attitude makes at constant height, and what a radian
+    more of roll and of pitch would make."""
+    roll, pitch, yaw = told.roll_rad + float(x[ROLL]), told.pitch_rad + float(x[PITCH]), told.yaw_rad + x[PSI]
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    forward, right = -GRAVITY_MPS2 * math.tan(pitch), GRAVITY_MPS2 * math.tan(roll)
+    per_roll, per_pitch = GRAVITY_MPS2 / math.cos(roll) ** 2, -GRAVITY_MPS2 / math.cos(pitch) ** 2
+    accel = cos * forward - sin * right, sin * forward + cos * right
+    return accel, (-sin * per_roll, cos * per_roll), (cos * per_pitch, sin * per_pitch)
+
+
+def moved(
+    x: Matrix, axes: Sequence[int], told: Told, dt_s: float, drag_per_s: float, attitude_s: float
+) -> Step:
+    """The state (n,) after `dt_s` in the told attitude; `axes` are those across which each line held lies,
+    `attitude_s` is the time within which errors of the attitude fade."""
+    n, end = len(x), x.copy()
+    (ax, ay), by_roll, by_pitch = lean(x, told)
+    accel = np.array([ax + x[PUSH_X] - drag_per_s * x[VX], ay + x[PUSH_Y] - drag_per_s * x[VY]])
+    jacobian = np.eye(n)
+    jacobian[PSI, PSI_RATE] = dt_s
+    for axis, (velocity, push) in enumerate(zip(VELOCITY, PUSH, strict=True)):
+        jacobian[velocity, velocity] = 1.0 - drag_per_s * dt_s
+        jacobian[velocity, push] = dt_s
+        jacobian[velocity, ROLL] = by_roll[axis] * dt_s
+        jacobian[velocity, PITCH] = by_pitch[axis] * dt_s
+    jacobian[VX, PSI], jacobian[VY, PSI] = -ay * dt_s, ax * dt_s
+    by_accel = np.zeros((n, 2))
+    by_accel[VX, 0] = by_accel[VY, 1] = dt_s
+    way_m = x[[VX, VY]] * dt_s + 0.5 * accel * dt_s * dt_s
+    for row, axis in enumerate(axes, FIRST_LINE):
+        velocity = VELOCITY[axis]
+        jacobian[row] -= 0.5 * dt_s * jacobian[velocity]
+        jacobian[row, velocity] -= 0.5 * dt_s
+        by_accel[row, axis] = -0.5 * dt_s * dt_s
+        end[row] -= way_m[axis]
+    end[PSI] += x[PSI_RATE] * dt_s
+    end[[VX, VY]] += accel * dt_s
+    _leak(x, end, jacobian, accel, (ax, ay), told, dt_s, drag_per_s, attitude_s)
+    return Step(end, jacobian, by_accel)
+
+
+def _leak(
+    x: Matrix,
+    end: Matrix,
+    jacobian: Matrix,
+    accel: Matrix,
+    leant: tuple[float, float],
+    told: Told,
+    dt_s: float,
+    drag_per_s: float,
+    attitude_s: float,
+) -> None:
+    """Let the errors of the told roll and pitch leak to those at which the drone would not accelerate, and
+    fade; `leant` is the part of the acceleration `accel` that the lean makes."""
+    yaw_rad = told.yaw_rad + float(x[PSI])
+    ahead = np.array([math.cos(yaw_rad), math.sin(yaw_rad)]) / GRAVITY_MPS2
+    aside = np.array([-math.sin(yaw_rad), math.cos(yaw_rad)]) / GRAVITY_MPS2
+    felt = accel - leant
+    keep, part = math.exp(-dt_s / attitude_s), float(x[LEAK]) * dt_s
+    cosines = math.cos(told.roll_rad + x[ROLL]), math.cos(told.pitch_rad + x[PITCH])
+    for row, by_felt, by_turn, cos in zip(
+        (ROLL, PITCH), (aside, -ahead), (-ahead, -aside), cosines, strict=True
+    ):
+        way = float(by_felt @ accel) - float(x[row])
+        end[row] = x[row] * keep + part * way
+        jacobian[row, row] = keep + part * (1.0 / cos**2 - 1.0)  # who leans more accelerates more
+        jacobian[row, LEAK] = way * dt_s
+        jacobian[row, PSI] = part * float(by_turn @ felt)
+        jacobian[row, list(PUSH)] = part * by_felt
+        jacobian[row, list(VELOCITY)] = -drag_per_s * part * by_felt

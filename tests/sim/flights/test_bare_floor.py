@@ -1,0 +1,27 @@
+"""A node without any paint around it is flown to, and from, by what the floor shows besides."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from flightd.cli.main import app
+
+BARE = """
+[[fault]]
+kind = "bare_floor"
+at_node = "A4"
+half_m = 1.6
+"""
+
+
+def test_three_metres_without_paint_are_flown_over(tmp_path: Path) -> None:
+    extra, out = tmp_path / "bare.toml", tmp_path / "out"
+    extra.write_text(BARE)
+    options = ["--scenario", str(extra), "--out", str(out), "--json", "--seed", "5104"]
+    result = CliRunner().invoke(app, ["sim", *options, "--set", 'mission.nodes=["A2","A4"]'])
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["mission"] == "completed", summary
+    assert result.exit_code == 0, result.output

@@ -1,0 +1,37 @@
+"""When the lines' width is believed against the range finder, and when it is not."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from flightd.tracking.width_heights import WidthHeights
+
+
+def test_a_height_that_all_widths_contradict_is_theirs() -> None:
+    heights = WidthHeights()
+    for _ in range(30):
+        assert heights.believed_m([1.6], 1.62) == 1.62
+    told = [heights.believed_m([1.6], 2.4) for _ in range(90)]
+    assert told[-1] == 1.6
+    assert heights.share == pytest.approx(1.5, abs=0.05)
+
+
+def test_widths_that_contradict_each_other_tell_no_height() -> None:
+    """Boards and boxes at the edge of the picture, taken for lines now and then."""
+    heights, rng = WidthHeights(), random.Random(3)
+    for _ in range(30):
+        heights.believed_m([1.6], 1.6)
+    for _ in range(120):
+        false = [rng.uniform(0.35, 1.3)]
+        assert heights.believed_m(false, 1.6) == 1.6
+        assert heights.share == 1.0
+
+
+def test_one_width_that_agrees_is_enough_and_none_at_all_changes_nothing() -> None:
+    heights = WidthHeights()
+    for _ in range(60):
+        assert heights.believed_m([0.5, 1.6, 3.0], 1.62) == 1.62
+    assert heights.believed_m([], 1.62) == 1.62
+    assert heights.believed_m([1.5, 1.6, 1.7], float("nan")) == 1.6
