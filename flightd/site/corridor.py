@@ -41,9 +41,15 @@ class Corridor:
         self._a = np.array([(a.x_m, a.y_m) for a, _ in ends]).reshape(-1, 2)
         self._along = np.array([(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in ends]).reshape(-1, 2)
         self._square = np.maximum(np.einsum("ij,ij->i", self._along, self._along), 1e-12)
+        self._last: tuple[tuple[float, float], Nearest] | None = None
 
     def nearest(self, x_m: float, y_m: float) -> Nearest:
-        """Distance infinite on a site without edges."""
+        """Distance infinite on a site without edges.  Each tick asks for one point several times."""
+        if self._last is None or self._last[0] != (x_m, y_m):
+            self._last = (x_m, y_m), self._nearest(x_m, y_m)
+        return self._last[1]
+
+    def _nearest(self, x_m: float, y_m: float) -> Nearest:
         if not len(self._a):
             return Nearest(x_m, y_m, math.inf)
         away = np.array((x_m, y_m)) - self._a

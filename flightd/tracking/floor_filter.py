@@ -50,6 +50,7 @@ _UNSEEN_S = 0.1
 """An axis without a line for so long is dead-reckoned: the gust that was last felt on it fades."""
 _SENSORS, _LASTING = slice(ROLL, FIRST_LINE), slice(LEAK, FIRST_LINE)
 """What is wrong with the sensors, and what of it is learnt for good."""
+_TILTS = [*range(ROLL, DELAY), SCALE]
 _BUT_MOTION = [PSI, PSI_RATE, *range(LEAK, FIRST_LINE)]
 _YAW_SIGMA_RAD, _YAW_RATE_SIGMA_RADPS = math.radians(5.0), 0.005
 """Of the heading before it is told at all, and of its drift whenever it is."""
@@ -194,10 +195,12 @@ class FloorFilter:
         features: Sequence[FeatureSight] = (),
         *,
         assumed: bool = False,
+        exact: bool = True,
     ) -> bool:
         """Take the lines of one frame, and the features of the floor; those that belong to none held start
-        new ones.  Of an attitude that is only `assumed` nothing is learnt for good.  Whether the motion was
-        told by features, too."""
+        new ones.  Of an attitude that is only `assumed` nothing is learnt for good; of lines whose tilt was
+        not compensated in an `exact` form nothing but the delay.  Whether the motion was told by
+        features, too."""
         before = self._x[:FIRST_LINE].copy()
         known, fresh = associate(
             sights, self.held, lambda sight, line: self._innovation(sight, line, rates), self._gate_m
@@ -210,7 +213,7 @@ class FloorFilter:
         for sight in sights:
             if not math.isnan(sight.turn_rad):
                 told.add_turn(sight, self._x, rates)
-        self._take(told, _LASTING if assumed else None)
+        self._take(told, (_LASTING if assumed else None) if exact else _TILTS)
         carried = FrameMeasurement()
         for sight, line in followed:
             carried.add_offset(sight, line, self._x, rates)

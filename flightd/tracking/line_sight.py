@@ -35,6 +35,10 @@ class LineSight(NamedTuple):
     offset_per_mount: tuple[float, float]
     turn_per_mount: tuple[float, float]
     feature: int | None = None
+    tilted_m: float = 0.0
+    """What the tilt of the frame makes of the offset."""
+    bent_m: float = 0.0
+    """What it makes of it beyond the height times the tilt."""
 
 
 class FeatureSight(NamedTuple):
@@ -87,6 +91,8 @@ def line_sight(
     by_yaw = -on(along, middle) if across_x else on(along, middle)
     shifts, (turn_by_roll, turn_by_pitch) = tilt_effects(line, height_m)
     by_roll, by_pitch = (on(across, shift) for shift in shifts)
+    tilted_m = by_roll * tilt_rad[0] + by_pitch * tilt_rad[1]
+    bent_m = tilted_m - height_m * (across[0] * tilt_rad[1] - across[1] * tilt_rad[0])
     # who rolls while pitched, or is mounted pitched and rolls, turns a little, too
     turned_by_roll, turned_by_mount = -math.sin(tilt_rad[1]), math.sin(tilt_rad[0])
     by_roll, turn_by_roll = by_roll + by_yaw * turned_by_roll, turn_by_roll + turned_by_roll
@@ -106,6 +112,8 @@ def line_sight(
         turn_per_tilt=(turn_by_roll, turn_by_pitch),
         offset_per_mount=(by_roll, by_pitch + by_yaw * turned_by_mount),
         turn_per_mount=(turn_by_roll, turn_by_pitch + turned_by_mount),
+        tilted_m=tilted_m,
+        bent_m=bent_m,
     )
 
 
@@ -149,12 +157,20 @@ def feature_sight(
 
 
 def as_compensated(sight: LineSight, compensation: TiltCompensation) -> LineSight:
-    """The same line as a compensation that is not exact leaves it: the paper's, of the first order, turns no
-    line, so that a mount cannot be told by it; without one no tilt is told by where the lines are."""
+    """The same line as a compensation that is not exact leaves it, less sure by what that leaves in it: the
+    paper's, of the first order, turns no line and forgets how tilt widens the picture away from its middle;
+    without one no tilt is told by where the lines are."""
     match compensation:
         case TiltCompensation.EXACT:
             return sight
         case TiltCompensation.FIRST_ORDER:
-            return sight._replace(turn_per_tilt=_LEVEL, offset_per_mount=_LEVEL, turn_per_mount=_LEVEL)
+            left_m = sight.bent_m
         case TiltCompensation.NONE:
-            return as_compensated(sight, TiltCompensation.FIRST_ORDER)._replace(offset_per_tilt=_LEVEL)
+            left_m = sight.tilted_m
+            sight = sight._replace(offset_per_tilt=_LEVEL)
+    return sight._replace(
+        sigma_m=math.hypot(sight.sigma_m, left_m),
+        turn_per_tilt=_LEVEL,
+        offset_per_mount=_LEVEL,
+        turn_per_mount=_LEVEL,
+    )

@@ -163,7 +163,8 @@ class LineTracker:
         placed = (line_sight(line, yaw, sigma_yaw, tilt, height_m, params.min_sigma_m) for line in on_floor)
         sights = [as_compensated(sight, self._compensation) for sight in placed if sight is not None]
         features = self._features(lines, view, yaw)
-        if self._filter.update(sights, self._rates(stamp_ns), stamp_ns, features, assumed=assumed):
+        rates, exact = self._rates(stamp_ns), self._compensation is TiltCompensation.EXACT
+        if self._filter.update(sights, rates, stamp_ns, features, assumed=assumed, exact=exact):
             self._features_ns = stamp_ns
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
         self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in _placed(lines.pads, view, yaw))

@@ -58,7 +58,15 @@ class StuckHeight:
         self.found = self.found or self._contradicts(new)
         return self.found
 
+    def _rose(self, new: _Sample) -> bool:
+        """Whether there is anything that a height could contradict: cheap, and nearly always not."""
+        climbed_m = [old.climbed_m for old in self._samples]
+        moved_m = max(new.climbed_m - min(climbed_m), max(climbed_m) - new.climbed_m)
+        return moved_m > _MOVED_M or new.wanted_m - min(old.wanted_m for old in self._samples) > _WANTED_M
+
     def _contradicts(self, new: _Sample) -> bool:
+        if not self._rose(new):
+            return False
         stands_still, drop_m, later = True, 0.0, new
         for old in reversed(self._samples):
             age_ns = new.stamp_ns - old.stamp_ns
