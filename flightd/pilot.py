@@ -173,7 +173,7 @@ class Pilot:
         now_ns, v, pose = tick.now_ns, tick.vehicle, known.pose
         estimator, localiser = self._estimator, self._estimator.localiser
         x_ns, y_ns = localiser.told_ns
-        features_ns = known.tracks.features_ns if known.tracks is not None else 0
+        features_ns = min(known.tracks.features_ns) if known.tracks is not None else 0
         max_sigma_m = self._config.localisation.expert.max_sigma_m
         precise = pose is not None and max(pose.covariance[0], pose.covariance[4]) < max_sigma_m**2
         seeking = self._mission.phase is Phase.RELOCATE

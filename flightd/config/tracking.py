@@ -78,8 +78,8 @@ class TrackingExpert(Section):
         0.3, gt=0, le=10, description="sigma of the tilt where it is not compensated"
     )
     min_sigma_m: float = Field(0.004, gt=0, le=0.1, description="least sigma of a line's offset")
-    feature_sigma_m: float = Field(
-        0.004, gt=0, le=0.1, description="sigma of the place of a feature of the floor"
+    feature_sigma_px: float = Field(
+        1.0, gt=0, le=50, description="sigma of the place of a feature of the floor in the picture"
     )
     width_share: tuple[_WidthShare, _WidthShare] = Field(
         (0.55, 1.7),

@@ -110,5 +110,6 @@ class TrackSet:
     push_y_mps2: float = 0.0
     markers: tuple[MarkerOffset, ...] = ()
     sensors: SensorEstimate = NOT_SEEN
-    features_ns: int = 0
-    """Capture time of the newest frame in which the motion was told by features of the floor, too."""
+    features_ns: tuple[int, int] = (0, 0)
+    """Capture time of the newest frame in which features of the floor, and no line, told the motion along
+    x, and along y."""

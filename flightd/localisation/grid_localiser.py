@@ -57,6 +57,8 @@ _SEEN_NS = 200_000_000
 """A line seen so lately counts as in view."""
 _CARRIED_NS = 400_000_000
 """So lately features of the floor must have been followed to carry a position on."""
+_CREEP_MPS = 0.1
+"""A hover counts as so fast: what carries a position drifts at rest, too."""
 _GAP_S = 0.6
 """Without a line for so long, the count may have slipped."""
 
@@ -137,12 +139,12 @@ class GridLocaliser:
         self._stamp_ns = now_ns
         reach_m = max(1.5 * height_m, 0.3)
         due = now_ns - self._judge_ns >= _JUDGE_NS
-        carried = now_ns - tracks.features_ns < _CARRIED_NS
         for axis, velocity in ((0, tracks.vx_mps), (1, tracks.vy_mps)):
             lines = tracks.across_y if axis else tracks.across_x
+            carried = now_ns - tracks.features_ns[axis] < _CARRIED_NS
             places.move(axis, velocity, dt_s, carried=carried)
             self._match(axis, lines, reach_m, due)
-            places.settle(axis, lines, now_ns, tracks.features_ns)
+            places.settle(axis, lines, now_ns, tracks.features_ns[axis])
             self._carry(axis, tracks, dt_s)
         if tracks.junctions_ns > self._junctions_ns:
             self._junctions_ns = tracks.junctions_ns
@@ -168,14 +170,17 @@ class GridLocaliser:
     # The parts of a step
 
     def _carry(self, axis: int, tracks: TrackSet, dt_s: float) -> None:
-        """Count how far features of the floor have carried the position on since a line told it."""
-        seen_ns = self._seen_ns[axis]
-        if tracks.stamp_ns - seen_ns < _SEEN_NS:
+        """Count how far features of the floor have carried the position on since a line told it.  Once
+        neither tells it, only a line does again."""
+        seen_ns, features_ns = self._seen_ns[axis], tracks.features_ns[axis]
+        if tracks.pads_ns - seen_ns < _SEEN_NS:
             self._carried_m[axis] = 0.0
+        elif tracks.stamp_ns - max(self._told_ns[axis], seen_ns) > _CARRIED_NS:
+            self._carried_m[axis] = math.inf
         else:
-            self._carried_m[axis] += math.hypot(tracks.vx_mps, tracks.vy_mps) * dt_s
+            self._carried_m[axis] += max(math.hypot(tracks.vx_mps, tracks.vy_mps), _CREEP_MPS) * dt_s
         carries = seen_ns > 0 and self._carried_m[axis] < self._params.by_features_m
-        told_ns = max(seen_ns, tracks.features_ns) if carries else seen_ns
+        told_ns = max(seen_ns, features_ns) if carries else seen_ns
         self._told_ns[axis] = max(self._told_ns[axis], told_ns)
 
     def _start(self, node: str) -> None:
@@ -256,8 +261,7 @@ class GridLocaliser:
             for axis in (0, 1):
                 near = float(here[axis])
                 self._judged[axis][:] = [at for at in self._judged[axis] if abs(at - near) < leave_m]
-        told_s = (tracks.stamp_ns - max(self._told_ns)) * 1e-9
-        self._gap |= max(self._seen_ns) > 0 and min(lines_age_s, told_s) > _GAP_S
+        self._gap |= max(self._seen_ns) > 0 and lines_age_s > _GAP_S
         if self._gap and lines_age_s < 0.3:
             self._gap = False
             self._leak(params.slip_in_gap)

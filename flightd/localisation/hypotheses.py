@@ -18,8 +18,9 @@ from flightd.localisation.observation_model import Flags, Indices, SensorModel, 
 from flightd.site.painted_lines import AxisLines, PaintMap
 
 _FAR_M = 1e7
-_DRIFT_MPS, _CARRIED_MPS = 0.15, 0.03
-"""Growth of a position's sigma while no line is seen, and while features of the floor tell the motion."""
+_DRIFT_MPS, _CARRIED_MPS, _CARRIED_SHARE = 0.15, 0.03, 0.04
+"""Growth of a position's sigma while no line is seen, and while features of the floor tell the motion, to
+which a wrong height adds its share."""
 _RIVAL = 0.01
 """Another map line is considered too where it explains the track so well, against the nearest one."""
 _MATCH_SIGMAS = 4.0
@@ -76,7 +77,8 @@ class Places:
         """Carry all places on by the odometry, which is better while features of the floor have `carried`
         it."""
         self.at_m[1:, axis] += velocity_mps * dt_s
-        self.sigma_m[:, axis] += (_CARRIED_MPS if carried else _DRIFT_MPS) * dt_s
+        carried_mps = _CARRIED_MPS + _CARRIED_SHARE * abs(velocity_mps)
+        self.sigma_m[:, axis] += (carried_mps if carried else _DRIFT_MPS) * dt_s
 
     def settle(self, axis: int, tracks: Sequence[TrackedLine], now_ns: int, carried_ns: int = 0) -> None:
         """Take each place's position from the lines that it has matched; forget tracks that are gone.  Until

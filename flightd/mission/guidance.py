@@ -60,7 +60,7 @@ class MissionInputs:
     """All that the mission knows at one tick.  `pose` is None before the floor was seen; ages in
     seconds, infinite when there never was any.  `ground_silent_s` is 0 while no ground station attends.
     `pad_m` is the centre of the goal's pad on the map, as seen or else as drawn; None where there is none.
-    `features_age_s` is the age of the newest frame in which features of the floor told the motion, `x_age_s`
+    `features_age_s` is the age of the newest frame in which features of the floor told all motion, `x_age_s`
     and `y_age_s` that of the newest line, or of features that stand in for it.
     `by_pad` says that the pose is only that over the pad: enough to climb straight up.
     While the position is sought again, `rivals` are the nodes where the drone may be with their

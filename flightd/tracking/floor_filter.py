@@ -51,7 +51,9 @@ _UNSEEN_S = 0.1
 _SENSORS, _LASTING = slice(ROLL, FIRST_LINE), slice(LEAK, FIRST_LINE)
 """What is wrong with the sensors, and what of it is learnt for good."""
 _TILTS = [*range(ROLL, DELAY), SCALE]
+"""All of the sensors but the delay."""
 _BUT_MOTION = [PSI, PSI_RATE, *range(LEAK, FIRST_LINE)]
+"""All but velocities, disturbances, the error of the attitude and the lines."""
 _YAW_SIGMA_RAD, _YAW_RATE_SIGMA_RADPS = math.radians(5.0), 0.005
 """Of the heading before it is told at all, and of its drift whenever it is."""
 _MOST_LEAK_PER_S = 1.0
@@ -59,8 +61,9 @@ _MOST_SIGMAS = 4.0
 """A delay further off than so many sigmas of what was thought possible is not believed."""
 _OUTLIER_SIGMAS = 3.0
 """What errs by more is weighed less (Huber)."""
-_FEATURES, _FEATURE_SIGMAS, _FEATURE_NS = 3, 4.0, 200_000_000
-"""So many features are held across an axis at once; none that errs by more, or is not seen for so long."""
+_FEATURES, _FRESH, _TELLING, _FEATURE_SIGMAS, _FEATURE_NS = 6, 3, 2, 4.0, 500_000_000
+"""So many features are held across an axis, those seen last, since several detectors take turns; so many are
+followed from one frame, so many tell the motion; none that errs by more, or is not seen for so long."""
 _SURE_HITS, _GLIMPSE_NS = 3, 250_000_000
 """A line seen less often is forgotten so soon: what only shows now and then is none."""
 _CARRIED_M = 0.12
@@ -108,6 +111,8 @@ class FloorFilter:
         self._drift = drift
         self._steady = [0.0, 0.0]
         self._unseen_s = [0.0, 0.0]
+        self._followed_ns = [0, 0]
+        self._refused: set[int | None] = set()
         self._innovations = Innovations(priors.shake_rad, priors.shake_bounds_rad)
 
     # What is known
@@ -144,7 +149,7 @@ class FloorFilter:
         )
 
     def learnt(self) -> tuple[Matrix, Matrix]:
-        """What is known of the sensors: (6,) means and (6, 6) covariance from `ROLL` to `SCALE`."""
+        """What is known of the sensors: (7,) means and (7, 7) covariance from `ROLL` to `SCALE`."""
         return self._x[_SENSORS].copy(), self._p[_SENSORS, _SENSORS].copy()
 
     def begin_with(self, learnt: tuple[Matrix, Matrix]) -> None:
@@ -159,6 +164,18 @@ class FloorFilter:
         self._begin_anew([ROLL, PITCH])
 
     # What happens
+
+    def tells(self, axis: int, lines: Sequence[int]) -> bool:
+        """Whether one of these lines held is surely one, across the axis."""
+        return any(self.held[line].axis == axis and self.held[line].hits >= _SURE_HITS for line in lines)
+
+    def speeds(self, stamp_ns: int) -> tuple[float | None, float | None]:
+        """Speed along each axis, None where no line seen in the frame of that time tells it."""
+        seen = [
+            line for line, held in enumerate(self.held) if held.feature is None and held.seen_ns == stamp_ns
+        ]
+        x, y = (self.mean(VX + axis) if self.tells(axis, seen) else None for axis in range(2))
+        return x, y
 
     def turn_to(self, offset_rad: float, sigma_rad: float) -> None:
         """The heading offset is another one, and all that it was correlated with is no longer."""
@@ -196,16 +213,17 @@ class FloorFilter:
         *,
         assumed: bool = False,
         exact: bool = True,
-    ) -> bool:
+    ) -> frozenset[int]:
         """Take the lines of one frame, and the features of the floor; those that belong to none held start
         new ones.  Of an attitude that is only `assumed` nothing is learnt for good; of lines whose tilt was
-        not compensated in an `exact` form nothing but the delay.  Whether the motion was told by
-        features, too."""
+        not compensated in an `exact` form nothing but the delay.  Across which axes
+        features told the motion where no line did."""
+        self._forget_features(stamp_ns)
         before = self._x[:FIRST_LINE].copy()
         known, fresh = associate(
             sights, self.held, lambda sight, line: self._innovation(sight, line, rates), self._gate_m
         )
-        bare = [axis for axis in range(2) if all(sight.axis != axis for sight, _ in known)]
+        bare = [axis for axis in range(2) if not self.tells(axis, [line for _, line in known])]
         followed, strange = self._followed([seen.across[axis] for axis in bare for seen in features], rates)
         told = FrameMeasurement()
         for sight, line in known:
@@ -213,26 +231,29 @@ class FloorFilter:
         for sight in sights:
             if not math.isnan(sight.turn_rad):
                 told.add_turn(sight, self._x, rates)
-        self._take(told, (_LASTING if assumed else None) if exact else _TILTS)
+        self._take(told, self._unmoved(assumed=assumed, exact=exact))
         carried = FrameMeasurement()
         for sight, line in followed:
-            carried.add_offset(sight, line, self._x, rates)
+            carried.add_offset(sight, line, self._x, rates, before)
         # a feature lives too short to tell more than the motion
         self._take(carried, _BUT_MOTION, minded=False)
         for sight, line in known + followed:
             held = self.held[line]
+            if held.feature is not None:
+                self._followed_ns[held.axis] = stamp_ns
             self._unseen_s[held.axis] = 0.0
             held.seen_ns, held.hits = stamp_ns, held.hits + 1
             held.width_m += 0.2 * (sight.width_m - held.width_m)
             held.from_m, held.to_m = sight.from_m, sight.to_m
         for sight in fresh:
             self._add(sight, rates, stamp_ns, before)
+        told_by = [sight.axis for sight, _ in followed]
         for axis in bare:
-            room = _FEATURES - sum(held.axis == axis and held.feature is not None for held in self.held)
-            for sight in [sight for sight in strange if sight.axis == axis][: max(room, 0)]:
+            room = max(_FRESH - told_by.count(axis), 0)
+            for sight in [sight for sight in strange if sight.axis == axis][:room]:
                 self._add(sight, rates, stamp_ns, before)
-        self._forget_old(stamp_ns, carried=bool(followed))
-        return bool(followed)
+        self._forget_old(stamp_ns)
+        return frozenset(axis for axis in bare if told_by.count(axis) >= _TELLING)
 
     # How
 
@@ -257,22 +278,34 @@ class FloorFilter:
             self._unseen_s[axis] += dt_s
 
     def _innovation(self, sight: LineSight, line: int, rates: Rates) -> tuple[float, float]:
-        """How far the line held is from the sight, and the standard deviation of that."""
-        row, apart_m = offset_error(sight, line, self._x, rates)
+        """How far the line held is from the sight, and the standard deviation of that; 0 where it is too
+        far to be asked."""
+        apart_m = sight.offset_m - self.mean(FIRST_LINE + line)
+        if abs(apart_m) > self._gate_m:
+            return apart_m, 0.0
+        row, _ = offset_error(sight, line, self._x, rates)
         by_roll, by_pitch = sight.offset_per_tilt
         shaken = (by_roll**2 + by_pitch**2) * self._innovations.shake_rad**2
         return apart_m, math.sqrt(max(float(row @ self._p @ row), 0.0) + sight.sigma_m**2 + shaken)
+
+    def _unmoved(self, *, assumed: bool, exact: bool) -> slice | list[int] | None:
+        if exact:
+            return _LASTING if assumed else None
+        return _SENSORS if assumed else _TILTS
 
     def _followed(
         self, sights: Sequence[LineSight], rates: Rates
     ) -> tuple[list[tuple[LineSight, int]], list[LineSight]]:
         """The features that are held across their axis, and those that are not.  One that is not where it
-        should be was no point of the floor: it is dropped."""
+        should be was no point of the floor: it is refused for as long as it is told."""
         places = {(held.feature, held.axis): line for line, held in enumerate(self.held)}
+        self._refused &= {sight.feature for sight in sights}
         known: list[tuple[LineSight, int]] = []
         strange: list[LineSight] = []
         for sight in sights:
             line = places.get((sight.feature, sight.axis))
+            if sight.feature in self._refused:
+                continue
             if line is None:
                 strange.append(sight)
                 continue
@@ -280,8 +313,21 @@ class FloorFilter:
             if abs(apart_m) < _FEATURE_SIGMAS * sigma_m:
                 known.append((sight, line))
             else:
-                self.held[line].seen_ns = 0
+                self._refused.add(sight.feature)
         return known, strange
+
+    def _forget_features(self, stamp_ns: int) -> None:
+        """Drop the features that were not seen for long, turned out to be none, or are too many."""
+        old = set[int]()
+        for axis in range(2):
+            lately = [
+                line for line, held in enumerate(self.held) if held.feature is not None and held.axis == axis
+            ]
+            lately.sort(key=lambda line: -self.held[line].seen_ns)
+            old |= set(lately[_FEATURES:])
+            old |= {line for line in lately if stamp_ns - self.held[line].seen_ns > _FEATURE_NS}
+            old |= {line for line in lately if self.held[line].feature in self._refused}
+        self._drop(old)
 
     def _take(
         self, measured: FrameMeasurement, unmoved: slice | list[int] | None, *, minded: bool = True
@@ -343,18 +389,19 @@ class FloorFilter:
         )
         self._next_id += 1
 
-    def _forget_old(self, stamp_ns: int, *, carried: bool) -> None:
-        """Drop what was not seen for long; lines not, where features have `carried` them on well."""
+    def _forget_old(self, stamp_ns: int) -> None:
+        """Drop lines that were not seen for long, but those that features have carried on well."""
         old, lines = set[int](), list[int]()
         for line, held in enumerate(self.held):
-            unseen_ns = stamp_ns - held.seen_ns
             if held.feature is not None:
-                if unseen_ns > _FEATURE_NS:
-                    old.add(line)
                 continue
             lines.append(line)
-            glimpsed = held.hits < _SURE_HITS and unseen_ns > _GLIMPSE_NS
+            unseen_ns = stamp_ns - held.seen_ns
+            if unseen_ns > _GLIMPSE_NS:
+                held.from_m = held.to_m = 0.0  # where it was in view is no longer known
+            carried = stamp_ns - self._followed_ns[held.axis] <= _FEATURE_NS
             held_on = carried and self.offset(line)[1] < _CARRIED_M
+            glimpsed = held.hits < _SURE_HITS and unseen_ns > _GLIMPSE_NS
             if glimpsed or (unseen_ns > self._forget_ns and not held_on):
                 old.add(line)
         lines.sort(key=lambda line: -self.held[line].seen_ns)

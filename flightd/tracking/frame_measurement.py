@@ -30,9 +30,14 @@ class FrameMeasurement:
         self.axes: list[int | None] = []
         """Across which axis an offset was seen; None for a direction."""
 
-    def add_offset(self, sight: LineSight, line: int, x: Matrix, rates: Rates) -> None:
-        """The offset seen less that of the line held."""
+    def add_offset(
+        self, sight: LineSight, line: int, x: Matrix, rates: Rates, before: Matrix | None = None
+    ) -> None:
+        """The offset seen less that of the line held; `before` are the first states by which the sight was
+        placed where they are others now."""
         row, error_m = offset_error(sight, line, x, rates)
+        if before is not None:
+            error_m += float(row[:FIRST_LINE] @ (x[:FIRST_LINE] - before))
         self._add(row, error_m, sight.sigma_m, sight.offset_per_tilt, sight.axis)
 
     def add_turn(self, sight: LineSight, x: Matrix, rates: Rates) -> None:

@@ -39,11 +39,14 @@ class LineSight(NamedTuple):
     """What the tilt of the frame makes of the offset."""
     bent_m: float = 0.0
     """What it makes of it beyond the height times the tilt."""
+    turned_rad: float = 0.0
+    """What it makes of the direction."""
 
 
 class FeatureSight(NamedTuple):
     """A point of the floor as two sights, one across each grid axis; they have its number as `feature`."""
 
+    id: int
     across: tuple[LineSight, LineSight]
 
 
@@ -93,6 +96,7 @@ def line_sight(
     by_roll, by_pitch = (on(across, shift) for shift in shifts)
     tilted_m = by_roll * tilt_rad[0] + by_pitch * tilt_rad[1]
     bent_m = tilted_m - height_m * (across[0] * tilt_rad[1] - across[1] * tilt_rad[0])
+    turned_rad = turn_by_roll * tilt_rad[0] + turn_by_pitch * tilt_rad[1]
     # who rolls while pitched, or is mounted pitched and rolls, turns a little, too
     turned_by_roll, turned_by_mount = -math.sin(tilt_rad[1]), math.sin(tilt_rad[0])
     by_roll, turn_by_roll = by_roll + by_yaw * turned_by_roll, turn_by_roll + turned_by_roll
@@ -114,6 +118,7 @@ def line_sight(
         turn_per_mount=(turn_by_roll, turn_by_pitch + turned_by_mount),
         tilted_m=tilted_m,
         bent_m=bent_m,
+        turned_rad=turned_rad,
     )
 
 
@@ -153,7 +158,7 @@ def feature_sight(
             feature=id_,
         )
 
-    return FeatureSight((across(0, x_m, -y_m), across(1, y_m, x_m)))
+    return FeatureSight(id_, (across(0, x_m, -y_m), across(1, y_m, x_m)))
 
 
 def as_compensated(sight: LineSight, compensation: TiltCompensation) -> LineSight:
@@ -170,6 +175,7 @@ def as_compensated(sight: LineSight, compensation: TiltCompensation) -> LineSigh
             sight = sight._replace(offset_per_tilt=_LEVEL)
     return sight._replace(
         sigma_m=math.hypot(sight.sigma_m, left_m),
+        sigma_theta_rad=math.hypot(sight.sigma_theta_rad, sight.turned_rad),
         turn_per_tilt=_LEVEL,
         offset_per_mount=_LEVEL,
         turn_per_mount=_LEVEL,

@@ -18,6 +18,7 @@ from flightd.core.geometry import Lens, Matrix, Mount, wrap_pi
 from flightd.core.tracks import NOT_SEEN, FloorJunction, MarkerOffset, PadOffset, TrackedLine, TrackSet
 from flightd.core.types import Attitude, LineSet, MarkerSight, PadSight
 from flightd.tracking.attitude_history import AttitudeHistory
+from flightd.tracking.feature_trust import FeatureTrust
 from flightd.tracking.floor_filter import FloorFilter
 from flightd.tracking.ground_junctions import floor_junctions
 from flightd.tracking.heading_dispute import HeadingDispute
@@ -52,6 +53,8 @@ from flightd.tracking.tilt_compensation import (
 from flightd.tracking.width_heights import WidthHeights
 
 _STEP_NS = 20_000_000
+_FARTHEST = 3.0
+"""A feature further off than so many heights is told by hardly anything."""
 _ASSUMED_TILT_RAD = math.radians(2.0)
 _RATE_NS = 20_000_000
 """The told attitude's rates are taken over so long before and after."""
@@ -90,7 +93,9 @@ class LineTracker:
         if learnt is not None:
             self._filter.begin_with(learnt)
         self._forget_ns = forget_ns
-        self._lines_ns = self._features_ns = 0
+        self._lines_ns = 0
+        self._features_ns = [0, 0]
+        self._trust = FeatureTrust()
         self._stamp_ns = self._told_ns = 0
         self._pads: tuple[PadOffset, ...] = ()
         self._junctions: tuple[FloorJunction, ...] = ()
@@ -164,8 +169,11 @@ class LineTracker:
         sights = [as_compensated(sight, self._compensation) for sight in placed if sight is not None]
         features = self._features(lines, view, yaw)
         rates, exact = self._rates(stamp_ns), self._compensation is TiltCompensation.EXACT
-        if self._filter.update(sights, rates, stamp_ns, features, assumed=assumed, exact=exact):
-            self._features_ns = stamp_ns
+        believed = features if self._trust.holds else []
+        for axis in self._filter.update(sights, rates, stamp_ns, believed, assumed=assumed, exact=exact):
+            self._features_ns[axis] = stamp_ns
+        places = {seen.id: (seen.across[0].offset_m, seen.across[1].offset_m) for seen in features}
+        self._trust.step(places, self._filter.speeds(stamp_ns), stamp_ns)
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
         self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in _placed(lines.pads, view, yaw))
         marks = _placed(lines.markers, view, yaw)
@@ -223,18 +231,21 @@ class LineTracker:
             markers=tuple(
                 replace(mark, x_m=mark.x_m - moved_x, y_m=mark.y_m - moved_y) for mark in self._markers
             ),
-            features_ns=self._features_ns,
+            features_ns=(self._features_ns[0], self._features_ns[1]),
         )
 
     def _features(self, lines: LineSet, view: FloorView, yaw_rad: float) -> list[FeatureSight]:
         """The features of one frame.  Without an exact compensation they do not move as its lines do."""
         if not lines.features or self._compensation is not TiltCompensation.EXACT:
             return []
-        tilt, sigma_m = (view.attitude.roll_rad, view.attitude.pitch_rad), self._params.feature_sigma_m
+        tilt, height_m = (view.attitude.roll_rad, view.attitude.pitch_rad), view.height_m
+        by_px = self._params.feature_sigma_px * height_m / self._lens.fx_px
+        sigma_m = math.hypot(by_px, height_m * view.sigma_tilt_rad)
         points = floor_points([(seen.x_px, seen.y_px) for seen in lines.features], view)
         return [
-            feature_sight(seen.id, point, yaw_rad, tilt, view.height_m, sigma_m)
+            feature_sight(seen.id, point, yaw_rad, tilt, height_m, sigma_m)
             for seen, point in zip(lines.features, points, strict=bool(points))
+            if math.hypot(*point) < _FARTHEST * height_m
         ]
 
     def _lines(self, axis: int) -> list[TrackedLine]:

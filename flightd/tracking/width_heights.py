@@ -8,8 +8,9 @@ from statistics import median
 
 _GAIN = 0.15
 _AGREEING, _DOUBTED = 0.15, 0.2
-_STEADY = 0.1
-"""Lines whose widths tell heights that differ by more (standard deviation, share) are none of the map."""
+_STEADY = 0.06
+"""Lines whose widths tell heights that change by more from frame to frame (share) are none of the map; a fast
+climb changes them by less."""
 
 
 class WidthHeights:
@@ -17,26 +18,31 @@ class WidthHeights:
 
     def __init__(self) -> None:
         self._share = 1.0
-        self._variance = 0.0
+        self._changes = 0.0
+        self._last_m: float | None = None
         self._agreed = False
 
     @property
     def share(self) -> float:
-        """The height told lately against that by the width; 1 while they agree, and while the widths do not
-        agree with each other."""
-        steady = math.sqrt(self._variance) < _STEADY * self._share
-        return self._share if steady else 1.0
+        """The height told lately against that by the width: near 1 while they agree, 1 while the widths do
+        not agree with each other."""
+        return self._share if self._changes < _STEADY else 1.0
 
     def believed_m(self, by_width_m: Sequence[float], told_m: float) -> float:
         """The height `told_m`, unless there is none or the heights of this frame's lines by their widths
         contradict it for long: then theirs."""
         if not by_width_m or not told_m > 0:
-            return median(by_width_m) if by_width_m else told_m
+            return median(by_width_m) if by_width_m else told_m / self._believed_share
         nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
         self._agreed |= abs(told_m / nearest_m - 1.0) < _AGREEING
         if not self._agreed:  # then it is the line that is another
             return told_m
-        off = told_m / nearest_m - self._share
-        self._share += _GAIN * off
-        self._variance = (1.0 - _GAIN) * (self._variance + _GAIN * off * off)
-        return nearest_m if abs(self.share - 1.0) > _DOUBTED else told_m
+        self._share += _GAIN * (told_m / nearest_m - self._share)
+        if self._last_m is not None:
+            self._changes += _GAIN * (min(abs(math.log(nearest_m / self._last_m)), 1.0) - self._changes)
+        self._last_m = nearest_m
+        return told_m if self._believed_share == 1.0 else nearest_m
+
+    @property
+    def _believed_share(self) -> float:
+        return self.share if abs(self.share - 1.0) > _DOUBTED else 1.0

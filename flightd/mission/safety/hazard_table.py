@@ -244,7 +244,8 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "lines_lost",
         Trigger.LINES_LOST,
-        "no line of the map newer than `mission.lines_hold_s`, the followed one older than 0.8 s, or the"
+        "no line of the map newer than `mission.lines_hold_s`, the followed one older than 0.8 s, and no"
+        " features of the floor that carry the position on (`localisation.expert.by_features_m`), or the"
         " position too uncertain",
         Action.HOLD,
         "brake by dead reckoning, hold; after `hazards.expert.search_s` climb by"

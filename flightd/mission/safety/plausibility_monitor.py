@@ -49,7 +49,7 @@ class PlausibilityMonitor:
         self._tick_s += min(dt_s / _TICK_MEMORY_S, 1.0) * (dt_s - self._tick_s)
         share = tracker.height_share if height_m > self._judged_above_m else 1.0
         self._doubt = abs(share - 1.0) > self._height_share
-        if tracks is not None and now_ns - tracks.lines_ns < _FRESH_NS:
+        if tracks is not None and now_ns - max(tracks.lines_ns, min(tracks.features_ns)) < _FRESH_NS:
             part = min(dt_s / _PUSH_MEMORY_S, 1.0)
             x, y = self.push_mps2
             self.push_mps2 = x + part * (tracks.push_x_mps2 - x), y + part * (tracks.push_y_mps2 - y)

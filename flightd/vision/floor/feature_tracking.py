@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flightd.core.types import FloorFeature, Image
 from flightd.vision.lines.sampling import Grid
-from flightd.vision.lines.undistortion import Plane
+from flightd.vision.lines.undistortion import NOWHERE_PX, Plane
 
 Array: TypeAlias = NDArray[Any]
 
@@ -64,7 +64,7 @@ class FeatureTracker:
             self._keep(np.zeros(len(self._ids), bool))
         found = self._tell(plane, grid, join)
         if len(self._ids) < _ENOUGH:
-            self._make_up(grey, seq)
+            self._detect(grey, seq)
         self._grey, self._stamp_ns = grey, stamp_ns
         return found
 
@@ -93,12 +93,14 @@ class FeatureTracker:
             return ()
         at = (self._at[chosen].astype(float) + 0.5) * join - 0.5
         x, y = plane.ideal(grid.x(at[:, 0]), grid.y(at[:, 1]))
+        there = np.maximum(np.abs(x), np.abs(y)) < NOWHERE_PX
+        chosen, x, y = chosen[there], x[there], y[there]
         return tuple(
             FloorFeature(int(id_), round(float(u), 2), round(float(v), 2))
             for id_, u, v in zip(self._ids[chosen], x, y, strict=True)
         )
 
-    def _make_up(self, grey: Image, seq: int) -> None:
+    def _detect(self, grey: Image, seq: int) -> None:
         """Look for new points away from those that are followed."""
         free = np.zeros(grey.shape, np.uint8)
         free[_BORDER_PX:-_BORDER_PX, _BORDER_PX:-_BORDER_PX] = 255

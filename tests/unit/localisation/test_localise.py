@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from flightd.core.camera_view import FloorReach
@@ -108,8 +109,9 @@ def test_features_of_the_floor_carry_the_position_on_for_as_far_as_they_may() ->
     told_m = 0.0
     for tick in range(20, 400):
         moving = tracks(tick, [], [], vx=0.8)
-        pose = localiser.step(replace(moving, features_ns=moving.stamp_ns - 100_000_000), 1.6)
-        if min(localiser.told_ns) == moving.stamp_ns - 100_000_000:
+        at_ns = moving.stamp_ns - 100_000_000
+        pose = localiser.step(replace(moving, features_ns=(at_ns, at_ns), pads_ns=at_ns), 1.6)
+        if min(localiser.told_ns) == at_ns:
             told_m = pose.x_m - A1.x_m
     assert 2.9 < told_m < 3.3
     assert min(localiser.told_ns) > max(seen_ns)
@@ -123,5 +125,37 @@ def test_features_alone_tell_no_position() -> None:
     localiser = GridLocaliser(SITE, "A1", FloorReach())
     for tick in range(1, 20):
         seen = tracks(tick, [], [])
-        localiser.step(replace(seen, features_ns=seen.stamp_ns), 1.6)
+        localiser.step(replace(seen, features_ns=(seen.stamp_ns, seen.stamp_ns)), 1.6)
     assert localiser.told_ns == (0, 0)
+
+
+def after_lines(features: Callable[[int], tuple[bool, bool]], ticks: int = 200) -> tuple[GridLocaliser, int]:
+    """Lines for 20 ticks, then only the features that `features` says, at rest."""
+    localiser, last = GridLocaliser(SITE, "A1", FloorReach()), [0, 0]
+    for tick in range(1, ticks):
+        here = [replace(line(0, 0.0), seen_ns=tick * TICK_NS)] if tick < 20 else []
+        now_ns = tick * TICK_NS
+        for axis, told in enumerate(features(tick)):
+            last[axis] = now_ns if told else last[axis]
+        seen = replace(tracks(tick, here, here), features_ns=(last[0], last[1]), pads_ns=now_ns)
+        localiser.step(seen, 1.6)
+    return localiser, now_ns
+
+
+def test_once_nothing_told_the_position_features_do_not_take_it_up_again() -> None:
+    localiser, now_ns = after_lines(lambda tick: (not 60 < tick < 110,) * 2)
+    assert max(localiser.told_ns) < now_ns - 2_000_000_000
+    unbroken, now_ns = after_lines(lambda _: (True, True))
+    assert min(unbroken.told_ns) == now_ns
+
+
+def test_features_along_one_axis_tell_nothing_of_the_other() -> None:
+    localiser, now_ns = after_lines(lambda _: (True, False))
+    x_ns, y_ns = localiser.told_ns
+    assert x_ns == now_ns
+    assert y_ns < now_ns - 3_000_000_000
+
+
+def test_a_hover_is_not_carried_for_ever() -> None:
+    localiser, now_ns = after_lines(lambda _: (True, True), ticks=2000)
+    assert max(localiser.told_ns) < now_ns - 5_000_000_000

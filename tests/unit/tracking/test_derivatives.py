@@ -46,7 +46,7 @@ def test_the_transition_is_derived_rightly(
     for column in range(len(x)):
         aside = np.eye(len(x))[column] * step
         difference = (end(x + aside) - end(x - aside)) / (2 * step)
-        assert jacobian[:, column] == pytest.approx(difference, abs=2e-4)
+        assert jacobian[:, column] == pytest.approx(difference, abs=2e-5)
 
 
 def view(

@@ -29,6 +29,20 @@ def test_widths_that_contradict_each_other_tell_no_height() -> None:
         assert heights.share == 1.0
 
 
+def test_a_range_finder_that_swings_is_contradicted_by_a_steady_width() -> None:
+    heights = WidthHeights()
+    for n in range(90):
+        heights.believed_m([1.6], 1.6 if n < 30 else (0.5 if n % 2 else 1.6))
+    assert heights.share < 0.85
+
+
+def test_without_widths_a_contradicted_height_is_put_right_by_what_they_said() -> None:
+    heights = WidthHeights()
+    for n in range(120):
+        heights.believed_m([1.6], 1.6 if n < 30 else 2.4)
+    assert heights.believed_m([], 1.2) == pytest.approx(0.8, abs=0.02)
+
+
 def test_one_width_that_agrees_is_enough_and_none_at_all_changes_nothing() -> None:
     heights = WidthHeights()
     for _ in range(60):
