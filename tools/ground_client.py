@@ -21,7 +21,7 @@ while True:
     said = json.loads(body)
     if topic == b"event":
         print(said["level"], said["name"], said["text"], flush=True)
-    elif said["vehicle"] and said["vehicle"]["battery_frac"] < 0.5 and not sent_home:
+    elif said["vehicle"] and (said["vehicle"]["battery_frac"] or 1.0) < 0.5 and not sent_home:
         command.send_json({"version": 1, "id": uuid.uuid4().hex, "op": "command", "command": "home"})
         print(command.recv_json(), flush=True)
         sent_home = True

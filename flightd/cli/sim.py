@@ -27,7 +27,7 @@ EXAMPLES = """Examples:
   flightd sim --truth-url tcp:127.0.0.1:5762 --vehicle-url tcp:127.0.0.1:5760   ArduCopter's SITL flies
   flightd sim --scenario camera_frozen --scenario wind.toml    what goes wrong, by name or file
   flightd sim --scenario all                   every hazard in turn, and one table
-  flightd sim --world rough                    a drone that is not as its configuration says
+  flightd sim --world ideal                    a drone that is as its configuration says
   flightd sim --seeds 10                       ten flights, seeds 1 to 10, and one table
   flightd sim --set mission.heading=shelf --set control.tilt_compensation=none
 """

@@ -23,7 +23,11 @@ class LocalisationExpert(Section):
         3.0, gt=0, le=100, description="at this distance from the start node those odds have halved"
     )
     by_features_m: float = Field(
-        3.0, ge=0, le=20, description="so far features of the floor may carry the position on without lines"
+        3.0,
+        ge=0,
+        le=20,
+        description="way (a hover counts as 0.1 m/s) over which features of the floor may carry the position "
+        "on without a line across an axis",
     )
     most_places: int = Field(48, ge=4, le=1000, description="places that are told apart at once, at most")
     slip: float = Field(

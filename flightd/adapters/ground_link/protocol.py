@@ -98,14 +98,14 @@ class LinkReport(msgspec.Struct, frozen=True):
 class SensorReport(msgspec.Struct, frozen=True):
     """The drone's own sensors, beyond their configuration; each with its standard deviation."""
 
-    delay_ms: Annotated[float, Meta(description="frames are exposed so much later than their stamps say, ms")]
-    delay_sigma_ms: float
+    delay_ms: Annotated[float, Meta(description="the camera's, more than `camera.latency_s`, ms")]
+    delay_sigma_ms: Annotated[float, Meta(description="standard deviation of the delay, ms")]
     mount_roll_deg: Annotated[float, Meta(description="the camera rolled, its right side down")]
     mount_pitch_deg: Annotated[float, Meta(description="the camera pitched, its front up")]
-    mount_sigma_deg: float
+    mount_sigma_deg: Annotated[float, Meta(description="standard deviation of the mount")]
     tilt_roll_deg: Annotated[float, Meta(description="the roll that is told is too small by this")]
     tilt_pitch_deg: Annotated[float, Meta(description="the pitch that is told is too small by this")]
-    tilt_sigma_deg: float
+    tilt_sigma_deg: Annotated[float, Meta(description="standard deviation of the tilt")]
     shake_deg: Annotated[float, Meta(description="the picture against the attitude, frame by frame, rms")]
 
 
@@ -315,7 +315,7 @@ DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 PUBLISHED = (StatusReport, EventReport)
 REQUESTS = (Hello, Order, AskStatus, AskPicture, AskInventory, Attend)
 ANSWERS = (Welcome, Accepted, Refused, StatusAnswer, PictureAnswer, InventoryAnswer)
-PARTS = (Position, SeenLine, VehicleReport, LinkReport, FloorStatus, FloorNode, FloorLine)
+PARTS = (Position, SeenLine, VehicleReport, LinkReport, SensorReport, FloorStatus, FloorNode, FloorLine)
 
 
 def finite(value: float) -> float | None:

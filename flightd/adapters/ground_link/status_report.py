@@ -55,7 +55,7 @@ def _sensors(known: SensorEstimate) -> SensorReport:
         return round(math.degrees(angle_rad), 3)
 
     return SensorReport(
-        delay_ms=round(known.delay_s * 1e3, 2),
+        delay_ms=round(-known.delay_s * 1e3, 2),
         delay_sigma_ms=round(known.delay_sigma_s * 1e3, 2),
         mount_roll_deg=degrees(known.mount_roll_rad),
         mount_pitch_deg=degrees(known.mount_pitch_rad),

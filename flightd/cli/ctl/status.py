@@ -62,9 +62,11 @@ def status_lines(report: StatusReport) -> list[str]:
     lines.append(f"latency  {report.latency_ms.get('total', 0.0):.0f} ms from exposure to setpoint")
     if (seen := report.sensors) is not None:
         lines.append(
-            f"sensors  delay {seen.delay_ms:+.0f} ms (sigma {seen.delay_sigma_ms:.0f}),"
+            f"sensors  beyond the configuration: delay {seen.delay_ms:+.0f} ms"
+            f" (sigma {seen.delay_sigma_ms:.0f}),"
             f" mount roll {seen.mount_roll_deg:+.1f} pitch {seen.mount_pitch_deg:+.1f} deg"
-            f" (sigma {seen.mount_sigma_deg:.1f})"
+            f" (sigma {seen.mount_sigma_deg:.1f}), attitude {seen.tilt_roll_deg:+.1f}"
+            f" {seen.tilt_pitch_deg:+.1f} deg (sigma {seen.tilt_sigma_deg:.1f})"
         )
     lines.append(
         f"link     {link.attending} attending, {link.refused} of {link.requests} requests refused, "

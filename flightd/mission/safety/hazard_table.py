@@ -235,8 +235,8 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "aisle_open",
         Trigger.AISLE_OPEN,
-        "where the site demands it (`interlock`): `interlock.file` does not say any more that the aisles are"
-        " closed, or cannot be read",
+        "where `interlock.file` is named (a site may demand that): it does not say any more that the aisles"
+        " are closed, or cannot be read",
         Action.CONFIGURED,
         "nothing arms; in flight `hazards.aisle_open`: continue, hold, home or land",
         _FAST,

@@ -25,8 +25,11 @@ _MOST, _ENOUGH, _FEWEST = 24, 12, 4
 """Points followed; fewer than `_ENOUGH` are made up; fewer than `_FEWEST` agree by chance."""
 _APART_PX = 10.0
 _QUALITY = 0.02
-_CONTRAST = 1e-4
-"""Least eigenvalue of a corner's structure tensor (grey levels of 0..1): flatter ones are noise."""
+_CONTRAST = 1e-3
+"""Least eigenvalue of a corner's structure tensor (detail of 0..1): flatter ones are noise."""
+_LIGHT_PX, _GAIN = 7, 4.0
+"""What is wider than this in the small picture is light: shadows and mirrored lamps do not move as the floor
+does, and pull what lies in them along."""
 _BORDER_PX = 4
 _GAP_NS = 250_000_000
 """After so long the floor below is another one."""
@@ -43,7 +46,7 @@ class FeatureTracker:
     """Give each frame to `find` in turn.  One for each detector: what it follows is its own."""
 
     def __init__(self) -> None:
-        self._grey: Image | None = None
+        self._detail: Image | None = None
         self._stamp_ns = 0
         self._ids: Array = np.empty(0, np.int64)
         self._told: Array = np.empty(0, bool)
@@ -56,16 +59,16 @@ class FeatureTracker:
         the frame before, the oldest first, at most `MOST_TOLD`; in centred image coordinates of a
         distortion-free camera."""
         join = max(round(grid.width / _WIDTH_PX), 1)
-        grey = _joined(small, join)
-        follows = self._grey is not None and 0 < stamp_ns - self._stamp_ns <= _GAP_NS
-        if follows and self._grey is not None and self._grey.shape == grey.shape:
-            self._follow(self._grey, grey)
+        detail = _detail_of(small, join)
+        follows = self._detail is not None and 0 < stamp_ns - self._stamp_ns <= _GAP_NS
+        if follows and self._detail is not None and self._detail.shape == detail.shape:
+            self._follow(self._detail, detail)
         else:
             self._keep(np.zeros(len(self._ids), bool))
         found = self._tell(plane, grid, join)
         if len(self._ids) < _ENOUGH:
-            self._detect(grey, seq)
-        self._grey, self._stamp_ns = grey, stamp_ns
+            self._detect(detail, seq)
+        self._detail, self._stamp_ns = detail, stamp_ns
         return found
 
     def _follow(self, before: Image, now: Image) -> None:
@@ -100,13 +103,13 @@ class FeatureTracker:
             for id_, u, v in zip(self._ids[chosen], x, y, strict=True)
         )
 
-    def _detect(self, grey: Image, seq: int) -> None:
+    def _detect(self, detail: Image, seq: int) -> None:
         """Look for new points away from those that are followed."""
-        free = np.zeros(grey.shape, np.uint8)
+        free = np.zeros(detail.shape, np.uint8)
         free[_BORDER_PX:-_BORDER_PX, _BORDER_PX:-_BORDER_PX] = 255
         for x, y in self._at:
             cv2.circle(free, (round(float(x)), round(float(y))), round(_APART_PX), 0, -1)
-        strength = np.asarray(cv2.cornerMinEigenVal(grey, _BLOCK))
+        strength = np.asarray(cv2.cornerMinEigenVal(detail, _BLOCK))
         wanted = _MOST - len(self._ids)
         limit = max(_QUALITY * float(strength.max()), _CONTRAST)
         peaks = (strength == cv2.dilate(strength, _BLOCK_ONES)) & (strength > limit) & (free > 0)
@@ -122,12 +125,14 @@ class FeatureTracker:
 _BLOCK_ONES = np.ones((_BLOCK, _BLOCK), np.uint8)
 
 
-def _joined(small: Image, join: int) -> Image:
-    """Grey, `join` samples a side to one pixel."""
+def _detail_of(small: Image, join: int) -> Image:
+    """The detail of the grey picture without its light, `join` samples a side to one pixel."""
     grey = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY)
     size = max(small.shape[1] // join, 1), max(small.shape[0] // join, 1)
     whole = grey[: size[1] * join, : size[0] * join]
-    return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.uint8)
+    joined = cv2.resize(whole, size, interpolation=cv2.INTER_AREA)
+    light = cv2.blur(joined, (_LIGHT_PX, _LIGHT_PX))
+    return np.asarray(cv2.addWeighted(joined, _GAIN, light, -_GAIN, 128.0), np.uint8)
 
 
 def _followed(before: Image, now: Image, at: Array) -> tuple[Array, Array]:

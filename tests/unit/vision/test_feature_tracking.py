@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import cv2
@@ -109,3 +110,32 @@ def test_features_are_those_of_a_camera_without_distortion() -> None:
     for distorted, straight in zip(raw, ideal, strict=True):
         # barrel distortion pulls points towards the middle
         assert np.hypot(straight.x_px, straight.y_px) > np.hypot(distorted.x_px, distorted.y_px)
+
+
+def slide(floor: Image, spoil: Callable[[Image], Image], frames: int = 25) -> float:
+    """How much of a flight across the floor the features go along with, the median of all told."""
+    tracker, at = FeatureTracker(), dict[int, tuple[int, float]]()
+    shares = []
+    for n in range(frames):
+        for seen in find(tracker, spoil(view(floor, 0.0, 4.0 * n, noise=n + 1)), n, n * FRAME_NS, PLANE):
+            begun, y_px = at.setdefault(seen.id, (n, seen.y_px))
+            if n - begun >= 5:
+                shares.append(abs(1.0 + (seen.y_px - y_px) / (4.0 * (n - begun))))
+    assert len(shares) > 4 * frames / 2
+    return float(np.quantile(shares, 0.9))
+
+
+def test_lamps_mirrored_in_the_floor_pull_nothing_along() -> None:
+    light = np.zeros(SIZE[::-1], np.float32)
+    for x in (120, 260, 400, 540):
+        cv2.circle(light, (x, 180), 30, 60.0, -1)
+    light = np.asarray(cv2.GaussianBlur(light, (0, 0), 18.0))[..., None]
+    assert slide(concrete(4), lambda seen: np.clip(seen + light, 0, 255).astype(np.uint8)) < 0.05
+
+
+def test_along_a_tyre_mark_no_point_is_followed() -> None:
+    """Its edges show no motion along it."""
+    floor = concrete(5, contrast=3.0)
+    for x in range(150, 760, 60):
+        floor[:, x : x + 14] -= 45
+    assert slide(floor, lambda seen: seen) < 0.05
