@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 
 from flightd.config.schema import Config
+from flightd.core.learnt import LearntSensors
 from flightd.core.scanning import Place
 from flightd.core.tick import TICK_S, StepFailure, TickInput, TickOutput
 from flightd.core.types import AttitudeSetpoint, CommandKind, Demand, Phase
@@ -32,7 +33,8 @@ class Pilot:
     """The whole flying state of one mission.
 
     `overhead_m` are the heights below the keep-outs, also of those that `site` leaves out because the
-    flight's own heights pass them by; `autostart` is the order's, None: the configuration's."""
+    flight's own heights pass them by; `autostart` is the order's, None: the configuration's; `learnt` what
+    earlier flights have learnt of the sensors."""
 
     def __init__(
         self,
@@ -44,12 +46,13 @@ class Pilot:
         overhead_m: Sequence[float] = (),
         *,
         autostart: bool | None = None,
+        learnt: LearntSensors | None = None,
     ) -> None:
         self._config = config
         self._plan = plan
         self._scanner = scanner
         self._mission = Mission(site, plan, policy, config, scanner, overhead_m, autostart=autostart)
-        self._estimator = StateEstimator(site, config, scanner.least_integrity, self._mission.stand)
+        self._estimator = StateEstimator(site, config, scanner.least_integrity, self._mission.stand, learnt)
         self._charge = BatteryCharge(config.battery)
         self._plausibility = PlausibilityMonitor(site, config)
         self._steering = Steering(config.control, self._plausibility)
@@ -72,6 +75,11 @@ class Pilot:
     def failure(self) -> StepFailure | None:
         """What the newest step raised, None where it raised nothing."""
         return self._last_resort.failure
+
+    @property
+    def learnt(self) -> LearntSensors | None:
+        """What the flight that ended last has learnt of the sensors, or those before it."""
+        return self._estimator.learnt
 
     @property
     def mission(self) -> Mission:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from flightd.adapters.store.progress import LeftOver
 from flightd.app.flight import Tasks
 from flightd.core.scanning import CodeSet
 from flightd.core.snapshot import Snapshot
@@ -98,13 +97,13 @@ class NoCounting:
         pass
 
 
-class NoProgress:
-    """Nobody asks for the stops left over."""
+class NothingKept:
+    """`Kept` of what nobody asks for once the daemon has ended."""
 
     async def run(self) -> None:
         await _idle()
 
-    def put(self, left: LeftOver) -> None:
+    def put(self, value: object) -> None:
         pass
 
 
@@ -117,4 +116,4 @@ NO_GROUND = NoGround()
 NO_INTERLOCK = NoInterlock()
 NO_CAMERA = NoCamera()
 NO_COUNTING = NoCounting()
-NO_PROGRESS = NoProgress()
+NOTHING_KEPT = NothingKept()

@@ -14,15 +14,16 @@ from functools import partial
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.adapters.interlock import FileInterlock
-from flightd.adapters.store.progress import ProgressFile
+from flightd.adapters.store.learnt_sensors import learnt_file
+from flightd.adapters.store.progress import progress_file
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.app.absent_parts import (
     NO_CAMERA,
     NO_COUNTING,
     NO_GROUND,
     NO_INTERLOCK,
-    NO_PROGRESS,
     NO_RECORDER,
+    NOTHING_KEPT,
     keep_pose,
 )
 from flightd.app.counting.count import Counting
@@ -38,6 +39,7 @@ from flightd.config.mission import HEIGHT_ROOM_M
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError
 from flightd.core.flight_order import FlightOrder
+from flightd.core.learnt import LearntSensors
 from flightd.core.refusal import Refusal
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TICK_S
@@ -86,7 +88,8 @@ def build(
     counting: Counting | None = None,
     monitors: Sequence[Monitor] = (),
     observers: Sequence[Callable[[Snapshot], None]] = (),
-    keep_progress: bool = False,
+    learnt: LearntSensors | None = None,
+    keep_files: bool = False,
     peers: Peers | None = None,
     opener: OpenDatagrams = open_datagrams,
     hold: Hold = nullcontext,
@@ -96,10 +99,10 @@ def build(
 ) -> Flight:
     """Connect the vehicle and the cameras and compose the flight that `order` asks for.  `peers` are those of
     the configuration unless given; `opener` opens sockets and time is held by `hold` while threads work, as
-    the event loop wants it; the rest as `assemble`.  InputError where configuration, map and order
-    contradict each other."""
+    the event loop wants it; `learnt` is what earlier flights have learnt; the rest as `assemble`.  InputError
+    where configuration, map and order contradict each other."""
     peers = peers or configured_peers(config)
-    pilot = pilot_of(config, site, order)
+    pilot = pilot_of(config, site, order, learnt)
     vehicle = connect_vehicle(config.vehicle, clock, config.control, url=peers.vehicle, opener=opener)
     publishers = TelemetryPublishers(clock, vehicle, recorder, ground, monitors, observers)
     kept_fps = 0.0 if recorder is NO_RECORDER else config.recorder.picture_fps
@@ -123,7 +126,7 @@ def build(
         ground=ground,
         cameras=(camera, front_camera),
         counting=NO_COUNTING if counting is None else counting,
-        keep_progress=keep_progress,
+        keep_files=keep_files,
         startup_fault=startup_fault,
         interlock=interlock,
         unfit=unfit,
@@ -144,15 +147,16 @@ def assemble(
     ground: Ground = NO_GROUND,
     cameras: tuple[Camera, Camera] = (NO_CAMERA, NO_CAMERA),
     counting: Count = NO_COUNTING,
-    keep_progress: bool = False,
+    keep_files: bool = False,
     startup_fault: FlightdError | None = None,
     interlock: Interlock | None = None,
     unfit: Refusal | None = None,
 ) -> Flight:
     """Put a flight together from what is connected already.  `cameras` are the down and the front one;
-    `keep_progress`: the stops left over are kept in `mission.progress`, if that names a file; `interlock` is
+    `keep_files`: the stops left over are kept in `mission.progress`, what is learnt of the sensors in
+    `tracking.learnt`, if those name files; `interlock` is
     the configured one unless given, `unfit` what speaks against a flight on this computer."""
-    kept = config.mission.progress if keep_progress else None
+    progress, learnt = (config.mission.progress, config.tracking.learnt) if keep_files else (None, None)
     camera, front_camera = cameras
     return Flight(
         clock=clock,
@@ -165,7 +169,8 @@ def assemble(
         counting=counting,
         recorder=recorder,
         ground=ground,
-        progress=NO_PROGRESS if kept is None else ProgressFile(kept, site.name),
+        progress=NOTHING_KEPT if progress is None else progress_file(progress, site.name),
+        learnt=NOTHING_KEPT if learnt is None else learnt_file(learnt, config),
         publishers=publishers,
         share_pose=_pose_sharing(config, site, vehicle),
         startup_fault=startup_fault,
@@ -214,8 +219,11 @@ def start_of(order: FlightOrder, site: Site) -> str:
     return pad.node
 
 
-def pilot_of(config: Config, site: Site, order: FlightOrder | None = None) -> Pilot:
-    """A fresh pilot for one flight of an order (by default the configuration's).  InputError where map and
+def pilot_of(
+    config: Config, site: Site, order: FlightOrder | None = None, learnt: LearntSensors | None = None
+) -> Pilot:
+    """A fresh pilot for one flight of an order (by default the configuration's), which begins with what
+    earlier ones have `learnt`.  InputError where map and
     configuration contradict each other."""
     order = order or configured_order(config)
     _demand_ceiling(config, site)
@@ -228,7 +236,9 @@ def pilot_of(config: Config, site: Site, order: FlightOrder | None = None) -> Pi
     plan, policy = _plan_on(config, flown, order), HeadingPolicy.of(config)
     scanner = scanner_of(config, site)
     check_battery(flown, plan, policy, config, scanner)
-    return Pilot(flown, plan, policy, config, scanner, site.overhead_m, autostart=order.autostart)
+    return Pilot(
+        flown, plan, policy, config, scanner, site.overhead_m, autostart=order.autostart, learnt=learnt
+    )
 
 
 def scanner_of(config: Config, site: Site) -> AnyScanner:

@@ -82,6 +82,7 @@ class Daemon:
             "ground": restarted(flight.ground.run, self.failed),
             "interlock": flight.interlock.run(),
             "progress": restarted(flight.progress.run, self.failed),
+            "learnt sensors": restarted(flight.learnt.run, self.failed),
             "front-camera": restarted(flight.front_camera.run, self.failed),
             **flight.counting.tasks(flight.publishers.trouble),
         }

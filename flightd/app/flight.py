@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 from flightd.adapters.store.progress import LeftOver
 from flightd.app.publishers import TelemetryPublishers
 from flightd.core.errors import FlightdError
+from flightd.core.learnt import LearntSensors
 from flightd.core.refusal import Refusal
 from flightd.core.scanning import CodeSet
 from flightd.core.tick import TickOutput
 from flightd.core.types import AttitudeSetpoint, GridPose, LineSet
 from flightd.pilot import Pilot
 from flightd.ports import Camera, Clock, Ground, Interlock, Recorder, Vehicle
+
+T_contra = TypeVar("T_contra", contravariant=True)
 
 Tasks: TypeAlias = Mapping[str, Coroutine[Any, Any, None]]
 """What runs beside the tick until it is cancelled, by name."""
@@ -106,12 +109,12 @@ class Count(Protocol):
         ...
 
 
-class Progress(Protocol):
-    """Keeps which stops are still to be made."""
+class Kept(Protocol[T_contra]):
+    """Keeps what is told last beyond the end of the daemon."""
 
     async def run(self) -> None: ...
 
-    def put(self, left: LeftOver) -> None: ...
+    def put(self, value: T_contra) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +135,8 @@ class Flight:
     counting: Count
     recorder: Recorder
     ground: Ground
-    progress: Progress
+    progress: Kept[LeftOver]
+    learnt: Kept[LearntSensors]
     publishers: TelemetryPublishers
     share_pose: Callable[[GridPose], None]
     interlock: Interlock

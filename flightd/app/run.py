@@ -14,6 +14,7 @@ from pathlib import Path
 
 from flightd.adapters.recorder.archive import FlightArchive
 from flightd.adapters.recorder.recorder import McapRecorder
+from flightd.adapters.store.learnt_sensors import load_learnt
 from flightd.app import service
 from flightd.app.absent_parts import NO_GROUND, NO_RECORDER
 from flightd.app.build import build, detector_pool, ground_link
@@ -24,6 +25,7 @@ from flightd.app.flight_orders import configured_order, going_on, resumed
 from flightd.app.recording import FlightSetting, record_setting
 from flightd.config.schema import Config
 from flightd.core.errors import InputError, TransientError
+from flightd.core.learnt import LearntSensors
 from flightd.core.snapshot import Snapshot
 from flightd.doctor.calibration import check_calibration
 from flightd.doctor.check import CheckLevel, FailedChecks
@@ -64,7 +66,22 @@ def prepare(config: Config, path: Path, *, resume: bool) -> Run:
         order = replace(order, autostart=False)
     journal = service.logs_to_journal(os.environ)
     service.note_start(os.environ)
-    return Run(FlightSetting(config, site, order), anew, journal)
+    return Run(FlightSetting(config, site, order, _learnt(config, in_air=anew)), anew, journal)
+
+
+def _learnt(config: Config, *, in_air: bool) -> LearntSensors | None:
+    """What earlier flights have learnt of the sensors.  InputError for a file that is none, but not where
+    the vehicle may be `in_air`."""
+    kept = config.tracking.learnt
+    if kept is None:
+        return None
+    try:
+        return load_learnt(kept, config)
+    except InputError as err:
+        if not in_air:
+            raise
+        _LOG.warning("%s", err)
+        return None
 
 
 async def run_until_signal(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult | signal.Signals:
@@ -101,7 +118,8 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
             counting=counting,
             monitors=monitors,
             observers=[observer],
-            keep_progress=True,
+            learnt=run.setting.learnt,
+            keep_files=True,
             opener=open_paced_datagrams,
             startup_fault=count.error,
             unfit=unfit_here(config, site),

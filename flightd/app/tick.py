@@ -72,11 +72,14 @@ class Tick:
             call("pose output", lambda: flight.share_pose(pose), None)
         call("count", lambda: flight.counting.keep(output), None)
         call("front camera", lambda: flight.front_camera.expose(flight.pilot.exposure), None)
-        call("progress", self._keep_left_over, None)
+        call("progress", self._keep, None)
 
-    def _keep_left_over(self) -> None:
-        mission = self._flight.pilot.mission
-        self._flight.progress.put(LeftOver(mission.remaining, *mission.stand))
+    def _keep(self) -> None:
+        """What is to last beyond the daemon's end."""
+        pilot = self._flight.pilot
+        self._flight.progress.put(LeftOver(pilot.mission.remaining, *pilot.mission.stand))
+        if pilot.learnt is not None:
+            self._flight.learnt.put(pilot.learnt)
 
     def _snapshot(self, tick: TickInput, output: TickOutput, late_s: float) -> Snapshot:
         flight, pilot, call = self._flight, self._flight.pilot, self._call

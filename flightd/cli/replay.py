@@ -53,7 +53,9 @@ def replay(
     recorded = read_log(log, {Topic.TICK, Topic.DECISION, *SETTING_TOPICS})
     flown = recorded_setting(recorded)
     ticks = sum(entry.topic == Topic.TICK for entry in recorded.entries)
-    with watched(pilot_of(flown.config, flown.site, flown.order).step, "deciding", ticks) as step:
+    with watched(
+        pilot_of(flown.config, flown.site, flown.order, flown.learnt).step, "deciding", ticks
+    ) as step:
         decisions = replay_decisions(recorded, step)
     with watched(detector_of(flown.config, flown.site)().detect, "seeing") as detect:
         seen = replay_pictures(log, detect)

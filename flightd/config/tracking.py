@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, TypeAlias
+from pathlib import Path
+from typing import Annotated, ClassVar, TypeAlias
 
 from pydantic import Field
 
@@ -106,4 +107,11 @@ class TrackingExpert(Section):
 class TrackingConfig(Section):
     """How lines are followed from frame to frame."""
 
+    files: ClassVar = ("learnt",)
+
+    learnt: Path | None = Field(
+        None,
+        description="file that keeps what flights learn of the camera's delay and mount, relative to this "
+        "file; none: each begins with what is configured",
+    )
     expert: TrackingExpert = TrackingExpert()

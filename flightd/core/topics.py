@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from flightd.core.flight_order import FlightOrder
+from flightd.core.learnt import LearntSensors
 from flightd.core.scanning import CodeSet, Finding
 from flightd.core.tick import StepFailure
 from flightd.core.types import (
@@ -46,6 +47,7 @@ class Topic(enum.StrEnum):
     CONFIG = "/config"
     MAP = "/map"
     ORDER = "/order"
+    LEARNT = "/learnt"
     TRUTH = "/truth"
     SCENARIO = "/scenario"
     FAULT = "/fault"
@@ -72,7 +74,7 @@ class Document:
 FOR_PEOPLE = frozenset(Topic) - {Topic.FRAME, Topic.TICK, Topic.DECISION}
 """All but the pictures and what only a replay needs."""
 
-RETAINED = frozenset({Topic.CONFIG, Topic.MAP, Topic.ORDER, Topic.SCENARIO})
+RETAINED = frozenset({Topic.CONFIG, Topic.MAP, Topic.ORDER, Topic.LEARNT, Topic.SCENARIO})
 """Topics whose newest message holds for the whole flight, so that every log file must carry it."""
 
 MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(
@@ -91,6 +93,7 @@ MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(
         Topic.CONFIG: Document,
         Topic.MAP: Document,
         Topic.ORDER: FlightOrder,
+        Topic.LEARNT: LearntSensors,
         Topic.SCENARIO: Document,
         Topic.UNKNOWNS: Document,
     }

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 
+from flightd.adapters.store.learnt_sensors import load_learnt
 from flightd.config.camera import CameraConfig
+from flightd.config.schema import Config
+from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
+from flightd.core.learnt import Learnt
 from flightd.doctor.check import Check, error, ok, warning
 from flightd.site.site import Site
 
@@ -16,6 +20,8 @@ _LINE_MIN_PX = 4.0
 _CALIBRATE = "calibrate the camera: flightd calibrate"
 _NAME = "calibration"
 _STEPS = 50
+_LEARNT, _DELAY_S = "learnt", 0.02
+"""A delay that is off by more had better be configured."""
 
 
 def check_calibration(camera: CameraConfig, site: Site, height_m: float) -> list[Check]:
@@ -54,6 +60,28 @@ def check_calibration(camera: CameraConfig, site: Site, height_m: float) -> list
     if not {"fx_px", "fy_px"} & camera.model_fields_set:
         checks.append(warning(_NAME, "camera.fx_px and fy_px are not given: a guess is used", _CALIBRATE))
     return checks or [ok(_NAME, text)]
+
+
+def check_learnt(config: Config) -> list[Check]:
+    """What the last flights have learnt of the camera, where that is kept."""
+    if config.tracking.learnt is None:
+        return []
+    try:
+        learnt = load_learnt(config.tracking.learnt, config)
+    except InputError as err:
+        return [error(_LEARNT, str(err), "the next flight writes it anew")]
+    if learnt is None:
+        return [ok(_LEARNT, "nothing yet of this camera, as it is configured")]
+    delay_s, sigma_s = -learnt.mean(Learnt.DELAY), learnt.sigma(Learnt.DELAY)
+    roll, pitch = (math.degrees(learnt.mean(one)) for one in (Learnt.MOUNT_ROLL, Learnt.MOUNT_PITCH))
+    mount_sigma = math.degrees(learnt.sigma(Learnt.MOUNT_ROLL))
+    text = (
+        f"beyond the configuration: delay {delay_s * 1e3:+.0f} ms (sigma {sigma_s * 1e3:.0f}), mount roll"
+        f" {roll:+.1f} and pitch {pitch:+.1f} deg (sigma {mount_sigma:.1f})"
+    )
+    if abs(delay_s) < max(_DELAY_S, 3.0 * sigma_s):
+        return [ok(_LEARNT, text)]
+    return [warning(_LEARNT, text, f"camera.latency_s = {max(config.camera.latency_s + delay_s, 0.0):.3f}")]
 
 
 def _unfolds(lens: Lens) -> bool:

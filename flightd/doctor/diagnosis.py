@@ -14,7 +14,7 @@ from flightd.adapters.vehicle.mavlink.examination import ExaminationReport
 from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
 from flightd.config.schema import Config
 from flightd.doctor import camera, machine, vehicle
-from flightd.doctor.calibration import check_calibration
+from flightd.doctor.calibration import check_calibration, check_learnt
 from flightd.doctor.check import Check, CheckLevel, ok
 from flightd.doctor.ground import GroundListener, check_ground
 from flightd.doctor.vehicle import Autopilot
@@ -83,6 +83,7 @@ async def examine(subject: Subject) -> Diagnosis:
     checks = [
         *_check_machine(subject),
         *check_calibration(config.camera, subject.site, config.mission.height_m),
+        *check_learnt(config),
     ]
     autopilot = Autopilot(())
     if config.vehicle.kind == "ardrone":

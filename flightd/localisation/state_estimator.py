@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from flightd.config.schema import Config
-from flightd.core.geometry import Matrix
+from flightd.core.learnt import LearntSensors
 from flightd.core.tick import TickInput
 from flightd.core.tracks import TrackSet
 from flightd.core.types import AttitudeSetpoint, GridPose, VehicleState
@@ -36,16 +35,25 @@ class StateEstimator:
     """Call `take` with what came in, then `step`; `begin` at the start and whenever the vehicle is armed or
     disarmed."""
 
-    def __init__(self, site: Site, config: Config, least_integrity: float, stand: tuple[str, float]) -> None:
-        """`least_integrity` is that of a pose that counts as certain; `stand` as for `begin`."""
+    def __init__(
+        self,
+        site: Site,
+        config: Config,
+        least_integrity: float,
+        stand: tuple[str, float],
+        learnt: LearntSensors | None = None,
+    ) -> None:
+        """`least_integrity` is that of a pose that counts as certain; `stand` as for `begin`; `learnt` is
+        what earlier flights have learnt of the sensors."""
         self._site = site
         self._config = config
         self._least_integrity = least_integrity
         self._heights = HeightHistory()
         self._extrapolation = AttitudeExtrapolation()
         self.frames = FrameMonitor()
-        self._learnt: Callable[[], tuple[Matrix, Matrix] | None] = lambda: None
-        self.begin(stand, armed=False)
+        self.learnt = learnt
+        """What the last flight has learnt of the sensors, or those before it."""
+        self._begin(stand, armed=False)
 
     def begin(self, stand: tuple[str, float], *, armed: bool) -> None:
         """Stand on a node, in a heading (rad), and know nothing else.
@@ -53,6 +61,10 @@ class StateEstimator:
         What was seen before arming says nothing: until then the drone may have been carried about.  The
         flight starts on the pad, in the plan's heading.  Nor is anything dead-reckoned once it is disarmed.
         """
+        self.learnt = self.tracker.learnt() or self.learnt
+        self._begin(stand, armed=armed)
+
+    def _begin(self, stand: tuple[str, float], *, armed: bool) -> None:
         node, yaw_rad = stand
         camera, control = self._config.camera, self._config.control
         self.tracker = LineTracker(
@@ -62,10 +74,9 @@ class StateEstimator:
             yaw_rad,
             control.tilt_compensation,
             self._config.tracking,
-            self._learnt(),
+            self.learnt,
             camera.latency_s,
         )
-        self._learnt = self.tracker.learnt
         view = camera.floor_reach(control.max_tilt_rad)
         self.localiser = GridLocaliser(self._site, node, view, self._config.localisation)
         self.poses = PoseHistory(self._least_integrity)

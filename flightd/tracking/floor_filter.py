@@ -19,6 +19,7 @@ import numpy as np
 
 from flightd.config.tracking import MotionNoise, SensorPriors
 from flightd.core.geometry import Matrix
+from flightd.core.learnt import LearntSensors
 from flightd.core.tracks import SensorEstimate
 from flightd.tracking.frame_measurement import FrameMeasurement, offset_error, placed
 from flightd.tracking.held_lines import HeldLine, associate
@@ -148,14 +149,15 @@ class FloorFilter:
             shake_rad=self._innovations.shake_rad,
         )
 
-    def learnt(self) -> tuple[Matrix, Matrix]:
-        """What is known of the sensors: (7,) means and (7, 7) covariance from `ROLL` to `SCALE`."""
-        return self._x[_SENSORS].copy(), self._p[_SENSORS, _SENSORS].copy()
+    def learnt(self) -> LearntSensors:
+        """What is known of the sensors, from `ROLL` to `SCALE`."""
+        covariance = self._p[_SENSORS, _SENSORS]
+        return LearntSensors(tuple(self._x[_SENSORS].tolist()), tuple(covariance.ravel().tolist()))
 
-    def begin_with(self, learnt: tuple[Matrix, Matrix]) -> None:
+    def begin_with(self, learnt: LearntSensors) -> None:
         """Begin with what another filter has learnt of the same sensors: less surely, for a mount can have
         been knocked since, and with another error of the attitude.  What is no number is ignored."""
-        means, covariance = learnt
+        means, covariance = np.array(learnt.means), np.reshape(learnt.covariance, (len(learnt.means), -1))
         if not (np.isfinite(means).all() and np.isfinite(covariance).all()):
             return
         self._x[_SENSORS], self._p[_SENSORS, _SENSORS] = means, covariance

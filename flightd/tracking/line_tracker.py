@@ -14,7 +14,8 @@ from typing import TypeVar
 
 from flightd.config.control import TiltCompensation
 from flightd.config.tracking import TrackingConfig
-from flightd.core.geometry import Lens, Matrix, Mount, wrap_pi
+from flightd.core.geometry import Lens, Mount, wrap_pi
+from flightd.core.learnt import LearntSensors
 from flightd.core.tracks import NOT_SEEN, FloorJunction, MarkerOffset, PadOffset, TrackedLine, TrackSet
 from flightd.core.types import Attitude, LineSet, MarkerSight, PadSight
 from flightd.tracking.attitude_history import AttitudeHistory
@@ -76,7 +77,7 @@ class LineTracker:
         start_yaw_rad: float,
         compensation: TiltCompensation = TiltCompensation.EXACT,
         config: TrackingConfig = _DEFAULTS,
-        learnt: tuple[Matrix, Matrix] | None = None,
+        learnt: LearntSensors | None = None,
         latency_s: float = math.inf,
     ) -> None:
         """`learnt` is what another tracker has learnt of the same sensors, `latency_s` the delay that the
@@ -114,9 +115,9 @@ class LineTracker:
         """The height told lately against that by the lines' width; 1 when they agree, or tell none."""
         return self._widths.share
 
-    def learnt(self) -> tuple[Matrix, Matrix]:
-        """What is known of the sensors, for the tracker after this one."""
-        return self._filter.learnt()
+    def learnt(self) -> LearntSensors | None:
+        """What is known of the sensors, for the tracker after this one; None before a line was seen."""
+        return self._filter.learnt() if self._lines_ns else None
 
     def assume(self, sample: Attitude) -> None:
         """Take an attitude that is only assumed, while the vehicle is silent."""

@@ -6,16 +6,12 @@ says is flown on the next start when it is asked to.
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import json
-import threading
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from flightd.core.errors import InputError, TransientError
-from flightd.runtime.durable_files import replace_file
-from flightd.runtime.latest_slot import Latest
+from flightd.adapters.store.kept_file import KeptFile
+from flightd.core.errors import InputError
 from flightd.site.site import Site
 
 
@@ -49,47 +45,8 @@ def load_left_over(path: Path, site: Site) -> LeftOver:
     return left
 
 
-class ProgressFile:
-    """Keeps the file: `put` from the tick, `run` beside it.  What is put last is what is written."""
-
-    def __init__(self, path: Path, site: str) -> None:
-        self._path = path
-        self._site = site
-        self._changed: Latest[bool] = Latest()
-        self._writing = threading.Lock()
-        self._put: LeftOver | None = None
-        self._written: LeftOver | None = None
-
-    def put(self, left: LeftOver) -> None:
-        """What is left now; cheap when nothing has changed."""
-        if left != self._put:
-            self._put = left
-            self._changed.put(True)
-
-    async def run(self) -> None:
-        """Write each change until cancelled, the last one too.  TransientError when the disk refuses."""
-        try:
-            while True:
-                await self._changed.get()
-                await asyncio.to_thread(self._write)
-        except asyncio.CancelledError:
-            with contextlib.suppress(TransientError):  # ending comes before saving what a disk refuses
-                self._write()
-            raise
-
-    def _write(self) -> None:
-        """Bring the file up to what was put last, whoever comes last."""
-        with self._writing:
-            left = self._put
-            if left is not None and left != self._written:
-                self._replace(left)
-                self._written = left
-
-    def _replace(self, left: LeftOver) -> None:
-        text = json.dumps({"site": self._site, **asdict(left)}, ensure_ascii=False)
-        beside = self._path.with_suffix(self._path.suffix + ".new")
-        try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            replace_file(self._path, beside, f"{text}\n".encode())
-        except OSError as err:
-            raise TransientError(f"progress {self._path}: {err.strerror or err}") from err
+def progress_file(path: Path, site: str) -> KeptFile[LeftOver]:
+    """Keeps what is left over on a site of that name."""
+    return KeptFile(
+        path, "progress", lambda left: json.dumps({"site": site, **asdict(left)}, ensure_ascii=False)
+    )

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from flightd.adapters.store.progress import LeftOver, NothingLeftError, ProgressFile, load_left_over
+from flightd.adapters.store.progress import LeftOver, NothingLeftError, load_left_over, progress_file
 from flightd.app.build import plan_of
 from flightd.app.flight_orders import configured_order, resumed
 from flightd.config.schema import Config, load_config
@@ -24,7 +24,7 @@ LARGE = load_site(CONFIGS / "site-large.toml")
 
 async def kept(path: Path, *states: tuple[str, ...]) -> None:
     """Put the states one after the other, with and without time to write, then lose the task."""
-    file = ProgressFile(path, "demo")
+    file = progress_file(path, "demo")
     task = asyncio.ensure_future(file.run())
     for i, state in enumerate(states):
         file.put(LeftOver(state, "A1", 3.0))
@@ -65,7 +65,7 @@ def test_another_sites_progress_and_rubbish_are_refused(tmp_path: Path) -> None:
 
 def test_a_disk_that_refuses_is_trouble_not_the_end(tmp_path: Path) -> None:
     (tmp_path / "state").write_text("a file where a folder should be")
-    file = ProgressFile(tmp_path / "state" / "progress.json", "demo")
+    file = progress_file(tmp_path / "state" / "progress.json", "demo")
 
     async def run() -> None:
         file.put(LeftOver(("A2",), "A1", 0.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import replace
 
 import pytest
 
@@ -159,9 +160,8 @@ def test_what_was_learnt_is_begun_with_but_less_surely() -> None:
     second.begin_with(first.learnt())
     assert second.mean(MOUNT_ROLL) == first.mean(MOUNT_ROLL) != 0.0
     assert first.sigma(MOUNT_ROLL) < second.sigma(MOUNT_ROLL) < SensorPriors().mount_rad
-    means, covariance = first.learnt()
     third = FloorFilter(MotionNoise(), SensorPriors(), gate_m=0.35, forget_ns=10**9)
-    third.begin_with((means * math.nan, covariance))
+    third.begin_with(replace(first.learnt(), means=(math.nan,) * 7))
     assert third.mean(MOUNT_ROLL) == 0.0, "what is no number is not begun with"
 
 

@@ -161,6 +161,10 @@ class Library:
         if self._calls:
             _LOG.warning("MAVSDK: %d calls never came back", len(self._calls))
             _ABANDONED.append(self._sdk)
+            abandoned = set(self._calls)
+            for call in abandoned:
+                call.cancel()  # its thread stays behind, nobody waits for it
+            await asyncio.wait(abandoned)
             return
         self._sdk.destroy()
 
