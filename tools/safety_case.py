@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -42,9 +43,12 @@ def evidence_of(flights: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any
 
 def markdown() -> str:
     """The table as the guide prints it."""
-    evidence = json.loads(EVIDENCE.read_text(encoding="utf-8"))
+    told = json.loads(EVIDENCE.read_text(encoding="utf-8"))
+    evidence = told["hazards"]
     paths = shipped_scenarios()
     lines = [
+        f"Last flown on {told['flown']}, in the {told['world']} world.",
+        "",
         "| hazard | cause | found by | action | flown | good | nearest | off its leg | too high | down in |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
@@ -77,7 +81,9 @@ def main(arguments: Sequence[str]) -> int:
     options = parser.parse_args(arguments)
     sweeps = [json.loads(path.read_text(encoding="utf-8")) for path in options.sweeps]
     flights = [flight for sweep in sweeps for flight in sweep["flights"]]
-    EVIDENCE.write_text(json.dumps(evidence_of(flights), indent=1) + "\n", encoding="utf-8")
+    (world,) = {flight["world"] for flight in flights}  # one page tells of one world
+    told = {"flown": f"{datetime.now(UTC):%Y-%m-%d}", "world": world, "hazards": evidence_of(flights)}
+    EVIDENCE.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     print(f"{EVIDENCE.name}: {len(flights)} flights")
     return 0
 

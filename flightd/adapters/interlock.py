@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import time
 from pathlib import Path
 
 from flightd.ports import Clock
@@ -14,12 +16,14 @@ _MOST_BYTES = 256
 
 
 class FileInterlock:
-    """`ports.Interlock` of one file; open until it was read, and whenever that fails or takes long."""
+    """`ports.Interlock` of one file; open until it was read, whenever that fails or takes long, and when it
+    was not written for `max_age_s` (a controller that died goes on saying what it said last)."""
 
-    def __init__(self, path: Path, closed: str, clock: Clock) -> None:
+    def __init__(self, path: Path, closed: str, clock: Clock, max_age_s: float | None = None) -> None:
         self._path = path
         self._closed = closed.strip()
         self._clock = clock
+        self._max_age_s = max_age_s
         self._read_ns: int | None = None
 
     @property
@@ -38,6 +42,11 @@ class FileInterlock:
         try:
             with self._path.open("rb") as file:
                 text = file.read(_MOST_BYTES)
+                age_s = time.time() - os.fstat(file.fileno()).st_mtime
         except OSError:
+            return False
+        if (
+            self._max_age_s is not None and abs(age_s) > self._max_age_s
+        ):  # one of the future is of a clock that was set
             return False
         return text.decode("utf-8", "replace").strip() == self._closed

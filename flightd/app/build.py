@@ -193,7 +193,7 @@ def interlock_of(config: Config, site: Site, clock: Clock) -> Interlock:
     """What tells whether the aisles are closed.  InputError where the site demands that, and nothing does."""
     settings = config.interlock
     if settings.file is not None:
-        return FileInterlock(settings.file, settings.closed, clock)
+        return FileInterlock(settings.file, settings.closed, clock, settings.max_age_s)
     if site.interlock:
         raise InputError(
             f"site {site.name} demands it, and there is none",

@@ -24,3 +24,9 @@ class InterlockConfig(Section):
     closed: str = Field(
         "1", min_length=1, max_length=40, description="its content while the aisles are closed"
     )
+    max_age_s: float | None = Field(
+        None,
+        gt=0,
+        description="it was written within so long, else the aisles are open; none: whenever.  For a "
+        "file that a controller writes again and again, not for a GPIO's value",
+    )

@@ -208,6 +208,8 @@ class Mission:
             if lost in found:
                 found.remove(lost)
                 found |= self._lost(action, lost, s.now_ns)
+        if Trigger.HOLD in found:
+            found.discard(Trigger.LINES_FOUND)
         if self.phase is Phase.ARMING and not s.aisle_closed:
             found.add(Trigger.AISLE_OPEN)
         if Trigger.DISARMED in found and self.state.on_pad:

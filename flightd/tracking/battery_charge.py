@@ -33,6 +33,7 @@ class ChargeDoubt(enum.Enum):
     UNKNOWN = "the vehicle does not know its charge"
     FROZEN = "its charge stands still in flight"
     CELLS = "its volts do not fit its cells"
+    VOLTS = "its volts are told no longer"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +59,7 @@ class BatteryCharge:
         self._told_frac = math.nan
         self._least_frac = math.inf
         self._moved: tuple[int, float] | None = None
+        self._volts_ns: int | None = None
         self._low_ns: int | None = None
         self._empty_ns: int | None = None
 
@@ -65,8 +67,9 @@ class BatteryCharge:
         if vehicle is None:
             return Charge(math.nan, doubt=ChargeDoubt.UNKNOWN)
         if not flying:
-            self._least_frac, self._moved = math.inf, None
+            self._least_frac, self._moved, self._volts_ns = math.inf, None, None
         cell_v = self._cell_v(vehicle)
+        self._volts_ns = now_ns if math.isfinite(cell_v) else self._volts_ns
         frac = self._frac(now_ns, vehicle.battery_frac)
         doubt = self._doubt(now_ns, vehicle, frac, cell_v, flying)
         sane = math.isfinite(cell_v) and doubt not in {ChargeDoubt.CELLS, ChargeDoubt.SILENT}
@@ -109,6 +112,8 @@ class BatteryCharge:
             return ChargeDoubt.UNKNOWN
         if math.isfinite(cell_v) and not _CELL_V[0] <= cell_v <= _CELL_V[1]:
             return ChargeDoubt.CELLS
+        if self._volts_ns is not None and now_ns - self._volts_ns > _UNKNOWN_S * 1e9:
+            return ChargeDoubt.VOLTS
         if flying and self._stands_still(now_ns, frac):
             return ChargeDoubt.FROZEN
         return None

@@ -38,6 +38,7 @@ class StuckHeight:
         self.found = False
         """Stays so until the end of the flight: what stuck once is not believed again."""
         self._samples: deque[_Sample] = deque()
+        self._least = self._most = _Sample(0, 0.0, 0.0, 0.0)
         self._last_ns: int | None = None
         self._climbed_m = 0.0
         self._wanted_m = 0.0
@@ -52,17 +53,22 @@ class StuckHeight:
             return self.found
         new = _Sample(now_ns, height_m, self._climbed_m, self._wanted_m)
         if not self._samples or now_ns - self._samples[-1].stamp_ns >= _KEPT_EVERY_NS:
-            self._samples.append(new)
-        while now_ns - self._samples[0].stamp_ns > _WANTED_NS:
-            self._samples.popleft()
+            self._keep(new)
         self.found = self.found or self._contradicts(new)
         return self.found
 
+    def _keep(self, new: _Sample) -> None:
+        samples = self._samples
+        samples.append(new)
+        while new.stamp_ns - samples[0].stamp_ns > _WANTED_NS:
+            samples.popleft()
+        self._least, self._most = (_Sample(*map(of, zip(*samples, strict=True))) for of in (min, max))
+
     def _rose(self, new: _Sample) -> bool:
         """Whether there is anything that a height could contradict: cheap, and nearly always not."""
-        climbed_m = [old.climbed_m for old in self._samples]
-        moved_m = max(new.climbed_m - min(climbed_m), max(climbed_m) - new.climbed_m)
-        return moved_m > _MOVED_M or new.wanted_m - min(old.wanted_m for old in self._samples) > _WANTED_M
+        least, most = self._least, self._most
+        moved_m = max(new.climbed_m - least.climbed_m, most.climbed_m - new.climbed_m)
+        return moved_m > _MOVED_M or new.wanted_m - least.wanted_m > _WANTED_M
 
     def _contradicts(self, new: _Sample) -> bool:
         if not self._rose(new):

@@ -57,7 +57,13 @@ class ServiceRig:
     def _toml(self, nodes: tuple[str, ...]) -> str:
         lens = CAMERA.lens
         sections: dict[str, dict[str, Any]] = {
-            "mission": {"site": str(SITE_FILE), "nodes": list(nodes), "autostart": True, "dwell_s": 1.0},
+            "mission": {
+                "site": str(SITE_FILE),
+                "nodes": list(nodes),
+                "autostart": True,
+                "autostart_countdown_s": 0.0,
+                "dwell_s": 0.5,
+            },
             "camera": {
                 "url": f"udp://127.0.0.1:{self.ports[0]}",
                 "mount_yaw_deg": 90,

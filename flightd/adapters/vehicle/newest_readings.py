@@ -13,6 +13,7 @@ from flightd.core.types import Attitude, LandedState, VehicleState
 _ATTITUDES_MAX = 512
 _STAMP_AGE_MAX_NS = 500_000_000
 _RANGE_STALE_NS = 500_000_000
+_CLIMB_FRESH_NS = 250_000_000
 _LANDED_STALE_NS = 1_000_000_000
 _NEAR_LEAST_M = 0.15
 """Seen so little above its range finder's minimum, a vehicle may be below it at the next sample."""
@@ -76,6 +77,10 @@ class NewestReadings:
     def climb_mps(self, now_ns: int) -> float:
         """Climb rate, NaN when it is not told."""
         return self._climb_mps if now_ns - self._climb_ns <= self.climb_stale_ns else math.nan
+
+    def fresh_climb_mps(self, now_ns: int) -> float:
+        """Climb rate to close a loop by, NaN when it was not told just now."""
+        return self._climb_mps if now_ns - self._climb_ns <= _CLIMB_FRESH_NS else math.nan
 
     def landed(self, now_ns: int) -> LandedState:
         """Whether it stands or flies; unknown when the autopilot has not said so for a second."""

@@ -45,6 +45,7 @@ class SweptFlight:
             "error": self.error,
             "real_time": self.simulation.speed is not None,
             "seed": self.simulation.seed,
+            "world": self.simulation.unknowns.kind,
         }
 
 

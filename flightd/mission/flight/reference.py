@@ -172,8 +172,8 @@ class ReferenceGenerator:
             return self._relocator.height_m(self._height_goal_m(task))
         if task.phase is not Phase.HOLD or self._monitor.unseen_s < h.expert.search_s:
             return self._height_goal_m(task)
-        highest_m = self._ceiling_m - h.headroom_m
-        return max(p.height_m, min(self._height_goal_m(task) + h.expert.search_climb_m, highest_m))
+        highest_m = max(p.height_m, self._ceiling_m - h.headroom_m)
+        return min(self._relocator.raised_m(self._height_goal_m(task), h.expert.search_climb_m), highest_m)
 
     def _descend(self, s: MissionInputs, task: ReferenceTask) -> tuple[float, Demand]:
         """Climb rate and demand of a landing: at rest first, unless stopped or out of sight; down until

@@ -84,11 +84,14 @@ class Relocator:
         self._look = DebounceTimer()
 
     def height_m(self, flown_m: float) -> float:
-        """The height to look from: above what is flown now, more of the floor is in view.  Wherever it is, it
-        stays below the ceiling and below the keep-outs that begin above what is flown now."""
+        """The height to look from: above what is flown now, more of the floor is in view."""
+        return self.raised_m(flown_m, self._params.expert.relocate_climb_m)
+
+    def raised_m(self, flown_m: float, by_m: float) -> float:
+        """A height above what is flown now.  Wherever the drone is, that stays below the ceiling and below
+        the keep-outs that begin above what is flown now."""
         above = (height_m for height_m in self._overhead_m if height_m >= flown_m)
-        climbed_m = flown_m + self._params.expert.relocate_climb_m
-        return max(flown_m, min(climbed_m, self._ceiling_m, *above))
+        return max(flown_m, min(flown_m + by_m, self._ceiling_m, *above))
 
     def _watch_jumps(self, s: MissionInputs) -> None:
         self.jump_m = (0.0, 0.0)

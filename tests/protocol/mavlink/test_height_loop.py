@@ -64,8 +64,32 @@ def test_without_a_climb_rate_the_hover_thrust_is_kept() -> None:
     thrust = loop.step(
         6_000_000_000, 0.5, climb_mps=math.nan, height_m=math.nan, tilt_cos=1.0, armed=True, on_floor=False
     )
-    assert thrust == pytest.approx(loop.hover)
+    assert thrust == pytest.approx(loop.hover, rel=0.05)
     assert thrust == pytest.approx(airframe.params.hover_collective, rel=0.1)
+
+
+@pytest.mark.parametrize("climb_mps", [0.6, -0.6, -0.9, 0.0])
+def test_a_climb_that_is_told_no_longer_ends_and_is_not_answered_for_ever(climb_mps: float) -> None:
+    """Thrust went on against a rate of a second ago: a sinking vehicle rose by metres."""
+    loop, airframe = HeightLoop(), Airframe(wind=CALM)
+    fly_loop(loop, airframe, [(0.8, 5.0), (0.0, 3.0), (climb_mps, 1.0)])
+    begun_m, now_ns = airframe.height_m, 9_000_000_000
+    for tick in range(150):
+        now_ns += 20_000_000
+        told_mps = airframe.climb_mps if tick == 0 else math.nan
+        thrust = loop.step(
+            now_ns,
+            0.0,
+            climb_mps=told_mps,
+            height_m=airframe.height_m,
+            tilt_cos=1.0,
+            armed=True,
+            on_floor=False,
+        )
+        for _ in range(5):
+            airframe.step(0.004, AirframeCommand(motors=True, collective=thrust))
+    assert abs(airframe.climb_mps) < 0.5
+    assert abs(airframe.height_m - begun_m) < (0.1 if climb_mps == 0.0 else 1.0)
 
 
 def test_a_flight_taken_over_in_the_air_starts_at_the_guessed_hover_thrust() -> None:

@@ -114,7 +114,7 @@ def test_a_taken_camera_port_is_one_line(tmp_path: Path) -> None:
 
 def short_flight(folder: Path, speed: float, observer: Any) -> Simulation:
     config = load_config(CONFIG)
-    mission = config.mission.model_copy(update={"nodes": ("A1", "A2")})
+    mission = config.mission.model_copy(update={"nodes": ("A1", "A2"), "autostart_countdown_s": 0.0})
     vision = config.vision.model_copy(update={"workers": 2})
     config = _with_sim_lens(config.model_copy(update={"mission": mission, "vision": vision}))
     return Simulation(config, load_site(mission.site), Scenario(), 2, speed, folder, observer)

@@ -22,7 +22,8 @@ from tests.rigs.event_loops import real
 from tests.rigs.vehicles import Rig
 
 ROOT = Path(__file__).parents[3]
-SHORT = ("--set", 'mission.nodes=["A2"]', "--set", "mission.dwell_s=0.5")
+AT_ONCE = ("--set", "mission.autostart_countdown_s=0")
+SHORT = ("--set", 'mission.nodes=["A2"]', "--set", "mission.dwell_s=0.5", *AT_ONCE)
 
 
 def flown(folder: Path, *options: str) -> dict[str, Any]:

@@ -8,8 +8,10 @@ from dataclasses import replace
 import pytest
 
 from flightd.config.battery import BatteryConfig
+from flightd.config.hazards import LossAction
 from flightd.config.scan import ScanConfig
 from flightd.core.types import (
+    HEALTHY,
     CommandKind,
     Demand,
     LandedState,
@@ -219,6 +221,33 @@ def test_on_a_leg_other_lines_do_not_stand_in_for_the_one_followed() -> None:
     flight.set(y_age_s=1.0)
     flight.run(0.1)
     assert flight.phase is Phase.HOLD
+
+
+@pytest.mark.parametrize("lost", ["aisle_open", "record_lost"])
+def test_what_is_answered_by_a_hold_holds(lost: str) -> None:
+    """It held and went on by turns, tick by tick, with an event for each."""
+    flight = Flight(configured(dwell_s=1.0).with_values(hazards={lost: LossAction.HOLD}))
+    flight.to(Phase.FOLLOW)
+    flight.mission.drain_events()
+    changes: dict[str, dict[str, object]] = {
+        "aisle_open": {"aisle_closed": False},
+        "record_lost": {"warnings": replace(ALL_WELL, health=replace(HEALTHY, recorder_error="disk full"))},
+    }
+    flight.set(**changes[lost])
+    flight.run(5.0)
+    begun = [event for event in flight.mission.drain_events() if event.name == "phase"]
+    assert len(begun) == 1
+    assert flight.phase is Phase.HOLD
+    flight.set(aisle_closed=True, warnings=ALL_WELL)
+    flight.to(Phase.FOLLOW)
+
+
+def test_a_take_off_whose_pictures_stop_lands() -> None:
+    flight = Flight()
+    flight.to(Phase.TAKE_OFF)
+    flight.run(0.5)
+    flight.set(warnings=replace(ALL_WELL, frame_age_s=1.0))
+    flight.to(Phase.LAND, within_s=0.1)
 
 
 def test_a_long_leg_is_given_its_time() -> None:

@@ -42,3 +42,4 @@ def test_the_climb_ends_below_the_ceiling_and_below_every_keep_out_above(
     site = parse_site(SITE, "hall")
     relocator = Relocator(configured().mission, site.ceiling_m - CEILING_MARGIN_M, site.overhead_m)
     assert relocator.height_m(flown_m) == pytest.approx(wanted_m)
+    assert relocator.raised_m(flown_m, 0.1) == pytest.approx(min(flown_m + 0.1, wanted_m))

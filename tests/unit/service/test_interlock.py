@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,6 +50,24 @@ async def test_it_is_closed_only_while_the_file_says_so(tmp_path: Path) -> None:
         await asyncio.wait([reading])
     path.write_text("1\n")
     await until(lambda: not interlock.is_closed, 20.0)  # nobody reads it any more
+
+
+@in_real_time
+async def test_what_a_dead_controller_said_last_is_not_believed(tmp_path: Path) -> None:
+    path = tmp_path / "value"
+    interlock = FileInterlock(path, "1", LoopClock(), max_age_s=60.0)
+    reading = asyncio.ensure_future(interlock.run())
+    try:
+        path.write_text("1\n")
+        await until(lambda: interlock.is_closed, 20.0)
+        for apart_s in (-100.0, 100.0):  # of an hour ago, or of a clock that was set back since
+            os.utime(path, (time.time() + apart_s,) * 2)
+            await until(lambda: not interlock.is_closed, 20.0)
+            path.write_text("1\n")
+            await until(lambda: interlock.is_closed, 20.0)
+    finally:
+        reading.cancel()
+        await asyncio.wait([reading])
 
 
 def test_a_site_that_demands_one_is_not_flown_without() -> None:

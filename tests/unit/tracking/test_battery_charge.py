@@ -102,3 +102,17 @@ def test_the_cells_are_those_of_the_configuration_else_those_that_are_told() -> 
 def test_volts_that_the_cells_cannot_have_are_a_doubt(volts: float) -> None:
     assert judged(5, battery_v=volts).doubt is ChargeDoubt.CELLS
     assert not judged(5, battery_v=volts).empty
+
+
+def test_volts_that_are_told_no_longer_in_flight_are_a_doubt() -> None:
+    """Charge alone, counted from full, would decide."""
+    judge = BatteryCharge(BatteryConfig(cells=4))
+    for second in range(20):
+        state = replace(STATE, battery_stamp_ns=START_NS + second * S, battery_frac=0.8 - second / 600)
+        told = state if second < 10 else replace(state, battery_v=math.nan)
+        charge = judge.step(START_NS + second * S, told, flying=True)
+        assert (charge.doubt is ChargeDoubt.VOLTS) is (second > 12)
+    unheard = BatteryCharge(BatteryConfig(cells=4))  # one that never told any
+    for second in range(20):
+        state = replace(STATE, battery_stamp_ns=START_NS + second * S, battery_v=math.nan)
+        assert unheard.step(START_NS + second * S, state, flying=True).doubt is None

@@ -62,6 +62,7 @@ class HeightLoop:
         self._stamp_ns = 0
         self._thrust = 0.0
         self._wanted_mps = 0.0
+        self._climb_mps = 0.0
         self._trim_mps2 = 0.0
         self._floor_m = math.nan
         self._touched_s = 0.0
@@ -90,9 +91,10 @@ class HeightLoop:
     ) -> float:
         """Thrust, 0..1, for a climb rate.
 
-        `climb_mps` and `height_m` are measured, NaN when unknown: without a climb rate the hover thrust
-        is kept.  `on_floor` is what the autopilot says; in the air it counts only where the vehicle does
-        not move and is near the floor (or, unseen, the floor carries some weight).
+        `climb_mps` and `height_m` are measured just now, NaN when unknown: without a climb rate the last
+        one is ended by dead reckoning, and the hover thrust kept.  `on_floor` is what the autopilot says; in
+        the air it counts only where the vehicle does not move and is near the floor (or, unseen, the floor
+        carries some weight).
         """
         dt_s = min(max(now_ns - self._stamp_ns, 0) * 1e-9, _STEP_MAX_S)
         self._stamp_ns = now_ns
@@ -120,6 +122,7 @@ class HeightLoop:
     def _settle(self, climb_mps: float) -> None:
         known = 0.0 if math.isnan(climb_mps) else climb_mps
         self._wanted_mps = min(max(known, -_SETTLE_MAX_MPS), _SETTLE_MAX_MPS)
+        self._climb_mps = known
         self._trim_mps2 = self._touched_s = self._stuck_s = 0.0
 
     def _learn(self, hover: float) -> None:
@@ -147,10 +150,17 @@ class HeightLoop:
             self._settle(climb_mps)
 
     def _fly(self, dt_s: float, wanted_mps: float, climb_mps: float, tilt_cos: float) -> None:
-        accel = 0.0
-        if not math.isnan(climb_mps):
-            slew = _SLEW_MPS2 * dt_s
-            self._wanted_mps += min(max(wanted_mps - self._wanted_mps, -slew), slew)
+        unknown, slew = math.isnan(climb_mps), _SLEW_MPS2 * dt_s
+        wanted_mps = 0.0 if unknown else wanted_mps
+        self._wanted_mps += min(max(wanted_mps - self._wanted_mps, -slew), slew)
+        if unknown:  # an old rate, taken for the present one, would be answered for as long as it stands
+            if abs(self._climb_mps) >= _STANDING_MPS:
+                self._trim_mps2 = 0.0  # half of it answered the change of the climb
+            felt_mps2 = _VELOCITY_PER_S * (self._wanted_mps - self._climb_mps)
+            self._climb_mps += felt_mps2 * dt_s
+            accel = felt_mps2 + self._trim_mps2
+        else:
+            self._climb_mps = climb_mps
             error_mps = self._wanted_mps - climb_mps
             self._trim_mps2 += _INTEGRAL_PER_S2 * error_mps * dt_s
             self._trim_mps2 = min(max(self._trim_mps2, -_TRIM_MAX_MPS2), _TRIM_MAX_MPS2)

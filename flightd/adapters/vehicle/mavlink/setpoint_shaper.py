@@ -22,7 +22,7 @@ class Measured(Protocol):
 
     def height_m(self, now_ns: int) -> float: ...
 
-    def climb_mps(self, now_ns: int) -> float: ...
+    def fresh_climb_mps(self, now_ns: int) -> float: ...
 
 
 class SetpointShaper:
@@ -51,7 +51,7 @@ class SetpointShaper:
         return self.height.step(
             now_ns,
             setpoint.climb_mps,
-            climb_mps=self._measured.climb_mps(now_ns),
+            climb_mps=self._measured.fresh_climb_mps(now_ns),
             height_m=self._measured.height_m(now_ns),
             tilt_cos=math.cos(setpoint.roll_rad) * math.cos(setpoint.pitch_rad),
             armed=self._measured.armed,
