@@ -156,6 +156,7 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
         Trigger.AISLE_OPEN: Phase.ABORTED,
         Trigger.TIMED_OUT: Phase.ABORTED,
         Trigger.START_EXPIRED: Phase.PREFLIGHT,
+        Trigger.PAUSE: Phase.PREFLIGHT,
         Trigger.ARMED: Phase.TAKE_OFF,
     },
     Phase.TAKE_OFF: _UNDER_WAY

@@ -149,6 +149,9 @@ class Mission:
         if self.state.waiting and kind in {CommandKind.START, CommandKind.PAUSE}:
             self._take_start(trigger, now_ns)
             return
+        if self.phase is Phase.ARMING and kind is CommandKind.PAUSE:
+            self._clearance.take_back(now_ns)
+            return
         self._orders.take(kind)
         if kind is CommandKind.HOME:
             self._go_home(trigger, Happened(trigger), now_ns)
@@ -201,6 +204,9 @@ class Mission:
         if self._clearance.is_void(s.now_ns, obstacle) and Trigger.START_EXPIRED in taken_in(self.state):
             found.add(Trigger.START_EXPIRED)
             self._void_start(s.now_ns, obstacle)
+        if self.phase is Phase.ARMING and self._clearance.taken_back:
+            found = found - {Trigger.ARMED} | {Trigger.PAUSE}  # also at the very tick on which it arms
+            self._clearance.void(s.now_ns)
         if Trigger.FOUND_FLYING in found:  # an order to land or stop stands until it may be obeyed
             found -= self._orders.urgent
         found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))

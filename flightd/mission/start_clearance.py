@@ -31,6 +31,8 @@ class StartClearance:
         self._order = StartOrder(config.mission)
         self._obstacle: Reason | None = Plain.NO_TELEMETRY
         self._void_ns: int | None = None
+        self.taken_back = False
+        """An operator has taken the start back, and it was not voided since."""
         self._told_ns: int | None = None
         self._unfit = DebounceTimer()
         self._unfit_reported: Reason | None = None
@@ -57,6 +59,7 @@ class StartClearance:
             text = f"start refused: {in_words(self._obstacle)}"
             self._events.report(now_ns, EventLevel.WARNING, "command", text)
             return False
+        self.taken_back = False
         self._order.give(now_ns, self._config.mission.start_countdown_s)
         self._report_countdown(now_ns)
         return True
@@ -87,7 +90,7 @@ class StartClearance:
 
     def take_back(self, now_ns: int) -> None:
         """An operator takes the start back; the next one is his, too."""
-        self.autostart = False
+        self.autostart, self.taken_back = False, True
         self._order.withdraw()
         self._events.report(now_ns, EventLevel.WARNING, "start", "taken back")
 
@@ -98,7 +101,7 @@ class StartClearance:
     def void(self, now_ns: int) -> None:
         """The start came to nothing."""
         self._order.withdraw()
-        self._void_ns = now_ns
+        self._void_ns, self.taken_back = now_ns, False
 
     def is_void(self, now_ns: int, obstacle: Reason | None) -> bool:
         """The start has not armed in time; or it was ordered and an aisle opened: whoever closes it behind

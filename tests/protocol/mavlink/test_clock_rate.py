@@ -75,6 +75,22 @@ def test_a_jittery_radio_and_a_strange_rate_are_still_told_apart() -> None:
     assert clocks.sync.error_s(clocks.now_ns) < 0.02
 
 
+def test_a_long_way_is_flown_by_where_its_delay_is_the_same_all_the_time() -> None:
+    """What uneven ways put wrong is constant, and found with the camera's delay; what changes is told."""
+    for seed in range(5):
+        long = Compared(0.0, least_ms=120.0, jitter_ms=30.0, seed=seed)
+        long.run(6.0)
+        assert max(_errors_s(long)) < 0.02
+    endless = Compared(0.0, least_ms=400.0, jitter_ms=1.0)
+    endless.run(6.0)
+    assert endless.sync.error_s(endless.now_ns) > 0.05
+
+
+def _errors_s(clocks: Compared) -> list[float]:
+    """What is told of the error, in each second of a minute."""
+    return [clocks.sync.error_s(clocks.now_ns) for _ in range(60) if clocks.run(1.0) >= 0.0]
+
+
 def test_a_rate_that_changes_at_once_is_found_within_a_second() -> None:
     clocks = Compared(0.0)
     clocks.run(10.0)

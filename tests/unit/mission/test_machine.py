@@ -169,6 +169,6 @@ def test_commands_are_possible_where_they_mean_something() -> None:
         assert ({CommandKind.LAND, CommandKind.STOP} <= possible_in(phase)) is not over
         assert (CommandKind.START in possible_in(phase)) is (phase in {Phase.PREFLIGHT, Phase.SWAP})
         on_way = {CommandKind.PAUSE, CommandKind.RESUME, CommandKind.GOTO, CommandKind.HOME}
-        waits = {CommandKind.PAUSE} if phase in {Phase.PREFLIGHT, Phase.SWAP} else set()
+        waits = {CommandKind.PAUSE} if phase in {Phase.PREFLIGHT, Phase.SWAP, Phase.ARMING} else set()
         assert possible_in(phase) & on_way == (on_way if phase in FLYING else waits)
     assert CommandKind.GOTO not in possible_commands(State(Phase.FOLLOW, Intent.HOME))

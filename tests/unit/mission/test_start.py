@@ -159,6 +159,25 @@ def test_a_start_by_itself_is_counted_down_anew_after_what_comes_between(open_s:
     assert flight.phase.value == "arming"
 
 
+@pytest.mark.parametrize("armed", [False, True])
+def test_a_start_is_taken_back_while_the_vehicle_arms(armed: bool) -> None:
+    """Also at the very tick on which it has armed."""
+    flight = starting_by_itself()
+    flight.run(3.2, follow=False)
+    assert flight.phase.value == "arming"
+    flight.order(CommandKind.PAUSE)
+    flight.set(armed=armed)
+    flight.run(0.1, follow=False)
+    assert flight.phase.value == "preflight"
+    assert "taken back" in said(flight)
+    flight.run(5.0, follow=False)
+    assert flight.phase.value == "preflight"
+    assert flight.demand is Demand.DISARM
+    flight.set(armed=False)
+    flight.run(60.0, follow=False)
+    assert (flight.phase, flight.mission.reason) == (Phase.PREFLIGHT, "waiting for the start command")
+
+
 def test_what_comes_and_goes_does_not_flood_the_events() -> None:
     flight = starting_by_itself()
     said(flight)

@@ -22,6 +22,8 @@ _CONTRADICTING = 3
 _SLACK_NS = 1_000_000.0
 _ASYMMETRY = 0.25
 """Share of the fastest round trip by which ways of different length put the offset wrong."""
+_FOUND_NS = 30_000_000.0
+"""So much of that is no error to fly by: it is constant, and found in flight with the camera's delay."""
 _WANDER, _WANDER_SHARE = 2e-4, 0.2
 """What a rate may have changed by when it was measured no longer: a strange one changes the most."""
 
@@ -87,12 +89,12 @@ class ClockSync:
         return len(self._trips) >= _SETTLED
 
     def error_s(self, now_ns: int) -> float:
-        """By how much times of that clock may be wrong in ours, one standard deviation; NaN before the
-        clocks are compared."""
+        """By how much times of that clock may be wrong in ours, one standard deviation, but for what is the
+        same all the time; NaN before the clocks are compared."""
         if self._fit is None:
             return math.nan
         fastest_ns = min(trip.round_trip_ns for trip in self._trips)
-        return (self._fit.sigma_ns(now_ns) + _ASYMMETRY * fastest_ns) * 1e-9
+        return (self._fit.sigma_ns(now_ns) + max(_ASYMMETRY * fastest_ns - _FOUND_NS, 0.0)) * 1e-9
 
     def reset(self) -> None:
         """The other clock started anew."""
