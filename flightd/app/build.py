@@ -103,7 +103,9 @@ def build(
     where configuration, map and order contradict each other."""
     peers = peers or configured_peers(config)
     pilot = pilot_of(config, site, order, learnt)
-    vehicle = connect_vehicle(config.vehicle, clock, config.control, url=peers.vehicle, opener=opener)
+    vehicle = connect_vehicle(
+        config.vehicle, clock, config.control, cells=config.battery.cells, url=peers.vehicle, opener=opener
+    )
     publishers = TelemetryPublishers(clock, vehicle, recorder, ground, monitors, observers)
     kept_fps = 0.0 if recorder is NO_RECORDER else config.recorder.picture_fps
     vision = DetectionPipeline(detectors, config.vision.workers, recorder, ground, kept_fps)

@@ -48,6 +48,8 @@ _INTERRUPTED = (Phase.HOLD, Phase.RELOCATE, Phase.ACQUIRE)
 """Where a leg that was interrupted goes on from."""
 _OVER_PAD_M = 0.5
 """So near its centre a landing goes on onto the pad, whatever the position was taken for before."""
+_CLIMBS_UNSEEING_S = 1.0
+"""So long a take-off, which hardly steers, goes on without a picture."""
 _VISITED = (Trigger.DWELLED, Trigger.ROUTE_DONE)
 
 
@@ -188,8 +190,9 @@ class Mission:
 
     def _triggers(self, s: MissionInputs) -> set[Trigger]:
         """What has happened by this tick.  Turning back acts at once."""
-        obstacle = self._grounded(s) if self.state.waiting else None
-        may_start = self.state.waiting and self._may_start(s.now_ns, obstacle)
+        arming, waiting = self.phase is Phase.ARMING, self.state.waiting
+        obstacle = self._grounded(s) if arming or waiting else None
+        may_start = waiting and self._may_start(s.now_ns, obstacle)
         found = self._progress.step(s, self.state, may_start=may_start)
         found |= self._orders.urgent
         if self._losses.ground_lost(s):
@@ -201,12 +204,11 @@ class Mission:
             found.add(Trigger.TIMED_OUT)
         if s.failed:
             found.add(Trigger.STEP_FAILED)
-        if self._clearance.is_void(s.now_ns, obstacle) and Trigger.START_EXPIRED in taken_in(self.state):
+        if arming:
+            found = self._while_arming(found, s, obstacle)
+        elif waiting and self._clearance.is_void(s.now_ns, obstacle):
             found.add(Trigger.START_EXPIRED)
             self._void_start(s.now_ns, obstacle)
-        if self.phase is Phase.ARMING and self._clearance.taken_back:
-            found = found - {Trigger.ARMED} | {Trigger.PAUSE}  # also at the very tick on which it arms
-            self._clearance.void(s.now_ns)
         if Trigger.FOUND_FLYING in found:  # an order to land or stop stands until it may be obeyed
             found -= self._orders.urgent
         found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))
@@ -216,8 +218,8 @@ class Mission:
                 found |= self._lost(action, lost, s.now_ns)
         if Trigger.HOLD in found:
             found.discard(Trigger.LINES_FOUND)
-        if self.phase is Phase.ARMING and not s.aisle_closed:
-            found.add(Trigger.AISLE_OPEN)
+        if self.phase is Phase.TAKE_OFF and s.warnings.frame_age_s < _CLIMBS_UNSEEING_S:
+            found.discard(Trigger.FRAMES_STALE)
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._progress.adopting(s, self.phase) else found
@@ -227,12 +229,29 @@ class Mission:
         self._clearance.look_again(now_ns, obstacle, ordered=self.state.intent is Intent.VISIT)
         return obstacle is None and self._clearance.counted_down(now_ns)
 
+    def _while_arming(self, found: set[Trigger], s: MissionInputs, obstacle: Reason | None) -> set[Trigger]:
+        """What becomes of a start while the vehicle is armed for it: it takes off only from a tick on which
+        nothing speaks against that."""
+        if not s.aisle_closed:
+            found.add(Trigger.AISLE_OPEN)
+        hindered = self._clearance.is_hindered(s.now_ns, obstacle)
+        if self._clearance.taken_back:
+            found = found - {Trigger.ARMED} | {Trigger.PAUSE}  # also at the very tick on which it arms
+            self._clearance.void(s.now_ns)
+        elif self._clearance.gives_up(s.now_ns):
+            found.add(Trigger.TIMED_OUT)
+        elif hindered or self._clearance.is_void(s.now_ns, None):
+            found.add(Trigger.START_EXPIRED)
+            if obstacle is not None:
+                self._clearance.report_void(s.now_ns, obstacle)
+            self._clearance.void(s.now_ns)
+        return found if obstacle is None else found - {Trigger.ARMED}
+
     def _void_start(self, now_ns: int, obstacle: Reason | None) -> None:
         """A start that came to nothing is not kept for later."""
         self._clearance.void(now_ns)
-        if self.state.waiting:
-            self._clearance.report_void(now_ns, obstacle)
-            self._turn(Trigger.START_EXPIRED)
+        self._clearance.report_void(now_ns, obstacle)
+        self._turn(Trigger.START_EXPIRED)
 
     def _landed(self) -> set[Trigger]:
         """What a landing on the pad is more than its end."""
@@ -268,7 +287,8 @@ class Mission:
     def _grounded(self, s: MissionInputs) -> Reason | None:
         """Why it stays on the ground, None if nothing keeps it there."""
         stops_left = len(self.remaining) if self.phase is Phase.SWAP else None
-        return self._clearance.obstacle(s, stops_left, self._losses.ground_silent)
+        arming = self.phase is Phase.ARMING
+        return self._clearance.obstacle(s, stops_left, self._losses.ground_silent, arming=arming)
 
     # Changing the intent of the phase in hand
 
@@ -328,6 +348,8 @@ class Mission:
     def _enter(self, s: MissionInputs, trigger: Trigger) -> None:
         """What the phase that begins starts with."""
         match self.phase:
+            case Phase.PREFLIGHT:
+                self._await_start()
             case Phase.TAKE_OFF:
                 self._clearance.withdraw()
                 self._steering.take_off(s.height_m)

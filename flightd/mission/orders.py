@@ -52,14 +52,13 @@ class StartOrder:
 
     def __init__(self, params: MissionConfig) -> None:
         self._countdown_s = 0.0
-        self._expires = True
         self._expires_s = params.expert.start_expires_s
         self._given_ns: int | None = None
 
-    def give(self, now_ns: int, countdown_s: float, *, expires: bool = True) -> None:
+    def give(self, now_ns: int, countdown_s: float) -> None:
         """The command comes, to be counted down for so long; again, it changes nothing."""
         if self._given_ns is None:
-            self._given_ns, self._countdown_s, self._expires = now_ns, countdown_s, expires
+            self._given_ns, self._countdown_s = now_ns, countdown_s
 
     def withdraw(self) -> None:
         """It stands no longer."""
@@ -76,7 +75,7 @@ class StartOrder:
 
     def is_void(self, now_ns: int) -> bool:
         """It has not armed in time."""
-        return self.given and self._expires and self._age_s(now_ns) > self._countdown_s + self._expires_s
+        return self.given and self._age_s(now_ns) > self._countdown_s + self._expires_s
 
     def _age_s(self, now_ns: int) -> float:
         return (now_ns - (self._given_ns or now_ns)) * 1e-9

@@ -15,6 +15,7 @@ from flightd.mission.triggers import Trigger
 _AFTER_VOID_NS = 10_000_000_000
 """An arming that was asked for may succeed so long after it was given up."""
 _TOLD_AGAIN_NS = 10_000_000_000
+_HINDERED_S = 0.5
 _UNFIT_S = 3.0
 """Parameters are still being read for about so long."""
 
@@ -31,6 +32,9 @@ class StartClearance:
         self._order = StartOrder(config.mission)
         self._obstacle: Reason | None = Plain.NO_TELEMETRY
         self._void_ns: int | None = None
+        self._tried_ns: int | None = None
+        """Since when it starts by itself, again and again."""
+        self._hindered = DebounceTimer()
         self.taken_back = False
         """An operator has taken the start back, and it was not voided since."""
         self._told_ns: int | None = None
@@ -42,11 +46,13 @@ class StartClearance:
         """Nothing kept the drone on the ground when it was last looked at."""
         return self._obstacle is None
 
-    def obstacle(self, s: MissionInputs, stops_left: int | None, ground_silent: bool) -> Reason | None:
+    def obstacle(
+        self, s: MissionInputs, stops_left: int | None, ground_silent: bool, *, arming: bool
+    ) -> Reason | None:
         """What keeps the drone on the ground now, None if nothing does; `stops_left` where it waits for a
-        battery for them, `ground_silent` as in `not_ready`."""
+        battery for them, the others as in `not_ready`."""
         stale = not_fresh(s, self._config, stops_left) if stops_left is not None else None
-        return stale or not_ready(s, self._config, ground_silent)
+        return stale or not_ready(s, self._config, ground_silent, arming=arming)
 
     def counted_down(self, now_ns: int) -> bool:
         """No count-down is under way."""
@@ -71,8 +77,10 @@ class StartClearance:
             return
         if obstacle is not None:
             self._order.withdraw()
+            self._tried_ns = None
         elif not self._order.given:
-            self._order.give(now_ns, self._config.mission.autostart_countdown_s, expires=False)
+            self._tried_ns = now_ns if self._tried_ns is None else self._tried_ns
+            self._order.give(now_ns, self._config.mission.autostart_countdown_s)
             if not self.counted_down(now_ns):
                 self._report_countdown(now_ns)
 
@@ -91,17 +99,28 @@ class StartClearance:
     def take_back(self, now_ns: int) -> None:
         """An operator takes the start back; the next one is his, too."""
         self.autostart, self.taken_back = False, True
-        self._order.withdraw()
+        self.withdraw()
         self._events.report(now_ns, EventLevel.WARNING, "start", "taken back")
 
     def withdraw(self) -> None:
         """The start has done its work, or came to nothing: it is not kept for later."""
         self._order.withdraw()
+        self._tried_ns = None
 
     def void(self, now_ns: int) -> None:
         """The start came to nothing."""
         self._order.withdraw()
         self._void_ns, self.taken_back = now_ns, False
+
+    def is_hindered(self, now_ns: int, obstacle: Reason | None) -> bool:
+        """Something keeps the drone on the ground, now that it is being armed, and is no passing matter: call
+        at each tick of that."""
+        return self._hindered.step(obstacle is not None, now_ns) > _HINDERED_S
+
+    def gives_up(self, now_ns: int) -> bool:
+        """It has started by itself again and again, and was never armed."""
+        given_up_s = self._config.mission.expert.arm_timeout_s
+        return self._tried_ns is not None and (now_ns - self._tried_ns) * 1e-9 > given_up_s
 
     def is_void(self, now_ns: int, obstacle: Reason | None) -> bool:
         """The start has not armed in time; or it was ordered and an aisle opened: whoever closes it behind

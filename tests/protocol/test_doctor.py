@@ -33,8 +33,9 @@ from tests.rigs.event_loops import real
 pytestmark = pytest.mark.slow  # the command has its own loop: real time
 
 ROOT = Path(__file__).parents[2]
+FACTORY = {"GUID_TIMEOUT": 3.0, "FS_GCS_TIMEOUT": 5.0, "FS_THR_ENABLE": 1.0, "BATT_FS_LOW_ACT": 0.0}
 WRONG = {"GUID_TIMEOUT", "FS_GCS_TIMEOUT", "FS_THR_ENABLE", "BATT_FS_LOW_ACT"}
-"""What a simulated ArduCopter has that should be better."""
+"""What an ArduCopter has that is half set up, and what of that should be better."""
 
 
 @contextmanager
@@ -119,7 +120,7 @@ def by_name(document: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def test_wrong_parameters_are_named_then_set_and_the_vehicle_is_fit(tmp_path: Path, doctor: Doctor) -> None:
-    with serving(ArduCopterPeer) as (peer, url):
+    with serving(ArduCopterPeer, parameters=FACTORY) as (peer, url):
         config = write_config(tmp_path, {"url": url})
         code, out, err = doctor(config, "--json")
         document = json.loads(out)
@@ -152,7 +153,7 @@ def test_wrong_parameters_are_named_then_set_and_the_vehicle_is_fit(tmp_path: Pa
 
 
 def test_what_does_not_stay_as_set_is_still_wrong(tmp_path: Path, doctor: Doctor) -> None:
-    with serving(ArduCopterPeer) as (peer, url):
+    with serving(ArduCopterPeer, parameters=FACTORY) as (peer, url):
         peer.parameters.locked.add("GUID_TIMEOUT")
         code, out, _ = doctor(write_config(tmp_path, {"url": url}), "--fix", "--yes", "--json")
         document = json.loads(out)
@@ -163,7 +164,7 @@ def test_what_does_not_stay_as_set_is_still_wrong(tmp_path: Path, doctor: Doctor
 
 
 def test_an_armed_vehicle_is_not_fit_and_not_written_to(tmp_path: Path, doctor: Doctor) -> None:
-    with serving(ArduCopterPeer) as (peer, url):
+    with serving(ArduCopterPeer, parameters=FACTORY) as (peer, url):
         assert peer.pilot_arm()
         code, out, _ = doctor(write_config(tmp_path, {"url": url}), "--fix", "--yes", "--json")
         document = json.loads(out)
@@ -175,7 +176,7 @@ def test_an_armed_vehicle_is_not_fit_and_not_written_to(tmp_path: Path, doctor: 
 
 def test_the_job_decides_what_is_right(tmp_path: Path, doctor: Doctor) -> None:
     job = {"raw_thrust": True, "pose_output": "odometry", "landing_target": True}
-    with serving(ArduCopterPeer) as (_, url):
+    with serving(ArduCopterPeer, parameters=FACTORY) as (_, url):
         code, out, _ = doctor(write_config(tmp_path, {"url": url, **job}), "--json")
         found = {entry["name"]: entry["better"] for entry in json.loads(out)["parameters"]}
         assert code == 1
@@ -204,7 +205,7 @@ def test_px4_behind_either_adapter_and_the_wrong_kind(tmp_path: Path, doctor: Do
 def test_a_signed_autopilot_answers_only_the_key(tmp_path: Path, doctor: Doctor) -> None:
     key = tmp_path / "mavlink.key"
     make_key(key)
-    with serving(ArduCopterPeer, signing_key=read_key(key)) as (_, url):
+    with serving(ArduCopterPeer, parameters=FACTORY, signing_key=read_key(key)) as (_, url):
         _, out, _ = doctor(write_config(tmp_path, {"url": url, "signing_key": "mavlink.key"}), "--json")
         assert {entry["name"] for entry in json.loads(out)["parameters"]} == WRONG
         other = tmp_path / "other.key"
@@ -260,7 +261,7 @@ def test_bad_input_is_one_line_and_exit_2(tmp_path: Path, doctor: Doctor) -> Non
 
 @pytest.mark.parametrize(("answer", "kept"), [("n", 3.0), ("y", 0.5)])
 def test_on_a_terminal_it_asks_first(tmp_path: Path, answer: str, kept: float) -> None:
-    with serving(ArduCopterPeer) as (peer, url):
+    with serving(ArduCopterPeer, parameters=FACTORY) as (peer, url):
         config = write_config(tmp_path, {"url": url})
         command = [sys.executable, "-m", "flightd", "doctor", "--config", str(config), "--fix"]
         ours, theirs = pty.openpty()

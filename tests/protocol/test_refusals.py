@@ -12,17 +12,16 @@ from typing import Any
 
 import pytest
 
+from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.core.refusal import words
 from flightd.core.types import Demand
 from flightd.runtime.clock import LoopClock
-from flightd.sim.autopilot.autopilot import PeerConfig
 from tests.protocol.mavlink.scripted_autopilot import ScriptedAutopilot, scripted
 from tests.rigs.ardrone import Ear, bench, make_drone
 from tests.rigs.event_loops import virtual
-from tests.rigs.vehicles import Rig, ardupilot_rig, px4_rig
+from tests.rigs.vehicles import PATIENT_COPTER, PATIENT_PX4, Rig, ardupilot_rig, px4_rig
 
 BOTH = {"ardupilot": ardupilot_rig, "px4": px4_rig}
-_PATIENT_PX4 = PeerConfig(ready_s=0.5, parameters={"COM_OF_LOSS_T": 6.5})
 
 
 @pytest.fixture(params=list(BOTH))
@@ -83,7 +82,8 @@ def test_the_pilots_disarm_switch_is_final(on_rig: Any, height_m: float | None) 
 
 
 @pytest.mark.parametrize(
-    ("make_rig", "alone_s"), [(ardupilot_rig, 5.0), (partial(px4_rig, _PATIENT_PX4), 3.0)]
+    ("make_rig", "alone_s"),
+    [(partial(ardupilot_rig, patience=PATIENT_COPTER), 5.0), (partial(px4_rig, patience=PATIENT_PX4), 3.0)],
 )
 def test_a_daemon_that_died_in_the_air_and_comes_back_takes_the_flight_over(
     make_rig: Any, alone_s: float
@@ -109,6 +109,35 @@ def test_a_daemon_that_died_in_the_air_and_comes_back_takes_the_flight_over(
             height_m = rig.peer.truth().height_m
             await rig.stream(2.0, climb_mps=0.3)
             assert rig.peer.truth().height_m > height_m + 0.3
+            running.cancel()
+            await asyncio.wait([running])
+
+    virtual(test())
+
+
+def test_one_found_flying_whose_parameters_are_not_answered_is_brought_down_all_the_same() -> None:
+    """The heartbeats of the daemon that came back keep the autopilot's own failsafe from landing it."""
+
+    async def test() -> None:
+        async with ardupilot_rig(patience=PATIENT_COPTER) as rig:
+            assert rig.flying_task is not None
+            await rig.take_off(1.5)
+            rig.cut(True)  # it was killed: it says nothing more
+            rig.flying_task.cancel()
+            await asyncio.wait([rig.flying_task])
+            rig.cut(False)
+            rig.peer.parameters.answer = lambda *_: None
+            host, port = rig.peer.address
+            rig.vehicle = second = ArduPilotVehicle(f"udpout://{host}:{port}", LoopClock())
+            running = asyncio.create_task(second.run())
+            await rig.until(lambda: second.state() is not None)
+            second.demand(Demand.KEEP)
+            await rig.until(lambda: rig.known().in_control, 1.5)
+            assert "GUID_OPTIONS" in words(rig.known().refusal)
+            assert not any(await rig.stream(1.0)), "what thrust means to it is not known"
+            second.demand(Demand.LAND)
+            await rig.until(lambda: not rig.peer.armed, 20.0)
+            assert rig.peer.truth().height_m < 0.15
             running.cancel()
             await asyncio.wait([running])
 

@@ -18,8 +18,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.protocol import StatusReport
+from flightd.adapters.vehicle.mavlink.link.codec import Codec
 from flightd.app.simulation.world_process import run_world
 from flightd.core.topics import Topic
 from flightd.replay.log import read_log
@@ -88,8 +91,8 @@ class ServiceRig:
         return "\n".join(lines)
 
     @asynccontextmanager
-    async def world(self, **parameters: float) -> AsyncIterator[None]:
-        """The simulated vehicle, but for `parameters` as shipped, and camera, alive meanwhile."""
+    async def world(self) -> AsyncIterator[None]:
+        """The simulated vehicle, with the parameters that are shipped, and camera, alive meanwhile."""
         context = multiprocessing.get_context("spawn")
         channel = Channel()
         spec = WorldSpec(
@@ -97,7 +100,6 @@ class ServiceRig:
             seed=3,
             camera_address=("127.0.0.1", self.ports[0]),
             vehicle_ports=(self.ports[1],),
-            parameters=parameters,
             camera=CAMERA.__class__(**_fields(CAMERA) | {"mount": _turned(CAMERA.mount)}),
         )
         log = self.folder / "truth.mcap"
@@ -114,6 +116,15 @@ class ServiceRig:
             process.join(30)
             assert process.exitcode == 0
             self._manager.close()
+
+    def set_parameters(self, **values: float) -> None:
+        """Change the autopilot's parameters, as a ground station does: also in flight."""
+        codec = Codec(255, dialect.MAV_COMP_ID_MISSIONPLANNER)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+            for name, value in values.items():
+                kind = dialect.MAV_PARAM_TYPE_REAL32
+                message = dialect.MAVLink_param_set_message(1, 1, name.encode(), value, kind)
+                sock.sendto(codec.pack(message), ("127.0.0.1", self.ports[1]))
 
     async def start(self) -> asyncio.subprocess.Process:
         """`flightd run` as systemd would start it."""

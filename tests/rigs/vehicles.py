@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Protocol
 
@@ -64,6 +64,8 @@ class Rig:
     texts: Callable[[], list[str] | None] = lambda: None
     """What the vehicle was given to show; None where it shows nothing."""
     flying_task: asyncio.Task[None] | None = None
+    patience: Mapping[str, float] = field(default_factory=dict)
+    """Parameters that the vehicle is given in the air: how long it waits for us before it lands by itself."""
 
     def known(self) -> VehicleState:
         state = self.vehicle.state()
@@ -94,6 +96,8 @@ class Rig:
         while self.peer.truth().height_m < height_m:
             assert asyncio.get_running_loop().time() < climb_until, "does not climb"
             await self.stream(0.1, climb_mps=0.5)
+        for name, value in self.patience.items():
+            self.peer.parameters[name] = value
         await self.stream(2.0)
 
 
@@ -114,6 +118,7 @@ async def mavlink_rig(
     config: PeerConfig | None = None,
     *,
     peer_runs: bool = True,
+    patience: Mapping[str, float] | None = None,
 ) -> AsyncIterator[Rig]:
     clock = LoopClock()
     peer = make_peer(clock, Airframe(wind=CALM), config or PeerConfig(ready_s=0.5))
@@ -127,7 +132,9 @@ async def mavlink_rig(
         peer.link.muted = apart
 
     late_s = 1.0 if isinstance(vehicle, MavsdkVehicle) else 0.0
-    rig = Rig(vehicle, peer, take_over, cut, late_s=late_s, texts=lambda: list(peer.texts))
+    rig = Rig(
+        vehicle, peer, take_over, cut, late_s=late_s, texts=lambda: list(peer.texts), patience=patience or {}
+    )
     tasks = [asyncio.create_task(vehicle.run(), name="vehicle")]
     if peer_runs:
         tasks.append(asyncio.create_task(peer.run(), name="peer"))
@@ -142,11 +149,10 @@ ardupilot_rig = partial(mavlink_rig, ArduCopterPeer, ArduPilotVehicle, CopterMod
 px4_rig = partial(mavlink_rig, Px4Peer, Px4Vehicle, Px4Mode.ALTCTL)
 mavsdk_rig = partial(mavlink_rig, Px4Peer, MavsdkVehicle, Px4Mode.ALTCTL)
 
-_PATIENT: dict[str, float] = {"FS_GCS_TIMEOUT": 6.5}
-_PATIENT_COPTER = PeerConfig(ready_s=0.5, parameters=_PATIENT)
-_RAW_THRUST = PeerConfig(ready_s=0.5, parameters={"GUID_OPTIONS": 8, **_PATIENT})
-_PATIENT_PX4 = PeerConfig(ready_s=0.5, parameters={"COM_OF_LOSS_T": 6.5})
-"""It waits through the contract's radio gap; what it does by default has its own tests."""
+_RAW_THRUST = PeerConfig(ready_s=0.5, parameters={"GUID_OPTIONS": 8})
+PATIENT_COPTER: dict[str, float] = {"GUID_TIMEOUT": 3.0, "FS_GCS_TIMEOUT": 6.5}
+PATIENT_PX4: dict[str, float] = {"COM_OF_LOSS_T": 6.5}
+"""It waits through the contract's radio gap; what it does as it is shipped has its own tests."""
 
 
 @asynccontextmanager
@@ -170,10 +176,10 @@ async def ardrone_rig(**settings: Any) -> AsyncIterator[Rig]:
 
 
 RIGS: dict[str, Callable[[], Any]] = {
-    "ardupilot": partial(ardupilot_rig, _PATIENT_COPTER),
-    "ardupilot raw thrust": partial(ardupilot_rig, _RAW_THRUST),
-    "px4": partial(px4_rig, _PATIENT_PX4),
-    "mavsdk": partial(mavsdk_rig, _PATIENT_PX4),
+    "ardupilot": partial(ardupilot_rig, patience=PATIENT_COPTER),
+    "ardupilot raw thrust": partial(ardupilot_rig, _RAW_THRUST, patience=PATIENT_COPTER),
+    "px4": partial(px4_rig, patience=PATIENT_PX4),
+    "mavsdk": partial(mavsdk_rig, patience=PATIENT_PX4),
     "ardrone": ardrone_rig,
     "ardrone full navdata": partial(ardrone_rig, full_navdata=True),
 }

@@ -6,7 +6,7 @@ import time
 
 from flightd.adapters.vehicle.ardrone.settings import settings_of
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
-from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, GUIDED_NOGPS, ArduPilotVehicle
+from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.link.signing import Signing, read_key
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
@@ -24,6 +24,7 @@ def connect_vehicle(
     clock: Clock,
     limits: ControlConfig | None = None,
     *,
+    cells: int | None = None,
     url: str | None = None,
     opener: OpenDatagrams = open_datagrams,
 ) -> Vehicle:
@@ -31,30 +32,32 @@ def connect_vehicle(
     signing key that cannot be used.
 
     `limits` are those of the setpoints: an AR.Drone's own are set to them, for it takes shares of its own.
+    `cells` are the battery's in series, None: not known here.
     `url` is where the vehicle is reached, unless that is the configuration's; `opener` opens the
     sockets of a MAVLink one.
     """
     url = config.url if url is None else url
     match config.kind:
         case "ardupilot":
-            mode = GUIDED if config.flying_mode == "guided" else GUIDED_NOGPS
-            return ArduPilotVehicle(url, clock, _options(config, clock, opener), flying_mode=mode)
+            return ArduPilotVehicle(url, clock, _options(config, clock, opener, cells))
         case "px4":
-            return Px4Vehicle(url, clock, _options(config, clock, opener))
+            return Px4Vehicle(url, clock, _options(config, clock, opener, cells))
         case "ardrone":
             return ArDroneVehicle(settings_of(url, limits), clock)
         case "mavsdk":
-            return _mavsdk_vehicle(url, config, clock, opener)
+            return _mavsdk_vehicle(url, config, clock, opener, cells)
     raise InputError(f"vehicle.kind {config.kind}: no such adapter")
 
 
-def _mavsdk_vehicle(url: str, config: VehicleConfig, clock: Clock, opener: OpenDatagrams) -> Vehicle:
+def _mavsdk_vehicle(
+    url: str, config: VehicleConfig, clock: Clock, opener: OpenDatagrams, cells: int | None
+) -> Vehicle:
     """The library is an extra, and 19 MB that nobody else has to load."""
     try:
         from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle  # noqa: PLC0415
     except ImportError as err:
         raise missing_extra("mavsdk", "vehicle.kind mavsdk") from err
-    return MavsdkVehicle(url, clock, config.system_id, opener)
+    return MavsdkVehicle(url, clock, config.system_id, opener, cells=cells)
 
 
 def signing_of(config: VehicleConfig, clock: Clock) -> Signing | None:
@@ -64,10 +67,13 @@ def signing_of(config: VehicleConfig, clock: Clock) -> Signing | None:
     return Signing(read_key(config.signing_key), clock, time.time(), config.stamp_file)
 
 
-def _options(config: VehicleConfig, clock: Clock, opener: OpenDatagrams) -> MavlinkOptions:
+def _options(config: VehicleConfig, clock: Clock, opener: OpenDatagrams, cells: int | None) -> MavlinkOptions:
     return MavlinkOptions(
         system_id=config.system_id,
         own_system_id=config.own_system_id,
+        cells=cells,
+        guided=config.flying_mode == "guided",
+        lands_by_target=config.landing_target,
         signing=signing_of(config, clock),
         pose_form=PoseForm(config.pose_output) if config.shares_pose else None,
         raw_thrust=config.raw_thrust,

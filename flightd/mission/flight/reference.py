@@ -11,7 +11,7 @@ from flightd.control.motion_profile import Profile
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Demand, LandedState, Phase
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.flight.touchdown import Standstill, Touchdown
+from flightd.mission.flight.touchdown import ReckonedHeight, Standstill, Touchdown
 from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.machine import State
 from flightd.mission.plan.flight_plan import Stop
@@ -73,7 +73,8 @@ class ReferenceGenerator:
         self._monitor = monitor
         self._blind = monitor.blind
         self._relocator = relocator
-        self._touchdown = Touchdown(p)
+        self._reckoned = ReckonedHeight()
+        self._touchdown = Touchdown(p, self._reckoned)
         self._standstill = Standstill(p)
         self._still_s = 0.0
         self._by_itself = False
@@ -119,6 +120,7 @@ class ReferenceGenerator:
     def step(self, s: MissionInputs, task: ReferenceTask) -> Guidance:
         """Move the reference on by one tick."""
         demand = Demand.KEEP if task.phase is Phase.RECOVER else Demand.FLY
+        self._reckoned.step(s)
         self._steers = not (task.state.stopped or task.state.adopted) and self._steer(s, task)
         if task.phase is Phase.LAND:
             climb, demand = self._descend(s, task)

@@ -24,6 +24,8 @@ _STANDS_M = 0.1
 """What the range finder reads on the floor, until it was read there."""
 _FLOOR_M = 0.5
 """No range finder reads more on the floor."""
+_RECKONED_M, _RECKONED_SHARE = 0.3, 0.2
+"""By how much a dead-reckoned height may be wrong, and by what share of the way."""
 _NEAR_FLOOR_M = 0.08
 _STILL_MPS = 0.1
 _STILL_M = 0.04
@@ -70,11 +72,36 @@ def _is_still(before: tuple[float, Attitude], now: tuple[float, Attitude]) -> bo
     return not abs(before[0] - now[0]) > _STILL_M and turned_rad < _STILL_RAD
 
 
-class Touchdown:
-    """One planned landing: call `begin`, then `rate_mps` at each tick."""
+class ReckonedHeight:
+    """How high above the floor the drone is at least: as measured, and from the last measurement on by the
+    climb that the vehicle tells.  Call `step` at each tick in the air."""
 
-    def __init__(self, params: MissionConfig) -> None:
+    def __init__(self) -> None:
+        self._height_m = math.nan
+        self._moved_m: float | None = None
+        """How far it has climbed and sunk since it was measured; None while it is."""
+
+    def step(self, s: MissionInputs) -> None:
+        climb_mps = math.nan if s.vehicle is None else s.vehicle.climb_mps
+        if not math.isnan(s.height_m):
+            self._height_m, self._moved_m = s.height_m, None
+        else:
+            self._height_m += climb_mps * s.dt_s
+            self._moved_m = (self._moved_m or 0.0) + abs(climb_mps) * s.dt_s
+
+    @property
+    def least_m(self) -> float:
+        """NaN where nothing tells."""
+        doubt_m = 0.0 if self._moved_m is None else _RECKONED_M + _RECKONED_SHARE * self._moved_m
+        return self._height_m - doubt_m
+
+
+class Touchdown:
+    """One planned landing: call `begin`, then `rate_mps` at each tick; `height` is stepped by its owner."""
+
+    def __init__(self, params: MissionConfig, height: ReckonedHeight) -> None:
         self._params = params
+        self._height = height
         self._left_s = AIM_S
 
     def begin(self) -> None:
@@ -83,10 +110,9 @@ class Touchdown:
     def rate_mps(self, s: MissionInputs, target_m: tuple[float, float] | None) -> float:
         """Rate of descent; 0 while it still aims at `target_m` (None: it lands where it is)."""
         p = self._params
-        height_m = 0.0 if math.isnan(s.height_m) else s.height_m
         if (
             target_m is not None
-            and abs(height_m - ALIGN_M) < 0.1
+            and abs(s.height_m - ALIGN_M) < 0.1
             and self._left_s > 0.0
             and s.pose is not None
         ):
@@ -95,7 +121,7 @@ class Touchdown:
                 self._left_s -= s.dt_s
                 return 0.0
         slow_below_m = p.expert.touch_below_m if target_m is None else _SLOW_OVER_PAD * p.expert.touch_below_m
-        return p.expert.touch_mps if height_m < slow_below_m else p.land_mps
+        return p.land_mps if self._height.least_m >= slow_below_m else p.expert.touch_mps  # NaN: slowly
 
     def unseen_s(self, s: MissionInputs, target_m: tuple[float, float] | None) -> float:
         """How old the newest line may be to steer by: the usual, and more just above the pad."""

@@ -19,8 +19,9 @@ from flightd.mission.reasons import (
 )
 
 
-def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason | None:
-    """Why the flight cannot start, None if it can; `ground_silent`: who attends it has fallen silent."""
+def not_ready(s: MissionInputs, config: Config, ground_silent: bool, *, arming: bool) -> Reason | None:
+    """Why the flight cannot start, None if it can; `ground_silent`: who attends it has fallen silent,
+    `arming`: it is being armed by us."""
     p, v, latency_s = config.mission, s.vehicle, config.hazards.latency_s
     clock_s = config.hazards.clock_error_s
     if v is None or s.telemetry_age_s > p.telemetry_hold_s:
@@ -29,7 +30,7 @@ def not_ready(s: MissionInputs, config: Config, ground_silent: bool) -> Reason |
     cell_v = battery.cell_home_v if charge.loaded else battery.cell_start_v
     found = s.unfit or v.unfit
     checks: tuple[Reason | None, ...] = (
-        Plain.ARMED_ALREADY if v.armed else None,
+        Plain.ARMED_ALREADY if v.armed and not arming else None,
         None if v.clock_error_s <= clock_s else ClockUnsure(v.clock_error_s, clock_s),
         Unfit(found) if found else None,
         Plain.NO_HEIGHT if math.isnan(s.height_m) else None,

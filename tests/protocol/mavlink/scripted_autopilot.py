@@ -27,7 +27,12 @@ def known(vehicle: Any) -> VehicleState:
     return VehicleState(**{name: getattr(state, name) for name in VehicleState.__slots__})
 
 
-WAY_DOWN: dict[str, float] = {"FS_GCS_ENABLE": 5, "FS_GCS_TIMEOUT": 2, "SYSID_MYGCS": 191}
+WAY_DOWN: dict[str, float] = {
+    "GUID_TIMEOUT": 0.5,
+    "FS_GCS_ENABLE": 5,
+    "FS_GCS_TIMEOUT": 2,
+    "SYSID_MYGCS": 191,
+}
 """Without these nothing is armed."""
 
 

@@ -22,7 +22,9 @@ from tests.rigs.vehicles import CALM
 
 @asynccontextmanager
 async def pair(config: PeerConfig | None = None) -> AsyncIterator[tuple[ArduCopterPeer, RawClient]]:
-    peer = ArduCopterPeer(LoopClock(), Airframe(wind=CALM), config or PeerConfig(ready_s=0.0))
+    peer = ArduCopterPeer(
+        LoopClock(), Airframe(wind=CALM), config or PeerConfig(ready_s=0.0, parameters={"GUID_TIMEOUT": 3.0})
+    )
     client = await RawClient.connect(await peer.open())
     async with asyncio.TaskGroup() as tasks:
         serving = tasks.create_task(peer.run())

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.ardupilot import GUIDED, ArduPilotVehicle
+from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.link.codec import Codec
+from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
 from flightd.core.refusal import words
 from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, LandedState
 from flightd.runtime.clock import LoopClock
@@ -158,7 +159,7 @@ def test_a_vehicle_found_flying_is_not_steered_before_the_meaning_of_thrust_is_k
             vehicle.demand(Demand.KEEP)
             await asyncio.sleep(1.0)
             assert words(known(vehicle).refusal) == "GUID_OPTIONS not read yet"
-            assert not known(vehicle).in_control
+            assert known(vehicle).in_control, "it may be told to land"
             assert not vehicle.send(AttitudeSetpoint(0))
             await asyncio.sleep(10.0)  # however often an answer is lost
             autopilot.parameters = WAY_DOWN | {"GUID_OPTIONS": 8}
@@ -220,9 +221,13 @@ def test_another_firmware_is_recognised_and_not_flown() -> None:
 def test_guided_flies_a_vehicle_that_knows_its_position_and_no_other(has_position: bool) -> None:
     async def test() -> None:
         clock = LoopClock()
-        peer = ArduCopterPeer(clock, Airframe(), PeerConfig(ready_s=0.5, has_position=has_position))
+        peer = ArduCopterPeer(
+            clock,
+            Airframe(),
+            PeerConfig(ready_s=0.5, has_position=has_position, parameters={"EK3_SRC1_VELXY": 5}),
+        )
         host, port = await peer.open()
-        vehicle = ArduPilotVehicle(f"udpout://{host}:{port}", clock, flying_mode=GUIDED)
+        vehicle = ArduPilotVehicle(f"udpout://{host}:{port}", clock, MavlinkOptions(guided=True))
         tasks = [asyncio.create_task(part.run()) for part in (peer, vehicle)]
         rig = Rig(vehicle, peer, lambda: None, lambda apart: None)
         if has_position:

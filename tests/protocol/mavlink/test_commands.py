@@ -66,6 +66,7 @@ def test_in_progress_is_waited_for_and_strange_results_are_refusals() -> None:
                     asyncio.get_running_loop().call_later(2.0, autopilot.say, ack)
 
             autopilot.after = finish
+            await asyncio.sleep(2.0)  # its parameters are read first
             vehicle.demand(Demand.FLY)
             await asyncio.sleep(1.9)
             assert len(autopilot.commands(SET_MODE)) == 1
@@ -75,6 +76,7 @@ def test_in_progress_is_waited_for_and_strange_results_are_refusals() -> None:
         autopilot = ScriptedAutopilot()
         autopilot.results[SET_MODE] = 42
         async with scripted(autopilot) as (_, vehicle):
+            await asyncio.sleep(2.0)
             vehicle.demand(Demand.FLY)
             await asyncio.sleep(1.0)
             assert words(known(vehicle).refusal) == "mode GUIDED_NOGPS: result 42"

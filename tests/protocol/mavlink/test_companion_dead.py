@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import pytest
@@ -17,11 +16,8 @@ from flightd.sim.autopilot.autopilot import PeerConfig
 from tests.rigs.event_loops import virtual
 from tests.rigs.vehicles import ardupilot_rig, px4_rig
 
-_SHIPPED = PeerConfig(ready_s=0.5, parameters={"FS_GCS_TIMEOUT": 2.0})
-"""As configs/arducopter-nogps.parm has it."""
 
-
-@pytest.mark.parametrize("make", [partial(ardupilot_rig, _SHIPPED), px4_rig], ids=["ardupilot", "px4"])
+@pytest.mark.parametrize("make", [ardupilot_rig, px4_rig], ids=["ardupilot", "px4"])
 def test_it_lands_and_disarms_by_itself(make: Callable[[], Any]) -> None:
     async def test() -> None:
         async with make() as rig:
@@ -41,7 +37,7 @@ def test_what_else_beats_on_the_vehicle_does_not_keep_it_in_the_air() -> None:
     (beat,) = FrameParser(codec).datagram(frame)
 
     async def test() -> None:
-        async with ardupilot_rig(_SHIPPED) as rig:
+        async with ardupilot_rig() as rig:
             await rig.take_off()
             (channel,) = rig.peer.link.channels.values()
             rig.cut(True)
@@ -58,14 +54,18 @@ def test_what_else_beats_on_the_vehicle_does_not_keep_it_in_the_air() -> None:
     ("make", "name", "value"),
     [
         (ardupilot_rig, "FS_GCS_ENABLE", 0.0),
-        (ardupilot_rig, "FS_GCS_TIMEOUT", 30.0),
+        (ardupilot_rig, "FS_GCS_TIMEOUT", 5.0),
+        (ardupilot_rig, "GUID_TIMEOUT", 3.0),
+        (ardupilot_rig, "BATT_FS_LOW_ACT", 0.0),
+        (ardupilot_rig, "EK3_SRC1_POSZ", 2.0),
+        (px4_rig, "EKF2_HGT_REF", 2),
         (ardupilot_rig, "SYSID_MYGCS", 255.0),
         (ardupilot_rig, "SYSID_MYGCS", 1.0),
         (px4_rig, "COM_OBL_RC_ACT", 0),
-        (px4_rig, "COM_OF_LOSS_T", 20.0),
+        (px4_rig, "COM_OF_LOSS_T", 5.0),
     ],
 )
-def test_nothing_is_armed_that_would_stay_in_the_air(
+def test_nothing_is_armed_that_would_stay_in_the_air_or_is_wrong_for_the_job(
     make: Callable[[PeerConfig], Any], name: str, value: float
 ) -> None:
     async def test() -> None:
@@ -90,9 +90,33 @@ def test_what_would_not_be_armed_is_told_before_anybody_asks_for_a_flight(
         async with make(PeerConfig(ready_s=0.5, parameters={name: value})) as rig:
             await rig.until(lambda: rig.vehicle.state() is not None)
             await rig.until(lambda: name in words(rig.known().unfit), 6.0)
-        async with make(_SHIPPED if make is ardupilot_rig else PeerConfig(ready_s=0.5)) as rig:
+        async with make(PeerConfig(ready_s=0.5)) as rig:
             await rig.until(lambda: rig.vehicle.state() is not None)
             await rig.until(lambda: not rig.known().unfit, 6.0)
             assert not rig.known().armed
+
+    virtual(test())
+
+
+def test_what_nobody_but_a_person_can_choose_is_told_as_that() -> None:
+    async def test() -> None:
+        async with ardupilot_rig(PeerConfig(ready_s=0.5, parameters={"BATT_LOW_VOLT": 0.0})) as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            await rig.until(lambda: "BATT_LOW_VOLT" in words(rig.known().unfit), 6.0)
+            assert "choose it yourself" in words(rig.known().unfit)
+            assert "--fix" not in words(rig.known().unfit)
+
+    virtual(test())
+
+
+def test_after_a_reboot_the_parameters_are_looked_at_anew() -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await rig.until(lambda: rig.vehicle.state() is not None)
+            await rig.until(lambda: not rig.known().unfit, 6.0)
+            await asyncio.sleep(5.0)
+            rig.peer.parameters["LAND_SPEED"] = 200.0
+            rig.peer.reboot()
+            await rig.until(lambda: "LAND_SPEED" in words(rig.known().unfit), 15.0)
 
     virtual(test())

@@ -27,6 +27,8 @@ from flightd.sim.autopilot.streams import MessageStreams
 from flightd.sim.plant.airframe import Airframe
 from tests.rigs.event_loops import virtual
 
+_FACTORY = {"GUID_TIMEOUT": 3.0, "FS_GCS_TIMEOUT": 5.0, "FS_THR_ENABLE": 1.0, "BATT_FS_LOW_ACT": 0.0}
+
 
 @asynccontextmanager
 async def examined(
@@ -47,7 +49,7 @@ async def examined(
 
 def test_the_factory_settings_of_arducopter_are_named_and_mended() -> None:
     async def test() -> None:
-        async with examined(ArduCopterPeer) as (peer, examination):
+        async with examined(ArduCopterPeer, **_FACTORY) as (peer, examination):
             report = await examination.report()
             assert report.firmware is Firmware.ARDUPILOT
             assert report.version == "4.5.6"
@@ -137,7 +139,7 @@ def test_a_climb_rate_that_comes_from_the_range_finder_is_named(
 
 def test_an_armed_vehicle_is_left_alone() -> None:
     async def test() -> None:
-        async with examined(ArduCopterPeer) as (peer, examination):
+        async with examined(ArduCopterPeer, **_FACTORY) as (peer, examination):
             assert peer.pilot_arm()
             await asyncio.sleep(1.5)
             report = await examination.report()
@@ -150,7 +152,7 @@ def test_an_armed_vehicle_is_left_alone() -> None:
 
 def test_a_value_that_does_not_stay_is_still_found() -> None:
     async def test() -> None:
-        async with examined(ArduCopterPeer) as (peer, examination):
+        async with examined(ArduCopterPeer, **_FACTORY) as (peer, examination):
             report = await examination.report()
             peer.parameters.locked.add("GUID_TIMEOUT")
             (left,) = await examination.fix(report.findings)

@@ -22,6 +22,8 @@ from tests.rigs.event_loops import in_real_time
 from tests.rigs.service import ServiceRig
 
 _UP = {Phase.ACQUIRE, Phase.TURN, Phase.FOLLOW, Phase.HOVER, Phase.HOLD}
+_FIT = "waiting for the start command"
+"""In spite of autostart: what is started anew starts no flight."""
 _GUIDED_TIMEOUT_S = 3.0
 """After which the simulated autopilot levels by itself."""
 
@@ -29,13 +31,15 @@ _GUIDED_TIMEOUT_S = 3.0
 @pytest.mark.realtime
 @in_real_time
 async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp_path: Path) -> None:
-    """By an autopilot that waits long for its companion."""
+    """By an autopilot that somebody has told in flight to wait long for its companion."""
     rig = ServiceRig(tmp_path, ("A3",))
-    async with rig.world(GUID_TIMEOUT=_GUIDED_TIMEOUT_S, FS_GCS_TIMEOUT=10.0):
+    async with rig.world():
         first = await rig.start()
         await rig.until(lambda status: status.phase in _UP, 120)
         assert [message for message in rig.said if message.get("READY") == "1"]
         assert [message for message in rig.said if message.get("WATCHDOG") == "1"]
+        rig.set_parameters(GUID_TIMEOUT=_GUIDED_TIMEOUT_S, FS_GCS_TIMEOUT=10.0)
+        await asyncio.sleep(0.2)
         killed_s = rig.kill()
         await first.wait()
         (log,) = rig.flights.rglob("flight.mcap")
@@ -56,9 +60,9 @@ async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp
         assert code == 1, "an aborted mission"
         assert "nobody took over after the restart" in (tmp_path / "stderr").read_text()
 
+        rig.set_parameters(GUID_TIMEOUT=0.5, FS_GCS_TIMEOUT=2.0)
         third = await rig.start()
-        fit = "waiting for the start command"  # in spite of autostart
-        waiting = await rig.until(lambda status: status.reason == fit or status.phase is not Phase.PREFLIGHT)
+        waiting = await rig.until(lambda status: status.reason == _FIT or status.phase is not Phase.PREFLIGHT)
         assert waiting.phase is Phase.PREFLIGHT
         third.send_signal(signal.SIGTERM)
         assert await asyncio.wait_for(third.wait(), 30) == 128 + signal.SIGTERM
@@ -95,7 +99,7 @@ async def test_killed_in_the_air_the_vehicle_as_shipped_lands_and_the_restart_le
         async with asyncio.timeout(60):
             async for status in rig.statuses():
                 phases.add(status.phase)
-                if not phases <= {Phase.PREFLIGHT, Phase.RECOVER}:
+                if not phases <= {Phase.PREFLIGHT, Phase.RECOVER} or status.reason == _FIT:
                     break
         # On a slow machine the vehicle stands on the floor before the restarted daemon has looked.
         assert phases <= {Phase.PREFLIGHT, Phase.RECOVER, Phase.PILOT, Phase.LAND, Phase.ABORTED}
@@ -105,7 +109,7 @@ async def test_killed_in_the_air_the_vehicle_as_shipped_lands_and_the_restart_le
         await asyncio.sleep(8.0)
     truth = rig.truth()
     heights_m = [k.height_m for k in truth if k.stamp_ns * 1e-9 > killed_s]
-    assert max(heights_m) < heights_m[0] + 0.3, "it never climbs"
+    assert max(heights_m) < heights_m[0] + 0.5, "it climbs no longer than GUID_TIMEOUT"
     assert truth[-1].height_m < 0.15
 
 

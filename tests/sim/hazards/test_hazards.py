@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from flightd.config.schema import load_config
+from flightd.config.schema import Config, load_config
 from flightd.core.types import Command, CommandKind, Health, Phase
 from flightd.mission.safety.hazard_table import HAZARDS, PHASE_OF, Action, Hazard
 from flightd.sim.plant.kinematics import Kinematics
@@ -114,11 +114,11 @@ TRIALS: dict[str, Trial] = {
 }
 
 
-def fly(trial: Trial, seed: int) -> tuple[Flown, float]:
+def fly(trial: Trial, seed: int, config: Config = CONFIG) -> tuple[Flown, float]:
     """The flight and the time at which the fault began, s of its clock."""
     flight = IdealFlight(
         SITE,
-        CONFIG,
+        config,
         visits=VISITS,
         seed=seed,
         wind=WindParams(gust_rms_mps=trial.gust_mps),
@@ -181,3 +181,14 @@ def test_a_drone_that_is_not_heard_comes_to_rest_by_the_pictures() -> None:
     assert max(math.hypot(k.vx_mps, k.vy_mps) for k in silent) > 0.6
     assert math.hypot(silent[-1].x_m - silent[0].x_m, silent[-1].y_m - silent[0].y_m) < 1.0
     assert math.hypot(silent[-1].vx_mps, silent[-1].vy_mps) < 0.15
+
+
+def test_one_that_loses_its_height_high_up_is_down_within_twenty_seconds() -> None:
+    flown, begun_s = fly(TRIALS["height_lost"], 5, CONFIG.with_values(mission={"height_m": 4.2}))
+    found_s = next(e.stamp_ns * 1e-9 for e in flown.events if "height" in e.text and e.name == "hazard")
+    truth = [k for _, k in flown.truth]
+    down_s = next(k.stamp_ns * 1e-9 for k in truth if k.stamp_ns * 1e-9 > found_s and k.height_m < 0.15)
+    assert max(k.height_m for k in truth) > 4.0
+    assert begun_s < found_s < down_s < found_s + 20.0
+    touched = [k for k in truth if down_s - 0.3 < k.stamp_ns * 1e-9 < down_s]
+    assert min(k.climb_mps for k in touched) > -0.45

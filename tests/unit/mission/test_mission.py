@@ -150,7 +150,7 @@ def test_it_does_not_arm_for_flight_without_a_height() -> None:
     flight.to(Phase.ARMING)
     flight.set(height_m=math.nan)
     flight.run(30.0)
-    assert flight.phase is Phase.ARMING
+    assert flight.phase.value == "preflight"
 
 
 def test_stale_telemetry_stops_the_climb() -> None:
@@ -243,9 +243,13 @@ def test_what_is_answered_by_a_hold_holds(lost: str) -> None:
 
 
 def test_a_take_off_whose_pictures_stop_lands() -> None:
+    """A busy computer's gap is no reason for that."""
     flight = Flight()
     flight.to(Phase.TAKE_OFF)
     flight.run(0.5)
+    flight.set(warnings=replace(ALL_WELL, frame_age_s=0.6))
+    flight.run(0.1)
+    assert flight.phase.value == "take_off"
     flight.set(warnings=replace(ALL_WELL, frame_age_s=1.0))
     flight.to(Phase.LAND, within_s=0.1)
 

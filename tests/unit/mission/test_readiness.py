@@ -39,8 +39,8 @@ READY = MissionInputs(
 
 
 def test_late_pictures_keep_it_on_the_ground() -> None:
-    assert not_ready(READY, PARAMS, ground_silent=False) is None
+    assert not_ready(READY, PARAMS, ground_silent=False, arming=False) is None
     late = replace(READY, warnings=replace(ALL_WELL, frame_age_s=PARAMS.hazards.latency_s + 0.05))
-    reason = not_ready(late, PARAMS, ground_silent=False)
+    reason = not_ready(late, PARAMS, ground_silent=False, arming=False)
     assert reason is not None
     assert "pictures are more than 250 ms old" in in_words(reason)

@@ -253,3 +253,47 @@ def test_without_the_number_of_cells_nothing_starts() -> None:
     flight.set(judged_charge=Charge(1.0, cell_v=4.1))
     flight.run(0.1, follow=False)
     assert CommandKind.START in flight.mission.possible_commands
+
+
+def test_a_start_by_itself_that_does_not_arm_is_counted_down_anew_and_given_up_after_a_minute() -> None:
+    flight = starting_by_itself()
+    flight.run(2.1, follow=False)
+    phases, began_s = [flight.phase], flight.now_ns * 1e-9
+    while flight.phase is not Phase.ABORTED:
+        flight.run(0.02, follow=False)
+        phases += [flight.phase] if flight.phase is not phases[-1] else []
+        assert flight.now_ns * 1e-9 - began_s < 70.0
+    assert flight.now_ns * 1e-9 - began_s > 55.0
+    assert phases == [Phase.ARMING, Phase.PREFLIGHT] * 7 + [Phase.ARMING, Phase.ABORTED]
+    assert said(flight).count("arms in 3 s; pause takes the start back") >= 4, (
+        "told every ten seconds at most"
+    )
+
+
+def test_one_that_arms_late_is_not_armed_between_two_count_downs() -> None:
+    flight = starting_by_itself()
+    flight.run(2.1 + 5.2, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+    assert flight.demand is Demand.DISARM
+
+
+def test_what_comes_up_while_it_arms_voids_the_start() -> None:
+    flight = waiting(start_countdown_s=0.0)
+    flight.order(CommandKind.START)
+    flight.run(0.1, follow=False)
+    assert flight.mission.state.phase is Phase.ARMING
+    flight.set(battery_frac=0.1)
+    flight.run(0.7, follow=False)
+    assert flight.phase is Phase.PREFLIGHT
+    assert said(flight)[-1] == "the start command is void: battery at 10%, 30% needed to start"
+
+
+def test_nothing_takes_off_from_a_tick_on_which_something_speaks_against_it() -> None:
+    flight = waiting(start_countdown_s=0.0)
+    flight.order(CommandKind.START)
+    flight.run(0.1, follow=False)
+    flight.set(battery_frac=0.1, armed=True)
+    flight.run(0.3, follow=False)
+    assert flight.phase is Phase.ARMING
+    flight.run(0.5, follow=False)
+    assert (flight.phase, flight.demand) == (Phase.PREFLIGHT, Demand.DISARM)

@@ -50,12 +50,9 @@ class ArduPilotVehicle(MavlinkVehicle):
         url: str,
         clock: Clock,
         options: MavlinkOptions = DEFAULTS,
-        *,
-        flying_mode: int = GUIDED_NOGPS,
     ) -> None:
-        """`flying_mode` is GUIDED_NOGPS, or GUIDED for a vehicle that estimates its position."""
         super().__init__(url, clock, options)
-        self.flying_mode = flying_mode
+        self.flying_mode = GUIDED if options.guided else GUIDED_NOGPS
         self._raw_thrust = options.raw_thrust
         self._flies_raw = False
         self._origin: Origin | None = None

@@ -13,7 +13,14 @@ from typing import Protocol
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.authority import Authority
-from flightd.adapters.vehicle.mavlink.refusal import CommandRefused, ExplainedRefusal, OffFloor, TakenOver
+from flightd.adapters.vehicle.mavlink.refusal import (
+    CommandRefused,
+    ExplainedRefusal,
+    OffFloor,
+    ParameterUnread,
+    TakenOver,
+    ThrustMismatch,
+)
 from flightd.adapters.vehicle.mavlink.services.commands import Answer
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, Demand, LandedState
@@ -55,8 +62,9 @@ class FirmwareRules(Protocol):
         """Why the vehicle must not be flown by us; None where it may."""
         ...
 
-    def no_way_down(self) -> Refusal | None:
-        """Why the vehicle would stay in the air if this computer died; None where it would land."""
+    def not_set_up(self) -> Refusal | None:
+        """Why the vehicle must not be armed: it would stay in the air if this computer died, or a parameter
+        is wrong for the job; None where it may."""
         ...
 
     def sinks_unmeasured(self) -> bool:
@@ -114,6 +122,9 @@ class ModeArmingManager:
         self._refused_ns = 0
         self._wake = asyncio.Event()
         self._unheard_since_ns = self._unheard_ns = self._unheard_orders = 0
+        self._unread = False
+        """The vehicle was taken over though it is not known how it takes setpoints: it gets none until it
+        is."""
 
     # What is so
 
@@ -152,7 +163,7 @@ class ModeArmingManager:
         """Whether setpoints may go out.  Heartbeats alone that fail to come do not end them: an autopilot
         whose setpoints stop flies on by the last lean until its own time-out, and one that a pilot has
         taken meanwhile passes over them."""
-        flying = self._authority.held == self._firmware.flying_mode
+        flying = self._authority.held == self._firmware.flying_mode and not self._unread
         return self.is_engaged and flying and (not self.is_silent or self._tells())
 
     def _tells(self) -> bool:
@@ -180,7 +191,7 @@ class ModeArmingManager:
         """Why a vehicle that stands disarmed would not be armed by us; None where it would."""
         if self._telemetry.armed or self.is_silent:
             return None
-        return self._firmware.not_fit() or self._firmware.no_way_down()
+        return self._firmware.not_fit() or self._firmware.not_set_up()
 
     @property
     def off_floor_m(self) -> float | None:
@@ -265,18 +276,13 @@ class ModeArmingManager:
             return
         self._unheard_since_ns = self._unheard_orders = 0
         firmware, held, armed = self._firmware, self._authority.held, self._telemetry.armed
-        takes_over = demand is Demand.FLY or (demand is Demand.KEEP and held is None)
-        problem = firmware.not_fit() if takes_over else None
-        if demand is Demand.FLY and not armed:  # one that flies already is looked after all the same
-            problem = problem or firmware.no_way_down()
+        problem = self._problem(demand)
         match demand:
+            case Demand.KEEP if held is None and armed and self._flies_for_nobody(problem):
+                self._refused, self._unread = problem, problem is not None
+                self._authority.ask(firmware.flying_mode, firmware.flying_mode)
             case Demand.FLY | Demand.KEEP if problem is not None:
                 self._refuse(problem)
-            case Demand.KEEP if (
-                held is None and armed and self._telemetry.custom_mode == firmware.flying_mode
-            ):
-                self._refused = None
-                self._authority.ask(firmware.flying_mode, firmware.flying_mode)
             case Demand.FLY if held != firmware.flying_mode:
                 await self._ask_mode(firmware.flying_mode)
             case Demand.FLY if not armed and not self._was_armed:
@@ -289,6 +295,23 @@ class ModeArmingManager:
                 await self._ask("disarming", dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
             case _:
                 pass
+
+    def _problem(self, demand: Demand) -> Refusal | None:
+        """What keeps the vehicle from being flown as demanded, where that is to be begun."""
+        unfit = self._firmware.not_fit()
+        if self._unread and unfit is None:
+            self._unread, self._refused = False, None
+        begins = demand is Demand.FLY or (demand is Demand.KEEP and self._authority.held is None)
+        problem = unfit if begins else None
+        if demand is Demand.FLY and not self._telemetry.armed:  # one that flies already is looked after
+            problem = problem or self._firmware.not_set_up()
+        return problem
+
+    def _flies_for_nobody(self, problem: Refusal | None) -> bool:
+        """Whether a vehicle waits in the air for setpoints that nobody sends: it is ours to bring down, even
+        where its parameters are not read yet, or are wrong: our heartbeats keep it from landing by itself."""
+        ours = problem is None or isinstance(problem, ParameterUnread | ThrustMismatch)
+        return ours and self._telemetry.custom_mode == self._firmware.flying_mode
 
     def _land_unheard(self) -> None:
         """Bring down a vehicle that may hear us: by setpoints first, where they can sink it, for they brake

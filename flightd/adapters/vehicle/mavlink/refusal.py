@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from flightd.adapters.vehicle.mavlink.required_parameters import Names, ParameterFinding, Rule, judge
 from flightd.adapters.vehicle.mavlink.services.commands import Answer
 from flightd.core.refusal import Refusal
+
+Read: TypeAlias = Callable[[Names], tuple[str, float] | None]
+"""What was read of a parameter: the name that answered and its value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,27 +64,39 @@ class SharedSystemId(Refusal):
 
 
 @dataclass(frozen=True, slots=True)
-class NoWayDown(Refusal):
-    """A parameter by which the vehicle would stay in the air if this computer died."""
+class ParametersUnread(Refusal):
+    """The autopilot's parameters are being read."""
+
+    def __str__(self) -> str:
+        return "its parameters are still being read"
+
+
+@dataclass(frozen=True, slots=True)
+class WrongParameter(Refusal):
+    """A parameter that is unsafe or wrong for this job."""
 
     finding: ParameterFinding
 
     def __str__(self) -> str:
-        return f"{self.finding} (flightd doctor --fix sets it)"
+        by_doctor = self.finding.better is not None
+        remedy = "flightd doctor --fix sets it" if by_doctor else "choose it yourself, in a ground station"
+        return f"{self.finding} ({remedy})"
 
 
-def no_way_down(rules: Sequence[Rule], read: Callable[[Names], tuple[str, float] | None]) -> Refusal | None:
+def no_way_down(rules: Sequence[Rule], read: Read) -> Refusal | None:
     """Why the vehicle would stay in the air if this computer died, by what is `read` of its parameters; None
     where it would land."""
     for rule in rules:
-        found = read(rule.names)
-        if found is None and rule.optional:
-            continue
-        if found is None:
+        if read(rule.names) is None and not rule.optional:
             return ParameterUnread(rule.names[0])
-        if finding := judge(rule, found):
-            return NoWayDown(finding)
-    return None
+    return wrong_parameter(rules, read)
+
+
+def wrong_parameter(rules: Sequence[Rule], read: Read) -> Refusal | None:
+    """The first parameter that is unsafe or wrong, of those that were read; None where there is none."""
+    findings = (judge(rule, read(rule.names)) for rule in rules)
+    found = next((finding for finding in findings if finding is not None), None)
+    return None if found is None else WrongParameter(found)
 
 
 @dataclass(frozen=True, slots=True)

@@ -321,21 +321,19 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
     return (*table, *stricter.values())
 
 
-_LANDS = frozenset({"FS_GCS_ENABLE", "SYSID_MYGCS", "MAV_GCS_SYSID_HI", "COM_OBL_RC_ACT"})
-_LANDS_WITHIN = {Firmware.ARDUPILOT: "FS_GCS_TIMEOUT", Firmware.PX4: "COM_OF_LOSS_T"}
+_WAY_DOWN = frozenset(
+    {
+        *("GUID_TIMEOUT", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "SYSID_MYGCS", "MAV_GCS_SYSID_HI"),
+        *("COM_OBL_RC_ACT", "COM_OF_LOSS_T"),
+    }
+)
 
 
 def way_down_rules(firmware: Firmware, own_system_id: int) -> tuple[Rule, ...]:
-    """What must be so before a flight begins: the autopilot itself lands when this computer dies.  How soon
-    it had better do so is for the doctor to say."""
+    """What must be so before a flight begins: the autopilot itself levels and lands when this computer dies,
+    within the times that the doctor asks for."""
     table = rules_for(firmware, Job(own_system_id))
-    within = Rule(
-        (_LANDS_WITHIN[firmware],),
-        _within(0.1, 10.0),
-        "at most 10 s",
-        "so long the vehicle is in the air without anybody after this computer has died",
-    )
-    return (*(rule for rule in table if _LANDS.intersection(rule.names)), within)
+    return tuple(rule for rule in table if _WAY_DOWN.intersection(rule.names))
 
 
 def judge(rule: Rule, found: tuple[str, float] | None) -> ParameterFinding | None:

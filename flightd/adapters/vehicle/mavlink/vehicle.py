@@ -19,8 +19,14 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
-from flightd.adapters.vehicle.mavlink.refusal import SharedSystemId, WrongFirmware, no_way_down
-from flightd.adapters.vehicle.mavlink.required_parameters import Names, way_down_rules
+from flightd.adapters.vehicle.mavlink.refusal import (
+    ParametersUnread,
+    SharedSystemId,
+    WrongFirmware,
+    no_way_down,
+    wrong_parameter,
+)
+from flightd.adapters.vehicle.mavlink.required_parameters import Job, Names, rules_for, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, BeatPoll, Beats, too_slow
@@ -57,6 +63,7 @@ RATES_HZ: dict[int, float] = {
 }
 
 _BEATS_SETTLE_S, _BEATS_WINDOW_S, _BEATS_CHECK_S = 5.0, 3.0, 1.0
+_EXAMINE_S, _EXAMINE_AGAIN_S = 0.5, 10.0
 _PAD_NEAR_M = 1.0
 """Further away the pad is not shown: a landing of last resort must not set out for it."""
 
@@ -70,6 +77,11 @@ class MavlinkOptions:
 
     system_id: int = 1
     own_system_id: int = VehicleConfig().own_system_id
+    cells: int | None = None
+    """In series in the battery; None: not known here."""
+    guided: bool = False
+    """ArduCopter is flown in GUIDED: its vehicle estimates its motion."""
+    lands_by_target: bool = False
     signing: Signing | None = None
     pose_form: PoseForm | None = None
     raw_thrust: bool | None = None
@@ -78,6 +90,18 @@ class MavlinkOptions:
     """Id of the DISTANCE_SENSOR to fly by; None: the one that measures best as the vehicle stands."""
     opener: OpenDatagrams = open_datagrams
     """What opens its UDP socket."""
+
+    @property
+    def job(self) -> Job:
+        """What the autopilot's parameters have to be set up for."""
+        return Job(
+            self.own_system_id,
+            self.guided,
+            self.raw_thrust,
+            shares_pose=self.pose_form is not None,
+            landing_target=self.lands_by_target,
+            cells=self.cells,
+        )
 
 
 DEFAULTS = MavlinkOptions()
@@ -125,6 +149,10 @@ class MavlinkVehicle(abc.ABC):
         self._texts = TextAssembler()
         self._text_id = 0
         self._way_down = way_down_rules(self.firmware, options.own_system_id)
+        self._rules = rules_for(self.firmware, options.job)
+        self._examined = False
+        """All that the autopilot answers of its parameters was read."""
+        self._reboots = 0
         self._heard = asyncio.Event()
         self._beats = Beats(_BEATS_WINDOW_S)
         self._poll = BeatPoll()
@@ -208,11 +236,15 @@ class MavlinkVehicle(abc.ABC):
     def mode_params(self, custom_mode: int) -> tuple[float, ...]:
         """Parameters of DO_SET_MODE."""
 
-    def no_way_down(self) -> Refusal | None:
-        """Why the vehicle would stay in the air if this computer died; None where it would land."""
+    def not_set_up(self) -> Refusal | None:
+        """Why the vehicle must not be armed: it would stay in the air if this computer died, or a parameter
+        is wrong for the job; None where it may."""
         if self.link.hears_namesake(self._clock.now_ns()):
             return SharedSystemId(self._own_system_id)
-        return no_way_down(self._way_down, self.parameters.get)
+        problem = no_way_down(self._way_down, self.parameters.get)
+        if problem is None and not self._examined:
+            return ParametersUnread()
+        return problem or wrong_parameter(self._rules, self.parameters.get)
 
     def sinks_unmeasured(self) -> bool:
         """Whether the autopilot itself keeps a setpoint's climb rate; not where our own height loop does."""
@@ -235,6 +267,7 @@ class MavlinkVehicle(abc.ABC):
         tasks.create_task(self._once_heard(self._compare_clocks), name="mavlink timesync")
         tasks.create_task(self._once_heard(self.streams.run), name="mavlink streams")
         tasks.create_task(self._once_heard(self._read_parameters), name="mavlink parameters")
+        tasks.create_task(self._once_heard(self._examine), name="mavlink examination")
         tasks.create_task(self._once_heard(self._mind_beats), name="mavlink heartbeat rate")
         tasks.create_task(self._once_heard(self._poll_beats), name="mavlink heartbeat poll")
 
@@ -267,6 +300,8 @@ class MavlinkVehicle(abc.ABC):
     def _rebooted(self) -> None:
         """The autopilot started anew: what was read of it and set in it may be so no longer."""
         self.parameters.forget()
+        self._examined = False
+        self._reboots += 1
 
     def _say(self, message: Message, now_ns: int) -> None:
         for severity, text in self._texts.add(message):
@@ -282,6 +317,17 @@ class MavlinkVehicle(abc.ABC):
     async def _read_parameters(self) -> None:
         way_down = tuple(rule.names for rule in sorted(self._way_down, key=lambda rule: rule.optional))
         await self.parameters.keep((*self.parameter_names, *way_down), self.required_names)
+
+    async def _examine(self) -> None:
+        """Read what else the doctor would look at, on the ground; what this version does not have is never
+        answered."""
+        names = tuple(rule.names for rule in self._rules)
+        while True:
+            if not self._telemetry.armed:
+                reboots = self._reboots
+                await self.parameters.read_all(names)
+                self._examined = self._examined or reboots == self._reboots
+            await asyncio.sleep(_EXAMINE_AGAIN_S if self._examined else _EXAMINE_S)
 
     async def _mind_beats(self) -> None:
         """Tell people once, when the heartbeats stay too far apart to see a take-over in time."""

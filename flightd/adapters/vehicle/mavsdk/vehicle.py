@@ -28,8 +28,14 @@ from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
-from flightd.adapters.vehicle.mavlink.refusal import BeyondLibrary, WrongSystemId, no_way_down
-from flightd.adapters.vehicle.mavlink.required_parameters import way_down_rules
+from flightd.adapters.vehicle.mavlink.refusal import (
+    BeyondLibrary,
+    ParametersUnread,
+    WrongSystemId,
+    no_way_down,
+    wrong_parameter,
+)
+from flightd.adapters.vehicle.mavlink.required_parameters import Job, Names, rules_for, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BeatPoll
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
@@ -97,7 +103,13 @@ class MavsdkVehicle:
     """PX4 wants setpoints for more than a second before it enters OFFBOARD."""
 
     def __init__(
-        self, url: str, clock: Clock, system_id: int = 1, opener: OpenDatagrams = open_datagrams
+        self,
+        url: str,
+        clock: Clock,
+        system_id: int = 1,
+        opener: OpenDatagrams = open_datagrams,
+        *,
+        cells: int | None = None,
     ) -> None:
         self._clock = clock
         self._system_id = system_id
@@ -114,6 +126,8 @@ class MavsdkVehicle:
         self._sent_ns = 0
         self._unfit: Refusal | None = None
         self._way_down = way_down_rules(Firmware.PX4, system_id)
+        self._rules = rules_for(Firmware.PX4, Job(cells=cells))
+        self._examined = False
         self._parameters: dict[str, tuple[str, float]] = {}
 
     # The port
@@ -197,9 +211,16 @@ class MavsdkVehicle:
         """Why the vehicle must not be flown by us; None where it may."""
         return self._unfit
 
-    def no_way_down(self) -> Refusal | None:
-        """Why the vehicle would stay in the air if this computer died; None where it would land."""
-        return no_way_down(self._way_down, lambda names: self._parameters.get(names[0]))
+    def not_set_up(self) -> Refusal | None:
+        """Why the vehicle must not be armed: it would stay in the air if this computer died, or a parameter
+        is wrong for the job; None where it may."""
+        problem = no_way_down(self._way_down, self._read)
+        if problem is None and not self._examined:
+            return ParametersUnread()
+        return problem or wrong_parameter(self._rules, self._read)
+
+    def _read(self, names: Names) -> tuple[str, float] | None:
+        return next((self._parameters[name] for name in names if name in self._parameters), None)
 
     def sinks_unmeasured(self) -> bool:
         """PX4 takes raw thrust, which our own height loop makes of measured climb rates."""
@@ -285,14 +306,17 @@ class MavsdkVehicle:
             self._readings.take_cells(volts_mv)
 
     async def _read_parameters(self, library: Library) -> None:
-        """Those without which nothing is armed, again and again: somebody may change them."""
+        """Those without which nothing is armed, again and again: somebody may change them; the others once,
+        for a version that does not have them takes its time to say so."""
         while self._unfit is None:
-            for rule in self._way_down:
-                name = rule.names[0]
-                value = await library.parameter(name)
-                if value is not None:
-                    self._parameters[name] = (name, value)
-            missing = len(self._parameters) < len(self._way_down)
+            for rule in self._way_down if self._examined else self._rules:
+                for name in rule.names:
+                    value = await library.parameter(name)
+                    if value is not None:
+                        self._parameters[name] = (name, value)
+                        break
+            missing = any(self._read(rule.names) is None for rule in self._way_down)
+            self._examined = not missing
             await asyncio.sleep(_UNREAD_S if missing else _READ_AGAIN_S)
 
     async def _poll_beats(self) -> None:

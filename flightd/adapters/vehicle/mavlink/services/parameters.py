@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -76,6 +76,19 @@ class Parameters:
         if self.get(names) is None:
             await self._exchange(lambda: self._ask(names), lambda: self.get(names) is not None)
         return self.get(names)
+
+    async def read_all(self, wanted: Sequence[Names]) -> None:
+        """Read what is not known yet of these, asked for in one go."""
+
+        def missing() -> list[Names]:
+            return [names for names in wanted if self.get(names) is None]
+
+        def ask() -> None:
+            for names in missing():
+                self._ask(names)
+
+        if missing():
+            await self._exchange(ask, lambda: not missing())
 
     async def write(self, name: str, value: float) -> bool:
         """Set a parameter that has been read; True when it read back as asked."""
