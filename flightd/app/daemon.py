@@ -106,7 +106,8 @@ class Daemon:
                 continue
             over_ns = over_ns or now_ns
             state = vehicle.state()
-            silent = state is not None and now_ns - state.attitude.stamp_ns > _SILENT_NS
+            heard_ns = 0 if state is None else min(state.attitude.stamp_ns, state.heartbeat_ns)
+            silent = now_ns - heard_ns > _SILENT_NS  # without heartbeats nobody knows whether it is armed
             down = state is None or not state.armed or silent
             if down and now_ns - over_ns > _LINGER_NS:
                 return

@@ -64,7 +64,7 @@ def prepare(config: Config, path: Path, *, resume: bool) -> Run:
     order = going_on(order, config.inventory.run, site, config.inventory.folder, in_air=anew)
     if anew:  # it looks after what flies, and never starts a flight by itself
         order = replace(order, autostart=False)
-    journal = service.logs_to_journal(os.environ)
+    journal = service.set_up_log(os.environ)
     service.note_start(os.environ)
     return Run(FlightSetting(config, site, order, _learnt(config, in_air=anew)), anew, journal)
 

@@ -20,16 +20,17 @@ from flightd.runtime.line_writer import LineWriter
 _MARK = "started"
 
 
-def logs_to_journal(environment: Mapping[str, str]) -> bool:
-    """Whether stderr goes to the journal; if so, the program's own log lines take its form from now on."""
-    if not goes_to_journal(sys.stderr, environment.get("JOURNAL_STREAM", "")):
-        return False
+def set_up_log(environment: Mapping[str, str]) -> bool:
+    """Send the program's own log lines to stderr without ever waiting for it; whether that is the journal,
+    whose form they take then."""
+    journal = goes_to_journal(sys.stderr, environment.get("JOURNAL_STREAM", ""))
     lines = LineWriter(sys.stderr)
     atexit.register(lines.close)
     handler = logging.StreamHandler(lines)
-    handler.setFormatter(JournalFormatter())
-    logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
-    return True
+    if journal:
+        handler.setFormatter(JournalFormatter())
+    logging.basicConfig(level=logging.INFO if journal else logging.WARNING, handlers=[handler], force=True)
+    return journal
 
 
 def was_started_before(environment: Mapping[str, str]) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+import threading
 from typing import Self
 
 from rich.console import Console
@@ -11,10 +13,15 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from flightd.core.snapshot import Snapshot
 
 _PLAIN_NS = 10_000_000_000
+_CLOSE_S = 1.0
 
 
 class FlightProgress:
-    """Shows each snapshot it is called with: a bar on a terminal, a line now and then elsewhere."""
+    """Shows the newest snapshot it was called with: a bar on a terminal, a line now and then elsewhere.
+
+    A thread of its own does, for a terminal may stand still (Ctrl-S) and a pipe may be full: whoever flies
+    does not wait for that.
+    """
 
     def __init__(self, shown: bool) -> None:
         self._shown = shown
@@ -30,17 +37,44 @@ class FlightProgress:
         self._task: TaskID | None = None
         self._plain_ns = 0
         self._waits_for = ""
+        self._newest: Snapshot | None = None
+        self._came = threading.Event()
+        self._over = False
+        self._thread = threading.Thread(target=self._run, name="flight progress", daemon=True)
 
     def __enter__(self) -> Self:
-        self._progress.start()
+        if self._shown:
+            self._progress.start()
+            self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._progress.stop()
-
-    def __call__(self, snapshot: Snapshot) -> None:
         if not self._shown:
             return
+        self._over = True
+        self._came.set()
+        self._thread.join(_CLOSE_S)
+        if not self._thread.is_alive():
+            self._progress.stop()
+
+    def __call__(self, snapshot: Snapshot) -> None:
+        self._newest = snapshot
+        self._came.set()
+
+    def _run(self) -> None:
+        shown: Snapshot | None = None
+        while True:
+            self._came.wait()
+            self._came.clear()
+            over, snapshot = self._over, self._newest
+            if snapshot is not None and snapshot is not shown:
+                shown = snapshot
+                with contextlib.suppress(OSError, ValueError):  # nobody reads any more, or it is closed
+                    self._show(snapshot)
+            if over:
+                return
+
+    def _show(self, snapshot: Snapshot) -> None:
         detail = (
             snapshot.reason
             if snapshot.waits

@@ -199,7 +199,7 @@ class RequestHandler:
                 f"more than {_ORDERS_PER_S} commands a second",
             ),
             (
-                peer.role is not Role.OPERATOR,
+                peer.role is not Role.OPERATOR and not _takes_start_back(kind, phase),
                 Code.ROLE,
                 f"{peer.name} is a {peer.role}; commands need the role operator",
             ),
@@ -265,6 +265,11 @@ class RequestHandler:
     def _refuse(self, request_id: str, code: Code, text: str) -> Refused:
         self.refused += 1
         return Refused(request=request_id, code=code, text=text)
+
+
+def _takes_start_back(kind: CommandKind, phase: Phase) -> bool:
+    """What anybody who looks on may order: he sees who stands beside the drone that is about to start."""
+    return kind is CommandKind.PAUSE and (phase in WAITING or phase is Phase.ARMING)
 
 
 def _wrong_version(envelope: Envelope) -> str:

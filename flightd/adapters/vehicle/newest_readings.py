@@ -74,6 +74,11 @@ class NewestReadings:
         """Height above the floor below, NaN when the range finder has fallen silent."""
         return self._range_m if now_ns - self._range_ns <= _RANGE_STALE_NS else math.nan
 
+    @property
+    def height_stamp_ns(self) -> int:
+        """The time of the newest height."""
+        return self._range_ns
+
     def climb_mps(self, now_ns: int) -> float:
         """Climb rate, NaN when it is not told."""
         return self._climb_mps if now_ns - self._climb_ns <= self.climb_stale_ns else math.nan

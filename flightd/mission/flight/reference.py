@@ -77,6 +77,7 @@ class ReferenceGenerator:
         self._touchdown = Touchdown(p, self._reckoned)
         self._standstill = Standstill(p)
         self._still_s = 0.0
+        self._sinks = False
         self._by_itself = False
         self._stood = False
         self.anchor = (start[0], start[1])
@@ -101,6 +102,7 @@ class ReferenceGenerator:
         self.height_goal_m = 0.0
         self._standstill.begin()
         self._still_s = 0.0
+        self._sinks = False
         self._by_itself = by_itself
         self._stood = False
 
@@ -181,7 +183,8 @@ class ReferenceGenerator:
         """Climb rate and demand of a landing: at rest first, unless stopped or out of sight; down until
         the vehicle says that it stands, or does so without a word; then disarm."""
         p, v = self._params, s.vehicle
-        self._still_s = self._standstill.step(s)
+        self._still_s = self._standstill.step(s, sinks=self._sinks)
+        self._sinks = False
         moving = self._steers and s.speed_mps > _REST_MPS
         if moving and not task.state.on_pad and task.phase_s < _SETTLE_S:
             self._height.reset(self._height.position)
@@ -190,6 +193,7 @@ class ReferenceGenerator:
         if rate > 0.0 and not self._steers:  # what drifts unseen should not do so for long
             rate = self._blind.rate_mps(s.height_m)
         self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
+        self._sinks = rate > 0.0
         deaf = s.telemetry_age_s > p.telemetry_land_s
         unsteered = v is not None and math.isnan(v.climb_mps)
         standing = v is not None and v.landed is LandedState.ON_GROUND and not deaf

@@ -27,14 +27,16 @@ _FLOOR_M = 0.5
 _RECKONED_M, _RECKONED_SHARE = 0.3, 0.2
 """By how much a dead-reckoned height may be wrong, and by what share of the way."""
 _NEAR_FLOOR_M = 0.08
+_HIGH_S = 2.0
 _STILL_MPS = 0.1
 _STILL_M = 0.04
 _STILL_RAD = math.radians(2.0)
 
 
 class Standstill:
-    """For how long a vehicle that sinks has been down and still, whatever its autopilot says of it: near the
-    height that it read on the floor (or with none read), neither climbing nor turning over."""
+    """For how long a vehicle that lands has been down and still, whatever its autopilot says of it: near the
+    height that it read on the floor (or with none read), neither climbing nor turning over.  One that reads
+    more is down, too, if it has been commanded to sink and was still for a while: its range finder errs."""
 
     def __init__(self, params: MissionConfig) -> None:
         self._hold_s = params.telemetry_hold_s
@@ -50,20 +52,24 @@ class Standstill:
         """A landing begins."""
         self._since = None
 
-    def step(self, s: MissionInputs) -> float:
-        """Seconds; 0 while it moves, is higher, or is not heard."""
+    def step(self, s: MissionInputs, *, sinks: bool) -> float:
+        """Seconds; 0 while it moves, is higher, or is not heard.  `sinks`: it is commanded to."""
         v = s.vehicle
-        if v is None or s.telemetry_age_s > self._hold_s or not self._is_down(s.height_m, v.climb_mps):
+        if v is None or s.telemetry_age_s > self._hold_s or not _is_steady(s.height_m, v.climb_mps):
+            self._since = None
+            return 0.0
+        high = s.height_m > self._floor_m + _NEAR_FLOOR_M  # NaN: unknown
+        if high and not sinks:
             self._since = None
             return 0.0
         if self._since is None or not _is_still(self._since[1:], (s.height_m, v.attitude)):
             self._since = s.now_ns, s.height_m, v.attitude
-        return (s.now_ns - self._since[0]) * 1e-9
+        still_s = (s.now_ns - self._since[0]) * 1e-9
+        return max(still_s - _HIGH_S, 0.0) if high else still_s
 
-    def _is_down(self, height_m: float, climb_mps: float) -> bool:
-        if math.isnan(height_m) and math.isnan(climb_mps):
-            return False
-        return not (height_m > self._floor_m + _NEAR_FLOOR_M or abs(climb_mps) > _STILL_MPS)  # NaN: unknown
+
+def _is_steady(height_m: float, climb_mps: float) -> bool:
+    return not (math.isnan(height_m) and math.isnan(climb_mps)) and not abs(climb_mps) > _STILL_MPS
 
 
 def _is_still(before: tuple[float, Attitude], now: tuple[float, Attitude]) -> bool:

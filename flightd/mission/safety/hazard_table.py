@@ -126,9 +126,11 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "climb_lost",
         Trigger.CLIMB_LOST,
-        "no climb rate from the autopilot for a second, and then for `mission.telemetry_hold_s`",
+        "no climb rate from the autopilot for a second, and then for `mission.telemetry_hold_s`; or, where"
+        " thrust is sent, one that is 0.5 m/s off the height's for 0.2 s while the height moves as commanded",
         Action.LAND,
-        "the autopilot's own landing: it cannot be steered unmeasured; nothing is armed without a climb rate",
+        "flown by the height's as long as that is told; the autopilot's own landing: it cannot be steered"
+        " unmeasured; nothing is armed without a climb rate",
         _FAST,
     ),
     Hazard(
@@ -198,7 +200,8 @@ HAZARDS: tuple[Hazard, ...] = (
         "landing_unreported",
         None,
         "down at the height that the range finder read on the floor, neither climbing nor turning over, while"
-        " it sinks; or a landing that takes longer than twice its way's time and"
+        " it sinks; or the same for 2 s at any height that it reads, commanded to sink; or a landing that"
+        " takes longer than twice its way's time and"
         " `mission.expert.phase_slack_s`",
         Action.LAND,
         "after 1.5 s level, after 2.5 s the autopilot's own landing, which disarms; then asked to disarm,"

@@ -118,7 +118,7 @@ class Instruments:
         floor no speed is estimated."""
         sensors = self._sensors
         height_mm = round(sensors.height_m * 1000)
-        sinks_cmps = 0 if self.landed_state == LANDED_GROUND else -round(sensors.climb_mps * 100)
+        sinks_cmps = 0 if self.landed_state == LANDED_GROUND else -round(sensors.told_climb_mps * 100)
         heading_cdeg = round(math.degrees(sensors.yaw_rad % math.tau) * 100) % 36000
         return dialect.MAVLink_global_position_int_message(
             self.boot_ms,
@@ -134,7 +134,7 @@ class Instruments:
 
     def _local_position(self) -> Message:
         """Down and its speed are the barometer's; the horizontal part is not estimated."""
-        height_m, climb_mps = self._sensors.height_m, self._sensors.climb_mps
+        height_m, climb_mps = self._sensors.height_m, self._sensors.told_climb_mps
         return dialect.MAVLink_local_position_ned_message(
             self.boot_ms, 0.0, 0.0, -height_m, 0.0, 0.0, -climb_mps
         )

@@ -148,6 +148,14 @@ class HeightStuck(_Fault):
     swing_m: float = Field(0.0, ge=0, le=2)
 
 
+class ClimbStuck(_Fault):
+    """The autopilot tells one climb rate, whatever it is."""
+
+    by_vehicle = True
+    kind: Literal["climb_stuck"]
+    reading_mps: float = Field(0.0, ge=-3, le=3)
+
+
 class HeightQuality(_Fault):
     """The range finder goes on reading, and tells this quality of its signal: 0 is unknown, 1 none."""
 
@@ -287,6 +295,7 @@ Fault: TypeAlias = Annotated[
     | HeightLost
     | HeightScaled
     | HeightStuck
+    | ClimbStuck
     | HeightQuality
     | LandingUnreported
     | BatteryDrop

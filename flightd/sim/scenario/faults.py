@@ -28,6 +28,7 @@ from flightd.sim.scenario.fault_schema import (
     CameraLate,
     CameraTurned,
     ChargeMisreported,
+    ClimbStuck,
     ClockJump,
     ClockRate,
     Fault,
@@ -240,6 +241,8 @@ def _mislead(wrong: SensorFault, fault: Fault, on: bool) -> None:
             wrong.range_lost = on
         case HeightQuality():
             wrong.range_quality_pc = fault.percent if on else 0
+        case ClimbStuck():
+            wrong.climb_stuck_mps = fault.reading_mps if on else None
         case HeightStuck():
             wrong.range_stuck_m = fault.reading_m if on else None
             wrong.range_swing_m = fault.swing_m

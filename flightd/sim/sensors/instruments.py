@@ -52,6 +52,8 @@ class SensorFault:
     """How much more than that it reads at times."""
     range_share: float = 1.0
     """What it reads for a metre."""
+    climb_stuck_mps: float | None = None
+    """What is told of the climb rate whatever it is; None: as it is estimated."""
     charge_pc: int | None = None
     """What is told of the charge whatever the battery holds; None: it is measured."""
     range_quality_pc: int = 0
@@ -75,6 +77,12 @@ class Sensors:
         self._roll_wander = self._pitch_wander = self._baro_wander = self._climb_error = 0.0
         self.roll_rad = self.pitch_rad = self.yaw_rad = 0.0
         self.height_m = self.climb_mps = 0.0
+
+    @property
+    def told_climb_mps(self) -> float:
+        """The estimate of the climb rate as it is told."""
+        stuck_mps = self.fault.climb_stuck_mps
+        return self.climb_mps if stuck_mps is None else stuck_mps
 
     @property
     def roll_error_rad(self) -> float:

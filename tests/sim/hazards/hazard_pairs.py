@@ -65,6 +65,18 @@ _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
     lambda draw: {"kind": "climb_silent"},
     lambda draw: {"kind": "charge_misreported", "percent": draw.randint(0, 100)},
     lambda draw: {"kind": "timesync_silent"},
+    lambda draw: {"kind": "clock_rate", "share": round(draw.uniform(-0.03, 0.03), 4)},
+    lambda draw: {"kind": "height_quality"},
+    lambda draw: {
+        "kind": "climb_stuck",
+        "reading_mps": draw.choice([0.0, round(draw.uniform(-1.0, 1.0), 2)]),
+    },
+    lambda draw: {"kind": "aisle_opened"},
+    lambda draw: {
+        "kind": "bare_floor",
+        "at_node": draw.choice(["A2", "A3", "A4"]),
+        "half_m": round(draw.uniform(0.5, 4.0), 2),
+    },
     lambda draw: {"kind": "camera_disordered", "delay_s": round(draw.uniform(0.05, 0.2), 2)},
 )
 """All that a lockstep flight can have, each as strong as the table of hazards claims to bear."""
@@ -86,12 +98,14 @@ class FlownPair:
 
 
 def draw_pair(seed: int) -> Scenario:
-    """Two different kinds of fault, each for good or for a while."""
+    """Two different kinds of fault, each for good or for a while, or at a place."""
     draw = random.Random(seed)
     faults = []
     for make in draw.sample(_KINDS, 2):
         lasts_s = math.inf if draw.random() < 0.5 else round(draw.uniform(*_LASTS_S), 2)
-        faults.append({"at_s": round(draw.uniform(*_MOMENTS_S), 2), "duration_s": lasts_s} | make(draw))
+        when = {"at_s": round(draw.uniform(*_MOMENTS_S), 2), "duration_s": lasts_s}
+        fault = make(draw)
+        faults.append(fault if "at_node" in fault else when | fault)
     return Scenario.model_validate({"fault": faults})
 
 

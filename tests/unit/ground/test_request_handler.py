@@ -74,11 +74,22 @@ def test_a_refused_command_may_be_tried_again_with_its_id() -> None:
 
 @pytest.mark.parametrize("kind", list(CommandKind))
 def test_a_viewer_commands_nothing_and_the_attempt_is_written_down(kind: CommandKind) -> None:
-    rig = RequestHandlerRig(Phase.PREFLIGHT)
+    rig = RequestHandlerRig(Phase.FOLLOW)
     assert refusal(rig.order(kind, VIEWER, node="A2" if kind is CommandKind.GOTO else "")) is Code.ROLE
     assert refusal(rig.hand(body("attend"), VIEWER)) is Code.ROLE
     assert rig.handler.take_commands() == []
     assert [entry.outcome for entry in rig.audit] == ["role"]
+
+
+@pytest.mark.parametrize("kind", list(CommandKind))
+def test_a_start_is_taken_back_by_whoever_looks_on(kind: CommandKind) -> None:
+    rig = RequestHandlerRig(Phase.ARMING)
+    answer = rig.order(kind, VIEWER, node="A2" if kind is CommandKind.GOTO else "")
+    if kind is CommandKind.PAUSE:
+        assert isinstance(answer, Accepted)
+        assert [command.kind for command in rig.handler.take_commands()] == [CommandKind.PAUSE]
+    else:
+        assert refusal(answer) is Code.ROLE
 
 
 @pytest.mark.parametrize("phase", list(Phase))

@@ -70,6 +70,11 @@ class HeightLoop:
         self._guess = self.hover
 
     @property
+    def wanted_mps(self) -> float:
+        """The climb rate that it pushes towards in the air: the commanded one, which it reaches by and by."""
+        return self._wanted_mps
+
+    @property
     def in_air(self) -> bool:
         """Whether this loop carries the vehicle."""
         return self._stage is _Stage.AIR

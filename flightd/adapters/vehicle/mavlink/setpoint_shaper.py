@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
+from flightd.adapters.vehicle.climb_check import ClimbCheck
 from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.setpoint import HeadingIntegrator
@@ -24,6 +25,9 @@ class Measured(Protocol):
 
     def fresh_climb_mps(self, now_ns: int) -> float: ...
 
+    @property
+    def height_stamp_ns(self) -> int: ...
+
 
 class SetpointShaper:
     """Heading and own height loop of one vehicle, let go of whenever the vehicle is not ours."""
@@ -33,6 +37,12 @@ class SetpointShaper:
         self._measured = measured
         self._heading = HeadingIntegrator()
         self.height = HeightLoop()
+        self._climb = ClimbCheck()
+
+    @property
+    def climb_contradicted(self) -> bool:
+        """The climb rate that is told is not the vehicle's: it is flown by the height's, and has to land."""
+        return self.height.in_air and self._climb.contradicted
 
     def heading_rad(self, setpoint: AttitudeSetpoint, now_ns: int) -> float | None:
         """The heading for a setpoint that goes out now; None when none may."""
@@ -48,11 +58,14 @@ class SetpointShaper:
 
     def collective(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         """Raw thrust for a setpoint's climb rate, by the height loop."""
+        height_m, told_mps = self._measured.height_m(now_ns), self._measured.fresh_climb_mps(now_ns)
+        if not math.isnan(height_m):
+            self._climb.height(self._measured.height_stamp_ns, height_m)
         return self.height.step(
             now_ns,
             setpoint.climb_mps,
-            climb_mps=self._measured.fresh_climb_mps(now_ns),
-            height_m=self._measured.height_m(now_ns),
+            climb_mps=self._climb.believed_mps(now_ns, told_mps, self.height.wanted_mps),
+            height_m=height_m,
             tilt_cos=math.cos(setpoint.roll_rad) * math.cos(setpoint.pitch_rad),
             armed=self._measured.armed,
             on_floor=self._modes.stands,

@@ -185,6 +185,8 @@ class MavlinkVehicle(abc.ABC):
             in_control=self._modes.in_control,
             refusal=self._modes.refusal,
         )
+        if state is not None and self._steering.climb_contradicted:
+            state = replace(state, climb_mps=math.nan)
         return state and replace(state, unfit=self._modes.unfit)
 
     def attitudes(self) -> list[Attitude]:

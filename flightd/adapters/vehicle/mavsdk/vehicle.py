@@ -167,6 +167,8 @@ class MavsdkVehicle:
     def state(self) -> VehicleState | None:
         modes = self._modes
         state = self._readings.state(self._clock.now_ns(), in_control=modes.in_control, refusal=modes.refusal)
+        if state is not None and self._steering.climb_contradicted:
+            state = replace(state, climb_mps=math.nan)
         return state and replace(state, unfit=modes.unfit)
 
     def attitudes(self) -> list[Attitude]:

@@ -1,0 +1,98 @@
+"""Whether the climb rate that the vehicle tells can be flown by, where thrust is ours.
+
+A rate that stands still, whatever the vehicle does, is answered with ever more thrust.  It is found by three
+things together: it stays off the rate that is wanted, it does not move although thrust pushes it there, and
+the height does.  A range finder that sticks shows nothing of that: the told rate follows the thrust then.
+Pure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+_WINDOW_NS = 300_000_000
+_SPAN_NS, _SAMPLES = 150_000_000, 4
+"""A slope over less than this, or of fewer samples, tells nothing."""
+_FRESH_NS = 150_000_000
+_LEAP_MPS = 3.0
+"""A height that changes faster is another floor: goods, a pallet's edge."""
+_PUSHED_NS = 400_000_000
+_OFF_MPS, _STILL_MPS = 0.15, 0.1
+"""So far off what is wanted for so long, and no more moved: the push for that moves a vehicle by 0.24 m/s."""
+_AHEAD_MPS = 0.3
+"""So much further the height's rate is where the told one is pushed to."""
+_AGREED_MPS, _AGREED_NS = 0.5, 3_000_000_000
+
+
+class _Told(NamedTuple):
+    stamp_ns: int
+    told_mps: float
+    off_mps: float
+
+
+class ClimbCheck:
+    """Call `height` with each sample of the range finder, then `believed_mps` at each setpoint."""
+
+    def __init__(self) -> None:
+        self._heights: deque[tuple[int, float]] = deque()
+        self._rates: deque[_Told] = deque()
+        self._agreed_ns: int | None = None
+        self.contradicted = False
+        """The told rate is wrong: until it and the height have agreed for three seconds."""
+
+    def height(self, stamp_ns: int, height_m: float) -> None:
+        """Take a sample, in order of time; the same one again is passed over."""
+        heights = self._heights
+        if heights and stamp_ns <= heights[-1][0]:
+            return
+        if heights and abs(height_m - heights[-1][1]) > _LEAP_MPS * (stamp_ns - heights[-1][0]) * 1e-9:
+            heights.clear()
+        heights.append((stamp_ns, height_m))
+        while stamp_ns - heights[0][0] > _WINDOW_NS:
+            heights.popleft()
+
+    def believed_mps(self, now_ns: int, told_mps: float, wanted_mps: float) -> float:
+        """The climb rate to close the loop by: as told, or the height's where that contradicts it (NaN where
+        there is none of either), m/s, + up; `wanted_mps` is what the loop pushes towards."""
+        slope_mps = self._slope_mps(now_ns)
+        agree = abs(slope_mps - told_mps) < _AGREED_MPS  # NaN: no
+        self._agreed_ns = (self._agreed_ns or now_ns) if agree else None
+        if self._agreed_ns is not None and now_ns - self._agreed_ns >= _AGREED_NS:
+            self.contradicted = False
+        if self._stands_still(now_ns, told_mps, wanted_mps):
+            ahead_mps = math.copysign(1.0, wanted_mps - told_mps) * (slope_mps - told_mps)
+            self.contradicted |= ahead_mps > _AHEAD_MPS
+        return slope_mps if self.contradicted else told_mps
+
+    def _stands_still(self, now_ns: int, told_mps: float, wanted_mps: float) -> bool:
+        """The told rate has not moved for a while although it is pushed one way."""
+        off_mps = wanted_mps - told_mps
+        rates = self._rates
+        if not abs(off_mps) > _OFF_MPS or (rates and rates[-1].off_mps * off_mps < 0.0):
+            rates.clear()
+            return False
+        rates.append(_Told(now_ns, told_mps, off_mps))
+        while now_ns - rates[0].stamp_ns > _PUSHED_NS + _FRESH_NS:
+            rates.popleft()
+        told = [rate.told_mps for rate in rates]
+        return now_ns - rates[0].stamp_ns >= _PUSHED_NS and max(told) - min(told) < _STILL_MPS
+
+    def _slope_mps(self, now_ns: int) -> float:
+        """Of the height over the last moments, by least squares; NaN where it is not known."""
+        heights = self._heights
+        if len(heights) < _SAMPLES or now_ns - heights[-1][0] > _FRESH_NS:
+            return math.nan
+        first_ns = heights[0][0]
+        if heights[-1][0] - first_ns < _SPAN_NS:
+            return math.nan
+        times_s = [(stamp_ns - first_ns) * 1e-9 for stamp_ns, _ in heights]
+        mean_s = sum(times_s) / len(times_s)
+        mean_m = sum(height_m for _, height_m in heights) / len(heights)
+        spread = sum((time_s - mean_s) ** 2 for time_s in times_s)
+        moved = sum(
+            (time_s - mean_s) * (height_m - mean_m)
+            for time_s, (_, height_m) in zip(times_s, heights, strict=True)
+        )
+        return moved / spread

@@ -1,0 +1,40 @@
+"""Hazards flown whole, camera, adapter and autopilot, and judged by the truth: the short form of
+`flightd sim --scenario all`, which flies every row of the table with as many seeds as one has time for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from flightd.app.simulation.judgement import judge_flight
+from flightd.app.simulation.launch import fly
+from flightd.app.simulation.prepare import SimOptions, prepare
+from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
+from flightd.sim.scenario.scenario_files import load_scenario, shipped_scenarios
+
+ARDUPILOT = ("height_lost", "telemetry_lost", "companion_dead", "camera_gone")
+PX4 = ("height_stuck", "telemetry_lost", "climb_lost", "ceiling_left")
+"""What asks for a landing, by each autopilot's own way of it."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("vehicle", "hazard"),
+    [*(("ardupilot", name) for name in ARDUPILOT), *(("px4", name) for name in PX4)],
+)
+def test_it_is_found_and_ends_as_the_table_says(vehicle: str, hazard: str, tmp_path: Path) -> None:
+    scenario = load_scenario(shipped_scenarios()[hazard])
+    small = scenario.camera.model_copy(update={"width_px": 320, "height_px": 180, "fps": 20.0})
+    options = SimOptions(seed=1 + len(hazard), vehicle=vehicle)
+    simulation = prepare(
+        options,
+        scenario.model_copy(update={"camera": small}),
+        tmp_path,
+        lambda _: None,
+        sweep_route=SHORT_ROUTE,
+    )
+    fly(simulation)
+    verdict = judge_flight(simulation).hazard
+    assert verdict is not None
+    assert not verdict.faults, verdict
