@@ -104,7 +104,13 @@ def build(
     peers = peers or configured_peers(config)
     pilot = pilot_of(config, site, order, learnt)
     vehicle = connect_vehicle(
-        config.vehicle, clock, config.control, cells=config.battery.cells, url=peers.vehicle, opener=opener
+        config.vehicle,
+        clock,
+        config.control,
+        cells=config.battery.cells,
+        highest_m=site.ceiling_m - config.hazards.headroom_m,
+        url=peers.vehicle,
+        opener=opener,
     )
     publishers = TelemetryPublishers(clock, vehicle, recorder, ground, monitors, observers)
     kept_fps = 0.0 if recorder is NO_RECORDER else config.recorder.picture_fps

@@ -33,6 +33,7 @@ class FlightProgress:
             TimeElapsedColumn(),
             console=Console(stderr=True),
             disable=not self._live,
+            auto_refresh=False,  # its thread would hold a lock while it writes
         )
         self._task: TaskID | None = None
         self._plain_ns = 0
@@ -44,7 +45,6 @@ class FlightProgress:
 
     def __enter__(self) -> Self:
         if self._shown:
-            self._progress.start()
             self._thread.start()
         return self
 
@@ -54,14 +54,16 @@ class FlightProgress:
         self._over = True
         self._came.set()
         self._thread.join(_CLOSE_S)
-        if not self._thread.is_alive():
-            self._progress.stop()
 
     def __call__(self, snapshot: Snapshot) -> None:
         self._newest = snapshot
         self._came.set()
 
     def _run(self) -> None:
+        with contextlib.suppress(OSError, ValueError), self._progress:  # nobody reads it any more
+            self._show_newest()
+
+    def _show_newest(self) -> None:
         shown: Snapshot | None = None
         while True:
             self._came.wait()
@@ -69,8 +71,7 @@ class FlightProgress:
             over, snapshot = self._over, self._newest
             if snapshot is not None and snapshot is not shown:
                 shown = snapshot
-                with contextlib.suppress(OSError, ValueError):  # nobody reads any more, or it is closed
-                    self._show(snapshot)
+                self._show(snapshot)
             if over:
                 return
 
@@ -99,3 +100,4 @@ class FlightProgress:
         self._progress.update(
             self._task, completed=snapshot.nodes_done, description=snapshot.phase.value, detail=detail
         )
+        self._progress.refresh()

@@ -47,14 +47,7 @@ async def examine(
 
     InputError for a wrong address or signing key."""
     signing = signing_of(config, clock)
-    job = Job(
-        own_system_id=config.own_system_id,
-        guided=config.flying_mode == "guided",
-        raw_thrust=config.raw_thrust,
-        shares_pose=config.shares_pose,
-        landing_target=config.landing_target,
-        cells=cells,
-    )
+    job = Job.of(config, cells)
     examination = Examination(config.url, clock, config.system_id, signing, job)
     try:
         async with examination.connected():

@@ -88,6 +88,8 @@ class Mission:
         self._charging = BatterySwap(site, policy, config, scanner, self._route, self._monitor)
         self._reporter = PhaseReporter(self._events, self._route, self._scan)
         self.state = BEGIN
+        self._swapped = False
+        """It has landed for a fresh battery, and goes on with nothing less."""
         self._leg_along_x: bool | None = None
         self._await_start()
 
@@ -286,7 +288,7 @@ class Mission:
 
     def _grounded(self, s: MissionInputs) -> Reason | None:
         """Why it stays on the ground, None if nothing keeps it there."""
-        stops_left = len(self.remaining) if self.phase is Phase.SWAP else None
+        stops_left = len(self.remaining) if self._swapped else None
         arming = self.phase is Phase.ARMING
         return self._clearance.obstacle(s, stops_left, self._losses.ground_silent, arming=arming)
 
@@ -360,6 +362,7 @@ class Mission:
             case Phase.LAND:
                 self._steering.land(by_itself=trigger is Trigger.TIMED_OUT)
             case Phase.SWAP:
+                self._swapped = True
                 self._steering.anchor = (self.goal.x_m, self.goal.y_m)
                 self._charging.await_battery(s.now_ns)
                 self._await_start()

@@ -77,7 +77,8 @@ class StartClearance:
             return
         if obstacle is not None:
             self._order.withdraw()
-            self._tried_ns = None
+            if not self.disarms(now_ns):  # what comes up only while it arms would else begin the time anew
+                self._tried_ns = None
         elif not self._order.given:
             self._tried_ns = now_ns if self._tried_ns is None else self._tried_ns
             self._order.give(now_ns, self._config.mission.autostart_countdown_s)
@@ -105,11 +106,13 @@ class StartClearance:
     def withdraw(self) -> None:
         """The start has done its work, or came to nothing: it is not kept for later."""
         self._order.withdraw()
+        self._hindered = DebounceTimer()
         self._tried_ns = None
 
     def void(self, now_ns: int) -> None:
         """The start came to nothing."""
         self._order.withdraw()
+        self._hindered = DebounceTimer()
         self._void_ns, self.taken_back = now_ns, False
 
     def is_hindered(self, now_ns: int, obstacle: Reason | None) -> bool:
@@ -119,7 +122,8 @@ class StartClearance:
 
     def gives_up(self, now_ns: int) -> bool:
         """It has started by itself again and again, and was never armed."""
-        given_up_s = self._config.mission.expert.arm_timeout_s
+        p = self._config.mission
+        given_up_s = p.autostart_countdown_s + p.expert.arm_timeout_s
         return self._tried_ns is not None and (now_ns - self._tried_ns) * 1e-9 > given_up_s
 
     def is_void(self, now_ns: int, obstacle: Reason | None) -> bool:

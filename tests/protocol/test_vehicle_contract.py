@@ -156,6 +156,7 @@ def test_sinking_to_the_floor_and_disarming_ends_the_flight(on_rig: Any) -> None
 
 def test_a_landed_vehicle_is_not_armed_again_by_the_same_demand(on_rig: Any) -> None:
     async def test(rig: Rig) -> None:
+        rig.patience = {}  # set up so it would not be armed again
         await rig.take_off(1.0)
         while rig.known().armed:
             await rig.stream(0.1, climb_mps=-0.3)

@@ -12,18 +12,19 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-_WINDOW_NS = 300_000_000
-_SPAN_NS, _SAMPLES = 150_000_000, 4
-"""A slope over less than this, or of fewer samples, tells nothing."""
-_FRESH_NS = 150_000_000
-_LEAP_MPS = 3.0
-"""A height that changes faster is another floor: goods, a pallet's edge."""
-_PUSHED_NS = 400_000_000
+_KEPT_NS, _SPAN_NS, _SAMPLES = 600_000_000, 250_000_000, 6
+"""A slope is of the newest samples that span so long, but of no fewer; older ones are not kept."""
+_FRESH_NS = 250_000_000
+_LEAP_M, _LEAP_MPS = 0.1, 3.0
+"""A height that changes by more from one sample to the next is that of another floor: goods, a pallet."""
+_PUSHED_MPS, _PUSHED_NS, _PUSH_KEPT_NS = 0.3, 200_000_000, 600_000_000
+_PUSH_PER_S = 4.0
+"""What thrust was raised by for the rate that is wanted should have changed the rate by so much, and has had
+the time for that: `height_loop` pushes by so much for each m/s."""
 _OFF_MPS, _STILL_MPS = 0.15, 0.1
-"""So far off what is wanted for so long, and no more moved: the push for that moves a vehicle by 0.24 m/s."""
-_AHEAD_MPS = 0.3
-"""So much further the height's rate is where the told one is pushed to."""
-_AGREED_MPS, _AGREED_NS = 0.5, 3_000_000_000
+"""So far off what is wanted all the while, and no more moved."""
+_AHEAD_MPS, _AHEAD_NS = 0.4, 100_000_000
+"""So much further the height's rate is where the told one is pushed to, for so long."""
 
 
 class _Told(NamedTuple):
@@ -38,32 +39,35 @@ class ClimbCheck:
     def __init__(self) -> None:
         self._heights: deque[tuple[int, float]] = deque()
         self._rates: deque[_Told] = deque()
-        self._agreed_ns: int | None = None
+        self._ahead_ns: int | None = None
         self.contradicted = False
-        """The told rate is wrong: until it and the height have agreed for three seconds."""
+        """The told rate is wrong, for good: one that stands still agrees with every hover."""
 
     def height(self, stamp_ns: int, height_m: float) -> None:
         """Take a sample, in order of time; the same one again is passed over."""
         heights = self._heights
         if heights and stamp_ns <= heights[-1][0]:
             return
-        if heights and abs(height_m - heights[-1][1]) > _LEAP_MPS * (stamp_ns - heights[-1][0]) * 1e-9:
-            heights.clear()
+        if heights:
+            since_s = (stamp_ns - heights[-1][0]) * 1e-9
+            if abs(height_m - heights[-1][1]) > _LEAP_M + _LEAP_MPS * since_s:
+                heights.clear()
         heights.append((stamp_ns, height_m))
-        while stamp_ns - heights[0][0] > _WINDOW_NS:
+        while stamp_ns - heights[0][0] > _KEPT_NS:
+            heights.popleft()
+        while len(heights) > _SAMPLES and stamp_ns - heights[1][0] >= _SPAN_NS:
             heights.popleft()
 
     def believed_mps(self, now_ns: int, told_mps: float, wanted_mps: float) -> float:
         """The climb rate to close the loop by: as told, or the height's where that contradicts it (NaN where
-        there is none of either), m/s, + up; `wanted_mps` is what the loop pushes towards."""
+        there is none of either), m/s, + up; `wanted_mps` is what the loop pushes towards, NaN where it does
+        not carry the vehicle."""
         slope_mps = self._slope_mps(now_ns)
-        agree = abs(slope_mps - told_mps) < _AGREED_MPS  # NaN: no
-        self._agreed_ns = (self._agreed_ns or now_ns) if agree else None
-        if self._agreed_ns is not None and now_ns - self._agreed_ns >= _AGREED_NS:
-            self.contradicted = False
-        if self._stands_still(now_ns, told_mps, wanted_mps):
-            ahead_mps = math.copysign(1.0, wanted_mps - told_mps) * (slope_mps - told_mps)
-            self.contradicted |= ahead_mps > _AHEAD_MPS
+        ahead = self._stands_still(now_ns, told_mps, wanted_mps) and (
+            math.copysign(1.0, wanted_mps - told_mps) * (slope_mps - told_mps) > _AHEAD_MPS  # NaN: no
+        )
+        self._ahead_ns = (self._ahead_ns or now_ns) if ahead else None
+        self.contradicted |= self._ahead_ns is not None and now_ns - self._ahead_ns >= _AHEAD_NS
         return slope_mps if self.contradicted else told_mps
 
     def _stands_still(self, now_ns: int, told_mps: float, wanted_mps: float) -> bool:
@@ -74,10 +78,13 @@ class ClimbCheck:
             rates.clear()
             return False
         rates.append(_Told(now_ns, told_mps, off_mps))
-        while now_ns - rates[0].stamp_ns > _PUSHED_NS + _FRESH_NS:
+        while now_ns - rates[0].stamp_ns > _PUSH_KEPT_NS:
             rates.popleft()
         told = [rate.told_mps for rate in rates]
-        return now_ns - rates[0].stamp_ns >= _PUSHED_NS and max(told) - min(told) < _STILL_MPS
+        if now_ns - rates[0].stamp_ns < _PUSHED_NS or max(told) - min(told) > _STILL_MPS:
+            return False
+        mean_mps = sum(abs(rate.off_mps) for rate in rates) / len(rates)
+        return _PUSH_PER_S * mean_mps * (now_ns - rates[0].stamp_ns) * 1e-9 > _PUSHED_MPS
 
     def _slope_mps(self, now_ns: int) -> float:
         """Of the height over the last moments, by least squares; NaN where it is not known."""
@@ -85,7 +92,7 @@ class ClimbCheck:
         if len(heights) < _SAMPLES or now_ns - heights[-1][0] > _FRESH_NS:
             return math.nan
         first_ns = heights[0][0]
-        if heights[-1][0] - first_ns < _SPAN_NS:
+        if heights[-1][0] - first_ns < 0.8 * _SPAN_NS:
             return math.nan
         times_s = [(stamp_ns - first_ns) * 1e-9 for stamp_ns, _ in heights]
         mean_s = sum(times_s) / len(times_s)

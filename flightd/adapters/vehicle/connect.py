@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 from flightd.adapters.vehicle.ardrone.settings import settings_of
@@ -25,6 +26,7 @@ def connect_vehicle(
     limits: ControlConfig | None = None,
     *,
     cells: int | None = None,
+    highest_m: float = math.inf,
     url: str | None = None,
     opener: OpenDatagrams = open_datagrams,
 ) -> Vehicle:
@@ -32,7 +34,8 @@ def connect_vehicle(
     signing key that cannot be used.
 
     `limits` are those of the setpoints: an AR.Drone's own are set to them, for it takes shares of its own.
-    `cells` are the battery's in series, None: not known here.
+    `cells` are the battery's in series, None: not known here; `highest_m` is the greatest height that may be
+    flown, for the one that keeps it itself.
     `url` is where the vehicle is reached, unless that is the configuration's; `opener` opens the
     sockets of a MAVLink one.
     """
@@ -43,7 +46,7 @@ def connect_vehicle(
         case "px4":
             return Px4Vehicle(url, clock, _options(config, clock, opener, cells))
         case "ardrone":
-            return ArDroneVehicle(settings_of(url, limits), clock)
+            return ArDroneVehicle(settings_of(url, limits, highest_m), clock)
         case "mavsdk":
             return _mavsdk_vehicle(url, config, clock, opener, cells)
     raise InputError(f"vehicle.kind {config.kind}: no such adapter")

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.required_parameters import Job, rules_for
 from flightd.app.build import plan_of, start_of
 from flightd.app.flight_orders import configured_order
 from flightd.app.recording import FlightSetting
@@ -15,6 +18,8 @@ from flightd.config.schema import Config
 from flightd.core.flight_order import FlightOrder
 from flightd.core.snapshot import Snapshot
 from flightd.mission.plan.flight_plan import FlightPlan
+from flightd.sim.autopilot.parameters import COPTER_PARAMETERS, PX4_PARAMETERS
+from flightd.sim.autopilot.shipped_parameters import shipped_parameters
 from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
 from flightd.sim.scenario.scenario import Scenario
 from flightd.sim.unknowns import NOTHING, Unknowns
@@ -81,10 +86,28 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
         clock_ppm=scenario.vehicle.clock_ppm + simulation.unknowns.clock_ppm - 20.0,
         range_least_m=scenario.vehicle.range_least_m,
         second_range_m=scenario.vehicle.second_range_m,
+        parameters=_set_up(config),
         truth_url=simulation.truth_url,
         faults=scenario.fault,
         unknowns=simulation.unknowns,
     )
+
+
+def _set_up(config: Config) -> dict[str, float]:
+    """The simulated autopilot's parameters beyond those that are shipped: as `flightd doctor --fix` leaves
+    them for what is configured."""
+    if config.vehicle.kind not in ("ardupilot", "px4", "mavsdk"):
+        return {}
+    kind: Literal["ardupilot", "px4"] = "ardupilot" if config.vehicle.kind == "ardupilot" else "px4"
+    known: Mapping[str, float | int] = COPTER_PARAMETERS if kind == "ardupilot" else PX4_PARAMETERS
+    values = {**known, **shipped_parameters(kind, known)}
+    firmware = Firmware.ARDUPILOT if kind == "ardupilot" else Firmware.PX4
+    return {
+        name: rule.better
+        for rule in rules_for(firmware, Job.of(config.vehicle, config.battery.cells))
+        for name in rule.names
+        if name in values and rule.better is not None and not rule.fits(values[name])
+    }
 
 
 def _front(simulation: Simulation, port: int | None) -> FrontSpec | None:

@@ -196,16 +196,12 @@ class ReferenceGenerator:
         self._sinks = rate > 0.0
         deaf = s.telemetry_age_s > p.telemetry_land_s
         unsteered = v is not None and math.isnan(v.climb_mps)
+        self._by_itself |= unsteered  # nothing takes it back out of its own landing
         standing = v is not None and v.landed is LandedState.ON_GROUND and not deaf
         standing = standing or self._still_s > _DISARM_S
         self._stood |= standing  # from then on nothing takes it out of its own landing any more
         by_itself = (
-            deaf
-            or unsteered
-            or task.state.adopted
-            or self._by_itself
-            or self._stood
-            or self._still_s > _OWN_LANDING_S
+            deaf or task.state.adopted or self._by_itself or self._stood or self._still_s > _OWN_LANDING_S
         )
         return -rate, Demand.DISARM if standing else Demand.LAND if by_itself else Demand.FLY
 

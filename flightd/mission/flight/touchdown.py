@@ -89,7 +89,9 @@ class ReckonedHeight:
 
     def step(self, s: MissionInputs) -> None:
         climb_mps = math.nan if s.vehicle is None else s.vehicle.climb_mps
-        if not math.isnan(s.height_m):
+        if s.warnings.height_stuck:
+            self._height_m = math.nan  # nobody knows since when
+        elif not math.isnan(s.height_m):
             self._height_m, self._moved_m = s.height_m, None
         else:
             self._height_m += climb_mps * s.dt_s

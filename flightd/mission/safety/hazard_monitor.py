@@ -126,8 +126,9 @@ class HazardMonitor:
         heartbeat_s = (s.now_ns - v.heartbeat_ns) * 1e-9
         jumped = self._stamps.step(v.stamps_refused, s.now_ns) or s.dt_s > _GAP_S
         heard = s.telemetry_age_s <= p.telemetry_hold_s  # silence as a whole is another hazard
+        climbless = math.isnan(v.climb_mps) or v.climb_contradicted
         return {
-            Trigger.CLIMB_LOST: (math.isnan(v.climb_mps) and heard, p.telemetry_hold_s),
+            Trigger.CLIMB_LOST: (climbless and heard, p.telemetry_hold_s),
             Trigger.HEARTBEAT_LOST: (heartbeat_s > h.heartbeat_land_s, 0.0),
             Trigger.BATTERY_CRITICAL: (s.charge.frac < p.battery_land or s.charge.empty, 0.0),
             Trigger.BATTERY_UNKNOWN: (s.charge.doubt is not None, 0.0),

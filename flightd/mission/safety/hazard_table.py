@@ -127,10 +127,10 @@ HAZARDS: tuple[Hazard, ...] = (
         "climb_lost",
         Trigger.CLIMB_LOST,
         "no climb rate from the autopilot for a second, and then for `mission.telemetry_hold_s`; or, where"
-        " thrust is sent, one that is 0.5 m/s off the height's for 0.2 s while the height moves as commanded",
+        " thrust is sent, one that stands still for 0.4 s off what is wanted while the height moves there",
         Action.LAND,
-        "flown by the height's as long as that is told; the autopilot's own landing: it cannot be steered"
-        " unmeasured; nothing is armed without a climb rate",
+        "down by the height's rate where the told one is contradicted; else, and once that is lost, too, the"
+        " autopilot's own landing: it cannot be steered unmeasured; nothing is armed without a climb rate",
         _FAST,
     ),
     Hazard(

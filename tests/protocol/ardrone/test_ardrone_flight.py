@@ -165,6 +165,9 @@ def test_with_a_deaf_sonar_the_height_is_unknown_and_a_descent_becomes_a_landing
             b.drone.warnings |= DroneState.ULTRASOUND
             await b.steer(0.3)
             assert math.isnan(b.state.height_m)
+            assert not math.isnan(b.state.climb_mps)
+            await b.steer(1.0)
+            assert math.isnan(b.state.climb_mps), "it is not known to stand still in the air"
             await b.steer(0.3, climb_mps=-0.3)
             assert b.drone.major == MajorState.LANDING
 

@@ -36,6 +36,8 @@ def test_the_url_names_host_ports_and_navdata() -> None:
     plain = settings_of("ardrone://192.168.1.1")
     assert (plain.host, plain.at_port, plain.navdata_port) == ("192.168.1.1", 5556, 5554)
     assert not plain.full_navdata
+    assert settings_of("ardrone://192.168.1.1", highest_m=3.5).height_max_m == 3.5
+    assert settings_of("ardrone://192.168.1.1", highest_m=99.0).height_max_m == plain.height_max_m
     other = settings_of("ardrone://localhost?at=1&navdata=2&video=3&control=4&full=1")
     assert (other.at_port, other.navdata_port, other.video_port, other.control_port) == (1, 2, 3, 4)
     assert other.full_navdata

@@ -14,6 +14,7 @@ from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions, MavlinkVehi
 from flightd.core.types import VehicleState
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.link import MavlinkChannel, UdpLink
+from flightd.sim.autopilot.parameters import COPTER_PARAMETERS
 
 SET_MODE, ARM, INTERVAL = 176, 400, 511
 GUIDED_NOGPS, ALT_HOLD, LAND = 20, 2, 9
@@ -44,6 +45,7 @@ class ScriptedAutopilot:
         self.heard: list[tuple[float, Any]] = []
         self.results: dict[int, list[int | None] | int | None] = {}
         self.parameters: dict[str, float] = {
+            **COPTER_PARAMETERS,
             "GUID_OPTIONS": 0,
             "WPNAV_SPEED_UP": 250,
             "WPNAV_SPEED_DN": 150,

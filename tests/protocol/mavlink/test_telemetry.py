@@ -192,6 +192,14 @@ def test_without_a_velocity_the_climb_rate_is_the_heights_slope() -> None:
     assert told(position(0, 1000, vx=10)).climb_mps == 0.0
 
 
+def test_a_height_that_was_overtaken_on_its_way_does_not_begin_the_slope_anew() -> None:
+    order = [i + (i % 5 == 2) - (i % 5 == 3) for i in range(60)]
+    assert order != sorted(order)
+    telemetry = MavlinkTelemetry(ClockSync())
+    seen = [told(position(40 * i, 1000 + 20 * i), telemetry=telemetry).climb_mps for i in order]
+    assert seen[12:] == pytest.approx([0.5] * len(seen[12:]))
+
+
 def test_the_battery_is_read_from_either_message_and_unknown_stays_unknown() -> None:
     cells = [3900, 3900, 3900] + [65535] * 7
 

@@ -28,7 +28,7 @@ from flightd.runtime.frame_ring import FrameTicket
 from flightd.sim.autopilot.copter import CopterMode
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import virtual
-from tests.rigs.vehicles import Rig, ardupilot_rig
+from tests.rigs.vehicles import PATIENT_COPTER, Rig, ardupilot_rig
 
 ROOT = Path(__file__).parents[3]
 SITE = load_site(ROOT / "configs" / "site-demo.toml")
@@ -91,7 +91,7 @@ async def restarted(
 @pytest.mark.parametrize("alone_s", [0.3, 5.0])
 def test_it_keeps_the_vehicle_level_reports_and_lands_it(alone_s: float) -> None:
     async def test() -> None:
-        async with ardupilot_rig() as rig:
+        async with ardupilot_rig(patience=PATIENT_COPTER) as rig:
             await rig.take_off(1.5)
             await died(rig)
             await asyncio.sleep(alone_s)

@@ -14,6 +14,7 @@ from flightd.core.errors import InputError
 
 _TILT_RAD, _CLIMB_MPS, _YAW_RATE_RADPS = (0.0, 0.52), (0.2, 2.0), (0.7, 6.11)
 """The ranges in the maker's guide."""
+_HEIGHT_M, _HIGHEST_M = (0.5, 100.0), 6.0
 _PORT_NAMES = ("at", "navdata", "video", "control")
 
 
@@ -49,7 +50,7 @@ class ArDroneSettings:
     tilt_max_rad: float = math.radians(12.0)
     climb_max_mps: float = 0.7
     yaw_rate_max_radps: float = math.radians(100.0)
-    height_max_m: float = 6.0
+    height_max_m: float = _HIGHEST_M
     camera: DroneCamera = DroneCamera.DOWN
     video_bitrate_kbps: int = 4000
     full_navdata: bool = False
@@ -74,7 +75,7 @@ class ArDroneSettings:
             "tilt_max_rad": _TILT_RAD,
             "climb_max_mps": _CLIMB_MPS,
             "yaw_rate_max_radps": _YAW_RATE_RADPS,
-            "height_max_m": (0.5, 100.0),
+            "height_max_m": _HEIGHT_M,
             "period_s": (0.005, 0.045),
             "setpoint_timeout_s": (0.02, 1.0),
             "link_lost_s": (0.5, 10.0),
@@ -85,10 +86,12 @@ class ArDroneSettings:
                 raise ValueError(f"{name} = {value} outside {low}..{high}")
 
 
-def settings_of(url: str, limits: ControlConfig | None = None) -> ArDroneSettings:
+def settings_of(
+    url: str, limits: ControlConfig | None = None, highest_m: float = math.inf
+) -> ArDroneSettings:
     """Settings for `ardrone://HOST`, with `?at=5556&navdata=5554&video=5555&control=5559&full=1` where they
-    differ from the drone's own ports and short navdata; the drone's limits after `limits`, as near as its
-    ranges allow.
+    differ from the drone's own ports and short navdata; the drone's limits after `limits` and the greatest
+    height that may be flown, as near as its ranges allow.
 
     Raises `InputError` for anything else.
     """
@@ -112,4 +115,5 @@ def settings_of(url: str, limits: ControlConfig | None = None) -> ArDroneSetting
                 ("yaw_rate_max_radps", limits.max_yaw_rate_radps, _YAW_RATE_RADPS),
             )
         }
+    chosen["height_max_m"] = max(min(highest_m, _HIGHEST_M), _HEIGHT_M[0])
     return ArDroneSettings(host=parts.hostname, full_navdata=given.get("full") == "1", **chosen)

@@ -19,6 +19,7 @@ AIRBORNE = frozenset(
 _MAX_ATTITUDES = 1000
 _CLIMB_LAG_S = 0.2
 _JUMP_M = 0.5
+_CLIMB_STALE_NS = 1_000_000_000
 _JUMP_PATIENCE_NS = 300_000_000
 
 
@@ -42,7 +43,7 @@ class NavdataTelemetry:
         self.flight_ns = 0
         self.height_m = math.nan
         self.height_ns = 0
-        self.climb_mps = 0.0
+        self._climb_mps = 0.0
         self.battery_v = math.nan
 
     @property
@@ -82,6 +83,12 @@ class NavdataTelemetry:
         self._attitudes.append(self.attitude)
         self._observe_height(demo.height_m, packet.climb_mps, stamp_ns)
 
+    def climb_mps(self, now_ns: int) -> float:
+        """Climb rate, NaN once no height has told it for a second; 0 on the floor."""
+        if not self.airborne:
+            return 0.0
+        return self._climb_mps if now_ns - self.height_ns <= _CLIMB_STALE_NS else math.nan
+
     def drain(self) -> list[Attitude]:
         """The attitude samples since the last call, oldest first."""
         drained = list(self._attitudes)
@@ -90,7 +97,7 @@ class NavdataTelemetry:
 
     def _observe_height(self, height_m: float, climb_mps: float | None, stamp_ns: int) -> None:
         if self.state & DroneState.ULTRASOUND:
-            self.height_m, self.climb_mps = math.nan, 0.0
+            self.height_m = math.nan
             return
         past_s = (stamp_ns - self.height_ns) / 1e9
         known = not math.isnan(self.height_m)
@@ -98,8 +105,8 @@ class NavdataTelemetry:
         if leap and self.airborne and stamp_ns - self.height_ns < _JUMP_PATIENCE_NS:
             return
         if climb_mps is not None:
-            self.climb_mps = climb_mps
+            self._climb_mps = climb_mps
         elif known and not leap and past_s > 0.0:
             measured = (height_m - self.height_m) / past_s
-            self.climb_mps += (measured - self.climb_mps) * min(1.0, past_s / _CLIMB_LAG_S)
+            self._climb_mps += (measured - self._climb_mps) * min(1.0, past_s / _CLIMB_LAG_S)
         self.height_m, self.height_ns = height_m, stamp_ns

@@ -89,7 +89,7 @@ class ArDroneVehicle:
             attitude=attitude,
             height_m=height_m if linked else math.nan,
             height_stamp_ns=telemetry.height_ns,
-            climb_mps=telemetry.climb_mps,
+            climb_mps=telemetry.climb_mps(now_ns),
             mode="emergency" if telemetry.emergency else _MODES.get(demo.major, "unknown"),
             in_control=self._flight.in_control(now_ns),
             armed=telemetry.airborne,

@@ -29,6 +29,7 @@ _AT_LIFT_OFF = 0.96
 
 _VELOCITY_PER_S = 4.0
 _INTEGRAL_PER_S2 = 4.0
+_GAIN_LAGGING = 0.7
 _SLEW_MPS2 = 2.5
 _TRIM_MAX_MPS2 = 3.0
 _LEARN_S = 3.0
@@ -68,6 +69,7 @@ class HeightLoop:
         self._touched_s = 0.0
         self._lifted_s = self._stuck_s = 0.0
         self._guess = self.hover
+        self._gain = 1.0
 
     @property
     def wanted_mps(self) -> float:
@@ -93,16 +95,20 @@ class HeightLoop:
         tilt_cos: float,
         armed: bool,
         on_floor: bool,
+        lags: bool = False,
     ) -> float:
         """Thrust, 0..1, for a climb rate.
 
         `climb_mps` and `height_m` are measured just now, NaN when unknown: without a climb rate the last
         one is ended by dead reckoning, and the hover thrust kept.  `on_floor` is what the autopilot says; in
         the air it counts only where the vehicle does not move and is near the floor (or, unseen, the floor
-        carries some weight).
+        carries some weight).  `lags`: the climb rate comes late, and is answered more gently.
         """
         dt_s = min(max(now_ns - self._stamp_ns, 0) * 1e-9, _STEP_MAX_S)
         self._stamp_ns = now_ns
+        if lags and self._gain == 1.0:
+            self._trim_mps2 = 0.0  # it answered a rate that was none
+        self._gain = _GAIN_LAGGING if lags else 1.0
         if not armed:
             self._stage, wanted_mps = _Stage.FLOOR, 0.0
         elif self._stage is None:
@@ -161,15 +167,15 @@ class HeightLoop:
         if unknown:  # an old rate, taken for the present one, would be answered for as long as it stands
             if abs(self._climb_mps) >= _STANDING_MPS:
                 self._trim_mps2 = 0.0  # half of it answered the change of the climb
-            felt_mps2 = _VELOCITY_PER_S * (self._wanted_mps - self._climb_mps)
+            felt_mps2 = self._gain * _VELOCITY_PER_S * (self._wanted_mps - self._climb_mps)
             self._climb_mps += felt_mps2 * dt_s
             accel = felt_mps2 + self._trim_mps2
         else:
             self._climb_mps = climb_mps
             error_mps = self._wanted_mps - climb_mps
-            self._trim_mps2 += _INTEGRAL_PER_S2 * error_mps * dt_s
+            self._trim_mps2 += self._gain**2 * _INTEGRAL_PER_S2 * error_mps * dt_s
             self._trim_mps2 = min(max(self._trim_mps2, -_TRIM_MAX_MPS2), _TRIM_MAX_MPS2)
-            accel = _VELOCITY_PER_S * error_mps + self._trim_mps2
+            accel = self._gain * _VELOCITY_PER_S * error_mps + self._trim_mps2
             learnt = self._trim_mps2 * min(dt_s / _LEARN_S, 1.0)
             self._trim_mps2 -= learnt
             self._learn(self.hover * (1.0 + learnt / GRAVITY_MPS2))

@@ -44,6 +44,21 @@ class Job:
     landing_target: bool = False
     cells: int | None = None
     """In series in the battery; None: not known here."""
+    range_finder: int | None = None
+    """Id of the range finder to fly by, which ArduPilot counts from 0; None: the first."""
+
+    @classmethod
+    def of(cls, config: VehicleConfig, cells: int | None) -> Job:
+        """What is configured, `cells` of the battery (None: not)."""
+        return cls(
+            own_system_id=config.own_system_id,
+            guided=config.flying_mode == "guided",
+            raw_thrust=config.raw_thrust,
+            shares_pose=config.shares_pose,
+            landing_target=config.landing_target,
+            cells=cells,
+            range_finder=config.range_finder,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +85,14 @@ def _within(low: float, high: float) -> Callable[[float], bool]:
 
 def _has_bits(bits: int) -> Callable[[float], bool]:
     return lambda value: int(value) & bits == bits
+
+
+def _range_finder(sensor: int) -> tuple[Rule, ...]:
+    reason = "the height above the floor comes from it"
+    return (
+        Rule((f"RNGFND{sensor + 1}_TYPE",), lambda value: value != 0, "a range finder", reason),
+        Rule((f"RNGFND{sensor + 1}_ORIENT",), _one_of(25), "25 (down)", reason, 25),
+    )
 
 
 _CLIMB = "the climb rate shows a range finder that sticks: it must not come from the same one"
@@ -147,13 +170,7 @@ _ARDUPILOT: tuple[Rule, ...] = (
         1,
     ),
     Rule(("GPS1_TYPE", "GPS_TYPE"), _one_of(0), "0 (none)", "indoors a GPS reports nonsense", 0),
-    Rule(
-        ("RNGFND1_TYPE",),
-        lambda value: value != 0,
-        "a range finder",
-        "the height above the floor comes from it",
-    ),
-    Rule(("RNGFND1_ORIENT",), _one_of(25), "25 (down)", "the height above the floor comes from it", 25),
+    *_range_finder(0),
     Rule(("ARMING_CHECK",), lambda value: value != 0, "1 (all)", "arming unchecked hides faults", 1),
     Rule(("ARMING_SKIPCHK",), _one_of(0), "0 (none skipped)", "arming unchecked hides faults", 0),
     Rule(
@@ -317,6 +334,10 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
         if job.shares_pose:
             extra += _PX4_POSE
     stricter = {rule.names: rule for rule in extra}
+    other = job.range_finder if firmware is Firmware.ARDUPILOT else None
+    if other is not None:
+        pairs = zip(_range_finder(0), _range_finder(other), strict=True)
+        stricter |= {first.names: rule for first, rule in pairs}
     table = [stricter.pop(rule.names, rule) for rule in RULES[firmware]]
     return (*table, *stricter.values())
 

@@ -4,13 +4,14 @@ MAVLink adapters and for MAVSDK's."""
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Protocol
 
 from flightd.adapters.vehicle.climb_check import ClimbCheck
 from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.setpoint import HeadingIntegrator
-from flightd.core.types import AttitudeSetpoint
+from flightd.core.types import AttitudeSetpoint, VehicleState
 
 
 class Measured(Protocol):
@@ -38,11 +39,13 @@ class SetpointShaper:
         self._heading = HeadingIntegrator()
         self.height = HeightLoop()
         self._climb = ClimbCheck()
+        self._climb_mps = math.nan
 
-    @property
-    def climb_contradicted(self) -> bool:
-        """The climb rate that is told is not the vehicle's: it is flown by the height's, and has to land."""
-        return self.height.in_air and self._climb.contradicted
+    def climb_of(self, state: VehicleState) -> VehicleState:
+        """The state with the climb rate that is flown by, where the told one is not the vehicle's."""
+        if not (self._climb.contradicted and state.armed):
+            return state
+        return replace(state, climb_mps=self._climb_mps, climb_contradicted=True)
 
     def heading_rad(self, setpoint: AttitudeSetpoint, now_ns: int) -> float | None:
         """The heading for a setpoint that goes out now; None when none may."""
@@ -59,12 +62,17 @@ class SetpointShaper:
     def collective(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         """Raw thrust for a setpoint's climb rate, by the height loop."""
         height_m, told_mps = self._measured.height_m(now_ns), self._measured.fresh_climb_mps(now_ns)
+        if not self._measured.armed and self._climb.contradicted:
+            self._climb = ClimbCheck()
         if not math.isnan(height_m):
             self._climb.height(self._measured.height_stamp_ns, height_m)
+        pushed_mps = self.height.wanted_mps if self.height.in_air else math.nan
+        self._climb_mps = self._climb.believed_mps(now_ns, told_mps, pushed_mps)
         return self.height.step(
             now_ns,
             setpoint.climb_mps,
-            climb_mps=self._climb.believed_mps(now_ns, told_mps, self.height.wanted_mps),
+            climb_mps=self._climb_mps,
+            lags=self._climb.contradicted,
             height_m=height_m,
             tilt_cos=math.cos(setpoint.roll_rad) * math.cos(setpoint.pitch_rad),
             armed=self._measured.armed,

@@ -158,6 +158,8 @@ class MavlinkTelemetry(NewestReadings):
         """Climb from the velocity; ArduPilot sends all zeros when it estimates none, and then the
         height's own slope tells, over several samples without a gap or leap between them."""
         boot_ms, height_mm = message.time_boot_ms, message.relative_alt
+        if self._heights and 0 < self._heights[-1][0] - boot_ms < _REBOOT_MS:
+            return  # it was overtaken on its way
         if self._heights and not self._follows(boot_ms, height_mm):
             self._heights.clear()
         self._heights.append((boot_ms, height_mm))

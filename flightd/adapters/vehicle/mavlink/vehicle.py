@@ -101,6 +101,7 @@ class MavlinkOptions:
             shares_pose=self.pose_form is not None,
             landing_target=self.lands_by_target,
             cells=self.cells,
+            range_finder=self.range_finder,
         )
 
 
@@ -185,9 +186,7 @@ class MavlinkVehicle(abc.ABC):
             in_control=self._modes.in_control,
             refusal=self._modes.refusal,
         )
-        if state is not None and self._steering.climb_contradicted:
-            state = replace(state, climb_mps=math.nan)
-        return state and replace(state, unfit=self._modes.unfit)
+        return state and self._steering.climb_of(replace(state, unfit=self._modes.unfit))
 
     def attitudes(self) -> list[Attitude]:
         return self._telemetry.attitudes()
@@ -321,14 +320,16 @@ class MavlinkVehicle(abc.ABC):
         await self.parameters.keep((*self.parameter_names, *way_down), self.required_names)
 
     async def _examine(self) -> None:
-        """Read what else the doctor would look at, on the ground; what this version does not have is never
-        answered."""
+        """Read all that the doctor would look at, again and again on the ground; what this version does not
+        have is never answered."""
         names = tuple(rule.names for rule in self._rules)
         while True:
             if not self._telemetry.armed:
                 reboots = self._reboots
+                if self._examined:
+                    await self.parameters.read_again(names)
                 await self.parameters.read_all(names)
-                self._examined = self._examined or reboots == self._reboots
+                self._examined = reboots == self._reboots
             await asyncio.sleep(_EXAMINE_AGAIN_S if self._examined else _EXAMINE_S)
 
     async def _mind_beats(self) -> None:

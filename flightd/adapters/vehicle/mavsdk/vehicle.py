@@ -167,9 +167,7 @@ class MavsdkVehicle:
     def state(self) -> VehicleState | None:
         modes = self._modes
         state = self._readings.state(self._clock.now_ns(), in_control=modes.in_control, refusal=modes.refusal)
-        if state is not None and self._steering.climb_contradicted:
-            state = replace(state, climb_mps=math.nan)
-        return state and replace(state, unfit=modes.unfit)
+        return state and self._steering.climb_of(replace(state, unfit=modes.unfit))
 
     def attitudes(self) -> list[Attitude]:
         return self._readings.attitudes()
@@ -308,11 +306,12 @@ class MavsdkVehicle:
             self._readings.take_cells(volts_mv)
 
     async def _read_parameters(self, library: Library) -> None:
-        """Those without which nothing is armed, again and again: somebody may change them; the others once,
-        for a version that does not have them takes its time to say so."""
+        """Again and again: somebody may change them; what a version does not have only at first, for it takes
+        its time to say so."""
         while self._unfit is None:
-            for rule in self._way_down if self._examined else self._rules:
-                for name in rule.names:
+            for rule in self._rules:
+                needed = rule in self._way_down or self._read(rule.names) is not None
+                for name in rule.names if needed or not self._examined else ():
                     value = await library.parameter(name)
                     if value is not None:
                         self._parameters[name] = (name, value)

@@ -7,6 +7,7 @@ import math
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -16,6 +17,8 @@ from flightd.adapters.vehicle.mavlink.required_parameters import Names
 
 _ANSWER_S = 0.4
 _ATTEMPTS = 3
+_PASSES, _AT_ONCE = 3, 8
+"""ArduPilot's queue holds 20 requests, some of them under two names."""
 _AGAIN_S = 5.0
 _REST_S = 1.0
 
@@ -78,17 +81,20 @@ class Parameters:
         return self.get(names)
 
     async def read_all(self, wanted: Sequence[Names]) -> None:
-        """Read what is not known yet of these, asked for in one go."""
+        """Read what is not known yet of these, a few at a time: an autopilot drops what it is asked in a
+        burst."""
+        for _ in range(_PASSES):
+            missing = [names for names in wanted if self.get(names) is None]
+            for first in range(0, len(missing), _AT_ONCE):
+                some = missing[first : first + _AT_ONCE]
+                await self._exchange(partial(self._ask_all, some), partial(self._known, some), attempts=1)
 
-        def missing() -> list[Names]:
-            return [names for names in wanted if self.get(names) is None]
-
-        def ask() -> None:
-            for names in missing():
-                self._ask(names)
-
-        if missing():
-            await self._exchange(ask, lambda: not missing())
+    async def read_again(self, wanted: Sequence[Names]) -> None:
+        """Ask anew for what is known of these: somebody may have changed it, and it was not heard."""
+        known = [found[0] for names in wanted if (found := self.get(names)) is not None]
+        for name in known:
+            self._ask((name,))
+            await asyncio.sleep(_ANSWER_S / _AT_ONCE)
 
     async def write(self, name: str, value: float) -> bool:
         """Set a parameter that has been read; True when it read back as asked."""
@@ -102,8 +108,10 @@ class Parameters:
         self._heard.setdefault(name, stored)
         return is_set()
 
-    async def _exchange(self, send: Callable[[], None], done: Callable[[], bool]) -> None:
-        for _ in range(_ATTEMPTS):
+    async def _exchange(
+        self, send: Callable[[], None], done: Callable[[], bool], attempts: int = _ATTEMPTS
+    ) -> None:
+        for _ in range(attempts):
             self._arrived.clear()
             send()
             try:
@@ -114,6 +122,13 @@ class Parameters:
             except TimeoutError:
                 continue
             return
+
+    def _known(self, wanted: Sequence[Names]) -> bool:
+        return all(self.get(names) is not None for names in wanted)
+
+    def _ask_all(self, wanted: Sequence[Names]) -> None:
+        for names in wanted:
+            self._ask(names)
 
     def _ask(self, names: Names) -> None:
         target = dialect.MAV_COMP_ID_AUTOPILOT1
