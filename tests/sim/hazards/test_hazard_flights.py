@@ -13,9 +13,9 @@ from flightd.app.simulation.prepare import SimOptions, prepare
 from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
 from flightd.sim.scenario.scenario_files import load_scenario, shipped_scenarios
 
-ARDUPILOT = ("height_lost", "telemetry_lost", "companion_dead", "camera_gone")
-PX4 = ("height_stuck", "telemetry_lost", "climb_lost", "ceiling_left")
-"""What asks for a landing, by each autopilot's own way of it."""
+ARDUPILOT = ("height_lost", "camera_gone")
+PX4 = ("height_stuck", "climb_lost", "ceiling_left")
+"""What asks for a landing, by each autopilot's own way of it, and is over soon."""
 
 
 @pytest.mark.slow
