@@ -45,8 +45,7 @@ class FileInterlock:
                 age_s = time.time() - os.fstat(file.fileno()).st_mtime
         except OSError:
             return False
-        if (
-            self._max_age_s is not None and abs(age_s) > self._max_age_s
-        ):  # one of the future is of a clock that was set
+        # one of the future is of a clock that was set
+        if self._max_age_s is not None and abs(age_s) > self._max_age_s:
             return False
         return text.decode("utf-8", "replace").strip() == self._closed

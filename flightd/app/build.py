@@ -162,8 +162,8 @@ def assemble(
 ) -> Flight:
     """Put a flight together from what is connected already.  `cameras` are the down and the front one;
     `keep_files`: the stops left over are kept in `mission.progress`, what is learnt of the sensors in
-    `tracking.learnt`, if those name files; `interlock` is
-    the configured one unless given, `unfit` what speaks against a flight on this computer."""
+    `tracking.learnt`, if those name files; `interlock` is the configured one unless given, `unfit` what
+    speaks against a flight on this computer."""
     progress, learnt = (config.mission.progress, config.tracking.learnt) if keep_files else (None, None)
     camera, front_camera = cameras
     return Flight(
@@ -231,8 +231,7 @@ def pilot_of(
     config: Config, site: Site, order: FlightOrder | None = None, learnt: LearntSensors | None = None
 ) -> Pilot:
     """A fresh pilot for one flight of an order (by default the configuration's), which begins with what
-    earlier ones have `learnt`.  InputError where map and
-    configuration contradict each other."""
+    earlier ones have `learnt`.  InputError where map and configuration contradict each other."""
     order = order or configured_order(config)
     _demand_ceiling(config, site)
     if config.mission.height_m > site.ceiling_m - CEILING_MARGIN_M:

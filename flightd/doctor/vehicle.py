@@ -10,7 +10,7 @@ from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.connect import signing_of
 from flightd.adapters.vehicle.mavlink.examination import Examination, ExaminationReport
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
-from flightd.adapters.vehicle.mavlink.required_parameters import Job
+from flightd.adapters.vehicle.mavlink.required_parameters import FIRMWARES, Job
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import too_slow
 from flightd.config.schema import Config
 from flightd.config.vehicle import VehicleConfig
@@ -18,7 +18,6 @@ from flightd.core.errors import UnavailableError
 from flightd.doctor.check import Check, error, ok, warning
 from flightd.ports import Clock
 
-_FIRMWARES = {"ardupilot": Firmware.ARDUPILOT, "px4": Firmware.PX4, "mavsdk": Firmware.PX4}
 _NAMES = {Firmware.ARDUPILOT: "ArduCopter", Firmware.PX4: "PX4"}
 _CABLE = "check vehicle.url, cable (TX to RX), baud rate and power; is another flightd running?"
 _KEY = "; does the autopilot have the same signing key?"
@@ -68,7 +67,7 @@ def judge(config: VehicleConfig, report: ExaminationReport, cells: int | None = 
     name = _NAMES[report.firmware]
     text = f"{name} {report.version}".strip() + f" answers at {config.url}"
     checks = []
-    if _FIRMWARES[config.kind] is not report.firmware:
+    if FIRMWARES[config.kind] is not report.firmware:
         remedy = f'set vehicle.kind = "{report.firmware.name.lower()}"'
         if report.firmware is Firmware.ARDUPILOT:
             remedy = 'set vehicle.kind = "ardupilot"'

@@ -11,6 +11,7 @@ from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.link.signing import Signing, read_key
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
+from flightd.adapters.vehicle.mavlink.required_parameters import Job
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
 from flightd.config.control import ControlConfig
 from flightd.config.vehicle import VehicleConfig
@@ -73,14 +74,9 @@ def signing_of(config: VehicleConfig, clock: Clock) -> Signing | None:
 def _options(config: VehicleConfig, clock: Clock, opener: OpenDatagrams, cells: int | None) -> MavlinkOptions:
     return MavlinkOptions(
         system_id=config.system_id,
-        own_system_id=config.own_system_id,
-        cells=cells,
-        guided=config.flying_mode == "guided",
-        lands_by_target=config.landing_target,
+        job=Job.of(config, cells),
         signing=signing_of(config, clock),
         pose_form=PoseForm(config.pose_output) if config.shares_pose else None,
-        raw_thrust=config.raw_thrust,
         origin_deg=config.origin_deg,
-        range_finder=config.range_finder,
         opener=opener,
     )

@@ -6,10 +6,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
-from flightd.adapters.vehicle.mavlink.required_parameters import Job, rules_for
+from flightd.adapters.vehicle.mavlink.required_parameters import FIRMWARES, Job, rules_for
 from flightd.app.build import plan_of, start_of
 from flightd.app.flight_orders import configured_order
 from flightd.app.recording import FlightSetting
@@ -96,12 +95,12 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
 def _set_up(config: Config) -> dict[str, float]:
     """The simulated autopilot's parameters beyond those that are shipped: as `flightd doctor --fix` leaves
     them for what is configured."""
-    if config.vehicle.kind not in ("ardupilot", "px4", "mavsdk"):
+    firmware = FIRMWARES.get(config.vehicle.kind)
+    if firmware is None:
         return {}
-    kind: Literal["ardupilot", "px4"] = "ardupilot" if config.vehicle.kind == "ardupilot" else "px4"
-    known: Mapping[str, float | int] = COPTER_PARAMETERS if kind == "ardupilot" else PX4_PARAMETERS
-    values = {**known, **shipped_parameters(kind, known)}
-    firmware = Firmware.ARDUPILOT if kind == "ardupilot" else Firmware.PX4
+    is_px4 = firmware is Firmware.PX4
+    known: Mapping[str, float | int] = PX4_PARAMETERS if is_px4 else COPTER_PARAMETERS
+    values = {**known, **shipped_parameters("px4" if is_px4 else "ardupilot", known)}
     return {
         name: rule.better
         for rule in rules_for(firmware, Job.of(config.vehicle, config.battery.cells))

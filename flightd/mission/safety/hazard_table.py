@@ -127,7 +127,7 @@ HAZARDS: tuple[Hazard, ...] = (
         "climb_lost",
         Trigger.CLIMB_LOST,
         "no climb rate from the autopilot for a second, and then for `mission.telemetry_hold_s`; or, where"
-        " thrust is sent, one that stands still for 0.4 s off what is wanted while the height moves there",
+        " thrust is sent, one that stands still though pushed by 0.3 m/s, while the height moves that way",
         Action.LAND,
         "down by the height's rate where the told one is contradicted; else, and once that is lost, too, the"
         " autopilot's own landing: it cannot be steered unmeasured; nothing is armed without a climb rate",

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.link.codec import Codec
+from flightd.adapters.vehicle.mavlink.required_parameters import Job
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
 from flightd.core.refusal import words
 from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, LandedState
@@ -141,7 +142,7 @@ def test_thrust_that_means_something_else_than_configured_is_not_flown(options: 
         for configured in (wanted, None):
             autopilot = ScriptedAutopilot()
             autopilot.parameters["GUID_OPTIONS"] = options
-            async with scripted(autopilot, raw_thrust=configured) as (_, vehicle):
+            async with scripted(autopilot, job=Job(raw_thrust=configured)) as (_, vehicle):
                 vehicle.demand(Demand.FLY)
                 await asyncio.sleep(3.0)
                 refused = "vehicle.raw_thrust" in words(known(vehicle).refusal)
@@ -227,7 +228,7 @@ def test_guided_flies_a_vehicle_that_knows_its_position_and_no_other(has_positio
             PeerConfig(ready_s=0.5, has_position=has_position, parameters={"EK3_SRC1_VELXY": 5}),
         )
         host, port = await peer.open()
-        vehicle = ArduPilotVehicle(f"udpout://{host}:{port}", clock, MavlinkOptions(guided=True))
+        vehicle = ArduPilotVehicle(f"udpout://{host}:{port}", clock, MavlinkOptions(job=Job(guided=True)))
         tasks = [asyncio.create_task(part.run()) for part in (peer, vehicle)]
         rig = Rig(vehicle, peer, lambda: None, lambda apart: None)
         if has_position:

@@ -8,11 +8,12 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
-from flightd.adapters.vehicle.climb_check import ClimbCheck
+from flightd.adapters.vehicle.mavlink.climb_check import ClimbCheck
 from flightd.cli.main import app
 from flightd.core.types import Demand, VehicleState
 from flightd.replay.log import read_log
@@ -22,10 +23,15 @@ from tests.rigs.event_loops import virtual
 from tests.rigs.vehicles import ardupilot_rig, px4_rig
 
 _STEP_S = 0.02
-RAW = {
-    "px4": px4_rig,
-    "ardupilot, raw thrust": lambda: ardupilot_rig(PeerConfig(ready_s=0.5, parameters={"GUID_OPTIONS": 8})),
+RAW: dict[str, tuple[Any, dict[str, float]]] = {
+    "px4": (px4_rig, {}),
+    "ardupilot, raw thrust": (ardupilot_rig, {"GUID_OPTIONS": 8}),
 }
+
+
+def raw_rig(name: str, **config: Any) -> Any:
+    make, parameters = RAW[name]
+    return make(PeerConfig(ready_s=0.5, parameters=parameters, **config))
 
 
 def believed(
@@ -78,7 +84,7 @@ def test_goods_below_are_no_climb(step_m: float, edge_s: float) -> None:
 @pytest.mark.parametrize("make", RAW)
 def test_it_never_shoots_up_and_comes_down_by_the_height(make: str, stuck_mps: float) -> None:
     async def test() -> None:
-        async with RAW[make]() as rig:  # type: ignore[operator]
+        async with raw_rig(make) as rig:
             await rig.take_off(1.0)
             rig.peer.sensors.fault.climb_stuck_mps = stuck_mps
             fastest_mps = 0.0
@@ -105,11 +111,9 @@ def test_it_never_shoots_up_and_comes_down_by_the_height(make: str, stuck_mps: f
 @pytest.mark.parametrize("make", RAW)
 def test_a_noisy_range_finder_contradicts_no_sound_rate(make: str) -> None:
     noisy = SensorParams(range_noise_m=0.04, range_dropout=0.08)
-    rig_of = {"px4": px4_rig, "ardupilot, raw thrust": ardupilot_rig}[make]
-    parameters = {} if make == "px4" else {"GUID_OPTIONS": 8.0}
 
     async def test() -> None:
-        async with rig_of(PeerConfig(ready_s=0.5, sensors=noisy, parameters=parameters)) as rig:
+        async with raw_rig(make, sensors=noisy) as rig:
             await rig.take_off(1.0)
             for climb_mps in [0.5, 0.0, 0.3, -0.2, 0.0, 0.1, -0.4, 0.2] * 6:
                 await rig.stream(1.0, climb_mps=climb_mps)

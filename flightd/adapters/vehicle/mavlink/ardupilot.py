@@ -52,8 +52,8 @@ class ArduPilotVehicle(MavlinkVehicle):
         options: MavlinkOptions = DEFAULTS,
     ) -> None:
         super().__init__(url, clock, options)
-        self.flying_mode = GUIDED if options.guided else GUIDED_NOGPS
-        self._raw_thrust = options.raw_thrust
+        self.flying_mode = GUIDED if options.job.guided else GUIDED_NOGPS
+        self._raw_thrust = options.job.raw_thrust
         self._flies_raw = False
         self._origin: Origin | None = None
         if options.pose_form is not None:

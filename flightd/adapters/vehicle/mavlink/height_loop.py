@@ -27,7 +27,8 @@ _SETTLE_MAX_MPS = 0.5
 _AT_LIFT_OFF = 0.96
 """Share of the thrust at which lift-off was noticed that is the weight: it is noticed a moment late."""
 
-_VELOCITY_PER_S = 4.0
+VELOCITY_PER_S = 4.0
+"""Acceleration for each m/s that the climb is off."""
 _INTEGRAL_PER_S2 = 4.0
 _GAIN_LAGGING = 0.7
 _SLEW_MPS2 = 2.5
@@ -167,7 +168,7 @@ class HeightLoop:
         if unknown:  # an old rate, taken for the present one, would be answered for as long as it stands
             if abs(self._climb_mps) >= _STANDING_MPS:
                 self._trim_mps2 = 0.0  # half of it answered the change of the climb
-            felt_mps2 = self._gain * _VELOCITY_PER_S * (self._wanted_mps - self._climb_mps)
+            felt_mps2 = self._gain * VELOCITY_PER_S * (self._wanted_mps - self._climb_mps)
             self._climb_mps += felt_mps2 * dt_s
             accel = felt_mps2 + self._trim_mps2
         else:
@@ -175,7 +176,7 @@ class HeightLoop:
             error_mps = self._wanted_mps - climb_mps
             self._trim_mps2 += self._gain**2 * _INTEGRAL_PER_S2 * error_mps * dt_s
             self._trim_mps2 = min(max(self._trim_mps2, -_TRIM_MAX_MPS2), _TRIM_MAX_MPS2)
-            accel = self._gain * _VELOCITY_PER_S * error_mps + self._trim_mps2
+            accel = self._gain * VELOCITY_PER_S * error_mps + self._trim_mps2
             learnt = self._trim_mps2 * min(dt_s / _LEARN_S, 1.0)
             self._trim_mps2 -= learnt
             self._learn(self.hover * (1.0 + learnt / GRAVITY_MPS2))

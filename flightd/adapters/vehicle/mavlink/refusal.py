@@ -83,17 +83,22 @@ class WrongParameter(Refusal):
         return f"{self.finding} ({remedy})"
 
 
-def no_way_down(rules: Sequence[Rule], read: Read) -> Refusal | None:
-    """Why the vehicle would stay in the air if this computer died, by what is `read` of its parameters; None
-    where it would land."""
-    for rule in rules:
+def not_set_up(
+    way_down: Sequence[Rule], rules: Sequence[Rule], read: Read, *, examined: bool
+) -> Refusal | None:
+    """Why a vehicle must not be armed, by what is `read` of its parameters; None where it may.  Those of the
+    `way_down` have to be known, of the others what is answered until the vehicle is `examined`."""
+    for rule in way_down:
         if read(rule.names) is None and not rule.optional:
             return ParameterUnread(rule.names[0])
-    return wrong_parameter(rules, read)
+    problem = _wrong_parameter(way_down, read)
+    if problem is None and not examined:
+        return ParametersUnread()
+    return problem or _wrong_parameter(rules, read)
 
 
-def wrong_parameter(rules: Sequence[Rule], read: Read) -> Refusal | None:
-    """The first parameter that is unsafe or wrong, of those that were read; None where there is none."""
+def _wrong_parameter(rules: Sequence[Rule], read: Read) -> Refusal | None:
+    """The first that is unsafe or wrong, of those that were read; None where there is none."""
     findings = (judge(rule, read(rule.names)) for rule in rules)
     found = next((finding for finding in findings if finding is not None), None)
     return None if found is None else WrongParameter(found)

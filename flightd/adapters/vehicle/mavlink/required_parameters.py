@@ -16,6 +16,9 @@ from flightd.config.vehicle import VehicleConfig
 Names: TypeAlias = tuple[str, ...]
 """One parameter under the names it has had, oldest first."""
 
+FIRMWARES = {"ardupilot": Firmware.ARDUPILOT, "px4": Firmware.PX4, "mavsdk": Firmware.PX4}
+"""By `vehicle.kind`, of those that have parameters."""
+
 
 @dataclass(frozen=True, slots=True)
 class Rule:
@@ -350,11 +353,9 @@ _WAY_DOWN = frozenset(
 )
 
 
-def way_down_rules(firmware: Firmware, own_system_id: int) -> tuple[Rule, ...]:
-    """What must be so before a flight begins: the autopilot itself levels and lands when this computer dies,
-    within the times that the doctor asks for."""
-    table = rules_for(firmware, Job(own_system_id))
-    return tuple(rule for rule in table if _WAY_DOWN.intersection(rule.names))
+def way_down_rules(rules: tuple[Rule, ...]) -> tuple[Rule, ...]:
+    """Those by which the autopilot itself levels and lands when this computer dies."""
+    return tuple(rule for rule in rules if _WAY_DOWN.intersection(rule.names))
 
 
 def judge(rule: Rule, found: tuple[str, float] | None) -> ParameterFinding | None:

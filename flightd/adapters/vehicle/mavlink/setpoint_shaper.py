@@ -7,7 +7,7 @@ import math
 from dataclasses import replace
 from typing import Protocol
 
-from flightd.adapters.vehicle.climb_check import ClimbCheck
+from flightd.adapters.vehicle.mavlink.climb_check import ClimbCheck
 from flightd.adapters.vehicle.mavlink.height_loop import HeightLoop
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.setpoint import HeadingIntegrator

@@ -7,7 +7,7 @@ import asyncio
 import logging
 import math
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -19,13 +19,7 @@ from flightd.adapters.vehicle.mavlink.link.signing import Signing
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
-from flightd.adapters.vehicle.mavlink.refusal import (
-    ParametersUnread,
-    SharedSystemId,
-    WrongFirmware,
-    no_way_down,
-    wrong_parameter,
-)
+from flightd.adapters.vehicle.mavlink.refusal import SharedSystemId, WrongFirmware, not_set_up
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, Names, rules_for, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
@@ -36,7 +30,6 @@ from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource, MavlinkTelemetry
-from flightd.config.vehicle import VehicleConfig
 from flightd.core.refusal import Refusal
 from flightd.core.types import (
     Attitude,
@@ -70,39 +63,17 @@ _PAD_NEAR_M = 1.0
 
 @dataclass(frozen=True, slots=True)
 class MavlinkOptions:
-    """The vehicle's `system_id` and this computer's own, the key of a signed link, the form in which the grid
-    pose is given to the autopilot's estimator (None: not at all); what ArduCopter's GUID_OPTIONS must say of
-    thrust (raw, a climb rate, or None: either), and latitude and longitude for an estimator that has to have
-    some."""
+    """The vehicle's `system_id`, what its parameters have to be set up for (`job`), the key of a signed link,
+    the form in which the grid pose is given to the autopilot's estimator (None: not at all), and latitude and
+    longitude for an estimator that has to have some."""
 
     system_id: int = 1
-    own_system_id: int = VehicleConfig().own_system_id
-    cells: int | None = None
-    """In series in the battery; None: not known here."""
-    guided: bool = False
-    """ArduCopter is flown in GUIDED: its vehicle estimates its motion."""
-    lands_by_target: bool = False
+    job: Job = field(default_factory=Job)
     signing: Signing | None = None
     pose_form: PoseForm | None = None
-    raw_thrust: bool | None = None
     origin_deg: tuple[float, float] = (51.4778, 0.0)
-    range_finder: int | None = None
-    """Id of the DISTANCE_SENSOR to fly by; None: the one that measures best as the vehicle stands."""
     opener: OpenDatagrams = open_datagrams
     """What opens its UDP socket."""
-
-    @property
-    def job(self) -> Job:
-        """What the autopilot's parameters have to be set up for."""
-        return Job(
-            self.own_system_id,
-            self.guided,
-            self.raw_thrust,
-            shares_pose=self.pose_form is not None,
-            landing_target=self.lands_by_target,
-            cells=self.cells,
-            range_finder=self.range_finder,
-        )
 
 
 DEFAULTS = MavlinkOptions()
@@ -134,13 +105,13 @@ class MavlinkVehicle(abc.ABC):
     def __init__(self, url: str, clock: Clock, options: MavlinkOptions = DEFAULTS) -> None:
         system_id = options.system_id
         self._clock = clock
-        self._system_id, self._own_system_id = system_id, options.own_system_id
+        self._system_id, self._own_system_id = system_id, options.job.own_system_id
         self._sync = ClockSync()
-        self._telemetry = MavlinkTelemetry(self._sync, self.climb_from, options.range_finder)
+        self._telemetry = MavlinkTelemetry(self._sync, self.climb_from, options.job.range_finder)
         self._pose_output = None if options.pose_form is None else PoseOutput(options.pose_form)
         transport = make_transport(parse_endpoint(url), options.opener)
         codec = Codec(system_id, signing=options.signing)
-        beats = Codec(options.own_system_id, signing=options.signing) if self.watches_beats else codec
+        beats = Codec(options.job.own_system_id, signing=options.signing) if self.watches_beats else codec
         self.link = MavlinkLink(transport, codec, clock, system_id, self._received, beats)
         self._commander = Commander(self.link, system_id)
         self._modes = ModeArmingManager(self, self._commander, self._telemetry, clock)
@@ -149,8 +120,8 @@ class MavlinkVehicle(abc.ABC):
         self.parameters = Parameters(self.link, system_id, bytewise=self.firmware is Firmware.PX4)
         self._texts = TextAssembler()
         self._text_id = 0
-        self._way_down = way_down_rules(self.firmware, options.own_system_id)
         self._rules = rules_for(self.firmware, options.job)
+        self._way_down = way_down_rules(self._rules)
         self._examined = False
         """All that the autopilot answers of its parameters was read."""
         self._reboots = 0
@@ -242,10 +213,7 @@ class MavlinkVehicle(abc.ABC):
         is wrong for the job; None where it may."""
         if self.link.hears_namesake(self._clock.now_ns()):
             return SharedSystemId(self._own_system_id)
-        problem = no_way_down(self._way_down, self.parameters.get)
-        if problem is None and not self._examined:
-            return ParametersUnread()
-        return problem or wrong_parameter(self._rules, self.parameters.get)
+        return not_set_up(self._way_down, self._rules, self.parameters.get, examined=self._examined)
 
     def sinks_unmeasured(self) -> bool:
         """Whether the autopilot itself keeps a setpoint's climb rate; not where our own height loop does."""

@@ -28,13 +28,7 @@ from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
-from flightd.adapters.vehicle.mavlink.refusal import (
-    BeyondLibrary,
-    ParametersUnread,
-    WrongSystemId,
-    no_way_down,
-    wrong_parameter,
-)
+from flightd.adapters.vehicle.mavlink.refusal import BeyondLibrary, WrongSystemId, not_set_up
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, Names, rules_for, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BeatPoll
@@ -125,8 +119,8 @@ class MavsdkVehicle:
         self._text_waits = asyncio.Event()
         self._sent_ns = 0
         self._unfit: Refusal | None = None
-        self._way_down = way_down_rules(Firmware.PX4, system_id)
         self._rules = rules_for(Firmware.PX4, Job(cells=cells))
+        self._way_down = way_down_rules(self._rules)
         self._examined = False
         self._parameters: dict[str, tuple[str, float]] = {}
 
@@ -214,10 +208,7 @@ class MavsdkVehicle:
     def not_set_up(self) -> Refusal | None:
         """Why the vehicle must not be armed: it would stay in the air if this computer died, or a parameter
         is wrong for the job; None where it may."""
-        problem = no_way_down(self._way_down, self._read)
-        if problem is None and not self._examined:
-            return ParametersUnread()
-        return problem or wrong_parameter(self._rules, self._read)
+        return not_set_up(self._way_down, self._rules, self._read, examined=self._examined)
 
     def _read(self, names: Names) -> tuple[str, float] | None:
         return next((self._parameters[name] for name in names if name in self._parameters), None)

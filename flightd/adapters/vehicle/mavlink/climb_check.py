@@ -12,15 +12,16 @@ import math
 from collections import deque
 from typing import NamedTuple
 
+from flightd.adapters.vehicle.mavlink.height_loop import VELOCITY_PER_S
+
 _KEPT_NS, _SPAN_NS, _SAMPLES = 600_000_000, 250_000_000, 6
 """A slope is of the newest samples that span so long, but of no fewer; older ones are not kept."""
 _FRESH_NS = 250_000_000
 _LEAP_M, _LEAP_MPS = 0.1, 3.0
 """A height that changes by more from one sample to the next is that of another floor: goods, a pallet."""
 _PUSHED_MPS, _PUSHED_NS, _PUSH_KEPT_NS = 0.3, 200_000_000, 600_000_000
-_PUSH_PER_S = 4.0
 """What thrust was raised by for the rate that is wanted should have changed the rate by so much, and has had
-the time for that: `height_loop` pushes by so much for each m/s."""
+the time for that."""
 _OFF_MPS, _STILL_MPS = 0.15, 0.1
 """So far off what is wanted all the while, and no more moved."""
 _AHEAD_MPS, _AHEAD_NS = 0.4, 100_000_000
@@ -84,7 +85,7 @@ class ClimbCheck:
         if now_ns - rates[0].stamp_ns < _PUSHED_NS or max(told) - min(told) > _STILL_MPS:
             return False
         mean_mps = sum(abs(rate.off_mps) for rate in rates) / len(rates)
-        return _PUSH_PER_S * mean_mps * (now_ns - rates[0].stamp_ns) * 1e-9 > _PUSHED_MPS
+        return VELOCITY_PER_S * mean_mps * (now_ns - rates[0].stamp_ns) * 1e-9 > _PUSHED_MPS
 
     def _slope_mps(self, now_ns: int) -> float:
         """Of the height over the last moments, by least squares; NaN where it is not known."""
