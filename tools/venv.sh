@@ -17,7 +17,8 @@ make_venv() {
     [ -e "$stamp" ] && return
     [ -x .venv/bin/python ] || "$python" -m venv .venv
     echo "== installing flightd[$extra] into .venv"
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check \
+    # Only what is imported is worth compiling, and that happens as it is imported.
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile \
         --constraint constraints.txt --editable ".[$extra]" || {
         echo "installing failed: the lines above say why (no network? no space?); run this again when it is mended" >&2
         exit 2

@@ -119,13 +119,12 @@ def test_with_the_nose_to_the_shelf_no_leg_begins_with_half_a_turn() -> None:
     assert len(sides) * 0.02 < 0.5 * len(NODES) * math.pi / CONFIG.mission.turn_rate_radps
 
 
-@pytest.mark.parametrize("seed", [5, 6])
-def test_from_aisle_to_aisle_it_flies_where_it_sees_both(seed: int) -> None:
+def test_from_aisle_to_aisle_it_flies_where_it_sees_both() -> None:
     """The last view of a node is a low one, from which a line 3.4 m off is long out of sight."""
     site = load_site(Path(__file__).parents[3] / "configs" / "site-racks-small.toml")
     front = IdealFront(site, SIGHT, Stock())
     visits = ("A4", "B4")
-    flown = IdealFlight(site, CONFIG, visits=visits, seed=seed, front=front).fly()
+    flown = IdealFlight(site, CONFIG, visits=visits, seed=5, front=front).fly()
     assert (flown.phase, flown.visited) == (Phase.DONE, list(visits))
     between = [k.height_m for phase, k in flown.truth if phase is Phase.FOLLOW and 1.2 < k.y_m < 2.2]
     assert min(between) > CONFIG.mission.height_m - 0.3
@@ -133,7 +132,7 @@ def test_from_aisle_to_aisle_it_flies_where_it_sees_both(seed: int) -> None:
 
 
 @pytest.mark.parametrize("phase", [Phase.CLIMB, Phase.SCAN])
-@pytest.mark.parametrize("seed", range(1, 1 + int(os.environ.get("FLIGHTD_SEEDS", "2"))))
+@pytest.mark.parametrize("seed", range(1, 1 + int(os.environ.get("FLIGHTD_SEEDS", "1"))))
 def test_going_blind_in_front_of_a_shelf_is_down_before_it_drifts_there(phase: Phase, seed: int) -> None:
     flight = scan_flight(("A2",), seed)
 
