@@ -1,7 +1,8 @@
 """Fly a recorded flight again, tick by tick, through today's code and compare every decision.
 
-The record of a tick is all that the pilot was given then, so the same code decides the same, to the
-last digit.  A difference is a change of behaviour: wanted or not, it is told with its size.
+The record of a tick is all that the pilot was given then, so the same code decides the same, on another
+processor but for the last digits of its sums.  A larger difference is a change of behaviour: wanted or not,
+it is told with its size.
 """
 
 from __future__ import annotations
