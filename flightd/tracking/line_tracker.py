@@ -50,6 +50,7 @@ from flightd.tracking.tilt_compensation import (
     floor_points,
     ground_lines,
     ground_point,
+    heights_by_width,
 )
 from flightd.tracking.width_heights import WidthHeights
 
@@ -139,27 +140,19 @@ class LineTracker:
         the last, no attitude at its exposure, no height)."""
         stamp_ns = self.exposed_ns(lines)
         attitude = self._history.at(stamp_ns)
-        scale = self._line_width_m * self._lens.fx_px
-        widths_m = [scale / line.width_px for line in lines.lines if line.width_px > 0]
-        height_m = self._widths.believed_m(widths_m, height_m) * (1.0 + self._filter.mean(SCALE))
-        if attitude is None or not self._headed or not height_m > 0 or lines.stamp_ns <= self._told_ns:
+        if attitude is None or not self._headed or lines.stamp_ns <= self._told_ns:
+            self.rejected += 1
+            return False
+        view = self._view(attitude, stamp_ns, height_m)
+        by_width_m = heights_by_width(lines.lines, view, self._line_width_m)
+        height_m = self._widths.believed_m(by_width_m, height_m) * (1.0 + self._filter.mean(SCALE))
+        if not height_m > 0:
             self.rejected += 1
             return False
         self._told_ns = lines.stamp_ns
         self._advance(stamp_ns)
-        params = self._params
-        sigma_tilt_rad = 0.0 if self._compensation is TiltCompensation.EXACT else params.sigma_tilt_rad
-        assumed = self._history.is_assumed(stamp_ns)
-        if assumed:
-            sigma_tilt_rad = _ASSUMED_TILT_RAD
-        view = FloorView(
-            self._lens,
-            self._corrected_mount(),
-            self._corrected(attitude),
-            height_m,
-            self._compensation,
-            sigma_tilt_rad,
-        )
+        view = self._view(attitude, stamp_ns, height_m)
+        params, assumed = self._params, self._history.is_assumed(stamp_ns)
         low, high = (share * self._line_width_m for share in params.width_share)
         seen = ground_lines(lines.lines, view)
         on_floor = [line for line in seen if low <= line.width_m <= high]
@@ -287,6 +280,14 @@ class LineTracker:
         """Acceleration along the grid axes that the attitude makes at constant height, g tan(tilt)."""
         told = self._attitude_at(stamp_ns)
         return self._filter.accel(Told(told.roll_rad, told.pitch_rad, told.yaw_rad))
+
+    def _view(self, attitude: Attitude, stamp_ns: int, height_m: float) -> FloorView:
+        """How the floor was seen from that height, by what has been learnt of attitude and mount."""
+        sigma_tilt_rad = 0.0 if self._compensation is TiltCompensation.EXACT else self._params.sigma_tilt_rad
+        if self._history.is_assumed(stamp_ns):
+            sigma_tilt_rad = _ASSUMED_TILT_RAD
+        mount, corrected = self._corrected_mount(), self._corrected(attitude)
+        return FloorView(self._lens, mount, corrected, height_m, self._compensation, sigma_tilt_rad)
 
     def _corrected(self, told: Attitude) -> Attitude:
         """The attitude, by what has been learnt of it."""

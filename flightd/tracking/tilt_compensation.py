@@ -135,6 +135,32 @@ def _place(
     )
 
 
+def heights_by_width(lines: Sequence[Line], view: FloorView, width_m: float) -> list[float]:
+    """The height of the body, metres, that each line tells by how wide it is seen, were it `width_m` wide;
+    without lines that the view cannot place or whose width was not seen.  Always the exact form; the
+    view's own height does not matter."""
+    roll, pitch = view.attitude.roll_rad, view.attitude.pitch_rad
+    if abs(roll) > _MAX_TILT_RAD or abs(pitch) > _MAX_TILT_RAD:
+        return []
+    inverse = np.linalg.inv(ground_homography(view.lens, view.mount, roll, pitch))
+    lever_m = float((level_from_body(roll, pitch) @ np.array(view.mount.offset_m))[2])
+    area = 1.0 / (view.lens.fx_px * view.lens.fy_px)
+    heights_m = []
+    for line in lines:
+        x, y = line.point_at((line.start_px + line.end_px) / 2)
+        centre = view.lens.centre_px
+        point = inverse @ np.array([x + centre[0], y + centre[1], 1.0])
+        along = inverse @ np.array([-math.sin(line.theta_rad), math.cos(line.theta_rad), 0.0])
+        depth = float(point[2])
+        if depth < 0.2 or not line.width_px > 0:  # the horizon, or nearly
+            continue
+        # A projective map makes an area 1/depth^3 times as large; what it is stretched along the line, it is
+        # not stretched across.
+        stretched = np.hypot(*(along[:2] * depth - point[:2] * along[2])) / depth**2
+        heights_m.append(width_m * float(stretched) * depth**3 / (area * line.width_px) + lever_m)
+    return heights_m
+
+
 def tilt_effects(
     line: GroundLine, height_m: float
 ) -> tuple[tuple[tuple[float, float], tuple[float, float]], tuple[float, float]]:

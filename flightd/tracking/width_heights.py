@@ -11,6 +11,8 @@ _AGREEING, _DOUBTED = 0.15, 0.2
 _STEADY = 0.06
 """Lines whose widths tell heights that change by more from frame to frame (share) are none of the map; a fast
 climb changes them by less."""
+_LEAP = 0.1
+"""A height by widths that leaps by more from one frame to the next (share) is another line's."""
 
 
 class WidthHeights:
@@ -21,6 +23,7 @@ class WidthHeights:
         self._changes = 0.0
         self._last_m: float | None = None
         self._agreed = False
+        self._followed = False  # by its widths, from frame to frame, since it last agreed with the one told
 
     @property
     def share(self) -> float:
@@ -30,18 +33,27 @@ class WidthHeights:
 
     def believed_m(self, by_width_m: Sequence[float], told_m: float) -> float:
         """The height `told_m`, unless there is none or the heights of this frame's lines by their widths
-        contradict it for long: then theirs."""
+        contradict it for long: then theirs.  Theirs at once where they go on as before and what is told
+        leaps away from them."""
         if not by_width_m or not told_m > 0:
             return median(by_width_m) if by_width_m else told_m / self._believed_share
         nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
-        self._agreed |= abs(told_m / nearest_m - 1.0) < _AGREEING
+        agrees = abs(told_m / nearest_m - 1.0) < _AGREEING
+        if self._last_m is not None and not agrees:  # it is no better for being nearer to what is wrong
+            last_m = self._last_m
+            nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
+        self._agreed |= agrees
         if not self._agreed:  # then it is the line that is another
             return told_m
-        self._share += _GAIN * (told_m / nearest_m - self._share)
+        share = told_m / nearest_m
+        self._share += _GAIN * (share - self._share)
         if self._last_m is not None:
-            self._changes += _GAIN * (min(abs(math.log(nearest_m / self._last_m)), 1.0) - self._changes)
+            change = min(abs(math.log(nearest_m / self._last_m)), 1.0)
+            self._changes += _GAIN * (change - self._changes)
+            self._followed = agrees or (self._followed and change < _LEAP)
         self._last_m = nearest_m
-        return told_m if self._believed_share == 1.0 else nearest_m
+        leapt = self._followed and abs(share - 1.0) > _DOUBTED
+        return nearest_m if leapt or self._believed_share != 1.0 else told_m
 
     @property
     def _believed_share(self) -> float:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightd.config.control import TiltCompensation
-from flightd.core.geometry import Lens, Mount
-from flightd.core.types import Attitude
+from flightd.core.geometry import Lens, Mount, ground_homography, normalise_line
+from flightd.core.types import Attitude, Line
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.random_sites import random_site
 from flightd.site.site import PaintedLine, Site
-from flightd.tracking.tilt_compensation import FloorView, GroundLine, ground_lines
+from flightd.tracking.tilt_compensation import FloorView, GroundLine, ground_lines, heights_by_width
 from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
 
 LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)
@@ -99,3 +100,35 @@ def test_lines_at_the_horizon_and_impossible_heights_are_left_out() -> None:
     for height, roll in ((0.0, 0.0), (math.nan, 0.0), (1.5, 1.2)):
         view = FloorView(LENS, Mount(), Attitude(0, roll, 0.0, 0.0), height, TiltCompensation.EXACT, 0.0)
         assert ground_lines(lines, view) == []
+
+
+@given(
+    roll=st.floats(-0.3, 0.3),
+    pitch=st.floats(-0.3, 0.3),
+    height=st.floats(0.5, 4.0),
+    forward=st.floats(-0.35, 0.35),
+    right=st.floats(-0.7, 0.7),
+    way=st.floats(0.0, math.pi),
+)
+@settings(deadline=None, max_examples=60)
+def test_the_height_by_a_lines_width_is_right_wherever_the_line_is_and_however_the_drone_leans(
+    roll: float, pitch: float, height: float, forward: float, right: float, way: float
+) -> None:
+    width_m, along = 0.01, np.array([math.cos(way), math.sin(way)])
+    across = np.array([-along[1], along[0]])
+    homography = ground_homography(LENS, Mount(), roll, pitch)
+
+    def pixel(on_floor: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]  # of a camera `height` up
+        x, y, w = homography @ np.array([*on_floor / height, 1.0])
+        return np.array([x / w, y / w]) - LENS.centre_px
+
+    middle = np.array([forward, right]) * height
+    here, tangent = pixel(middle), pixel(middle + 1e-4 * along) - pixel(middle - 1e-4 * along)
+    tangent /= np.linalg.norm(tangent)
+    normal = np.array([-tangent[1], tangent[0]])
+    width_px = abs(normal @ (pixel(middle + width_m / 2 * across) - pixel(middle - width_m / 2 * across)))
+    rho, theta = normalise_line(float(normal @ here), math.atan2(normal[1], normal[0]))
+    at_px = float(here @ np.array([-math.sin(theta), math.cos(theta)]))
+    line = Line(rho, theta, float(width_px), at_px - 1.0, at_px + 1.0, 1.0, 0.1, 0.001)
+    view = FloorView(LENS, Mount(), Attitude(0, roll, pitch, 0.0), math.nan, TiltCompensation.NONE, 0.0)
+    assert heights_by_width([line], view, width_m) == pytest.approx([height], rel=1e-3)

@@ -49,3 +49,27 @@ def test_one_width_that_agrees_is_enough_and_none_at_all_changes_nothing() -> No
         assert heights.believed_m([0.5, 1.6, 3.0], 1.62) == 1.62
     assert heights.believed_m([], 1.62) == 1.62
     assert heights.believed_m([1.5, 1.6, 1.7], float("nan")) == 1.6
+
+
+def test_a_height_that_leaps_away_from_a_width_is_not_believed_for_one_frame() -> None:
+    heights = WidthHeights()
+    for _ in range(30):
+        heights.believed_m([1.6], 1.6)
+    assert heights.believed_m([1.59], 0.9) == 1.59
+    assert heights.believed_m([1.58], 1.58) == 1.58
+
+
+def test_a_line_of_another_width_does_not_contradict_the_height_at_once() -> None:
+    heights = WidthHeights()
+    for _ in range(30):
+        heights.believed_m([1.6], 1.6)
+    assert heights.believed_m([0.8], 1.6) == 1.6
+    assert heights.believed_m([0.8], 1.6) == 1.6
+
+
+def test_once_contradicted_a_width_is_not_taken_for_being_nearer_to_what_is_wrong() -> None:
+    heights = WidthHeights()
+    for _ in range(30):
+        heights.believed_m([1.6, 1.45], 1.6)
+    for n in range(30):
+        assert heights.believed_m([1.6, 1.45 - 0.01 * n], 0.9) == 1.6
