@@ -68,8 +68,9 @@ def replay(
     else:
         _print(decisions, tolerance)
         print(
-            f"{seen.pictures} pictures seen again: {seen.pairs} lines within {seen.rho_max_px:.2f} px and "
-            f"{seen.theta_max_deg:.2f} degrees, {seen.gone} gone, {seen.new} new"
+            f"{seen.pictures} pictures seen again: 95 % of {seen.pairs} lines within "
+            f"{seen.rho_p95_px:.2f} px and {seen.theta_p95_deg:.2f} degrees (all within {seen.rho_max_px:.2f} px), {seen.gone} gone, "
+            f"{seen.new} new"
         )
     if not passed:
         raise RunError(_complaint(decisions, tolerance), file=log)

@@ -13,7 +13,7 @@ from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.core.topics import RecordedFrame, Topic
 from flightd.core.types import Image, Line, LineSet
 from flightd.replay.log import LogReader
-from flightd.replay.perception_compare import replay_pictures
+from flightd.replay.perception_compare import PerceptionDrift, replay_pictures
 from flightd.vision.line_detector import Detector
 from tests.replay.synthetic_flight import picture, seen_lines
 
@@ -89,3 +89,22 @@ def test_a_picture_without_recorded_lines_is_passed_over(log: Path, tmp_path: Pa
             recorder.image(Topic.FRAME, entry.stamp_ns, entry.message.seq, entry.message.jpeg)
         recorder.image(Topic.FRAME, 99, 99, b"no picture")
     assert replay_pictures(path, Detector().detect).pictures == 0
+
+
+@pytest.mark.parametrize(
+    ("pairs", "new", "gone", "same"),
+    [
+        (76, 2, 0, True),
+        (101, 1, 2, True),
+        (101, 3, 3, False),
+        (1000, 15, 14, False),
+        (1000, 14, 14, True),
+        (10, 1, 0, True),
+        (4, 1, 0, False),
+        (0, 0, 0, True),
+    ],
+)
+def test_lines_at_the_edge_of_being_seen_may_tip_over_as_often_as_chance_has_it(
+    pairs: int, new: int, gone: int, same: bool
+) -> None:
+    assert PerceptionDrift(pairs, pairs, gone, new, 0.1, 5.0, 0.1, 1.0).within(0.5) is same
