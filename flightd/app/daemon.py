@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 
 from flightd.app.flight import Flight, Tasks
 from flightd.app.tick import Tick
+from flightd.app.tick_pace import TickPace
 from flightd.core.errors import FlightdError, TransientError, UnavailableError
 from flightd.core.tick import TICK_S
 from flightd.core.types import OVER, Command, Phase
 from flightd.runtime.supervisor import restarted
 
 _FIRST_HEARD_S = 2.0
-_TICK_NS = round(TICK_S * 1e9)
 _SILENT_NS = 30_000_000_000
 """A vehicle that nobody heard for so long after the mission's end is not waited for."""
 _LINGER_NS = 1_500_000_000
@@ -91,16 +91,12 @@ class Daemon:
         return parts
 
     async def _tick_until_over(self) -> None:
-        """The control tick, at a fixed rate."""
-        clock, vehicle = self._flight.clock, self._flight.vehicle
-        due_ns = clock.now_ns()
+        """The control tick, at its pace."""
+        vehicle = self._flight.vehicle
+        pace = TickPace(self._flight.clock, self._flight.vision.arrival)
         over_ns: int | None = None
         while True:
-            due_ns += _TICK_NS
-            await asyncio.sleep((due_ns - clock.now_ns()) * 1e-9)
-            now_ns = clock.now_ns()
-            late_s = (now_ns - due_ns) * 1e-9
-            due_ns = max(due_ns, now_ns - _TICK_NS)  # late: leave ticks out, never bunch them
+            now_ns, late_s = await pace.turn()
             output = self._tick.run(now_ns, late_s)
             if output.phase not in OVER:
                 continue

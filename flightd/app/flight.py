@@ -48,6 +48,10 @@ class Vision(Protocol):
 
     def tasks(self) -> Tasks: ...
 
+    async def arrival(self) -> None:
+        """Until there are lines that no tick has taken."""
+        ...
+
     def fresh(self, now_ns: int) -> tuple[LineSet, ...]:
         """Lines since the last tick, in the order of their frames."""
         ...

@@ -23,7 +23,9 @@ from flightd.core.types import (
 )
 
 TICK_S = 0.02
-"""Period of the control tick."""
+"""Longest period of the control tick; fresh lines shorten it."""
+CLOSEST_TICKS_S = 0.005
+"""Between two ticks: several detectors that answer together cost one tick, not one each."""
 _SHOWN_CHARS = 160
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from flightd.adapters.camera.connect import connect_camera
 from flightd.config.schema import Config
 from flightd.core.errors import TransientError, UnavailableError
-from flightd.core.tick import TICK_S
+from flightd.core.tick import CLOSEST_TICKS_S
 from flightd.core.types import Image
 from flightd.doctor.check import Check, error, ok, warning
 from flightd.ports import Clock, Vehicle
@@ -129,10 +129,10 @@ def check_latency(config: Config, detector: Detector, found: Pictures) -> list[C
         return []
     most_s = config.hazards.latency_s
     camera_s, (detector_s, _) = max(found.delays_s), _look(detector, found.picture)
-    whole_s = camera_s + detector_s + TICK_S
+    whole_s = camera_s + detector_s + CLOSEST_TICKS_S
     text = (
         f"{whole_s * 1000:.0f} ms from exposure to setpoint: camera {camera_s * 1000:.0f},"
-        f" detector {detector_s * 1000:.0f}, up to {TICK_S * 1000:.0f} until the next tick"
+        f" detector {detector_s * 1000:.0f}, up to {CLOSEST_TICKS_S * 1000:.0f} until the next tick"
     )
     remedy = (
         f"hazards.latency_s allows {most_s * 1000:.0f} ms: a camera with less delay (camera.latency_s is its"

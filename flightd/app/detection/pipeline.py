@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping
 
 from flightd.app.detection.detector_pool import Detection, Detectors
@@ -34,6 +35,7 @@ class DetectionPipeline:
         self.latency = LatencyBook()
         self._lost = 0
         self._detections: list[Detection] = []
+        self._arrived = asyncio.Event()
         self._newest_ns = -1
         self._picture_ns = 0
         self._rate: list[int] = []
@@ -58,9 +60,15 @@ class DetectionPipeline:
             if detection.jpeg is not None and show:
                 self._ground.picture(ticket.seq, ticket.stamp_ns, detection.jpeg)
             self._detections.append(detection)
+            self._arrived.set()
+
+    async def arrival(self) -> None:
+        """Until there are lines that no tick has taken."""
+        await self._arrived.wait()
 
     def fresh(self, now_ns: int) -> tuple[LineSet, ...]:
         """Lines since the last tick in the order of their frames; a frame that was overtaken is dropped."""
+        self._arrived.clear()
         arrived, self._detections = sorted(self._detections, key=lambda d: d.ticket.stamp_ns), []
         fresh = [d for d in arrived if d.ticket.stamp_ns > self._newest_ns]
         self._lost += len(arrived) - len(fresh)

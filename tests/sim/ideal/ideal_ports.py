@@ -83,6 +83,9 @@ class IdealVision:
     def tasks(self) -> Tasks:
         return {}
 
+    async def arrival(self) -> None:
+        """The flight's own loop ticks at a fixed rate."""
+
     def fresh(self, now_ns: int) -> tuple[LineSet, ...]:
         lines = []
         while self._coming and self._coming[0][0] <= now_ns:
