@@ -69,8 +69,8 @@ def replay(
         _print(decisions, tolerance)
         print(
             f"{seen.pictures} pictures seen again: 95 % of {seen.pairs} lines within "
-            f"{seen.rho_p95_px:.2f} px and {seen.theta_p95_deg:.2f} degrees (all within {seen.rho_max_px:.2f} px), {seen.gone} gone, "
-            f"{seen.new} new"
+            f"{seen.rho_p95_px:.2f} px and {seen.theta_p95_deg:.2f} degrees "
+            f"(all within {seen.rho_max_px:.2f} px), {seen.gone} gone, {seen.new} new"
         )
     if not passed:
         raise RunError(_complaint(decisions, tolerance), file=log)
