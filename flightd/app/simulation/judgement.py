@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
+from flightd.app.simulation.sensor_summary import sensor_summary
 from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.stock_summary import stock_summary
 from flightd.core.topics import Topic
+from flightd.core.tracks import NOT_SEEN
 from flightd.core.types import AttitudeSetpoint, Event, Status
 from flightd.mission.safety.hazard_table import HAZARDS
 from flightd.replay.log import Entry, read_log
@@ -21,11 +23,13 @@ from flightd.sim.plant.kinematics import ArmedChange, Kinematics
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """`stock` are the count's keys of the summary; `hazard` is how the hazard that the scenario expects went,
-    None where it expects none.  `faults` are all that was wrong, what the scenario expects left out."""
+    """`stock` and `sensors` are the summary's keys of the count and of what the flight learnt; `hazard` is
+    how the hazard that the scenario expects went, None where it expects none.  `faults` are all that was
+    wrong, what the scenario expects left out."""
 
     score: FlightScore
     stock: dict[str, Any]
+    sensors: dict[str, Any]
     hazard: HazardVerdict | None
     faults: tuple[JudgedFault, ...]
 
@@ -41,10 +45,11 @@ def judge_flight(simulation: Simulation) -> Judgement:
     armed = [ArmedChange(**row) for row in _rows(truth, Topic.ARMED, ArmedChange)]
     notes = [e.message for e in truth if e.topic == Topic.FAULT and isinstance(e.message, dict)]
     begun = [note for note in notes if note["began"]]
+    statuses = flown.messages(Status)
     evidence = FlightEvidence(
         site=simulation.scenario.floor.site(simulation.site),
         plan=simulation.plan(),
-        statuses=flown.messages(Status),
+        statuses=statuses,
         events=flown.messages(Event),
         truth=[Kinematics(**row) for row in _rows(truth, Topic.TRUTH, Kinematics)],
         setpoints_ns=[setpoint.stamp_ns for setpoint in flown.messages(AttitudeSetpoint)],
@@ -59,12 +64,14 @@ def judge_flight(simulation: Simulation) -> Judgement:
         codes_wrong=stock["codes_wrong"],
         empty_wrong=stock.get("empty_wrong", 0),
     )
+    seen = next((one.sensors for one in reversed(statuses) if one.sensors.is_known), NOT_SEEN)
+    sensors = sensor_summary(simulation, seen)
     expected = simulation.scenario.expect
     if expected is None:
-        return Judgement(figures, stock, None, tuple(faults))
+        return Judgement(figures, stock, sensors, None, tuple(faults))
     row = next(row for row in HAZARDS if row.name == expected.hazard)
     verdict = judged_hazard(row, expected, evidence, figures, faults, [note["stamp_ns"] for note in begun])
-    return Judgement(figures, stock, verdict, verdict.faults)
+    return Judgement(figures, stock, sensors, verdict, verdict.faults)
 
 
 def _rows(entries: Sequence[Entry], topic: Topic, kind: type) -> list[dict[str, Any]]:

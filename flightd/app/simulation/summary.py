@@ -37,6 +37,7 @@ def write_results(
         "seed": simulation.seed,
         "world": simulation.unknowns.kind,
         "vehicle": simulation.config.vehicle.kind,
+        **judgement.sensors,
         **judgement.stock,
     }
     if ended_by:

@@ -1,0 +1,77 @@
+"""What a simulated flight found out of its own sensors, beside what was drawn of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeAlias
+
+from flightd.app.simulation.simulation import Simulation
+from flightd.core.tracks import SensorEstimate
+
+Known: TypeAlias = dict[str, float | None]
+
+
+def sensor_summary(simulation: Simulation, seen: SensorEstimate) -> dict[str, Any]:
+    """The summary's part on the sensors, of which the lines said `seen` last: `estimated`, `estimated_sigma`
+    and `drawn`, the same keys each.
+
+    The camera's delay is whole, configuration included; the mount's angles are beyond the configured ones;
+    the tilt bias is by how much the told roll and pitch are too large, as two angles and their hypotenuse.
+    None for what nobody estimates, and before any line was seen."""
+    return {
+        "estimated": _estimated(seen, simulation.config.camera.latency_s),
+        "estimated_sigma": _sigma(seen),
+        "drawn": _drawn(simulation),
+    }
+
+
+def _estimated(seen: SensorEstimate, latency_s: float) -> Known:
+    return _rounded(
+        camera_delay_s=latency_s - seen.delay_s,
+        mount_roll_deg=math.degrees(seen.mount_roll_rad),
+        mount_pitch_deg=math.degrees(seen.mount_pitch_rad),
+        tilt=(-math.degrees(seen.tilt_roll_rad), -math.degrees(seen.tilt_pitch_rad)),
+    )
+
+
+def _sigma(seen: SensorEstimate) -> Known:
+    mount_deg, tilt_deg = math.degrees(seen.mount_sigma_rad), math.degrees(seen.tilt_sigma_rad)
+    known = _rounded(
+        camera_delay_s=seen.delay_sigma_s,
+        mount_roll_deg=mount_deg,
+        mount_pitch_deg=mount_deg,
+        tilt=(tilt_deg, tilt_deg),
+    )
+    return known | {"tilt_bias_deg": known["tilt_roll_deg"]}
+
+
+def _drawn(simulation: Simulation) -> Known:
+    unknowns, configured = simulation.unknowns, simulation.scenario.camera.camera()
+    roll_rad, pitch_rad = unknowns.tilt_bias_rad or (math.nan, math.nan)
+    return _rounded(
+        camera_delay_s=unknowns.camera(configured).capture_delay_s,
+        mount_roll_deg=math.degrees(unknowns.mount_roll_rad),
+        mount_pitch_deg=math.degrees(unknowns.mount_pitch_rad),
+        mount_yaw_deg=math.degrees(unknowns.mount_yaw_rad),
+        tilt=(math.degrees(roll_rad), math.degrees(pitch_rad)),
+    )
+
+
+def _rounded(
+    *,
+    camera_delay_s: float,
+    mount_roll_deg: float,
+    mount_pitch_deg: float,
+    tilt: tuple[float, float],
+    mount_yaw_deg: float = math.nan,
+) -> Known:
+    values = {
+        "camera_delay_s": camera_delay_s,
+        "mount_roll_deg": mount_roll_deg,
+        "mount_pitch_deg": mount_pitch_deg,
+        "mount_yaw_deg": mount_yaw_deg,
+        "tilt_bias_deg": math.hypot(*tilt),
+        "tilt_roll_deg": tilt[0],
+        "tilt_pitch_deg": tilt[1],
+    }
+    return {key: None if math.isnan(value) else round(value, 4) for key, value in values.items()}

@@ -1,0 +1,58 @@
+"""What a simulated flight found out of its sensors, in its summary."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from flightd.app.simulation.prepare import SimOptions, prepare
+from flightd.app.simulation.sensor_summary import sensor_summary
+from flightd.app.simulation.simulation import Simulation
+from flightd.core.tracks import NOT_SEEN, SensorEstimate
+from flightd.sim.scenario.scenario import Scenario
+
+SEEN = SensorEstimate(
+    delay_s=-0.012,
+    delay_sigma_s=0.002,
+    mount_roll_rad=math.radians(0.5),
+    mount_pitch_rad=math.radians(-0.25),
+    mount_sigma_rad=math.radians(0.2),
+    tilt_roll_rad=math.radians(-0.3),
+    tilt_pitch_rad=math.radians(0.4),
+    tilt_sigma_rad=math.radians(0.1),
+)
+
+
+@pytest.fixture
+def simulation(tmp_path: Path) -> Simulation:
+    return prepare(SimOptions(seed=3), Scenario(), tmp_path, lambda _: None)
+
+
+def test_what_was_found_stands_beside_what_was_drawn_with_the_same_keys(simulation: Simulation) -> None:
+    told = sensor_summary(simulation, SEEN)
+    assert told["estimated"] == {
+        "camera_delay_s": pytest.approx(simulation.config.camera.latency_s + 0.012),
+        "mount_roll_deg": 0.5,
+        "mount_pitch_deg": -0.25,
+        "mount_yaw_deg": None,
+        "tilt_bias_deg": 0.5,
+        "tilt_roll_deg": 0.3,
+        "tilt_pitch_deg": -0.4,
+    }
+    assert told["estimated_sigma"]["camera_delay_s"] == 0.002
+    assert told["estimated_sigma"]["tilt_bias_deg"] == 0.1
+    assert list(told["estimated"]) == list(told["estimated_sigma"]) == list(told["drawn"])
+
+
+def test_the_drawn_delay_is_the_whole_one(simulation: Simulation) -> None:
+    drawn = sensor_summary(simulation, NOT_SEEN)["drawn"]
+    delay_s = simulation.scenario.camera.capture_delay_s + simulation.unknowns.camera_delay_s
+    assert drawn["camera_delay_s"] == pytest.approx(delay_s, abs=1e-4)
+    assert drawn["mount_yaw_deg"] == pytest.approx(math.degrees(simulation.unknowns.mount_yaw_rad), abs=1e-4)
+
+
+def test_before_any_line_nothing_is_estimated(simulation: Simulation) -> None:
+    told = sensor_summary(simulation, NOT_SEEN)
+    assert set(told["estimated"].values()) == set(told["estimated_sigma"].values()) == {None}
