@@ -39,7 +39,7 @@ def stock_summary(simulation: Simulation, flight_time_s: float) -> dict[str, Any
     """The summary's part on codes and places, over the locations of the wanted nodes."""
     truth, records = truth_of(simulation), _records(simulation.folder)
     if not truth or records is None:
-        return {"codes_expected": 0, "codes_read": 0, "codes_wrong": 0}
+        return {"codes_expected": 0, "codes_read": 0, "codes_wrong": 0, "locations_per_hour": 0.0}
     wanted = {stop.node for stop in simulation.plan().stops if stop.visit}
     planned = {code for code, place in truth.items() if place.node in wanted}
     scored = score_stock(truth, records, planned).as_summary()
