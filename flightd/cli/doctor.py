@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from flightd.config.schema import Config
     from flightd.doctor.diagnosis import Diagnosis
 
+LEAST_ROCK_S, MOST_ROCK_S = 5.0, 120.0
 _COLOURS = {"ok": typer.colors.GREEN, "warning": typer.colors.YELLOW, "error": typer.colors.RED}
 
 
@@ -34,6 +35,13 @@ def doctor(
         bool,
         typer.Option("--quick", help="Without camera and vehicle, in a second: before a service starts."),
     ] = False,
+    rock: Annotated[
+        float,
+        typer.Option(
+            help="Measure the camera's delay: so many seconds in which you rock the drone, propellers off.",
+            show_default=False,
+        ),
+    ] = 0.0,
     as_json: AsJson = False,
 ) -> None:
     """Say whether configuration, computer, camera and vehicle are fit to fly, and what to do if not.
@@ -45,9 +53,14 @@ def doctor(
       flightd doctor --config /etc/flightd/flightd.toml
       flightd doctor --config configs/ardupilot.toml --fix
       flightd doctor --config configs/ardupilot.toml --json | jq .parameters
+      flightd doctor --config configs/ardupilot.toml --rock 20
     """
     from flightd.config.schema import load_config
 
+    if quick and rock:
+        raise InputError("--quick looks at no vehicle: it does not go with --rock")
+    if rock and not LEAST_ROCK_S <= rock <= MOST_ROCK_S:
+        raise InputError(f"--rock {rock:g}: expected {LEAST_ROCK_S:g} to {MOST_ROCK_S:g} seconds")
     if quick and fix:
         raise InputError("--quick looks at no vehicle: it does not go with --fix")
     if fix and not yes and not sys.stdin.isatty():
@@ -57,7 +70,7 @@ def doctor(
     chosen = load_config(config)
     if fix and chosen.vehicle.kind == "ardrone":
         raise InputError("--fix is for autopilots with parameters; an AR.Drone is set up at each start")
-    found = asyncio.run(_examined(chosen, config, quick=quick))
+    found = asyncio.run(_examined(chosen, config, rock, quick=quick))
     if fix and (agreed := _agreed(found, ask=not yes)):
         found = asyncio.run(_fixed(found, chosen, agreed))
     if as_json:
@@ -68,10 +81,10 @@ def doctor(
         raise RunError(f"not fit to fly: {found.errors} {'error' if found.errors == 1 else 'errors'}")
 
 
-async def _examined(config: Config, path: Path, *, quick: bool) -> Diagnosis:
+async def _examined(config: Config, path: Path, rock_s: float, *, quick: bool) -> Diagnosis:
     """Composed as for a flight: InputError where configuration and site are not sound."""
     from flightd.app.build import detector_of, ground_link, pilot_of, plan_of
-    from flightd.doctor.diagnosis import Subject, examine, examine_quickly
+    from flightd.doctor.diagnosis import Subject, examine, examine_quickly, measure_delay
     from flightd.runtime.clock import LoopClock
     from flightd.site.site_file import load_site
 
@@ -87,7 +100,12 @@ async def _examined(config: Config, path: Path, *, quick: bool) -> Diagnosis:
         ground_link(config.ground, site, clock),
         clock,
     )
-    return await (examine_quickly if quick else examine)(subject)
+    found = await (examine_quickly if quick else examine)(subject)
+    return await measure_delay(found, subject, rock_s, _say) if rock_s else found
+
+
+def _say(line: str) -> None:
+    print(f"flightd: {line}", file=sys.stderr, flush=True)
 
 
 async def _fixed(found: Diagnosis, config: Config, agreed: list[str]) -> Diagnosis:

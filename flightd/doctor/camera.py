@@ -12,8 +12,9 @@ from flightd.core.errors import TransientError, UnavailableError
 from flightd.core.tick import CLOSEST_TICKS_S
 from flightd.core.types import Image
 from flightd.doctor.check import Check, error, ok, warning
+from flightd.doctor.picture_of import picture_of
 from flightd.ports import Clock, Vehicle
-from flightd.runtime.frame_ring import FrameRing, FrameTicket
+from flightd.runtime.frame_ring import FrameTicket
 from flightd.vision.line_detector import Detector
 
 _FIRST_S = 6.0
@@ -55,7 +56,7 @@ async def watch(config: Config, clock: Clock, vehicle: Vehicle | None) -> Pictur
         pictures.delays_s.append((ticket.arrival_ns - ticket.stamp_ns) * 1e-9)
         first.set()
         if pictures.picture is None and len(pictures.arrivals_ns) >= _LEAST_PICTURES:
-            pictures.picture = _copy(ticket)  # the first ones are exposed badly
+            pictures.picture = picture_of(ticket)  # the first ones are exposed badly
 
     def complain(text: str) -> None:
         pictures.trouble = text
@@ -153,19 +154,3 @@ def _look(detector: Detector, picture: Image) -> tuple[float, int]:
         lines = len(detector.detect(picture).lines)
         best_s = min(best_s, time.perf_counter() - start_s)
     return best_s, lines
-
-
-def _copy(ticket: FrameTicket) -> Image | None:
-    """The picture behind a ticket; None when it is gone already."""
-    try:
-        ring = FrameRing.attach(ticket.ring, ticket.slots, ticket.width_px, ticket.height_px)
-    except UnavailableError:
-        return None
-    try:
-        picture = ring.pixels(ticket.slot).copy()
-        ring.check(ticket.slot, ticket.seq)
-    except TransientError:
-        return None
-    finally:
-        ring.close()
-    return picture

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,8 @@ from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFindin
 from flightd.config.schema import Config
 from flightd.doctor import camera, machine, vehicle
 from flightd.doctor.calibration import check_calibration, check_learnt
-from flightd.doctor.check import Check, CheckLevel, ok
+from flightd.doctor.check import Check, CheckLevel, ok, warning
+from flightd.doctor.delay import check_delay
 from flightd.doctor.ground import GroundListener, check_ground
 from flightd.doctor.vehicle import Autopilot
 from flightd.ports import Clock
@@ -102,6 +103,19 @@ async def examine(subject: Subject) -> Diagnosis:
 async def examine_quickly(subject: Subject) -> Diagnosis:
     """What can be known without waiting for anything."""
     return Diagnosis([*_check_machine(subject), *check_ground(subject.config.ground, subject.ground)])
+
+
+async def measure_delay(
+    found: Diagnosis, subject: Subject, seconds: float, say: Callable[[str], None]
+) -> Diagnosis:
+    """The diagnosis with the camera's delay as a person's rocking tells it; `say` hears what he is to do.
+    Nothing is measured of a vehicle that is armed, or does not answer."""
+    about = [check for check in found.checks if check.name in {"vehicle", "camera"}]
+    if any(check.level is CheckLevel.ERROR for check in about):
+        skipped = warning("delay", "not measured: see the lines of camera and vehicle", "mend those first")
+        return replace(found, checks=[*found.checks, skipped])
+    checks = await check_delay(subject.config, subject.clock, subject.detector, seconds, say)
+    return replace(found, checks=[*found.checks, *checks])
 
 
 async def fix_parameters(found: Diagnosis, config: Config, agreed: Sequence[str], clock: Clock) -> Diagnosis:

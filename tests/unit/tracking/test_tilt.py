@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from flightd.config.control import TiltCompensation
 from flightd.core.geometry import Lens, Mount, ground_homography, normalise_line
@@ -118,7 +119,7 @@ def test_the_height_by_a_lines_width_is_right_wherever_the_line_is_and_however_t
     across = np.array([-along[1], along[0]])
     homography = ground_homography(LENS, Mount(), roll, pitch)
 
-    def pixel(on_floor: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]  # of a camera `height` up
+    def pixel(on_floor: NDArray[np.float64]) -> NDArray[np.float64]:  # of a camera `height` up
         x, y, w = homography @ np.array([*on_floor / height, 1.0])
         return np.array([x / w, y / w]) - LENS.centre_px
 
