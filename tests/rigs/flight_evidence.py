@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from flightd.config.mission import Heading
-from flightd.core.types import Event, Phase, Status
+from flightd.core.types import AttitudeSetpoint, Event, Phase, Status
 from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
 from flightd.sim.judge.evidence import FlightEvidence
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
@@ -35,9 +35,9 @@ def evidence(
     statuses: Sequence[Status],
     events: Sequence[Event] = (),
     armed: Sequence[ArmedChange] | None = None,
-    setpoints_ns: Sequence[int] = (),
+    setpoints: Sequence[AttitudeSetpoint] = (),
 ) -> FlightEvidence:
-    return FlightEvidence(SITE, PLAN, statuses, events, list(truth), setpoints_ns, armed)
+    return FlightEvidence(SITE, PLAN, statuses, events, list(truth), setpoints, armed)
 
 
 def landed(*flown: Kinematics) -> list[Kinematics]:

@@ -52,7 +52,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
         statuses=statuses,
         events=flown.messages(Event),
         truth=[Kinematics(**row) for row in _rows(truth, Topic.TRUTH, Kinematics)],
-        setpoints_ns=[setpoint.stamp_ns for setpoint in flown.messages(AttitudeSetpoint)],
+        setpoints=flown.messages(AttitudeSetpoint),
         armed=armed or None,
         piloted=any(note["kind"] == "pilot" for note in begun) or bool(simulation.truth_url),
     )

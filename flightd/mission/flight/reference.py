@@ -32,8 +32,9 @@ _SETTLE_S = 3.0
 """The most that a landing waits for the drone to come to rest."""
 _REST_MPS = 0.15
 # the autopilots themselves say after a second that they stand
-_FADE_S, _OWN_LANDING_S, _DISARM_S = 1.5, 2.5, 5.5
-"""Down and still for so long: lean no more, have the autopilot land by itself, ask it to disarm."""
+_FADE_S, _OWN_LANDING_S, _DISARM_S = 0.3, 2.5, 5.5
+"""Down and still for so long: lean no more (who stands does not follow a lean, and the position loop would
+ask for more and more), have the autopilot land by itself, ask it to disarm."""
 _HURRY = 4.0 / 3.0
 """How much faster than usual a take-off out of sight climbs, within the limits."""
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from flightd.core.types import Event, Phase, Status
+from flightd.core.types import AttitudeSetpoint, Event, Phase, Status
 from flightd.mission.plan.flight_plan import FlightPlan
 from flightd.sim.judge.motion import TrueMotion
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
@@ -17,7 +17,7 @@ from flightd.site.site import Site
 
 @dataclass(frozen=True)
 class FlightEvidence:
-    """`site` as it really is; `statuses`, `events` and `setpoints_ns` (when setpoints went out) are the
+    """`site` as it really is; `statuses`, `events` and `setpoints` (those that went out) are the
     daemon's, `truth` and `armed` the simulator's; all in time order.  `armed` is None where the vehicle does
     not tell.  `piloted`: there was a pilot who could take over; where there was none a hand-over is the
     autopilot's failsafe, and still judged."""
@@ -27,7 +27,7 @@ class FlightEvidence:
     statuses: Sequence[Status]
     events: Sequence[Event]
     truth: Sequence[Kinematics]
-    setpoints_ns: Sequence[int] = ()
+    setpoints: Sequence[AttitudeSetpoint] = ()
     armed: Sequence[ArmedChange] | None = None
     piloted: bool = True
 

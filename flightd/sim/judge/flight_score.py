@@ -83,7 +83,7 @@ def score(flight: FlightEvidence) -> FlightScore:
         ),
         min_clearance_m=_rounded(min(free, default=None)),
         max_overshoot_m=_rounded(max(0.0, float(above.max())) if len(above) else None),
-        uncontrolled_s=_rounded(longest_uncontrolled(flight)[1] if flight.setpoints_ns else None),
+        uncontrolled_s=_rounded(longest_uncontrolled(flight)[1] if flight.setpoints else None),
     )
 
 
@@ -112,7 +112,7 @@ def longest_uncontrolled(flight: FlightEvidence) -> tuple[float, float]:
     """When the longest time without control began, s of the clock, and how long it was, s; 0 where nothing is
     known of setpoints."""
     motion = flight.in_air
-    sent = np.asarray(flight.setpoints_ns, np.float64) * 1e-9
+    sent = np.array([setpoint.stamp_ns for setpoint in flight.setpoints], np.float64) * 1e-9
     if not len(motion) or not len(sent):
         return math.inf, 0.0
     before = np.searchsorted(sent, motion.stamp_s, side="right") - 1

@@ -26,6 +26,8 @@ _STANDS_M = 0.12
 """A body origin at most this high stands."""
 _HARD_MPS = 1.2
 _STAYS_ARMED_S = 15.0
+_LEANS_DEG, _SETTLES_S = 6.0, 0.5
+"""Whoever leans so much so long after touching down, motors on, slides or tips over its legs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,7 @@ KINDS = {
     "too_high": f"more than {OVERSHOOT_M:g} m above the commanded height, by m",
     "out_of_control": f"in the air for more than {UNCONTROLLED_S:g} s without setpoint or landing, s",
     "hard_landing": f"touched the floor faster than {_HARD_MPS:g} m/s, m/s",
+    "leaned_on_floor": f"commanded to lean by more than {_LEANS_DEG:g} deg while it stands, motors on, deg",
     "stayed_up": "in the air at the end, m above the floor",
     "stayed_armed": f"armed on the floor for more than {_STAYS_ARMED_S:g} s, or at the end, s",
     "aborted": "the mission was not completed, nodes left",
@@ -72,6 +75,7 @@ SAFETY_KINDS = frozenset(
         "too_high",
         "out_of_control",
         "hard_landing",
+        "leaned_on_floor",
         "stayed_up",
         "stayed_armed",
         "down_late",
@@ -134,6 +138,7 @@ def _at_the_floor(flight: FlightEvidence) -> Iterator[JudgedFault]:
     if len(sink_mps) and sink_mps.max() > _HARD_MPS:
         at_s = float(motion.stamp_s[touching[int(np.argmax(sink_mps))]]) - begun_s
         yield JudgedFault("hard_landing", round(at_s, 2), round(float(sink_mps.max()), 2))
+    yield from _leaning(flight)
     if flight.handed_over:
         return
     asked = [
@@ -152,6 +157,26 @@ def _at_the_floor(flight: FlightEvidence) -> Iterator[JudgedFault]:
         armed_s = (disarmed[0] if disarmed else end_s) - down_s
         if not disarmed or armed_s > _STAYS_ARMED_S:
             yield JudgedFault("stayed_armed", round(down_s - begun_s, 2), round(armed_s, 2))
+
+
+def _leaning(flight: FlightEvidence) -> Iterator[JudgedFault]:
+    """What was commanded while it stands: the simulated airframe does not tip over by it, a real one does."""
+    motion, sent = flight.motion, flight.setpoints
+    stands = motion.height_m <= _STANDS_M
+    if not sent or not len(motion):
+        return
+    began = np.flatnonzero(stands & ~np.r_[True, stands[:-1]])  # after a flight, not before the first
+    since_s = np.full(len(motion), math.inf)
+    for index in began:
+        ends = np.flatnonzero(~stands[index:])
+        since_s[index : index + ends[0] if len(ends) else None] = motion.stamp_s[index] + _SETTLES_S
+    stamps_s = np.array([setpoint.stamp_ns for setpoint in sent], np.float64) * 1e-9
+    lean_deg = np.degrees([math.hypot(setpoint.roll_rad, setpoint.pitch_rad) for setpoint in sent])
+    at = np.clip(np.searchsorted(motion.stamp_s, stamps_s, side="right") - 1, 0, None)
+    wrong = (stamps_s > since_s[at]) & (lean_deg > _LEANS_DEG) & (stamps_s < flight.handed_over_ns * 1e-9)
+    if wrong.any():
+        first_s = float(stamps_s[int(np.argmax(wrong))]) - flight.begun_s
+        yield JudgedFault("leaned_on_floor", round(first_s, 2), round(float(lean_deg[wrong].max()), 1))
 
 
 def _finite(value: float) -> float:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
 
-from flightd.core.types import Event, EventLevel, Phase
+from flightd.core.types import AttitudeSetpoint, Event, EventLevel, Phase
 from flightd.sim.judge.evidence import FlightEvidence
 from flightd.sim.judge.flight_score import score
 from flightd.sim.judge.verdict import KINDS, judged
@@ -115,10 +116,24 @@ def test_a_climb_beyond_the_command_is_told_and_a_descent_to_it_is_none() -> Non
 
 def test_a_drone_left_to_itself_in_the_air_is_out_of_control_unless_it_is_landing() -> None:
     truth = [at(stamp * 100 * MS) for stamp in range(200)]
-    sent = [stamp * 20 * MS for stamp in range(100)]
-    assert kinds(evidence(truth, [status(0)], setpoints_ns=sent))["out_of_control"] > 10.0
+    sent = [AttitudeSetpoint(stamp * 20 * MS) for stamp in range(100)]
+    assert kinds(evidence(truth, [status(0)], setpoints=sent))["out_of_control"] > 10.0
     sinking = [replace(t, climb_mps=-0.2) for t in truth]
-    assert "out_of_control" not in kinds(evidence(sinking, [status(0)], setpoints_ns=sent))
+    assert "out_of_control" not in kinds(evidence(sinking, [status(0)], setpoints=sent))
+
+
+@pytest.mark.parametrize(
+    ("lean_deg", "after_s", "wrong"), [(10.0, 1.0, True), (10.0, 0.2, False), (4.0, 1.0, False)]
+)
+def test_who_is_commanded_to_lean_while_it_stands_is_bad(
+    lean_deg: float, after_s: float, wrong: bool
+) -> None:
+    truth = [at(n * 100 * MS, height_m=1.6 if n < 50 else 0.1) for n in range(100)]
+    lean = AttitudeSetpoint(5 * S + round(after_s * S), roll_rad=math.radians(lean_deg))
+    sent = [AttitudeSetpoint(4 * S, roll_rad=0.2), lean]
+    faults = kinds(evidence(truth, [status(0)], setpoints=sent))
+    assert ("leaned_on_floor" in faults) is wrong
+    assert not wrong or faults["leaned_on_floor"] == pytest.approx(lean_deg)
 
 
 def test_armed_on_the_floor_for_long_and_in_the_air_at_the_end_are_bad() -> None:
