@@ -146,8 +146,8 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "height_wrong",
         Trigger.HEIGHT_WRONG,
-        "width of the seen lines against the map's by more than `hazards.height_share` for"
-        " `hazards.disagree_s`",
+        "width of the seen lines against the map's by more than `hazards.height_share`, or by 0.25 m and"
+        " 12 %, for `hazards.disagree_s`; from the floor on, too",
         Action.HOLD,
         "no climb by it; land after `mission.lines_land_s`",
         _FAST,

@@ -49,3 +49,16 @@ def test_a_take_off_by_a_height_that_moves_but_does_not_follow_ends_below_the_ro
     assert "does not follow" in flown.reason
     assert max(k.height_m for _, k in flown.truth) < CONFIG.mission.height_m + 0.5
     assert flown.truth[-1][1].height_m < 0.2
+
+
+@pytest.mark.parametrize("share", [0.8, 0.85])
+def test_a_range_finder_that_reads_a_fifth_too_little_from_the_floor_on_is_found_by_the_lines(
+    share: float,
+) -> None:
+    """It follows the climb, so that only the width of the lines contradicts it."""
+    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=1)
+    flight.faults.misread = lambda height_m: share * height_m
+    flown = flight.fly(60.0)
+    assert flown.phase is Phase.ABORTED
+    assert max(k.height_m for _, k in flown.truth) < CONFIG.mission.height_m + 0.5
+    assert flown.truth[-1][1].height_m < 0.2

@@ -306,7 +306,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.CAMERA_FROZEN: warned(frozen_s=9.0),
     Trigger.CAMERA_BLIND: warned(blank_s=9.0),
     Trigger.FRAMES_STALE: warned(frame_age_s=9.0),
-    Trigger.HEIGHT_WRONG: warned(height_share=2.0),
+    Trigger.HEIGHT_WRONG: warned(height_doubted=True),
     Trigger.CORRIDOR_LEFT: warned(outside_m=1.0),
     Trigger.OVERLOAD: sick(latency_p99_s=9.0),
     Trigger.LINES_LOST: sensed(x_age_s=9.0, y_age_s=9.0),
