@@ -31,6 +31,8 @@ class WidthHeights:
         self._mean_share: float | None = None
         self._strays = 0.0
         self._told_m = 0.0
+        self.by_width_m: float | None = None
+        """What the newest frame's lines tell, where they could be held against a height; None where not."""
 
     @property
     def share(self) -> float:
@@ -47,6 +49,7 @@ class WidthHeights:
         """The height `told_m`, unless there is none or the heights of this frame's lines by their widths
         contradict it for long: then theirs.  Theirs at once where they go on as before and what is told
         leaps away from them."""
+        self.by_width_m = None
         if not by_width_m or not told_m > 0:
             return median(by_width_m) if by_width_m else told_m / self._believed_share
         nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
@@ -66,7 +69,7 @@ class WidthHeights:
             change = min(abs(math.log(nearest_m / self._last_m)), 1.0)
             self._changes += _GAIN * (change - self._changes)
             self._followed = agrees or (self._followed and change < _LEAP)
-        self._last_m = nearest_m
+        self._last_m = self.by_width_m = nearest_m
         leapt = self._followed and abs(share - 1.0) > _DOUBTED
         return nearest_m if leapt or self._believed_share != 1.0 else told_m
 

@@ -171,6 +171,7 @@ class HazardMonitor:
         h, w = self._hazards, s.warnings
         return {
             Trigger.HEIGHT_STUCK: (w.height_stuck, 0.0),
+            Trigger.CLIMB_WRONG: (w.climb_wrong, 0.0),
             Trigger.HEIGHT_WRONG: (w.height_doubted, h.disagree_s),
             Trigger.ATTITUDE_WRONG: (abs(w.heading_error_rad) > h.heading_rad, h.disagree_s),
             Trigger.WIND: (w.push_mps2 > h.expert.push_mps2 or w.off_m > h.expert.off_m, h.expert.push_s),

@@ -134,6 +134,16 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "climb_wrong",
+        Trigger.CLIMB_WRONG,
+        "range finder and lines' width both change by 0.35 m more, or less, within two seconds than the"
+        " autopilot tells to have climbed: moved air has misled its barometer",
+        Action.LAND,
+        "from 0.2 m on the climb is commanded otherwise by that error, by 1.5 m/s at most; the heights are"
+        " believed; down by them",
+        _FAST,
+    ),
+    Hazard(
         "height_stuck",
         Trigger.HEIGHT_STUCK,
         "the height does not follow the climb that the autopilot tells: it stands still for 0.4 m within"

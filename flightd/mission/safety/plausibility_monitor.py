@@ -10,6 +10,7 @@ from flightd.core.types import GridPose, Health
 from flightd.mission.guidance import Guidance, Guide, Warnings
 from flightd.site.corridor import Corridor
 from flightd.site.site import Site
+from flightd.tracking.climb_doubt import ClimbDoubt
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.line_tracker import LineTracker
 
@@ -48,11 +49,13 @@ class PlausibilityMonitor:
         frames: FrameMonitor,
         health: Health,
         height_stuck: bool = False,
+        climb: ClimbDoubt | None = None,
     ) -> Warnings:
         self._tick_s += min(dt_s / _TICK_MEMORY_S, 1.0) * (dt_s - self._tick_s)
         off_share, off_m = abs(tracker.height_share - 1.0), abs(tracker.height_off_m)
         is_off = off_share > self._height_share or (off_m > _OFF_M and off_share > _OFF_SHARE)
-        self._doubt = is_off and height_m > self._judged_above_m
+        highest_m = max(height_m, height_m - tracker.height_off_m)  # one that sticks near the floor is low
+        self._doubt = is_off and highest_m > self._judged_above_m
         if tracks is not None and now_ns - max(tracks.lines_ns, min(tracks.features_ns)) < _FRESH_NS:
             part = min(dt_s / _PUSH_MEMORY_S, 1.0)
             x, y = self.push_mps2
@@ -70,6 +73,8 @@ class PlausibilityMonitor:
             heading_error_rad=tracker.heading_error_rad,
             height_doubted=self._doubt,
             height_stuck=height_stuck,
+            climb_wrong=climb is not None and climb.found,
+            climb_error_mps=0.0 if climb is None else climb.error_mps(now_ns),
             push_mps2=math.hypot(*self.push_mps2),
             off_m=self._off_m,
             headroom_m=self._ceiling_m - height_m,

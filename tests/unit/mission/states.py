@@ -283,6 +283,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.STEP_FAILED: sensed(failed=True),
     Trigger.HEARTBEAT_LOST: Stimulus(_beat_lost),
     Trigger.HEIGHT_STUCK: warned(height_stuck=True),
+    Trigger.CLIMB_WRONG: warned(climb_wrong=True),
     Trigger.CLIMB_LOST: sensed(1.2, climb_mps=math.nan),
     Trigger.HEIGHT_LOST: sensed(height_m=math.nan),
     Trigger.CEILING_LEFT: warned(headroom_m=-1.0),
