@@ -11,13 +11,13 @@ from collections import deque
 from typing import NamedTuple
 
 _WINDOW_NS = 2_000_000_000
-_OFF_M, _NOTICED_M = 0.35, 0.2
+_OFF_M, _NOTICED_M = 0.35, 0.15
 """What both heights changed by more, or less, than what was told within the window: barometers err by less.
 From `_NOTICED_M` on the climb is put right: a door's gust moves a drone by a metre in a second."""
 _AGREEING_M, _AGREEING_SHARE = 0.12, 0.25
 """So far the changes of the two heights may differ: one of them is scaled, the other one noisy."""
-_RATE_NS = 500_000_000
-"""The error of the rate is that of the newest samples that span so long."""
+_RATE_NS, _HELD_NS = 300_000_000, 500_000_000
+"""The error of the rate is that of the newest samples that span so long, and holds for so long without."""
 
 
 class _Sample(NamedTuple):
@@ -56,7 +56,7 @@ class ClimbDoubt:
         """How much too great the told rate is; 0 where nothing is noticed, and while the heights do not agree
         on it."""
         samples = self._samples
-        if not self._noticed or not samples or now_ns - samples[-1].stamp_ns > _RATE_NS:
+        if not self._noticed or not samples or now_ns - samples[-1].stamp_ns > _HELD_NS:
             return 0.0
         new = samples[-1]
         old = next((sample for sample in samples if new.stamp_ns - sample.stamp_ns <= _RATE_NS), new)

@@ -139,7 +139,7 @@ HAZARDS: tuple[Hazard, ...] = (
         "range finder and lines' width both change by 0.35 m more, or less, within two seconds than the"
         " autopilot tells to have climbed: moved air has misled its barometer",
         Action.LAND,
-        "from 0.2 m on the climb is commanded otherwise by that error, by 1.5 m/s at most; the heights are"
+        "from 0.15 m on the climb is commanded otherwise by that error, by 1.5 m/s at most; the heights are"
         " believed; down by them",
         _FAST,
     ),

@@ -73,7 +73,7 @@ _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
     },
     lambda draw: {
         "kind": "climb_drifts",
-        "error_mps": round(draw.uniform(-1.0, 1.0), 2),
+        "error_mps": round(draw.uniform(-0.8, 0.8), 2),
         "duration_s": 3.0,
     },
     lambda draw: {"kind": "aisle_opened"},
