@@ -120,3 +120,24 @@ def test_after_a_reboot_the_parameters_are_looked_at_anew() -> None:
             await rig.until(lambda: "LAND_SPEED" in words(rig.known().unfit), 15.0)
 
     virtual(test())
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "value"), [(ardupilot_rig, "BATT_FS_LOW_ACT", 0.0), (px4_rig, "COM_RC_IN_MODE", 4)]
+)
+def test_a_parameter_that_an_autopilot_drops_from_a_burst_is_judged_too(
+    make: Any, name: str, value: float
+) -> None:
+    """It is asked for alone in the end; what no version has is then known to be that."""
+    config = PeerConfig(ready_s=0.5, parameters={name: value}, parameter_queue=1)
+
+    async def test() -> None:
+        async with make(config) as rig:
+            await rig.until(
+                lambda: rig.vehicle.state() is not None and f"{name} is" in str(rig.known().unfit), 40.0
+            )
+            rig.vehicle.demand(Demand.FLY)
+            await asyncio.sleep(5.0)
+            assert not rig.peer.armed
+
+    virtual(test())
