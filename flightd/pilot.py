@@ -217,5 +217,6 @@ class Pilot:
                 estimator.frames,
                 tick.health,
                 estimator.height_stuck,
+                estimator.climb,
             ),
         )

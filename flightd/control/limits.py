@@ -9,6 +9,8 @@ from flightd.config.control import ControlConfig
 from flightd.core.geometry import GRAVITY_MPS2
 from flightd.core.types import AttitudeSetpoint
 
+_LESS_CLIMB_MPS, _MORE_CLIMB_MPS = 1.5, 0.5
+"""The most by which a climb is commanded otherwise for the vehicle's own error of it: rather too low."""
 _GAP_S = 0.1
 """A longer gap between two setpoints counts as this long."""
 
@@ -19,12 +21,13 @@ class Surroundings:
     above), `back` the unit vector (forward, right) into the corridor that was left, None inside it;
     `data_age_s` the age of the oldest thing that the lean was computed from, for a brake that of the newest:
     pictures or attitude, either tells enough to come to rest by.  `at_once`: an emergency stop is not kept
-    waiting by the rates."""
+    waiting by the rates.  `climb_error_mps`: the vehicle takes its climb for so much more than it is."""
 
     headroom_m: float = math.inf
     back: tuple[float, float] | None = None
     data_age_s: float = 0.0
     at_once: bool = False
+    climb_error_mps: float = 0.0
 
 
 OPEN = Surroundings()
@@ -62,8 +65,10 @@ class Limiter:
                 yaw_rate - last.yaw_rate_radps, limits.expert.max_yaw_accel_radps2 * dt_s
             )
         climb = min(max(wanted.climb_mps, -limits.max_descend_mps), limits.max_climb_mps)
+        error = min(max(around.climb_error_mps, -_LESS_CLIMB_MPS), _MORE_CLIMB_MPS)
         if not around.headroom_m > 0.0:  # NaN is no headroom
-            climb = min(climb, 0.0)
+            climb, error = min(climb, 0.0), min(error, 0.0)
+        climb += error  # the limits are those of the climb that it makes
         limited = AttitudeSetpoint(
             wanted.stamp_ns, roll, pitch, _clamp(yaw_rate, limits.max_yaw_rate_radps), climb
         )

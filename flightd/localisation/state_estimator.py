@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from flightd.config.schema import Config
 from flightd.core.learnt import LearntSensors
 from flightd.core.tick import TickInput
 from flightd.core.tracks import TrackSet
-from flightd.core.types import AttitudeSetpoint, GridPose, VehicleState
+from flightd.core.types import AttitudeSetpoint, GridPose, LineSet, VehicleState
 from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.localisation.pad_finder import PadFinder
 from flightd.localisation.pose_history import PoseHistory
 from flightd.site.site import Site
 from flightd.tracking.attitude_extrapolation import AttitudeExtrapolation
+from flightd.tracking.climb_doubt import ClimbDoubt
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.height_history import HeightHistory
 from flightd.tracking.line_tracker import LineTracker
@@ -82,6 +84,9 @@ class StateEstimator:
         self.poses = PoseHistory(self._least_integrity)
         self.pads = PadFinder(self._site)
         self._stuck = StuckHeight()
+        self.climb = ClimbDoubt()
+        self._climbed = HeightHistory()
+        self._climbed_m, self._climb_ns = 0.0, 0
         self.armed = armed
 
     @property
@@ -103,10 +108,11 @@ class StateEstimator:
             v = tick.vehicle
             if not self._stuck.found:
                 self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
+            self._count_climb(tick.now_ns, v.climb_mps)
             self._mind_height(tick.now_ns, v, commanded)
         for lines in tick.lines:
             if self.frames.take(lines) and self.armed:
-                self.tracker.frame(lines, self._heights.at(self.tracker.exposed_ns(lines)))
+                self._take_frame(lines)
 
     def step(self, now_ns: int) -> Estimate:
         """The motion now."""
@@ -120,9 +126,27 @@ class StateEstimator:
         by_pad = None if pose is None else self.pads.over(pose, self.localiser.ever_matched)
         return Estimate(height_m, tracks, by_pad or pose, by_pad is not None)
 
+    def _take_frame(self, lines: LineSet) -> None:
+        exposed_ns = self.tracker.exposed_ns(lines)
+        height_m, climbed_m = self._heights.at(exposed_ns), self._climbed.at(exposed_ns)
+        used, by_width_m = self.tracker.frame(lines, height_m), self.tracker.by_width_m
+        if used and by_width_m is not None and math.isfinite(height_m + climbed_m):
+            self.climb.step(exposed_ns, height_m, by_width_m, climbed_m)
+
+    def _count_climb(self, now_ns: int, climb_mps: float) -> None:
+        """What the vehicle tells to have climbed; over a gap nothing is compared."""
+        if math.isnan(climb_mps):
+            self._climbed, self._climb_ns = HeightHistory(), 0
+            self.climb.forget()
+            return
+        dt_s = (now_ns - self._climb_ns) * 1e-9 if self._climb_ns else 0.0
+        self._climbed_m, self._climb_ns = self._climbed_m + climb_mps * dt_s, now_ns
+        self._climbed.add(now_ns, self._climbed_m, climb_mps)
+
     def _mind_height(self, now_ns: int, vehicle: VehicleState, commanded: AttitudeSetpoint | None) -> None:
-        """Forget the heights of a range finder that is found to be stuck: then the lines' width tells."""
-        if not self.armed or commanded is None or self._stuck.found:
+        """Forget the heights of a range finder that is found to be stuck: then the lines' width tells.  Once
+        it is the climb that is wrong it says nothing against the height any more."""
+        if not self.armed or commanded is None or self._stuck.found or self.climb.found:
             return
         if self._stuck.step(now_ns, vehicle.height_m, vehicle.climb_mps, commanded.climb_mps):
             self._heights = HeightHistory()

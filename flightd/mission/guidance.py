@@ -31,8 +31,9 @@ class Warnings:
     """How far what the mission senses can be believed.
 
     Pictures: age of the newest, and since when they are the same or show nothing.  `heading_error_rad` is
-    what the lines say against the vehicle's heading, `height_share` the lines' width against the map's
-    (1: they agree), `height_stuck` that the height does not follow the climb of the vehicle,
+    what the lines say against the vehicle's heading, `height_doubted` that their width contradicts the
+    height, `height_stuck` that the height does not follow the climb of the vehicle, `climb_wrong` that
+    the climb does not follow the height, by `climb_error_mps` (how much too great it is told),
     `push_mps2` the acceleration that no lean explains, `off_m` the distance from the reference while
     steering, `headroom_m` the way up to the ceiling's margin, `outside_m` how far outside the corridor, whose
     nearest line is at `line_m`; `tick_s` the mean time between ticks."""
@@ -41,8 +42,10 @@ class Warnings:
     frozen_s: float = 0.0
     blank_s: float = 0.0
     heading_error_rad: float = 0.0
-    height_share: float = 1.0
+    height_doubted: bool = False
     height_stuck: bool = False
+    climb_wrong: bool = False
+    climb_error_mps: float = 0.0
     push_mps2: float = 0.0
     off_m: float = 0.0
     headroom_m: float = math.inf

@@ -20,6 +20,7 @@ class Trigger(enum.Enum):
     HEIGHT_STUCK = "the height does not follow the climb"
     HEIGHT_LOST = "height lost"
     CLIMB_LOST = "climb rate lost"
+    CLIMB_WRONG = "the climb rate does not agree with the height"
     CEILING_LEFT = "too near the ceiling"
     ATTITUDE_WRONG = "attitude disagrees with the picture"
     BATTERY_CRITICAL = "battery critical"

@@ -116,6 +116,16 @@ class LineTracker:
         """The height told lately against that by the lines' width; 1 when they agree, or tell none."""
         return self._widths.share
 
+    @property
+    def height_off_m(self) -> float:
+        """The same as metres: how much higher the vehicle tells it to be, m."""
+        return self._widths.off_m
+
+    @property
+    def by_width_m(self) -> float | None:
+        """The height by the lines' width in the newest frame; None where they tell none."""
+        return self._widths.by_width_m
+
     def learnt(self) -> LearntSensors | None:
         """What is known of the sensors, for the tracker after this one; None before a line was seen."""
         return self._filter.learnt() if self._lines_ns else None

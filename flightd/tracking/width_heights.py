@@ -13,6 +13,9 @@ _STEADY = 0.06
 climb changes them by less."""
 _LEAP = 0.1
 """A height by widths that leaps by more from one frame to the next (share) is another line's."""
+_STEADY_FRAMES, _STEADY_SHARE = 30, 0.08
+"""Widths that never agreed with the height are held against it, too, once they were so many frames the same
+share of it, within so much on average: a range finder that reads too little from the floor on."""
 
 
 class WidthHeights:
@@ -22,8 +25,14 @@ class WidthHeights:
         self._share = 1.0
         self._changes = 0.0
         self._last_m: float | None = None
-        self._agreed = False
+        self._judged = False
         self._followed = False  # by its widths, from frame to frame, since it last agreed with the one told
+        self._frames = 0
+        self._mean_share: float | None = None
+        self._strays = 0.0
+        self._told_m = 0.0
+        self.by_width_m: float | None = None
+        """What the newest frame's lines tell, where they could be held against a height; None where not."""
 
     @property
     def share(self) -> float:
@@ -31,10 +40,16 @@ class WidthHeights:
         not agree with each other."""
         return self._share if self._changes < _STEADY else 1.0
 
+    @property
+    def off_m(self) -> float:
+        """How much higher the height was told last than the widths have it, by that share, m."""
+        return self._told_m - self._told_m / self.share
+
     def believed_m(self, by_width_m: Sequence[float], told_m: float) -> float:
         """The height `told_m`, unless there is none or the heights of this frame's lines by their widths
         contradict it for long: then theirs.  Theirs at once where they go on as before and what is told
         leaps away from them."""
+        self.by_width_m = None
         if not by_width_m or not told_m > 0:
             return median(by_width_m) if by_width_m else told_m / self._believed_share
         nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
@@ -42,18 +57,30 @@ class WidthHeights:
         if self._last_m is not None and not agrees:  # it is no better for being nearer to what is wrong
             last_m = self._last_m
             nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
-        self._agreed |= agrees
-        if not self._agreed:  # then it is the line that is another
-            return told_m
         share = told_m / nearest_m
+        if not self._judged:
+            steady_share = self._steady_share(share)
+            if not agrees and steady_share is None:  # then it is the line that is another
+                return told_m
+            self._judged, self._share = True, 1.0 if agrees else steady_share or 1.0
         self._share += _GAIN * (share - self._share)
+        self._told_m = told_m
         if self._last_m is not None:
             change = min(abs(math.log(nearest_m / self._last_m)), 1.0)
             self._changes += _GAIN * (change - self._changes)
             self._followed = agrees or (self._followed and change < _LEAP)
-        self._last_m = nearest_m
+        self._last_m = self.by_width_m = nearest_m
         leapt = self._followed and abs(share - 1.0) > _DOUBTED
         return nearest_m if leapt or self._believed_share != 1.0 else told_m
+
+    def _steady_share(self, share: float) -> float | None:
+        """The share of that by the width as which the height has long been told; None where it changes."""
+        mean = share if self._mean_share is None else self._mean_share
+        self._frames += 1
+        self._mean_share = mean + _GAIN * (share - mean)
+        self._strays += _GAIN * (abs(share / mean - 1.0) - self._strays)
+        steady = self._frames >= _STEADY_FRAMES and self._strays < _STEADY_SHARE
+        return self._mean_share if steady else None
 
     @property
     def _believed_share(self) -> float:

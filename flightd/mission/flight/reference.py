@@ -133,7 +133,7 @@ class ReferenceGenerator:
         elif (
             math.isnan(s.height_m)
             or s.telemetry_age_s > self._params.telemetry_hold_s
-            or abs(s.warnings.height_share - 1.0) > self._hazards.height_share
+            or s.warnings.height_doubted
         ):
             self._height.reset(self._height.position)  # no climb by heights of the past
             climb = 0.0

@@ -52,6 +52,7 @@ class Steering:
             back=self._plausibility.back(pose, inputs.warnings.line_m) if inputs.localised else None,
             data_age_s=age_s,
             at_once=guidance.at_once,
+            climb_error_mps=inputs.warnings.climb_error_mps,
         )
         return self._limiter.apply(wanted, around)
 

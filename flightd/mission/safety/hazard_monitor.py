@@ -171,7 +171,8 @@ class HazardMonitor:
         h, w = self._hazards, s.warnings
         return {
             Trigger.HEIGHT_STUCK: (w.height_stuck, 0.0),
-            Trigger.HEIGHT_WRONG: (abs(w.height_share - 1.0) > h.height_share, h.disagree_s),
+            Trigger.CLIMB_WRONG: (w.climb_wrong, 0.0),
+            Trigger.HEIGHT_WRONG: (w.height_doubted, h.disagree_s),
             Trigger.ATTITUDE_WRONG: (abs(w.heading_error_rad) > h.heading_rad, h.disagree_s),
             Trigger.WIND: (w.push_mps2 > h.expert.push_mps2 or w.off_m > h.expert.off_m, h.expert.push_s),
             Trigger.CEILING_LEFT: (w.headroom_m < 0.0, h.expert.outside_s),

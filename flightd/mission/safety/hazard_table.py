@@ -134,6 +134,16 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "climb_wrong",
+        Trigger.CLIMB_WRONG,
+        "range finder and lines' width both change by 0.35 m more, or less, within two seconds than the"
+        " autopilot tells to have climbed: moved air has misled its barometer",
+        Action.LAND,
+        "from 0.15 m on the climb is commanded otherwise by that error, by 1.5 m/s at most; the heights are"
+        " believed; down by them",
+        _FAST,
+    ),
+    Hazard(
         "height_stuck",
         Trigger.HEIGHT_STUCK,
         "the height does not follow the climb that the autopilot tells: it stands still for 0.4 m within"
@@ -146,8 +156,8 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "height_wrong",
         Trigger.HEIGHT_WRONG,
-        "width of the seen lines against the map's by more than `hazards.height_share` for"
-        " `hazards.disagree_s`",
+        "width of the seen lines against the map's by more than `hazards.height_share`, or by 0.25 m and"
+        " 12 %, for `hazards.disagree_s`; from the floor on, too",
         Action.HOLD,
         "no climb by it; land after `mission.lines_land_s`",
         _FAST,

@@ -10,12 +10,16 @@ from flightd.core.types import GridPose, Health
 from flightd.mission.guidance import Guidance, Guide, Warnings
 from flightd.site.corridor import Corridor
 from flightd.site.site import Site
+from flightd.tracking.climb_doubt import ClimbDoubt
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.line_tracker import LineTracker
 
 _TICK_MEMORY_S = 1.0
 _PUSH_MEMORY_S = 2.0
 _FRESH_NS = 250_000_000
+_OFF_M, _OFF_SHARE = 0.25, 0.12
+"""A height is wrong, too, that is off by so much and by so great a share: the wrong height above what was
+commanded has to stay within half a metre, whatever is flown at."""
 _KNOWN_M = 0.3
 """A position less certain than this (standard deviation) cannot tell whether the corridor is left."""
 
@@ -45,10 +49,13 @@ class PlausibilityMonitor:
         frames: FrameMonitor,
         health: Health,
         height_stuck: bool = False,
+        climb: ClimbDoubt | None = None,
     ) -> Warnings:
         self._tick_s += min(dt_s / _TICK_MEMORY_S, 1.0) * (dt_s - self._tick_s)
-        share = tracker.height_share if height_m > self._judged_above_m else 1.0
-        self._doubt = abs(share - 1.0) > self._height_share
+        off_share, off_m = abs(tracker.height_share - 1.0), abs(tracker.height_off_m)
+        is_off = off_share > self._height_share or (off_m > _OFF_M and off_share > _OFF_SHARE)
+        highest_m = max(height_m, height_m - tracker.height_off_m)  # one that sticks near the floor is low
+        self._doubt = is_off and highest_m > self._judged_above_m
         if tracks is not None and now_ns - max(tracks.lines_ns, min(tracks.features_ns)) < _FRESH_NS:
             part = min(dt_s / _PUSH_MEMORY_S, 1.0)
             x, y = self.push_mps2
@@ -64,8 +71,10 @@ class PlausibilityMonitor:
             frozen_s=frames.frozen_s(now_ns),
             blank_s=frames.blank_s(now_ns),
             heading_error_rad=tracker.heading_error_rad,
-            height_share=share,
+            height_doubted=self._doubt,
             height_stuck=height_stuck,
+            climb_wrong=climb is not None and climb.found,
+            climb_error_mps=0.0 if climb is None else climb.error_mps(now_ns),
             push_mps2=math.hypot(*self.push_mps2),
             off_m=self._off_m,
             headroom_m=self._ceiling_m - height_m,

@@ -29,6 +29,7 @@ _BOOT_WRAP_MS = 2**32
 _TRUTH_EVERY = 2
 _TRUTH_SAMPLES = 1000
 _TEXTS_KEPT = 50
+_BURST_NS = 50_000_000
 _CATCH_UP_NS = 2_000 * _NS_PER_MS
 """A process that slept longer than this goes on from now instead of simulating what it missed."""
 
@@ -72,6 +73,9 @@ class PeerConfig:
     radio: RadioParams = PERFECT
     radio_up: RadioParams | None = None
     parameters: dict[str, float] = field(default_factory=dict)
+    parameter_queue: int | None = None
+    """So many parameters are told of those asked for within 50 ms, the rest of the burst is dropped; None:
+    all."""
 
 
 class AutopilotPeer(abc.ABC):
@@ -132,6 +136,7 @@ class AutopilotPeer(abc.ABC):
         self._stick_yaw_rad = 0.0
         self._idle_s = 0.0
         self._settled_s = 0.0
+        self._burst_ns = self._burst = 0
 
     async def open(self) -> Address:
         """Bind the socket and greet the remotes; the address bound.  OSError when the port is taken."""
@@ -376,10 +381,19 @@ class AutopilotPeer(abc.ABC):
                 self.texts.append(message.text)
             case "SETUP_SIGNING" if self.takes_keys and not self.armed:
                 self.link.sign(bytes(message.secret_key), message.initial_timestamp)
+            case "PARAM_REQUEST_READ" if not self._queues(now_ns):
+                pass
             case "PARAM_REQUEST_READ" | "PARAM_REQUEST_LIST" | "PARAM_SET":
                 self.parameters.answer(message, lambda reply: self.link.send(channel, reply))
             case _:
                 pass
+
+    def _queues(self, now_ns: int) -> bool:
+        """Whether there is room for another request for a parameter."""
+        if now_ns - self._burst_ns > _BURST_NS:
+            self._burst_ns, self._burst = now_ns, 0
+        self._burst += 1
+        return self._config.parameter_queue is None or self._burst <= self._config.parameter_queue
 
     def _answer(self, channel: MavlinkChannel, message: Message, now_ns: int) -> None:
         params = tuple(float(getattr(message, f"param{i}")) for i in range(1, 8))

@@ -156,6 +156,15 @@ class ClimbStuck(_Fault):
     reading_mps: float = Field(0.0, ge=-3, le=3)
 
 
+class ClimbDrifts(_Fault):
+    """The autopilot believes to climb so much faster than it does, by its height too, tells so, and flies by
+    it: a door that opens, or a duct that blows, moves the barometer's air."""
+
+    by_vehicle = True
+    kind: Literal["climb_drifts"]
+    error_mps: float = Field(-0.6, ge=-3, le=3)
+
+
 class HeightQuality(_Fault):
     """The range finder goes on reading, and tells this quality of its signal: 0 is unknown, 1 none."""
 
@@ -296,6 +305,7 @@ Fault: TypeAlias = Annotated[
     | HeightScaled
     | HeightStuck
     | ClimbStuck
+    | ClimbDrifts
     | HeightQuality
     | LandingUnreported
     | BatteryDrop

@@ -28,6 +28,7 @@ from flightd.sim.scenario.fault_schema import (
     CameraLate,
     CameraTurned,
     ChargeMisreported,
+    ClimbDrifts,
     ClimbStuck,
     ClockJump,
     ClockRate,
@@ -243,6 +244,8 @@ def _mislead(wrong: SensorFault, fault: Fault, on: bool) -> None:
             wrong.range_quality_pc = fault.percent if on else 0
         case ClimbStuck():
             wrong.climb_stuck_mps = fault.reading_mps if on else None
+        case ClimbDrifts():
+            wrong.climb_drift_mps = fault.error_mps if on else 0.0
         case HeightStuck():
             wrong.range_stuck_m = fault.reading_m if on else None
             wrong.range_swing_m = fault.swing_m

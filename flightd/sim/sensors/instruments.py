@@ -54,6 +54,8 @@ class SensorFault:
     """What it reads for a metre."""
     climb_stuck_mps: float | None = None
     """What is told of the climb rate whatever it is; None: as it is estimated."""
+    climb_drift_mps: float = 0.0
+    """How much too fast it believes to climb, by its height too, as a barometer whose air is moved has it."""
     charge_pc: int | None = None
     """What is told of the charge whatever the battery holds; None: it is measured."""
     range_quality_pc: int = 0
@@ -71,7 +73,7 @@ class Sensors:
         self._pitch_bias = rng.uniform(-p.tilt_bias_rad, p.tilt_bias_rad)
         if p.tilt_bias is not None:
             self._roll_bias, self._pitch_bias = p.tilt_bias
-        self._roll_leak = self._pitch_leak = 0.0
+        self._roll_leak = self._pitch_leak = self._drifted_m = 0.0
         self._yaw_drift = rng.uniform(-p.yaw_drift_radps, p.yaw_drift_radps)
         self._yaw_error = p.heading_offset_rad
         self._roll_wander = self._pitch_wander = self._baro_wander = self._climb_error = 0.0
@@ -113,8 +115,10 @@ class Sensors:
         self.roll_rad = airframe.roll_rad + self.roll_error_rad
         self.pitch_rad = airframe.pitch_rad + self.pitch_error_rad
         self.yaw_rad = wrap_pi(airframe.yaw_rad + self.yaw_error_rad)
-        self.height_m = airframe.height_m - airframe.params.rest_height_m + self._baro_wander
-        self.climb_mps = airframe.climb_mps + self._climb_error
+        self._drifted_m += self.fault.climb_drift_mps * dt_s
+        above_m = airframe.height_m - airframe.params.rest_height_m
+        self.height_m = above_m + self._baro_wander + self._drifted_m
+        self.climb_mps = airframe.climb_mps + self._climb_error + self.fault.climb_drift_mps
 
     def _leak(self, dt_s: float, airframe: Airframe) -> None:
         """Rotors push along the body's axis, so the accelerometers feel level, but for the drag."""

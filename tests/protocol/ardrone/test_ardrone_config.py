@@ -262,3 +262,26 @@ def test_outdoor_selects_its_own_limits() -> None:
     assert stored.number("control:euler_angle_max") == pytest.approx(0.349066)
     stored.write("control:outdoor", "FALSE", None)
     assert stored.number("control:control_vz_max") == 700.0
+
+
+def test_a_drone_is_unfit_until_it_is_configured() -> None:
+    async def main() -> None:
+        async with bench() as b:
+            await b.until(lambda: b.vehicle.state() is not None)
+            assert "still being configured" in str(b.state.unfit)
+            await b.configured()
+            assert b.state.unfit is None
+
+    virtual(main())
+
+
+def test_a_drone_that_keeps_another_limit_of_height_is_unfit_and_says_so() -> None:
+    async def main() -> None:
+        drone = make_drone()
+        Ear(drone, lose=lambda command: command.text(0) == "control:altitude_max")
+        async with bench(drone, height_max_m=2.5) as b:
+            await b.configured()
+            assert "keeps control:altitude_max" in str(b.state.unfit)
+            assert "instead of 2500" in str(b.state.unfit)
+
+    virtual(main())

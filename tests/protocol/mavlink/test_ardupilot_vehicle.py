@@ -113,7 +113,7 @@ def test_climb_is_scaled_by_the_autopilots_speeds(parameters: dict[str, float], 
         autopilot.parameters = WAY_DOWN | parameters
         async with scripted(autopilot) as (_, vehicle):
             vehicle.demand(Demand.FLY)
-            await asyncio.sleep(8.0)
+            await asyncio.sleep(16.0)  # it has hardly any parameter
             assert vehicle.send(AttitudeSetpoint(0, climb_mps=0.5))
             await asyncio.sleep(0.1)
             assert autopilot.all("SET_ATTITUDE_TARGET")[-1].thrust == pytest.approx(thrust)
@@ -314,7 +314,7 @@ def test_a_late_heartbeat_of_the_mode_before_is_no_take_over_but_any_other_is() 
 
                 autopilot.after = late
                 vehicle.demand(Demand.FLY)
-                await asyncio.sleep(1.0)
+                await asyncio.sleep(2.0)
                 assert known(vehicle).in_control is ours
 
     virtual(test())

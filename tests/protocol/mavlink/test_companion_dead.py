@@ -120,3 +120,23 @@ def test_after_a_reboot_the_parameters_are_looked_at_anew() -> None:
             await rig.until(lambda: "LAND_SPEED" in words(rig.known().unfit), 15.0)
 
     virtual(test())
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "value"), [(ardupilot_rig, "LAND_SPEED", 200.0), (px4_rig, "EKF2_HGT_REF", 2)]
+)
+def test_a_parameter_that_an_autopilot_drops_from_a_burst_is_judged_before_it_arms(
+    make: Any, name: str, value: float
+) -> None:
+    """It is asked for alone in the end; what is not answered then does not exist."""
+    config = PeerConfig(ready_s=0.5, parameters={name: value}, parameter_queue=1)
+
+    async def test() -> None:
+        async with make(config) as rig:
+            rig.vehicle.demand(Demand.FLY)
+            for _ in range(300):
+                await asyncio.sleep(0.1)
+                assert not rig.peer.armed
+            assert f"{name} is" in str(rig.known().unfit)
+
+    virtual(test())

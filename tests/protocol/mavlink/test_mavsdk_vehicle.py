@@ -169,6 +169,29 @@ def test_a_landed_state_is_believed_for_a_second() -> None:
     assert readings.landed(6 + 10**9) is LandedState.UNKNOWN
 
 
+_RANGED = {
+    "id": 0,
+    "orientation": 25,
+    "current_distance": 160,
+    "min_distance": 10,
+    "max_distance": 800,
+    "signal_quality": 0,
+}
+
+
+def test_a_range_finder_whose_signal_is_none_tells_no_height() -> None:
+    """As over our own link: the library's form of the message leaves the quality out."""
+    readings = MavsdkTelemetry(ClockSync())
+    readings.take_range(json.dumps(_RANGED), 1)
+    assert readings.height_m(2) == pytest.approx(1.6)
+    readings.take_range(json.dumps(_RANGED | {"signal_quality": 1, "current_distance": 30}), 3)
+    assert readings.height_m(4) == pytest.approx(1.6)
+    readings.take_range(json.dumps(_RANGED | {"id": 1, "current_distance": 30, "signal_quality": 90}), 5)
+    assert readings.height_m(6) == pytest.approx(0.3), "disarmed, the better one is chosen"
+    readings.take_range("{}", 7)
+    assert readings.height_m(8) == pytest.approx(0.3)
+
+
 def test_whatever_the_library_hands_over_nothing_raises_and_nothing_absurd_is_believed() -> None:
     rng = random.Random(11)
     odd = [math.nan, math.inf, -math.inf, 1e30, -1.0, 0.0, 0.7, 90.0, 270.0, 2**63, -(2**40), 255, 3]
@@ -181,13 +204,12 @@ def test_whatever_the_library_hands_over_nothing_raises_and_nothing_absurd_is_be
         whole = rng.choice([value for value in odd if isinstance(value, int)])
         angles = some("roll_deg", "pitch_deg", "yaw_deg")
         angles.timestamp_us = whole
-        sensor = some("current_distance_m", "minimum_distance_m", "maximum_distance_m")
-        sensor.orientation = some("pitch_deg")
+        ranged = {name: rng.choice([*odd, 25, None]) for name in _RANGED}
         readings.take_mode(whole, now_ns)
         readings.take_landed(whole, now_ns)
         readings.take_armed(bool(whole), now_ns)
         readings.take_attitude(angles, now_ns)
-        readings.take_range(sensor, now_ns)
+        readings.take_range(json.dumps(ranged), now_ns)
         readings.take_velocity(SimpleNamespace(velocity=some("down_m_s")), now_ns)
         readings.take_battery(some("id", "voltage_v", "remaining_percent"), now_ns)
         state = readings.state(now_ns, in_control=False, refusal=None)

@@ -71,6 +71,11 @@ _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
         "kind": "climb_stuck",
         "reading_mps": draw.choice([0.0, round(draw.uniform(-1.0, 1.0), 2)]),
     },
+    lambda draw: {
+        "kind": "climb_drifts",
+        "error_mps": round(draw.uniform(-0.8, 0.8), 2),
+        "duration_s": 3.0,
+    },
     lambda draw: {"kind": "aisle_opened"},
     lambda draw: {
         "kind": "bare_floor",

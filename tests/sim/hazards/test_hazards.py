@@ -74,6 +74,13 @@ def open_aisle(flight: IdealFlight) -> None:
     flight.aisle_closed = False
 
 
+def drift(error_mps: float) -> Callable[[IdealFlight], None]:
+    def begin(flight: IdealFlight) -> None:
+        flight.sensors.fault.climb_drift_mps = error_mps
+
+    return begin
+
+
 def silence(flight: IdealFlight) -> None:
     flight.ground_silent_s = 60.0
 
@@ -86,6 +93,7 @@ TRIALS: dict[str, Trial] = {
     "heartbeat_lost": Trial(fault(heartless=True), fault(heartless=False), 8.0, found_s=5.2),
     "height_lost": Trial(fault(rangeless=True), found_s=4.4),
     "climb_lost": Trial(fault(climbless=True), found_s=1.2),
+    "climb_wrong": Trial(drift(-1.0), drift(0.0), 3.0, found_s=1.0),
     "height_wrong": Trial(fault(height_m=-0.7), found_s=1.0),
     "attitude_wrong": Trial(fault(yaw_rad=math.radians(25.0)), found_s=1.0),
     "battery_low": Trial(fault(battery=0.15), found_s=0.05, ends=Phase.SWAP),

@@ -44,8 +44,55 @@ def test_a_take_off_by_a_height_that_moves_but_does_not_follow_ends_below_the_ro
 ) -> None:
     flight, draw = IdealFlight(SITE, CONFIG, visits=("A2",), seed=seed), random.Random(seed)
     flight.faults.misread = lambda height_m: misread(height_m, draw)
+    flight.faults.bare = True  # no width of a line tells
     flown = flight.fly(60.0)
     assert flown.phase is Phase.ABORTED
     assert "does not follow" in flown.reason
+    assert max(k.height_m for _, k in flown.truth) < CONFIG.mission.height_m + 0.5
+    assert flown.truth[-1][1].height_m < 0.2
+
+
+@pytest.mark.parametrize("share", [0.8, 0.85])
+def test_a_range_finder_that_reads_a_fifth_too_little_from_the_floor_on_is_found_by_the_lines(
+    share: float,
+) -> None:
+    """It follows the climb, so that only the width of the lines contradicts it."""
+    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=1)
+    flight.faults.misread = lambda height_m: share * height_m
+    flown = flight.fly(60.0)
+    assert flown.phase is Phase.ABORTED
+    assert max(k.height_m for _, k in flown.truth) < CONFIG.mission.height_m + 0.5
+    assert flown.truth[-1][1].height_m < 0.2
+
+
+@pytest.mark.parametrize("stuck_m", [0.1, 1.0])
+def test_a_sonar_that_sticks_and_tells_the_climb_too_is_found_by_the_lines(stuck_m: float) -> None:
+    """Height and climb rate agree, as an AR.Drone's do: they are of the same sensor."""
+    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=1)
+    flight.faults.misread = lambda height_m: min(height_m, stuck_m)
+    flight.faults.climb_by_range = True
+    flown = flight.fly(60.0)
+    assert flown.phase is Phase.ABORTED
+    assert max(k.height_m for _, k in flown.truth) < CONFIG.mission.height_m + 0.5
+    assert flown.truth[-1][1].height_m < 0.2
+
+
+@pytest.mark.parametrize(("error_mps", "lasts_s"), [(-0.5, 10.0), (-1.0, 3.0)])
+def test_an_autopilot_whose_barometer_is_misled_is_kept_at_its_height_and_landed(
+    error_mps: float, lasts_s: float
+) -> None:
+    """It flies by what it believes: without a word against it, ever higher."""
+    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=1)
+    left_ns: list[int] = []
+
+    def drift(_: Phase, now_ns: int) -> None:
+        if flight.airframe.height_m > 0.8:
+            left_ns.append(now_ns)
+        on = left_ns and (now_ns - left_ns[0]) * 1e-9 < lasts_s
+        flight.sensors.fault.climb_drift_mps = error_mps if on else 0.0
+
+    flight.on_tick = drift
+    flown = flight.fly(60.0)
+    assert flown.phase is Phase.ABORTED
     assert max(k.height_m for _, k in flown.truth) < CONFIG.mission.height_m + 0.5
     assert flown.truth[-1][1].height_m < 0.2

@@ -74,6 +74,8 @@ class Faults:
     climbless: bool = False
     misread: Callable[[float], float] = lambda height_m: height_m
     """What the range finder makes of the height (m)."""
+    climb_by_range: bool = False
+    """The climb rate that is told is the slope of the range finder's height."""
     yaw_rad: float = 0.0
     height_m: float = 0.0
     battery: float | None = None
@@ -301,9 +303,13 @@ class IdealFlight:
         if faults.silent and self._told is not None:
             return self._told
         on_floor = self.airframe.on_floor
+        climb_mps = math.nan if faults.climbless else self.sensors.climb_mps
         if not faults.rangeless:
-            measured_m = self.airframe.height_m + faults.height_m
-            self._range = (round(faults.misread(measured_m), 2), self._now_ns)
+            measured_m = faults.misread(self.airframe.height_m + faults.height_m)
+            last_m, last_ns = self._range
+            if faults.climb_by_range:
+                climb_mps = (measured_m - last_m) / max((self._now_ns - last_ns) * 1e-9, 0.005)
+            self._range = (round(measured_m, 2), self._now_ns)
         if not faults.heartless:
             self._beat_ns = self._now_ns
         standing = on_floor and not faults.landing_unreported
@@ -312,7 +318,7 @@ class IdealFlight:
             attitude=self._attitude(),
             height_m=math.nan if self._now_ns - self._range[1] > 10**9 else self._range[0],
             height_stamp_ns=self._range[1],
-            climb_mps=math.nan if faults.climbless else self.sensors.climb_mps,
+            climb_mps=climb_mps,
             mode="GUIDED_NOGPS",
             in_control=self._armed and self.in_control,
             armed=self._armed,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -98,3 +99,21 @@ def test_an_emergency_stop_is_level_at_once(wanted: list[tuple[float, float, flo
     last = stream(wanted, Surroundings(), limiter)[-1]
     out = limiter.apply(AttitudeSetpoint(last.stamp_ns + 1, 0.1, 0.1, 0.5, -0.3), Surroundings(at_once=True))
     assert (out.roll_rad, out.pitch_rad, out.yaw_rate_radps, out.climb_mps) == (0.0, 0.0, 0.0, -0.3)
+
+
+@pytest.mark.parametrize(
+    ("wanted_mps", "error_mps", "headroom_m", "commanded_mps"),
+    [
+        pytest.param(0.0, -1.0, 3.0, -1.0, id="it climbs while it believes to hover"),
+        pytest.param(-9.0, -1.0, 3.0, -LIMITS.max_descend_mps - 1.0, id="limited is the true climb"),
+        pytest.param(0.0, -9.0, 3.0, -1.5, id="no more than that"),
+        pytest.param(0.0, 9.0, 3.0, 0.5, id="less upwards"),
+        pytest.param(0.3, 1.0, 0.0, 0.0, id="and never under the ceiling"),
+    ],
+)
+def test_a_climb_that_the_vehicle_takes_for_another_is_commanded_otherwise(
+    wanted_mps: float, error_mps: float, headroom_m: float, commanded_mps: float
+) -> None:
+    around = Surroundings(headroom_m=headroom_m, climb_error_mps=error_mps)
+    limited = Limiter(LIMITS).apply(AttitudeSetpoint(1, climb_mps=wanted_mps), around)
+    assert limited.climb_mps == pytest.approx(commanded_mps)

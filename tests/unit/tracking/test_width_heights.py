@@ -73,3 +73,19 @@ def test_once_contradicted_a_width_is_not_taken_for_being_nearer_to_what_is_wron
         heights.believed_m([1.6, 1.45], 1.6)
     for n in range(30):
         assert heights.believed_m([1.6, 1.45 - 0.01 * n], 0.9) == 1.6
+
+
+def test_widths_that_never_agreed_contradict_a_height_that_is_always_the_same_share_of_theirs() -> None:
+    heights = WidthHeights()
+    for n in range(40):
+        true_m = 0.3 + 0.03 * n
+        heights.believed_m([true_m], 0.8 * true_m)
+    assert heights.share == pytest.approx(0.8, abs=0.03)
+    assert heights.off_m == pytest.approx(-0.2 * true_m, abs=0.06)
+
+
+def test_false_widths_before_the_first_true_one_contradict_nothing() -> None:
+    heights, rng = WidthHeights(), random.Random(5)
+    for _ in range(90):
+        heights.believed_m([rng.uniform(0.35, 1.0)], 1.6)
+    assert (heights.share, heights.off_m) == (1.0, 0.0)

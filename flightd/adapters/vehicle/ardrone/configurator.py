@@ -15,9 +15,13 @@ from typing import Protocol
 from flightd.adapters.vehicle.ardrone import at
 from flightd.adapters.vehicle.ardrone.at import AtCommand
 from flightd.adapters.vehicle.ardrone.navdata import DroneState, Navdata, Option
+from flightd.adapters.vehicle.ardrone.refusal import KeepsValue
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 
 _log = logging.getLogger(__name__)
+
+_SAFETY_KEYS = ("control:outdoor", "control:flying_mode", "control:control_level", "control:altitude_max")
+"""Those that bound its height and say how it takes setpoints; by its other limits setpoints are scaled."""
 
 ACK_TIMEOUT_S = 1.0
 _REPEAT_S = 0.1
@@ -69,6 +73,14 @@ def parse_text(data: bytes) -> dict[str, str]:
         if equals and ":" in key:
             values[key.strip()] = value.strip()
     return values
+
+
+def kept(settings: ArDroneSettings, found: Mapping[str, str]) -> KeepsValue | None:
+    """What of its configuration, as `found`, the drone must not be flown with; None where there is nothing,
+    or nothing was told."""
+    wanted = {key: value for key, value in wanted_values(settings).items() if key in _SAFETY_KEYS}
+    wrong = differing(wanted, found) if found else {}
+    return next((KeepsValue(key, found.get(key, ""), value) for key, value in wrong.items()), None)
 
 
 def same_value(left: str, right: str) -> bool:
@@ -124,7 +136,7 @@ class Configurator:
             found = await self.read()
         for key, value in differing(wanted, found).items():
             if found:
-                _log.warning("drone keeps %s = %s instead of %s", key, found.get(key, "(no such key)"), value)
+                _log.warning("%s", KeepsValue(key, found.get(key, ""), value))
         return found
 
     async def write(self, key: str, value: str) -> bool:

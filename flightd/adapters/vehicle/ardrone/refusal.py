@@ -48,6 +48,18 @@ class NotConfigured(Refusal):
 
 
 @dataclass(frozen=True, slots=True)
+class KeepsValue(Refusal):
+    """The drone was told a value of its configuration, and has another one in force."""
+
+    key: str
+    found: str
+    wanted: str
+
+    def __str__(self) -> str:
+        return f"the drone keeps {self.key} = {self.found or '(no such key)'} instead of {self.wanted}"
+
+
+@dataclass(frozen=True, slots=True)
 class StaysLanded(Refusal):
     """Take-off was ordered for longer than it takes."""
 

@@ -7,12 +7,14 @@ import logging
 import math
 
 from flightd.adapters.vehicle.ardrone import at
-from flightd.adapters.vehicle.ardrone.configurator import Configurator
+from flightd.adapters.vehicle.ardrone.configurator import Configurator, kept
 from flightd.adapters.vehicle.ardrone.flight import FlightLogic
 from flightd.adapters.vehicle.ardrone.link import ArDroneLink
 from flightd.adapters.vehicle.ardrone.navdata import DroneState, Major, Navdata
+from flightd.adapters.vehicle.ardrone.refusal import KeepsValue, NotConfigured
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings, DroneCamera
 from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
+from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, LandedState, VehicleState
 from flightd.ports import Clock
 
@@ -58,6 +60,7 @@ class ArDroneVehicle:
         self._flight = FlightLogic(settings, self._telemetry)
         self._link = ArDroneLink(settings, clock, self._receive)
         self._configurator = Configurator(self._link, settings)
+        self._kept: KeepsValue | None = None
         self._unconfigured = asyncio.Event()
         self._unconfigured.set()
         self._deaf_since_ns: int | None = None
@@ -100,7 +103,15 @@ class ArDroneVehicle:
             battery_cells=_CELLS,
             heartbeat_ns=telemetry.arrival_ns,
             refusal=self._flight.refusal(now_ns),
+            unfit=self._unfit(),
         )
+
+    def _unfit(self) -> Refusal | None:
+        """Why a drone that stands would not be flown; None where it would.  An emergency is none: the start
+        that follows it ends it."""
+        if self._telemetry.airborne:
+            return None
+        return self._kept if self._flight.configured else NotConfigured()
 
     def attitudes(self) -> list[Attitude]:
         return self._telemetry.drain()
@@ -210,6 +221,7 @@ class ArDroneVehicle:
                 _log.warning("navdata stopped while the drone was being configured: beginning again")
                 continue
             self._flight.limits.take(values)
+            self._kept = kept(self._settings, values)
             self._flight.configured = True
             self._unconfigured.clear()
             self._camera_wanted.set()

@@ -284,13 +284,13 @@ class MavlinkVehicle(abc.ABC):
         await work()
 
     async def _read_parameters(self) -> None:
-        way_down = tuple(rule.names for rule in sorted(self._way_down, key=lambda rule: rule.optional))
-        await self.parameters.keep((*self.parameter_names, *way_down), self.required_names)
+        """Those by which it is flown; the rest is read on the ground, by the examination."""
+        await self.parameters.keep(self.parameter_names, self.required_names)
 
     async def _examine(self) -> None:
         """Read all that the doctor would look at, again and again on the ground; what this version does not
         have is never answered."""
-        names = tuple(rule.names for rule in self._rules)
+        names = tuple(dict.fromkeys(rule.names for rule in (*self._way_down, *self._rules)))
         while True:
             if not self._telemetry.armed:
                 reboots = self._reboots
@@ -298,7 +298,8 @@ class MavlinkVehicle(abc.ABC):
                     await self.parameters.read_again(names)
                 await self.parameters.read_all(names)
                 self._examined = reboots == self._reboots
-            await asyncio.sleep(_EXAMINE_AGAIN_S if self._examined else _EXAMINE_S)
+            complete = all(rule.optional or self.parameters.get(rule.names) for rule in self._way_down)
+            await asyncio.sleep(_EXAMINE_AGAIN_S if self._examined and complete else _EXAMINE_S)
 
     async def _mind_beats(self) -> None:
         """Tell people once, when the heartbeats stay too far apart to see a take-over in time."""

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
 from mavsdk.plugins.telemetry import FlightMode
 from mavsdk.plugins.telemetry import LandedState as SdkLanded
 
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
-from flightd.adapters.vehicle.mavlink.telemetry import cells_of
+from flightd.adapters.vehicle.mavlink.telemetry import cells_of, range_sample
+from flightd.adapters.vehicle.mavsdk.library import whole_fields
 from flightd.adapters.vehicle.newest_readings import NewestReadings
-from flightd.adapters.vehicle.range_finders import RangeSample
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _CLIMB_STALE_NS = 500_000_000
 _REBOOT_US = 1_000_000
-_DOWN_DEG = 270.0
+_RANGE_FIELDS = ("id", "orientation", "current_distance", "min_distance", "max_distance")
 
 _MODES = {int(mode): mode for mode in FlightMode}
 _LANDED = {
@@ -71,15 +72,17 @@ class MavsdkTelemetry(NewestReadings):
             self._attitude = Attitude(stamp_ns, *map(math.radians, degrees))
             self._attitudes.append(self._attitude)
 
-    def take_range(self, sensor: Any, now_ns: int) -> None:
-        """A DistanceSensor, metres along the body's axis.  It has no number: two are told apart by their
-        limits."""
-        distance_m = sensor.current_distance_m
-        looks_down = abs(sensor.orientation.pitch_deg % 360.0 - _DOWN_DEG) < 1.0
-        if not looks_down or not math.isfinite(distance_m):
+    def take_range(self, document: str, now_ns: int) -> None:
+        """The fields of a DISTANCE_SENSOR, cm, as they came: in the library's own form of it neither the
+        sensor's number nor the quality of its signal is left."""
+        fields = whole_fields(document, *_RANGE_FIELDS)
+        if fields is None:
             return
-        least_m, most_m = max(sensor.minimum_distance_m, 0.01), sensor.maximum_distance_m
-        self._take_sample(RangeSample((least_m, most_m), distance_m, least_m, most_m), now_ns, now_ns)
+        (quality_pc,) = whole_fields(document, "signal_quality") or (0,)
+        told = dict(zip(_RANGE_FIELDS, fields, strict=True), signal_quality=quality_pc)
+        sample = range_sample(SimpleNamespace(**told))
+        if sample is not None:
+            self._take_sample(sample, now_ns, now_ns)
 
     def take_velocity(self, motion: Any, now_ns: int) -> None:
         """A PositionVelocityNed, of which only the vertical speed is known without GPS."""

@@ -240,9 +240,9 @@ class MavsdkVehicle:
                 readings.take_velocity,
             ),
             (
-                telemetry.subscribe_distance_sensor(),
+                plugins.direct.subscribe_message("DISTANCE_SENSOR"),
                 dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR,
-                readings.take_range,
+                self._take_range,
             ),
             (
                 telemetry.subscribe_landed_state(),
@@ -289,6 +289,10 @@ class MavsdkVehicle:
         fields = whole_fields(message.fields_json, "tc1", "ts1")
         if fields is not None and fields[0] != 0:
             self._sync.answered(fields[1], fields[0], now_ns)
+
+    def _take_range(self, message: Any, now_ns: int) -> None:
+        if message.system_id == self._system_id:
+            self._readings.take_range(message.fields_json, now_ns)
 
     def _take_cells(self, message: Any, _now_ns: int) -> None:
         volts_mv = whole_list(message.fields_json, "voltages")

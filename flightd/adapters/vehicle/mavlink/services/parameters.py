@@ -17,8 +17,9 @@ from flightd.adapters.vehicle.mavlink.required_parameters import Names
 
 _ANSWER_S = 0.4
 _ATTEMPTS = 3
-_PASSES, _AT_ONCE = 3, 8
-"""ArduPilot's queue holds 20 requests, some of them under two names."""
+_AT_ONCE = (8, 4, 1)
+"""ArduPilot's queue holds 20 requests, some of them under two names; what an autopilot with a shorter one
+drops is asked for again in smaller groups, in the end alone."""
 _AGAIN_S = 5.0
 _REST_S = 1.0
 
@@ -83,10 +84,10 @@ class Parameters:
     async def read_all(self, wanted: Sequence[Names]) -> None:
         """Read what is not known yet of these, a few at a time: an autopilot drops what it is asked in a
         burst."""
-        for _ in range(_PASSES):
+        for at_once in _AT_ONCE:
             missing = [names for names in wanted if self.get(names) is None]
-            for first in range(0, len(missing), _AT_ONCE):
-                some = missing[first : first + _AT_ONCE]
+            for first in range(0, len(missing), at_once):
+                some = missing[first : first + at_once]
                 await self._exchange(partial(self._ask_all, some), partial(self._known, some), attempts=1)
 
     async def read_again(self, wanted: Sequence[Names]) -> None:
@@ -94,7 +95,7 @@ class Parameters:
         known = [found[0] for names in wanted if (found := self.get(names)) is not None]
         for name in known:
             self._ask((name,))
-            await asyncio.sleep(_ANSWER_S / _AT_ONCE)
+            await asyncio.sleep(_ANSWER_S / _AT_ONCE[0])
 
     async def write(self, name: str, value: float) -> bool:
         """Set a parameter that has been read; True when it read back as asked."""

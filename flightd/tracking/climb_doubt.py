@@ -1,0 +1,80 @@
+"""Whether the climb rate that is told is that of the vehicle: range finder and lines' width against it.
+
+An autopilot flies by its own climb rate.  Where a door opens or a duct blows, the barometer's air moves, and
+a drone that is to hover climbs while it tells that it does not.  Goods below move the range finder alone, a
+range finder that sticks leaves the width of the lines to change alone: only both together contradict it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
+
+_WINDOW_NS = 2_000_000_000
+_OFF_M, _NOTICED_M = 0.35, 0.15
+"""What both heights changed by more, or less, than what was told within the window: barometers err by less.
+From `_NOTICED_M` on the climb is put right: a door's gust moves a drone by a metre in a second."""
+_AGREEING_M, _AGREEING_SHARE = 0.12, 0.25
+"""So far the changes of the two heights may differ: one of them is scaled, the other one noisy."""
+_RATE_NS, _HELD_NS = 300_000_000, 500_000_000
+"""The error of the rate is that of the newest samples that span so long, and holds for so long without."""
+
+
+class _Sample(NamedTuple):
+    stamp_ns: int
+    range_m: float
+    width_m: float
+    climbed_m: float
+
+
+class ClimbDoubt:
+    """Call `step` with each frame that shows lines; a new flight begins with a new one."""
+
+    def __init__(self) -> None:
+        self.found = False
+        """Stays so until the end of the flight."""
+        self._noticed = False
+        self._samples: deque[_Sample] = deque()
+
+    def step(self, stamp_ns: int, range_m: float, width_m: float, climbed_m: float) -> None:
+        """Take what range finder and lines' width tell of the height at a frame's exposure, and what the
+        vehicle had told to have climbed until then, m."""
+        new = _Sample(stamp_ns, range_m, width_m, climbed_m)
+        samples = self._samples
+        while samples and stamp_ns - samples[0].stamp_ns > _WINDOW_NS:
+            samples.popleft()
+        off_m = max((_off_m(new, old) for old in samples), default=0.0)
+        self.found = self.found or off_m > _OFF_M
+        self._noticed = self.found or off_m > _NOTICED_M
+        samples.append(new)
+
+    def forget(self) -> None:
+        """What was told of the climb was interrupted: nothing older is compared."""
+        self._samples.clear()
+
+    def error_mps(self, now_ns: int) -> float:
+        """How much too great the told rate is; 0 where nothing is noticed, and while the heights do not agree
+        on it."""
+        samples = self._samples
+        if not self._noticed or not samples or now_ns - samples[-1].stamp_ns > _HELD_NS:
+            return 0.0
+        new = samples[-1]
+        old = next((sample for sample in samples if new.stamp_ns - sample.stamp_ns <= _RATE_NS), new)
+        span_s = (new.stamp_ns - old.stamp_ns) * 1e-9
+        if span_s < 0.4e-9 * _RATE_NS or not _agree(new, old):
+            return 0.0
+        return ((new.climbed_m - old.climbed_m) - (new.range_m - old.range_m)) / span_s
+
+
+def _off_m(new: _Sample, old: _Sample) -> float:
+    """How far both heights say that the told climb is off, 0 where they do not agree on that."""
+    climbed_m = new.climbed_m - old.climbed_m
+    by_range_m, by_width_m = (new.range_m - old.range_m) - climbed_m, (new.width_m - old.width_m) - climbed_m
+    if by_range_m * by_width_m <= 0.0 or not _agree(new, old):
+        return 0.0
+    return min(abs(by_range_m), abs(by_width_m))
+
+
+def _agree(new: _Sample, old: _Sample) -> bool:
+    by_range_m, by_width_m = new.range_m - old.range_m, new.width_m - old.width_m
+    return abs(by_range_m - by_width_m) < _AGREEING_M + _AGREEING_SHARE * abs(by_width_m)

@@ -1,0 +1,56 @@
+"""When range finder and lines' width together contradict the told climb, and when one alone does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from flightd.tracking.climb_doubt import ClimbDoubt
+
+_FRAME_NS = 33_000_000
+Of = Callable[[float], float]
+
+
+def flown(range_m: Of, width_m: Of, climbed_m: Of, lasts_s: float = 4.0) -> tuple[ClimbDoubt, int]:
+    """What is thought after so long, and when; all as functions of the time, s."""
+    doubt, now_ns = ClimbDoubt(), 0
+    for frame in range(round(lasts_s * 1e9 / _FRAME_NS)):
+        now_ns = 1 + frame * _FRAME_NS
+        at_s = now_ns * 1e-9
+        doubt.step(now_ns, range_m(at_s), width_m(at_s), climbed_m(at_s))
+    return doubt, now_ns
+
+
+@pytest.mark.parametrize("drift_mps", [-1.0, -0.4, 0.6])
+def test_both_heights_against_the_told_climb_say_by_how_much_it_errs(drift_mps: float) -> None:
+    """The drone hovers by its own estimate."""
+    doubt, now_ns = flown(lambda s: 3.0 - drift_mps * s, lambda s: 3.0 - drift_mps * s, lambda _: 0.0, 1.5)
+    assert doubt.found
+    assert doubt.error_mps(now_ns) == pytest.approx(drift_mps)
+
+
+@pytest.mark.parametrize(
+    ("range_m", "width_m", "climbed_m"),
+    [
+        pytest.param(lambda s: 1.6, lambda s: 1.6 + 0.8 * s, lambda s: 0.8 * s, id="the range finder sticks"),
+        pytest.param(lambda s: 0.5 * s, lambda s: s, lambda s: s, id="it reads the half"),
+        pytest.param(lambda s: 2.0 - (s > 2.0), lambda s: 2.0, lambda s: 0.0, id="goods came below"),
+        pytest.param(lambda s: 2.0, lambda s: 2.0 - 0.8 * (s > 2.0), lambda s: 0.0, id="another line"),
+        pytest.param(lambda s: 1.0 + 0.1 * s, lambda s: 1.0 + 0.1 * s, lambda s: 0.0, id="a slow drift"),
+    ],
+)
+def test_one_of_them_alone_does_not_contradict_the_climb(range_m: Of, width_m: Of, climbed_m: Of) -> None:
+    doubt, now_ns = flown(range_m, width_m, climbed_m)
+    assert not doubt.found
+    assert abs(doubt.error_mps(now_ns)) < 0.15
+
+
+def test_what_is_wrong_once_is_not_put_right_by_heights_that_do_not_agree_or_are_old() -> None:
+    doubt, now_ns = flown(lambda s: 2.0 + s, lambda s: 2.0 + s, lambda _: 0.0, 1.0)
+    assert doubt.error_mps(now_ns) == pytest.approx(-1.0)
+    assert doubt.error_mps(now_ns + 600_000_000) == 0.0
+    for frame in range(1, 12):
+        doubt.step(now_ns + frame * _FRAME_NS, 3.0, 3.0 + 0.05 * frame, 0.0)
+    assert doubt.error_mps(now_ns + 11 * _FRAME_NS) == 0.0
+    assert doubt.found
