@@ -35,6 +35,8 @@ _REST_MPS = 0.15
 _FADE_S, _OWN_LANDING_S, _DISARM_S = 0.3, 2.5, 5.5
 """Down and still for so long: lean no more (who stands does not follow a lean, and the position loop would
 ask for more and more), have the autopilot land by itself, ask it to disarm."""
+_BLOCKED_S = 0.5
+"""The same of one that cannot sink any further, while its range finder is not at rest."""
 _HURRY = 4.0 / 3.0
 """How much faster than usual a take-off out of sight climbs, within the limits."""
 
@@ -143,10 +145,13 @@ class ReferenceGenerator:
         else:
             climb = self._climb_mps(s, task)
         guide = Guide.STEER if self._steers else Guide.BRAKE if self._may_brake(s, task) else Guide.LEVEL
-        if task.phase is Phase.LAND and self._still_s > _FADE_S:
+        if task.phase is Phase.LAND and self._touches():
             guide = Guide.LEVEL
         dead_reckoned = s.sight_s < self._hazards.expert.brake_s
         return Guidance(task.phase, guide, self._reference(climb), demand, dead_reckoned, task.state.stopped)
+
+    def _touches(self) -> bool:
+        return self._still_s > _FADE_S or self._standstill.blocked_s > _BLOCKED_S
 
     def _climb_mps(self, s: MissionInputs, task: ReferenceTask) -> float:
         """Climb rate towards the wanted height.  A take-off that drifts where no line tells how hurries: the

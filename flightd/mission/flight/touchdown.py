@@ -42,6 +42,9 @@ class Standstill:
         self._hold_s = params.telemetry_hold_s
         self._floor_m = _STANDS_M
         self._since: tuple[int, float, Attitude] | None = None
+        self.blocked_s = 0.0
+        """For how long something near the floor keeps it from sinking as it is commanded to, s: it touches,
+        whatever its range finder reads there."""
 
     def stands(self, height_m: float) -> None:
         """It stands on the floor and reads this, NaN for nothing."""
@@ -51,10 +54,13 @@ class Standstill:
     def begin(self) -> None:
         """A landing begins."""
         self._since = None
+        self.blocked_s = 0.0
 
     def step(self, s: MissionInputs, *, sinks: bool) -> float:
         """Seconds; 0 while it moves, is higher, or is not heard.  `sinks`: it is commanded to."""
         v = s.vehicle
+        held = v is not None and abs(v.climb_mps) <= _STILL_MPS and not s.height_m > _FLOOR_M
+        self.blocked_s = self.blocked_s + s.dt_s if sinks and held else 0.0
         if v is None or s.telemetry_age_s > self._hold_s or not _is_steady(s.height_m, v.climb_mps):
             self._since = None
             return 0.0

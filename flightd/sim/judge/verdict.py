@@ -24,6 +24,8 @@ DOWN_S = 20.0
 _OFF_PAD_M = 0.5
 _STANDS_M = 0.12
 """A body origin at most this high stands."""
+_TOUCHES_M = 0.105
+"""One so high carries weight on its legs."""
 _HARD_MPS = 1.2
 _STAYS_ARMED_S = 15.0
 _LEANS_DEG, _SETTLES_S = 6.0, 0.5
@@ -162,7 +164,7 @@ def _at_the_floor(flight: FlightEvidence) -> Iterator[JudgedFault]:
 def _leaning(flight: FlightEvidence) -> Iterator[JudgedFault]:
     """What was commanded while it stands: the simulated airframe does not tip over by it, a real one does."""
     motion, sent = flight.motion, flight.setpoints
-    stands = motion.height_m <= _STANDS_M
+    stands = motion.height_m <= _TOUCHES_M
     if not sent or not len(motion):
         return
     began = np.flatnonzero(stands & ~np.r_[True, stands[:-1]])  # after a flight, not before the first

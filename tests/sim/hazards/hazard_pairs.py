@@ -56,7 +56,8 @@ _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
     lambda draw: {"kind": "battery", "charge": round(draw.uniform(0.03, 0.3), 2)},
     lambda draw: {"kind": "wind", "mean_y_mps": round(draw.uniform(-3.5, 3.5), 2)},
     lambda draw: {"kind": "wind", "mean_x_mps": round(draw.uniform(-3.5, 3.5), 2)},
-    lambda draw: {"kind": "pilot"},
+    # he lands when it ends: one who flies on for ever is no flight of ours
+    lambda draw: {"kind": "pilot", "duration_s": round(draw.uniform(*_LASTS_S), 2)},
     lambda draw: {"kind": "clock_jump", "jump_s": round(draw.uniform(-5.0, 5.0), 2)},
     lambda draw: {"kind": "detector_killed"},
     lambda draw: {"kind": "step_fails"},

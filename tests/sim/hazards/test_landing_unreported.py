@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -44,6 +45,28 @@ def test_down_and_still_it_leans_no_more_and_is_disarmed(seed: int) -> None:
     for setpoint in landing[handed_over:]:
         assert setpoint is not None
         assert max(abs(setpoint.roll_rad), abs(setpoint.pitch_rad)) < math.radians(0.5)
+
+
+@pytest.mark.parametrize("swings", [False, True])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_once_it_touches_it_is_not_commanded_to_lean(seed: int, swings: bool) -> None:
+    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=seed, wind=WindParams(0.8, 0.5))
+    flight.faults.landing_unreported = True
+    readings = itertools.count()
+
+    def swinging(height_m: float) -> float:
+        return height_m + (0.3 * (next(readings) // 5 % 2) if height_m < 0.4 else 0.0)
+
+    if swings:
+        flight.faults.misread = swinging
+    flown = flight.fly(120.0)
+    touches = [phase is Phase.LAND and truth.height_m <= 0.101 for phase, truth in flown.truth]
+    touched = touches.index(True)
+    settled = flown.outputs[touched + round(0.8 / 0.02) :]
+    assert len(settled) > 10
+    for output in settled:
+        if output.setpoint is not None:
+            assert math.hypot(output.setpoint.roll_rad, output.setpoint.pitch_rad) < math.radians(2.0)
 
 
 def test_one_that_is_never_disarmed_is_given_up_and_said_aloud() -> None:
