@@ -54,6 +54,11 @@ class Itinerary:
         return tuple(stop.node for stop in self._stops[self._next + 1 :] if stop.visit)
 
     @property
+    def way(self) -> tuple[str, ...]:
+        """The nodes that are still flown over, the goal first."""
+        return tuple(stop.node for stop in self._stops[self._next :])
+
+    @property
     def left_over(self) -> tuple[str, ...]:
         """What the way home leaves unvisited."""
         return self._left_over
