@@ -111,7 +111,8 @@ class GroundClient:
             raise InputError(
                 f"{address.endpoint(address.command_port)}: {err.strerror}: no such host"
             ) from None
-        self._reading = asyncio.create_task(self._read(), name="ground link answers")
+        if self._reading is None:
+            self._reading = asyncio.create_task(self._read(), name="ground link answers")
         return self
 
     async def __aexit__(self, *_: object) -> None:

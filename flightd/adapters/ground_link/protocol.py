@@ -153,7 +153,7 @@ class StatusReport(msgspec.Struct, frozen=True):
     height_goal_m: Annotated[
         float | None, Meta(description="height that it flies at or makes for, m; 0 on the ground")
     ] = None
-    way: Annotated[tuple[str, ...], Meta(description="nodes still flown over, the next one first")] = ()
+    way: Annotated[tuple[str, ...], Meta(description="nodes flown over next, in order; 32 at most")] = ()
     possible: Annotated[tuple[CommandKind, ...], Meta(description="commands that the mission takes now")] = ()
     obstacles: Annotated[
         tuple[str, ...], Meta(description="all that keeps it on the ground while it waits there")

@@ -16,6 +16,10 @@ from flightd.site.site import Site
 from flightd.site.ways import NoWayError
 
 
+_WAY_SHOWN = 32
+"""So many nodes ahead are told."""
+
+
 class Itinerary:
     """The stops in order, re-planned on the way; says to `events` what became of an order or a doubt."""
 
@@ -55,8 +59,8 @@ class Itinerary:
 
     @property
     def way(self) -> tuple[str, ...]:
-        """The nodes that are still flown over, the goal first."""
-        return tuple(stop.node for stop in self._stops[self._next :])
+        """The nodes that are flown over next, the goal first; those far ahead are left out."""
+        return tuple(stop.node for stop in self._stops[self._next : self._next + _WAY_SHOWN])
 
     @property
     def left_over(self) -> tuple[str, ...]:

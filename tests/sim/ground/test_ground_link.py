@@ -327,7 +327,8 @@ async def test_expensive_requests_leave_the_loop_most_of_its_time() -> None:
         for aisle in aisles
         for k in range(100)
     }
-    big = replace(SITE, aisles=tuple(aisles), crosses=tuple(crosses), nodes=nodes)
+    pads = (replace(SITE.home, node="R0-1"),)
+    big = replace(SITE, aisles=tuple(aisles), crosses=tuple(crosses), nodes=nodes, edges=(), pads=pads)
     with _TimedGround(local(), big, LoopClock()) as link:
         address = address_of(link)
         with zmq.asyncio.Context() as context, context.socket(zmq.DEALER) as flood:
