@@ -18,8 +18,9 @@ class HazardSeen:
 @dataclass(frozen=True, slots=True)
 class Outlook:
     """`obstacles` is all that keeps the drone on the ground while it waits there, worst first; `way` the
-    nodes that it flies over next, in order (not those far ahead).  `battery_left_s` is how long the charge above the
-    reserve lasts in the air and `home_s` how long the way to the nearest charge pad takes; NaN: not known."""
+    nodes that it flies over next, in order (not those far ahead).  `battery_left_s` is how long the charge
+    above the reserve lasts in the air and `home_s` how long the way to the nearest charge pad takes; NaN: not
+    known."""
 
     hazards: tuple[HazardSeen, ...] = ()
     obstacles: tuple[str, ...] = ()

@@ -71,7 +71,7 @@ def found_lines(seen: LineSet, lens: Lens) -> tuple[FoundLine, ...]:
         points = [_shown(line.point_at(float(along)), scaled) for along in alongs]
         kept = tuple(point for point in points if all(map(math.isfinite, point)))
         if len(kept) > 1:
-            found.append(FoundLine(kept, line.width_px / seen.width_px))
+            found.append(FoundLine(kept, float(line.width_px / seen.width_px)))
     return tuple(found)
 
 
@@ -107,8 +107,5 @@ def _shown(centred: Point, lens: Lens) -> Point:
 
 
 def _fraction(x_px: float, y_px: float, width_px: int, height_px: int) -> Point:
-    """Centred pixels as fractions, to a hundredth of a percent."""
-    return (
-        round((x_px + width_px / 2) / width_px, 4) if math.isfinite(x_px) else math.nan,
-        round((y_px + height_px / 2) / height_px, 4) if math.isfinite(y_px) else math.nan,
-    )
+    """Centred pixels as fractions, to a hundredth of a percent; a picture's pixels lie around their centres."""
+    return round(float(x_px) / width_px + 0.5, 4), round(float(y_px) / height_px + 0.5, 4)

@@ -15,7 +15,6 @@ from flightd.mission.reasons import Reason, in_words
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
 
-
 _WAY_SHOWN = 32
 """So many nodes ahead are told."""
 

@@ -35,6 +35,8 @@ export const ACTIONS = {
   hands_off: "hands off", stop: "comes down at once", continue: "goes on", configured: "as configured",
 };
 
+export const count = (amount, one) => `${amount} ${one}${amount === 1 ? "" : "s"}`;
+
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 export const number = (value, digits = 0) =>
@@ -54,4 +56,7 @@ export function age(seconds) {
   return duration(seconds);
 }
 
-export const time = (date) => date.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" });
+const CLOCK = new Intl.DateTimeFormat([], {
+  hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23",
+});
+export const time = (date) => CLOCK.format(date);

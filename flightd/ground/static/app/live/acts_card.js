@@ -5,6 +5,8 @@ import { state, update } from "../store.js";
 import { capital, COMMANDS, isGrounded } from "../words.js";
 import { HoldButton } from "./hold_button.js";
 
+const SHOWN_MS = 20000;
+
 export function Acts({ status, welcome }) {
   const may = (command) => status.possible.includes(command);
   if (welcome.role !== "operator") {
@@ -71,7 +73,8 @@ function GoTo({ nodes, may }) {
 }
 
 function Outcome() {
-  const newest = state.acts.get(state.selected);
+  const given = state.acts.get(state.selected);
+  const newest = given && performance.now() - given.at < SHOWN_MS ? given : undefined;
   const words = newest && `${COMMANDS[newest.command]}${newest.node ? ` ${newest.node}` : ""}`;
   const text = {
     sent: newest?.text ? `not accepted yet: ${newest.text}` : "sent …",

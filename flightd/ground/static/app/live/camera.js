@@ -2,7 +2,7 @@
 import { showPictures } from "../connection.js";
 import { html, useEffect, useRef, useState } from "../html.js";
 import { shown, state } from "../store.js";
-import { age } from "../words.js";
+import { age, count } from "../words.js";
 
 const NAMES = { down: "Down camera", front: "Front camera" };
 const WIDTH = 640;
@@ -40,8 +40,7 @@ function caption(seen, found) {
 
 function foundWords({ lines, areas }) {
   const codes = areas.filter((area) => area.kind === "code").length;
-  const many = (count, one) => `${count} ${one}${count === 1 ? "" : "s"}`;
-  const parts = [lines.length && many(lines.length, "line"), codes && many(codes, "code")].filter(Boolean);
+  const parts = [lines.length && count(lines.length, "line"), codes && count(codes, "code")].filter(Boolean);
   return parts.join(", ") || "nothing found";
 }
 

@@ -16,8 +16,7 @@ export function Events() {
           (event) => html`
             <li key=${event.seq} class=${event.level}>
               <time>${when(event, status, heardAt)}</time>
-              <span class="what">${event.name}</span>
-              <span>${event.text}</span>
+              <span><span class="what">${event.name.replaceAll("_", " ")}</span> ${event.text}</span>
             </li>
           `,
         )}

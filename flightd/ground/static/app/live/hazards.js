@@ -4,7 +4,7 @@ import { ACTIONS, age, capital } from "../words.js";
 
 export function Hazards({ hazards }) {
   return html`
-    <div role="alert">
+    <div role="alert" class="alarm">
       ${hazards.length > 0 &&
       html`
         <section class="card hazards" aria-label="Hazards">
