@@ -107,5 +107,5 @@ def _shown(centred: Point, lens: Lens) -> Point:
 
 
 def _fraction(x_px: float, y_px: float, width_px: int, height_px: int) -> Point:
-    """Centred pixels as fractions, to a hundredth of a percent; a picture's pixels lie around their centres."""
+    """Centred pixels as fractions, to a hundredth of a percent; pixels lie around their centres."""
     return round(float(x_px) / width_px + 0.5, 4), round(float(y_px) / height_px + 0.5, 4)

@@ -8,7 +8,6 @@ import asyncio
 import queue
 import threading
 import time
-from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from typing import Any, Self
@@ -29,7 +28,7 @@ from flightd.sim.sensors.optics import SimCamera
 from flightd.site.site import Site
 from tests.rigs.event_loops import real
 from tests.rigs.ground_link import local
-from tests.sim.ideal.ideal_flight import IdealFlight
+from tests.sim.ideal.ideal_flight import Faults, IdealFlight
 from tests.sim.ideal.ideal_ports import HeldSetpoint, IdealVehicle, IdealVision
 
 _LOOK_S = 0.02
@@ -144,9 +143,18 @@ class LiveFlight:
         """How long whoever attends has been silent."""
         return self._mailbox.quiet_s
 
-    def faults(self, change: Callable[[Any], None]) -> None:
-        """Change what is wrong with the drone."""
-        change(self._flight.faults)
+    @property
+    def faults(self) -> Faults:
+        """What is wrong with the drone; a test changes it in flight."""
+        return self._flight.faults
+
+    def wait_s(self, seconds: float) -> None:
+        """Let it fly on."""
+        self._ending.wait(seconds)
+
+    def fall_silent(self) -> None:
+        """Fly on, and tell nobody."""
+        self._flight.end()
 
     def _fly(self) -> None:
         try:
