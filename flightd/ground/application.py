@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
@@ -105,12 +105,15 @@ async def _act(hub: Hub, request: Request) -> Response:
 
 
 async def _body(request: Request) -> bytes:
-    """The request's body.  InputError for one that is longer than any act."""
+    """The request's body.  InputError for one that is longer than any act, or breaks off."""
     body = b""
-    async for part in request.stream():
-        body += part
-        if len(body) > MAX_PAGE_MESSAGE_BYTES:
-            raise InputError("too long for an act")
+    try:
+        async for part in request.stream():
+            body += part
+            if len(body) > MAX_PAGE_MESSAGE_BYTES:
+                raise InputError("too long for an act")
+    except ClientDisconnect:
+        raise InputError("it breaks off") from None
     return body
 
 

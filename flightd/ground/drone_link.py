@@ -241,6 +241,6 @@ class DroneLink:
             if failed:
                 failed = False
                 self._pages.tell(self.name, trouble, "")
-            age_s = loop.time() - answer.stamp_ns * 1e-9 - self._clock_s
-            age_ms = round(age_s * 1e3, 1) if math.isfinite(age_s) else None
+            behind_s = loop.time() - answer.stamp_ns * 1e-9
+            age_ms = round(max(behind_s - self._clock_s, 0.0) * 1e3, 1) if self._seq else None
             self._pages.show(key, picture_message(key, answer, age_ms, jpeg))

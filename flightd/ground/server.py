@@ -122,6 +122,7 @@ async def serve(
             ws="websockets-sansio",
             lifespan="off",
             log_config=None,
+            log_level="error",
             access_log=False,
             proxy_headers=False,
             server_header=False,
