@@ -68,7 +68,7 @@ const vehicleWords = (vehicle) =>
 const frames = ({ frames: all, frames_dropped: dropped }) => (all ? `${percent(dropped / all)} dropped` : "");
 const missed = (heard) => (heard?.missed ? `${count(heard.missed, "message")} missed` : "");
 const leftOut = ({ dropped, picturesDropped }) =>
-  dropped + picturesDropped ? `${count(dropped, "state")}, ${count(picturesDropped, "picture")} left out` : "";
+  dropped + picturesDropped ? `${count(dropped + picturesDropped, "message")} left out` : "";
 const attending = (link, heard) => {
   if (heard?.attends) return "this station";
   return link.attending ? count(link.attending, "other") : "nobody";
