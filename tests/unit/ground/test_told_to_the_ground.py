@@ -64,7 +64,7 @@ def test_a_flight_tells_its_way_its_endurance_and_all_that_keeps_it_on_the_groun
     assert CommandKind.START not in told(seen[-1]).possible
     flight.faults.battery, flight.faults.rangeless = None, False
     flight.fly(25.0)
-    report = told(seen[-1])
+    report = next(told(snapshot) for snapshot in seen if snapshot.phase is Phase.FOLLOW)
     assert report.obstacles == ()
     assert report.way[:2] == ("A2", "A3")
     assert {CommandKind.PAUSE, CommandKind.STOP} <= set(report.possible)
