@@ -22,7 +22,7 @@ from tests.web.served import JSON, Station, served, told
 
 NOBODY = ("demo", Address("127.0.0.1", 1, 1))
 REQUESTS, ACTS, MESSAGES = 300, 200, 150
-_AT_ONCE = 10
+_AT_ONCE = 20
 PAGE_WORDS = (
     '{"say":"want","pictures":[{"drone":"demo","camera":"down"}]}',
     '{"say":"drawn"}',
@@ -56,7 +56,7 @@ async def test_malformed_requests_are_refused_and_the_next_page_is_served(
         made = requests(station, draw)
         for first in range(0, len(made), _AT_ONCE):
             answers = await asyncio.gather(
-                *(station.say(data, 0.4) for data in made[first : first + _AT_ONCE])
+                *(station.say(data, 0.3) for data in made[first : first + _AT_ONCE])
             )
             for answer in answers:
                 assert b"Traceback" not in answer

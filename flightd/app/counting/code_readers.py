@@ -53,7 +53,8 @@ class Readers(Protocol):
     async def read(self, ticket: FrameTicket, wanted: Wanted) -> Reading | None: ...
 
 
-def _read(bgr: Image, ticket: FrameTicket, wanted: Wanted) -> Reading:
+def read_frame(bgr: Image, ticket: FrameTicket, wanted: Wanted) -> Reading:
+    """What a reader process makes of a frame, (H, W, 3) BGR."""
     shown = _shown(bgr) if wanted.shown else b""
     if not wanted.places:
         return Reading(None, {}, shown)
@@ -73,7 +74,7 @@ def _shown(bgr: Image) -> bytes:
 
 
 def _shelf_reader() -> Work[Wanted, Reading]:
-    return _read
+    return read_frame
 
 
 class ReaderPool(FramePool[Wanted, Reading]):
