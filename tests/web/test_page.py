@@ -92,6 +92,10 @@ def test_a_flight_is_started_watched_paused_sent_elsewhere_and_stopped_by_key(
         expect(page.get_by_role("img", name=re.compile(r"^Down camera: \d lines?$"))).to_be_visible()
         expect(page.get_by_role("img", name="The drone")).to_be_visible()
         assert hindrances(page) == []
+        whole = page.get_by_role("group", name="Map of demo").get_attribute("viewBox")
+        page.get_by_role("button", name="Follow the drone").click()
+        expect(page.get_by_role("button", name="Follow the drone")).to_have_attribute("aria-pressed", "true")
+        expect(page.get_by_role("group", name="Map of demo")).not_to_have_attribute("viewBox", whole or "")
         page.keyboard.press("p")
         phase(page, "Holding its place")
         page.get_by_role("button", name="Resume").click()

@@ -6,25 +6,52 @@ import { Floor, bounds } from "./site_plan.js";
 
 const M = 100; // units of the drawing per metre
 const SURE = 2; // standard deviations that are drawn
+const AROUND_M = [12, 8]; // what is shown around a drone that is followed
+const LARGEST = 4;
 
 export function FloorMap({ floor }) {
   const box = useMemo(() => bounds(floor), [floor]);
   const plan = useMemo(() => html`<${Floor} floor=${floor} box=${box} />`, [floor]);
   const nodes = useMemo(() => new Map(floor.nodes.map((node) => [node.id, node])), [floor]);
   const { status, visited } = shown();
+  const view = state.followed ? around(status?.position ?? nodes.get(floor.home)) : box;
+  const scale = markScale(view);
   return html`
     <section class="card map" aria-labelledby="map">
       <h2 id="map" class="unseen">Map</h2>
-      <svg viewBox=${box.map((value) => value * M).join(" ")} role="group" aria-label=${`Map of ${floor.name}`}>
+      <svg
+        viewBox=${view.map((value) => value * M).join(" ")}
+        role="group"
+        aria-label=${`Map of ${floor.name}`}
+        style=${{ "--scale": scale }}
+      >
         ${plan}
         <${Way} status=${status} nodes=${nodes} />
         <${Track} />
-        <${Nodes} floor=${floor} visited=${visited} status=${status} />
-        ${status?.position && html`<${Drone} position=${status.position} />`}
+        <${Nodes} floor=${floor} visited=${visited} status=${status} scale=${scale} />
+        ${status?.position && html`<${Drone} position=${status.position} scale=${scale} />`}
       </svg>
-      <${Legend} />
+      <div class="map-foot">
+        <${Legend} />
+        <${Follow} />
+      </div>
     </section>
   `;
+}
+
+const around = ({ x_m: x, y_m: y }) => [x - AROUND_M[0] / 2, y - AROUND_M[1] / 2, ...AROUND_M];
+
+// Nodes and drone stay legible however large the hall is.
+function markScale([, , width, height]) {
+  return Math.min(Math.max(1, width / AROUND_M[0], height / AROUND_M[1]), LARGEST);
+}
+
+function Follow() {
+  const turn = () =>
+    update((s) => {
+      s.followed = !s.followed;
+    });
+  return html`<button class="order follow" aria-pressed=${state.followed} onClick=${turn}>Follow the drone</button>`;
 }
 
 function Way({ status, nodes }) {
@@ -45,7 +72,7 @@ function Track() {
   return html`<polyline class="track" points=${track.map(([x, y]) => `${x * M},${y * M}`).join(" ")} aria-hidden="true" />`;
 }
 
-function Nodes({ floor, visited, status }) {
+function Nodes({ floor, visited, status, scale }) {
   const chosen = state.chosenNode;
   const inTabOrder = chosen || floor.home;
   const choose = (id) =>
@@ -67,7 +94,7 @@ function Nodes({ floor, visited, status }) {
         key=${node.id}
         id=${`node-${node.id}`}
         class=${nodeClass(node.id, chosen, visited, status)}
-        transform=${`translate(${node.x_m * M} ${node.y_m * M})`}
+        transform=${`translate(${node.x_m * M} ${node.y_m * M}) scale(${scale})`}
         role="button"
         aria-pressed=${node.id === chosen}
         aria-label=${`Node ${node.id}${visited.has(node.id) ? ", visited" : ""}`}
@@ -90,7 +117,7 @@ function nodeClass(id, chosen, visited, status) {
   return classes.join(" ");
 }
 
-function Drone({ position }) {
+function Drone({ position, scale }) {
   const { x_m: x, y_m: y, yaw_rad: yaw } = position;
   const turn = (yaw * 180) / Math.PI;
   const spread = Math.min(SURE * (position.sigma_yaw_rad ?? 0), Math.PI / 2);
@@ -99,7 +126,7 @@ function Drone({ position }) {
     <g transform=${`translate(${x * M} ${y * M})`} role="img" aria-label="The drone">
       ${position.sigma_x_m !== null &&
       html`<ellipse class="sure" rx=${SURE * position.sigma_x_m * M} ry=${SURE * position.sigma_y_m * M} />`}
-      <g transform=${`rotate(${turn})`}>
+      <g transform=${`rotate(${turn}) scale(${scale})`}>
         <path class="heading" d=${`M0 0L${cx} ${-cy}A${r} ${r} 0 0 1 ${cx} ${cy}Z`} />
         <path class="drone" d="M34 0L-22 -22L-11 0L-22 22Z" />
       </g>
