@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
 
 from flightd.core.inventory import LocationRecord, Observation, PlannedLocation
+from flightd.core.preview import CameraName, Preview
 from flightd.core.snapshot import Snapshot
 from flightd.core.types import (
     Attitude,
@@ -133,9 +134,9 @@ class Ground(Protocol):
 
     `tell` comes ten times a second and at each change of phase, `event` with each event.  `take_commands`
     drains the orders since the last call, oldest first; `silent_s` is the time since any client that attends
-    the flight was heard, 0 when none attends.  `picture_due` says whether the picture exposed at that time is
-    asked for (True at a capped rate only), `picture` then hands it over.  `run` serves until cancelled;
-    TransientError when another `run` may succeed.
+    the flight was heard, 0 when none attends.  `picture_due` says whether a camera's picture exposed at that
+    time is asked for (True at a capped rate only), `picture` then hands it over.  `run` serves until
+    cancelled; TransientError when another `run` may succeed.
     """
 
     async def run(self) -> None: ...
@@ -148,9 +149,9 @@ class Ground(Protocol):
 
     def silent_s(self, now_ns: int) -> float: ...
 
-    def picture_due(self, stamp_ns: int) -> bool: ...
+    def picture_due(self, stamp_ns: int, camera: CameraName = CameraName.DOWN) -> bool: ...
 
-    def picture(self, seq: int, stamp_ns: int, jpeg: bytes) -> None: ...
+    def picture(self, preview: Preview) -> None: ...
 
 
 class Monitor(Protocol):

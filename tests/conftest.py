@@ -26,6 +26,7 @@ _COSTLY = {
     "tests/sim/ideal/test_height_changes.py",
     "tests/sim/pictures/test_shelf_reading.py",
     "tests/unit/cli/test_vision_commands.py",
+    "tests/web/test_page.py",
 }
 _IN_CI = os.environ.get("CI", "") == "true"
 _PATIENCE = pytest.StashKey[Patience]()

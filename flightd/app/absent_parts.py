@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable
 
 from flightd.app.flight import Tasks
+from flightd.core.preview import CameraName, Preview
 from flightd.core.scanning import CodeSet
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickOutput
@@ -52,10 +53,14 @@ class NoGround:
     def silent_s(self, now_ns: int) -> float:  # noqa: ARG002 - the port names it
         return 0.0
 
-    def picture_due(self, stamp_ns: int) -> bool:  # noqa: ARG002 - the port names it
+    def picture_due(
+        self,
+        stamp_ns: int,  # noqa: ARG002 - the port names it
+        camera: CameraName = CameraName.DOWN,  # noqa: ARG002
+    ) -> bool:
         return False
 
-    def picture(self, seq: int, stamp_ns: int, jpeg: bytes) -> None:
+    def picture(self, preview: Preview) -> None:
         pass
 
 

@@ -40,6 +40,7 @@ from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError
 from flightd.core.flight_order import FlightOrder
 from flightd.core.learnt import LearntSensors
+from flightd.core.preview import CameraName
 from flightd.core.refusal import Refusal
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TICK_S
@@ -114,12 +115,15 @@ def build(
     )
     publishers = TelemetryPublishers(clock, vehicle, recorder, ground, monitors, observers)
     kept_fps = 0.0 if recorder is NO_RECORDER else config.recorder.picture_fps
-    vision = DetectionPipeline(detectors, config.vision.workers, recorder, ground, kept_fps)
+    vision = DetectionPipeline(
+        detectors, config.vision.workers, recorder, ground, kept_fps, config.camera.lens()
+    )
     connect = partial(connect_camera, clock=clock, on_trouble=publishers.trouble, vehicle=vehicle, hold=hold)
     camera = connect(config.camera, on_frame=vision.frames.put, url=peers.camera)
     front_camera: Camera = NO_CAMERA
     if counting is not None:
         counting.read_for(pilot.places)
+        counting.show_on(ground)
         front_camera = connect(config.front_camera, on_frame=counting.frame, url=peers.front_camera)
     return assemble(
         config,
@@ -326,7 +330,9 @@ def ground_link(
     """The link to ground stations, not listening yet; None where none is wanted."""
     if not settings.listen:
         return None
-    return ZmqGround(settings, site, clock, None if counting is None else counting.places)
+    if counting is None:
+        return ZmqGround(settings, site, clock)
+    return ZmqGround(settings, site, clock, counting.places, tuple(CameraName))
 
 
 def _plan_on(config: Config, flown: Site, order: FlightOrder) -> FlightPlan:

@@ -20,7 +20,6 @@ from flightd.app.absent_parts import NO_GROUND, NO_RECORDER
 from flightd.app.build import build, detector_pool, ground_link
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
-from flightd.app.ending_signals import end_on_signals
 from flightd.app.flight_orders import configured_order, going_on, resumed
 from flightd.app.recording import FlightSetting, record_setting
 from flightd.config.schema import Config
@@ -33,6 +32,7 @@ from flightd.doctor.machine import check_clock, check_disk, check_processor
 from flightd.ports import Recorder
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
+from flightd.runtime.ending_signals import end_on_signals
 from flightd.runtime.supervisor import restarted
 from flightd.site.site import Site
 from flightd.site.site_file import load_site

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from flightd.adapters.store.progress import LeftOver
 from flightd.app.flight import Flight
+from flightd.core.outlook import NO_OUTLOOK
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import HEALTHY, Command, CommandKind, Health
@@ -107,4 +108,5 @@ class Tick:
             possible=call("mission", lambda: pilot.possible_commands, frozenset()),
             failure=pilot.failure,
             height_goal_m=call("mission", lambda: pilot.mission.height_goal_m, 0.0),
+            outlook=call("mission", lambda: pilot.mission.outlook(tick.now_ns), NO_OUTLOOK),
         )

@@ -11,6 +11,7 @@ from flightd.cli import (
     detect,
     doctor,
     evaluate,
+    ground,
     guide,
     inventory,
     keygen,
@@ -27,8 +28,8 @@ from flightd.cli.exits import run_app
 
 app = application("flightd")
 for command in (
-    detect, evaluate, codes, bench, train_colour, sim, calibrate, run, doctor, report, replay, log, keygen,
-    site_map, inventory, guide,
+    detect, evaluate, codes, bench, train_colour, sim, calibrate, run, ground, doctor, report, replay, log,
+    keygen, site_map, inventory, guide,
 ):  # fmt: skip
     command.register(app)
 

@@ -31,7 +31,7 @@ class GroundConfig(Section):
     )
     audit: Path | None = Field(None, description="audit log: every command as a line of JSON")
     picture_fps: float = Field(
-        2.0, ge=0, le=10, description="most preview pictures per second, all clients together"
+        2.0, ge=0, le=10, description="most preview pictures of each camera per second, all clients together"
     )
     lost_s: float = Field(5.0, ge=1, le=600, description="who attends and is silent for so long is lost")
     lost_action: LossAction = Field(

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from flightd.core.outlook import NO_OUTLOOK, Outlook
 from flightd.core.tick import StepFailure, TickInput, TickOutput
 from flightd.core.tracks import NOT_SEEN, SensorEstimate
 from flightd.core.types import CommandKind, Phase, Status, VehicleState
@@ -25,7 +26,7 @@ class Snapshot:
     `dropped` what a full queue or a lost worker cost, `restarts` what died and was brought back, each by the
     part's name; `repeated_level` the setpoints that went out because no tick made one.  `possible` are the
     operator's commands that the mission takes now, `failure` what the step raised, if anything.
-    `height_goal_m` is the commanded height above the floor.
+    `height_goal_m` is the commanded height above the floor, `outlook` what the mission expects.
     """
 
     tick: TickInput
@@ -44,6 +45,7 @@ class Snapshot:
     possible: frozenset[CommandKind] = frozenset()
     failure: StepFailure | None = None
     height_goal_m: float = 0.0
+    outlook: Outlook = NO_OUTLOOK
 
     @property
     def stamp_ns(self) -> int:

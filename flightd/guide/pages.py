@@ -17,6 +17,7 @@ TOPICS = (
     "real-drone",
     "cameras",
     "service",
+    "ground-station",
     "ground-link",
     "hazards",
     "safety-case",

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
+from flightd.core.outlook import Outlook
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, Phase
 from flightd.mission.battery.swap import BatterySwap
 from flightd.mission.event_log import EventLog
@@ -32,7 +33,7 @@ from flightd.mission.orders import StandingOrders, refusal
 from flightd.mission.phase_reporter import PhaseReporter
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
-from flightd.mission.reasons import Happened, Reason
+from flightd.mission.reasons import Happened, Reason, in_words
 from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
 from flightd.mission.safety.hazard_table import ACTIONS, Action, triggers_of
 from flightd.mission.safety.loss_actions import LossActions
@@ -91,6 +92,7 @@ class Mission:
         self._swapped = False
         """It has landed for a fresh battery, and goes on with nothing less."""
         self._leg_along_x: bool | None = None
+        self._obstacles: tuple[Reason, ...] = ()
         self._await_start()
 
     @property
@@ -139,6 +141,17 @@ class Mission:
         possible = possible_commands(self.state)
         held = self.state.waiting and not self._clearance.is_ready
         return possible - {CommandKind.START} if held else possible
+
+    def outlook(self, now_ns: int) -> Outlook:
+        """What it expects and what troubles it."""
+        left_s, home_s = self._charging.endurance_s
+        return Outlook(
+            hazards=self._events.hazards(now_ns),
+            obstacles=tuple(map(in_words, self._obstacles)) if self.state.waiting else (),
+            way=self._route.way,
+            battery_left_s=left_s,
+            home_s=home_s,
+        )
 
     def drain_events(self) -> tuple[Event, ...]:
         return (*self._events.drain(), *self._scan.drain_events())
@@ -290,7 +303,8 @@ class Mission:
         """Why it stays on the ground, None if nothing keeps it there."""
         stops_left = len(self.remaining) if self._swapped else None
         arming = self.phase is Phase.ARMING
-        return self._clearance.obstacle(s, stops_left, self._losses.ground_silent, arming=arming)
+        self._obstacles = self._clearance.obstacles(s, stops_left, self._losses.ground_silent, arming=arming)
+        return next(iter(self._obstacles), None)
 
     # Changing the intent of the phase in hand
 

@@ -9,7 +9,7 @@ from flightd.mission.guidance import MissionInputs
 from flightd.mission.orders import StartOrder
 from flightd.mission.reasons import Plain, Reason, StartsIn, Unfit, in_words
 from flightd.mission.safety.hazard_monitor import DebounceTimer
-from flightd.mission.safety.readiness import not_fresh, not_ready
+from flightd.mission.safety.readiness import not_fresh, obstacles
 from flightd.mission.triggers import Trigger
 
 _AFTER_VOID_NS = 10_000_000_000
@@ -46,13 +46,14 @@ class StartClearance:
         """Nothing kept the drone on the ground when it was last looked at."""
         return self._obstacle is None
 
-    def obstacle(
+    def obstacles(
         self, s: MissionInputs, stops_left: int | None, ground_silent: bool, *, arming: bool
-    ) -> Reason | None:
-        """What keeps the drone on the ground now, None if nothing does; `stops_left` where it waits for a
-        battery for them, the others as in `not_ready`."""
+    ) -> tuple[Reason, ...]:
+        """All that keeps the drone on the ground now, worst first; `stops_left` where it waits for a battery
+        for them, the others as in `readiness.obstacles`."""
         stale = not_fresh(s, self._config, stops_left) if stops_left is not None else None
-        return stale or not_ready(s, self._config, ground_silent, arming=arming)
+        others = obstacles(s, self._config, ground_silent, arming=arming)
+        return others if stale is None else (stale, *others)
 
     def counted_down(self, now_ns: int) -> bool:
         """No count-down is under way."""

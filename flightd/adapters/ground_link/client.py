@@ -6,13 +6,14 @@ import asyncio
 import uuid
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Self, TypeVar
 
 import zmq
 import zmq.asyncio
 from zmq.utils.monitor import parse_monitor_message
 
-from flightd.adapters.ground_link.keys import KeyPair
+from flightd.adapters.ground_link.keys import KeyPair, load_pair, load_public
 from flightd.adapters.ground_link.protocol import (
     DECODE_ERRORS,
     EVENT_TOPIC,
@@ -41,6 +42,7 @@ from flightd.adapters.ground_link.protocol import (
     encode,
 )
 from flightd.core.errors import InputError, RunError, TransientError, UnavailableError
+from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind
 
 RETRY_S = 1.0
@@ -63,6 +65,15 @@ class Address:
     keys: KeyPair | None = None
     server_key: str | None = None
 
+    @classmethod
+    def with_keys(cls, host: str, ports: tuple[int, int], key: Path | None, server_key: Path | None) -> Self:
+        """The address with what is in the key files: ours, secret, and the daemon's.  `ports` are those of
+        status and commands.  InputError for one key without the other, and for files that hold none."""
+        if (key is None) != (server_key is None):
+            raise InputError("belong together: yours, and the daemon's public one", key="--key, --server-key")
+        keys = None if key is None else load_pair(key)
+        return cls(host, *ports, keys, None if server_key is None else load_public(server_key))
+
     def endpoint(self, port: int) -> str:
         return f"tcp://[{self.host}]:{port}" if ":" in self.host else f"tcp://{self.host}:{port}"
 
@@ -70,8 +81,9 @@ class Address:
 class GroundClient:
     """Connected while entered: `async with GroundClient(address) as client`.
 
-    Each call raises UnavailableError when no daemon answers within `timeout_s` (saying why, as far as
-    ZMQ knows), InputError when it refuses what was asked for, RunError when it refuses to do it.
+    Calls may run beside each other: none waits for another's answer.  Each raises UnavailableError when no
+    daemon answers within `timeout_s` (saying why, as far as ZMQ knows), InputError when it refuses what was
+    asked for, RunError when it refuses to do it.
     """
 
     def __init__(self, address: Address, name: str = "flightctl", timeout_s: float = 3.0) -> None:
@@ -82,7 +94,8 @@ class GroundClient:
         self._requests: Any = self._socket(zmq.DEALER)
         self._status: Any = self._socket(zmq.SUB)
         self._monitor: Any = self._requests.get_monitor_socket()
-        self._asking = asyncio.Lock()
+        self._asked: dict[str, asyncio.Future[tuple[Answer, list[bytes]]]] = {}
+        self._reading: asyncio.Task[None] | None = None
         self._seen: set[int] = set()
         self.session = ""
 
@@ -98,9 +111,14 @@ class GroundClient:
             raise InputError(
                 f"{address.endpoint(address.command_port)}: {err.strerror}: no such host"
             ) from None
+        if self._reading is None:
+            self._reading = asyncio.create_task(self._read(), name="ground link answers")
         return self
 
     async def __aexit__(self, *_: object) -> None:
+        if self._reading is not None:
+            self._reading.cancel()
+            await asyncio.wait([self._reading])
         self._close()
 
     async def hello(self) -> Welcome:
@@ -128,9 +146,9 @@ class GroundClient:
         """What has been counted, place by place."""
         return (await self._ask(AskInventory(version=VERSION, id=_new_id()), InventoryAnswer)).places
 
-    async def picture(self) -> tuple[PictureAnswer, bytes]:
-        """The down camera's next picture and its JPEG."""
-        request = AskPicture(version=VERSION, id=_new_id())
+    async def picture(self, camera: CameraName = CameraName.DOWN) -> tuple[PictureAnswer, bytes]:
+        """A camera's next picture and its JPEG."""
+        request = AskPicture(version=VERSION, id=_new_id(), camera=camera)
         answer, frames = await self._answer(request, max(self._timeout_s, 4.0))
         return _expected(answer, PictureAnswer), frames[1]
 
@@ -148,12 +166,14 @@ class GroundClient:
 
     async def _answer(self, request: Request, timeout_s: float) -> tuple[Answer, list[bytes]]:
         """The answer to this request, asked for again while it does not come."""
-        async with self._asking:
-            try:
-                async with asyncio.timeout(timeout_s):
-                    return await self._repeated(request)
-            except TimeoutError:
-                raise UnavailableError(await self._why_silent()) from None
+        self._asked[request.id] = asyncio.get_running_loop().create_future()
+        try:
+            async with asyncio.timeout(timeout_s):
+                return await self._repeated(request)
+        except TimeoutError:
+            raise UnavailableError(await self._why_silent()) from None
+        finally:
+            self._asked.pop(request.id).cancel()
 
     async def _repeated(self, request: Request) -> tuple[Answer, list[bytes]]:
         patience_s = 4.0 if isinstance(request, AskPicture) else RETRY_S
@@ -161,24 +181,31 @@ class GroundClient:
             await self._requests.send(encode(request))
             try:
                 async with asyncio.timeout(patience_s):
-                    return await self._received(request.id)
+                    return await asyncio.shield(self._asked[request.id])
             except TimeoutError:
                 await self._note_events()
                 if self._seen & _SHUT_OUT:
                     raise
 
-    async def _received(self, request_id: str) -> tuple[Answer, list[bytes]]:
-        """The next answer to this request; late ones to earlier requests are left out."""
+    async def _read(self) -> None:
+        """Give each answer to the call that asked for it; late ones, which nobody waits for any more, are
+        left out.  One without a request's id, and one that cannot be read, may be anybody's."""
         while True:
             frames = await self._requests.recv_multipart()
             try:
                 answer = decode_answer(frames[0])
             except DECODE_ERRORS as err:
-                raise InputError(
-                    f"the daemon's answer is not of our protocol ({err}): update the older"
-                ) from None
-            if answer.request in {request_id, ""}:
-                return answer, frames
+                text = f"the daemon's answer is not of our protocol ({err}): update the older"
+                for asked in self._waiting(""):
+                    asked.set_exception(InputError(text))
+                continue
+            for asked in self._waiting(answer.request):
+                asked.set_result((answer, frames))
+
+    def _waiting(self, request_id: str) -> list[asyncio.Future[tuple[Answer, list[bytes]]]]:
+        """What waits for the answer to a request, or for any where the id is empty."""
+        found = [self._asked.get(request_id)] if request_id else list(self._asked.values())
+        return [asked for asked in found if asked is not None and not asked.done()]
 
     async def _why_silent(self) -> str:
         """What ZMQ saw happen to the connection, in words."""

@@ -6,7 +6,7 @@ import asyncio
 import secrets
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
-from typing import Any, Self
+from typing import Any, Self, TypeAlias
 
 import zmq
 import zmq.asyncio
@@ -14,6 +14,7 @@ import zmq.asyncio
 from flightd.adapters.ground_link.audit import AuditEntry, AuditLog
 from flightd.adapters.ground_link.authenticator import DOMAIN, Authenticator
 from flightd.adapters.ground_link.keys import Client, KeyPair, load_clients, load_pair
+from flightd.adapters.ground_link.picture_answer import picture_answer
 from flightd.adapters.ground_link.protocol import (
     EVENT_TOPIC,
     MAX_REQUEST_BYTES,
@@ -24,7 +25,6 @@ from flightd.adapters.ground_link.protocol import (
     Code,
     EventReport,
     LinkReport,
-    PictureAnswer,
     Role,
     encode,
 )
@@ -32,6 +32,7 @@ from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
 from flightd.adapters.ground_link.status_report import status_report
 from flightd.config.ground import GroundConfig
 from flightd.core.errors import TransientError, UnavailableError
+from flightd.core.preview import CameraName, Preview
 from flightd.core.snapshot import Snapshot
 from flightd.core.types import Command, Event
 from flightd.ports import Clock
@@ -39,6 +40,9 @@ from flightd.site.site import Site
 
 _LOCAL = Client("local", Role.OPERATOR)
 """Who may connect without a key: this machine's own users."""
+
+_Waiting: TypeAlias = "deque[tuple[list[bytes], AskPicture, int]]"
+"""Who asked for a picture, what, and when."""
 
 _REQUESTS_AT_ONCE = 10
 _TURN_S = 0.001
@@ -66,18 +70,22 @@ class ZmqGround:
         site: Site,
         clock: Clock,
         inventory: Callable[[], Sequence[dict[str, str]]] | None = None,
+        cameras: Sequence[CameraName] = (CameraName.DOWN,),
     ) -> None:
-        """Read keys and allow-list.  InputError names what is wrong with them."""
+        """Read keys and allow-list.  InputError names what is wrong with them.  `cameras` are those that this
+        flight has pictures of."""
         self._config = config
         self._clock = clock
         self._keys: KeyPair | None = load_pair(config.server_key) if config.server_key else None
         self._clients = load_clients(config.clients) if config.clients else {}
         self._session = secrets.token_hex(8)
         self._audit: AuditLog | None = None
-        self._handler = RequestHandler(site, self._session, self._write_down, config.picture_fps, inventory)
+        self._handler = RequestHandler(
+            site, self._session, self._write_down, config.picture_fps, inventory, cameras
+        )
         self._seq: Counter[bytes] = Counter()
-        self._waiting: deque[tuple[list[bytes], AskPicture, int]] = deque()
-        self._picture_ns = -(10**12)
+        self._waiting: dict[CameraName, _Waiting] = {camera: deque() for camera in CameraName}
+        self._picture_ns = dict.fromkeys(CameraName, -(10**12))
         self._dropped = 0
         self._context: zmq.asyncio.Context | None = None
         self._authenticator: Authenticator | None = None
@@ -180,20 +188,22 @@ class ZmqGround:
     @property
     def pictures_wanted(self) -> int:
         """Requests that wait for a picture."""
-        return len(self._waiting)
+        return sum(map(len, self._waiting.values()))
 
-    def picture_due(self, stamp_ns: int) -> bool:
-        """Somebody waits for a picture, and one exposed then does not exceed the rate."""
-        due = bool(self._waiting) and (stamp_ns - self._picture_ns) * self._config.picture_fps >= 10**9
+    def picture_due(self, stamp_ns: int, camera: CameraName = CameraName.DOWN) -> bool:
+        """Somebody waits for a picture of that camera, and one exposed then does not exceed the rate."""
+        fps = self._config.picture_fps
+        due = bool(self._waiting[camera]) and (stamp_ns - self._picture_ns[camera]) * fps >= 10**9
         if due:
-            self._picture_ns = stamp_ns
+            self._picture_ns[camera] = stamp_ns
         return due
 
-    def picture(self, seq: int, stamp_ns: int, jpeg: bytes) -> None:
-        """Give the picture to all who wait for one."""
-        while self._waiting:
-            head, request, _ = self._waiting.popleft()
-            self._send(head, PictureAnswer(request=request.id, seq=seq, stamp_ns=stamp_ns), jpeg)
+    def picture(self, preview: Preview) -> None:
+        """Give the picture to all who wait for one of that camera."""
+        waiting = self._waiting[preview.camera]
+        while waiting:
+            head, request, _ = waiting.popleft()
+            self._send(head, picture_answer(preview, request.id), preview.jpeg)
 
     def _listen(self, socket: Any, port: int, key: str) -> Any:
         config = self._config
@@ -251,8 +261,8 @@ class ZmqGround:
         answer = self._handler.answer(body, peer, now_ns)
         if not isinstance(answer, AskPicture):
             self._send(head, answer)
-        elif len(self._waiting) < _PICTURES_WAITING:
-            self._waiting.append((head, answer, now_ns))
+        elif len(self._waiting[answer.camera]) < _PICTURES_WAITING:
+            self._waiting[answer.camera].append((head, answer, now_ns))
         else:
             text = "too many clients wait for a picture; ask again later"
             self._send(head, self._handler.refuse_picture(answer, Code.BUSY, text))
@@ -277,10 +287,11 @@ class ZmqGround:
 
     def give_up_pictures(self, now_ns: int) -> None:
         """Refuse the requests for a picture that no camera answered in time."""
-        while self._waiting and now_ns - self._waiting[0][2] > _PICTURE_NS:
-            head, request, _ = self._waiting.popleft()
-            text = "the down camera delivers no picture"
-            self._send(head, self._handler.refuse_picture(request, Code.UNAVAILABLE, text))
+        for camera, waiting in self._waiting.items():
+            while waiting and now_ns - waiting[0][2] > _PICTURE_NS:
+                head, request, _ = waiting.popleft()
+                text = f"the {camera} camera delivers no picture"
+                self._send(head, self._handler.refuse_picture(request, Code.UNAVAILABLE, text))
 
     def _next(self, topic: bytes) -> int:
         self._seq[topic] += 1

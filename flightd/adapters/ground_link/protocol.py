@@ -16,6 +16,7 @@ from typing import Annotated, Literal, TypeAlias
 import msgspec
 from msgspec import Meta
 
+from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind, EventLevel, Phase
 
 VERSION = 1
@@ -59,6 +60,9 @@ class Position(msgspec.Struct, frozen=True):
     yaw_rad: Annotated[float, Meta(description="heading, clockwise from x, seen from above")]
     speed_mps: Annotated[float, Meta(description="speed over the floor, m/s")]
     integrity: Annotated[float, Meta(description="probability that the node is right, 0..1")]
+    sigma_x_m: Annotated[float | None, Meta(description="standard deviation of x, m")] = None
+    sigma_y_m: Annotated[float | None, Meta(description="standard deviation of y, m")] = None
+    sigma_yaw_rad: Annotated[float | None, Meta(description="standard deviation of the heading")] = None
 
 
 class SeenLine(msgspec.Struct, frozen=True):
@@ -109,6 +113,14 @@ class SensorReport(msgspec.Struct, frozen=True):
     shake_deg: Annotated[float, Meta(description="the picture against the attitude, frame by frame, rms")]
 
 
+class HazardReport(msgspec.Struct, frozen=True):
+    """A hazard that holds now, or held within the last second."""
+
+    text: Annotated[str, Meta(description="what it is")]
+    action: Annotated[str, Meta(description="what the drone does about it: hold, land, home, report ...")]
+    age_s: Annotated[float, Meta(description="since it was found, s")]
+
+
 class StatusReport(msgspec.Struct, frozen=True):
     """Topic `status`, ten times a second and at each change of phase; also the answer to `status`."""
 
@@ -138,6 +150,19 @@ class StatusReport(msgspec.Struct, frozen=True):
     sensors: Annotated[
         SensorReport | None, Meta(description="what the lines say of them; null before they were seen")
     ] = None
+    height_goal_m: Annotated[
+        float | None, Meta(description="height that it flies at or makes for, m; 0 on the ground")
+    ] = None
+    way: Annotated[tuple[str, ...], Meta(description="nodes flown over next, in order; 32 at most")] = ()
+    possible: Annotated[tuple[CommandKind, ...], Meta(description="commands that the mission takes now")] = ()
+    obstacles: Annotated[
+        tuple[str, ...], Meta(description="all that keeps it on the ground while it waits there")
+    ] = ()
+    hazards: Annotated[tuple[HazardReport, ...], Meta(description="hazards that hold, oldest first")] = ()
+    battery_left_s: Annotated[
+        float | None, Meta(description="time in the air until only the reserve is left, s")
+    ] = None
+    home_s: Annotated[float | None, Meta(description="time from the goal down onto a charge pad, s")] = None
 
 
 class EventReport(msgspec.Struct, frozen=True):
@@ -180,8 +205,10 @@ class AskStatus(_Request, frozen=True, tag="status"):
     """The newest status report.  Answer: `status`."""
 
 
-class AskPicture(_Request, frozen=True, tag="picture"):
-    """The down camera's next picture.  Answer: `picture`, with the JPEG as a second frame."""
+class AskPicture(_Request, frozen=True, tag="picture", omit_defaults=True):
+    """A camera's next picture.  Answer: `picture`, with the JPEG as a second frame."""
+
+    camera: Annotated[CameraName, Meta(description="down or front, of those in `welcome`")] = CameraName.DOWN
 
 
 class AskInventory(_Request, frozen=True, tag="inventory"):
@@ -230,6 +257,46 @@ class FloorLine(msgspec.Struct, frozen=True):
     y1_m: Annotated[float, Meta(description="other end")]
 
 
+class FloorRack(msgspec.Struct, frozen=True):
+    """A shelf front: a vertical rectangle parallel to x, which faces its aisle."""
+
+    aisle: Annotated[str, Meta(description="of which aisle")]
+    side: Annotated[str, Meta(description="left (towards -y) or right of it")]
+    x0_m: Annotated[float, Meta(description="one end")]
+    x1_m: Annotated[float, Meta(description="other end")]
+    y_m: Annotated[float, Meta(description="where the front stands")]
+    height_m: Annotated[float, Meta(description="above the floor")]
+
+
+class FloorArea(msgspec.Struct, frozen=True):
+    """A rectangle of floor over which nothing flies between two heights."""
+
+    x0_m: Annotated[float, Meta(description="smaller x")]
+    y0_m: Annotated[float, Meta(description="smaller y")]
+    x1_m: Annotated[float, Meta(description="larger x")]
+    y1_m: Annotated[float, Meta(description="larger y")]
+    from_m: Annotated[float, Meta(description="from this height")]
+    to_m: Annotated[float | None, Meta(description="to this height; null: without end")]
+
+
+class FloorPad(msgspec.Struct, frozen=True):
+    """A pad to start from, to land or to charge on."""
+
+    id: Annotated[str, Meta(description="name")]
+    x_m: Annotated[float, Meta(description="of its centre")]
+    y_m: Annotated[float, Meta(description="of its centre")]
+    size_m: Annotated[float, Meta(description="length of its sides")]
+    charge: Annotated[bool, Meta(description="batteries are charged or changed here")]
+
+
+class FloorWay(msgspec.Struct, frozen=True):
+    """A line between two nodes that is not simply open."""
+
+    a: Annotated[str, Meta(description="node")]
+    b: Annotated[str, Meta(description="node")]
+    closed: Annotated[bool, Meta(description="blocked, or too near a keep-out; else one way, from a to b")]
+
+
 class FloorStatus(msgspec.Struct, frozen=True):
     """The warehouse map, as far as a client draws it."""
 
@@ -237,6 +304,12 @@ class FloorStatus(msgspec.Struct, frozen=True):
     home: Annotated[str, Meta(description="node of the pad")]
     nodes: Annotated[tuple[FloorNode, ...], Meta(description="every node")]
     lines: Annotated[tuple[FloorLine, ...], Meta(description="every painted line")]
+    line_width_m: Annotated[float, Meta(description="width of the paint; 0: not told")] = 0.0
+    line_colour: Annotated[str, Meta(description="colour of the paint; empty: not told")] = ""
+    racks: Annotated[tuple[FloorRack, ...], Meta(description="every shelf front")] = ()
+    keep_outs: Annotated[tuple[FloorArea, ...], Meta(description="every keep-out")] = ()
+    pads: Annotated[tuple[FloorPad, ...], Meta(description="every pad")] = ()
+    ways: Annotated[tuple[FloorWay, ...], Meta(description="closed and one-way lines")] = ()
 
 
 class Welcome(_Answer, frozen=True, tag="welcome"):
@@ -246,9 +319,14 @@ class Welcome(_Answer, frozen=True, tag="welcome"):
     session: _Session
     role: Annotated[Role, Meta(description="viewer: look; operator: command")]
     client: Annotated[str, Meta(description="your name on the allow-list; `local` without keys")]
-    picture_fps: Annotated[float, Meta(description="most pictures per second, all clients together")]
+    picture_fps: Annotated[
+        float, Meta(description="most pictures of each camera per second, all clients together")
+    ]
     floor: Annotated[FloorStatus, Meta(description="the map")]
     events: Annotated[tuple[EventReport, ...], Meta(description="newest events, oldest first")]
+    cameras: Annotated[tuple[CameraName, ...], Meta(description="those whose pictures may be asked for")] = (
+        CameraName.DOWN,
+    )
 
 
 class Accepted(_Answer, frozen=True, tag="accepted"):
@@ -284,11 +362,35 @@ class StatusAnswer(_Answer, frozen=True, tag="status"):
     status: Annotated[StatusReport | None, Meta(description="null before the first tick")]
 
 
+class PictureLine(msgspec.Struct, frozen=True):
+    """A painted line that was found in the picture."""
+
+    points: Annotated[
+        tuple[tuple[float, float], ...],
+        Meta(description="of its centre line, as parts of the picture's width and height"),
+    ]
+    width: Annotated[float, Meta(description="of the line, as a part of the picture's width")]
+
+
+class PictureArea(msgspec.Struct, frozen=True):
+    """A code or a place of the shelf that was found in the picture."""
+
+    kind: Annotated[str, Meta(description="code or place")]
+    text: Annotated[str, Meta(description="the code's text, or the place and what it holds")]
+    corners: Annotated[
+        tuple[tuple[float, float], ...],
+        Meta(description="in order, as parts of the picture's width and height"),
+    ]
+
+
 class PictureAnswer(_Answer, frozen=True, tag="picture"):
-    """A picture of the down camera; the next frame of the message is the JPEG."""
+    """A camera's picture; the next frame of the message is the JPEG."""
 
     seq: Annotated[int, Meta(description="number of the frame")]
     stamp_ns: Annotated[int, Meta(description="middle of its exposure, the daemon's monotonic clock, ns")]
+    camera: Annotated[CameraName, Meta(description="which camera's")] = CameraName.DOWN
+    lines: Annotated[tuple[PictureLine, ...], Meta(description="painted lines found in it")] = ()
+    areas: Annotated[tuple[PictureArea, ...], Meta(description="codes and places found in it")] = ()
 
 
 class InventoryAnswer(_Answer, frozen=True, tag="inventory"):
@@ -315,7 +417,10 @@ DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 PUBLISHED = (StatusReport, EventReport)
 REQUESTS = (Hello, Order, AskStatus, AskPicture, AskInventory, Attend)
 ANSWERS = (Welcome, Accepted, Refused, StatusAnswer, PictureAnswer, InventoryAnswer)
-PARTS = (Position, SeenLine, VehicleReport, LinkReport, SensorReport, FloorStatus, FloorNode, FloorLine)
+PARTS = (
+    Position, SeenLine, VehicleReport, LinkReport, SensorReport, HazardReport, FloorStatus, FloorNode,
+    FloorLine, FloorRack, FloorArea, FloorPad, FloorWay, PictureLine, PictureArea,
+)  # fmt: skip
 
 
 def finite(value: float) -> float | None:

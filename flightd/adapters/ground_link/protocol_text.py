@@ -44,6 +44,10 @@ def _kind(spec: dict[str, object]) -> str:
         options = spec["anyOf"]
         assert isinstance(options, list)
         return " or ".join(_kind(option) for option in options)
+    if "prefixItems" in spec:
+        parts = spec["prefixItems"]
+        assert isinstance(parts, list)
+        return f"({', '.join(_kind(part) for part in parts)})"
     if spec.get("type") == "array":
         items = spec.get("items", {})
         assert isinstance(items, dict)

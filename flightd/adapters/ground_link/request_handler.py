@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from flightd import __version__
 from flightd.adapters.ground_link.audit import AuditEntry
+from flightd.adapters.ground_link.floor_status import floor_status
 from flightd.adapters.ground_link.protocol import (
     DECODE_ERRORS,
     VERSION,
@@ -23,9 +24,6 @@ from flightd.adapters.ground_link.protocol import (
     Code,
     Envelope,
     EventReport,
-    FloorLine,
-    FloorNode,
-    FloorStatus,
     Hello,
     InventoryAnswer,
     Order,
@@ -38,6 +36,7 @@ from flightd.adapters.ground_link.protocol import (
     decode_envelope,
     decode_request,
 )
+from flightd.core.preview import CameraName
 from flightd.core.types import WAITING, Command, CommandKind, Phase
 from flightd.mission.machine import BEGIN, possible_commands
 from flightd.site.site import Site
@@ -74,13 +73,15 @@ class RequestHandler:
         audit: Callable[[AuditEntry], None],
         picture_fps: float = 0.0,
         inventory: Callable[[], Sequence[dict[str, str]]] | None = None,
+        cameras: Sequence[CameraName] = (CameraName.DOWN,),
     ) -> None:
         self._nodes = frozenset(site.nodes)
-        self._floor = _floor(site)
+        self._floor = floor_status(site)
         self._session = session
         self._audit = audit
         self._picture_fps = picture_fps
         self._inventory = inventory
+        self._cameras = tuple(cameras)
         self._commands: deque[Command] = deque()
         self._done: OrderedDict[tuple[str, str], tuple[CommandKind, str]] = OrderedDict()
         self._recent: deque[tuple[str, int]] = deque(maxlen=_ORDERS_PER_S * 8)
@@ -137,9 +138,13 @@ class RequestHandler:
         if isinstance(request, AskStatus):
             return StatusAnswer(request=request.id, status=self.status)
         if isinstance(request, AskPicture):
-            off = self._picture_fps == 0
-            text = "pictures are off: set ground.picture_fps"
-            return self._refuse(request.id, Code.UNAVAILABLE, text) if off else request
+            if self._picture_fps == 0:
+                text = "pictures are off: set ground.picture_fps"
+                return self._refuse(request.id, Code.UNAVAILABLE, text)
+            if request.camera not in self._cameras:
+                text = f"this flight uses no {request.camera} camera"
+                return self._refuse(request.id, Code.UNAVAILABLE, text)
+            return request
         if self._inventory is None:
             return self._refuse(request.id, Code.UNAVAILABLE, "this flightd keeps no inventory store")
         return InventoryAnswer(request=request.id, places=tuple(self._inventory()))
@@ -158,6 +163,7 @@ class RequestHandler:
             picture_fps=self._picture_fps,
             floor=self._floor,
             events=tuple(self.events),
+            cameras=self._cameras,
         )
 
     def _order(self, order: Order, peer: Peer, now_ns: int) -> Answer:
@@ -275,12 +281,3 @@ def _takes_start_back(kind: CommandKind, phase: Phase) -> bool:
 def _wrong_version(envelope: Envelope) -> str:
     theirs = f"version {envelope.version}" if envelope.version else "no version"
     return f"this flightd speaks version {VERSION} of the ground protocol, the client {theirs}: update it"
-
-
-def _floor(site: Site) -> FloorStatus:
-    return FloorStatus(
-        name=site.name,
-        home=site.home.node,
-        nodes=tuple(FloorNode(node.id, node.x_m, node.y_m) for node in site.nodes.values()),
-        lines=tuple(FloorLine(line.x0_m, line.y0_m, line.x1_m, line.y1_m) for line in site.lines),
-    )

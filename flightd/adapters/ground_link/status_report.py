@@ -6,6 +6,7 @@ import math
 
 from flightd.adapters.ground_link.protocol import (
     VERSION,
+    HazardReport,
     LinkReport,
     Position,
     SeenLine,
@@ -17,7 +18,7 @@ from flightd.adapters.ground_link.protocol import (
 from flightd.core.refusal import words
 from flightd.core.snapshot import Snapshot
 from flightd.core.tracks import SensorEstimate, TrackSet
-from flightd.core.types import GridPose, VehicleState
+from flightd.core.types import CommandKind, GridPose, VehicleState
 
 
 def status_report(snapshot: Snapshot, session: str, seq: int, link: LinkReport) -> StatusReport:
@@ -47,6 +48,16 @@ def status_report(snapshot: Snapshot, session: str, seq: int, link: LinkReport) 
         latency_ms={stage: round(ms, 2) for stage, ms in snapshot.latency_ms.items()},
         link=link,
         sensors=_sensors(snapshot.sensors) if snapshot.sensors.is_known else None,
+        height_goal_m=finite(snapshot.height_goal_m),
+        way=snapshot.outlook.way,
+        possible=tuple(kind for kind in CommandKind if kind in snapshot.possible),
+        obstacles=snapshot.outlook.obstacles,
+        hazards=tuple(
+            HazardReport(seen.text, seen.action, round((snapshot.stamp_ns - seen.since_ns) * 1e-9, 1))
+            for seen in snapshot.outlook.hazards
+        ),
+        battery_left_s=finite(snapshot.outlook.battery_left_s),
+        home_s=finite(snapshot.outlook.home_s),
     )
 
 
@@ -74,7 +85,15 @@ def _position(pose: GridPose) -> Position:
         yaw_rad=pose.yaw_rad,
         speed_mps=math.hypot(pose.vx_mps, pose.vy_mps),
         integrity=pose.integrity,
+        sigma_x_m=_sigma(pose.covariance[0]),
+        sigma_y_m=_sigma(pose.covariance[4]),
+        sigma_yaw_rad=_sigma(pose.covariance[8]),
     )
+
+
+def _sigma(variance: float) -> float | None:
+    """The standard deviation, None where there is none to tell."""
+    return math.sqrt(variance) if 0.0 <= variance < math.inf else None
 
 
 def _lines(tracks: TrackSet) -> tuple[SeenLine, ...]:

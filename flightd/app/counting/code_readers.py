@@ -3,58 +3,100 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from typing import Protocol, TypeAlias
+from dataclasses import dataclass
+from typing import Protocol
 
+import cv2
+
+from flightd.app.absent_parts import NO_GROUND
 from flightd.app.detection.detector_pool import FramePool, Work
+from flightd.core.preview import CameraName, Preview, found_areas
 from flightd.core.scanning import CodeSet, Place
 from flightd.core.types import Image
-from flightd.ports import Clock
+from flightd.ports import Clock, Ground
 from flightd.runtime.clock import Hold
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.runtime.latest_slot import Latest
 from flightd.vision.shelf.shelf_look import read_shelf
 
-Reading: TypeAlias = tuple[CodeSet, dict[str, bytes]]
-"""What was read, and the evidence pictures by name (JPEG)."""
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a frame is wanted for: the places to look at (none: nothing is read), and whether the ground is
+    to see it."""
+
+    places: tuple[Place, ...]
+    shown: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What was read (None where nothing was asked for), the evidence pictures by name, and the frame for
+    the ground where that wants it; all pictures are JPEG."""
+
+    codes: CodeSet | None
+    evidence: dict[str, bytes]
+    shown: bytes = b""
+
 
 _MOST_EVIDENCE = 1000
 _MOST_SETS = 50
+_SHOWN_PX, _SHOWN_QUALITY = 960, 80
+"""Width and quality of a picture for people."""
 
 
 class Readers(Protocol):
     """Frames in, codes and places out, somewhere else."""
 
-    async def read(self, ticket: FrameTicket, places: tuple[Place, ...]) -> Reading | None: ...
+    async def read(self, ticket: FrameTicket, wanted: Wanted) -> Reading | None: ...
 
 
-def _read(bgr: Image, ticket: FrameTicket, places: tuple[Place, ...]) -> Reading:
-    return read_shelf(bgr, ticket.seq, ticket.stamp_ns, places, ticket.exposure)
+def read_frame(bgr: Image, ticket: FrameTicket, wanted: Wanted) -> Reading:
+    """What a reader process makes of a frame, (H, W, 3) BGR."""
+    shown = _shown(bgr) if wanted.shown else b""
+    if not wanted.places:
+        return Reading(None, {}, shown)
+    codes, evidence = read_shelf(bgr, ticket.seq, ticket.stamp_ns, wanted.places, ticket.exposure)
+    return Reading(codes, evidence, shown)
 
 
-def _shelf_reader() -> Work[tuple[Place, ...], Reading]:
-    return _read
+def _shown(bgr: Image) -> bytes:
+    """The frame as people look at it: no wider than a screen's window."""
+    height, width = bgr.shape[:2]
+    if width > _SHOWN_PX:
+        size = _SHOWN_PX, round(height * _SHOWN_PX / width)
+        small = cv2.resize(bgr, size, interpolation=cv2.INTER_AREA)
+    else:
+        small = bgr
+    return cv2.imencode(".jpg", small, (cv2.IMWRITE_JPEG_QUALITY, _SHOWN_QUALITY))[1].tobytes()
 
 
-class ReaderPool(FramePool[tuple[Place, ...], Reading]):
+def _shelf_reader() -> Work[Wanted, Reading]:
+    return read_frame
+
+
+class ReaderPool(FramePool[Wanted, Reading]):
     """Processes that read codes; one that dies or hangs is replaced, its frame counts as lost."""
 
     def __init__(self, size: int, timeout_s: float, clock: Clock, hold: Hold = nullcontext) -> None:
         super().__init__(_shelf_reader, size, timeout_s, clock, "code reader", hold)
 
-    async def read(self, ticket: FrameTicket, places: tuple[Place, ...]) -> Reading | None:
+    async def read(self, ticket: FrameTicket, wanted: Wanted) -> Reading | None:
         """Codes and places of one frame, or None when it was lost."""
-        return await self.ask(ticket, places)
+        return await self.ask(ticket, wanted)
 
 
 class ShelfWatch:
-    """Has the front camera's newest frame read while the mission wants one; all others are passed over
-    unread.  `places` says what a frame exposed at a time is wanted for."""
+    """Has the front camera's newest frame read while the mission wants one, and made a picture of when
+    `ground` asks for one; all others are passed over.  `places` says what a frame exposed at a time is wanted
+    for."""
 
     def __init__(self, readers: Readers, places: Callable[[int], tuple[Place, ...]]) -> None:
         self._readers = readers
         self.places = places
+        self.ground: Ground = NO_GROUND
         self._sets: list[CodeSet] = []
         self._evidence: OrderedDict[str, bytes] = OrderedDict()
         self.frames: Latest[FrameTicket] = Latest()
@@ -66,18 +108,32 @@ class ShelfWatch:
         while True:
             ticket = await self.frames.get()
             places = self.places(ticket.stamp_ns)
-            if not places:
+            shown = self.ground.picture_due(ticket.stamp_ns, CameraName.FRONT)
+            if not places and not shown:
                 continue
-            reading = await self._readers.read(ticket, places)
+            reading = await self._readers.read(ticket, Wanted(places, shown))
             if reading is None or len(self._sets) >= _MOST_SETS:
                 self.lost += 1
                 continue
-            codes, pictures = reading
-            self.read += 1
-            self._sets.append(codes)
-            self._evidence.update(pictures)
-            while len(self._evidence) > _MOST_EVIDENCE:
-                self._evidence.popitem(last=False)
+            self._show(ticket, reading)
+            if reading.codes is not None:
+                self._keep(reading.codes, reading.evidence)
+
+    def _show(self, ticket: FrameTicket, reading: Reading) -> None:
+        """Hand the ground the picture that it asked for."""
+        if reading.shown:
+            areas = () if reading.codes is None else found_areas(reading.codes)
+            self.ground.picture(
+                Preview(CameraName.FRONT, ticket.seq, ticket.stamp_ns, reading.shown, areas=areas)
+            )
+
+    def _keep(self, codes: CodeSet, evidence: Mapping[str, bytes]) -> None:
+        """What was read, for the mission, and its evidence for the store."""
+        self.read += 1
+        self._sets.append(codes)
+        self._evidence.update(evidence)
+        while len(self._evidence) > _MOST_EVIDENCE:
+            self._evidence.popitem(last=False)
 
     def take(self) -> tuple[CodeSet, ...]:
         """What was read since the last call, in the order of the frames."""

@@ -10,6 +10,7 @@ from flightd.app.counting.store_writer import StoreWriter
 from flightd.app.flight import Tasks
 from flightd.core.scanning import CodeSet, Finding, Place
 from flightd.core.tick import TickOutput
+from flightd.ports import Ground
 from flightd.runtime.frame_ring import FrameTicket
 
 
@@ -36,6 +37,10 @@ class Counting:
     def read_for(self, places: Callable[[int], tuple[Place, ...]]) -> None:
         """`places` says what a frame exposed at a time is wanted for."""
         self._watch.places = places
+
+    def show_on(self, ground: Ground) -> None:
+        """Frames that `ground` asks for are shown to it."""
+        self._watch.ground = ground
 
     def tasks(self, on_trouble: Callable[[str], None]) -> Tasks:
         """What runs during a flight; what goes wrong is told to `on_trouble`."""

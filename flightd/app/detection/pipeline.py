@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from flightd.app.detection.detector_pool import Detection, Detectors
 from flightd.app.detection.latency import LatencyBook
 from flightd.app.flight import Tasks
+from flightd.core.geometry import Lens
+from flightd.core.preview import CameraName, Preview, found_lines
 from flightd.core.topics import Topic
 from flightd.core.types import LineSet
 from flightd.ports import Ground, Recorder
@@ -21,15 +23,23 @@ class DetectionPipeline:
     """`app.flight.Vision`: frames in by `frames`, lines out by `fresh`; `workers` are looked at at once.
 
     Frames are kept for the recorder at up to `picture_fps` (0: none), for the ground when it asks.
-    `latency` hears from the pump when a setpoint is on the wire."""
+    `lens` says where its pictures show the lines, `latency` hears from the pump when a setpoint is on the
+    wire."""
 
     def __init__(
-        self, detectors: Detectors, workers: int, recorder: Recorder, ground: Ground, picture_fps: float
+        self,
+        detectors: Detectors,
+        workers: int,
+        recorder: Recorder,
+        ground: Ground,
+        picture_fps: float,
+        lens: Lens,
     ) -> None:
         self._detectors = detectors
         self._workers = workers
         self._recorder = recorder
         self._ground = ground
+        self._lens = lens
         self._period_ns = round(1e9 / picture_fps) if picture_fps else 0
         self.frames: Latest[FrameTicket] = Latest()
         self.latency = LatencyBook()
@@ -58,7 +68,10 @@ class DetectionPipeline:
             if detection.jpeg is not None and keep:
                 self._recorder.image(Topic.FRAME, ticket.stamp_ns, ticket.seq, detection.jpeg)
             if detection.jpeg is not None and show:
-                self._ground.picture(ticket.seq, ticket.stamp_ns, detection.jpeg)
+                lines = found_lines(detection.lines, self._lens)
+                self._ground.picture(
+                    Preview(CameraName.DOWN, ticket.seq, ticket.stamp_ns, detection.jpeg, lines)
+                )
             self._detections.append(detection)
             self._arrived.set()
 

@@ -20,7 +20,6 @@ from flightd.app.absent_parts import NO_GROUND
 from flightd.app.build import build, detector_pool, ground_link
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
-from flightd.app.ending_signals import end_on_signals
 from flightd.app.flight import Flight
 from flightd.app.recording import record_setting
 from flightd.app.service import monitors
@@ -34,6 +33,7 @@ from flightd.core.errors import RunError, UnavailableError
 from flightd.core.topics import Document, Topic
 from flightd.runtime.clock import Hold, LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
+from flightd.runtime.ending_signals import end_on_signals
 from flightd.runtime.event_loops import ScaledLoop, VirtualLoop
 from flightd.runtime.message_channel import Channel
 from flightd.runtime.undisturbed_start import undisturbed

@@ -5,9 +5,8 @@ from __future__ import annotations
 import asyncio
 from dataclasses import replace
 
-from flightd.app.counting.code_readers import Readers, Reading
+from flightd.app.counting.code_readers import Readers, Reading, Wanted
 from flightd.app.detection.detector_pool import Detection, Detectors
-from flightd.core.scanning import Place
 from flightd.ports import Clock
 from flightd.runtime.clock import Hold
 from flightd.runtime.frame_ring import FrameTicket
@@ -52,8 +51,8 @@ class LockstepReaders:
         self._latency_s = latency_s
         self._hold = hold
 
-    async def read(self, ticket: FrameTicket, places: tuple[Place, ...]) -> Reading | None:
-        work = asyncio.ensure_future(self._inner.read(ticket, places))
+    async def read(self, ticket: FrameTicket, wanted: Wanted) -> Reading | None:
+        work = asyncio.ensure_future(self._inner.read(ticket, wanted))
         try:
             await asyncio.sleep(self._latency_s)
             with self._hold():

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from flightd.core.errors import InputError
-
 if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import Address, GroundClient
 
@@ -41,14 +39,5 @@ class DaemonConnection:
 
     def _address(self) -> Address:
         from flightd.adapters.ground_link.client import Address
-        from flightd.adapters.ground_link.keys import load_pair, load_public
 
-        if (self.key is None) != (self.server_key is None):
-            raise InputError("belong together: yours, and the daemon's public one", key="--key, --server-key")
-        return Address(
-            self.host,
-            self.status_port,
-            self.command_port,
-            load_pair(self.key) if self.key is not None else None,
-            load_public(self.server_key) if self.server_key is not None else None,
-        )
+        return Address.with_keys(self.host, (self.status_port, self.command_port), self.key, self.server_key)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -66,6 +67,20 @@ class Sorties:
     def rate_per_s(self) -> float:
         """Share of the full battery used per second in flight."""
         return self._gauge.rate_per_s
+
+    @property
+    def left_s(self) -> float:
+        """Seconds in the air until only the reserve is left; NaN without a charge."""
+        if math.isnan(self._charge_frac):
+            return math.nan
+        return max(self._charge_frac - self._battery.reserve, 0.0) / self.rate_per_s
+
+    def home_s(self, node: str) -> float:
+        """Seconds from `node` down onto the nearest charge pad; NaN where no open way leads there."""
+        try:
+            return self.way_back(node).seconds
+        except NoWayError:
+            return math.nan
 
     def way_back(self, node: str) -> WayBack:
         """The quickest legal way from `node` to a charge pad and down onto it; where closed lines leave

@@ -50,6 +50,12 @@ class BatterySwap:
         the last."""
         return self._goes_on and len(self._route.visited) > self._visited_before
 
+    @property
+    def endurance_s(self) -> tuple[float, float]:
+        """Seconds in the air that the charge above the reserve gives, and those of the way from the goal down
+        onto a charge pad; NaN where that is not known."""
+        return self._sorties.left_s, self._sorties.home_s(self._route.goal.node)
+
     def step(self, s: MissionInputs, state: State) -> Trigger | None:
         """Turn back in time: below the fixed share, or when what is left only just brings it back.  How it
         turned back with this tick, None if it did not."""

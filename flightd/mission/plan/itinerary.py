@@ -15,6 +15,9 @@ from flightd.mission.reasons import Reason, in_words
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
 
+_WAY_SHOWN = 32
+"""So many nodes ahead are told."""
+
 
 class Itinerary:
     """The stops in order, re-planned on the way; says to `events` what became of an order or a doubt."""
@@ -52,6 +55,11 @@ class Itinerary:
     def ahead(self) -> tuple[str, ...]:
         """The nodes to visit after the goal, in order."""
         return tuple(stop.node for stop in self._stops[self._next + 1 :] if stop.visit)
+
+    @property
+    def way(self) -> tuple[str, ...]:
+        """The nodes that are flown over next, the goal first; those far ahead are left out."""
+        return tuple(stop.node for stop in self._stops[self._next : self._next + _WAY_SHOWN])
 
     @property
     def left_over(self) -> tuple[str, ...]:

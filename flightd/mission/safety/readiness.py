@@ -19,13 +19,13 @@ from flightd.mission.reasons import (
 )
 
 
-def not_ready(s: MissionInputs, config: Config, ground_silent: bool, *, arming: bool) -> Reason | None:
-    """Why the flight cannot start, None if it can; `ground_silent`: who attends it has fallen silent,
-    `arming`: it is being armed by us."""
+def obstacles(s: MissionInputs, config: Config, ground_silent: bool, *, arming: bool) -> tuple[Reason, ...]:
+    """All that keeps the flight on the ground, worst first; `ground_silent`: who attends it has fallen
+    silent, `arming`: it is being armed by us."""
     p, v, latency_s = config.mission, s.vehicle, config.hazards.latency_s
     clock_s = config.hazards.clock_error_s
     if v is None or s.telemetry_age_s > p.telemetry_hold_s:
-        return Plain.NO_TELEMETRY
+        return (Plain.NO_TELEMETRY,)
     charge, battery = s.charge, config.battery
     cell_v = battery.cell_home_v if charge.loaded else battery.cell_start_v
     found = s.unfit or v.unfit
@@ -44,7 +44,7 @@ def not_ready(s: MissionInputs, config: Config, ground_silent: bool, *, arming: 
         Plain.GROUND_SILENT if ground_silent else None,
         None if s.aisle_closed else Plain.AISLE_OPEN,
     )
-    return next((reason for reason in checks if reason is not None), None)
+    return tuple(reason for reason in checks if reason is not None)
 
 
 def not_fresh(s: MissionInputs, config: Config, stops_left: int) -> Reason | None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from flightd.adapters.ground_link.link import ZmqGround
+from flightd.core.preview import CameraName, Preview
 from flightd.core.types import CommandKind, Phase
 from tests.rigs.event_loops import in_real_time, real
 from tests.rigs.ground_link import Keyring, address_of, local, serving, tell_once
@@ -110,7 +111,7 @@ async def test_a_picture_is_written_to_a_file(tmp_path: Path) -> None:
     async with serving(local()) as link, asyncio.TaskGroup() as tasks:
         asked = tasks.create_task(flightctl(*at(link), "picture", str(tmp_path / "now.jpg")))
         await until(lambda: link.picture_due(10**10))
-        link.picture(1, 10**10, b"\xff\xd8 a picture")
+        link.picture(Preview(CameraName.DOWN, 1, 10**10, b"\xff\xd8 a picture"))
         assert (await asked)[0] == 0
         assert (tmp_path / "now.jpg").read_bytes() == b"\xff\xd8 a picture"
 

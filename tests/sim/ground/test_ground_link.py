@@ -21,6 +21,7 @@ from flightd.adapters.ground_link.client import GroundClient
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.adapters.ground_link.protocol import EventReport, Role, StatusReport
 from flightd.core.errors import InputError, RunError, UnavailableError
+from flightd.core.preview import CameraName, Preview
 from flightd.core.types import CommandKind, Phase
 from flightd.runtime.clock import LoopClock
 from flightd.site.site import Aisle, Edge, Node
@@ -213,7 +214,7 @@ async def test_pictures_come_on_request_at_a_capped_rate() -> None:
                 await until(lambda: link.pictures_wanted == 2)
                 assert link.picture_due(10**10)
                 assert not link.picture_due(10**10 + 10**8), "twice a second at most"
-                link.picture(7, 10**10, b"jpeg")
+                link.picture(Preview(CameraName.DOWN, 7, 10**10, b"jpeg"))
             for answer, jpeg in (task.result() for task in asked):
                 assert (answer.seq, answer.stamp_ns, jpeg) == (7, 10**10, b"jpeg")
             assert not link.picture_due(10**11), "each request gets one"
@@ -326,7 +327,8 @@ async def test_expensive_requests_leave_the_loop_most_of_its_time() -> None:
         for aisle in aisles
         for k in range(100)
     }
-    big = replace(SITE, aisles=tuple(aisles), crosses=tuple(crosses), nodes=nodes)
+    pads = (replace(SITE.home, node="R0-1"),)
+    big = replace(SITE, aisles=tuple(aisles), crosses=tuple(crosses), nodes=nodes, edges=(), pads=pads)
     with _TimedGround(local(), big, LoopClock()) as link:
         address = address_of(link)
         with zmq.asyncio.Context() as context, context.socket(zmq.DEALER) as flood:

@@ -29,6 +29,7 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightd sim": ("--config", "none.toml"),
     "flightd calibrate": ("none.jpg",),
     "flightd run": ("--config", "none.toml"),
+    "flightd ground": ("--listen", "0.0.0.0"),
     "flightd doctor": ("--config", "none.toml"),
     "flightd report": ("empty.mcap",),
     "flightd replay": ("empty.mcap",),
@@ -158,7 +159,7 @@ def test_ctrl_c_is_one_line_and_exit_130(run: Run, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize(
-    "path", [path for path in COMMANDS if path not in {"flightd run", "flightctl watch"}]
+    "path", [path for path in COMMANDS if path not in {"flightd run", "flightd ground", "flightctl watch"}]
 )
 def test_what_answers_once_can_answer_in_json(path: str) -> None:
     assert "--json" in {option for parameter in COMMANDS[path].params for option in parameter.opts}

@@ -7,7 +7,7 @@ from dataclasses import replace
 from flightd.core.types import Attitude, LandedState, VehicleState
 from flightd.mission.guidance import ALL_WELL, MissionInputs
 from flightd.mission.reasons import in_words
-from flightd.mission.safety.readiness import not_ready
+from flightd.mission.safety.readiness import obstacles
 from tests.unit.mission.configured import configured
 
 PARAMS = configured()
@@ -39,8 +39,8 @@ READY = MissionInputs(
 
 
 def test_late_pictures_keep_it_on_the_ground() -> None:
-    assert not_ready(READY, PARAMS, ground_silent=False, arming=False) is None
+    assert obstacles(READY, PARAMS, ground_silent=False, arming=False) == ()
     late = replace(READY, warnings=replace(ALL_WELL, frame_age_s=PARAMS.hazards.latency_s + 0.05))
-    reason = not_ready(late, PARAMS, ground_silent=False, arming=False)
+    (reason,) = obstacles(late, PARAMS, ground_silent=False, arming=False)
     assert reason is not None
     assert "pictures are more than 250 ms old" in in_words(reason)

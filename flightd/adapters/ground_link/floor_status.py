@@ -1,0 +1,41 @@
+"""A site as the ground link tells it: what a client draws of the warehouse."""
+
+from __future__ import annotations
+
+from flightd.adapters.ground_link.protocol import (
+    FloorArea,
+    FloorLine,
+    FloorNode,
+    FloorPad,
+    FloorRack,
+    FloorStatus,
+    FloorWay,
+    finite,
+)
+from flightd.site.site import Site
+
+
+def floor_status(site: Site) -> FloorStatus:
+    """The map as it goes over the link."""
+    return FloorStatus(
+        name=site.name,
+        home=site.home.node,
+        nodes=tuple(FloorNode(node.id, node.x_m, node.y_m) for node in site.nodes.values()),
+        lines=tuple(FloorLine(line.x0_m, line.y0_m, line.x1_m, line.y1_m) for line in site.lines),
+        line_width_m=site.line_width_m,
+        line_colour=site.line_colour.value,
+        racks=tuple(
+            FloorRack(shelf.aisle, shelf.side.value, shelf.x0_m, shelf.x1_m, shelf.y_m, shelf.height_m)
+            for shelf in site.shelves
+        ),
+        keep_outs=tuple(
+            FloorArea(area.x0_m, area.y0_m, area.x1_m, area.y1_m, area.from_m, finite(area.to_m))
+            for area in site.keep_outs
+        ),
+        pads=tuple(FloorPad(pad.id, *site.pad_centre(pad), pad.size_m, pad.charge) for pad in site.pads),
+        ways=tuple(
+            FloorWay(edge.a, edge.b, site.is_closed(edge))
+            for edge in site.edges
+            if edge.one_way or site.is_closed(edge)
+        ),
+    )

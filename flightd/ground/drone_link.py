@@ -1,0 +1,246 @@
+"""One drone: the task that keeps its link, tells the hub what it says, attends it, and hands acts on."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections import Counter, deque
+from collections.abc import Iterable
+from typing import Any, Protocol
+
+from flightd.adapters.ground_link.client import Address, GroundClient
+from flightd.adapters.ground_link.protocol import Accepted, EventReport, Role, StatusReport, Welcome
+from flightd.core.errors import FlightdError, RunError, TransientError, UnavailableError
+from flightd.core.preview import CameraName
+from flightd.core.types import CommandKind
+from flightd.ground.messages import Act, LinkState, PictureKey, picture_message
+
+ATTEND_S = 0.5
+_STATE_S = 0.5
+_ANSWER_S = 2.0
+_AGAIN_S = 0.5
+_NO_PICTURE_S = 1.0
+_EVENTS_KEPT = 100
+_TRACK_STEP_M = 0.05
+_TRACK_KEPT = 4000
+MOST_ACTS = 16
+"""So many acts may wait for their answer at once; what lands the drone is never turned away."""
+_VISITED = "visited"
+"""The event of a node that was visited: its name is the text."""
+_URGENT = frozenset({CommandKind.STOP, CommandKind.LAND})
+
+
+class Pages(Protocol):
+    """Everybody who looks on."""
+
+    @property
+    def browsers(self) -> int:
+        """Pages that are open now."""
+        ...
+
+    def tell(self, drone: str, topic: str, value: Any) -> None:
+        """Tell every page a topic's newest value, and those that are opened later."""
+        ...
+
+    def keep(self, drone: str, topic: str, value: Any) -> None:
+        """Tell it only to the pages that are opened from now on."""
+        ...
+
+    def show(self, key: PictureKey, message: bytes) -> None:
+        """Show a picture to every page that wants it."""
+        ...
+
+    async def wanted(self, key: PictureKey) -> None:
+        """Wait until some page has use for a picture of that camera."""
+        ...
+
+
+class DroneLink:
+    """`run` keeps connecting until cancelled; meanwhile `act` hands an act to the drone."""
+
+    def __init__(self, name: str, address: Address, pages: Pages) -> None:
+        self.name = name
+        self._address = address
+        self._pages = pages
+        self._client: GroundClient | None = None
+        self._welcome: Welcome | None = None
+        self._session = ""
+        self._events: deque[EventReport] = deque(maxlen=_EVENTS_KEPT)
+        self._visited: dict[str, None] = {}
+        self._track: deque[tuple[float, float]] = deque(maxlen=_TRACK_KEPT)
+        self._heard_at_s: float | None = None
+        self._clock_s = math.inf
+        """The drone's clock behind ours, with the quickest status so far."""
+        self._seq: dict[type, int] = {}
+        self._missed: Counter[type] = Counter()
+        self._round_trip_ms: float | None = None
+        self._attends = False
+        self._trouble = "connecting"
+        self._acting = 0
+
+    async def run(self) -> None:
+        """Connect, and again after whatever went wrong."""
+        while True:
+            try:
+                await self._connected()
+            except FlightdError as err:
+                self._trouble = str(err)
+            except ExceptionGroup as group:
+                known, unknown = group.split(FlightdError)
+                if known is None or unknown is not None:
+                    raise
+                self._trouble = str(known.exceptions[0])
+            self._client, self._attends, self._round_trip_ms = None, False, None
+            self._tell_state()
+            await asyncio.sleep(_AGAIN_S)
+
+    async def act(self, act: Act) -> Accepted:
+        """Hand an act to the drone; its answer.  As `GroundClient` raises; RunError where too many wait."""
+        client = self._client
+        if client is None:
+            raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
+        if self._acting >= MOST_ACTS and act.command not in _URGENT:
+            raise RunError(f"{MOST_ACTS} acts wait for an answer of {self.name} already")
+        self._acting += 1
+        try:
+            return await client.order(act.command, act.node, act.id)
+        finally:
+            self._acting -= 1
+
+    async def _connected(self) -> None:
+        """Everything on one connection, until something of it fails."""
+        async with GroundClient(self._address, "flightd ground", _ANSWER_S) as client:
+            welcome = await self._greet(client)
+            self._client = client
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self._listen(client), name=f"{self.name} listens")
+                tasks.create_task(self._attend(client), name=f"{self.name} attends")
+                tasks.create_task(self._tell_states(), name=f"{self.name} state")
+                for camera in welcome.cameras if welcome.picture_fps > 0 else ():
+                    name = f"{self.name} {camera} pictures"
+                    tasks.create_task(self._look(client, camera), name=name)
+
+    async def _greet(self, client: GroundClient) -> Welcome:
+        welcome = await client.hello()
+        self._welcome, self._trouble = welcome, ""
+        self._events.clear()
+        self._events.extend(welcome.events)
+        if welcome.session != self._session:
+            self._session = welcome.session
+            self._track.clear()
+            self._visited.clear()
+            self._seq.clear()
+            self._clock_s = math.inf
+        self._pages.tell(
+            self.name,
+            "welcome",
+            {
+                "flightd": welcome.flightd,
+                "session": welcome.session,
+                "role": welcome.role,
+                "client": welcome.client,
+                "cameras": welcome.cameras if welcome.picture_fps > 0 else (),
+                "floor": welcome.floor,
+            },
+        )
+        self._pages.tell(self.name, "events", tuple(self._events))
+        self._pages.tell(self.name, "track", tuple(self._track))
+        self._note_visits(welcome.events)
+        return welcome
+
+    async def _listen(self, client: GroundClient) -> None:
+        async for message in client.published():
+            if message.session != client.session:
+                raise TransientError("flightd was started anew: another flight, perhaps another map")
+            self._missed[type(message)] += max(message.seq - self._seq.get(type(message), message.seq) - 1, 0)
+            self._seq[type(message)] = message.seq
+            if isinstance(message, EventReport):
+                self._take_event(message)
+            else:
+                self._take_status(message)
+
+    def _take_event(self, event: EventReport) -> None:
+        if any(known.seq == event.seq for known in self._events):
+            return  # told with the welcome already
+        self._events.append(event)
+        self._note_visits([event])
+        self._pages.tell(self.name, "events", tuple(self._events))
+
+    def _note_visits(self, events: Iterable[EventReport]) -> None:
+        self._visited |= {event.text: None for event in events if event.name == _VISITED}
+        self._pages.tell(self.name, "visited", tuple(self._visited))
+
+    def _take_status(self, report: StatusReport) -> None:
+        now_s = asyncio.get_running_loop().time()
+        silent = self._heard_at_s is None or now_s - self._heard_at_s > _STATE_S
+        self._heard_at_s = now_s
+        self._clock_s = min(self._clock_s, now_s - report.stamp_ns * 1e-9)
+        at = report.position
+        if at is not None and (
+            not self._track or math.dist(self._track[-1], (at.x_m, at.y_m)) > _TRACK_STEP_M
+        ):
+            self._track.append((round(at.x_m, 3), round(at.y_m, 3)))
+            self._pages.keep(self.name, "track", tuple(self._track))
+        self._pages.tell(self.name, "status", report)
+        if silent:
+            self._tell_state()
+
+    async def _attend(self, client: GroundClient) -> None:
+        """Attend while a page is open; without one only measure the way.  Viewers cannot attend."""
+        loop = asyncio.get_running_loop()
+        while True:
+            began_s = loop.time()
+            try:
+                may = self._welcome is not None and self._welcome.role is Role.OPERATOR
+                if may and self._pages.browsers:
+                    await client.attend()
+                    self._attends = True
+                else:
+                    self._attends = False
+                    await client.status()
+                self._round_trip_ms, self._trouble = (loop.time() - began_s) * 1e3, ""
+            except UnavailableError as err:
+                self._round_trip_ms, self._attends, self._trouble = None, False, str(err)
+            except RunError as err:
+                self._attends, self._trouble = False, str(err)
+            await asyncio.sleep(max(ATTEND_S - (loop.time() - began_s), 0.05))
+
+    async def _tell_states(self) -> None:
+        while True:
+            self._tell_state()
+            await asyncio.sleep(_STATE_S)
+
+    def _tell_state(self) -> None:
+        now_s = asyncio.get_running_loop().time()
+        trip_ms = self._round_trip_ms
+        state = LinkState(
+            connected=self._client is not None and not self._trouble,
+            heard_s=None if self._heard_at_s is None else round(now_s - self._heard_at_s, 2),
+            round_trip_ms=None if trip_ms is None else round(trip_ms, 1),
+            missed=self._missed.total(),
+            attends=self._attends,
+            trouble=self._trouble,
+        )
+        self._pages.tell(self.name, "link", state)
+
+    async def _look(self, client: GroundClient, camera: CameraName) -> None:
+        """Fetch pictures as long as some page has use for them."""
+        key, loop = PictureKey(self.name, camera), asyncio.get_running_loop()
+        trouble = f"{camera} trouble"
+        self._pages.tell(self.name, trouble, "")
+        failed = False
+        while True:
+            await self._pages.wanted(key)
+            try:
+                answer, jpeg = await client.picture(camera)
+            except FlightdError as err:
+                failed = True
+                self._pages.tell(self.name, trouble, str(err))
+                await asyncio.sleep(_NO_PICTURE_S)
+                continue
+            if failed:
+                failed = False
+                self._pages.tell(self.name, trouble, "")
+            behind_s = loop.time() - answer.stamp_ns * 1e-9
+            age_ms = round(max(behind_s - self._clock_s, 0.0) * 1e3, 1) if self._seq else None
+            self._pages.show(key, picture_message(key, answer, age_ms, jpeg))

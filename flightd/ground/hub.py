@@ -1,0 +1,98 @@
+"""Between the drones and the browsers: newest values on their way out, acts on their way in."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from flightd import __version__
+from flightd.adapters.ground_link.client import Address
+from flightd.ground.browser import Browser, Topic
+from flightd.ground.drone_link import DroneLink
+from flightd.ground.messages import PageMessage, PictureKey, topic_message
+
+MOST_BROWSERS = 64
+"""More pages than this are refused: each costs memory and time."""
+
+
+class Hub:
+    """Runs one task per drone and keeps what each topic says last, so that a page that is opened, or opened
+    again, has everything at once.
+
+    A drone is attended while any page is open, and no longer: closing the last one is losing the ground."""
+
+    def __init__(self, drones: Sequence[tuple[str, Address]]) -> None:
+        self._latest: dict[Topic, Any] = {}
+        self._browsers: set[Browser] = set()
+        self._looking = asyncio.Event()
+        self.drones = {name: DroneLink(name, address, self) for name, address in drones}
+        self._tell_station()
+
+    async def run(self) -> None:
+        """Serve until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            for name, drone in self.drones.items():
+                tasks.create_task(drone.run(), name=f"drone {name}")
+
+    @property
+    def browsers(self) -> int:
+        """Pages that are open now."""
+        return len(self._browsers)
+
+    @property
+    def is_full(self) -> bool:
+        """No more pages are taken."""
+        return len(self._browsers) >= MOST_BROWSERS
+
+    @contextmanager
+    def opened(self) -> Iterator[Browser]:
+        """A page is open meanwhile, told at once what every topic says last."""
+        browser = Browser()
+        for topic in sorted(self._latest, key=lambda topic: topic[1] == "link"):  # how old the rest is: last
+            browser.offer(topic, topic_message(*topic, self._latest[topic]))
+        self._browsers.add(browser)
+        self._tell_station()
+        try:
+            yield browser
+        finally:
+            self._browsers.discard(browser)
+            self._tell_station()
+            self._looking.set()
+
+    def hear(self, browser: Browser, message: PageMessage) -> None:
+        """What a page says."""
+        browser.hear(message)
+        self._looking.set()
+
+    def keep(self, drone: str, topic: str, value: Any) -> None:
+        """Tell a topic's newest value to the pages that are opened from now on."""
+        self._latest[drone, topic] = value
+
+    def tell(self, drone: str, topic: str, value: Any) -> None:
+        """Tell every page a topic's newest value, and those that are opened later."""
+        self.keep(drone, topic, value)
+        if not self._browsers:
+            return
+        message = topic_message(drone, topic, value)
+        for browser in self._browsers:
+            browser.offer((drone, topic), message)
+
+    def show(self, key: PictureKey, message: bytes) -> None:
+        """Show a picture to every page that wants it."""
+        for browser in self._browsers:
+            browser.offer_picture(key, message)
+
+    async def wanted(self, key: PictureKey) -> None:
+        """Wait until some page has use for a picture of that camera."""
+        while not any(browser.has_use_for(key) for browser in self._browsers):
+            self._looking.clear()
+            await self._looking.wait()
+
+    def _tell_station(self) -> None:
+        self.tell(
+            "",
+            "station",
+            {"version": __version__, "drones": tuple(self.drones), "browsers": len(self._browsers)},
+        )

@@ -1,0 +1,147 @@
+"""Runs the station: hub and HTTP server in one loop, until a signal ends both."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ipaddress
+import re
+import signal
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import uvicorn
+
+from flightd.adapters.ground_link.client import Address
+from flightd.config.ground import is_loopback
+from flightd.core.errors import InputError, UnavailableError
+from flightd.ground.application import application
+from flightd.ground.guards import own_hosts
+from flightd.ground.hub import Hub
+from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+from flightd.runtime.ending_signals import end_on_signals
+
+PORT = 8080
+_PING_S = 4.0
+"""A page that does not answer for so long is closed: whoever cannot see does not attend."""
+_LEAVE_S = 2
+_LISTEN = re.compile(r"(?P<host>\[[0-9a-fA-F:.%]+\]|[^:\[\]]+)(:(?P<port>\d{1,5}))?")
+
+
+@dataclass(frozen=True, slots=True)
+class Listening:
+    """Where the station is asked."""
+
+    host: str
+    port: int = PORT
+
+    @property
+    def url(self) -> str:
+        return f"http://[{self.host}]:{self.port}" if ":" in self.host else f"http://{self.host}:{self.port}"
+
+    @classmethod
+    def read(cls, text: str) -> Listening:
+        """HOST, HOST:PORT or [HOST]:PORT.  InputError for anything else, and for what other machines reach:
+        the station asks nobody who he is yet."""
+        found = _LISTEN.fullmatch(text)
+        host = text if found is None else found["host"]
+        port = PORT if found is None or found["port"] is None else int(found["port"])
+        if found is None:
+            try:
+                ipaddress.IPv6Address(text)
+            except ValueError:
+                raise InputError("expected ADDRESS or ADDRESS:PORT", key=f"--listen {text}") from None
+        host = host.removeprefix("[").removesuffix("]")
+        if port > 65535:
+            raise InputError("a port is at most 65535", key=f"--listen {text}")
+        if not is_loopback(host):
+            raise InputError(
+                "reaches beyond this machine, and the ground station has no login yet",
+                key=f"--listen {text}",
+                remedy=f"listen on 127.0.0.1, and come from elsewhere through ssh -L {PORT}:127.0.0.1:{PORT}",
+            )
+        return cls("127.0.0.1" if host == "localhost" else host, port)
+
+
+class _Server(uvicorn.Server):
+    """Signals are the station's own matter."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+def opened(listening: Listening) -> tuple[socket.socket, Listening]:
+    """The listening socket, and where it really listens (port 0: any free one).  UnavailableError where the
+    address cannot be had."""
+    family = socket.AF_INET6 if ":" in listening.host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((listening.host, listening.port))
+    except OSError as err:
+        listener.close()
+        raise UnavailableError(
+            f"{listening.url}: {err.strerror or err}",
+            remedy="give --listen an address of this machine and a free port",
+        ) from None
+    return listener, Listening(listening.host, int(listener.getsockname()[1]))
+
+
+def run(
+    drones: Sequence[tuple[str, Address]], listening: Listening, on_ready: Callable[[Listening], None]
+) -> signal.Signals | None:
+    """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had."""
+    listener, where = opened(listening)
+    came: list[signal.Signals] = []
+
+    async def until_signal() -> None:
+        serving = asyncio.ensure_future(serve(drones, listener, where, on_ready))
+        end_on_signals(serving, came)
+        with contextlib.suppress(asyncio.CancelledError):
+            await serving
+
+    with listener:
+        asyncio.run(until_signal())
+    return came[0] if came else None
+
+
+async def serve(
+    drones: Sequence[tuple[str, Address]],
+    listener: socket.socket,
+    where: Listening,
+    on_ready: Callable[[Listening], None] = lambda _: None,
+) -> None:
+    """Serve until cancelled; the pages are told that it ends."""
+    hub = Hub(drones)
+    server = _Server(
+        uvicorn.Config(
+            application(hub, own_hosts(where.host, where.port)),
+            http="h11",
+            ws="websockets-sansio",
+            lifespan="off",
+            log_config=None,
+            log_level="error",
+            access_log=False,
+            proxy_headers=False,
+            server_header=False,
+            ws_max_size=MAX_PAGE_MESSAGE_BYTES,
+            ws_ping_interval=_PING_S,
+            ws_ping_timeout=_PING_S,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=_LEAVE_S,
+        )
+    )
+    async with asyncio.TaskGroup() as tasks:
+        station = tasks.create_task(hub.run(), name="hub")
+        serving = tasks.create_task(server.serve([listener]), name="pages")
+        try:
+            while not server.started:  # noqa: ASYNC110 - it tells nobody
+                await asyncio.sleep(0.01)
+            on_ready(where)
+            await station
+        finally:
+            server.should_exit = True
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.shield(asyncio.wait([serving], timeout=_LEAVE_S + 2.0))

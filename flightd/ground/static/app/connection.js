@@ -1,0 +1,72 @@
+// The WebSocket to the station: what it says goes into the store, pictures to whoever shows them.
+import { state, take, update } from "./store.js";
+
+const AGAIN_MS = 700;
+const ECHO_MS = 1000;
+const LOST_MS = 3000;
+
+const showing = new Map(); // "drone camera" -> function that draws a picture
+let socket = null;
+
+export function connect() {
+  const url = new URL("/live", location.href);
+  url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+  socket = new WebSocket(url);
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => {
+    update((s) => {
+      s.socket = { ...s.socket, open: true, heardAt: performance.now() };
+    });
+    sayWanted();
+  };
+  socket.onmessage = ({ data }) => (typeof data === "string" ? take(JSON.parse(data)) : draw(data));
+  socket.onclose = () => {
+    update((s) => {
+      s.socket = { ...s.socket, open: false, roundTripMs: null };
+    });
+    setTimeout(connect, AGAIN_MS);
+  };
+}
+
+// A picture of this camera is wanted while the function that is returned was not called.
+export function showPictures(drone, camera, drawPicture) {
+  const key = `${drone} ${camera}`;
+  showing.set(key, drawPicture);
+  sayWanted();
+  return () => {
+    if (showing.get(key) === drawPicture) showing.delete(key);
+    sayWanted();
+  };
+}
+
+function say(message) {
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+}
+
+function sayWanted() {
+  const keys = document.hidden ? [] : [...showing.keys()];
+  const pictures = keys.map((key) => ({ drone: key.split(" ")[0], camera: key.split(" ")[1] }));
+  say({ say: "want", pictures });
+}
+
+async function draw(data) {
+  try {
+    const length = new DataView(data).getUint32(0);
+    const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+    const jpeg = new Blob([new Uint8Array(data, 4 + length)], { type: "image/jpeg" });
+    const picture = await createImageBitmap(jpeg);
+    showing.get(`${head.drone} ${head.camera}`)?.(picture, head);
+    picture.close();
+  } catch {
+    // a picture that cannot be drawn is left out; the next one may come
+  } finally {
+    say({ say: "drawn" });
+  }
+}
+
+document.addEventListener("visibilitychange", sayWanted);
+setInterval(() => {
+  say({ say: "echo", number: performance.now() });
+  if (state.socket.open && performance.now() - state.socket.heardAt > LOST_MS) socket.close();
+  update(() => {}); // ages are drawn anew
+}, ECHO_MS);

@@ -1,0 +1,59 @@
+// The head: which site and drone, how well it is heard, and STOP, always in reach.
+import { act } from "./acts.js";
+import { html } from "./html.js";
+import { hears } from "./hearing.js";
+import { shown, state, update } from "./store.js";
+
+export function Head() {
+  return html`
+    <header class="head">
+      <h1 class="brand"><img src="/static/icon.svg" alt="" width="28" height="28" /><span>flightd</span></h1>
+      <${Drones} />
+      <${Hearing} />
+      <${Stop} />
+    </header>
+  `;
+}
+
+function Drones() {
+  const names = state.station?.drones ?? [];
+  const site = shown().welcome?.floor.name;
+  if (names.length < 2) return html`<p class="site">${site ? `Site ${site}` : ""}</p>`;
+  return html`
+    <nav class="drones" aria-label="Drones">
+      ${names.map(
+        (name) => html`
+          <button
+            key=${name}
+            class="tab"
+            aria-pressed=${name === state.selected}
+            onClick=${() =>
+              update((s) => {
+                s.selected = name;
+                s.chosenNode = "";
+              })}
+          >
+            ${name}
+          </button>
+        `,
+      )}
+    </nav>
+  `;
+}
+
+function Hearing() {
+  const { good, short } = hears();
+  return html`<p class=${`chip ${good ? "good" : "bad"}`}><span class="dot" />${short}</p>`;
+}
+
+function Stop() {
+  const newest = state.acts.get(state.selected);
+  const stopping = newest?.command === "stop" && newest.stage === "sent";
+  const several = (state.station?.drones.length ?? 0) > 1;
+  return html`
+    <button class="stop" onClick=${() => act("stop")} title="Level at once and down at once, without steering">
+      <strong>${stopping ? "STOPPING" : "STOP"}${several ? ` ${state.selected}` : ""}</strong>
+      <kbd>Esc</kbd>
+    </button>
+  `;
+}

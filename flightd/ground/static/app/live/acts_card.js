@@ -1,0 +1,87 @@
+// What a person may order now, what keeps the drone on the ground, and what became of the newest order.
+import { act } from "../acts.js";
+import { html } from "../html.js";
+import { state, update } from "../store.js";
+import { capital, COMMANDS, isGrounded } from "../words.js";
+import { HoldButton } from "./hold_button.js";
+
+const SHOWN_MS = 20000;
+
+export function Acts({ status, welcome }) {
+  const may = (command) => status.possible.includes(command);
+  if (welcome.role !== "operator") {
+    return html`<section class="card acts"><h2>Only looking on</h2>
+      <p class="quiet">The key of this station has the role ${welcome.role}; orders need an operator's.</p></section>`;
+  }
+  const waits = status.phase === "preflight" || status.phase === "swap";
+  return html`
+    <section class="card acts" aria-labelledby="acts">
+      <h2 id="acts" class="unseen">Orders</h2>
+      ${waits && html`<${Obstacles} obstacles=${status.obstacles} />`}
+      <div class="buttons">
+        ${waits &&
+        html`<${HoldButton} disabled=${!may("start")} onHeld=${() => act("start")}>Start<//>`}
+        <${Order} command="pause" may=${may("pause")} key_="P" />
+        <${Order} command="resume" may=${may("resume")} key_="R" />
+        <${Order} command="home" may=${may("home")} />
+        <${Order} command="land" may=${may("land") && !isGrounded(status)} />
+      </div>
+      <${GoTo} nodes=${welcome.floor.nodes} may=${may("goto")} />
+      <${Outcome} />
+    </section>
+  `;
+}
+
+function Order({ command, may, key_ }) {
+  return html`
+    <button class="order" disabled=${!may} onClick=${() => act(command)}>
+      ${COMMANDS[command]}${key_ && html` <kbd>${key_}</kbd>`}
+    </button>
+  `;
+}
+
+function Obstacles({ obstacles }) {
+  if (!obstacles.length) return html`<p class="ready"><span class="dot" />Ready to fly</p>`;
+  return html`
+    <div class="obstacles">
+      <p>It stays on the ground:</p>
+      <ul>${obstacles.map((text) => html`<li key=${text}>${capital(text)}</li>`)}</ul>
+    </div>
+  `;
+}
+
+function GoTo({ nodes, may }) {
+  const choose = (event) => {
+    const node = event.target.value;
+    update((s) => {
+      s.chosenNode = node;
+    });
+  };
+  const node = state.chosenNode;
+  return html`
+    <div class="goto">
+      <label for="goto-node">Node</label>
+      <select id="goto-node" value=${node} onChange=${choose}>
+        <option value="">choose here or on the map</option>
+        ${nodes.map(({ id }) => html`<option key=${id} value=${id}>${id}</option>`)}
+      </select>
+      <button class="order" disabled=${!may || !node} onClick=${() => act("goto", node)}>
+        Go to ${node || "…"}
+      </button>
+    </div>
+  `;
+}
+
+function Outcome() {
+  const given = state.acts.get(state.selected);
+  const newest = given && performance.now() - given.at < SHOWN_MS ? given : undefined;
+  const words = newest && `${COMMANDS[newest.command]}${newest.node ? ` ${newest.node}` : ""}`;
+  const text = {
+    sent: newest?.text ? `not accepted yet: ${newest.text}` : "sent …",
+    accepted: "accepted",
+    refused: newest?.text,
+  }[newest?.stage];
+  return html`
+    <p class=${`outcome ${newest?.stage ?? ""}`} role="status">${newest && `${words}: ${text}`}</p>
+  `;
+}

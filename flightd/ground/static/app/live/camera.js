@@ -1,0 +1,86 @@
+// One camera's newest picture, with what the drone found in it drawn over it.
+import { showPictures } from "../connection.js";
+import { html, useEffect, useRef, useState } from "../html.js";
+import { shown, state } from "../store.js";
+import { age, count } from "../words.js";
+
+const NAMES = { down: "Down camera", front: "Front camera" };
+const WIDTH = 640;
+
+export function Camera({ camera }) {
+  const canvas = useRef(null);
+  const [seen, setSeen] = useState(null);
+  const drone = state.selected;
+  useEffect(
+    () =>
+      showPictures(drone, camera, (picture, head) => {
+        if (canvas.current) drawPicture(canvas.current, picture, head);
+        setSeen({ head, at: performance.now() });
+      }),
+    [drone, camera],
+  );
+  const trouble = shown().trouble[camera];
+  const found = seen ? foundWords(seen.head) : "";
+  return html`
+    <figure class="card camera">
+      <canvas ref=${canvas} width=${WIDTH} height=${WIDTH * 0.75} role="img" aria-label=${`${NAMES[camera]}: ${found || "no picture yet"}`} />
+      <figcaption>
+        <strong>${NAMES[camera]}</strong>
+        <span class=${trouble ? "trouble" : "quiet"}>${trouble || caption(seen, found)}</span>
+      </figcaption>
+    </figure>
+  `;
+}
+
+function caption(seen, found) {
+  if (!seen) return "no picture yet";
+  const since = performance.now() - seen.at + (seen.head.age_ms ?? 0);
+  return `${found}, ${age(since / 1000)} old`;
+}
+
+function foundWords({ lines, areas }) {
+  const codes = areas.filter((area) => area.kind === "code").length;
+  const parts = [lines.length && count(lines.length, "line"), codes && count(codes, "code")].filter(Boolean);
+  return parts.join(", ") || "nothing found";
+}
+
+function drawPicture(canvas, picture, head) {
+  const height = Math.round((WIDTH * picture.height) / picture.width);
+  if (canvas.height !== height) canvas.height = height;
+  const context = canvas.getContext("2d");
+  context.drawImage(picture, 0, 0, WIDTH, height);
+  const path = (points, closed) => {
+    context.beginPath();
+    for (const [x, y] of points) context.lineTo(x * WIDTH, y * height);
+    if (closed) context.closePath();
+  };
+  context.lineCap = "round";
+  for (const line of head.lines) {
+    path(line.points, false);
+    stroke(context, "#000a", 6);
+    stroke(context, "#2fe0ff", 3);
+  }
+  for (const area of head.areas) {
+    path(area.corners, true);
+    stroke(context, "#000a", 4);
+    stroke(context, area.kind === "code" ? "#7dff6b" : "#ffffffb0", 2);
+    if (area.kind === "code") label(context, area, WIDTH, height);
+  }
+}
+
+function stroke(context, colour, width) {
+  context.strokeStyle = colour;
+  context.lineWidth = width;
+  context.stroke();
+}
+
+function label(context, area, width, height) {
+  const x = Math.min(...area.corners.map((corner) => corner[0])) * width;
+  const y = Math.min(...area.corners.map((corner) => corner[1])) * height - 5;
+  context.font = "600 13px system-ui, sans-serif";
+  context.lineWidth = 4;
+  context.strokeStyle = "#000c";
+  context.strokeText(area.text, x, Math.max(y, 14));
+  context.fillStyle = "#7dff6b";
+  context.fillText(area.text, x, Math.max(y, 14));
+}

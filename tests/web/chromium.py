@@ -1,0 +1,119 @@
+"""The system's Chromium for the tests of the page, and a station to look at with it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, BrowserContext, Page
+
+ROOT = Path(__file__).parents[2]
+AXE = Path(__file__).parent / "vendor" / "axe.min.js"
+WIDE, NARROW = (1400, 900), (390, 844)
+_QUIET = (
+    "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
+    "--disable-default-apps", "--disable-domain-reliability", "--disable-sync", "--no-first-run",
+    "--no-default-browser-check", "--no-pings",
+)  # fmt: skip
+"""Flags with which it asks nobody anything by itself."""
+_SERIOUS = {"serious", "critical"}
+
+
+def chromium_path() -> str:
+    """Where the system's Chromium is; a test without it is skipped, but not where everything has to run."""
+    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if found is None:
+        text = "no Chromium on this machine: apt install chromium"
+        if os.environ.get("CI") == "true":
+            pytest.fail(text)
+        pytest.skip(text)
+    return found
+
+
+@contextlib.contextmanager
+def running() -> Iterator[Browser]:
+    """Chromium, headless."""
+    from playwright.sync_api import sync_playwright
+
+    path = chromium_path()
+    with sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=path, args=list(_QUIET))
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+@contextlib.contextmanager
+def station(drones: Sequence[str], listen: str = "127.0.0.1:0") -> Iterator[str]:
+    """`flightd ground` as a person starts it; its address."""
+    words = [word for drone in drones for word in ("--drone", drone)]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "flightd", "ground", *words, "--listen", listen],
+        cwd=ROOT,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    with process.stderr:
+        try:
+            said = process.stderr.readline()
+            found = re.search(r"http://127\.0\.0\.1:\d+", said)
+            assert found is not None, said
+            yield found.group()
+        finally:
+            process.terminate()
+            assert process.wait(20) == 0, process.stderr.read()
+
+
+@contextlib.contextmanager
+def opened(browser: Browser, url: str, size: tuple[int, int] = WIDE, scheme: str = "light") -> Iterator[Page]:
+    """A page of the station.  No foreign host may be asked, and nothing may go wrong in it, meanwhile."""
+    context = new_context(browser, size, scheme)
+    asked: list[str] = []
+    wrong: list[str] = []
+    context.on("request", lambda request: asked.append(request.url))
+    context.on("weberror", lambda error: wrong.append(str(error.error)))
+    page = context.new_page()
+    page.on("websocket", lambda socket: asked.append(socket.url.replace("ws://", "http://")))
+    page.on("console", lambda said: wrong.append(said.text) if "Content Security" in said.text else None)
+    try:
+        page.goto(url)
+        yield page
+    finally:
+        context.close()
+    assert [other for other in asked if not other.startswith((url, "blob:"))] == []
+    assert asked
+    assert wrong == []
+
+
+def new_context(browser: Browser, size: tuple[int, int], scheme: str) -> BrowserContext:
+    """A person's browser: `scheme` light or dark, axe-core at hand in every page."""
+    context = browser.new_context(
+        viewport={"width": size[0], "height": size[1]},
+        color_scheme="dark" if scheme == "dark" else "light",
+    )
+    context.set_default_timeout(30_000)
+    context.add_init_script(path=AXE)
+    return context
+
+
+def hindrances(page: Page) -> list[str]:
+    """What axe-core finds serious or critical for people with disabilities: rule and element."""
+    found = page.evaluate("() => axe.run(document, {resultTypes: ['violations']})")
+    return [
+        f"{violation['id']}: {node['html']}"
+        for violation in found["violations"]
+        if violation["impact"] in _SERIOUS
+        for node in violation["nodes"]
+    ]

@@ -1,0 +1,121 @@
+"""`flightd ground`: its words, what it refuses in one line, and its end."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from flightd.core.errors import InputError
+from flightd.ground.application import STATIC
+from flightd.ground.drone_names import drone_addresses
+from flightd.ground.guards import own_hosts
+from flightd.ground.server import Listening
+
+ROOT = Path(__file__).parents[2]
+MOST_BYTES = 300_000
+"""A page is on the screen within a second on any link that can carry its pictures."""
+
+
+def ground(*words: str) -> tuple[int, str]:
+    """Exit code and what is said, of a command that ends by itself."""
+    done = subprocess.run(
+        [sys.executable, "-m", "flightd", "ground", *words],
+        cwd=ROOT, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.stdout == ""
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--listen", "0.0.0.0"], "--listen 0.0.0.0: reaches beyond this machine, and the ground"),
+        (["--drone", "north"], "--drone north: expected NAME=HOST"),
+        (["--drone", "a=h", "--drone", "a=k"], "--drone: the same name twice"),
+        (["--key", "none.key_secret"], "--key, --server-key: belong together"),
+    ],
+)  # fmt: skip
+def test_wrong_input_is_one_clear_line(words: list[str], said: str) -> None:
+    code, error = ground(*words)
+    assert code == 2
+    assert error.startswith(f"flightd: {said}")
+    assert error.count("\n") == 1
+
+
+def test_it_serves_until_ctrl_c_and_ends_in_order() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "flightd", "ground", "--listen", "127.0.0.1:0"],
+        cwd=ROOT, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stderr is not None
+    with process.stderr:
+        assert "the ground station is at http://127.0.0.1:" in process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) == 0
+        assert process.stderr.read() == "flightd: the ground station was ended by SIGINT\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "host", "port"),
+    [
+        ("127.0.0.1", "127.0.0.1", 8080), ("localhost:9000", "127.0.0.1", 9000),
+        ("127.0.0.7:0", "127.0.0.7", 0), ("::1", "::1", 8080), ("[::1]:81", "::1", 81),
+    ],
+)  # fmt: skip
+def test_it_listens_on_this_machine(text: str, host: str, port: int) -> None:
+    assert Listening.read(text) == Listening(host, port)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", ":80", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:65536", "0.0.0.0", "::", "10.0.0.1:80", "drone-1",
+        "[::]:1",
+    ],
+)  # fmt: skip
+def test_it_listens_nowhere_else(text: str) -> None:
+    with pytest.raises(InputError, match="--listen"):
+        Listening.read(text)
+
+
+def test_drones_are_named_with_host_and_ports() -> None:
+    named = dict(drone_addresses(["a=drone-1", "b=127.0.0.1:6571/6572", "c=[fe80::1]"]))
+    assert (named["a"].host, named["a"].status_port, named["a"].command_port) == ("drone-1", 5571, 5572)
+    assert (named["b"].host, named["b"].status_port, named["b"].command_port) == ("127.0.0.1", 6571, 6572)
+    assert named["c"].host == "fe80::1"
+    assert dict(drone_addresses([]))["drone"].host == "127.0.0.1"
+
+
+@pytest.mark.parametrize("text", ["a", "=h", "a=", "a b=h", "a=h:0/1", "a=h:1/99999", "a=h/x", "a=u@h"])
+def test_a_drone_that_is_not_named_so_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="--drone"):
+        drone_addresses([text])
+
+
+def test_a_server_key_of_no_drone_is_refused() -> None:
+    with pytest.raises(InputError, match="there is no --drone b"):
+        drone_addresses(["a=h"], Path("ann.key_secret"), ["b=drone-1.key"])
+
+
+def test_only_names_of_this_machine_may_stand_in_a_request() -> None:
+    assert own_hosts("127.0.0.7", 80) >= {"127.0.0.7:80", "127.0.0.7", "localhost", "[::1]:80"}
+    assert own_hosts("::1", 8080) == {"127.0.0.1:8080", "localhost:8080", "[::1]:8080"}
+
+
+def test_the_page_is_small_whole_and_names_no_foreign_host() -> None:
+    files = [path for path in STATIC.rglob("*") if path.is_file()]
+    shipped = [path for path in files if not path.name.endswith(".LICENSE.txt")]
+    assert sum(path.stat().st_size for path in shipped) < MOST_BYTES
+    own = [path for path in shipped if "vendor" not in path.parts]
+    for path in own:
+        text = path.read_text().replace("http://www.w3.org/2000/svg", "")
+        assert "http://" not in text, path
+        assert "https://" not in text, path
+    assert {path.name for path in files if "vendor" in path.parts} >= {
+        "htm.LICENSE.txt",
+        "preact.LICENSE.txt",
+    }

@@ -1,0 +1,231 @@
+"""The page in a real browser: what a person sees of a flight, and does with it by mouse and keyboard."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from flightd.config.schema import load_config
+from flightd.core.types import Phase
+from flightd.site.site_file import load_site
+from tests.web.chromium import NARROW, WIDE, hindrances, opened, running, station
+from tests.web.live_flight import LiveFlight
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
+from playwright.sync_api import expect
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+SITE = load_site(CONFIGS / "site-demo.toml")
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(
+    mission={"autostart": False, "start_countdown_s": 0.0}, ground={"lost_action": "land"}
+)
+WITHIN_MS = 40_000.0
+HOLD_MS = 1300.0
+
+expect.set_options(timeout=WITHIN_MS)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with running() as browser:
+        yield browser
+
+
+@pytest.fixture
+def flight() -> Iterator[LiveFlight]:
+    """One that waits for its start."""
+    with LiveFlight(SITE, CONFIG) as flight:
+        yield flight
+
+
+@pytest.fixture
+def url(flight: LiveFlight) -> Iterator[str]:
+    status, command = flight.ports
+    with station([f"demo=127.0.0.1:{status}/{command}"]) as url:
+        yield url
+
+
+def start(page: Page) -> None:
+    """Hold the button, as a person does."""
+    button = page.get_by_role("button", name="Start")
+    expect(button).to_have_attribute("aria-disabled", "false")
+    button.hover()
+    page.mouse.down()
+    page.wait_for_timeout(HOLD_MS)
+    page.mouse.up()
+
+
+def phase(page: Page, words: str) -> None:
+    """Wait until the head line says so."""
+    expect(page.get_by_role("heading", level=2, name=re.compile(words))).to_be_visible()
+
+
+def until_phase(flight: LiveFlight, wanted: set[Phase]) -> None:
+    end_s = time.monotonic() + WITHIN_MS * 1e-3
+    while flight.phase not in wanted:
+        assert time.monotonic() < end_s, flight.phase
+        flight.wait_s(0.05)
+
+
+def test_a_flight_is_started_watched_paused_sent_elsewhere_and_stopped_by_key(
+    browser: Browser, url: str, flight: LiveFlight
+) -> None:
+    with opened(browser, url) as page:
+        phase(page, "On the ground")
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+        expect(page.get_by_role("button", name="Fly home")).to_be_disabled()
+        assert hindrances(page) == []
+        page.get_by_role("button", name="Start").click()
+        expect(page.get_by_text("keep holding")).to_be_visible()
+        assert flight.phase is Phase.PREFLIGHT, "a touch starts nothing"
+        start(page)
+        expect(page.get_by_text("Start: accepted")).to_be_visible()
+        phase(page, "Flying to A2")
+        expect(page.get_by_role("img", name=re.compile(r"^Down camera: \d lines?$"))).to_be_visible()
+        expect(page.get_by_role("img", name="The drone")).to_be_visible()
+        assert hindrances(page) == []
+        whole = page.get_by_role("group", name="Map of demo").get_attribute("viewBox")
+        page.get_by_role("button", name="Follow the drone").click()
+        expect(page.get_by_role("button", name="Follow the drone")).to_have_attribute("aria-pressed", "true")
+        expect(page.get_by_role("group", name="Map of demo")).not_to_have_attribute("viewBox", whole or "")
+        page.keyboard.press("p")
+        phase(page, "Holding its place")
+        page.get_by_role("button", name="Resume").click()
+        expect(page.get_by_text("Resume: accepted")).to_be_visible()
+        phase(page, "Flying to|Over")
+        page.get_by_role("button", name=re.compile("^Node B1")).click()
+        page.get_by_role("button", name="Go to B1").click()
+        expect(page.get_by_text("Go to B1: accepted")).to_be_visible()
+        phase(page, "Flying to B1")
+        page.get_by_label("Node", exact=True).focus()
+        page.keyboard.press("Escape")
+        expect(page.get_by_text("STOP: accepted")).to_be_visible()
+        phase(page, "Landing|Flight ended early")
+        expect(page.get_by_role("list", name="Events").get_by_text("stop ordered").first).to_be_visible()
+    until_phase(flight, {Phase.ABORTED})
+
+
+def test_it_is_flown_by_keyboard_alone(browser: Browser, url: str, flight: LiveFlight) -> None:
+    with opened(browser, url) as page:
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+        for _ in range(8):
+            page.keyboard.press("Tab")
+            if page.evaluate("document.activeElement.textContent").startswith("Start"):
+                break
+        page.keyboard.down("Space")
+        page.wait_for_timeout(HOLD_MS)
+        page.keyboard.up("Space")
+        expect(page.get_by_text("Start: accepted")).to_be_visible()
+        phase(page, "Flying to A2")
+        page.get_by_role("button", name="Node A1").focus()
+        for key in ("ArrowRight", "ArrowRight", "Enter"):
+            page.keyboard.press(key)
+        expect(page.get_by_role("button", name="Go to A3")).to_be_enabled()
+        page.get_by_role("button", name="Land here").focus()
+        page.keyboard.press("Enter")
+        phase(page, "Landing|Flight ended early")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_narrow_page_has_everything_and_keeps_stop_in_reach(
+    browser: Browser, url: str, scheme: str
+) -> None:
+    with opened(browser, url, NARROW, scheme) as page:
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+        assert page.evaluate("document.documentElement.scrollWidth") == NARROW[0]
+        assert hindrances(page) == []
+        page.get_by_role("heading", name="Events").scroll_into_view_if_needed()
+        expect(page.get_by_role("button", name="STOP")).to_be_in_viewport(ratio=1.0)
+
+
+def test_what_keeps_it_on_the_ground_is_listed_and_the_start_is_held_back(
+    browser: Browser, url: str, flight: LiveFlight
+) -> None:
+    flight.faults.battery = 0.2
+    flight.faults.rangeless = True
+    with opened(browser, url, WIDE, "dark") as page:
+        expect(page.get_by_text("It stays on the ground:")).to_be_visible()
+        obstacles = page.get_by_role("listitem")
+        expect(obstacles.filter(has_text="No height from the vehicle's range finder")).to_be_visible()
+        expect(obstacles.filter(has_text=re.compile("20 ?%"))).to_be_visible()
+        expect(page.get_by_role("button", name="Start")).to_have_attribute("aria-disabled", "true")
+        assert hindrances(page) == []
+        flight.faults.battery, flight.faults.rangeless = None, False
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+
+
+def test_a_hazard_is_shown_with_what_is_done_and_since_when(
+    browser: Browser, url: str, flight: LiveFlight
+) -> None:
+    with opened(browser, url) as page:
+        start(page)
+        phase(page, "Flying to A2")
+        flight.faults.bare = True
+        alarm = page.get_by_role("region", name="Hazards")
+        expect(alarm.get_by_text("Lines lost")).to_be_visible()
+        expect(alarm.get_by_text(re.compile("holds, for"))).to_be_visible()
+        phase(page, "Holding its place")
+        assert hindrances(page) == []
+
+
+def test_a_page_that_is_loaded_again_or_opened_twice_has_it_all(
+    browser: Browser, url: str, flight: LiveFlight
+) -> None:
+    with opened(browser, url) as page:
+        start(page)
+        expect(page.get_by_role("button", name="Node A1, visited")).to_be_visible()
+        phase(page, "Flying to A2")
+        page.reload()
+        expect(page.get_by_role("button", name="Node A1, visited")).to_be_visible()
+        expect(page.get_by_role("list", name="Events").get_by_text("start", exact=True)).to_be_visible()
+        track = page.locator("polyline.track")
+        expect(track).to_have_attribute("points", re.compile(r"\d+,-?\d+.* .*\d+,"))
+        with opened(browser, url, NARROW) as other:
+            phase(other, "Flying to|Over")
+            expect(other.get_by_text("2 pages open")).to_be_visible()
+
+
+def test_closing_the_last_page_is_losing_the_ground(browser: Browser, url: str, flight: LiveFlight) -> None:
+    assert flight.quiet_s == 0.0, "no page was open yet: nobody attends"
+    with opened(browser, url) as page:
+        start(page)
+        expect(page.get_by_text("this station")).to_be_visible()
+        phase(page, "Flying to A2")
+        with opened(browser, url):
+            pass
+        page.wait_for_timeout(1500)
+        assert flight.quiet_s < 3.0, "one page is open still"
+    until_phase(flight, {Phase.LAND, Phase.ABORTED})
+
+
+def test_a_drone_that_falls_silent_is_said_to_be(browser: Browser) -> None:
+    with LiveFlight(SITE, CONFIG) as flight:
+        status, command = flight.ports
+        with station([f"demo=127.0.0.1:{status}/{command}"]) as url, opened(browser, url) as page:
+            expect(page.get_by_text("Ready to fly")).to_be_visible()
+            flight.fall_silent()
+            expect(page.get_by_role("alert").get_by_text("what you see is old")).to_be_visible()
+            assert hindrances(page) == []
+
+
+def test_a_station_that_ends_is_said_to_be_gone_and_found_again(browser: Browser, flight: LiveFlight) -> None:
+    status, command = flight.ports
+    drones = [f"demo=127.0.0.1:{status}/{command}"]
+    with station(drones) as url:
+        context = browser.new_context()
+        page = context.new_page()
+        page.goto(url)
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+    expect(page.get_by_text("The ground station does not answer")).to_be_visible()
+    with station(drones, url.removeprefix("http://")):
+        expect(page.get_by_text("The ground station does not answer")).to_be_hidden()
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+        context.close()
