@@ -43,6 +43,7 @@ from flightd.sim.sensors.instruments import SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
 from flightd.sim.unknowns import NOTHING, Shaken, Unknowns
 from flightd.site.site import Site
+from flightd.site.site_file import site_toml
 
 _TRUTH_PERIOD_S = 0.02
 
@@ -125,7 +126,7 @@ class World:
         being drawn.  InputError for a fault at an unknown node."""
         self._clock = clock
         self._recorder = recorder
-        self._unknowns = spec.unknowns
+        self._unknowns, self._floor = spec.unknowns, site_toml(spec.site)
         start = _placement(spec)
         airframe = Airframe(
             spec.unknowns.airframe(AirframeParams(battery_capacity_ah=spec.battery_ah)),
@@ -169,6 +170,7 @@ class World:
         await self.open()
         told = Document(json.dumps(asdict(self._unknowns), indent=1))
         self._recorder.record(Topic.UNKNOWNS, self._clock.now_ns(), told)
+        self._recorder.record(Topic.MAP, self._clock.now_ns(), Document(self._floor))
         try:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self.vehicle.run(), name="autopilot")

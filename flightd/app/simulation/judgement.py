@@ -42,7 +42,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
     notes = [e.message for e in truth if e.topic == Topic.FAULT and isinstance(e.message, dict)]
     begun = [note for note in notes if note["began"]]
     evidence = FlightEvidence(
-        site=simulation.scenario.floor.site(simulation.site),
+        site=simulation.scenario.floor.site(simulation.site, simulation.seed),
         plan=simulation.plan(),
         statuses=flown.messages(Status),
         events=flown.messages(Event),

@@ -66,7 +66,7 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
     scenario, config = simulation.scenario, simulation.config
     adapter, order = config.vehicle.kind, simulation.setting.order
     return WorldSpec(
-        site=scenario.floor.site(simulation.site),
+        site=scenario.floor.site(simulation.site, simulation.seed),
         seed=simulation.seed,
         camera_address=("127.0.0.1", ports.camera),
         vehicle="px4" if adapter == "mavsdk" else adapter,
