@@ -71,6 +71,11 @@ def map_scale(
         ScaleWitness(f"{one.a}-{one.b} as measured", one.metres / fitted_m, _TAPE_SIGMA_M / one.metres)
         for one, fitted_m in measured
     ]
+    return mean_scale(witnesses)
+
+
+def mean_scale(witnesses: Sequence[ScaleWitness]) -> MapScale:
+    """Their mean, weighed by how sure each is."""
     weights = [one.sigma**-2 for one in witnesses]
     total = math.fsum(weights)
     factor = math.fsum(one.factor * weight for one, weight in zip(witnesses, weights, strict=True)) / total
