@@ -32,6 +32,7 @@ from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe, AirframeParams
 from flightd.sim.plant.battery_swapper import BatterySwapper
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
+from flightd.sim.plant.plant_kind import PlantKind, airframe_kind
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
@@ -92,6 +93,7 @@ class WorldSpec:
     faults: tuple[Fault, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     unknowns: Unknowns = NOTHING
+    plant: PlantKind = PlantKind.OWN
 
 
 class VehiclePeer(Protocol):
@@ -128,7 +130,7 @@ class World:
         self._recorder = recorder
         self._unknowns, self._floor = spec.unknowns, site_toml(spec.site)
         start = _placement(spec)
-        airframe = Airframe(
+        airframe = airframe_kind(spec.plant)(
             spec.unknowns.airframe(AirframeParams(battery_capacity_ah=spec.battery_ah)),
             wind=spec.wind,
             seed=spec.seed,
