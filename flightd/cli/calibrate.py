@@ -1,24 +1,29 @@
-"""`flightd calibrate`: the down camera's lens from pictures of a chessboard."""
+"""`flightd calibrate`: the down camera's lens by a chessboard, or all of a drone's sensors by a flight."""
 
 from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightd.cli.options import AsJson, Pictures
+from flightd.cli.options import AsJson
 from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
+    from flightd.studies.sensor_fit_document import SensorRow
     from flightd.vision.lens_calibration import Board
 
 EXAMPLES = """Examples:
   flightd calibrate boards/                     8 or more pictures of a 9x6 chessboard
   flightd calibrate walk.mp4 --board 7x5 --json
+  flightd calibrate --from-log out/sim/flight.mcap
 
 Print the board, glue it to something flat, and fill every part of the picture with it, tilted and turned.
+
+A flight tells the camera's delay and mount, too: best one that hovers, goes fast, and turns by 90 degrees.
 """
 
 
@@ -28,14 +33,24 @@ def register(app: typer.Typer) -> None:
 
 
 def calibrate(
-    paths: Pictures,
+    paths: Annotated[
+        list[Path] | None, typer.Argument(metavar="PATH…", help="Images, folders of them, and videos.")
+    ] = None,
     board: Annotated[str, typer.Option(help="Inner corners, COLUMNSxROWS.")] = "9x6",
+    from_log: Annotated[
+        Path | None, typer.Option(metavar="LOG", help="A flight log: estimate delay, mount and more by it.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Calibrate the down camera; prints the `[camera]` keys for the configuration."""
     from flightd.studies.calibrate import calibrate_lens
 
-    found = calibrate_lens(paths, _board(board))
+    if bool(paths) is (from_log is not None):
+        raise InputError("give pictures of a board, or --from-log LOG")
+    if from_log is not None:
+        _by_flight(from_log, as_json=as_json)
+        return
+    found = calibrate_lens(paths or [], _board(board))
     if as_json:
         print(json.dumps(found.document(), indent=2))
         return
@@ -43,6 +58,50 @@ def calibrate(
     print("[camera]")
     for key, value in found.keys.items():
         print(f"{key} = {value}")
+
+
+def _by_flight(path: Path, *, as_json: bool) -> None:
+    """The sensors of the drone that flew it, and what to configure."""
+    from flightd.app.recording import SETTING_TOPICS, recorded_setting
+    from flightd.replay.log import read_log
+    from flightd.studies.flight_fit.record import READ, flight_record
+    from flightd.studies.sensor_fit import fit_sensors
+    from flightd.studies.sensor_fit_document import keys_to_set, sensor_rows, sensors_document
+
+    log = read_log(path, {*READ, *SETTING_TOPICS})
+    setting, record = recorded_setting(log), flight_record(log)
+    camera = setting.config.camera
+    found = fit_sensors(record, setting.config, setting.site)
+    rows = sensor_rows(found, camera, record.sensors)
+    if as_json:
+        print(json.dumps({"log": str(path), **sensors_document(found, rows, camera)}, indent=2))
+        return
+    _print(rows, found.frames)
+    keys = keys_to_set(rows, camera)
+    if not keys:
+        print("# nothing differs surely from what is configured")
+        return
+    print("[camera]")
+    for key, value in keys.items():
+        print(f"{key} = {value}")
+
+
+def _print(rows: list[SensorRow], frames: int) -> None:
+    from rich.table import Table
+
+    from flightd.cli.tables import stdout
+
+    def number(value: float | None, sigma: float | None) -> str:
+        return "" if value is None else f"{value:.4g}" + (f" ± {sigma:.2g}" if sigma is not None else "")
+
+    table = Table(title=f"{frames} frames", title_justify="left")
+    for heading in ("sensor", "configured", "in flight", "fitted", "note"):
+        table.add_column(heading, justify="left" if heading in {"sensor", "note"} else "right")
+    for row in rows:
+        fitted = number(row.fitted, row.sigma)
+        seen = number(row.online, row.online_sigma)
+        table.add_row(f"{row.name}, {row.unit}", f"{row.configured:.4g}", seen, fitted, row.note)
+    stdout().print(table)
 
 
 def _board(text: str) -> Board:

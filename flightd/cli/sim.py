@@ -67,6 +67,9 @@ def sim(
             help="How much of itself the drone keeps from its computer: ideal (nothing), usual or rough."
         ),
     ] = "usual",
+    plant: Annotated[
+        str, typer.Option(help="Whose airframe flies: own, or rotorpy (extra rotorpy).")
+    ] = "own",
     out: Annotated[Path, typer.Option(help="Folder for log, report and summary.")] = Path("out/sim"),
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE over the configuration.")
@@ -86,7 +89,7 @@ def sim(
     from flightd.app.simulation.prepare import SimOptions
 
     options = SimOptions(
-        config, warehouse, seed, vehicle, speed, tuple(settings or ()), truth_url, vehicle_url, world
+        config, warehouse, seed, vehicle, speed, tuple(settings or ()), truth_url, vehicle_url, world, plant
     )
     options.check()
     _fly_all(options, scenario or [], seeds, out, as_json=as_json)

@@ -18,7 +18,7 @@ import numpy as np
 from flightd.core.errors import InputError
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
-from flightd.replay.log import FlightLog, converted, with_nan
+from flightd.replay.log import FlightLog, recorded_tick
 
 Step: TypeAlias = Callable[[TickInput], TickOutput]
 
@@ -86,7 +86,7 @@ def replay_decisions(log: FlightLog, step: Step) -> Comparison:
     found: dict[str, list[_Difference]] = {}
     differing = missing = 0
     for entry in ticks:
-        replayed = _plain(step(_tick(log, entry.message)))
+        replayed = _plain(step(recorded_tick(log.path, entry.message)))
         decision = recorded.pop(entry.stamp_ns, None)
         if decision is None:
             missing += 1
@@ -128,16 +128,6 @@ def _drift(field: str, differences: list[_Difference]) -> Drift:
 def _shown(value: object) -> str:
     text = f"{value:.6g}" if isinstance(value, float) else str(value)
     return text if len(text) <= _SHOWN_CHARS else text[: _SHOWN_CHARS - 1] + "\u2026"
-
-
-def _tick(log: FlightLog, message: object) -> TickInput:
-    if isinstance(message, dict):  # null is "no vehicle yet" at the top and "no number" further in
-        message = {key: value if value is None else with_nan(value) for key, value in message.items()}
-    try:
-        return converted(message, TickInput)
-    except msgspec.ValidationError as err:
-        told = f"a message on {Topic.TICK} is not what this version records ({err})"
-        raise InputError(f"{log.path}: {told}") from None
 
 
 def _plain(output: TickOutput) -> object:

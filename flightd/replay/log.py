@@ -18,7 +18,8 @@ from mcap.records import Channel, Chunk, Metadata
 
 from flightd.core.errors import InputError
 from flightd.core.refusal import RecordedRefusal, Refusal
-from flightd.core.topics import MESSAGE_TYPES, RecordedFrame
+from flightd.core.tick import TickInput
+from flightd.core.topics import MESSAGE_TYPES, RecordedFrame, Topic
 from flightd.core.types import Event, EventLevel
 from flightd.runtime.mcap_scan import (
     MAGIC,
@@ -196,6 +197,17 @@ def with_nan(value: object) -> object:
 def converted(value: object, kind: type[MessageT]) -> MessageT:
     """JSON values as the message that they were recorded of; msgspec.ValidationError if they are none."""
     return msgspec.convert(_without_empty_reasons(value), kind, dec_hook=_recorded_reason)
+
+
+def recorded_tick(path: Path, message: object) -> TickInput:
+    """A message on TICK as the pilot was given it.  InputError if this version records no such."""
+    if isinstance(message, dict):  # null is "no vehicle yet" at the top and "no number" further in
+        message = {key: value if value is None else with_nan(value) for key, value in message.items()}
+    try:
+        return converted(message, TickInput)
+    except msgspec.ValidationError as err:
+        told = f"a message on {Topic.TICK} is not what this version records ({err})"
+        raise InputError(f"{path}: {told}") from None
 
 
 def _without_empty_reasons(value: object) -> object:

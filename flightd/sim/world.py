@@ -32,6 +32,7 @@ from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe, AirframeParams
 from flightd.sim.plant.battery_swapper import BatterySwapper
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
+from flightd.sim.plant.plant_kind import PlantKind, airframe_kind
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
@@ -43,6 +44,7 @@ from flightd.sim.sensors.instruments import SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
 from flightd.sim.unknowns import NOTHING, Shaken, Unknowns
 from flightd.site.site import Site
+from flightd.site.site_file import site_toml
 
 _TRUTH_PERIOD_S = 0.02
 
@@ -91,6 +93,7 @@ class WorldSpec:
     faults: tuple[Fault, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     unknowns: Unknowns = NOTHING
+    plant: PlantKind = PlantKind.OWN
 
 
 class VehiclePeer(Protocol):
@@ -125,9 +128,9 @@ class World:
         being drawn.  InputError for a fault at an unknown node."""
         self._clock = clock
         self._recorder = recorder
-        self._unknowns = spec.unknowns
+        self._unknowns, self._floor = spec.unknowns, site_toml(spec.site)
         start = _placement(spec)
-        airframe = Airframe(
+        airframe = airframe_kind(spec.plant)(
             spec.unknowns.airframe(AirframeParams(battery_capacity_ah=spec.battery_ah)),
             wind=spec.wind,
             seed=spec.seed,
@@ -169,6 +172,7 @@ class World:
         await self.open()
         told = Document(json.dumps(asdict(self._unknowns), indent=1))
         self._recorder.record(Topic.UNKNOWNS, self._clock.now_ns(), told)
+        self._recorder.record(Topic.MAP, self._clock.now_ns(), Document(self._floor))
         try:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self.vehicle.run(), name="autopilot")

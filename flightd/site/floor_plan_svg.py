@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from xml.sax.saxutils import escape
 
 from flightd.site.site import Edge, LineColour, Marker, Node, PaintedLine, Shelf, Side, Site
@@ -19,6 +21,8 @@ _PAINT = {
     LineColour.RED: "#c0322f",
     LineColour.BLUE: "#2f63ad",
 }
+_EXAGGERATED = 10.0
+"""How many times as far as it is a line is drawn beside its place."""
 _ARROW = "M-7 -6L9 0L-7 6Z"
 _STYLE = """
   text { font-family: ui-sans-serif, system-ui, "Segoe UI", Helvetica, Arial, sans-serif; fill: #2b3036 }
@@ -29,18 +33,32 @@ _STYLE = """
   .pad { fill: #3c4046; stroke: #1f2225 } .dot { fill: #fff; stroke: #2b3036; stroke-width: 1.8 }
   .shut { stroke: #c0322f; stroke-width: 4; fill: none } .way { fill: #2b3036 }
   .keep { fill: #c0322f; fill-opacity: 0.18; stroke: #c0322f; stroke-width: 1.5; stroke-dasharray: 6 4 }
+  .off { stroke: #8a2be2; stroke-width: 2; stroke-dasharray: 7 4; fill: none }
+  .off-by { font-size: 11.5px; font-weight: 600; fill: #8a2be2 }
   .axis { stroke: #8b939c; stroke-width: 1.4; fill: none } .home { fill: #1d9a57; stroke: #0f6b3a }
 """
 
 
-def draw_site(site: Site) -> str:
-    """The text of an SVG file.  Lines, shelves and pads are to scale, dots and letters are not."""
-    return _Plan(site).svg()
+@dataclass(frozen=True, slots=True)
+class LineOff:
+    """A painted line that lies `off_m` beside its place on the map, along the axis that it crosses ("x" or
+    "y") at `at_m`; None: that is not known.  Among those at one place it is the one through `through_m`."""
+
+    axis: str
+    at_m: float
+    through_m: float
+    off_m: float | None
+
+
+def draw_site(site: Site, off: Sequence[LineOff] = ()) -> str:
+    """The text of an SVG file.  Lines, shelves and pads are to scale, dots and letters are not; what is `off`
+    is drawn ten times as far beside its place as it is."""
+    return _Plan(site, off).svg()
 
 
 class _Plan:
-    def __init__(self, site: Site) -> None:
-        self._site = site
+    def __init__(self, site: Site, off: Sequence[LineOff]) -> None:
+        self._site, self._off = site, off
         x0, y0, x1, y1 = site.bounds()
         depth = _SHELF_DEPTH_M if site.shelves else 0.0
         self._x0_m, self._y0_m = x0 - _MARGIN_M, y0 - depth - 0.3 - _HEADER_M
@@ -69,6 +87,7 @@ class _Plan:
             *self._steps(),
             *itertools.chain.from_iterable(self._node(node) for node in site.nodes.values()),
             *self._aisle_names(),
+            *itertools.chain.from_iterable(self._beside(one) for one in self._off),
             *self._frame(),
             "</svg>",
         ]
@@ -86,6 +105,8 @@ class _Plan:
             f"{site.line_width_m * 1000:.0f} mm {site.line_colour} lines",
             f"ceiling {site.ceiling_m:g} m" if site.ceiling_given else "ceiling not given",
         ]
+        if self._off:
+            facts.append(f"dashed: where the lines lie, {_EXAGGERATED:g} times exaggerated")
         return [
             f'<text class="title" x="24" y="38">{escape(site.name)}</text>',
             f'<text class="fact" x="24" y="59">{escape("  ·  ".join(facts))}</text>',
@@ -113,6 +134,25 @@ class _Plan:
         rectangles = [self._stroke(line) for line in self._site.lines]
         outlines = [f'<path d="{d}" fill="none" stroke="#6b6047" stroke-width="2"/>' for d in rectangles]
         return [*outlines, *(f'<path d="{d}" fill="{colour}"/>' for d in rectangles)]
+
+    def _beside(self, one: LineOff) -> list[str]:
+        """Where the line lies, exaggerated, and by how much it is off in centimetres."""
+        line = next(line for line in self._site.lines if _is_at(line, one))
+        across_x, off_m = one.axis == "x", one.off_m
+        text = "not enough seen" if off_m is None else f"{off_m * 100:+.1f} cm"
+        shown_m = _EXAGGERATED * (off_m or 0.0)
+        dx_m, dy_m = (shown_m, 0.0) if across_x else (0.0, shown_m)
+        x0, y0 = self._at(line.x0_m + dx_m, line.y0_m + dy_m)
+        x1, y1 = self._at(line.x1_m + dx_m, line.y1_m + dy_m)
+        where = f'x="{x0:.1f}" y="{y0 - 6:.1f}" text-anchor="middle"'
+        if not across_x:
+            where = f'x="{x1 + 6:.1f}" y="{y1 + 4:.1f}"'
+        label = f'<text class="off-by" {where}>{text}</text>'
+        return (
+            [label]
+            if off_m is None
+            else [f'<path class="off" d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}"/>', label]
+        )
 
     def _stroke(self, line: PaintedLine) -> str:
         half = line.width_m / 2
@@ -214,6 +254,12 @@ class _Plan:
             f'<path class="axis" d="M{bar:.1f} {foot - 4:.1f}v8m0 -4h{_PX_PER_M:.1f}m0 -4v8"/>',
             _middle(bar + _PX_PER_M / 2, foot - 6, "1 m"),
         ]
+
+
+def _is_at(line: PaintedLine, one: LineOff) -> bool:
+    if one.axis == "x":
+        return line.x0_m == line.x1_m == one.at_m and line.y0_m <= one.through_m <= line.y1_m
+    return line.y0_m == line.y1_m == one.at_m and line.x0_m <= one.through_m <= line.x1_m
 
 
 def _middle(x: float, y: float, text: str) -> str:

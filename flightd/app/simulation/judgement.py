@@ -47,7 +47,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
     begun = [note for note in notes if note["began"]]
     statuses = flown.messages(Status)
     evidence = FlightEvidence(
-        site=simulation.scenario.floor.site(simulation.site),
+        site=simulation.scenario.floor.site(simulation.site, simulation.seed),
         plan=simulation.plan(),
         statuses=statuses,
         events=flown.messages(Event),

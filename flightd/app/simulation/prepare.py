@@ -13,6 +13,7 @@ from flightd.app.simulation.simulator_config import simulator_config
 from flightd.config.schema import Config
 from flightd.core.errors import InputError
 from flightd.sim.external.external_simulator import truth_address
+from flightd.sim.plant.plant_kind import PlantKind
 from flightd.sim.scenario.scenario import Scenario
 from flightd.sim.unknowns import WorldKind, unknowns_of
 
@@ -32,12 +33,18 @@ class SimOptions:
     truth_url: str = ""
     vehicle_url: str = ""
     world: str = WorldKind.USUAL
+    plant: str = PlantKind.OWN
 
     def check(self) -> None:
         """InputError where options contradict each other."""
         if self.world not in list(WorldKind):
             kinds = ", ".join(WorldKind)
             raise InputError(f"--world {self.world}: no such world; give one of {kinds}")
+        if self.plant not in list(PlantKind):
+            kinds = ", ".join(PlantKind)
+            raise InputError(f"--plant {self.plant}: no such airframe; give one of {kinds}")
+        if self.truth_url and self.plant != PlantKind.OWN:
+            raise InputError(f"--plant {self.plant}: with --truth-url the other simulator is the airframe")
         if bool(self.truth_url) is not bool(self.vehicle_url):
             raise InputError("--truth-url and --vehicle-url belong together: give both or neither")
 
@@ -79,6 +86,7 @@ def prepare(
         truth_url=options.truth_url,
         order=order,
         unknowns=unknowns_of(WorldKind(options.world), options.seed),
+        plant=PlantKind(options.plant),
     )
 
 

@@ -19,6 +19,7 @@ from flightd.core.snapshot import Snapshot
 from flightd.mission.plan.flight_plan import FlightPlan
 from flightd.sim.autopilot.parameters import COPTER_PARAMETERS, PX4_PARAMETERS
 from flightd.sim.autopilot.shipped_parameters import shipped_parameters
+from flightd.sim.plant.plant_kind import PlantKind
 from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
 from flightd.sim.scenario.scenario import Scenario
 from flightd.sim.unknowns import NOTHING, Unknowns
@@ -42,6 +43,7 @@ class Simulation:
     order: FlightOrder | None = None
     """What this flight is to do; None: what the configuration says."""
     unknowns: Unknowns = NOTHING
+    plant: PlantKind = PlantKind.OWN
 
     @property
     def flight_log(self) -> Path:
@@ -66,7 +68,7 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
     scenario, config = simulation.scenario, simulation.config
     adapter, order = config.vehicle.kind, simulation.setting.order
     return WorldSpec(
-        site=scenario.floor.site(simulation.site),
+        site=scenario.floor.site(simulation.site, simulation.seed),
         seed=simulation.seed,
         camera_address=("127.0.0.1", ports.camera),
         vehicle="px4" if adapter == "mavsdk" else adapter,
@@ -89,6 +91,7 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
         truth_url=simulation.truth_url,
         faults=scenario.fault,
         unknowns=simulation.unknowns,
+        plant=simulation.plant,
     )
 
 

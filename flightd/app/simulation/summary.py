@@ -36,6 +36,7 @@ def write_results(
         "wall_time_s": round(wall_s, 2),
         "seed": simulation.seed,
         "world": simulation.unknowns.kind,
+        "plant": simulation.plant,
         "vehicle": simulation.config.vehicle.kind,
         **judgement.sensors,
         **judgement.stock,

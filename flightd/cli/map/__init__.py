@@ -1,16 +1,18 @@
-"""`flightd map`: check, draw and make site files."""
+"""`flightd map`: check, draw, fit and make site files."""
 
 from __future__ import annotations
 
 import typer
 
 from flightd.cli.application import group
-from flightd.cli.map import check, draw, new
+from flightd.cli.map import check, draw, fit, new
 
 
 def register(app: typer.Typer) -> None:
     """Hang `map` with its commands under `app`."""
-    commands = group("flightd map new hall-3.toml --aisles 4\nflightd map check hall-3.toml")
-    for command in (check, draw, new):
+    commands = group(
+        "flightd map new hall-3.toml --aisles 4\nflightd map check hall-3.toml\nflightd map fit flight.mcap"
+    )
+    for command in (check, draw, fit, new):
         command.register(commands)
-    app.add_typer(commands, name="map", help="Check, draw and make site files (the map of a warehouse).")
+    app.add_typer(commands, name="map", help="Check, draw, fit and make site files (the map of a warehouse).")

@@ -35,6 +35,7 @@ exposure = 1.0           # brightness
 [floor]
 appearance = "default"   # default, clean, harsh, dim, glossy or worn
 pad_off_m = [0.0, 0.0]   # how far the pads have been pushed from where the map has them, x and y
+map_error_m = 0.0        # by up to so much each painted line lies beside its place on the map; not the pad's
 
 [wind]
 mean_x_mps = 0.0         # steady wind in the map frame
@@ -74,6 +75,7 @@ from pydantic import Field, model_validator
 from flightd.config.section import Section
 from flightd.sim.appearance import Appearance, preset
 from flightd.sim.autopilot.radio import RadioParams
+from flightd.sim.floor.misplaced_lines import misplaced
 from flightd.sim.judge.expectation import Expectation
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance
@@ -171,9 +173,13 @@ class FloorScenario(Section):
     appearance: Literal["default", "clean", "harsh", "dim", "glossy", "worn"] = "default"
 
     pad_off_m: tuple[_Shift, _Shift] = (0.0, 0.0)
+    map_error_m: float = Field(0.0, ge=0, le=0.3)
 
-    def site(self, site: Site) -> Site:
-        """The site as it really is: its pads pushed about."""
+    def site(self, site: Site, seed: int = 0) -> Site:
+        """The site as it really is: its lines beside where the map has them, drawn by the `seed`, and its
+        pads pushed about.  InputError where no such floor can be laid out."""
+        if self.map_error_m:
+            site = misplaced(site, self.map_error_m, seed)
         dx_m, dy_m = self.pad_off_m
         pads = (replace(pad, offset_m=(pad.offset_m[0] + dx_m, pad.offset_m[1] + dy_m)) for pad in site.pads)
         return replace(site, pads=tuple(pads))

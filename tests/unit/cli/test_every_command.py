@@ -40,6 +40,7 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightd log repair": ("empty.mcap",),
     "flightd map check": ("none.toml",),
     "flightd map draw": ("none.toml",),
+    "flightd map fit": ("empty.mcap",),
     "flightd map new": ("new.toml", "--spacing-m", "wide"),
     "flightd inventory plan": ("stock", "none.toml"),
     "flightd inventory show": ("none",),

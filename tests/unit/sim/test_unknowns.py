@@ -6,6 +6,8 @@ import math
 
 import pytest
 
+from flightd.app.simulation.prepare import SimOptions
+from flightd.core.errors import InputError
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.sensors.instruments import SensorParams
 from flightd.sim.sensors.optics import SimCamera
@@ -36,3 +38,10 @@ def test_what_is_drawn_stays_within_its_world_and_reaches_what_it_is_of(kind: Wo
         assert one.sensors(SensorParams()).leak_s == most.leak_s
         down_s, up_s = one.path_s
         assert down_s + up_s == pytest.approx(2.0 * most.path_s)
+
+
+def test_an_airframe_that_there_is_not_is_refused() -> None:
+    with pytest.raises(InputError, match=r"--plant kite: no such airframe; give one of own, rotorpy"):
+        SimOptions(plant="kite").check()
+    with pytest.raises(InputError, match=r"--truth-url the other simulator is the airframe"):
+        SimOptions(plant="rotorpy", truth_url="tcp:h:1", vehicle_url="tcp:h:2").check()
