@@ -29,11 +29,15 @@ class TruthHistory:
         return self._samples[-1]
 
     def at(self, stamp_ns: int) -> Kinematics:
-        """The motion at `stamp_ns`, linear between samples; outside the record the nearest sample's, with
-        the time asked for."""
+        """The motion at `stamp_ns`, linear between samples, and on beyond the newest for no longer than
+        samples are apart; farther outside the record the nearest sample's, with the time asked for."""
         samples = self._samples
         newest = self.latest()
         if stamp_ns >= newest.stamp_ns:
+            before = samples[-2] if len(samples) > 1 else newest
+            apart_ns, ahead_ns = newest.stamp_ns - before.stamp_ns, stamp_ns - newest.stamp_ns
+            if 0 < ahead_ns <= apart_ns:  # an exposure between two steps: held, it would be of the past
+                return _between(before, newest, 1.0 + ahead_ns / apart_ns, stamp_ns)
             return replace(newest, stamp_ns=stamp_ns)
         after = bisect_left(samples, stamp_ns, key=_stamp)
         if after == 0:

@@ -192,3 +192,14 @@ def test_truth_is_read_between_its_samples_across_the_turn_of_yaw() -> None:
     assert history.at(99).x_m == 4.0
     with pytest.raises(ValueError, match="not after"):
         history.add(history.latest())
+
+
+def test_the_truth_goes_on_beyond_its_newest_sample_by_one_step_and_no_more() -> None:
+    history = TruthHistory(3)
+    frame = Airframe()
+    for n in range(2):
+        frame.x_m, frame.roll_rad = 0.1 * n, 0.02 * n
+        history.add(frame.kinematics(n * 5_000_000))
+    ahead, far = history.at(7_500_000), history.at(20_000_000)
+    assert (ahead.x_m, ahead.roll_rad) == pytest.approx((0.15, 0.03))
+    assert (far.x_m, far.stamp_ns) == (0.1, 20_000_000)
