@@ -146,7 +146,9 @@ class Pilot:
         guidance = self._mission.step(inputs)
         push_mps2 = (tracks.push_x_mps2, tracks.push_y_mps2) if tracks is not None else (0.0, 0.0)
         stand_yaw_rad = self._mission.stand[1]
-        setpoint = self._commanded = self._steering.step(inputs, guidance, push_mps2, stand_yaw_rad)
+        setpoint = self._commanded = self._steering.step(
+            inputs, guidance, push_mps2, stand_yaw_rad, known.lead, known.conditions
+        )
         self._plausibility.steered(guidance, pose)
         mission = self._mission
         findings, settled = self._scanner.drain()
@@ -193,10 +195,10 @@ class Pilot:
             localised=precise and all(localiser.ever_matched),
             height_m=known.height_m,
             frames_arrive=estimator.frames.age_s(now_ns) < _FRAMES_ARRIVE_S,
-            x_age_s=(now_ns - x_ns) * 1e-9 if x_ns else math.inf,
-            y_age_s=(now_ns - y_ns) * 1e-9 if y_ns else math.inf,
-            features_age_s=(now_ns - features_ns) * 1e-9 if features_ns else math.inf,
-            telemetry_age_s=math.inf if v is None else (now_ns - v.attitude.stamp_ns) * 1e-9,
+            x_age_s=estimator.sight_age_s(now_ns, x_ns),
+            y_age_s=estimator.sight_age_s(now_ns, y_ns),
+            features_age_s=estimator.sight_age_s(now_ns, features_ns),
+            telemetry_age_s=math.inf if v is None else estimator.telemetry_age_s(now_ns, v.attitude.stamp_ns),
             vehicle=v,
             judged_charge=self._charge.step(now_ns, v, flying=self._mission.airborne),
             ground_silent_s=tick.ground_silent_s,

@@ -34,7 +34,7 @@ class HorizontalGains(PidGains):
         6.5, ge=0, le=100, description="acceleration per metre off", json_schema_extra=unit("m/s^2 per m")
     )
     ki: float = Field(
-        3.3, ge=0, le=100, description="its growth per metre off", json_schema_extra=unit("m/s^2 per m s")
+        0.7, ge=0, le=100, description="its growth per metre off", json_schema_extra=unit("m/s^2 per m s")
     )
     kd: float = Field(
         4.4, ge=0, le=100, description="acceleration against speed", json_schema_extra=unit("m/s^2 per m/s")

@@ -43,6 +43,18 @@ class Reference:
     climb_mps: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """What else the position loop goes by: the acceleration that no told lean explains (grid axes), against
+    which it leans, and by how much slower than configured it answers, 1 as configured."""
+
+    unleant_mps2: tuple[float, float] = (0.0, 0.0)
+    ease: float = 1.0
+
+
+CALM = Conditions()
+
+
 class FlightController:
     """Position, yaw and height loops.  Reset before flying after a time without control."""
 
@@ -60,18 +72,19 @@ class FlightController:
         for loop in (self._x, self._y, self._yaw, self._height):
             loop.reset()
 
-    def step(self, now_ns: int, motion: Motion, reference: Reference, dt_s: float) -> AttitudeSetpoint:
+    def step(
+        self, now_ns: int, motion: Motion, reference: Reference, dt_s: float, conditions: Conditions = CALM
+    ) -> AttitudeSetpoint:
         """The full setpoint, all loops closed; level when any number it would be made of is not finite."""
         known = (motion.x_m, motion.y_m, motion.vx_mps, motion.vy_mps, motion.yaw_rad, motion.yaw_rate_radps)
         if not all(map(math.isfinite, (*known, reference.x_m, reference.y_m, reference.yaw_rad))):
             return self.level(now_ns, motion, reference, dt_s)
-        kd = self._gains.kd
-        ax = self._x.step(
-            reference.x_m - motion.x_m, motion.vx_mps, dt_s, reference.ax_mps2 + kd * reference.vx_mps
-        )
-        ay = self._y.step(
-            reference.y_m - motion.y_m, motion.vy_mps, dt_s, reference.ay_mps2 + kd * reference.vy_mps
-        )
+        ease, (push_x, push_y) = conditions.ease, conditions.unleant_mps2
+        kd = ease * self._gains.kd
+        wanted_x = reference.ax_mps2 + kd * reference.vx_mps - push_x
+        wanted_y = reference.ay_mps2 + kd * reference.vy_mps - push_y
+        ax = self._x.step(reference.x_m - motion.x_m, motion.vx_mps, dt_s, wanted_x, ease)
+        ay = self._y.step(reference.y_m - motion.y_m, motion.vy_mps, dt_s, wanted_y, ease)
         return self._tilted(now_ns, ax, ay, motion, reference, dt_s)
 
     def level(self, now_ns: int, motion: Motion, reference: Reference, dt_s: float) -> AttitudeSetpoint:

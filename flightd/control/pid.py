@@ -25,15 +25,18 @@ class Pid:
         limit = self._integral_limit
         self._integral = min(max(integral, -limit), limit)
 
-    def step(self, error: float, rate: float, dt_s: float, feed_forward: float = 0.0) -> float:
-        """Output for this `error` (setpoint minus measurement) and measured `rate`.
+    def step(
+        self, error: float, rate: float, dt_s: float, feed_forward: float = 0.0, ease: float = 1.0
+    ) -> float:
+        """Output for this `error` (setpoint minus measurement) and measured `rate`; the loop answers `ease`
+        times as fast as configured, with the same damping.
 
         The integral stands still while the output is at its limit and the error would drive it further
         (conditional integration), and never exceeds its own limit.
         """
         g = self._gains
-        direct = g.kp * error - g.kd * rate + feed_forward
-        candidate = self._integral + g.ki * error * dt_s
+        direct = ease**2 * g.kp * error - ease * g.kd * rate + feed_forward
+        candidate = self._integral + ease**3 * g.ki * error * dt_s
         candidate = min(max(candidate, -self._integral_limit), self._integral_limit)
         output = direct + candidate
         if abs(output) <= self._output_limit or output * error < 0:

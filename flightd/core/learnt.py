@@ -11,16 +11,17 @@ class Learnt(enum.IntEnum):
     """What can be wrong with the sensors, beyond the configuration, in the order of the numbers.
 
     ROLL, PITCH: the told attitude is too small by this, rad; LEAK: rate at which it leaks, 1/s; MOUNT_ROLL,
-    MOUNT_PITCH: the camera in the airframe, rad; DELAY: frames are exposed so much later than their stamps
-    say, s; SCALE: share by which lengths are longer."""
+    MOUNT_PITCH, MOUNT_YAW: the camera in the airframe, rad; DELAY: frames are exposed so much later than
+    their stamps say, s; SCALE: share by which lengths are longer."""
 
     ROLL = 0
     PITCH = 1
     LEAK = 2
     MOUNT_ROLL = 3
     MOUNT_PITCH = 4
-    DELAY = 5
-    SCALE = 6
+    MOUNT_YAW = 5
+    DELAY = 6
+    SCALE = 7
 
 
 @dataclass(frozen=True, slots=True)

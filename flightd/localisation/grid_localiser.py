@@ -57,6 +57,8 @@ _SEEN_NS = 200_000_000
 """A line seen so lately counts as in view."""
 _CARRIED_NS = 400_000_000
 """So lately features of the floor must have been followed to carry a position on."""
+_SURE = 0.99
+"""A place this likely says which line of the map a track is."""
 _CREEP_MPS = 0.1
 """A hover counts as so fast: what carries a position drifts at rest, too."""
 _GAP_S = 0.6
@@ -119,6 +121,18 @@ class GridLocaliser:
             node = self._nodes.node(float(places.at_m[row, 0]), float(places.at_m[row, 1])).id
             by_node[node] = by_node.get(node, 0.0) + float(places.weights[row])
         return sorted(((n, w) for n, w in by_node.items() if w >= least), key=lambda item: -item[1])
+
+    def map_lines(self, axis: int) -> dict[int, float]:
+        """Where on the map (m, across the axis) each track is that is surely a line of it; none while the
+        place is in doubt."""
+        places = self._places
+        if places.weights[places.best] < _SURE:
+            return {}
+        return {
+            track: float(self._paint.axes[axis].at_m[line])
+            for track, line in places.lines(axis).items()
+            if line >= 0
+        }
 
     def way_out(self, least: float = 1e-3) -> tuple[float, float] | None:
         """A move (dx, dy) along open lines that is safe wherever the drone may be with at least this

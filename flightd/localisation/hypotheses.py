@@ -59,6 +59,10 @@ class Places:
         """(N) indices of the map lines that the track is, negative where it is none."""
         return self._matches[axis][track_id]
 
+    def lines(self, axis: int) -> dict[int, int]:
+        """The map line of each track at the likeliest place, negative where it is none."""
+        return {track: int(index[self.best]) for track, index in self._matches[axis].items()}
+
     def unmatched(self, axis: int, track_id: int) -> bool:
         """Whether at some place the track may still turn out to be a map line."""
         return bool((self._matches[axis][track_id][1:] == _UNMATCHED).any())

@@ -3,23 +3,37 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 from flightd.config.schema import Config
+from flightd.control.flight_controller import CALM, Conditions
 from flightd.core.learnt import LearntSensors
-from flightd.core.tick import TickInput
+from flightd.core.tick import TICK_S, TickInput
 from flightd.core.tracks import TrackSet
 from flightd.core.types import AttitudeSetpoint, GridPose, LineSet, VehicleState
 from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.localisation.pad_finder import PadFinder
 from flightd.localisation.pose_history import PoseHistory
 from flightd.site.site import Site
-from flightd.tracking.attitude_extrapolation import AttitudeExtrapolation
+from flightd.tracking.attitude_response import AttitudeResponse
 from flightd.tracking.climb_doubt import ClimbDoubt
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.height_history import HeightHistory
-from flightd.tracking.line_tracker import LineTracker
+from flightd.tracking.line_tracker import NO_LEAD, Lead, LineTracker
 from flightd.tracking.stuck_height import StuckHeight
+
+_LATE_GAIN, _MOST_LATE_S = 0.02, 0.15
+"""How soon the usual delay of attitudes is believed, and the most of it."""
+_FREE_S, _LEAST_EASE = 0.15, 0.5
+"""The configured gains are for a loop that is no later than this, beside the attitude's own; a later one
+answers more slowly in proportion, down to this share."""
+_UNLEANT_S = 0.3
+"""Over so long a push is averaged before it is leant against."""
+_MAP_SIGMA_M = 0.02
+"""Of a distance between two lines of the map, as it is painted."""
+_WAIT_NS = 300_000_000
+"""So old a frame is used by the attitude that is assumed of its exposure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +45,8 @@ class Estimate:
     tracks: TrackSet | None
     pose: GridPose | None
     by_pad: bool
+    lead: Lead = NO_LEAD
+    conditions: Conditions = CALM
 
 
 class StateEstimator:
@@ -51,7 +67,8 @@ class StateEstimator:
         self._config = config
         self._least_integrity = least_integrity
         self._heights = HeightHistory()
-        self._extrapolation = AttitudeExtrapolation()
+        self.response = AttitudeResponse()
+        self._telemetry_s = 0.0
         self.frames = FrameMonitor()
         self.learnt = learnt
         """What the last flight has learnt of the sensors, or those before it."""
@@ -87,6 +104,10 @@ class StateEstimator:
         self.climb = ClimbDoubt()
         self._climbed = HeightHistory()
         self._climbed_m, self._climb_ns = 0.0, 0
+        self._waiting: deque[LineSet] = deque()
+        self._judged_ns = 0
+        self._frames_s = 0.0
+        self._unleant = (0.0, 0.0)
         self.armed = armed
 
     @property
@@ -97,22 +118,42 @@ class StateEstimator:
     def take(self, tick: TickInput, commanded: AttitudeSetpoint | None) -> None:
         """Telemetry first: a frame needs the attitude and height of its exposure.  `commanded` is what went
         out with the last tick."""
+        v = tick.vehicle
+        obeys = v is not None and v.in_control and v.may_fly
+        self.response.sent(tick.now_ns, commanded)
         for sample in tick.attitudes:
+            late_s = (tick.now_ns - sample.stamp_ns) * 1e-9
+            self._telemetry_s += _LATE_GAIN * (min(max(late_s, 0.0), _MOST_LATE_S) - self._telemetry_s)
             self.tracker.attitude(sample)
             self.poses.add_attitude(sample)
-        heard = tick.vehicle.attitude if tick.vehicle is not None else None
-        assumed = self._extrapolation.step(tick.now_ns, heard, commanded)
-        if assumed is not None:
-            self.tracker.assume(assumed)
+            self.response.told(sample, obeys=obeys)
+        self.tracker.assume(self.response.foreseen(tick.now_ns))
         if tick.vehicle is not None:
             v = tick.vehicle
             if not self._stuck.found:
                 self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
             self._count_climb(tick.now_ns, v.climb_mps)
             self._mind_height(tick.now_ns, v, commanded)
-        for lines in tick.lines:
-            if self.frames.take(lines) and self.armed:
-                self._take_frame(lines)
+        self._waiting += (lines for lines in tick.lines if self.frames.take(lines) and self.armed)
+        while self._waiting and self._is_due(self._waiting[0], tick.now_ns):
+            lines = self._waiting.popleft()
+            self._judged_ns = lines.stamp_ns
+            self._take_frame(lines)
+
+    def telemetry_age_s(self, now_ns: int, stamp_ns: int) -> float:
+        """How much older a told attitude is than attitudes are on their usual way: that is bridged by what
+        was sent since, silence is not."""
+        return max((now_ns - stamp_ns) * 1e-9 - self._telemetry_s, 0.0)
+
+    def sight_age_s(self, now_ns: int, told_ns: int) -> float:
+        """For how long the floor has told nothing since then: without frames, or in those that are judged.
+        In frames that wait for their attitude nobody has looked yet."""
+        waiting_ns = self._waiting[-1].stamp_ns - self._judged_ns if self._waiting and self._judged_ns else 0
+        return max(now_ns - told_ns - waiting_ns, 0) * 1e-9 if told_ns else math.inf
+
+    def _is_due(self, lines: LineSet, now_ns: int) -> bool:
+        """A frame waits for the attitude at its exposure, but not for ever."""
+        return self.tracker.measured(lines) or now_ns - self.tracker.exposed_ns(lines) > _WAIT_NS
 
     def step(self, now_ns: int) -> Estimate:
         """The motion now."""
@@ -121,15 +162,36 @@ class StateEstimator:
         pose = None if tracks is None else self.localiser.step(tracks, height_m)
         if pose is not None:
             self.poses.add(pose)
+            for axis in (0, 1):
+                self.tracker.survey(axis, self.localiser.map_lines(axis), _MAP_SIGMA_M)
         if tracks is not None and pose is not None:
             self.pads.step(tracks, pose)
         by_pad = None if pose is None else self.pads.over(pose, self.localiser.ever_matched)
-        return Estimate(height_m, tracks, by_pad or pose, by_pad is not None)
+        lead = self.tracker.lead(now_ns, now_ns + round(self.response.delay_s * 1e9))
+        return Estimate(height_m, tracks, by_pad or pose, by_pad is not None, lead, self._conditions(now_ns))
+
+    def _conditions(self, now_ns: int) -> Conditions:
+        """What the position loop has to reckon with: a push that nothing leans against yet, and how late it
+        may all be still: frames, what is made of them, and what that is answered with."""
+        tracker, response = self.tracker, self.response
+        seen_ns = tracker.newest_ns
+        if not seen_ns:
+            return CALM
+        late_s = min(max((now_ns - seen_ns) * 1e-9, 0.0), _MOST_LATE_S)
+        self._frames_s += _LATE_GAIN * (late_s - self._frames_s)
+        total_s = (
+            self._frames_s + response.delay_s + math.hypot(response.delay_sigma_s, tracker.delay_sigma_s)
+        )
+        part = TICK_S / _UNLEANT_S
+        x, y = self._unleant
+        now_x, now_y = tracker.unleant(now_ns)
+        self._unleant = x + part * (now_x - x), y + part * (now_y - y)
+        return Conditions(self._unleant, min(max(_FREE_S / total_s, _LEAST_EASE), 1.0))
 
     def _take_frame(self, lines: LineSet) -> None:
         exposed_ns = self.tracker.exposed_ns(lines)
         height_m, climbed_m = self._heights.at(exposed_ns), self._climbed.at(exposed_ns)
-        used, by_width_m = self.tracker.frame(lines, height_m), self.tracker.by_width_m
+        used, by_width_m = self.tracker.frame(lines, height_m, self._heights.error_m), self.tracker.by_width_m
         if used and by_width_m is not None and math.isfinite(height_m + climbed_m):
             self.climb.step(exposed_ns, height_m, by_width_m, climbed_m)
 

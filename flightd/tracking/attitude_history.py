@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import deque
+from collections.abc import Iterable
 
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Attitude
@@ -26,21 +27,32 @@ class AttitudeHistory:
 
     def add(self, sample: Attitude) -> None:
         """Append a measured sample; one that is not newer than the last is ignored (reordered datagrams)."""
-        for _ in range(self._assumed):
-            self._samples.pop()
-            self._stamps.pop()
-        self._assumed = 0
+        self._forget_assumed()
         self._append(sample)
 
-    def assume(self, sample: Attitude) -> None:
-        """Append what is assumed while nothing is measured."""
-        if self._append(sample):
-            self._assumed = min(self._assumed + 1, len(self._samples))
+    def assume(self, samples: Iterable[Attitude]) -> None:
+        """What is assumed from the newest measured sample on, in the place of what was."""
+        self._forget_assumed()
+        for sample in samples:
+            if self._append(sample):
+                self._assumed = min(self._assumed + 1, len(self._samples))
 
     def is_assumed(self, stamp_ns: int) -> bool:
         """Whether the attitude at that time rests on what is only assumed."""
         measured = len(self._stamps) - self._assumed
         return self._assumed > 0 and (measured == 0 or stamp_ns > self._stamps[measured - 1])
+
+    @property
+    def measured_ns(self) -> int:
+        """The time of the newest measured sample; 0 before the first."""
+        measured = len(self._stamps) - self._assumed
+        return self._stamps[measured - 1] if measured else 0
+
+    def _forget_assumed(self) -> None:
+        for _ in range(self._assumed):
+            self._samples.pop()
+            self._stamps.pop()
+        self._assumed = 0
 
     def _append(self, sample: Attitude) -> bool:
         if self._stamps and sample.stamp_ns <= self._stamps[-1]:

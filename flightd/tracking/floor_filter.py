@@ -13,7 +13,7 @@ Filtering Theory, 1970, 8.3), with Joseph's form of the update.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -29,9 +29,12 @@ from flightd.tracking.line_sight import FeatureSight, LineSight, Rates
 from flightd.tracking.motion_model import (
     DELAY,
     FIRST_LINE,
+    HEIGHT,
+    HEIGHT_S,
     LEAK,
     MOUNT_PITCH,
     MOUNT_ROLL,
+    MOUNT_YAW,
     PITCH,
     PSI,
     PSI_RATE,
@@ -51,12 +54,13 @@ _UNSEEN_S = 0.1
 """An axis without a line for so long is dead-reckoned: the gust that was last felt on it fades."""
 _SENSORS, _LASTING = slice(ROLL, FIRST_LINE), slice(LEAK, FIRST_LINE)
 """What is wrong with the sensors, and what of it is learnt for good."""
-_TILTS = [*range(ROLL, DELAY), SCALE]
+_TILTS = [HEIGHT, *range(ROLL, DELAY), SCALE]
 """All of the sensors but the delay."""
 _BUT_MOTION = [PSI, PSI_RATE, *range(LEAK, FIRST_LINE)]
 """All but velocities, disturbances, the error of the attitude and the lines."""
 _YAW_SIGMA_RAD, _YAW_RATE_SIGMA_RADPS = math.radians(5.0), 0.005
 """Of the heading before it is told at all, and of its drift whenever it is."""
+_LEAST_HEIGHT_SHARE, _MOST_HEIGHT_SHARE = 0.001, 0.05
 _MOST_LEAK_PER_S = 1.0
 _MOST_SIGMAS = 4.0
 """A delay further off than so many sigmas of what was thought possible is not believed."""
@@ -69,6 +73,7 @@ _SURE_HITS, _GLIMPSE_NS = 3, 250_000_000
 """A line seen less often is forgotten so soon: what only shows now and then is none."""
 _CARRIED_M = 0.12
 """A line whose place features of the floor have told this well is held on, however long it is not seen."""
+_SURVEY_SIGMAS = 4.0
 _BETWEEN = 0.3
 """Share of what was thought possible by which a sensor can have changed between two flights."""
 
@@ -95,9 +100,10 @@ class FloorFilter:
         sigmas[[PSI, PSI_RATE]] = _YAW_SIGMA_RAD, _YAW_RATE_SIGMA_RADPS
         sigmas[[VX, VY]] = noise.start_velocity_mps
         sigmas[[PUSH_X, PUSH_Y]] = noise.start_disturbance_mps2
+        sigmas[HEIGHT] = _LEAST_HEIGHT_SHARE
         sigmas[[ROLL, PITCH]] = priors.attitude_rad
         sigmas[LEAK] = priors.leak_per_s
-        sigmas[[MOUNT_ROLL, MOUNT_PITCH]] = priors.mount_rad
+        sigmas[[MOUNT_ROLL, MOUNT_PITCH]], sigmas[MOUNT_YAW] = priors.mount_rad, priors.mount_yaw_rad
         sigmas[DELAY], sigmas[SCALE] = priors.delay_s, priors.scale_share
         self._first_sigmas = sigmas
         self._x: Matrix = np.zeros(FIRST_LINE)
@@ -108,8 +114,10 @@ class FloorFilter:
         drift[[ROLL, PITCH]] = priors.attitude_rad * math.sqrt(2.0 / priors.attitude_s)
         drift[LEAK] = priors.leak_per_s * 0.02
         drift[[MOUNT_ROLL, MOUNT_PITCH]] = priors.mount_rad * 0.002
+        drift[MOUNT_YAW] = priors.mount_yaw_rad * 0.002
         drift[DELAY], drift[SCALE] = priors.delay_s * 0.01, priors.scale_share * 0.01
         self._drift = drift
+        self.height_known_to(0.0)
         self._steady = [0.0, 0.0]
         self._unseen_s = [0.0, 0.0]
         self._followed_ns = [0, 0]
@@ -123,6 +131,12 @@ class FloorFilter:
 
     def sigma(self, index: int) -> float:
         return math.sqrt(max(float(self._p[index, index]), 0.0))
+
+    def without_errors(self) -> Matrix:
+        """The first states, were the told attitude right."""
+        state = self._x[:FIRST_LINE].copy()
+        state[[ROLL, PITCH]] = 0.0
+        return state
 
     def offset(self, line: int) -> tuple[float, float]:
         """Of the line held at that place: its offset from the drone, and sigma."""
@@ -156,8 +170,12 @@ class FloorFilter:
 
     def begin_with(self, learnt: LearntSensors) -> None:
         """Begin with what another filter has learnt of the same sensors: less surely, for a mount can have
-        been knocked since, and with another error of the attitude.  What is no number is ignored."""
-        means, covariance = np.array(learnt.means), np.reshape(learnt.covariance, (len(learnt.means), -1))
+        been knocked since, and with another error of the attitude.  What is no number, or of a version
+        that learnt other things, is ignored."""
+        known = FIRST_LINE - ROLL
+        if (len(learnt.means), len(learnt.covariance)) != (known, known**2):
+            return
+        means, covariance = np.array(learnt.means), np.reshape(learnt.covariance, (known, known))
         if not (np.isfinite(means).all() and np.isfinite(covariance).all()):
             return
         self._x[_SENSORS], self._p[_SENSORS, _SENSORS] = means, covariance
@@ -189,6 +207,11 @@ class FloorFilter:
         self._drop(range(len(self.held)))
         self._begin_anew([VX, VY, PUSH_X, PUSH_Y])
         self._innovations.forget()
+
+    def height_known_to(self, share: float) -> None:
+        """Standard deviation of the told height, as a share of it."""
+        share = min(max(share, _LEAST_HEIGHT_SHARE), _MOST_HEIGHT_SHARE)
+        self._drift[HEIGHT] = share * math.sqrt(2.0 / HEIGHT_S)
 
     def predict(self, dt_s: float, roll_rad: float, pitch_rad: float, yaw_rad: float) -> None:
         """Advance by `dt_s` in the told attitude; `yaw_rad` is the vehicle's own."""
@@ -258,6 +281,30 @@ class FloorFilter:
         return frozenset(axis for axis in bare if told_by.count(axis) >= _TELLING)
 
     # How
+
+    def survey(self, axis: int, places_m: Mapping[int, float], sigma_m: float) -> None:
+        """Lines held, by their ids, are at such places on the map, whose distances are known to `sigma_m`.
+        Each line is held against another one once: what the map errs by does not average out."""
+        known = [
+            (line, held) for line, held in enumerate(self.held) if held.axis == axis and held.id in places_m
+        ]
+        for line, held in known:
+            if held.surveyed or held.hits < _SURE_HITS:
+                continue
+            others = [(at, other) for at, other in known if other.surveyed]
+            others = others or [(at, other) for at, other in known if at != line and other.hits >= _SURE_HITS]
+            if not others:
+                continue
+            at, other = min(others, key=lambda one: self.sigma(FIRST_LINE + one[0]))
+            apart_m = places_m[held.id] - places_m[other.id]
+            row = np.zeros(len(self._x))
+            row[FIRST_LINE + line], row[FIRST_LINE + at] = 1.0, -1.0
+            off_m = float(row @ self._x) - apart_m
+            spread_m = math.sqrt(float(row @ self._p @ row) + sigma_m**2)
+            held.surveyed = other.surveyed = True
+            if abs(off_m) < _SURVEY_SIGMAS * spread_m:
+                noise, errors = np.array([[sigma_m**2]]), np.array([off_m])
+                self._x, self._p, _ = corrected(self._x, self._p, row[None, :], errors, noise)
 
     def _begin_anew(self, states: list[int]) -> None:
         """These are as unknown as at first, and nothing that is known says anything of them."""

@@ -9,8 +9,10 @@ from flightd.tracking.line_sight import LineSight, Rates
 from flightd.tracking.motion_model import (
     DELAY,
     FIRST_LINE,
+    HEIGHT,
     MOUNT_PITCH,
     MOUNT_ROLL,
+    MOUNT_YAW,
     PITCH,
     PSI,
     ROLL,
@@ -47,6 +49,7 @@ class FrameMeasurement:
         row[PSI] = 1.0
         row[[ROLL, PITCH]] = by_roll, by_pitch
         row[[MOUNT_ROLL, MOUNT_PITCH]] = sight.turn_per_mount
+        row[MOUNT_YAW] = 1.0
         row[DELAY] = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + rates.yaw_radps
         self._add(row, sight.turn_rad, sight.sigma_theta_rad, sight.turn_per_tilt, None)
 
@@ -66,7 +69,7 @@ def offset_error(sight: LineSight, line: int, x: Matrix, rates: Rates) -> tuple[
     row = placed(sight, x, rates)
     row[column] = -1.0
     # as held, not as seen: what is seen has the noise in it that is weighed here, and scale would shrink
-    row[SCALE] = x[column]
+    row[SCALE] = row[HEIGHT] = x[column]
     return row, sight.offset_m - float(x[column])
 
 
@@ -76,8 +79,9 @@ def placed(sight: LineSight, x: Matrix, rates: Rates) -> Matrix:
     (by_roll, by_pitch), by_yaw = sight.offset_per_tilt, sight.offset_per_yaw
     row[[ROLL, PITCH]] = by_roll, by_pitch
     row[[MOUNT_ROLL, MOUNT_PITCH]] = sight.offset_per_mount
+    row[MOUNT_YAW] = sight.offset_per_mount_yaw
     row[PSI] = by_yaw
     turning = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + by_yaw * rates.yaw_radps
     row[DELAY] = turning + x[VELOCITY[sight.axis]]
-    row[SCALE] = sight.offset_m
+    row[SCALE] = row[HEIGHT] = sight.offset_m
     return row

@@ -25,6 +25,8 @@ class HeldLine:
     to_m: float
     hits: int = 1
     feature: int | None = None
+    surveyed: bool = False
+    """Its distance from another line was held against the map."""
 
 
 def associate(

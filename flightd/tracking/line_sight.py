@@ -18,8 +18,8 @@ _GATE_RAD, _GATE_SIGMAS = math.radians(4.0), 4.0
 class LineSight(NamedTuple):
     """One line of a frame, across the grid axis `axis`: where it was seen from the drone along that axis,
     what its direction says of the heading, its width and its visible part, with the standard deviations of
-    offset and direction; what a radian more of yaw would change of the offset, and one of roll, and of pitch,
-    of both, in the attitude and in the mount."""
+    offset and direction; what a radian more of yaw would change of the offset, in the attitude and in the
+    mount, and one of roll, and of pitch, of both."""
 
     axis: int
     offset_m: float
@@ -35,6 +35,7 @@ class LineSight(NamedTuple):
     offset_per_mount: tuple[float, float]
     turn_per_mount: tuple[float, float]
     feature: int | None = None
+    offset_per_mount_yaw: float = 0.0
     tilted_m: float = 0.0
     """What the tilt of the frame makes of the offset."""
     bent_m: float = 0.0
@@ -76,6 +77,7 @@ def line_sight(
     tilt_rad: tuple[float, float],
     height_m: float,
     least_sigma_m: float,
+    mount_tilt_rad: tuple[float, float] = _LEVEL,
 ) -> LineSight | None:
     """The line seen by a drone that heads `yaw_rad` on the grid, rolled and pitched by `tilt_rad`; None for
     one that runs along no axis of the grid."""
@@ -92,6 +94,8 @@ def line_sight(
 
     middle = line.forward_m, line.right_m
     by_yaw = -on(along, middle) if across_x else on(along, middle)
+    turned = _untilted(middle, tilt_rad, mount_tilt_rad, height_m)
+    by_mount_yaw = -on(along, turned) if across_x else on(along, turned)
     shifts, (turn_by_roll, turn_by_pitch) = tilt_effects(line, height_m)
     by_roll, by_pitch = (on(across, shift) for shift in shifts)
     tilted_m = by_roll * tilt_rad[0] + by_pitch * tilt_rad[1]
@@ -116,6 +120,7 @@ def line_sight(
         turn_per_tilt=(turn_by_roll, turn_by_pitch),
         offset_per_mount=(by_roll, by_pitch + by_yaw * turned_by_mount),
         turn_per_mount=(turn_by_roll, turn_by_pitch + turned_by_mount),
+        offset_per_mount_yaw=by_mount_yaw,
         tilted_m=tilted_m,
         bent_m=bent_m,
         turned_rad=turned_rad,
@@ -129,6 +134,7 @@ def feature_sight(
     tilt_rad: tuple[float, float],
     height_m: float,
     sigma_m: float,
+    mount_tilt_rad: tuple[float, float] = _LEVEL,
 ) -> FeatureSight:
     """The point of the floor seen at `point` (forward, right)."""
     forward, right = point
@@ -138,7 +144,10 @@ def feature_sight(
     shifts = point_tilt_effects(forward, right, height_m)
     turned_by_roll, turned_by_mount = -math.sin(tilt_rad[1]), math.sin(tilt_rad[0])
 
-    def across(axis: int, offset_m: float, by_yaw: float) -> LineSight:
+    turned = _untilted(point, tilt_rad, mount_tilt_rad, height_m)
+    turned_x_m, turned_y_m = (axis[0] * turned[0] + axis[1] * turned[1] for axis in to_axis)
+
+    def across(axis: int, offset_m: float, by_yaw: float, by_mount_yaw: float) -> LineSight:
         by_roll, by_pitch = (to_axis[axis][0] * shift[0] + to_axis[axis][1] * shift[1] for shift in shifts)
         by_roll += by_yaw * turned_by_roll
         return LineSight(
@@ -155,10 +164,23 @@ def feature_sight(
             turn_per_tilt=_LEVEL,
             offset_per_mount=(by_roll, by_pitch + by_yaw * turned_by_mount),
             turn_per_mount=_LEVEL,
+            offset_per_mount_yaw=by_mount_yaw,
             feature=id_,
         )
 
-    return FeatureSight(id_, (across(0, x_m, -y_m), across(1, y_m, x_m)))
+    return FeatureSight(id_, (across(0, x_m, -y_m, -turned_y_m), across(1, y_m, x_m, turned_x_m)))
+
+
+def _untilted(
+    point: tuple[float, float],
+    tilt_rad: tuple[float, float],
+    mount_tilt_rad: tuple[float, float],
+    height_m: float,
+) -> tuple[float, float]:
+    """A point of the floor (forward, right) from where the camera looks: a camera that is turned in its mount
+    turns about there, not about the point below the drone."""
+    roll, pitch = tilt_rad[0] + mount_tilt_rad[0], tilt_rad[1] + mount_tilt_rad[1]
+    return point[0] - height_m * pitch, point[1] + height_m * roll
 
 
 def as_compensated(sight: LineSight, compensation: TiltCompensation) -> LineSight:

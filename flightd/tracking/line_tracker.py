@@ -8,9 +8,9 @@ prediction, never truth.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from flightd.config.control import TiltCompensation
 from flightd.config.tracking import TrackingConfig
@@ -34,8 +34,10 @@ from flightd.tracking.line_sight import (
 )
 from flightd.tracking.motion_model import (
     DELAY,
+    HEIGHT,
     MOUNT_PITCH,
     MOUNT_ROLL,
+    MOUNT_YAW,
     PITCH,
     PSI,
     ROLL,
@@ -43,6 +45,7 @@ from flightd.tracking.motion_model import (
     VX,
     VY,
     Told,
+    lean,
 )
 from flightd.tracking.tilt_compensation import (
     FloorView,
@@ -62,6 +65,20 @@ _RATE_NS = 20_000_000
 """The told attitude's rates are taken over so long before and after."""
 _DEFAULTS = TrackingConfig()
 _Square = TypeVar("_Square", PadSight, MarkerSight)
+
+
+class Lead(NamedTuple):
+    """What the motion changes by until a setpoint that goes out now begins to act: way and speed along the
+    grid axes, and the heading."""
+
+    x_m: float
+    y_m: float
+    vx_mps: float
+    vy_mps: float
+    yaw_rad: float
+
+
+NO_LEAD = Lead(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class LineTracker:
@@ -126,13 +143,27 @@ class LineTracker:
         """The height by the lines' width in the newest frame; None where they tell none."""
         return self._widths.by_width_m
 
+    @property
+    def newest_ns(self) -> int:
+        """The exposure of the newest frame taken; 0 before the first."""
+        return self._stamp_ns
+
+    @property
+    def delay_sigma_s(self) -> float:
+        """How well the camera's delay is known."""
+        return self._filter.sigma(DELAY)
+
     def learnt(self) -> LearntSensors | None:
         """What is known of the sensors, for the tracker after this one; None before a line was seen."""
         return self._filter.learnt() if self._lines_ns else None
 
-    def assume(self, sample: Attitude) -> None:
-        """Take an attitude that is only assumed, while the vehicle is silent."""
-        self._history.assume(sample)
+    def assume(self, samples: Iterable[Attitude]) -> None:
+        """Take what is assumed of the attitude from the newest sample on, in the place of what was."""
+        self._history.assume(samples)
+
+    def measured(self, lines: LineSet) -> bool:
+        """Whether the attitude at the frame's exposure has been told."""
+        return self.exposed_ns(lines) <= self._history.measured_ns
 
     def attitude(self, sample: Attitude) -> None:
         self._history.add(sample)
@@ -145,9 +176,9 @@ class LineTracker:
         """When the frame was exposed, by what has been learnt of the camera's delay."""
         return lines.stamp_ns + round(self._filter.mean(DELAY) * 1e9)
 
-    def frame(self, lines: LineSet, height_m: float) -> bool:
-        """Take the lines of one frame seen at `height_m`; False when it could not be used (older than
-        the last, no attitude at its exposure, no height)."""
+    def frame(self, lines: LineSet, height_m: float, height_sigma_m: float = 0.0) -> bool:
+        """Take the lines of one frame seen at `height_m`, known to `height_sigma_m`; False when it could not
+        be used (older than the last, no attitude at its exposure, no height)."""
         stamp_ns = self.exposed_ns(lines)
         attitude = self._history.at(stamp_ns)
         if attitude is None or not self._headed or lines.stamp_ns <= self._told_ns:
@@ -155,11 +186,13 @@ class LineTracker:
             return False
         view = self._view(attitude, stamp_ns, height_m)
         by_width_m = heights_by_width(lines.lines, view, self._line_width_m)
-        height_m = self._widths.believed_m(by_width_m, height_m) * (1.0 + self._filter.mean(SCALE))
+        longer = self._filter.mean(SCALE) + self._filter.mean(HEIGHT)
+        height_m = self._widths.believed_m(by_width_m, height_m) * (1.0 + longer)
         if not height_m > 0:
             self.rejected += 1
             return False
         self._told_ns = lines.stamp_ns
+        self._filter.height_known_to(height_sigma_m / height_m)
         self._advance(stamp_ns)
         view = self._view(attitude, stamp_ns, height_m)
         params, assumed = self._params, self._history.is_assumed(stamp_ns)
@@ -169,7 +202,10 @@ class LineTracker:
         self._settle_dispute(on_floor, attitude)
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
         sigma_yaw, tilt = self._filter.sigma(PSI), (view.attitude.roll_rad, view.attitude.pitch_rad)
-        placed = (line_sight(line, yaw, sigma_yaw, tilt, height_m, params.min_sigma_m) for line in on_floor)
+        leans = view.mount.roll_rad, view.mount.pitch_rad
+        placed = (
+            line_sight(line, yaw, sigma_yaw, tilt, height_m, params.min_sigma_m, leans) for line in on_floor
+        )
         sights = [as_compensated(sight, self._compensation) for sight in placed if sight is not None]
         features = self._features(lines, view, yaw)
         rates, exact = self._rates(stamp_ns), self._compensation is TiltCompensation.EXACT
@@ -195,23 +231,9 @@ class LineTracker:
         assert newest is not None
         held = self._filter
         yaw = wrap_pi(newest.yaw_rad + held.mean(PSI))
-        moved_x = moved_y = 0.0
-        vx, vy, drag = held.mean(VX), held.mean(VY), self._params.noise.drag_per_s
-        ax = ay = 0.0
         known_ns = now_ns - self._forget_ns  # a longer blindness is not bridged by prediction
-        stamp_ns = max(self._stamp_ns, known_ns)
-        while stamp_ns < now_ns:
-            step_ns = min(_STEP_NS, now_ns - stamp_ns)
-            ax, ay = self._accel(stamp_ns + step_ns // 2)
-            dt_s = step_ns * 1e-9
-            ahead_s = (stamp_ns + step_ns // 2 - self._stamp_ns) * 1e-9
-            ax += held.push_after(0, ahead_s) - drag * vx
-            ay += held.push_after(1, ahead_s) - drag * vy
-            moved_x += vx * dt_s + 0.5 * ax * dt_s * dt_s
-            moved_y += vy * dt_s + 0.5 * ay * dt_s * dt_s
-            vx += ax * dt_s
-            vy += ay * dt_s
-            stamp_ns += step_ns
+        since_ns = max(self._stamp_ns, known_ns)
+        vx, vy, moved_x, moved_y, ax, ay = self._carried(since_ns, now_ns, held.mean(VX), held.mean(VY))
         return TrackSet(
             now_ns,
             self._lines_ns,
@@ -238,6 +260,51 @@ class LineTracker:
             features_ns=(self._features_ns[0], self._features_ns[1]),
         )
 
+    def survey(self, axis: int, places_m: Mapping[int, float], sigma_m: float) -> None:
+        """Tracks, by their ids, are lines of the map that lie there, m across the axis, give or take
+        `sigma_m`."""
+        if self._compensation is TiltCompensation.EXACT:
+            self._filter.survey(axis, places_m, sigma_m)
+
+    def lead(self, now_ns: int, then_ns: int) -> Lead:
+        """The motion from now to a moment to come, by what is assumed of the attitude until then."""
+        here = self.at(now_ns)
+        if here is None or then_ns <= now_ns:
+            return NO_LEAD
+        yaw_now, yaw_then = (self._attitude_at(stamp_ns).yaw_rad for stamp_ns in (now_ns, then_ns))
+        vx, vy, moved_x, moved_y = self._carried(now_ns, then_ns, here.vx_mps, here.vy_mps)[:4]
+        return Lead(moved_x, moved_y, vx - here.vx_mps, vy - here.vy_mps, wrap_pi(yaw_then - yaw_now))
+
+    def unleant(self, now_ns: int) -> tuple[float, float]:
+        """Acceleration along the grid axes (m/s2) that the told lean does not explain: push of the air and
+        error of the told attitude, as they are expected then; drag is not in it."""
+        held, told = self._filter, self._attitude_at(now_ns)
+        as_told = lean(held.without_errors(), Told(told.roll_rad, told.pitch_rad, told.yaw_rad))[0]
+        (ax, ay), ahead_s = self._accel(now_ns), (now_ns - self._stamp_ns) * 1e-9
+        push = held.push_after(0, ahead_s), held.push_after(1, ahead_s)
+        return ax - as_told[0] + push[0], ay - as_told[1] + push[1]
+
+    def _carried(
+        self, from_ns: int, to_ns: int, vx: float, vy: float
+    ) -> tuple[float, float, float, float, float, float]:
+        """Velocity, way and acceleration along both axes after flying on in the attitude told or assumed."""
+        held, drag = self._filter, self._params.noise.drag_per_s
+        moved_x = moved_y = ax = ay = 0.0
+        stamp_ns = from_ns
+        while stamp_ns < to_ns:
+            step_ns = min(_STEP_NS, to_ns - stamp_ns)
+            ax, ay = self._accel(stamp_ns + step_ns // 2)
+            dt_s = step_ns * 1e-9
+            ahead_s = (stamp_ns + step_ns // 2 - self._stamp_ns) * 1e-9
+            ax += held.push_after(0, ahead_s) - drag * vx
+            ay += held.push_after(1, ahead_s) - drag * vy
+            moved_x += vx * dt_s + 0.5 * ax * dt_s * dt_s
+            moved_y += vy * dt_s + 0.5 * ay * dt_s * dt_s
+            vx += ax * dt_s
+            vy += ay * dt_s
+            stamp_ns += step_ns
+        return vx, vy, moved_x, moved_y, ax, ay
+
     def _features(self, lines: LineSet, view: FloorView, yaw_rad: float) -> list[FeatureSight]:
         """The features of one frame.  Without an exact compensation they do not move as its lines do."""
         if not lines.features or self._compensation is not TiltCompensation.EXACT:
@@ -245,9 +312,10 @@ class LineTracker:
         tilt, height_m = (view.attitude.roll_rad, view.attitude.pitch_rad), view.height_m
         by_px = self._params.feature_sigma_px * height_m / self._lens.fx_px
         sigma_m = math.hypot(by_px, height_m * view.sigma_tilt_rad)
+        leans = view.mount.roll_rad, view.mount.pitch_rad
         points = floor_points([(seen.x_px, seen.y_px) for seen in lines.features], view)
         return [
-            feature_sight(seen.id, point, yaw_rad, tilt, height_m, sigma_m)
+            feature_sight(seen.id, point, yaw_rad, tilt, height_m, sigma_m, leans)
             for seen, point in zip(lines.features, points, strict=bool(points))
             if math.hypot(*point) < _FARTHEST * height_m
         ]
@@ -313,6 +381,7 @@ class LineTracker:
             mount,
             roll_rad=mount.roll_rad + held.mean(MOUNT_ROLL),
             pitch_rad=mount.pitch_rad + held.mean(MOUNT_PITCH),
+            yaw_rad=mount.yaw_rad + held.mean(MOUNT_YAW),
         )
 
     def _rates(self, stamp_ns: int) -> Rates:

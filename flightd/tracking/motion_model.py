@@ -3,9 +3,9 @@ the next: the state of the filter of both, and its transition.  Pure.
 
 The state is
 
-    heading offset and its drift | velocity, disturbance of both grid axes | error of the told attitude
-    | rate of its leak | mount of the camera | delay of its frames | scale of lengths | offsets of all
-    lines and features of the floor held
+    heading offset and its drift | velocity, disturbance of both grid axes | error of the told height
+    | error of the told attitude | rate of its leak | mount of the camera | delay of its frames
+    | scale of lengths | offsets of all lines and features of the floor held
 
 Lines and features stand still, so all of them move with the one velocity; the control input is the
 acceleration that the attitude makes, g tan(tilt).  An autopilot without a position takes what its
@@ -23,8 +23,11 @@ import numpy as np
 
 from flightd.core.geometry import GRAVITY_MPS2, Matrix
 
-PSI, PSI_RATE, VX, VY, PUSH_X, PUSH_Y, ROLL, PITCH, LEAK, MOUNT_ROLL, MOUNT_PITCH, DELAY, SCALE = range(13)
-FIRST_LINE = 13
+PSI, PSI_RATE, VX, VY, PUSH_X, PUSH_Y, HEIGHT = range(7)
+ROLL, PITCH, LEAK, MOUNT_ROLL, MOUNT_PITCH, MOUNT_YAW, DELAY, SCALE = range(7, 15)
+FIRST_LINE = 15
+HEIGHT_S = 0.5
+"""Time within which an error of the told height, that of one averaged over a few samples, fades."""
 VELOCITY, PUSH = (VX, VY), (PUSH_X, PUSH_Y)
 """By grid axis, x and y."""
 
@@ -82,6 +85,8 @@ def moved(
         jacobian[row, velocity] -= 0.5 * dt_s
         by_accel[row, axis] = -0.5 * dt_s * dt_s
         end[row] -= way_m[axis]
+    jacobian[HEIGHT, HEIGHT] = math.exp(-dt_s / HEIGHT_S)
+    end[HEIGHT] *= jacobian[HEIGHT, HEIGHT]
     end[PSI] += x[PSI_RATE] * dt_s
     end[[VX, VY]] += accel * dt_s
     _leak(x, end, jacobian, accel, (ax, ay), told, dt_s, drag_per_s, attitude_s)

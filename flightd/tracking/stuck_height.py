@@ -20,6 +20,9 @@ _WANTED_M, _WANTED_NS = 3.0, 8_000_000_000
 before a vehicle leaves the floor."""
 _SHARE = 0.25
 """A height that changes by less than this share of the way stands still."""
+_UNMEASURED_M, _STANDING_M = (0.12, 0.3), 0.02
+"""A range finder that tells more than the first of these of a drone that stands may tell its own minimum: up
+to that height, or the second of these, it climbs unseen while the reading stays within the last of these."""
 _KEPT_EVERY_NS = 100_000_000
 """The past is looked through at each tick: a sample in so long is enough of it."""
 
@@ -39,6 +42,7 @@ class StuckHeight:
         """Stays so until the end of the flight: what stuck once is not believed again."""
         self._samples: deque[_Sample] = deque()
         self._least = self._most = _Sample(0, 0.0, 0.0, 0.0)
+        self._first_m: float | None = None
         self._last_ns: int | None = None
         self._climbed_m = 0.0
         self._wanted_m = 0.0
@@ -51,6 +55,8 @@ class StuckHeight:
         self._wanted_m += wanted_mps * dt_s
         if math.isnan(height_m):
             return self.found
+        if self._first_m is None:
+            self._first_m = height_m
         new = _Sample(now_ns, height_m, self._climbed_m, self._wanted_m)
         if not self._samples or now_ns - self._samples[-1].stamp_ns >= _KEPT_EVERY_NS:
             self._keep(new)
@@ -70,13 +76,20 @@ class StuckHeight:
         moved_m = max(new.climbed_m - least.climbed_m, most.climbed_m - new.climbed_m)
         return moved_m > _MOVED_M or new.wanted_m - least.wanted_m > _WANTED_M
 
+    def _unseen_m(self, old: _Sample) -> float:
+        """What may have been climbed since then before the range finder measured anything."""
+        first_m, (least_m, most_m) = self._first_m, _UNMEASURED_M
+        standing = first_m is not None and abs(old.height_m - first_m) < _STANDING_M
+        return min(first_m, most_m) if first_m is not None and first_m > least_m and standing else 0.0
+
     def _contradicts(self, new: _Sample) -> bool:
         if not self._rose(new):
             return False
         stands_still, drop_m, later = True, 0.0, new
         for old in reversed(self._samples):
             age_ns = new.stamp_ns - old.stamp_ns
-            rose_m, climbed_m = new.height_m - old.height_m, new.climbed_m - old.climbed_m
+            rose_m = new.height_m - old.height_m
+            climbed_m = new.climbed_m - old.climbed_m - self._unseen_m(old)
             drop_m, later = min(drop_m, later.height_m - old.height_m), old
             followed_m = max(rose_m - drop_m, 0.0)  # one drop may be goods that came below
             stands_still = stands_still and abs(rose_m) < _SHARE * _MOVED_M

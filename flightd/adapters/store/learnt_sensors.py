@@ -33,6 +33,9 @@ def load_learnt(path: Path, config: Config) -> LearntSensors | None:
         raise InputError(f"{path}: {err.strerror}") from None
     except (ValueError, KeyError, TypeError):
         raise InputError(f"{path}: not a file of learnt sensors; delete it") from None
+    known = len(learnt.means)
+    if known != len(Learnt) and len(learnt.covariance) == known**2:  # of a version that learnt something else
+        return None
     if not _is_a_distribution(learnt):
         raise InputError(f"{path}: its numbers cannot be; delete it")
     return learnt if sensors == _sensors_of(config) else None

@@ -7,6 +7,7 @@ import math
 from flightd.config.schema import Config
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Phase
+from flightd.mission.flight.smoothed_motion import SmoothedMotion
 from flightd.mission.flight.touchdown import AIM_S
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.machine import State
@@ -29,6 +30,7 @@ class PhaseProgress:
         self._scanner = scanner
         self._found_flying = FoundFlyingCheck(config.mission)
         self._settling = DebounceTimer()
+        self._motion = SmoothedMotion()
         self._limit_s = math.inf
         self._since_ns = 0
 
@@ -56,6 +58,7 @@ class PhaseProgress:
         """The trigger by which the phase reaches its end, if it has; on the ground it ends when the mission
         `may_start`."""
         p, v, goal = self._params, s.vehicle, self._itinerary.goal
+        self._motion.step(s.pose, s.dt_s)
         match state.phase:
             case Phase.PREFLIGHT if self._found_flying.flies_already(s):
                 done, trigger = True, Trigger.FOUND_FLYING
@@ -69,7 +72,7 @@ class PhaseProgress:
             case Phase.TAKE_OFF:
                 done, trigger = s.height_m > p.height_m - p.expert.height_reached_m, Trigger.AT_HEIGHT
             case Phase.ACQUIRE:
-                calm = s.localised and s.is_sure(p) and s.speed_mps < 2 * p.expert.arrive_mps
+                calm = s.localised and s.is_sure(p) and self._motion.speed_mps < 2 * p.expert.arrive_mps
                 done, trigger = self._settled(s, calm), Trigger.ACQUIRED
             case Phase.TURN:
                 turned = (
@@ -78,7 +81,7 @@ class PhaseProgress:
                 )
                 done, trigger = self._settled(s, turned), Trigger.TURNED
             case Phase.FOLLOW:
-                there = s.distance_m((goal.x_m, goal.y_m)) < p.arrive_m and s.speed_mps < p.expert.arrive_mps
+                there = self._rests_at((goal.x_m, goal.y_m))
                 done, trigger = self._settled(s, there), Trigger.ARRIVED
             case Phase.HOVER | Phase.CLIMB | Phase.SCAN:
                 done, trigger = self._at_node(s, state.phase, state.returning)
@@ -108,9 +111,14 @@ class PhaseProgress:
         p, view = self._params, self._scanner.view
         if view is None or s.pose is None:
             return False
-        there = s.distance_m((view.x_m, view.y_m)) < p.arrive_m and s.speed_mps < p.expert.arrive_mps
+        there = self._rests_at((view.x_m, view.y_m))
         level = abs(s.height_m - view.height_m) < p.expert.view_height_m
         return there and level and abs(wrap_pi(view.yaw_rad - s.pose.yaw_rad)) < p.expert.arrive_yaw_rad
+
+    def _rests_at(self, place_m: tuple[float, float]) -> bool:
+        """Whether the drone is at a place of the map, but for what it swings about it."""
+        near = self._motion.distance_m(place_m) < self._params.arrive_m
+        return near and self._motion.speed_mps < self._params.expert.arrive_mps
 
     def _to_view_s(self, s: MissionInputs) -> float:
         """How long it may take to reach the view."""

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 
 from flightd.config.control import ControlConfig
-from flightd.control.flight_controller import FlightController, Motion
+from flightd.control.flight_controller import CALM, Conditions, FlightController, Motion
 from flightd.control.limits import Limiter, Surroundings
+from flightd.core.geometry import wrap_pi
 from flightd.core.types import AttitudeSetpoint, GridPose, Phase
 from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
+from flightd.tracking.line_tracker import NO_LEAD, Lead
 
 _TOUCHDOWN_S = 2.0
 
@@ -25,13 +27,21 @@ class Steering:
         self._yaw_rate = 0.0
 
     def step(
-        self, inputs: MissionInputs, guidance: Guidance, push: tuple[float, float], stand_yaw_rad: float
+        self,
+        inputs: MissionInputs,
+        guidance: Guidance,
+        push: tuple[float, float],
+        stand_yaw_rad: float,
+        lead: Lead = NO_LEAD,
+        conditions: Conditions = CALM,
     ) -> AttitudeSetpoint | None:
         """What control makes of the guidance, within the limits; None when nothing may be sent.  `push` is
         the acceleration that no lean explains, m/s2, grid axes; `stand_yaw_rad` the heading before there is a
-        pose."""
+        pose; `lead` what the motion changes by until the setpoint begins to act: it is made for then,
+        under those `conditions`."""
         now_ns, dt_s, pose = inputs.now_ns, inputs.dt_s, inputs.pose
-        motion = self._motion(pose, self._plausibility.height_m(inputs.height_m), dt_s, stand_yaw_rad)
+        height_m = self._plausibility.height_m(inputs.height_m)
+        motion = self._motion(pose, height_m, dt_s, stand_yaw_rad, lead)
         control, reference = self._control, guidance.reference
         sight_s = min(inputs.x_age_s, inputs.y_age_s)
         if guidance.guide is Guide.NONE:
@@ -43,7 +53,7 @@ class Steering:
             wanted = control.rest(now_ns, motion, reference, dt_s, push, dead_reckoned=guidance.dead_reckoned)
             age_s = min(inputs.telemetry_age_s, inputs.sight_s)
         else:
-            wanted = control.step(now_ns, motion, reference, dt_s)
+            wanted = control.step(now_ns, motion, reference, dt_s, conditions)
             # above the pad the mission steers on without lines: by the mat, or the motion last known
             by_mat = inputs.by_pad or (guidance.phase is Phase.LAND and sight_s < _TOUCHDOWN_S)
             age_s = inputs.telemetry_age_s if by_mat else max(sight_s, inputs.telemetry_age_s)
@@ -56,11 +66,21 @@ class Steering:
         )
         return self._limiter.apply(wanted, around)
 
-    def _motion(self, pose: GridPose | None, height_m: float, dt_s: float, stand_yaw_rad: float) -> Motion:
+    def _motion(
+        self, pose: GridPose | None, height_m: float, dt_s: float, stand_yaw_rad: float, lead: Lead
+    ) -> Motion:
         if pose is None:
             return Motion(0.0, 0.0, 0.0, 0.0, stand_yaw_rad, 0.0, height_m)
         if self._last_yaw is not None:
             turned = math.remainder(pose.yaw_rad - self._last_yaw, math.tau)
             self._yaw_rate += min(1.0, dt_s / 0.05) * (turned / dt_s - self._yaw_rate)
         self._last_yaw = pose.yaw_rad
-        return Motion(pose.x_m, pose.y_m, pose.vx_mps, pose.vy_mps, pose.yaw_rad, self._yaw_rate, height_m)
+        return Motion(
+            pose.x_m + lead.x_m,
+            pose.y_m + lead.y_m,
+            pose.vx_mps + lead.vx_mps,
+            pose.vy_mps + lead.vy_mps,
+            wrap_pi(pose.yaw_rad + lead.yaw_rad),
+            self._yaw_rate,
+            height_m,
+        )

@@ -82,7 +82,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "telemetry_stale",
         Trigger.TELEMETRY_STALE,
-        "newest attitude older than `mission.telemetry_hold_s`",
+        "newest attitude older by `mission.telemetry_hold_s` than attitudes usually come",
         Action.HOLD,
         "brake by the pictures, with the commanded attitude; level without them; no climb; never"
         " taken for a pilot",

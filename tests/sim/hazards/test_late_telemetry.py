@@ -40,7 +40,7 @@ class LateLink:
 
 
 @pytest.mark.parametrize(("delay_ms", "burst_ms"), [(60, 120), (0, 200), (100, 80), (160, 20)])
-def test_the_drone_stays_on_its_line_and_lands(delay_ms: int, burst_ms: int) -> None:
+def test_the_drone_flies_on_along_its_line_and_comes_home(delay_ms: int, burst_ms: int) -> None:
     flight = IdealFlight(SITE, CONFIG, visits=("A2", "A4"), seed=1)
     link, step = LateLink(delay_ms * 1_000_000, burst_ms * 1_000_000), flight.pilot.step
 
@@ -49,6 +49,5 @@ def test_the_drone_stays_on_its_line_and_lands(delay_ms: int, burst_ms: int) -> 
 
     flight.pilot.step = late  # type: ignore[method-assign]
     flown = flight.fly(80)
-    assert flown.phase is Phase.ABORTED, "too unsteady to fly on, it comes down where it is"
-    assert max(k.height_m for _, k in flown.truth) > 1.4
-    assert max(abs(k.y_m) for _, k in flown.truth) < 0.4
+    assert (flown.phase, flown.visited) == (Phase.DONE, ["A2", "A4"]), flown.reason
+    assert max(abs(k.y_m) for _, k in flown.truth) < 0.3

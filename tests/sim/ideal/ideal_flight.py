@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -31,14 +32,17 @@ from flightd.core.types import (
     PictureCheck,
     VehicleState,
 )
-from flightd.sim.autopilot.climb_loop import ClimbLoop
+from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
 from flightd.sim.plant.battery_swapper import BatterySwapper
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import WindParams
-from flightd.sim.sensors.instruments import Sensors
+from flightd.sim.sensors.instruments import SensorParams, Sensors
+from flightd.sim.sensors.optics import SimCamera
+from flightd.sim.unknowns import Shaken, Unknowns
 from flightd.site.site import Site
 from tests.sim.ideal.ideal_front import IdealFront
+from tests.sim.ideal.ideal_link import IdealLink
 from tests.sim.ideal.ideal_ports import (
     HeldSetpoint,
     IdealCount,
@@ -120,9 +124,12 @@ class IdealFlight:
         world: Site | None = None,
         carried_to: str = "",
         observers: Sequence[Callable[[Snapshot], None]] = (),
+        unknowns: Unknowns | None = None,
     ) -> None:
+        """`unknowns` is what the configuration does not know of drone and link, None: nothing."""
         self._observers = observers
-        config = config.with_values(mission={"autostart_countdown_s": 0.0})  # it has tests of its own
+        if unknowns is None:  # with a link there are clocks to compare first
+            config = config.with_values(mission={"autostart_countdown_s": 0.0})  # it has tests of its own
         self._config, self._site = config, site
         self.pilot = pilot_of(config, site, FlightOrder(visits, autostart=config.mission.autostart))
         self._front = front
@@ -133,13 +140,23 @@ class IdealFlight:
         x_m, y_m = world.pad_centre(world.home)
         if carried_to:
             x_m, y_m = site.nodes[carried_to].x_m, site.nodes[carried_to].y_m
-        self.airframe = Airframe(airframe, wind=wind, seed=seed, x_m=x_m, y_m=y_m)
-        self.sensors = Sensors(seed=seed)
-        self._eye = IdealEye(world, config.camera.lens(), config.camera.mount(), errors, seed)
-        self._climb = ClimbLoop()
-        self._delay_ns = delay_ns
         self._armed = False
         self._now_ns = 1_000_000_000_000
+        unknown = unknowns or Unknowns()
+        frame = unknown.airframe(airframe or AirframeParams())
+        self.airframe = Airframe(frame, wind=wind, seed=seed, x_m=x_m, y_m=y_m)
+        self.sensors = Sensors(unknown.sensors(SensorParams()), seed)
+        camera = unknown.camera(SimCamera(config.camera.lens(), config.camera.mount()))
+        self._eye = IdealEye(world, camera.lens, camera.mount, errors, seed)
+        self._shaken = Shaken(unknown.shake_rad, seed)
+        self._camera_off_ns = round(unknown.camera_delay_s * 1e9)
+        self._jitter_s, self._jitter = unknown.camera_jitter_s, random.Random(f"jitter {seed}")
+        self._climb = ClimbLoop(ClimbGains(hover_guess=frame.hover_collective))
+        self._delay_ns = delay_ns
+        self.link: IdealLink | None = None
+        """Between autopilot and daemon; None: telemetry and setpoints are there at once."""
+        if unknowns is not None:
+            self.link = IdealLink(unknowns, self.airframe, self.sensors, seed, self._now_ns)
         self._yaw_target = 0.0
         self.in_control = True
         self.faults = Faults()
@@ -190,14 +207,20 @@ class IdealFlight:
         self.sensors.update(STEP_NS * 1e-9, self.airframe)
         while self._now_ns < end_ns:
             self._now_ns += STEP_NS
-            self._step(setpoints.newest)
-            if self._now_ns % 10_000_000 == 0 and not self.faults.silent:
-                vehicle.samples.append(self._attitude())
+            if self.link is None:
+                self._step(setpoints.newest)
+                if self._now_ns % 10_000_000 == 0 and not self.faults.silent:
+                    vehicle.samples.append(self._attitude())
+            else:
+                self.link.step(self._now_ns, setpoints.newest, armed=self._armed)
+                self._step(self.link.obeyed if setpoints.newest is not None else None)
+                vehicle.samples += self.link.attitudes()
             if self._now_ns >= frame_ns:
                 frame_ns += FRAME_NS
                 seq += 1
                 if not self.faults.blind:
-                    due_ns = self._now_ns + self._delay_ns + self.faults.late_ns
+                    late_ns = self.faults.late_ns + round(self._jitter.random() * self._jitter_s * 1e9)
+                    due_ns = self._now_ns + self._delay_ns + self._camera_off_ns + late_ns
                     vision.put(due_ns, self._see(seq))
             self._photograph()
             if self._now_ns >= tick_ns:
@@ -283,7 +306,8 @@ class IdealFlight:
 
     def _see(self, seq: int) -> LineSet:
         faults = self.faults
-        seen = self._eye.see(self.airframe.kinematics(self._now_ns), seq, self._now_ns)
+        pose = self._shaken(self.airframe.kinematics(self._now_ns))
+        seen = self._eye.see(pose, seq, self._now_ns + self._camera_off_ns)
         seen = replace(seen, picture=PictureCheck(seq, 120.0, 40.0))
         if faults.bare:
             seen = replace(seen, lines=())
@@ -298,7 +322,9 @@ class IdealFlight:
         s = self.sensors
         return Attitude(self._now_ns, s.roll_rad, s.pitch_rad, wrap_pi(s.yaw_rad + self.faults.yaw_rad))
 
-    def _state(self) -> VehicleState:
+    def _state(self) -> VehicleState | None:
+        if self.link is not None:
+            return self.link.state(self._now_ns, in_control=lambda armed: armed and self.in_control)
         faults = self.faults
         if faults.silent and self._told is not None:
             return self._told

@@ -41,7 +41,7 @@ class HeldSetpoint:
 class IdealVehicle:
     """`ports.Vehicle` that tells what `state` says and hands demands to `obey`."""
 
-    def __init__(self, state: Callable[[], VehicleState], obey: Callable[[Demand], None]) -> None:
+    def __init__(self, state: Callable[[], VehicleState | None], obey: Callable[[Demand], None]) -> None:
         self._state = state
         self._obey = obey
         self.samples: list[Attitude] = []
@@ -49,7 +49,7 @@ class IdealVehicle:
     async def run(self) -> None:
         """There is no link."""
 
-    def state(self) -> VehicleState:
+    def state(self) -> VehicleState | None:
         return self._state()
 
     def attitudes(self) -> list[Attitude]:

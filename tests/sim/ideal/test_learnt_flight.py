@@ -51,7 +51,7 @@ def test_the_next_flight_begins_with_what_the_last_has_learnt() -> None:
 
 
 def test_a_record_tells_what_the_flight_began_with(tmp_path: Path) -> None:
-    for learnt in (None, LearntSensors((0.1,) * 7, tuple(float(n == m) for n in range(7) for m in range(7)))):
+    for learnt in (None, LearntSensors((0.1,) * 8, tuple(float(n == m) for n in range(8) for m in range(8)))):
         path = tmp_path / f"{learnt is None}.mcap"
         setting = FlightSetting(CONFIG, SITE, ORDER, learnt)
         with McapRecorder(path, when_full=wait_for_disk) as recorder:

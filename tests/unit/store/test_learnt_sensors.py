@@ -17,9 +17,9 @@ from flightd.doctor.check import CheckLevel
 from tests.rigs.event_loops import real
 
 CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml")
-SIGMAS = (0.01, 0.01, 0.02, 0.004, 0.004, 0.003, 0.002)
+SIGMAS = (0.01, 0.01, 0.02, 0.004, 0.004, 0.006, 0.003, 0.002)
 LEARNT = LearntSensors(
-    (0.001, -0.002, 0.1, 0.017, -0.008, -0.031, 0.0), tuple(np.diag(np.square(SIGMAS)).ravel().tolist())
+    (0.001, -0.002, 0.1, 0.017, -0.008, 0.01, -0.031, 0.0), tuple(np.diag(np.square(SIGMAS)).ravel().tolist())
 )
 
 
@@ -42,6 +42,11 @@ def test_what_was_learnt_is_read_again_number_for_number(tmp_path: Path) -> None
     assert load_learnt(path, CONFIG) is None
     assert load_learnt(kept(path), CONFIG) == LEARNT
     assert [file.name for file in path.parent.iterdir()] == ["sensors.json"]
+
+
+def test_of_a_version_that_learnt_something_else_it_says_nothing(tmp_path: Path) -> None:
+    older = LearntSensors(LEARNT.means[:7], tuple(np.eye(7).ravel().tolist()))
+    assert load_learnt(kept(tmp_path / "sensors.json", learnt=older), CONFIG) is None
 
 
 @pytest.mark.parametrize(

@@ -50,9 +50,13 @@ def test_the_transition_is_derived_rightly(
 
 
 def view(
-    roll_rad: float, pitch_rad: float, mount_roll_rad: float = 0.0, mount_pitch_rad: float = 0.0
+    roll_rad: float,
+    pitch_rad: float,
+    mount_roll_rad: float = 0.0,
+    mount_pitch_rad: float = 0.0,
+    mount_yaw_rad: float = 0.0,
 ) -> FloorView:
-    mount = Mount(0.0, (0.0, 0.0, 0.0), mount_roll_rad, mount_pitch_rad)
+    mount = Mount(mount_yaw_rad, (0.0, 0.0, 0.0), mount_roll_rad, mount_pitch_rad)
     attitude = Attitude(0, roll_rad, pitch_rad, 0.0)
     return FloorView(LENS, mount, attitude, HEIGHT_M, TiltCompensation.EXACT, 0.0)
 
@@ -71,8 +75,8 @@ def point_seen(x_px: float, y_px: float, yaw_rad: float, seen: FloorView) -> tup
 
 
 STEP = 1e-4
-TURN, TILT, MOUNT = 0, (1, 2), (3, 4)
-"""Places of yaw, of roll and pitch, and of the mount's among the angles."""
+TURN, TILT, MOUNT, MOUNT_TURN = 0, (1, 2), (3, 4), 5
+"""Places of yaw, of roll and pitch, and of the mount's roll, pitch and yaw among the angles."""
 
 
 def slopes(offset: Callable[[tuple[float, ...]], float], at: tuple[float, ...]) -> list[float]:
@@ -90,6 +94,8 @@ def assert_derived(sight: LineSight, told: list[float], near: float) -> None:
     assert sight.offset_per_yaw == pytest.approx(told[TURN], abs=near)
     assert sight.offset_per_tilt == pytest.approx([told[n] for n in TILT], abs=near)
     assert sight.offset_per_mount == pytest.approx([told[n] for n in MOUNT], abs=near)
+    # of the first order in the tilt
+    assert sight.offset_per_mount_yaw == pytest.approx(told[MOUNT_TURN], abs=near + 0.06)
 
 
 @settings(max_examples=80)
@@ -106,7 +112,7 @@ def test_what_tilt_and_turn_make_of_a_line_is_derived_rightly(
         assert sight is not None
         return sight
 
-    at = (yaw, roll, pitch, 0.0, 0.0)
+    at = (yaw, roll, pitch, 0.0, 0.0, 0.0)
     told = slopes(lambda angles: seen(angles).offset_m, at)
     # the middle of what is in view slides along a line that lies askew
     assert_derived(seen(at), told, near=0.12 * HEIGHT_M * (abs(skew) + abs(yaw)) + 0.04)
@@ -120,6 +126,6 @@ def test_what_tilt_and_turn_make_of_a_feature_is_derived_rightly(
     def seen(angles: tuple[float, ...]) -> tuple[LineSight, LineSight]:
         return point_seen(x_px, y_px, angles[0], view(*angles[1:]))
 
-    at = (yaw, roll, pitch, 0.0, 0.0)
+    at = (yaw, roll, pitch, 0.0, 0.0, 0.0)
     assert_derived(seen(at)[0], slopes(lambda angles: seen(angles)[0].offset_m, at), near=0.05)
     assert_derived(seen(at)[1], slopes(lambda angles: seen(angles)[1].offset_m, at), near=0.05)

@@ -161,7 +161,7 @@ def test_what_was_learnt_is_begun_with_but_less_surely() -> None:
     assert second.mean(MOUNT_ROLL) == first.mean(MOUNT_ROLL) != 0.0
     assert first.sigma(MOUNT_ROLL) < second.sigma(MOUNT_ROLL) < SensorPriors().mount_rad
     third = FloorFilter(MotionNoise(), SensorPriors(), gate_m=0.35, forget_ns=10**9)
-    third.begin_with(replace(first.learnt(), means=(math.nan,) * 7))
+    third.begin_with(replace(first.learnt(), means=(math.nan,) * 8))
     assert third.mean(MOUNT_ROLL) == 0.0, "what is no number is not begun with"
 
 

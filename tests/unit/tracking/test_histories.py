@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 
 import numpy as np
 import pytest
@@ -45,14 +46,14 @@ def test_a_sample_from_the_past_is_ignored() -> None:
 def test_what_is_assumed_gives_way_to_the_next_measured_sample_however_late() -> None:
     history = AttitudeHistory()
     history.add(Attitude(100, 0.1, 0.0, 0.0))
-    for stamp_ns in (300, 320, 340):
-        history.assume(Attitude(stamp_ns, 0.5, 0.0, 0.0))
+    history.assume(Attitude(stamp_ns, 0.5, 0.0, 0.0) for stamp_ns in (300, 320, 340))
     assert history.is_assumed(310)
+    assert history.measured_ns == 100
     assert not history.is_assumed(100)
     history.add(Attitude(200, 0.2, 0.0, 0.0))
     assert history.newest == Attitude(200, 0.2, 0.0, 0.0)
     assert not history.is_assumed(200)
-    history.assume(Attitude(360, 0.5, 0.0, 0.0))
+    history.assume([Attitude(360, 0.5, 0.0, 0.0)])
     assert history.is_assumed(250)
     assert not history.is_assumed(150)
 
@@ -60,8 +61,7 @@ def test_what_is_assumed_gives_way_to_the_next_measured_sample_however_late() ->
 def test_a_silence_longer_than_the_memory_leaves_only_what_is_assumed() -> None:
     history = AttitudeHistory(keep_ns=100)
     history.add(Attitude(100, 0.1, 0.0, 0.0))
-    for stamp_ns in range(120, 500, 20):
-        history.assume(Attitude(stamp_ns, 0.5, 0.0, 0.0))
+    history.assume(Attitude(stamp_ns, 0.5, 0.0, 0.0) for stamp_ns in range(120, 500, 20))
     assert history.is_assumed(490)
     history.add(Attitude(500, 0.2, 0.0, 0.0))
     assert history.newest == Attitude(500, 0.2, 0.0, 0.0)
@@ -70,12 +70,37 @@ def test_a_silence_longer_than_the_memory_leaves_only_what_is_assumed() -> None:
 
 def test_height_follows_the_climb_past_the_newest_sample_but_not_for_long() -> None:
     history = HeightHistory()
-    history.add(0, 1.0, 0.5)
-    history.add(100_000_000, 1.1, 0.5)
+    history.add(0, 1.0, 1.0)
+    history.add(100_000_000, 1.1, 1.0)
     history.add(150_000_000, math.nan, 0.5)
     assert history.at(50_000_000) == pytest.approx(1.05)
-    assert history.at(200_000_000) == pytest.approx(1.15)
+    assert history.at(200_000_000) == pytest.approx(1.2)
     assert math.isnan(history.at(1_200_000_000))
+
+
+@pytest.mark.parametrize("scatter_m", [0.005, 0.04])
+def test_a_noisy_range_finder_is_averaged_over_by_the_climb_rate(scatter_m: float) -> None:
+    history, rng = HeightHistory(), random.Random(1)
+    raw, told = [], []
+    for step in range(400):
+        true_m = 1.0 + 0.3 * math.sin(0.05 * step)
+        climb_mps = 0.3 * 0.05 * math.cos(0.05 * step) / 0.05
+        off_m = rng.gauss(0.0, scatter_m)
+        history.add(step * 50_000_000, true_m + off_m, climb_mps)
+        raw.append(off_m)
+        told.append(history.at(step * 50_000_000) - true_m)
+    rms, raw_rms = (math.sqrt(math.fsum(x * x for x in of[100:]) / 300) for of in (told, raw))
+    assert rms < 0.6 * raw_rms if scatter_m > 0.01 else rms < raw_rms
+    assert history.sigma_m == pytest.approx(scatter_m, rel=0.4)
+    assert 0.4 * rms < history.error_m < 2.5 * rms
+
+
+def test_another_floor_is_taken_at_once() -> None:
+    history = HeightHistory()
+    for step in range(40):
+        history.add(step * 50_000_000, 1.6, 0.0)
+    history.add(40 * 50_000_000, 1.2, 0.0)
+    assert history.at(40 * 50_000_000) == 1.2
 
 
 @given(

@@ -145,6 +145,8 @@ class MavlinkTelemetry(NewestReadings):
         if rebooted:
             self._sync.reset()
         boot_ns = self._boot_ns(boot_ms, now_ns)
+        if boot_ms and not self._is_senseless(boot_ns, now_ns):
+            self._sync.heard(boot_ns, now_ns)
         stamp_ns = self._stamp(boot_ns, now_ns)
         self._stamps_refused += rebooted or self._is_senseless(boot_ns, now_ns)
         last_ns = stamp_ns - 1 if self._attitude is None or rebooted else self._attitude.stamp_ns
