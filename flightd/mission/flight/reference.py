@@ -35,7 +35,7 @@ _REST_MPS = 0.15
 _FADE_S, _OWN_LANDING_S, _DISARM_S = 0.3, 2.5, 5.5
 """Down and still for so long: lean no more (who stands does not follow a lean, and the position loop would
 ask for more and more), have the autopilot land by itself, ask it to disarm."""
-_BLOCKED_S = 0.5
+_BLOCKED_S = 0.3
 """The same of one that cannot sink any further, while its range finder is not at rest."""
 _HURRY = 4.0 / 3.0
 """How much faster than usual a take-off out of sight climbs, within the limits."""
