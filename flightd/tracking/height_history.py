@@ -2,6 +2,7 @@
 
 Between samples the climb rate tells the height, so a range finder that is noisy is averaged over as many of
 them as its own scatter asks for: a Kalman filter of the one state, whose noise follows its innovations.
+Innovations that stay on one side are no scatter: there it is the climb rate that errs, and the samples count.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ second."""
 _LEAST_M, _FIRST_M = 0.004, 0.01
 """Sigma of a sample: the least that is believed, and at first."""
 _GAIN = 0.05
+_ONE_SIDED = 0.2
+"""How soon the mean of the innovations is believed."""
 _LEAP_M, _LEAP_SIGMAS = 0.12, 4.0
 """A sample further off than both is that of another floor: it is taken as it is."""
 
@@ -28,6 +31,7 @@ class HeightHistory:
         self._climb_mps = 0.0
         self._variance = 0.0
         self._scatter = _FIRST_M**2
+        self._mean_off_m = 0.0
 
     @property
     def sigma_m(self) -> float:
@@ -67,7 +71,7 @@ class HeightHistory:
     def _believed_m(self, stamp_ns: int, height_m: float, climb_mps: float) -> float:
         """What the sample and those before it say of the height."""
         if not self._samples or stamp_ns - self._samples[-1][0] > self._keep_ns:
-            self._variance = self._scatter
+            self._variance, self._mean_off_m = self._scatter, 0.0
             return height_m
         last_ns, last_m = self._samples[-1]
         dt_s = (stamp_ns - last_ns) * 1e-9
@@ -76,10 +80,12 @@ class HeightHistory:
         self._variance += (_UNTOLD_M if untold else _CLIMB_M) ** 2 * dt_s
         off_m = height_m - expected_m
         if abs(off_m) > max(_LEAP_M, _LEAP_SIGMAS * math.sqrt(self._variance + self._scatter)):
-            self._variance = self._scatter
+            self._variance, self._mean_off_m = self._scatter, 0.0
             return height_m
-        self._scatter += _GAIN * (off_m * off_m - self._variance - self._scatter)
+        self._mean_off_m += _ONE_SIDED * (off_m - self._mean_off_m)
+        self._scatter += _GAIN * ((off_m - self._mean_off_m) ** 2 - self._variance - self._scatter)
         self._scatter = max(self._scatter, _LEAST_M**2)
+        self._variance = max(self._variance, self._mean_off_m**2)
         gain = self._variance / (self._variance + self._scatter)
         self._variance *= 1.0 - gain
         return expected_m + gain * off_m

@@ -170,3 +170,13 @@ def test_whatever_the_order_of_arrival_stamps_only_grow_and_are_true(order: list
     assert [k for k, _ in stamps] == sorted(k for k, _ in stamps)
     first_delay = (400 - order[0] * 30) * MS
     assert all(stamp <= k * 30 * MS + first_delay + 200_000 for k, stamp in stamps)
+
+
+def test_a_climb_rate_that_errs_does_not_carry_the_height_away_from_what_is_measured() -> None:
+    heights, rng = HeightHistory(), random.Random(5)
+    for n in range(150):
+        t_s = n * 0.02
+        heights.add(n * 20_000_000, 1.6 + 0.8 * t_s + rng.gauss(0.0, 0.01), 0.0)  # it tells that it hovers
+        if n > 10:
+            assert heights.at(n * 20_000_000) == pytest.approx(1.6 + 0.8 * t_s, abs=0.06)
+    assert heights.sigma_m < 0.02
