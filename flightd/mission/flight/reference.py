@@ -32,11 +32,8 @@ _SETTLE_S = 3.0
 """The most that a landing waits for the drone to come to rest."""
 _REST_MPS = 0.15
 # the autopilots themselves say after a second that they stand
-_FADE_S, _OWN_LANDING_S, _DISARM_S = 0.3, 2.5, 5.5
-"""Down and still for so long: lean no more (who stands does not follow a lean, and the position loop would
-ask for more and more), have the autopilot land by itself, ask it to disarm."""
-_BLOCKED_S = 0.3
-"""The same of one that cannot sink any further, while its range finder is not at rest."""
+_OWN_LANDING_S, _DISARM_S = 2.5, 5.5
+"""Down and still for so long: have the autopilot land by itself, ask it to disarm."""
 _HURRY = 4.0 / 3.0
 """How much faster than usual a take-off out of sight climbs, within the limits."""
 
@@ -145,13 +142,10 @@ class ReferenceGenerator:
         else:
             climb = self._climb_mps(s, task)
         guide = Guide.STEER if self._steers else Guide.BRAKE if self._may_brake(s, task) else Guide.LEVEL
-        if task.phase is Phase.LAND and self._touches():
+        if task.phase is Phase.LAND and self._standstill.touches:
             guide = Guide.LEVEL
         dead_reckoned = s.sight_s < self._hazards.expert.brake_s
         return Guidance(task.phase, guide, self._reference(climb), demand, dead_reckoned, task.state.stopped)
-
-    def _touches(self) -> bool:
-        return self._still_s > _FADE_S or self._standstill.blocked_s > _BLOCKED_S
 
     def _climb_mps(self, s: MissionInputs, task: ReferenceTask) -> float:
         """Climb rate towards the wanted height.  A take-off that drifts where no line tells how hurries: the

@@ -31,6 +31,8 @@ _HIGH_S = 2.0
 _STILL_MPS = 0.1
 _STILL_M = 0.04
 _STILL_RAD = math.radians(2.0)
+_TOUCHES_S, _FLIES_S = 0.3, 0.5
+"""Down and still, or kept from sinking, for so long it touches; moving for so long it flies again."""
 
 
 class Standstill:
@@ -42,9 +44,10 @@ class Standstill:
         self._hold_s = params.telemetry_hold_s
         self._floor_m = _STANDS_M
         self._since: tuple[int, float, Attitude] | None = None
-        self.blocked_s = 0.0
-        """For how long something near the floor keeps it from sinking as it is commanded to, s: it touches,
-        whatever its range finder reads there."""
+        self._blocked_s = self._moving_s = 0.0
+        self.touches = False
+        """It stands on something: who stands does not follow a lean, and the position loop would ask for more
+        and more of it."""
 
     def stands(self, height_m: float) -> None:
         """It stands on the floor and reads this, NaN for nothing."""
@@ -54,13 +57,24 @@ class Standstill:
     def begin(self) -> None:
         """A landing begins."""
         self._since = None
-        self.blocked_s = 0.0
+        self._blocked_s, self.touches = 0.0, False
 
     def step(self, s: MissionInputs, *, sinks: bool) -> float:
         """Seconds; 0 while it moves, is higher, or is not heard.  `sinks`: it is commanded to."""
         v = s.vehicle
+        # near the floor something keeps it from sinking, whatever its range finder reads there
         held = v is not None and abs(v.climb_mps) <= _STILL_MPS and not s.height_m > _FLOOR_M
-        self.blocked_s = self.blocked_s + s.dt_s if sinks and held else 0.0
+        self._blocked_s = self._blocked_s + s.dt_s if sinks and held else 0.0
+        still_s = self._stood_s(s, sinks=sinks)
+        if max(still_s, self._blocked_s) > _TOUCHES_S:
+            self.touches, self._moving_s = True, 0.0
+        elif self.touches:
+            self._moving_s += s.dt_s
+            self.touches = self._moving_s <= _FLIES_S
+        return still_s
+
+    def _stood_s(self, s: MissionInputs, *, sinks: bool) -> float:
+        v = s.vehicle
         if v is None or s.telemetry_age_s > self._hold_s or not _is_steady(s.height_m, v.climb_mps):
             self._since = None
             return 0.0
