@@ -22,8 +22,8 @@ class TickPace:
         self._due_ns = self._last_ns + _TICK_NS
 
     async def turn(self) -> tuple[int, float]:
-        """Wait for the next tick: the time now, and how late the tick is, seconds; one that came before its
-        period is over is never late."""
+        """Wait for the next tick: the time now, and how late the tick is, seconds; 0 for one that comes
+        before its period is over."""
         clock = self._clock
         try:
             async with asyncio.timeout((self._due_ns - clock.now_ns()) * 1e-9):
@@ -35,7 +35,8 @@ class TickPace:
             # late: leave ticks out, never bunch them
             self._due_ns = max(self._due_ns, now_ns - _TICK_NS) + _TICK_NS
         else:
-            now_ns, late_s = clock.now_ns(), 0.0
+            now_ns = clock.now_ns()
+            late_s = max(now_ns - self._due_ns, 0) * 1e-9
             self._due_ns = now_ns + _TICK_NS
         self._last_ns = now_ns
         return now_ns, late_s

@@ -17,7 +17,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from flightd.core.errors import FlightdError, InputError, UnavailableError
+from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
 from flightd.ground.browser import Browser
 from flightd.ground.guards import Guard
 from flightd.ground.hub import Hub
@@ -97,7 +97,7 @@ async def _act(hub: Hub, request: Request) -> Response:
         return _answer(400, refused=str(err))
     try:
         accepted = await drone.act(act)
-    except UnavailableError as err:
+    except (UnavailableError, TransientError) as err:
         return _answer(503, refused=str(err))
     except FlightdError as err:
         return _answer(409, refused=str(err).removeprefix("refused: "))

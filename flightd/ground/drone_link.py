@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 from collections import Counter, deque
 from collections.abc import Iterable
@@ -15,6 +16,7 @@ from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind
 from flightd.ground.messages import Act, LinkState, PictureKey, picture_message
 
+_LOG = logging.getLogger(__name__)
 ATTEND_S = 0.5
 _STATE_S = 0.5
 _ANSWER_S = 2.0
@@ -87,9 +89,9 @@ class DroneLink:
                 self._trouble = str(err)
             except ExceptionGroup as group:
                 known, unknown = group.split(FlightdError)
-                if known is None or unknown is not None:
-                    raise
-                self._trouble = str(known.exceptions[0])
+                if unknown is not None:  # an error of ours must not end the station for the other drones
+                    _LOG.error("%s: the link failed", self.name, exc_info=unknown)
+                self._trouble = "the link failed" if known is None else str(known.exceptions[0])
             self._client, self._attends, self._round_trip_ms = None, False, None
             self._tell_state()
             await asyncio.sleep(_AGAIN_S)
@@ -103,7 +105,10 @@ class DroneLink:
             raise RunError(f"{MOST_ACTS} acts wait for an answer of {self.name} already")
         self._acting += 1
         try:
-            return await client.order(act.command, act.node, act.id)
+            if act.command in _URGENT:  # whatever flies there now
+                return await client.order(act.command, act.node, act.id, session="", seen_ns=0)
+            session, seen_ns = act.session or None, act.seen_ns or None
+            return await client.order(act.command, act.node, act.id, session=session, seen_ns=seen_ns)
         finally:
             self._acting -= 1
 

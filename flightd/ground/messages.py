@@ -58,6 +58,10 @@ class Act(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     id: Annotated[str, Meta(min_length=8, max_length=64)]
     command: CommandKind
     node: _Name = ""
+    session: _Name = ""
+    """The flight that the person saw, from `welcome`; empty: the one that the station sees."""
+    seen_ns: Annotated[int, Meta(ge=0)] = 0
+    """`stamp_ns` of the newest status that the page had; 0: that of the station."""
 
 
 class LinkState(msgspec.Struct, frozen=True):

@@ -32,6 +32,12 @@ _UNLEANT_S = 0.3
 """Over so long a push is averaged before it is leant against."""
 _MAP_SIGMA_M = 0.02
 """Of a distance between two lines of the map, as it is painted."""
+_SILENT_S = 0.1
+"""A vehicle whose newest attitude is older than usual by so much is not waited for."""
+_CLIMB_DOUBT_M = 1.0
+"""Below, the rotors' own wash moves the barometer, and the adapter holds rate and height apart."""
+_GAP_NS = 100_000_000
+"""Frames further apart do not follow each other."""
 _WAIT_NS = 300_000_000
 """So old a frame is used by the attitude that is assumed of its exposure."""
 
@@ -69,6 +75,7 @@ class StateEstimator:
         self._heights = HeightHistory()
         self.response = AttitudeResponse()
         self._telemetry_s = 0.0
+        self._attitude_ns = 0
         self.frames = FrameMonitor()
         self.learnt = learnt
         """What the last flight has learnt of the sensors, or those before it."""
@@ -120,10 +127,11 @@ class StateEstimator:
         out with the last tick."""
         v = tick.vehicle
         obeys = v is not None and v.in_control and v.may_fly
-        self.response.sent(tick.now_ns, commanded)
+        self.response.sent(tick.now_ns, commanded if obeys else None)
         for sample in tick.attitudes:
             late_s = (tick.now_ns - sample.stamp_ns) * 1e-9
             self._telemetry_s += _LATE_GAIN * (min(max(late_s, 0.0), _MOST_LATE_S) - self._telemetry_s)
+            self._attitude_ns = sample.stamp_ns
             self.tracker.attitude(sample)
             self.poses.add_attitude(sample)
             self.response.told(sample, obeys=obeys)
@@ -148,12 +156,16 @@ class StateEstimator:
     def sight_age_s(self, now_ns: int, told_ns: int) -> float:
         """For how long the floor has told nothing since then: without frames, or in those that are judged.
         In frames that wait for their attitude nobody has looked yet."""
-        waiting_ns = self._waiting[-1].stamp_ns - self._judged_ns if self._waiting and self._judged_ns else 0
+        waiting_ns = 0
+        if self._waiting and self._judged_ns:  # a gap before the first that waits is a gap
+            judged_ns = max(self._judged_ns, self._waiting[0].stamp_ns - _GAP_NS)
+            waiting_ns = min(self._waiting[-1].stamp_ns - judged_ns, _WAIT_NS)
         return max(now_ns - told_ns - waiting_ns, 0) * 1e-9 if told_ns else math.inf
 
     def _is_due(self, lines: LineSet, now_ns: int) -> bool:
-        """A frame waits for the attitude at its exposure, but not for ever."""
-        return self.tracker.measured(lines) or now_ns - self.tracker.exposed_ns(lines) > _WAIT_NS
+        """A frame waits for the attitude at its exposure, but not for ever, nor for one that fell silent."""
+        silent = self.telemetry_age_s(now_ns, self._attitude_ns) > _SILENT_S
+        return silent or self.tracker.measured(lines) or now_ns - self.tracker.exposed_ns(lines) > _WAIT_NS
 
     def step(self, now_ns: int) -> Estimate:
         """The motion now."""
@@ -192,7 +204,9 @@ class StateEstimator:
         exposed_ns = self.tracker.exposed_ns(lines)
         height_m, climbed_m = self._heights.at(exposed_ns), self._climbed.at(exposed_ns)
         used, by_width_m = self.tracker.frame(lines, height_m, self._heights.error_m), self.tracker.by_width_m
-        if used and by_width_m is not None and math.isfinite(height_m + climbed_m):
+        if height_m < _CLIMB_DOUBT_M:
+            self.climb.forget()
+        elif used and by_width_m is not None and math.isfinite(height_m + climbed_m):
             self.climb.step(exposed_ns, height_m, by_width_m, climbed_m)
 
     def _count_climb(self, now_ns: int, climb_mps: float) -> None:

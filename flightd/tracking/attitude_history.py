@@ -34,8 +34,9 @@ class AttitudeHistory:
         """What is assumed from the newest measured sample on, in the place of what was."""
         self._forget_assumed()
         for sample in samples:
-            if self._append(sample):
-                self._assumed = min(self._assumed + 1, len(self._samples))
+            self._assumed += 1  # counted first: the newest measured one is never forgotten
+            if not self._append(sample):
+                self._assumed -= 1
 
     def is_assumed(self, stamp_ns: int) -> bool:
         """Whether the attitude at that time rests on what is only assumed."""
@@ -59,7 +60,7 @@ class AttitudeHistory:
             return False
         self._samples.append(sample)
         self._stamps.append(sample.stamp_ns)
-        while self._stamps[0] < sample.stamp_ns - self._keep_ns:
+        while self._stamps[0] < sample.stamp_ns - self._keep_ns and len(self._stamps) > self._assumed + 1:
             self._samples.popleft()
             self._stamps.popleft()
         return True

@@ -34,6 +34,8 @@ _INDEPENDENT_PER_S = 6.0
 """Errors of a model follow each other: so many of them a second tell something new."""
 _STEADY_S = 2.0
 """A constant difference between attitude and setpoint (trim) says nothing of the delay."""
+_FORESEEN_NS = 3_000_000_000
+"""Of a vehicle that fell silent no more is foreseen: what it does by then nobody knows."""
 _LEAST_RAD = math.radians(0.15)
 _SHARED_S = 0.02
 """Most that the delay believed moves at once."""
@@ -123,7 +125,7 @@ class AttitudeResponse:
         told = self._told
         if told is None or math.isinf(self._kept.oldest_ns):
             return []
-        ahead_ns = now_ns + round(self.delay_s * 1e9) - told.stamp_ns
+        ahead_ns = min(now_ns + round(self.delay_s * 1e9) - told.stamp_ns, _FORESEEN_NS)
         steps = math.ceil(ahead_ns * 1e-9 / _STEP_S)
         if steps <= 0 or told.stamp_ns < self._kept.oldest_ns:
             return []

@@ -53,6 +53,7 @@ _SHUT_OUT = {zmq.Event.HANDSHAKE_FAILED_AUTH, zmq.Event.HANDSHAKE_FAILED_PROTOCO
 """Events after which asking again is of no use."""
 
 _A = TypeVar("_A")
+_S = TypeVar("_S", StatusReport, "StatusReport | None")
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +99,8 @@ class GroundClient:
         self._reading: asyncio.Task[None] | None = None
         self._seen: set[int] = set()
         self.session = ""
+        self._seen_ns = 0
+        """`stamp_ns` of the newest status; 0 before the first."""
 
     async def __aenter__(self) -> Self:
         address = self._address
@@ -119,6 +122,8 @@ class GroundClient:
         if self._reading is not None:
             self._reading.cancel()
             await asyncio.wait([self._reading])
+        for asked in self._waiting(""):
+            asked.set_exception(UnavailableError("the connection was given up"))
         self._close()
 
     async def hello(self) -> Welcome:
@@ -127,10 +132,24 @@ class GroundClient:
         self.session = welcome.session
         return welcome
 
-    async def order(self, kind: CommandKind, node: str = "", order_id: str = "") -> Accepted:
-        """Give a command; sent again until it is answered, done once."""
+    async def order(
+        self,
+        kind: CommandKind,
+        node: str = "",
+        order_id: str = "",
+        *,
+        session: str | None = None,
+        seen_ns: int | None = None,
+    ) -> Accepted:
+        """Give a command; sent again until it is answered, done once.  It is for the flight `session`, given
+        by who saw the status of `seen_ns`; left out: this client's, and the newest that it heard."""
         order = Order(
-            version=VERSION, id=order_id or _new_id(), command=kind, node=node, session=self.session
+            version=VERSION,
+            id=order_id or _new_id(),
+            command=kind,
+            node=node,
+            session=self.session if session is None else session,
+            seen_ns=self._seen_ns if seen_ns is None else seen_ns,
         )
         return await self._ask(order, Accepted)
 
@@ -140,7 +159,8 @@ class GroundClient:
 
     async def status(self) -> StatusReport | None:
         """The newest status, None before the daemon's first tick."""
-        return (await self._ask(AskStatus(version=VERSION, id=_new_id()), StatusAnswer)).status
+        status = (await self._ask(AskStatus(version=VERSION, id=_new_id()), StatusAnswer)).status
+        return self._noted(status)
 
     async def inventory(self) -> tuple[dict[str, str], ...]:
         """What has been counted, place by place."""
@@ -150,16 +170,24 @@ class GroundClient:
         """A camera's next picture and its JPEG."""
         request = AskPicture(version=VERSION, id=_new_id(), camera=camera)
         answer, frames = await self._answer(request, max(self._timeout_s, 4.0))
-        return _expected(answer, PictureAnswer), frames[1]
+        picture = _expected(answer, PictureAnswer)
+        if len(frames) < 2:
+            raise TransientError("the daemon's picture came without its JPEG")
+        return picture, frames[1]
 
     async def published(self) -> AsyncIterator[StatusReport | EventReport]:
         """Every status and event from now on, for ever.  InputError for a message of another version."""
         while True:
             topic, body = (await self._status.recv_multipart())[:2]
             try:
-                yield decode_status(body) if topic == STATUS_TOPIC else decode_event(body)
+                yield self._noted(decode_status(body)) if topic == STATUS_TOPIC else decode_event(body)
             except DECODE_ERRORS as err:
                 raise InputError(f"the daemon's {topic.decode()} message is not ours: {err}") from None
+
+    def _noted(self, status: _S) -> _S:
+        if status is not None:
+            self._seen_ns = max(self._seen_ns, status.stamp_ns)
+        return status
 
     async def _ask(self, request: Request, kind: type[_A]) -> _A:
         return _expected((await self._answer(request, self._timeout_s))[0], kind)
@@ -234,6 +262,8 @@ class GroundClient:
         socket.linger = 0
         socket.rcvhwm = 200
         socket.sndhwm = 50
+        # a way that is gone is noticed on both sockets: one that only listens would wait for ever
+        socket.heartbeat_ivl, socket.heartbeat_timeout = 1000, 4000
         socket.ipv6 = ":" in self._address.host
         if self._address.keys is not None:
             socket.curve_publickey = self._address.keys.public.encode()

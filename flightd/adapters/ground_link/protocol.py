@@ -199,6 +199,14 @@ class Order(_Request, frozen=True, tag="command"):
     session: Annotated[
         str, Meta(max_length=64, description="from `welcome`; given, a daemon started since then refuses")
     ] = ""
+    seen_ns: Annotated[
+        int,
+        Meta(
+            ge=0,
+            description="`stamp_ns` of the newest status that the person had; by one older than 5 s only "
+            "stop, land and pause are taken: the order may have lain in a queue",
+        ),
+    ] = 0
 
 
 class AskStatus(_Request, frozen=True, tag="status"):
@@ -346,6 +354,7 @@ class Code(enum.StrEnum):
     PHASE = "phase"
     NODE = "node"
     BUSY = "busy"
+    LATE = "late"
     UNAVAILABLE = "unavailable"
 
 

@@ -51,6 +51,9 @@ _TAKEN_OVER_NS = 3_000_000_000
 
 _URGENT = frozenset({CommandKind.LAND, CommandKind.STOP})
 """Never held back for being too many."""
+_NEVER_LATE = _URGENT | {CommandKind.PAUSE}
+_LATE_NS = 5_000_000_000
+"""By an older status nothing else is ordered: the order lay in a queue, or its giver saw nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +211,11 @@ class RequestHandler:
                 peer.role is not Role.OPERATOR and not _takes_start_back(kind, phase),
                 Code.ROLE,
                 f"{peer.name} is a {peer.role}; commands need the role operator",
+            ),
+            (
+                kind not in _NEVER_LATE and bool(order.seen_ns) and now_ns - order.seen_ns > _LATE_NS,
+                Code.LATE,
+                f"{kind} was given {(now_ns - order.seen_ns) * 1e-9:.0f} s ago: look, and give it again",
             ),
             (id_known, Code.ID_REUSED, "this id was used for another command; make a new one for each"),
             (

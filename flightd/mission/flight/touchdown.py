@@ -44,7 +44,7 @@ class Standstill:
         self._hold_s = params.telemetry_hold_s
         self._floor_m = _STANDS_M
         self._since: tuple[int, float, Attitude] | None = None
-        self._blocked_s = self._moving_s = 0.0
+        self._blocked_s = self._moving_s = self._sank_s = 0.0
         self.touches = False
         """It stands on something: who stands does not follow a lean, and the position loop would ask for more
         and more of it."""
@@ -57,14 +57,11 @@ class Standstill:
     def begin(self) -> None:
         """A landing begins."""
         self._since = None
-        self._blocked_s, self.touches = 0.0, False
+        self._blocked_s, self._sank_s, self.touches = 0.0, 0.0, False
 
     def step(self, s: MissionInputs, *, sinks: bool) -> float:
         """Seconds; 0 while it moves, is higher, or is not heard.  `sinks`: it is commanded to."""
-        v = s.vehicle
-        # near the floor something keeps it from sinking, whatever its range finder reads there
-        held = v is not None and abs(v.climb_mps) <= _STILL_MPS and not s.height_m > _FLOOR_M
-        self._blocked_s = self._blocked_s + s.dt_s if sinks and held else 0.0
+        self._blocked_s = self._blocked_s + s.dt_s if sinks and self._is_held(s) else 0.0
         still_s = self._stood_s(s, sinks=sinks)
         if max(still_s, self._blocked_s) > _TOUCHES_S:
             self.touches, self._moving_s = True, 0.0
@@ -72,6 +69,16 @@ class Standstill:
             self._moving_s += s.dt_s
             self.touches = self._moving_s <= _FLIES_S
         return still_s
+
+    def _is_held(self, s: MissionInputs) -> bool:
+        """Something keeps it from sinking, near the floor or after it sank, whatever its range finder reads.
+        Elsewhere a climb rate of 0 may be one that stands still."""
+        if s.vehicle is None:
+            return False
+        climb_mps = s.vehicle.climb_mps
+        self._sank_s += s.dt_s if climb_mps < -_STILL_MPS else 0.0
+        low = s.height_m <= _FLOOR_M
+        return abs(climb_mps) <= _STILL_MPS and (low or self._sank_s > _TOUCHES_S)
 
     def _stood_s(self, s: MissionInputs, *, sinks: bool) -> float:
         v = s.vehicle

@@ -28,7 +28,7 @@ _TOUCHES_M = 0.105
 """One so high carries weight on its legs."""
 _HARD_MPS = 1.2
 _STAYS_ARMED_S = 15.0
-_LEANS_DEG, _SETTLES_S = 6.0, 0.5
+_LEANS_DEG, _SETTLES_S = 6.0, 0.8
 """Whoever leans so much so long after touching down, motors on, slides or tips over its legs."""
 
 

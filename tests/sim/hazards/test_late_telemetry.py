@@ -51,3 +51,16 @@ def test_the_drone_flies_on_along_its_line_and_comes_home(delay_ms: int, burst_m
     flown = flight.fly(80)
     assert (flown.phase, flown.visited) == (Phase.DONE, ["A2", "A4"]), flown.reason
     assert max(abs(k.y_m) for _, k in flown.truth) < 0.3
+
+
+def test_a_silence_of_many_seconds_in_the_air_is_no_error_of_the_software() -> None:
+    flight = IdealFlight(SITE, CONFIG, visits=("A2",))
+
+    def fall_silent(phase: Phase, _: int) -> None:
+        flight.faults.silent |= phase is Phase.FOLLOW
+
+    flight.on_tick = fall_silent
+    flown = flight.fly(60.0)
+    assert flown.phase is Phase.LAND
+    assert flown.reason == "vehicle telemetry lost"
+    assert not [event for event in flown.events if "software" in event.text]

@@ -126,6 +126,25 @@ def test_what_is_wrong_with_a_command_is_named() -> None:
 
 
 @pytest.mark.parametrize("version", [0, 2, -1, 10**12])
+@pytest.mark.parametrize(
+    ("command", "age_s", "code"),
+    [
+        ("pause", 60.0, None),
+        ("land", 60.0, None),
+        ("stop", 60.0, None),
+        ("home", 60.0, Code.LATE),
+        ("home", 1.0, None),
+    ],
+)
+def test_an_order_by_an_old_status_is_refused_unless_it_makes_the_flight_safer(
+    command: str, age_s: float, code: Code | None
+) -> None:
+    rig = RequestHandlerRig(Phase.FOLLOW)
+    rig.now_ns = 100 * S
+    answer = rig.order(command, seen_ns=rig.now_ns - round(age_s * S))
+    assert refusal(answer) is code if code else isinstance(answer, Accepted)
+
+
 def test_a_client_of_another_version_is_told_both_versions_whatever_else_it_says(version: int) -> None:
     rig = RequestHandlerRig()
     answer = rig.hand(json.dumps({"version": version, "id": "x", "op": "teleport", "to": []}).encode())

@@ -123,7 +123,7 @@ def test_a_drone_left_to_itself_in_the_air_is_out_of_control_unless_it_is_landin
 
 
 @pytest.mark.parametrize(
-    ("lean_deg", "after_s", "wrong"), [(10.0, 1.0, True), (10.0, 0.2, False), (4.0, 1.0, False)]
+    ("lean_deg", "after_s", "wrong"), [(10.0, 1.2, True), (10.0, 0.5, False), (4.0, 1.2, False)]
 )
 def test_who_is_commanded_to_lean_while_it_stands_is_bad(
     lean_deg: float, after_s: float, wrong: bool

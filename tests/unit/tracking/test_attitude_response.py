@@ -134,3 +134,18 @@ def test_nothing_is_foreseen_before_anything_was_told_or_sent() -> None:
     assert response.foreseen(START_NS) == []
     response.told(Attitude(START_NS, 0.0, 0.0, 0.0), obeys=True)
     assert response.foreseen(START_NS) == []
+
+
+def test_a_vehicle_that_fell_silent_for_long_is_still_known_by_what_it_told_last() -> None:
+    response, history = AttitudeResponse(), AttitudeHistory()
+    told = Attitude(START_NS, 0.02, -0.01, 0.3)
+    for n in range(1_000):  # twenty seconds
+        now_ns = START_NS - 1_000_000_000 + n * TICK_NS
+        response.sent(now_ns, AttitudeSetpoint(now_ns, roll_rad=0.05))
+        if now_ns == START_NS:
+            history.add(told)
+            response.told(told, obeys=True)
+        history.assume(response.foreseen(now_ns))
+        if now_ns >= START_NS:
+            assert history.newest is not None
+            assert history.measured_ns == START_NS

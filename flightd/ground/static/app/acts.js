@@ -1,18 +1,23 @@
 // Acts of the person: sent to the drone by POST, the same one again until it is answered, done once.
-import { state, update } from "./store.js";
+import { shown, state, update } from "./store.js";
 
 const AGAIN_MS = 500;
 const PATIENCE_MS = 6000;
 const STOP_PATIENCE_MS = 60000;
+const ANSWER_MS = 3000;
 
 export async function act(command, node = "") {
   const drone = state.selected;
-  const body = JSON.stringify({ id: newId(), command, ...(node && { node }) });
+  if (!drone) return undefined;
+  // What was seen as it was pressed: the drone refuses what was ordered by an old picture, or for another flight.
+  const { welcome, status } = shown();
+  const seen = { session: welcome?.session ?? "", seen_ns: status?.stamp_ns ?? 0 };
+  const body = JSON.stringify({ id: newId(), command, ...(node && { node }), ...seen });
   const began = performance.now();
   const patience = command === "stop" ? STOP_PATIENCE_MS : PATIENCE_MS;
   note(drone, command, node, "sent", "");
   for (;;) {
-    const answer = await sent(drone, body);
+    const answer = await sent(drone, body, command === "stop" || command === "land");
     if (answer.accepted) return note(drone, command, node, "accepted", "");
     const final = !answer.again || performance.now() - began > patience;
     note(drone, command, node, final ? "refused" : "sent", answer.refused);
@@ -21,13 +26,14 @@ export async function act(command, node = "") {
   }
 }
 
-async function sent(drone, body) {
+async function sent(drone, body, urgent) {
   try {
     const answer = await fetch(`/drones/${encodeURIComponent(drone)}/acts`, {
       method: "POST",
       headers: { "Content-Type": "application/json" },
       body,
-      keepalive: true,
+      keepalive: urgent, // even while the page closes
+      signal: AbortSignal.timeout(ANSWER_MS),
     });
     return { again: answer.status === 503, ...(await answer.json()) };
   } catch {

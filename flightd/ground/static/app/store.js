@@ -63,7 +63,9 @@ export function take({ drone, topic, value }) {
 
 function takeStation(s, value) {
   s.station = value;
-  if (!value.drones.includes(s.selected)) s.selected = value.drones[0] ?? "";
+  if (value.drones.includes(s.selected)) return;
+  s.selected = value.drones[0] ?? "";
+  s.chosenNode = "";
 }
 
 function takeEcho(s, value) {

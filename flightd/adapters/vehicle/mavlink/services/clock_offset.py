@@ -166,6 +166,7 @@ class ClockSync:
         """Take a message that was stamped then; it tells nothing before the first answer."""
         if self._fit is not None:
             self._take(self._down, now_ns, theirs_ns - now_ns)
+            self._down.since(now_ns - _WINDOW_NS)  # answers, which end it else, may stop coming
 
     def answered(self, ts1_ns: int, tc1_ns: int, now_ns: int) -> bool:
         """Take an answer; False when we did not ask (another client's answer, a late or forged one)."""

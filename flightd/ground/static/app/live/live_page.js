@@ -1,7 +1,7 @@
 // The live page: where the drone is, what it sees, what it does and why, and what a person may order.
 import { hears } from "../hearing.js";
 import { html } from "../html.js";
-import { shown } from "../store.js";
+import { shown, state } from "../store.js";
 import { Acts } from "./acts_card.js";
 import { Camera } from "./camera.js";
 import { Events } from "./events.js";
@@ -21,7 +21,7 @@ export function LivePage() {
       <div class="side">
         ${status && html`<${Phase} status=${status} />`}
         ${status && html`<${Hazards} hazards=${status.hazards} />`}
-        ${status && html`<${Acts} status=${status} welcome=${welcome} />`}
+        ${status && html`<${Acts} key=${state.selected} status=${status} welcome=${welcome} />`}
       </div>
       <div class="sight">
         <${FloorMap} floor=${welcome.floor} />
