@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 
@@ -79,6 +80,11 @@ class SensorEstimate:
 
 NOT_SEEN = SensorEstimate()
 """Nothing is known yet, or a log does not tell it."""
+
+
+def last_known(told: Sequence[SensorEstimate]) -> SensorEstimate:
+    """The newest in which anything is known, oldest first; `NOT_SEEN` where there is none."""
+    return next((one for one in reversed(told) if one.is_known), NOT_SEEN)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from flightd.app.simulation.sensor_summary import sensor_summary
 from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.stock_summary import stock_summary
 from flightd.core.topics import Topic
-from flightd.core.tracks import NOT_SEEN
+from flightd.core.tracks import last_known
 from flightd.core.types import AttitudeSetpoint, Event, Status
 from flightd.mission.safety.hazard_table import HAZARDS
 from flightd.replay.log import Entry, read_log
@@ -64,8 +64,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
         codes_wrong=stock["codes_wrong"],
         empty_wrong=stock.get("empty_wrong", 0),
     )
-    seen = next((one.sensors for one in reversed(statuses) if one.sensors.is_known), NOT_SEEN)
-    sensors = sensor_summary(simulation, seen)
+    sensors = sensor_summary(simulation, last_known([status.sensors for status in statuses]))
     expected = simulation.scenario.expect
     if expected is None:
         return Judgement(figures, stock, sensors, None, tuple(faults))

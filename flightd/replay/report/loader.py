@@ -14,7 +14,7 @@ import numpy as np
 
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.topics import FOR_PEOPLE, RETAINED, Document, Topic
-from flightd.core.tracks import NOT_SEEN
+from flightd.core.tracks import last_known
 from flightd.core.types import (
     AT_STOP,
     AttitudeSetpoint,
@@ -78,7 +78,7 @@ def load_flight(path: Path) -> RecordedFlight:
         latency=_latency(statuses, seconds),
         events=tuple(log.messages(Event)),
         last_status=statuses[-1] if statuses else None,
-        sensors=next((one.sensors for one in reversed(statuses) if one.sensors.is_known), NOT_SEEN),
+        sensors=last_known([status.sensors for status in statuses]),
         line_sets={lines.frame_seq: lines for lines in log.messages(LineSet)},
         config="\n".join(document.text for document in log.messages(Document, Topic.CONFIG)),
         summary=_summary(path.with_name("summary.json")),
