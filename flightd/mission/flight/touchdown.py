@@ -61,7 +61,14 @@ class Standstill:
 
     def step(self, s: MissionInputs, *, sinks: bool) -> float:
         """Seconds; 0 while it moves, is higher, or is not heard.  `sinks`: it is commanded to."""
-        self._blocked_s = self._blocked_s + s.dt_s if sinks and self._is_held(s) else 0.0
+        climb_mps = math.nan if s.vehicle is None else s.vehicle.climb_mps
+        if sinks and climb_mps < -_STILL_MPS:
+            self._sank_s += s.dt_s
+        # near the floor or after it sank, whatever its range finder reads: elsewhere a climb rate of 0 may be
+        # one that stands still
+        may_touch = s.height_m <= _FLOOR_M or self._sank_s > _TOUCHES_S
+        is_held = sinks and abs(climb_mps) <= _STILL_MPS and may_touch
+        self._blocked_s = self._blocked_s + s.dt_s if is_held else 0.0
         still_s = self._stood_s(s, sinks=sinks)
         if max(still_s, self._blocked_s) > _TOUCHES_S:
             self.touches, self._moving_s = True, 0.0
@@ -69,16 +76,6 @@ class Standstill:
             self._moving_s += s.dt_s
             self.touches = self._moving_s <= _FLIES_S
         return still_s
-
-    def _is_held(self, s: MissionInputs) -> bool:
-        """Something keeps it from sinking, near the floor or after it sank, whatever its range finder reads.
-        Elsewhere a climb rate of 0 may be one that stands still."""
-        if s.vehicle is None:
-            return False
-        climb_mps = s.vehicle.climb_mps
-        self._sank_s += s.dt_s if climb_mps < -_STILL_MPS else 0.0
-        low = s.height_m <= _FLOOR_M
-        return abs(climb_mps) <= _STILL_MPS and (low or self._sank_s > _TOUCHES_S)
 
     def _stood_s(self, s: MissionInputs, *, sinks: bool) -> float:
         v = s.vehicle
