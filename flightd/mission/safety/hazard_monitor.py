@@ -175,6 +175,7 @@ class HazardMonitor:
             Trigger.HEIGHT_WRONG: (w.height_doubted, h.disagree_s),
             Trigger.ATTITUDE_WRONG: (abs(w.heading_error_rad) > h.heading_rad, h.disagree_s),
             Trigger.WIND: (w.push_mps2 > h.expert.push_mps2 or w.off_m > h.expert.off_m, h.expert.push_s),
+            Trigger.SWINGS: (w.swings, 0.0),
             Trigger.CEILING_LEFT: (w.headroom_m < 0.0, h.expert.outside_s),
             Trigger.CORRIDOR_LEFT: (w.outside_m > 0.0, h.expert.outside_s),
         }
