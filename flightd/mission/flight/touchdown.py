@@ -33,6 +33,9 @@ _STILL_M = 0.04
 _STILL_RAD = math.radians(2.0)
 _TOUCHES_S, _FLIES_S = 0.3, 0.5
 """Down and still, or kept from sinking, for so long it touches; moving for so long it flies again."""
+_MOVES_MPS, _MOVES_M = 0.3, 0.15
+"""What touches moves again when it climbs or sinks by more, or is so much higher: a told climb wanders by a
+third of it on the floor."""
 
 
 class Standstill:
@@ -45,6 +48,7 @@ class Standstill:
         self._floor_m = _STANDS_M
         self._since: tuple[int, float, Attitude] | None = None
         self._blocked_s = self._moving_s = self._sank_s = 0.0
+        self._touched_m = math.nan
         self.touches = False
         """It stands on something: who stands does not follow a lean, and the position loop would ask for more
         and more of it."""
@@ -71,9 +75,12 @@ class Standstill:
         self._blocked_s = self._blocked_s + s.dt_s if is_held else 0.0
         still_s = self._stood_s(s, sinks=sinks)
         if max(still_s, self._blocked_s) > _TOUCHES_S:
+            if not self.touches:
+                self._touched_m = s.height_m
             self.touches, self._moving_s = True, 0.0
         elif self.touches:
-            self._moving_s += s.dt_s
+            moves = abs(climb_mps) > _MOVES_MPS or abs(s.height_m - self._touched_m) > _MOVES_M
+            self._moving_s = self._moving_s + s.dt_s if moves else 0.0
             self.touches = self._moving_s <= _FLIES_S
         return still_s
 

@@ -39,10 +39,10 @@ COPTER_PARAMETERS: dict[str, float] = {
     "BATT_LOW_TIMER": 10,
     "BATT_FS_LOW_ACT": 1,
     "GUID_OPTIONS": 0,
-    "GUID_TIMEOUT": 0.5,
+    "GUID_TIMEOUT": 0.3,
     "WPNAV_SPEED_UP": 250,
     "WPNAV_SPEED_DN": 150,
-    "LAND_SPEED": 50,
+    "LAND_SPEED": 60,
     "ANGLE_MAX": 3000,
     "MOT_THST_HOVER": 0.34,
 }

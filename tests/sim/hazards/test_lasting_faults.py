@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,7 +30,7 @@ def flown_since(folder: Path, fault: dict[str, object]) -> list[dict[str, float]
     assert not [fault for fault in judge_flight(simulation).faults if fault.kind in SAFETY_KINDS]
     log = read_log(folder / "truth.mcap", {Topic.TRUTH, Topic.FAULT})
     begun_ns = next(entry.stamp_ns for entry in log.entries if entry.topic == Topic.FAULT)
-    truth = [entry.message for entry in log.entries if entry.topic == Topic.TRUTH]
+    truth: list[Any] = [entry.message for entry in log.entries if entry.topic == Topic.TRUTH]
     assert truth[-1]["height_m"] < 0.15
     return [k for k in truth if k["stamp_ns"] > begun_ns + 2_000_000_000]
 

@@ -106,7 +106,7 @@ _ARDUPILOT: tuple[Rule, ...] = (
         _within(0.1, 0.5),
         "0.3 to 0.5 s",
         "so long the last tilt is flown on after this computer has died",
-        0.5,
+        0.3,
     ),
     Rule(
         ("GUID_OPTIONS",),
