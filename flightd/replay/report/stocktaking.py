@@ -14,7 +14,7 @@ from flightd.core.inventory import LocationRecord, LocationState
 from flightd.inventory.comparison import ComparisonOutcome
 from flightd.replay.report.markup import NOTHING, element, table, text
 from flightd.replay.report.racks import STATE_NAMES, racks_section
-from flightd.replay.report.stock import SETTLED, CountedStock
+from flightd.replay.report.stock import SETTLED, CountedStock, share
 from flightd.site.site import Site
 
 _PICTURES_BYTES = 12_000_000
@@ -53,12 +53,17 @@ def inventory_section(count: CountedStock, site: Site | None) -> str:
 
 
 def _exceptions(count: CountedStock) -> str:
-    found = [record for state in _ORDER for record in count.records if record.state is state]
+    odd = [record for state in _ORDER for record in count.records if record.state is state]
+    found = [record for record in odd if record.observation or count.task.includes(record)]
+    apart = len(odd) - len(found)
+    note = f"{apart:,} locations not visited are at nodes that this flight was not to count." if apart else ""
+    tail = element("p", note, class_="note") if note else ""
     if not found:
-        return element("p", "None: every location was counted, each with one code or empty.", class_="empty")
+        told = "None: every location was counted, each with one code or empty."
+        return element("p", told, class_="empty") + tail
     rows = [_exception(record) for record in found[:_ROWS]]
     heads = ["Location", "State", "Codes", "Confidence", "Looked at", "What to do"]
-    return table(heads, rows, "exceptions") + _more(len(found) - len(rows), "flightd inventory show")
+    return table(heads, rows, "exceptions") + _more(len(found) - len(rows), "flightd inventory show") + tail
 
 
 def _exception(record: LocationRecord) -> str:
@@ -67,7 +72,7 @@ def _exception(record: LocationRecord) -> str:
         element("td", element("b", text(record.code))),
         element("td", element("i", class_=f"cell {record.state.value}"), text(STATE_NAMES[record.state])),
         element("td", text(", ".join(record.texts) or NOTHING)),
-        element("td", f"{seen.confidence:.0%}" if seen else NOTHING),
+        element("td", share(seen.confidence) if seen else NOTHING),
         element("td", _when(seen.utc_ns) if seen else NOTHING),
         element("td", _REMEDIES[record.state]),
     ]
@@ -94,7 +99,7 @@ def _differences(count: CountedStock) -> str:
                 text(line.text if line.outcome is ComparisonOutcome.UNEXPECTED else line.found or NOTHING),
             ),
             element("td", text(line.found_at or NOTHING)),
-            element("td", f"{line.confidence:.0%}"),
+            element("td", share(line.confidence)),
             data_code=line.location,
         )
         for line in wrong[:_ROWS]
@@ -130,7 +135,7 @@ def _look(record: LocationRecord, outcome: str) -> dict[str, object]:
         for label, value in (
             ("Codes", ", ".join(record.texts)),
             ("Symbology", ", ".join(dict.fromkeys(read.symbology for read in seen.reads)) if seen else ""),
-            ("Confidence", f"{seen.confidence:.0%}" if seen else ""),
+            ("Confidence", share(seen.confidence) if seen else ""),
             ("Looked at", f"{_when(seen.utc_ns)} UTC" if seen else ""),
             ("From node", (seen.pose.node if seen and seen.pose else record.node)),
             ("Height", f"{seen.pose.height_m:.2f} m" if seen and seen.pose else ""),
