@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from flightd.adapters.store.sqlite import SqliteStore
+from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.core.errors import InputError, UnavailableError
 from flightd.inventory.comparison import compare_stock
 from flightd.inventory.expected_stock import read_stock
@@ -24,7 +24,7 @@ def counted_beside(
     if not asked and not (folder / "inventory.db").exists():
         return None
     try:
-        with SqliteStore(folder, create=False) as store:
+        with opened_for_reading(folder) as store:
             records, evidence = store.locations(), store.evidence
     except (InputError, UnavailableError) as err:
         if asked:

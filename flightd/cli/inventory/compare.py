@@ -49,7 +49,7 @@ def compare(
       flightd inventory compare out/inventory stock.csv
       flightd inventory compare out/inventory stock.csv --recount recount.toml --config hall.toml
     """
-    from flightd.adapters.store.sqlite import SqliteStore
+    from flightd.adapters.store.for_reading import opened_for_reading
     from flightd.inventory.comparison import compare_stock, comparison_document, doubtful_locations
     from flightd.inventory.expected_stock import read_stock
     from flightd.inventory.recount import write_recount
@@ -57,7 +57,7 @@ def compare(
     if (recount is None) != (config is None):
         raise InputError("give both, the mission needs a configuration", key="--recount and --config")
     stock = read_stock(expected)
-    with SqliteStore(folder, create=False) as store:
+    with opened_for_reading(folder) as store:
         records = store.locations()
     lines = compare_stock(records, stock)
     doubtful = doubtful_locations(lines, records, least_confidence)

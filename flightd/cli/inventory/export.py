@@ -37,13 +37,13 @@ def export(
       flightd inventory export out/inventory --format epcis --out stock.jsonld
       flightd inventory export out/inventory | column -s, -t
     """
-    from flightd.adapters.store.sqlite import SqliteStore
+    from flightd.adapters.store.for_reading import opened_for_reading
     from flightd.inventory.export.formats import STDOUT, chosen_format
 
     chosen = chosen_format(kind, out)
     if as_json and out == STDOUT:
         raise InputError("says what was written to a file", key="--json", remedy="add --out F")
-    with SqliteStore(folder, create=False) as store:
+    with opened_for_reading(folder) as store:
         data = chosen.write(store.locations())
     if out == STDOUT:
         sys.stdout.buffer.write(data)
