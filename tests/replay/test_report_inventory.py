@@ -219,6 +219,15 @@ def test_the_flight_that_a_log_orders_is_the_one_that_its_report_judges(tmp_path
     assert RUN in page
 
 
+def test_a_location_that_only_the_books_know_is_named_with_its_line(folder: Path, tmp_path: Path) -> None:
+    books = tmp_path / "books.csv"
+    books.write_text("location,code\nA-<1>,PALLET\n")
+    count = counted_beside(folder / "flight.mcap", expected=books)
+    assert count is not None
+    told = inventory_section(count, None)
+    assert "Unknown to the count, misspelt or not planned: A-&lt;1&gt; (books.csv, line 2)." in told
+
+
 @pytest.mark.parametrize(
     ("confidence", "shown"),
     [(1.0, "100 %"), (0.9996, "99.9 %"), (0.998, "99.8 %"), (0.29, "29 %"), (0.0, "0 %")],

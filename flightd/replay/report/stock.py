@@ -45,12 +45,14 @@ WHOLE = CountTask()
 @dataclass(frozen=True, slots=True)
 class CountedStock:
     """Every location as it stands, the evidence picture (JPEG) of a name, and the comparison with the
-    expected stock (None where there was none to compare with)."""
+    expected stock (None where there was none to compare with), which names `unknown` locations, too (each
+    with the line of its file)."""
 
     records: Sequence[LocationRecord]
     picture: Callable[[str], bytes | None] = no_picture
     differences: Sequence[Difference] | None = None
     task: CountTask = WHOLE
+    unknown: Sequence[str] = ()
 
     @property
     def asked(self) -> list[LocationRecord]:

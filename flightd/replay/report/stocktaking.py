@@ -22,6 +22,8 @@ _PICTURES_BYTES = 12_000_000
 _PICTURE_PX = 480
 _QUALITY = 60
 _ROWS = 300
+_NAMED = 20
+"""So many locations are named in one sentence."""
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _ORDER = (
     LocationState.UNREADABLE,
@@ -86,6 +88,12 @@ def _differences(count: CountedStock) -> str:
         f"{unknown:,} expected codes lie where nobody could see: nothing is said of them." if unknown else ""
     )
     tail = element("p", note, class_="note") if note else ""
+    if count.unknown:
+        shown = ", ".join(count.unknown[:_NAMED])
+        more = f" and {len(count.unknown) - _NAMED:,} more" if len(count.unknown) > _NAMED else ""
+        tail += element(
+            "p", text(f"Unknown to the count, misspelt or not planned: {shown}{more}."), class_="note"
+        )
     if not wrong:
         return element("p", "No difference.", class_="empty") + tail
     rows = [

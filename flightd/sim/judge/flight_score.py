@@ -37,10 +37,10 @@ class FlightScore:
     """The flight's part of the summary; metres, seconds.  None where there was nothing to measure.
 
     `hover_error_p95_m` is off the place where it was to stand (`hover_error`), `cross_track_*` are off the
-    leg that was meant (`meant_leg`); `min_clearance_m` is free between the body with its propellers and racks,
-    ceiling and keep-outs, below 0 in them; `max_overshoot_m` how far above the commanded height it came;
-    `uncontrolled_s` the longest time in the air in which neither setpoints went out nor the autopilot was
-    landing it."""
+    leg that was meant (`meant_leg`); `min_clearance_m` is free between the body with its propellers and
+    racks, ceiling and keep-outs, below 0 in them; `max_overshoot_m` how far above the commanded height it
+    came; `uncontrolled_s` the longest time in the air in which neither setpoints went out nor the autopilot
+    was landing it."""
 
     mission: str
     reason: str

@@ -16,9 +16,11 @@ import pytest
 import zxingcpp
 from typer.testing import CliRunner
 
+from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.build import flown_between_m
 from flightd.app.flight_orders import configured_order, going_on
+from flightd.app.recording import FlightSetting, record_setting
 from flightd.cli.main import app
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
@@ -275,7 +277,7 @@ def test_bad_arguments_are_refused(counted: Path, tmp_path: Path) -> None:
     said = error_of("export", counted, "--out", tmp_path / "stock.json", "--format", "epcis")
     assert "its ending says json, --format says epcis" in said
     assert said.endswith("name the file stock.jsonld")
-    assert "give both" in error_of("compare", counted, stock, "--recount", tmp_path / "r.toml")
+    assert "no flight.mcap beside" in error_of("compare", counted, stock, "--recount", tmp_path / "r.toml")
     elsewhere = tmp_path / "deep" / "r.toml"
     config = CONFIGS / "sim.toml"
     assert "beside" in error_of("compare", counted, stock, "--recount", elsewhere, "--config", config)
@@ -291,3 +293,107 @@ def test_a_sites_locations_are_planned(tmp_path: Path) -> None:
     bare = tmp_path / "bare.toml"
     assert RUNNER.invoke(app, ["map", "new", str(bare)]).exit_code == 0
     assert "add a [[rack]]" in error_of("plan", tmp_path / "store", bare)
+
+
+@pytest.fixture
+def flown(tmp_path: Path) -> Path:
+    """The folder of a flight over the small racks: its log, and a count with doubts in both aisles."""
+    folder = tmp_path / "flown"
+    site = load_site(CONFIGS / "site-racks-small.toml")
+    config = load_config(CONFIGS / "sim.toml").with_values(
+        inventory={"run": "monday"}, mission={"resume": True, "progress": tmp_path / "left.json"}
+    )
+    order = configured_order(config)
+    with SqliteStore(folder) as store:
+        store.plan(PlannedLocation(place.code, place.node) for place in site.locations.values())
+        for number, place in enumerate(site.locations.values()):
+            state = ("unreadable", "occluded", "empty")[number % 3]
+            store.commit(Observation("monday", place.code, number + 1, LocationState(state), 0.9))
+    with McapRecorder(folder / "flight.mcap") as recorder:
+        record_setting(recorder, 1, FlightSetting(config, site, order))
+    return folder
+
+
+def recounted(flown: Path, out: Path, *options: str) -> tuple[dict[str, str], tuple[str, ...]]:
+    """The doubtful locations with their reasons, and the nodes of the mission that is written for them."""
+    books = flown / "books.csv"
+    books.write_text("location,code\n")
+    told = json.loads(run("compare", flown, books, "--recount", out, *options, "--json"))
+    nodes = load_config(out).mission.nodes
+    assert tuple(told["recount_nodes"]) == nodes
+    return told["recount"], nodes
+
+
+def test_a_recount_needs_no_configuration_beside_the_flight_that_knows_it(
+    flown: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "recount.toml"
+    doubtful, nodes = recounted(flown, out)
+    site, config = load_site(CONFIGS / "site-racks-small.toml"), load_config(out)
+    assert load_site(config.mission.site) == site
+    assert {site.locations[code].node for code in doubtful} == set(nodes)
+    assert set(doubtful.values()) == {"unreadable", "occluded"}
+    assert config.front_camera == load_config(CONFIGS / "sim.toml").front_camera
+    assert (config.inventory.run, config.mission.resume) == ("monday recount", False)
+    order = configured_order(config)
+    assert going_on(order, config.inventory.run, site, flown).nodes == nodes
+    elsewhere = tmp_path / "elsewhere"
+    shutil.copytree(flown, elsewhere)
+    (elsewhere / "flight.mcap").unlink()
+    books = flown / "books.csv"
+    assert "add --log FLIGHT.mcap or --config F" in error_of("compare", elsewhere, books, "--recount", out)
+    run("compare", elsewhere, books, "--recount", out, "--log", flown / "flight.mcap")
+
+
+def test_a_recount_is_limited_to_what_is_named(flown: Path, tmp_path: Path) -> None:
+    out, site = tmp_path / "recount.toml", load_site(CONFIGS / "site-racks-small.toml")
+    every, _ = recounted(flown, out)
+    in_a, nodes = recounted(flown, out, "--aisles", "A")
+    assert in_a
+    assert in_a.keys() == {code for code in every if site.locations[code].aisle == "A"}
+    assert {site.nodes[node].aisle for node in nodes} == {"A"}
+    two = sorted({site.locations[code].node for code in every})[:2]
+    _, nodes = recounted(flown, out, "--nodes", ",".join(two))
+    assert set(nodes) == set(two)
+    occluded, _ = recounted(flown, out, "--states", "occluded")
+    assert occluded == {code: why for code, why in every.items() if why == "occluded"}
+    assert recounted(flown, out, "--reasons", "unreadable")[0].keys() == every.keys() - occluded.keys()
+    some = list(every)[3:5]
+    assert list(recounted(flown, out, "--locations", ", ".join(some))[0]) == some
+    assert len(recounted(flown, out, "--at-most", "4")[0]) == 4
+
+
+def test_a_recount_of_so_many_begins_with_differences(flown: Path, tmp_path: Path) -> None:
+    out, books = tmp_path / "recount.toml", flown / "books.csv"
+    (late,) = list(load_site(CONFIGS / "site-racks-small.toml").locations)[-1:]
+    books.write_text(f"location,code\n{late},PALLET-9\n")
+    told = json.loads(run("compare", flown, books, "--recount", out, "--at-most", "1", "--json"))
+    assert told["recount"] == {late: "empty_but_expected"}
+
+
+@pytest.mark.parametrize(
+    ("option", "name"),
+    [
+        ("--aisles", "Z"),
+        ("--nodes", "Z9"),
+        ("--locations", "nowhere"),
+        ("--states", "lost"),
+        ("--reasons", "whim"),
+    ],
+)
+def test_a_limit_that_names_nothing_is_refused(flown: Path, tmp_path: Path, option: str, name: str) -> None:
+    books = flown / "books.csv"
+    books.write_text("location,code\n")
+    said = error_of("compare", flown, books, "--recount", tmp_path / "r.toml", option, name)
+    assert f"{option} {name}: unknown here; there are " in said
+
+
+def test_a_misspelt_location_of_the_books_is_named_with_its_line(counted: Path, tmp_path: Path) -> None:
+    books = tmp_path / "books.csv"
+    books.write_text("location,code\nA-01,PALLET-1\nA-O2,PALLET-2\nA-O2,PALLET-3\n")
+    told = RUNNER.invoke(app, ["inventory", "compare", str(counted), str(books), "--json"])
+    assert told.exit_code == 0
+    assert json.loads(told.stdout)["unknown_locations"] == [{"location": "A-O2", "line": 3}]
+    assert f"{books}: line 3: A-O2: {counted} knows no such location" in told.stderr
+    assert "line 4" not in told.stderr
+    assert "A-01" not in told.stderr

@@ -1,4 +1,4 @@
-"""A store of somebody else, or on a medium that nobody can write: it can be shown and exported all the same."""
+"""A store of somebody else, or on a medium that nobody can write, can be shown and exported all the same."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from click.testing import Result
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.adapters.store.sqlite import SqliteStore
