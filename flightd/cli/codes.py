@@ -26,7 +26,7 @@ def codes(
 ) -> None:
     """Read the QR codes and barcodes in pictures.
 
-    Every symbology; GS1 element strings come with their parts.  A text is told only when the code's own
+    Every symbology; GS1 codes and Digital Links come with their parts.  A text is told only when the code's own
     checksum vouches for it or two ways of looking at the picture agree; the rest is counted as doubtful.
 
     \b

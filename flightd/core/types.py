@@ -185,8 +185,8 @@ class CodeRead:
     that comes from an inventory.  `sure` says that the code's error correction or checksum vouches for the
     text; `agreeing` counts the ways of looking at the picture that gave this text; `quality` is 1 for a code
     read from the picture as it is and falls towards 0 with every alteration it took.  `gs1` are the
-    (application identifier, value) pairs of a GS1 code whose check digits hold, and `gs1_problem` says what
-    is wrong with one that is none.
+    (application identifier, value) pairs of a GS1 code or GS1 Digital Link whose check digits hold, and
+    `gs1_problem` says what is wrong with one that is none.
     """
 
     symbology: str

@@ -9,6 +9,7 @@ import os
 import shutil
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -161,27 +162,113 @@ def test_what_is_exported_as_expected_stock_matches_itself(counted: Path, tmp_pa
     assert "=HYPERLINK(1)" in texts
 
 
-def test_epcis_counts_with_gs1_uris(counted: Path, tmp_path: Path) -> None:
-    out = tmp_path / "stock.jsonld"
-    run("export", counted, "--out", out)
+def epcis(store: Path, out: Path, *options: str) -> dict[str, dict[str, Any]]:
+    """The events by the location, as its record and not the event calls it."""
+    run("export", store, "--out", out, *options)
     document = json.loads(out.read_text())
     assert (document["type"], document["schemaVersion"]) == ("EPCISDocument", "2.0")
-    events = {event["readPoint"]["id"]: event for event in document["epcisBody"]["eventList"]}
-    assert sorted(events) == [f"urn:x-flightd:location:A-0{n}" for n in range(1, 5)]
-    assert {(e["type"], e["action"], e["bizStep"]) for e in events.values()} == {
-        ("ObjectEvent", "OBSERVE", "cycle_counting")
-    }
-    assert len({event["eventID"] for event in events.values()}) == 4
-    told = [
-        (event.get("epcList"), [q["epcClass"] for q in event.get("quantityList", [])])
-        for _, event in sorted(events.items())
+    events = document["epcisBody"]["eventList"]
+    assert len({event["eventID"] for event in events}) == len(events)
+    for event in events:
+        assert (event["type"], event["action"], event["bizStep"]) == (
+            "ObjectEvent", "OBSERVE", "cycle_counting",
+        )  # fmt: skip
+        assert event["readPoint"] == event["bizLocation"]
+        # as the standard's schema has it: objects, or a sensor's word of the read point
+        assert event.keys() & {"epcList", "quantityList", "sensorElementList"}
+        assert all(event.get(key) != [] for key in ("epcList", "quantityList", "sensorElementList"))
+    with SqliteStore(store) as opened:
+        looked = [record.code for record in opened.locations() if record.observation]
+    return dict(zip(looked, events, strict=True))
+
+
+def named(event: dict[str, Any]) -> tuple[list[str], list[str]]:
+    """The things and the classes that an event names."""
+    return event.get("epcList", []), [element["epcClass"] for element in event.get("quantityList", [])]
+
+
+def test_epcis_counts_with_gs1_uris(counted: Path, tmp_path: Path) -> None:
+    events = epcis(counted, tmp_path / "stock.jsonld")
+    assert [event["readPoint"]["id"] for event in events.values()] == [
+        f"urn:x-flightd:location:A-0{n}" for n in range(1, 7)
     ]
-    assert told == [
+    assert [named(events[f"A-0{n}"]) for n in range(1, 5)] == [
         (["urn:x-flightd:code:%3DHYPERLINK%281%29"], []),
-        (None, ["https://id.gs1.org/01/09501101530003/10/B%2F1"]),
+        ([], ["https://id.gs1.org/01/09501101530003/10/B%2F1"]),
         (["https://id.gs1.org/01/09501101530003/21/S%201"], []),
         (["https://id.gs1.org/00/395011010013000129"], ["https://id.gs1.org/01/00036602301467"]),
     ]
+
+
+def test_epcis_tells_of_places_without_a_code_too_and_of_none_that_was_not_seen(
+    counted: Path, tmp_path: Path
+) -> None:
+    events = epcis(counted, tmp_path / "stock.jsonld")
+    assert [events[code].get("sensorElementList") for code in ("A-01", "A-05", "A-06")] == [
+        None,
+        [{"sensorReport": [{"type": "urn:x-flightd:location_state", "stringValue": "empty"}]}],
+        [{"sensorReport": [{"type": "urn:x-flightd:location_state", "stringValue": "occluded"}]}],
+    ]
+    assert "A-07" not in events
+
+
+GLN = "9501101530003"
+
+
+def test_epcis_names_locations_by_their_gln(tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    with SqliteStore(store) as opened:
+        opened.commit(look("A-01", 1, code("PALLET")))
+        opened.commit(
+            look("A-02", 2, code("PALLET 2"), code(f"414{GLN}254B", "Data Matrix", a414=GLN, a254="B"))
+        )
+        opened.commit(look(f"(414){GLN}(254)A/3", 3, state="empty"))
+        opened.commit(look(f"https://example.com/414/{GLN}", 4, state="empty"))
+    at = {code: event["readPoint"]["id"] for code, event in epcis(store, tmp_path / "a.jsonld").items()}
+    assert at == {
+        "A-01": "urn:x-flightd:location:A-01",
+        "A-02": f"https://id.gs1.org/414/{GLN}/254/B",
+        f"(414){GLN}(254)A/3": f"https://id.gs1.org/414/{GLN}/254/A%2F3",
+        f"https://example.com/414/{GLN}": f"https://id.gs1.org/414/{GLN}",
+    }
+    events = epcis(store, tmp_path / "b.jsonld", "--gln", GLN)
+    assert events["A-01"]["readPoint"]["id"] == f"https://id.gs1.org/414/{GLN}/254/A-01"
+    assert named(events["A-02"]) == (["urn:x-flightd:code:PALLET%202"], [])
+
+
+def test_epcis_takes_the_key_out_of_a_digital_link(tmp_path: Path) -> None:
+    store, gtin = tmp_path / "store", "09501101530003"
+    links = {
+        "A": f"https://shop.example/x/01/{gtin}/10/B1/21/S1",
+        "B": f"https://shop.example/01/{gtin}",
+        "C": f"https://shop.example/8003/{gtin}",
+        "D": f"https://shop.example/8003/{gtin}9",
+        "E": "https://shop.example/01/09501101530004",
+    }
+    with SqliteStore(store) as opened:
+        for number, (place, text) in enumerate(links.items()):
+            opened.commit(look(place, number, code(text)))
+    events = epcis(store, tmp_path / "stock.jsonld")
+    assert [named(event) for event in events.values()] == [
+        ([f"https://id.gs1.org/01/{gtin}/21/S1"], []),
+        ([], [f"https://id.gs1.org/01/{gtin}"]),
+        ([], [f"https://id.gs1.org/8003/{gtin}"]),
+        ([f"https://id.gs1.org/8003/{gtin}9"], []),
+        (["urn:x-flightd:code:https%3A%2F%2Fshop.example%2F01%2F09501101530004"], []),
+    ]
+
+
+def test_a_gln_that_is_none_is_refused(counted: Path, tmp_path: Path) -> None:
+    out = tmp_path / "stock.jsonld"
+    assert "the check digit of 9501101530004 does not hold" in error_of(
+        "export", counted, "--out", out, "--gln", "9501101530004"
+    )
+    assert "only EPCIS has it" in error_of("export", counted, "--out", tmp_path / "s.csv", "--gln", GLN)
+    with SqliteStore(counted) as store:
+        store.commit(look("a location with a long name", 1, state="empty"))
+    assert "location a location with a long name cannot be a place" in error_of(
+        "export", counted, "--out", out, "--gln", GLN
+    )
 
 
 def test_the_comparison_names_differences_and_makes_a_mission_that_loads(
