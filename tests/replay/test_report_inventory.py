@@ -76,7 +76,7 @@ class Cells(HTMLParser):
         given = {name: value or "" for name, value in attrs}
         self.open.append(tag)
         self.loaded += [value for name, value in given.items() if name in {"src", "href"}]
-        if tag == "button":
+        if tag == "button" and "cell" in given.get("class", "").split():
             self.places.append((given["data-code"], set(given["class"].split()), given["title"]))
 
     def handle_endtag(self, tag: str) -> None:
@@ -257,7 +257,8 @@ def data_of(section: str, name: str) -> dict[str, object]:
 
 
 def test_a_click_shows_the_evidence_picture(section: str, count: CountedStock) -> None:
-    looks, pictures = data_of(section, "counted"), data_of(section, "pictures")
+    looks, pictures = data_of(section, "counted")["places"], data_of(section, "pictures")
+    assert isinstance(looks, dict)
     assert set(looks) == {record.code for record in count.records}
     for record in count.records:
         look = looks[record.code]

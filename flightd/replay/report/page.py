@@ -109,9 +109,12 @@ def _tile(figure: Figure) -> str:
         "div",
         element("dt", text(figure.label)),
         element(
-            "dd", element("b", text(figure.value)), element("span", text(figure.unit)) if figure.unit else ""
+            "dd",
+            element("b", text(figure.value)),
+            element("span", text(figure.unit)) if figure.unit else "",
+            class_="value",
         ),
-        element("p", text(figure.note)) if figure.note else "",
+        element("dd", text(figure.note), class_="about") if figure.note else "",
         class_=f"tile {figure.tone}".strip(),
     )
 

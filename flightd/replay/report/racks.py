@@ -123,6 +123,7 @@ def cell(record: LocationRecord, outcome: str) -> str:
     return element(
         "button",
         class_=f"cell {record.state.value}" + (" differs" if outcome else ""),
+        type="button",
         title=" · ".join(parts),
         data_code=record.code,
     )
