@@ -1,4 +1,4 @@
-"""The report in a real browser: read by everybody, reached by key, filtered, taken along without a network."""
+"""The report in a real browser: read by everybody, reached by key, filtered and taken along off-line."""
 
 from __future__ import annotations
 
