@@ -19,7 +19,7 @@ from flightd.cli.main import app
 from flightd.core.errors import InputError
 from flightd.core.flight_order import FlightOrder
 from flightd.core.inventory import LocationRecord, LocationState, Observation
-from flightd.core.topics import Topic
+from flightd.core.topics import Document, Topic
 from flightd.core.types import CodeRead
 from flightd.inventory.comparison import ComparisonOutcome
 from flightd.replay.report.figures import Figure
@@ -217,6 +217,25 @@ def test_the_flight_that_a_log_orders_is_the_one_that_its_report_judges(tmp_path
     assert re.search(rf"of {wanted} locations looked at; {len(site.locations) - wanted} at other nodes", page)
     assert "Kestrel" in page
     assert RUN in page
+
+
+@pytest.mark.parametrize(
+    ("config", "nodes"),
+    [
+        ('[mission]\nnodes = ["A2", "B2"]\n', {"A2", "B2"}),
+        ('{"mission": {"nodes": ["A2"]}}', {"A2"}),
+        ("[mission]\n", set()),
+        ("no table at all", set()),
+        ('{"mission": [1]}', set()),
+    ],
+)
+def test_an_older_log_orders_what_its_configuration_does(
+    tmp_path: Path, config: str, nodes: set[str]
+) -> None:
+    log = tmp_path / "flight.mcap"
+    with McapRecorder(log) as recorder:
+        recorder.record(Topic.CONFIG, 1, Document(config))
+    assert load_flight(log).nodes == nodes
 
 
 def test_a_location_that_only_the_books_know_is_named_with_its_line(folder: Path, tmp_path: Path) -> None:

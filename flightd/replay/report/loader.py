@@ -120,8 +120,9 @@ def _ordered_nodes(log: FlightLog) -> frozenset[str]:
         with suppress(ValueError):  # a configuration that cannot be read orders nothing
             is_json = document.text.lstrip().startswith("{")
             table = json.loads(document.text) if is_json else tomllib.loads(document.text)
-            nodes = table.get("mission", {}).get("nodes", ())
-            return frozenset(map(str, nodes))
+            mission = table.get("mission") if isinstance(table, dict) else None
+            nodes = mission.get("nodes") if isinstance(mission, dict) else None
+            return frozenset(map(str, nodes)) if isinstance(nodes, list) else frozenset()
     return frozenset()
 
 
