@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from flightd.adapters.store.evidence import EvidenceFolder
+from flightd.adapters.store.evidence_pictures import EvidenceFolder
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
 

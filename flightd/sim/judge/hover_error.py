@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from flightd.core.types import AT_STOP, Event, Phase, Status
-from flightd.sim.judge.evidence import FlightEvidence
+from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.site.site import Site
 
 _Place: TypeAlias = tuple[float, float]
