@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import platform
 import signal
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 from flightd.adapters.recorder.archive import FlightArchive
@@ -20,6 +20,7 @@ from flightd.app.absent_parts import NO_GROUND, NO_RECORDER
 from flightd.app.build import build, detector_pool, ground_link
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
+from flightd.app.flight_identity import FlightIdentity
 from flightd.app.flight_orders import configured_order, going_on, resumed
 from flightd.app.recording import FlightSetting, record_setting
 from flightd.config.schema import Config
@@ -96,13 +97,15 @@ async def run_until_signal(run: Run, observer: Callable[[Snapshot], None]) -> Fl
 async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
     config, site, clock = run.setting.config, run.setting.site, LoopClock()
     watchers = service.monitors(config.metrics, os.environ, journal=run.journal)
+    identity = FlightIdentity.of(run.setting, platform.node(), clock.now_ns())
     async with watchers as monitors, AsyncExitStack() as stack:
-        count = FlightCount(config, site, config.inventory.folder, stack, in_air=run.started_anew)
+        folder, anew = config.inventory.folder, run.started_anew
+        count = FlightCount(config, site, folder, stack, run=identity.run, in_air=anew)
         pool = stack.enter_context(detector_pool(config, site, clock))
         archive = _archive(config)
         recorder: Recorder = NO_RECORDER
         if archive is not None:
-            recorder = stack.enter_context(_recorder(run.setting, archive, clock.now_ns()))
+            recorder = stack.enter_context(_recorder(run.setting, archive, identity))
         counting = await count.begun(clock)
         link = ground_link(config.ground, site, clock, counting)
         ground = NO_GROUND if link is None else stack.enter_context(link)
@@ -173,10 +176,8 @@ def _archive(config: Config) -> FlightArchive | None:
     return FlightArchive(settings.folder, round(settings.quota_gb * 1e9), round(settings.reserve_gb * 1e9))
 
 
-def _recorder(setting: FlightSetting, archive: FlightArchive, now_ns: int) -> McapRecorder:
+def _recorder(setting: FlightSetting, archive: FlightArchive, identity: FlightIdentity) -> McapRecorder:
     """The recorder of this flight, with what it is flown by."""
-    started = datetime.now(UTC)
-    metadata = {"started": f"{started:%Y-%m-%d %H:%M:%S} UTC", "vehicle": setting.config.vehicle.kind}
-    recorder = McapRecorder(archive.begin(started), metadata=metadata)
-    record_setting(recorder, now_ns, setting)
+    recorder = McapRecorder(archive.begin(identity.started), metadata=identity.metadata())
+    record_setting(recorder, identity.clock_ns, setting)
     return recorder

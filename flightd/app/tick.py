@@ -108,5 +108,6 @@ class Tick:
             possible=call("mission", lambda: pilot.possible_commands, frozenset()),
             failure=pilot.failure,
             height_goal_m=call("mission", lambda: pilot.mission.height_goal_m, 0.0),
+            view_m=call("mission", lambda: pilot.mission.view_m, None),
             outlook=call("mission", lambda: pilot.mission.outlook(tick.now_ns), NO_OUTLOOK),
         )

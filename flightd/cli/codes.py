@@ -26,8 +26,8 @@ def codes(
 ) -> None:
     """Read the QR codes and barcodes in pictures.
 
-    Every symbology; GS1 element strings come with their parts.  A text is told only when the code's own
-    checksum vouches for it or two ways of looking at the picture agree; the rest is counted as doubtful.
+    Every symbology; GS1 codes and Digital Links come with their parts.  A text is told only when the code's
+    own checksum vouches for it or two ways of looking at the picture agree; the rest is counted as doubtful.
 
     \b
     F: {"codes": [{"file": "a.jpg", "text": "9780804816632"}]}

@@ -18,6 +18,11 @@ class VehicleConfig(Section):
 
     files: ClassVar = ("signing_key", "signing_stamp")
 
+    name: str = Field(
+        "",
+        max_length=80,
+        description="the drone's name in flight logs and reports; empty: this computer's name",
+    )
     kind: Literal["ardupilot", "px4", "ardrone", "mavsdk"] = Field(
         "ardupilot", description="which adapter flies"
     )

@@ -26,7 +26,8 @@ class Snapshot:
     `dropped` what a full queue or a lost worker cost, `restarts` what died and was brought back, each by the
     part's name; `repeated_level` the setpoints that went out because no tick made one.  `possible` are the
     operator's commands that the mission takes now, `failure` what the step raised, if anything.
-    `height_goal_m` is the commanded height above the floor, `outlook` what the mission expects.
+    `height_goal_m` is the commanded height above the floor, `view_m` the place on the map from which a shelf
+    is to be looked at (None: it does not scan), `outlook` what the mission expects.
     """
 
     tick: TickInput
@@ -45,6 +46,7 @@ class Snapshot:
     possible: frozenset[CommandKind] = frozenset()
     failure: StepFailure | None = None
     height_goal_m: float = 0.0
+    view_m: tuple[float, float] | None = None
     outlook: Outlook = NO_OUTLOOK
 
     @property
@@ -119,4 +121,6 @@ class Snapshot:
             latency_ms=dict(self.latency_ms),
             height_goal_m=self.height_goal_m,
             sensors=self.sensors,
+            view_x_m=self.view_m[0] if self.view_m else None,
+            view_y_m=self.view_m[1] if self.view_m else None,
         )

@@ -185,8 +185,8 @@ class CodeRead:
     that comes from an inventory.  `sure` says that the code's error correction or checksum vouches for the
     text; `agreeing` counts the ways of looking at the picture that gave this text; `quality` is 1 for a code
     read from the picture as it is and falls towards 0 with every alteration it took.  `gs1` are the
-    (application identifier, value) pairs of a GS1 code whose check digits hold, and `gs1_problem` says what
-    is wrong with one that is none.
+    (application identifier, value) pairs of a GS1 code or GS1 Digital Link whose check digits hold, and
+    `gs1_problem` says what is wrong with one that is none.
     """
 
     symbology: str
@@ -394,7 +394,7 @@ OVER = frozenset({Phase.DONE, Phase.ABORTED, Phase.PILOT})
 WAITING = frozenset({Phase.PREFLIGHT, Phase.SWAP})
 """On the floor before a flight."""
 AT_STOP = frozenset({Phase.HOVER, Phase.CLIMB, Phase.SCAN})
-"""At a node that is visited: a scan's views are all straight above it."""
+"""At a node that is visited: over it, or beside it where a scan looks again from nearer or from aside."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -404,7 +404,8 @@ class Status:
     `latency_ms` are the newest frame's stages: capture, transport, detection, track (each from its
     predecessor), and total (mid-exposure to setpoint on the wire).  `height_goal_m` is the commanded height
     above the floor, None in logs that do not tell it; `sensors` what the lines say of the drone's own sensors
-    (`core.tracks.SensorEstimate`).
+    (`core.tracks.SensorEstimate`); `view_x_m`, `view_y_m` the place on the map from which a shelf is looked
+    at, None (or NaN) where none is and in logs that do not tell it.
     """
 
     stamp_ns: int
@@ -422,3 +423,5 @@ class Status:
     latency_ms: dict[str, float]
     height_goal_m: float | None = None
     sensors: SensorEstimate = NOT_SEEN
+    view_x_m: float | None = None
+    view_y_m: float | None = None

@@ -4,39 +4,121 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flightd.config.schema import load_table, parse_config
+from flightd.config.schema import Config, load_table, parse_config
 from flightd.core.errors import InputError, cannot_write
 from flightd.core.inventory import LocationRecord
+from flightd.site.site import Site
+from flightd.site.site_file import load_site, site_toml
+
+_LONGEST_RUN = 80
+
+
+@dataclass(frozen=True, slots=True)
+class RecountModel:
+    """What the re-count is flown like: a configuration as a table of TOML, and its site.  `file` is where it
+    was read, None where its paths are absolute."""
+
+    table: dict[str, Any]
+    site: Site
+    file: Path | None = None
+
+
+def model_of_file(config: Path) -> RecountModel:
+    """Like the flights of a configuration file.  InputError for one that is none."""
+    table = load_table(config)
+    return RecountModel(table, load_site(parse_config(table, config).mission.site), config)
+
+
+def model_of_flight(config: Config, site: Site) -> RecountModel:
+    """Like a flight that was flown: only what it has otherwise than by default."""
+    return RecountModel(config.model_dump(mode="json", exclude_defaults=True, exclude_none=True), site)
+
+
+@dataclass(frozen=True, slots=True)
+class RecountMission:
+    """What was written: its nodes in order, and the doubtful locations whose node nobody knows."""
+
+    nodes: tuple[str, ...]
+    without_node: tuple[str, ...]
 
 
 def write_recount(
-    out: Path, config: Path, doubtful: Mapping[str, str], records: Sequence[LocationRecord]
-) -> list[str]:
-    """Write a configuration like `config` whose mission visits the nodes of the doubtful locations.
+    out: Path, model: RecountModel, doubtful: Mapping[str, str], records: Sequence[LocationRecord]
+) -> RecountMission:
+    """Write a configuration like `model` whose mission visits the nodes of the doubtful locations; where its
+    site is not in the file that it names any more, a site file beside `out`.
 
-    Returns the doubtful locations whose node nobody knows.  Raises InputError when there is nothing to
-    fly to, or `out` does not stand beside `config` (paths in it are taken from there).
+    Raises InputError when there is nothing to fly to, or `out` does not stand beside the model's file
+    (paths in it are taken from there).
     """
-    table = load_table(config)
-    parse_config(table, config)
-    if out.resolve().parent != config.resolve().parent or out.resolve() == config.resolve():
-        raise InputError(f"must be a new file beside {config}: paths in it are taken from there", file=out)
+    if model.file is not None and (
+        out.resolve().parent != model.file.resolve().parent or out.resolve() == model.file.resolve()
+    ):
+        raise InputError(
+            f"must be a new file beside {model.file}: paths in it are taken from there", file=out
+        )
     node_of = {record.code: record.node for record in records}
-    nodes = list(dict.fromkeys(node for code in doubtful if (node := node_of.get(code, ""))))
-    without = [code for code in doubtful if not node_of.get(code)]
+    nodes = tuple(dict.fromkeys(node for code in doubtful if (node := node_of.get(code, ""))))
+    without = tuple(code for code in doubtful if not node_of.get(code))
     if not nodes:
         raise InputError("nothing to fly to: no doubtful location has a node", file=out)
-    table.setdefault("mission", {})["nodes"] = nodes
+    if strange := [node for node in nodes if node not in model.site.nodes]:
+        raise InputError(
+            f"site {model.site.name} has no node {strange[0]}",
+            file=out,
+            remedy="give the configuration of the site that was counted",
+        )
+    table = _mission_over(nodes, model.table, records)
     heading = [f"# Counts {len(doubtful) - len(without)} doubtful locations again:"]
     heading += [f"# {json.dumps(code)}: {why}" for code, why in doubtful.items() if code not in without]
     try:
+        if model.file is None and not _holds(Path(table["mission"]["site"]), model.site):
+            site_file = out.with_name(f"{out.stem}-site.toml")
+            site_file.write_text(site_toml(model.site), encoding="utf-8")
+            table["mission"]["site"] = site_file.name
         out.write_text("\n".join(heading) + "\n\n" + _toml(table), encoding="utf-8")
     except OSError as err:
         raise cannot_write(out, err) from None
-    return without
+    return RecountMission(nodes, without)
+
+
+def _mission_over(
+    nodes: Sequence[str], table: Mapping[str, Any], records: Sequence[LocationRecord]
+) -> dict[str, Any]:
+    """The table with these nodes, as a count of its own: one that goes on would pass over what is counted,
+    and one that resumes would fly what was left over."""
+    mission = {**table.get("mission", {}), "nodes": list(nodes)}
+    if mission.get("resume"):
+        mission["resume"] = False
+    made = {**table, "mission": mission}
+    run = table.get("inventory", {}).get("run", "")
+    if run:
+        taken = {record.observation.run for record in records if record.observation}
+        made["inventory"] = {**table["inventory"], "run": _new_run(run, taken)}
+    return made
+
+
+def _new_run(run: str, taken: set[str]) -> str:
+    """A name for another count after `run`."""
+    number = 1
+    while True:
+        tail = " recount" if number == 1 else f" recount {number}"
+        name = run[: _LONGEST_RUN - len(tail)] + tail
+        if name not in taken:
+            return name
+        number += 1
+
+
+def _holds(file: Path, site: Site) -> bool:
+    """Whether the file holds this site still."""
+    try:
+        return site_toml(load_site(file)) == site_toml(site)
+    except InputError:
+        return False
 
 
 def _toml(table: Mapping[str, Any], name: str = "") -> str:

@@ -121,6 +121,12 @@ class Mission:
         return self._steering.height_goal_m if self.airborne else 0.0
 
     @property
+    def view_m(self) -> tuple[float, float] | None:
+        """Where on the map it looks at a shelf from, or flies to for that; None while it does not scan."""
+        view = self._scan.view(self.phase)
+        return None if view is None else (view.x_m, view.y_m)
+
+    @property
     def stand(self) -> tuple[str, float]:
         """The node on which the drone stands before it flies, and its heading there."""
         return self._route.stand

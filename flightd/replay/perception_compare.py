@@ -47,11 +47,24 @@ class PerceptionDrift:
     theta_p95_deg: float
     theta_max_deg: float
 
+    @property
+    def may_tip(self) -> int:
+        """How many lines may come or go without anything having changed."""
+        tipped = _CHANGED * max(self.pairs, 1)
+        return math.floor(tipped + _CHANCE_SIGMAS * math.sqrt(tipped))
+
     def within(self, tolerance_px: float) -> bool:
         """Whether lines moved by no more than `tolerance_px` (95 of 100) and hardly any came or went."""
-        tipped = _CHANGED * max(self.pairs, 1)
-        most = tipped + _CHANCE_SIGMAS * math.sqrt(tipped)
-        return self.gone + self.new <= most and self.rho_p95_px <= tolerance_px
+        return not self.complaint(tolerance_px)
+
+    def complaint(self, tolerance_px: float) -> str:
+        """What is seen differently, with the figure that says so and the one allowed; empty for nothing."""
+        found = []
+        if self.rho_p95_px > tolerance_px:
+            found.append(f"95 % of the lines within {self.rho_p95_px:.3f} px, {tolerance_px:g} allowed")
+        if self.gone + self.new > self.may_tip:
+            found.append(f"{self.gone + self.new} lines gone or new, {self.may_tip} allowed")
+        return "; ".join(found)
 
 
 def replay_pictures(path: Path, detect: Detect) -> PerceptionDrift:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Collection
 from pathlib import Path
 
-from flightd.adapters.store.sqlite import SqliteStore
+from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.core.errors import InputError, UnavailableError
 from flightd.inventory.comparison import compare_stock
-from flightd.inventory.expected_stock import read_stock
+from flightd.inventory.expected_stock import read_stock, unknown_locations
 from flightd.replay.report.stock import CountedStock
 
 
@@ -24,7 +25,7 @@ def counted_beside(
     if not asked and not (folder / "inventory.db").exists():
         return None
     try:
-        with SqliteStore(folder, create=False) as store:
+        with opened_for_reading(folder) as store:
             records, evidence = store.locations(), store.evidence
     except (InputError, UnavailableError) as err:
         if asked:
@@ -39,4 +40,13 @@ def counted_beside(
         except (OSError, ValueError):
             return None
 
-    return CountedStock(records, picture, differences)
+    known = {record.code for record in records}
+    return CountedStock(records, picture, differences, unknown=_unknown(expected, known))
+
+
+def _unknown(expected: Path | None, known: Collection[str]) -> list[str]:
+    """The locations of the books that the count does not know, each with its line."""
+    if expected is None:
+        return []
+    places = unknown_locations(expected, known)
+    return [f"{place.location} ({expected.name}, line {place.line})" for place in places]

@@ -2,15 +2,19 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
-from flightd.app.build import pilot_of
+from flightd.app.build import detector_of, pilot_of
 from flightd.config.schema import Config, load_config
 from flightd.core.errors import InputError
 from flightd.core.tick import TickInput, TickOutput
@@ -21,6 +25,7 @@ from flightd.replay.log import read_log
 from flightd.site.site import Site
 from flightd.site.site_file import load_site, site_toml
 from tests.command import Command
+from tests.replay.synthetic_flight import picture, seen_lines
 from tests.sim.ideal.ideal_flight import IdealFlight
 
 ROOT = Path(__file__).parents[2]
@@ -144,6 +149,33 @@ def test_the_command_tells_the_drift_of_another_configuration(
     assert "setpoint.pitch_rad" in result.stdout
     assert len(result.stderr.splitlines()) == 1
     assert "decisions drift" in result.stderr
+
+
+def test_exit_code_line_and_complaint_judge_the_pictures_by_the_same_figures(
+    flightd: Command, log: Path, tmp_path: Path
+) -> None:
+    """Every line was recorded a pixel beside where it is seen now."""
+    path, rng, detector = tmp_path / "flight.mcap", np.random.default_rng(3), detector_of(*_setting())()
+    with McapRecorder(path, when_full=wait_for_disk) as recorder:
+        for entry in read_log(log).entries:
+            recorder.record(entry.topic, entry.stamp_ns, entry.message)
+        for seq in range(1, 6):
+            jpeg = picture(seen_lines(seq, seq, 0.0, rng), rng)
+            frame = np.asarray(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR), np.uint8)
+            seen = detector.detect(frame, seq, seq)
+            beside = tuple(replace(line, rho_px=line.rho_px + 1.0) for line in seen.lines)
+            recorder.record(Topic.LINES, seq, replace(seen, lines=beside))
+            recorder.image(Topic.FRAME, seq, seq, jpeg)
+    strict, loose = flightd("replay", path), flightd("replay", path, "--pixels", "1.5")
+    assert (strict.returncode, loose.returncode) == (1, 0)
+    figure = re.search(r"95 % of \d+ lines within (\d\.\d+) px \(0\.5 allowed\)", strict.stdout)
+    assert figure is not None, strict.stdout
+    assert f"95 % of the lines within {figure[1]} px, 0.5 allowed" in strict.stderr
+    assert "(1.5 allowed)" in loose.stdout
+    assert "0 gone and 0 new" in loose.stdout
+    told = json.loads(flightd("replay", path, "--json").stdout)
+    assert (told["passed"], told["identical"]) == (False, True)
+    assert f"({told['pictures']['may_tip']} together allowed)" in strict.stdout
 
 
 def test_a_log_without_its_map_is_one_line_and_exit_2(flightd: Command, tmp_path: Path, log: Path) -> None:

@@ -107,4 +107,9 @@ def test_a_picture_without_recorded_lines_is_passed_over(log: Path, tmp_path: Pa
 def test_lines_at_the_edge_of_being_seen_may_tip_over_as_often_as_chance_has_it(
     pairs: int, new: int, gone: int, same: bool
 ) -> None:
-    assert PerceptionDrift(pairs, pairs, gone, new, 0.1, 5.0, 0.1, 1.0).within(0.5) is same
+    drift = PerceptionDrift(pairs, pairs, gone, new, 0.1, 5.0, 0.1, 1.0)
+    assert drift.within(0.5) is same
+    assert (gone + new <= drift.may_tip) is same
+    assert drift.complaint(0.5) == (
+        "" if same else f"{gone + new} lines gone or new, {drift.may_tip} allowed"
+    )

@@ -14,18 +14,23 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.cli.main import app
 from flightd.core.errors import InputError
+from flightd.core.flight_order import FlightOrder
 from flightd.core.inventory import LocationRecord, LocationState, Observation
+from flightd.core.topics import Document, Topic
+from flightd.core.types import CodeRead
 from flightd.inventory.comparison import ComparisonOutcome
+from flightd.replay.report.figures import Figure
 from flightd.replay.report.loader import load_flight
 from flightd.replay.report.page import render
 from flightd.replay.report.racks import racks_section
-from flightd.replay.report.stock import CountedStock, count_figures, percent
+from flightd.replay.report.stock import WHOLE, CountedStock, CountTask, count_figures, percent, share
 from flightd.replay.report.stocktaking import inventory_section
 from flightd.site.site import Side, Site
 from flightd.studies.counted_stock import counted_beside
-from tests.replay.synthetic_count import site_with_racks, state_of, write_count, write_stock
+from tests.replay.synthetic_count import RUN, site_with_racks, state_of, write_count, write_stock
 from tests.replay.synthetic_flight import SITE_TOML, write_flight
 
 
@@ -71,7 +76,7 @@ class Cells(HTMLParser):
         given = {name: value or "" for name, value in attrs}
         self.open.append(tag)
         self.loaded += [value for name, value in given.items() if name in {"src", "href"}]
-        if tag == "button":
+        if tag == "button" and "cell" in given.get("class", "").split():
             self.places.append((given["data-code"], set(given["class"].split()), given["title"]))
 
     def handle_endtag(self, tag: str) -> None:
@@ -143,13 +148,116 @@ def test_figures_say_what_was_counted(count: CountedStock, site: Site) -> None:
     figures = {figure.label: figure for figure in count_figures(count, 1800.0)}
     states = Counter(state_of(number) for number in range(len(site.locations)))
     looked = len(site.locations) - states[LocationState.NOT_VISITED]
-    read = states[LocationState.READ] + states[LocationState.SEVERAL]
     assert figures["Coverage"].note == f"{looked} of {len(site.locations)} locations looked at"
     assert figures["Coverage"].tone == "bad"
-    assert figures["Read rate"].note == f"{read} of {read + states[LocationState.UNREADABLE]} labels seen"
+    hidden = states[LocationState.UNREADABLE] + states[LocationState.OCCLUDED]
+    assert figures["Places settled"].note.startswith(f"{looked - hidden} of {looked} places, ")
+    lines = [line for line in count.differences or () if line.location in {r.code for r in count.records}]
+    read = sum(line.outcome in {ComparisonOutcome.MATCH, ComparisonOutcome.MOVED} for line in lines)
+    assert figures["Read rate"].note == f"{read} of {read + hidden} labels of the books"
     assert figures["Pace"].value == f"{2 * looked:,}"
     assert 80.0 < float(figures["Confidence"].value) < 99.0
     assert figures["Differences"].tone == "bad"
+
+
+def record(code: str, node: str, state: LocationState | None, run: str = "now") -> LocationRecord:
+    if state is None:
+        return LocationRecord(code, node, None)
+    reads = (CodeRead("QR Code", code, (), True, 2, 1.0),) if state is LocationState.READ else ()
+    return LocationRecord(code, node, Observation(run, code, 1, state, 0.998, reads))
+
+
+def figures_of(records: list[LocationRecord], task: CountTask = WHOLE) -> dict[str, Figure]:
+    return {figure.label: figure for figure in count_figures(CountedStock(records, task=task), None)}
+
+
+def test_places_without_a_readable_label_are_not_called_labels_that_were_missed() -> None:
+    """18 labels read of 18, and four places in doubt: nothing says that those have a label."""
+    read = [record(f"R{i}", "A1", LocationState.READ) for i in range(18)]
+    doubt = [record(f"U{i}", "A1", LocationState.UNREADABLE) for i in range(4)]
+    figures = figures_of([*read, *doubt])
+    assert "Read rate" not in figures
+    assert (figures["Places settled"].value, figures["Places settled"].tone) == ("81.8", "")
+    assert figures["Places settled"].note == "18 of 22 places, 4 unreadable"
+
+
+def test_coverage_is_of_the_nodes_that_were_asked_for() -> None:
+    asked = [record(f"A{i}", "A2", LocationState.READ) for i in range(6)]
+    others = [record(f"B{i}", "B2", None) for i in range(34)]
+    count = CountedStock([*asked, *others], task=CountTask(frozenset({"A2"}), "now"))
+    figure = {figure.label: figure for figure in count_figures(count, None)}["Coverage"]
+    assert (figure.value, figure.tone) == ("100", "good")
+    assert figure.note == "6 of 6 locations looked at; 34 at other nodes"
+    section = inventory_section(count, None)
+    assert "None: every location was counted" in section
+    assert "34 locations not visited are at nodes that this flight was not to count" in section
+    assert figures_of([*asked, *others])["Coverage"].tone == "bad"
+
+
+def test_what_an_earlier_count_saw_is_no_coverage_of_this_one() -> None:
+    records = [
+        record("A", "A1", LocationState.READ, "monday"),
+        record("B", "A1", LocationState.READ, "tuesday"),
+    ]
+    figure = figures_of(records, CountTask(run="tuesday"))["Coverage"]
+    assert (figure.value, figure.tone) == ("50", "bad")
+    assert figure.note == "1 of 2 locations looked at, 1 known from other counts"
+
+
+def test_the_flight_that_a_log_orders_is_the_one_that_its_report_judges(tmp_path: Path, site: Site) -> None:
+    log = tmp_path / "flight.mcap"
+    chosen = next(iter(site.locations.values())).node
+    with McapRecorder(log, metadata={"run": RUN, "drone": "Kestrel"}) as recorder:
+        recorder.record(Topic.ORDER, 1, FlightOrder(nodes=(chosen,)))
+    write_count(tmp_path, site)
+    flight = load_flight(log)
+    page = render(flight, counted_beside(log))
+    wanted = sum(place.node == chosen for place in site.locations.values())
+    assert flight.nodes == {chosen}
+    assert re.search(rf"of {wanted} locations looked at; {len(site.locations) - wanted} at other nodes", page)
+    assert "Kestrel" in page
+    assert RUN in page
+
+
+@pytest.mark.parametrize(
+    ("config", "nodes"),
+    [
+        ('[mission]\nnodes = ["A2", "B2"]\n', {"A2", "B2"}),
+        ('{"mission": {"nodes": ["A2"]}}', {"A2"}),
+        ("[mission]\n", set()),
+        ("no table at all", set()),
+        ('{"mission": [1]}', set()),
+    ],
+)
+def test_an_older_log_orders_what_its_configuration_does(
+    tmp_path: Path, config: str, nodes: set[str]
+) -> None:
+    log = tmp_path / "flight.mcap"
+    with McapRecorder(log) as recorder:
+        recorder.record(Topic.CONFIG, 1, Document(config))
+    assert load_flight(log).nodes == nodes
+
+
+def test_a_location_that_only_the_books_know_is_named_with_its_line(folder: Path, tmp_path: Path) -> None:
+    books = tmp_path / "books.csv"
+    books.write_text("location,code\nA-<1>,PALLET\n")
+    count = counted_beside(folder / "flight.mcap", expected=books)
+    assert count is not None
+    told = inventory_section(count, None)
+    assert "Unknown to the count, misspelt or not planned: A-&lt;1&gt; (books.csv, line 2)." in told
+
+
+@pytest.mark.parametrize(
+    ("confidence", "shown"),
+    [(1.0, "100 %"), (0.9996, "99.9 %"), (0.998, "99.8 %"), (0.29, "29 %"), (0.0, "0 %")],
+)
+def test_a_confidence_is_never_rounded_up(confidence: float, shown: str) -> None:
+    assert share(confidence) == shown
+
+
+def test_the_least_confidence_is_not_above_the_mean() -> None:
+    figure = figures_of([record("A", "A1", LocationState.READ)])["Confidence"]
+    assert (figure.value, figure.note) == ("99.8", "least 99.8 % at A")
 
 
 @pytest.mark.parametrize(
@@ -168,7 +276,8 @@ def data_of(section: str, name: str) -> dict[str, object]:
 
 
 def test_a_click_shows_the_evidence_picture(section: str, count: CountedStock) -> None:
-    looks, pictures = data_of(section, "counted"), data_of(section, "pictures")
+    looks, pictures = data_of(section, "counted")["places"], data_of(section, "pictures")
+    assert isinstance(looks, dict)
     assert set(looks) == {record.code for record in count.records}
     for record in count.records:
         look = looks[record.code]

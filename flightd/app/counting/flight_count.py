@@ -27,7 +27,8 @@ def counts_shelves(config: Config, site: Site) -> bool:
 
 
 class FlightCount:
-    """The inventory of one flight, kept in `folder` if one is given.  Raises what the store raises; where
+    """The inventory of one flight, kept in `folder` if one is given, its looks named by `run` (empty:
+    as configured, or by the time).  Raises what the store raises; where
     the vehicle may be `in_air` already, that is its `error` instead, and nothing is kept."""
 
     def __init__(
@@ -37,12 +38,13 @@ class FlightCount:
         folder: Path | None,
         stack: ExitStack | AsyncExitStack,
         *,
+        run: str = "",
         in_air: bool = False,
     ) -> None:
         self._scan = config.scan
         self._stack = stack
         self._store: SqliteStore | None = None
-        self._run = config.inventory.run or f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
+        self._run = run or config.inventory.run or f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         self._counted: frozenset[str] = frozenset()
         self.error: FlightdError | None = None
         self.scans = counts_shelves(config, site)

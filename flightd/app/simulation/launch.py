@@ -21,6 +21,7 @@ from flightd.app.build import build, detector_pool, ground_link
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.flight import Flight
+from flightd.app.flight_identity import FlightIdentity
 from flightd.app.recording import record_setting
 from flightd.app.service import monitors
 from flightd.app.simulation.lockstep import LockstepDetectors, LockstepReaders
@@ -47,6 +48,7 @@ READING_S = 0.15
 _SCAN_S = 30.0
 """More than the count of one location can take, re-takes included."""
 _PORT_TRIES = 5
+_DRONE = "simulated"
 
 
 class FlightInterruptedError(RunError):
@@ -84,13 +86,14 @@ def _this_task() -> asyncio.Task[Any]:
 async def _lockstep(simulation: Simulation, hold: Hold, ended_by: list[signal.Signals]) -> FlightResult:
     end_on_signals(_this_task(), ended_by)
     clock, config, site = LoopClock(), simulation.config, simulation.site
+    identity = FlightIdentity.of(simulation.setting, _DRONE, clock.now_ns())
     with ExitStack() as stack:
-        recorder = stack.enter_context(_flight_recorder(simulation, clock, wait_for_disk))
+        recorder = stack.enter_context(_flight_recorder(simulation, identity, wait_for_disk))
         truth = stack.enter_context(McapRecorder(simulation.truth_log, when_full=wait_for_disk))
         pool = stack.enter_context(detector_pool(config, site, clock, hold))
         faults = LauncherFaults(simulation.scenario.fault, pool, recorder)
         world, ports = await _opened(simulation, clock, hold, truth, faults)
-        count = FlightCount(config, site, simulation.folder, stack)
+        count = FlightCount(config, site, simulation.folder, stack, run=identity.run)
         counting = await count.begun(clock, lambda readers: LockstepReaders(readers, READING_S, hold), hold)
         await pool.ready()
         flight = build(
@@ -133,13 +136,15 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
     clock, config, site = LoopClock(), simulation.config, simulation.site
     ports = free_ports(config)
     peers = peers_at(ports, config)
+    identity = FlightIdentity.of(simulation.setting, _DRONE, clock.now_ns())
     if simulation.truth_url:
         peers = replace(peers, vehicle=config.vehicle.url)
     async with monitors(config.metrics, {}, journal=False) as watchers, AsyncExitStack() as stack:
-        recorder = stack.enter_context(_flight_recorder(simulation, clock, drop_newest))
+        recorder = stack.enter_context(_flight_recorder(simulation, identity, drop_newest))
         process, channel = _started_world(simulation, ports, factor, stack)
         pool = stack.enter_context(detector_pool(config, site, clock))
-        counting = await FlightCount(config, site, simulation.folder, stack).begun(clock)
+        count = FlightCount(config, site, simulation.folder, stack, run=identity.run)
+        counting = await count.begun(clock)
         link = ground_link(_ground_settings(simulation), site, clock, counting)
         ground = NO_GROUND if link is None else stack.enter_context(link)
         faults = LauncherFaults(simulation.scenario.fault, pool, recorder, link)
@@ -237,9 +242,10 @@ async def _within_limit(
     raise RunError(f"the flight was not over after {limit_s:.0f} s of its own time")
 
 
-def _flight_recorder(simulation: Simulation, clock: LoopClock, when_full: WhenFull) -> McapRecorder:
-    recorder = McapRecorder(simulation.flight_log, when_full=when_full)
-    now_ns = clock.now_ns()
+def _flight_recorder(simulation: Simulation, identity: FlightIdentity, when_full: WhenFull) -> McapRecorder:
+    metadata = {**identity.metadata(), "seed": str(simulation.seed)}
+    recorder = McapRecorder(simulation.flight_log, metadata=metadata, when_full=when_full)
+    now_ns = identity.clock_ns
     record_setting(recorder, now_ns, simulation.setting)
     recorder.record(Topic.SCENARIO, now_ns, Document(simulation.scenario.model_dump_json(indent=1)))
     return recorder

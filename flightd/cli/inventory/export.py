@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -25,6 +26,9 @@ def export(
         str | None,
         typer.Option("--format", help="csv, xlsx, json or epcis. Default: by the file's ending, else csv."),
     ] = None,
+    gln: Annotated[
+        str, typer.Option(metavar="GLN", help="EPCIS: the site's GLN; locations become its places (254).")
+    ] = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Print what was written as one JSON document.")
     ] = False,
@@ -34,17 +38,23 @@ def export(
     \b
     Examples:
       flightd inventory export out/inventory --out stock.xlsx
-      flightd inventory export out/inventory --format epcis --out stock.jsonld
+      flightd inventory export out/inventory --out stock.jsonld --gln 9501101530003
       flightd inventory export out/inventory | column -s, -t
     """
-    from flightd.adapters.store.sqlite import SqliteStore
-    from flightd.inventory.export.formats import STDOUT, chosen_format
+    from flightd.adapters.store.for_reading import opened_for_reading
+    from flightd.inventory.export.epcis import as_epcis
+    from flightd.inventory.export.formats import FORMATS, STDOUT, chosen_format
 
     chosen = chosen_format(kind, out)
+    write = chosen.write
+    if gln:
+        if chosen is not FORMATS["epcis"]:
+            raise InputError("only EPCIS has it", key="--gln", remedy="add --format epcis")
+        write = partial(as_epcis, gln=gln)
     if as_json and out == STDOUT:
         raise InputError("says what was written to a file", key="--json", remedy="add --out F")
-    with SqliteStore(folder, create=False) as store:
-        data = chosen.write(store.locations())
+    with opened_for_reading(folder) as store:
+        data = write(store.locations())
     if out == STDOUT:
         sys.stdout.buffer.write(data)
         return

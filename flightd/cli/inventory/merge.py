@@ -28,12 +28,13 @@ def merge(
     Examples:
       flightd inventory merge out/inventory flight-2/inventory
     """
+    from flightd.adapters.store.for_reading import opened_for_reading
     from flightd.adapters.store.sqlite import SqliteStore
 
     taken = 0
     with SqliteStore(folder) as store:
         for other in others:
-            with SqliteStore(other, create=False) as source:
+            with opened_for_reading(other) as source:
                 taken += store.merge(source)
         records = store.locations()
     if as_json:

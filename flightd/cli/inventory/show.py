@@ -37,9 +37,9 @@ def show(
       flightd inventory show out/inventory
       flightd inventory show out/inventory --location A-03-2-1
     """
-    from flightd.adapters.store.sqlite import SqliteStore
+    from flightd.adapters.store.for_reading import opened_for_reading
 
-    with SqliteStore(folder, create=False) as store:
+    with opened_for_reading(folder) as store:
         records = store.locations()
         if location is None:
             _show_records(records, as_json)

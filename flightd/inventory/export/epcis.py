@@ -5,26 +5,40 @@ from __future__ import annotations
 import json
 import uuid
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any
 from urllib.parse import quote
 
+from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, Observation
-from flightd.core.types import CodeRead
 from flightd.core.utc_time import utc_text
+from flightd.inventory.export.gs1_uri import (
+    elements_of,
+    item_uri,
+    location_code_uri,
+    location_uri,
+    place_in,
+)
+from flightd.vision.shelf.gs1 import Gs1Error
 
-_GTIN: Final = {"EAN-13": 13, "EAN-8": 8, "UPC-A": 12, "UPC-E": 12, "ITF-14": 14}
+BASE_URI = "urn:x-flightd:"
+"""Before what has no URI of GS1."""
 
 
-def as_epcis(records: Sequence[LocationRecord], base_uri: str = "urn:x-flightd:") -> bytes:
-    """EPCIS 2.0 JSON-LD: one ObjectEvent (OBSERVE, cycle_counting) for each location with codes.
+def as_epcis(records: Sequence[LocationRecord], gln: str = "", base_uri: str = BASE_URI) -> bytes:
+    """EPCIS 2.0 JSON-LD: one ObjectEvent (OBSERVE, cycle_counting) for each location that was looked at.
 
-    GS1 keys become GS1 Digital Link URIs: SSCC and serialised GTIN as instances, GTIN (with batch) as
-    classes without a quantity, for a label does not tell how much is behind it.  Other texts and the
-    locations become URIs under `base_uri`.  EPCIS has no event for an empty or unread location.
-    The creation date is that of the newest look: the same inventory gives the same document.
+    GS1 keys become canonical GS1 Digital Link URIs: SSCC, serialised GTIN, GRAI and the like as instances,
+    GTIN (with batch) as classes without a quantity, for a label does not tell how much is behind it.  Other
+    texts become URIs under `base_uri`.  A location is the GLN (414) and extension (254) that its code or a
+    label there says, else its code as an extension of the site's `gln`, else a URI under `base_uri`.
+
+    An event of an empty, unreadable or occluded location has no object: it tells the state as a sensor
+    report of the read point (`location_state`), which is the standard's event of a place alone.  One that
+    nobody looked at has none.  The creation date is that of the newest look: the same inventory gives the
+    same document.  InputError for a `gln` that is none, or a location code that cannot extend it.
     """
     looked = [(record, record.observation) for record in records if record.observation]
-    events = [_event(record, seen, base_uri) for record, seen in looked if seen.reads]
+    events = [_event(record, seen, gln, base_uri) for record, seen in looked]
     newest = max((seen.utc_ns for _, seen in looked), default=0)
     document = {
         "@context": ["https://ref.gs1.org/standards/epcis/2.0.0/epcis-context.jsonld"],
@@ -36,13 +50,20 @@ def as_epcis(records: Sequence[LocationRecord], base_uri: str = "urn:x-flightd:"
     return (json.dumps(document, indent=1) + "\n").encode()
 
 
-def _event(record: LocationRecord, seen: Observation, base_uri: str) -> dict[str, Any]:
-    instances: list[str] = []
-    classes: list[str] = []
-    for read in {read.text: read for read in seen.reads}.values():
-        uri, is_class = _epc(read, base_uri)
-        (classes if is_class else instances).append(uri)
-    place = {"id": f"{base_uri}location:{quote(record.code, safe='-._~')}"}
+def _event(record: LocationRecord, seen: Observation, gln: str, base_uri: str) -> dict[str, Any]:
+    instances: set[str] = set()
+    classes: set[str] = set()
+    labels: set[str] = set()
+    for read in seen.reads:
+        item = item_uri(read)
+        if item is not None:
+            uri, is_class = item
+            (classes if is_class else instances).add(uri)
+        elif (own := location_uri(elements_of(read))) is not None:
+            labels.add(own)
+        else:
+            instances.add(f"{base_uri}code:{quote(read.text, safe='-._~')}")
+    place = {"id": _place(record.code, labels, gln, base_uri)}
     event: dict[str, Any] = {
         "type": "ObjectEvent",
         "eventID": f"urn:uuid:{uuid.UUID(seen.id[:32], version=5)}",
@@ -54,22 +75,29 @@ def _event(record: LocationRecord, seen: Observation, base_uri: str) -> dict[str
         "bizLocation": place,
     }
     if instances:
-        event["epcList"] = sorted(set(instances))
+        event["epcList"] = sorted(instances)
     if classes:
-        event["quantityList"] = [{"epcClass": uri} for uri in sorted(set(classes))]
+        event["quantityList"] = [{"epcClass": uri} for uri in sorted(classes)]
+    if not instances and not classes:
+        report = {"type": f"{base_uri}location_state", "stringValue": seen.state.value}
+        event["sensorElementList"] = [{"sensorReport": [report]}]
     return event
 
 
-def _epc(read: CodeRead, base_uri: str) -> tuple[str, bool]:
-    """The URI of what a code names, and whether it names a class rather than one thing."""
-    elements = dict(read.gs1)
-    if "00" in elements:
-        return f"https://id.gs1.org/00/{elements['00']}", False
-    if "01" in elements:
-        uri = f"https://id.gs1.org/01/{elements['01']}"
-        if "21" in elements:
-            return f"{uri}/21/{quote(elements['21'], safe='')}", False
-        return (f"{uri}/10/{quote(elements['10'], safe='')}" if "10" in elements else uri), True
-    if len(read.text) == _GTIN.get(read.symbology) and read.text.isdecimal():
-        return f"https://id.gs1.org/01/{read.text.zfill(14)}", True
-    return f"{base_uri}code:{quote(read.text, safe='-._~')}", False
+def _place(code: str, labels: set[str], gln: str, base_uri: str) -> str:
+    """The URI of a location; `labels` are what labels there call it, believed where they agree."""
+    own = location_code_uri(code)
+    if own is not None:
+        return own
+    if len(labels) == 1:
+        return next(iter(labels))
+    if not gln:
+        return f"{base_uri}location:{quote(code, safe='-._~')}"
+    try:
+        return place_in(gln, code)
+    except Gs1Error as err:
+        raise InputError(
+            f"location {code} cannot be a place of GLN {gln}: {err}",
+            key="--gln",
+            remedy="give the 13 digits of the site; codes have at most 20 characters then",
+        ) from None

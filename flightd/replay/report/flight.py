@@ -117,7 +117,7 @@ class Latency:
 class RecordedFlight:
     """A flight as the report shows it.  `truth` and `summary` are there if their files are; `smoothed` is the
     estimate judged afterwards, or why there is none.  `sensors` is what the lines said last of the drone's
-    own sensors."""
+    own sensors; `nodes` are those that were ordered, none: all of them."""
 
     log: FlightLog
     start_ns: int
@@ -137,6 +137,7 @@ class RecordedFlight:
     sensors: SensorEstimate
     line_sets: dict[int, LineSet]
     config: str
+    nodes: frozenset[str]
     summary: Summary
 
     def seconds(self, stamp_ns: int) -> float:

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from flightd.replay.report.flight import Array, RecordedFlight, Track
-from flightd.replay.report.markup import element, number, path_data, text
+from flightd.replay.report.markup import element, number, path_data, scrolled, text
 from flightd.site.site import Shelf, Side, Site
 
 _SHELF_DEPTH_M = 0.45
@@ -69,7 +69,9 @@ def floor_plan(flight: RecordedFlight) -> str:
         f'<svg class="plan" viewBox="0 0 {_WIDTH_PX:g} {number(place.height)}" role="img" '
         f'aria-label="Floor plan with the flown track">{"".join(layers)}</svg>'
     )
-    return element("figure", element("div", drawing, class_="scroll"), _caption(flight), class_="floor")
+    return element(
+        "figure", element("div", drawing, **scrolled("Floor plan")), _caption(flight), class_="floor"
+    )
 
 
 def _bounds(flight: RecordedFlight) -> tuple[float, float, float, float] | None:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
+import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TypeAlias
 
@@ -13,6 +16,7 @@ import msgspec
 import numpy as np
 
 from flightd.core.errors import InputError, UnavailableError
+from flightd.core.flight_order import FlightOrder
 from flightd.core.topics import FOR_PEOPLE, RETAINED, Document, Topic
 from flightd.core.tracks import last_known
 from flightd.core.types import (
@@ -81,6 +85,7 @@ def load_flight(path: Path) -> RecordedFlight:
         sensors=last_known([status.sensors for status in statuses]),
         line_sets={lines.frame_seq: lines for lines in log.messages(LineSet)},
         config="\n".join(document.text for document in log.messages(Document, Topic.CONFIG)),
+        nodes=_ordered_nodes(log),
         summary=_summary(path.with_name("summary.json")),
     )
 
@@ -104,6 +109,21 @@ def _site(log: FlightLog) -> tuple[Site | None, str]:
         return parse_site(maps[-1].text, "the recorded map"), ""
     except InputError as err:
         return None, str(err)
+
+
+def _ordered_nodes(log: FlightLog) -> frozenset[str]:
+    """The nodes that the flight was to visit, empty where that is all of them or nobody knows.  A log without
+    an order is of a time when the configuration was recorded with the order laid over it."""
+    if orders := log.messages(FlightOrder):
+        return frozenset(orders[-1].nodes)
+    for document in reversed(log.messages(Document, Topic.CONFIG)):
+        with suppress(ValueError):  # a configuration that cannot be read orders nothing
+            is_json = document.text.lstrip().startswith("{")
+            table = json.loads(document.text) if is_json else tomllib.loads(document.text)
+            mission = table.get("mission") if isinstance(table, dict) else None
+            nodes = mission.get("nodes") if isinstance(mission, dict) else None
+            return frozenset(map(str, nodes)) if isinstance(nodes, list) else frozenset()
+    return frozenset()
 
 
 class _TruthSample(msgspec.Struct, frozen=True):

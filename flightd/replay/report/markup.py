@@ -34,9 +34,16 @@ def element(name: str, *children: str, **attributes: object) -> str:
 
 
 def table(heads: Iterable[str], rows: Iterable[str], name: str) -> str:
-    """A table of rows that are markup already, scrolled sideways where it is too wide."""
+    """A table of rows that are markup already, scrolled where it is too large, by key as well."""
     head = element("thead", element("tr", *(element("th", text(label), scope="col") for label in heads)))
-    return element("div", element("table", head, element("tbody", *rows), class_=name), class_="scroll")
+    return element(
+        "div", element("table", head, element("tbody", *rows), class_=name), **scrolled(name.capitalize())
+    )
+
+
+def scrolled(label: str) -> dict[str, object]:
+    """The attributes of a part of the page that scrolls by itself: reached and named without a mouse."""
+    return {"class_": "scroll", "tabindex": 0, "role": "region", "aria_label": label}
 
 
 def number(value: float, digits: int = 2) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from string import Template
@@ -18,7 +19,7 @@ from flightd.replay.report.latency import latency_section
 from flightd.replay.report.loader import load_flight
 from flightd.replay.report.markup import NOTHING, clock, element, number, table, text
 from flightd.replay.report.pictures import frames_section
-from flightd.replay.report.stock import CountedStock, count_figures
+from flightd.replay.report.stock import CountedStock, CountTask, count_figures
 from flightd.replay.report.stocktaking import inventory_section
 
 _EVENTS_SHOWN = 400
@@ -43,6 +44,8 @@ def write_report(log: Path, out: Path, count: CountedStock | None = None) -> Non
 def render(flight: RecordedFlight, count: CountedStock | None = None) -> str:
     """The report as HTML text."""
     ending = outcome(flight)
+    if count is not None:
+        count = replace(count, task=CountTask(flight.nodes, flight.log.metadata.get("run", "")))
     figures = (*(count_figures(count, flight_time_s(flight)) if count else ()), *key_figures(flight))
     return Template(_file("report.html")).substitute(
         style=_file("report.css") + _file("inventory.css"),
@@ -72,7 +75,9 @@ def _file(name: str) -> str:
 
 
 def _site_name(flight: RecordedFlight) -> str:
-    return flight.site.name if flight.site is not None else flight.log.path.name
+    if flight.site is not None:
+        return flight.site.name
+    return flight.log.metadata.get("site") or flight.log.path.name
 
 
 def _facts(flight: RecordedFlight) -> str:
@@ -80,6 +85,8 @@ def _facts(flight: RecordedFlight) -> str:
     metadata = flight.log.metadata
     facts = [
         ("Started", metadata.get("started", "")),
+        ("Drone", metadata.get("drone", "")),
+        ("Run", metadata.get("run", "")),
         ("Vehicle", str(flight.summary.get("vehicle") or metadata.get("vehicle", ""))),
         ("Seed", str(flight.summary.get("seed", metadata.get("seed", "")))),
         ("Recorded", f"{clock(flight.duration_s)} min" if flight.duration_s else ""),
@@ -102,9 +109,12 @@ def _tile(figure: Figure) -> str:
         "div",
         element("dt", text(figure.label)),
         element(
-            "dd", element("b", text(figure.value)), element("span", text(figure.unit)) if figure.unit else ""
+            "dd",
+            element("b", text(figure.value)),
+            element("span", text(figure.unit)) if figure.unit else "",
+            class_="value",
         ),
-        element("p", text(figure.note)) if figure.note else "",
+        element("dd", text(figure.note), class_="about") if figure.note else "",
         class_=f"tile {figure.tone}".strip(),
     )
 

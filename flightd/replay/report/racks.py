@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from flightd.core.inventory import LocationRecord, LocationState
 from flightd.replay.report.markup import element, text
-from flightd.replay.report.stock import CountedStock
+from flightd.replay.report.stock import CountedStock, share
 from flightd.site.site import Location, Side, Site
 
 _HALF_COLUMNS = 30
@@ -117,12 +117,13 @@ def cell(record: LocationRecord, outcome: str) -> str:
     seen = record.observation
     parts = [record.code, STATE_NAMES[record.state], *record.texts]
     if seen is not None:
-        parts.append(f"{seen.confidence:.0%}")
+        parts.append(share(seen.confidence))
     if outcome:
         parts.append(outcome.replace("_", " "))
     return element(
         "button",
         class_=f"cell {record.state.value}" + (" differs" if outcome else ""),
+        type="button",
         title=" · ".join(parts),
         data_code=record.code,
     )

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from flightd.core.inventory import LocationRecord, LocationState
+from flightd.core.inventory import LocationRecord, LocationState, Observation
 from flightd.inventory.comparison import ComparisonOutcome, Difference
 from flightd.replay.report.figures import Figure
 from flightd.replay.report.markup import number
@@ -22,13 +22,42 @@ def no_picture(_name: str) -> bytes | None:
 
 
 @dataclass(frozen=True, slots=True)
+class CountTask:
+    """What a flight was to count: the locations of its `nodes` (none: all there are), as part of the count
+    `run` (empty: any look at them is one of it)."""
+
+    nodes: frozenset[str] = frozenset()
+    run: str = ""
+
+    def includes(self, record: LocationRecord) -> bool:
+        return not self.nodes or record.node in self.nodes
+
+    def look(self, record: LocationRecord) -> Observation | None:
+        """The look of this count at a location, None where the newest is another's."""
+        seen = record.observation
+        return seen if seen is not None and self.run in {"", seen.run} else None
+
+
+WHOLE = CountTask()
+"""Everything, by whatever look."""
+
+
+@dataclass(frozen=True, slots=True)
 class CountedStock:
     """Every location as it stands, the evidence picture (JPEG) of a name, and the comparison with the
-    expected stock (None where there was none to compare with)."""
+    expected stock (None where there was none to compare with), which names `unknown` locations, too (each
+    with the line of its file)."""
 
     records: Sequence[LocationRecord]
     picture: Callable[[str], bytes | None] = no_picture
     differences: Sequence[Difference] | None = None
+    task: CountTask = WHOLE
+    unknown: Sequence[str] = ()
+
+    @property
+    def asked(self) -> list[LocationRecord]:
+        """The locations that the flight was to count."""
+        return [record for record in self.records if self.task.includes(record)]
 
     def states(self) -> Counter[LocationState]:
         return Counter(record.state for record in self.records)
@@ -45,12 +74,14 @@ class CountedStock:
 
 
 def count_figures(count: CountedStock, flight_s: float | None) -> tuple[Figure, ...]:
-    """Coverage, read rate, pace, confidence and agreement with the books, as far as they can be given.
+    """Coverage, places settled, read rate, pace, confidence and agreement with the books, as far as they can
+    be given.
 
     `flight_s` is the time in the air, for the pace of the newest run alone.
     """
     made = (
         _coverage(count),
+        _settled(count),
         _read_rate(count),
         _pace(count, flight_s),
         _confidence(count),
@@ -66,29 +97,71 @@ def percent(part: int, whole: int) -> str:
     return number(max(shown, 0.1) if part else 0.0, 1)
 
 
+def share(value: float) -> str:
+    """A confidence, 0 to 1, in per cent, never rounded up."""
+    return f"{number(math.floor(value * 1000 + _ROUNDING) / 10, 1)} %"
+
+
+_ROUNDING = 1e-9
+"""0.29 * 1000 is a little less than 290."""
+
+
 def _coverage(count: CountedStock) -> Figure:
-    states, whole = count.states(), len(count.records)
-    looked = whole - states[LocationState.NOT_VISITED]
+    """How much of what was asked for was looked at: a flight over two nodes is no bad flight over eight."""
+    asked, whole = count.asked, len(count.records)
     if not whole:
         return Figure("Coverage", "0", "locations", "none is planned", "bad")
-    note = f"{looked:,} of {whole:,} locations looked at"
-    return Figure("Coverage", percent(looked, whole), "%", note, "good" if looked == whole else "bad")
+    if not asked:
+        return Figure("Coverage", "0", "locations", "none at the nodes of this flight")
+    looked = sum(count.task.look(record) is not None for record in asked)
+    note = f"{looked:,} of {len(asked):,} locations looked at"
+    earlier = sum(record.observation is not None for record in asked) - looked
+    note += f", {earlier:,} known from other counts" if earlier else ""
+    note += f"; {whole - len(asked):,} at other nodes" if len(asked) < whole else ""
+    return Figure(
+        "Coverage", percent(looked, len(asked)), "%", note, "good" if looked == len(asked) else "bad"
+    )
+
+
+def _settled(count: CountedStock) -> Figure | None:
+    """How much of what was looked at says what is there.  What cannot be read is no label that was missed:
+    goods without one and places in doubt are `unreadable`, too."""
+    looked = [record for record in count.asked if count.task.look(record)]
+    if not looked:
+        return None
+    settled = sum(record.state.is_counted for record in looked)
+    states = Counter(record.state for record in looked)
+    open_ = [
+        f"{states[state]:,} {state.value}"
+        for state in (LocationState.UNREADABLE, LocationState.OCCLUDED)
+        if states[state]
+    ]
+    note = ", ".join([f"{settled:,} of {len(looked):,} places", *open_])
+    return Figure("Places settled", percent(settled, len(looked)), "%", note)
 
 
 def _read_rate(count: CountedStock) -> Figure | None:
-    states = count.states()
-    read = states[LocationState.READ] + states[LocationState.SEVERAL]
-    labels = read + states[LocationState.UNREADABLE]
+    """Of the labels that the books have in the places looked at, how many were read; without the ones whose
+    place was counted and has another code or none, for nobody saw them.  Without the books nobody knows how
+    many labels there are."""
+    seen = {record.code for record in count.asked if count.task.look(record)}
+    labels = [line for line in count.differences or () if line.location in seen and line.outcome in _THERE]
     if not labels:
         return None
-    return Figure("Read rate", percent(read, labels), "%", f"{read:,} of {labels:,} labels seen")
+    read = sum(line.outcome in _FOUND for line in labels)
+    note = f"{read:,} of {len(labels):,} labels of the books"
+    return Figure("Read rate", percent(read, len(labels)), "%", note)
+
+
+_FOUND = frozenset({ComparisonOutcome.MATCH, ComparisonOutcome.MOVED})
+_THERE = _FOUND | {ComparisonOutcome.UNCOUNTED}
 
 
 def _pace(count: CountedStock, flight_s: float | None) -> Figure | None:
     seen = [record.observation for record in count.records if record.observation]
     if not seen or not flight_s:
         return None
-    run = max(seen, key=lambda look: look.utc_ns).run
+    run = count.task.run or max(seen, key=lambda look: look.utc_ns).run
     looked = sum(look.run == run for look in seen)
     note = f"{looked:,} in {number(flight_s / 60, 1)} min of flight"
     return Figure("Pace", f"{looked * 3600 / flight_s:,.0f}", "locations/h", note)
@@ -104,8 +177,8 @@ def _confidence(count: CountedStock) -> Figure | None:
         return None
     mean = sum(confidence for confidence, _ in sure) / len(sure)
     least, where = min(sure)
-    shown = math.floor(mean * 1000) / 10
-    return Figure("Confidence", number(shown, 1), "%", f"least {least:.0%} at {where}")
+    value, unit = share(mean).split(" ")
+    return Figure("Confidence", value, unit, f"least {share(least)} at {where}")
 
 
 def _books(count: CountedStock) -> Figure | None:

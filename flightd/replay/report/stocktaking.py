@@ -1,4 +1,4 @@
-"""The inventory's part of the page: key figures, racks, exceptions, differences, and what a click shows."""
+"""The inventory's part of the page: racks, exceptions, differences, and what a click and a download give."""
 
 from __future__ import annotations
 
@@ -12,16 +12,19 @@ import numpy as np
 
 from flightd.core.inventory import LocationRecord, LocationState
 from flightd.inventory.comparison import ComparisonOutcome
+from flightd.inventory.export.rows import COLUMNS, rows_of
 from flightd.replay.report.markup import NOTHING, element, table, text
 from flightd.replay.report.racks import STATE_NAMES, racks_section
-from flightd.replay.report.stock import SETTLED, CountedStock
+from flightd.replay.report.stock import SETTLED, CountedStock, share
 from flightd.site.site import Site
 
 _PICTURES_BYTES = 12_000_000
 """All pictures in the page together, before base64; those of exceptions come first."""
 _PICTURE_PX = 480
 _QUALITY = 60
-_ROWS = 300
+_ROWS = 2000
+_NAMED = 20
+"""So many locations are named in one sentence."""
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _ORDER = (
     LocationState.UNREADABLE,
@@ -41,33 +44,70 @@ def inventory_section(count: CountedStock, site: Site | None) -> str:
     """Racks, exceptions and differences, with the data that a click shows."""
     parts = [
         element("h2", "Racks"),
-        element("p", "Point to a place to read it, click for its picture.", class_="hint"),
+        element("p", "Point to a place to read it, press it for its picture.", class_="hint"),
+        _filter_bar(count),
         racks_section(count, site),
         element("h2", "Exceptions"),
         _exceptions(count),
     ]
     if count.differences is not None:
         parts += [element("h2", "Against the expected stock"), _differences(count)]
-    dialog = element("dialog", element("div", class_="look"), class_="look-box", aria_label="Location")
+    close = element("button", "Close", type="button", class_="close")
+    dialog = element(
+        "dialog", close, element("div", class_="look"), class_="look-box", aria_labelledby="look-title"
+    )
     return element("section", *parts, class_="wide inventory") + dialog + _data(count)
 
 
+def _filter_bar(count: CountedStock) -> str:
+    """Search, choice of states and download; the script shows it, for without one it does nothing."""
+    states = count.states()
+    kinds = [("", "all"), ("exceptions", "exceptions")]
+    kinds += [("differs", "not as expected")] if count.outcomes() else []
+    kinds += [(state.value, name) for state, name in STATE_NAMES.items() if states[state]]
+    choice = element(
+        "select", *(element("option", name, value=value) for value, name in kinds), class_="state"
+    )
+    words = element("input", type="search", class_="words", autocomplete="off").replace("></input>", "/>")
+    downloads = [
+        element("button", f"Download {name.upper()}", type="button", data_format=name)
+        for name in ("csv", "json")
+    ]
+    parts = [
+        element("label", "Location or code ", words),
+        element("label", "State ", choice),
+        element("output", class_="told", aria_live="polite"),
+        *downloads,
+    ]
+    return element("form", *parts, class_="filter", hidden="", role="search", aria_label="Locations")
+
+
+def _opener(code: str) -> str:
+    """What opens the picture of a row by key as well."""
+    return element("button", text(code), type="button", class_="open")
+
+
 def _exceptions(count: CountedStock) -> str:
-    found = [record for state in _ORDER for record in count.records if record.state is state]
+    odd = [record for state in _ORDER for record in count.records if record.state is state]
+    found = [record for record in odd if record.observation or count.task.includes(record)]
+    apart = len(odd) - len(found)
+    note = f"{apart:,} locations not visited are at nodes that this flight was not to count." if apart else ""
+    tail = element("p", note, class_="note") if note else ""
     if not found:
-        return element("p", "None: every location was counted, each with one code or empty.", class_="empty")
+        told = "None: every location was counted, each with one code or empty."
+        return element("p", told, class_="empty") + tail
     rows = [_exception(record) for record in found[:_ROWS]]
     heads = ["Location", "State", "Codes", "Confidence", "Looked at", "What to do"]
-    return table(heads, rows, "exceptions") + _more(len(found) - len(rows), "flightd inventory show")
+    return table(heads, rows, "exceptions") + _more(len(found) - len(rows), "flightd inventory show") + tail
 
 
 def _exception(record: LocationRecord) -> str:
     seen = record.observation
     cells = [
-        element("td", element("b", text(record.code))),
+        element("td", _opener(record.code)),
         element("td", element("i", class_=f"cell {record.state.value}"), text(STATE_NAMES[record.state])),
         element("td", text(", ".join(record.texts) or NOTHING)),
-        element("td", f"{seen.confidence:.0%}" if seen else NOTHING),
+        element("td", share(seen.confidence) if seen else NOTHING),
         element("td", _when(seen.utc_ns) if seen else NOTHING),
         element("td", _REMEDIES[record.state]),
     ]
@@ -81,12 +121,18 @@ def _differences(count: CountedStock) -> str:
         f"{unknown:,} expected codes lie where nobody could see: nothing is said of them." if unknown else ""
     )
     tail = element("p", note, class_="note") if note else ""
+    if count.unknown:
+        shown = ", ".join(count.unknown[:_NAMED])
+        more = f" and {len(count.unknown) - _NAMED:,} more" if len(count.unknown) > _NAMED else ""
+        tail += element(
+            "p", text(f"Unknown to the count, misspelt or not planned: {shown}{more}."), class_="note"
+        )
     if not wrong:
         return element("p", "No difference.", class_="empty") + tail
     rows = [
         element(
             "tr",
-            element("td", element("b", text(line.location))),
+            element("td", _opener(line.location)),
             element("td", element("i", line.outcome.replace("_", " "), class_="level error")),
             element("td", text(line.text if line.outcome is not ComparisonOutcome.UNEXPECTED else NOTHING)),
             element(
@@ -94,7 +140,7 @@ def _differences(count: CountedStock) -> str:
                 text(line.text if line.outcome is ComparisonOutcome.UNEXPECTED else line.found or NOTHING),
             ),
             element("td", text(line.found_at or NOTHING)),
-            element("td", f"{line.confidence:.0%}"),
+            element("td", share(line.confidence)),
             data_code=line.location,
         )
         for line in wrong[:_ROWS]
@@ -118,19 +164,27 @@ def _when(utc_ns: int) -> str:
 
 def _data(count: CountedStock) -> str:
     outcomes = {code: outcome.value.replace("_", " ") for code, outcome in count.outcomes().items()}
-    looks = {record.code: _look(record, outcomes.get(record.code, "")) for record in count.records}
-    return _block("counted", looks) + _block("pictures", _pictures(count, outcomes))
+    places = {record.code: _look(record, outcomes.get(record.code, "")) for record in count.records}
+    return _block("counted", {"columns": [*COLUMNS, "outcome"], "places": places}) + _block(
+        "pictures", _pictures(count, outcomes)
+    )
 
 
 def _look(record: LocationRecord, outcome: str) -> dict[str, object]:
     seen = record.observation
     look: dict[str, object] = {"state": record.state.value, "name": STATE_NAMES[record.state]}
+    look |= {
+        "texts": record.texts,
+        "odd": record.state in _ORDER,
+        "differs": bool(outcome),
+        "rows": [[*row, outcome] for row in rows_of([record])],
+    }
     look["facts"] = [
         [label, value]
         for label, value in (
             ("Codes", ", ".join(record.texts)),
             ("Symbology", ", ".join(dict.fromkeys(read.symbology for read in seen.reads)) if seen else ""),
-            ("Confidence", f"{seen.confidence:.0%}" if seen else ""),
+            ("Confidence", share(seen.confidence) if seen else ""),
             ("Looked at", f"{_when(seen.utc_ns)} UTC" if seen else ""),
             ("From node", (seen.pose.node if seen and seen.pose else record.node)),
             ("Height", f"{seen.pose.height_m:.2f} m" if seen and seen.pose else ""),

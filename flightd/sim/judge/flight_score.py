@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from flightd.core.types import AT_STOP, Event, EventLevel, Phase
+from flightd.core.types import Event, EventLevel, Phase
 from flightd.sim.judge.clearance import clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
+from flightd.sim.judge.hover_error import hover_errors
 from flightd.sim.judge.meant_leg import off_leg
 from flightd.sim.judge.motion import OFF_FLOOR_M, TrueMotion, Values
 
@@ -35,10 +36,11 @@ _SINKING_MPS = -0.1
 class FlightScore:
     """The flight's part of the summary; metres, seconds.  None where there was nothing to measure.
 
-    `cross_track_*` are off the leg that was meant (`meant_leg`); `min_clearance_m` is free between the body
-    with its propellers and racks, ceiling and keep-outs, below 0 in them; `max_overshoot_m` how far above
-    the commanded height it came; `uncontrolled_s` the longest time in the air in which neither setpoints
-    went out nor the autopilot was landing it."""
+    `hover_error_p95_m` is off the place where it was to stand (`hover_error`), `cross_track_*` are off the
+    leg that was meant (`meant_leg`); `min_clearance_m` is free between the body with its propellers and
+    racks, ceiling and keep-outs, below 0 in them; `max_overshoot_m` how far above the commanded height it
+    came; `uncontrolled_s` the longest time in the air in which neither setpoints went out nor the autopilot
+    was landing it."""
 
     mission: str
     reason: str
@@ -63,7 +65,7 @@ def score(flight: FlightEvidence) -> FlightScore:
     right = [event for event in visits if _at_node(flight, event)]
     off = off_leg_in_air(flight)
     off = off[np.isfinite(off)]
-    hover = _hover_errors(flight, visits)
+    hover = hover_errors(flight, visits)
     above = overshoot(flight)
     free = [clearance.least_m for clearance in clearances(flight.site, flight.motion)]
     return FlightScore(
@@ -143,23 +145,6 @@ def _at_node(flight: FlightEvidence, event: Event) -> bool:
     if node is None or there is None:
         return False
     return math.hypot(there.x_m - node.x_m, there.y_m - node.y_m) < _AT_NODE_M
-
-
-def _hover_errors(flight: FlightEvidence, visits: Iterable[Event]) -> list[float]:
-    """Distances from the node during its whole dwell or scan, for each visit."""
-    errors: list[float] = []
-    motion = flight.motion
-    for visit in visits:
-        node = flight.site.nodes.get(visit.text)
-        index = int(np.searchsorted(motion.stamp_s, visit.stamp_ns * 1e-9)) - 1
-        while node is not None and index >= 0 and _stops_at(flight, motion.stamp_s[index]):
-            errors.append(math.hypot(motion.x_m[index] - node.x_m, motion.y_m[index] - node.y_m))
-            index -= 1
-    return errors
-
-
-def _stops_at(flight: FlightEvidence, stamp_s: float) -> bool:
-    return flight.phase_at(round(stamp_s * 1e9)) in AT_STOP
 
 
 def _flight_time_s(motion: TrueMotion) -> float:

@@ -21,6 +21,7 @@ from flightd.core.geometry import Matrix
 from flightd.core.types import CodeRead, Image
 from flightd.vision.shelf.code_regions import CodeRegion, code_regions
 from flightd.vision.shelf.crease_flattening import flatten_qr
+from flightd.vision.shelf.digital_link import parse_digital_link
 from flightd.vision.shelf.gs1 import Gs1Error, parse_element_string
 
 
@@ -334,11 +335,10 @@ def _code_read(candidate: _Candidate, width: int, height: int) -> CodeRead:
     corners = candidate.corners - ((width - 1) / 2, (height - 1) / 2)
     elements: tuple[tuple[str, str], ...] = ()
     problem = ""
-    if candidate.gs1:
-        try:
-            elements = parse_element_string(candidate.text)
-        except Gs1Error as err:
-            problem = str(err)
+    try:
+        elements = (parse_element_string if candidate.gs1 else parse_digital_link)(candidate.text)
+    except Gs1Error as err:
+        problem = str(err)
     return CodeRead(
         symbology=candidate.symbology,
         text=candidate.text,

@@ -149,14 +149,26 @@ def parse_element_string(text: str) -> Elements:
             value, rest = body[: field.longest], body[field.longest :].removeprefix(FNC1)
         else:
             value, _, rest = body.partition(FNC1)
-        if not field.pattern.fullmatch(value):
-            raise Gs1Error(f"({ai}): {value!r} has a wrong length or a character that may not be there")
-        if field.checked and not has_check_digit(value[: field.checked]):
-            raise Gs1Error(f"({ai}): the check digit of {value[: field.checked]} does not hold")
-        if field.is_date and not _is_date(value):
-            raise Gs1Error(f"({ai}): {value} is no date (YYMMDD)")
+        _check(ai, field, value)
         elements.append((ai, value))
     return tuple(elements)
+
+
+def check_element(ai: str, value: str, *, with_check_digit: bool = True) -> None:
+    """Gs1Error for an identifier that is not known, or a value that is not of its form."""
+    known, field = _identifier(ai)
+    if known != ai:
+        raise Gs1Error(f"{ai!r} is no application identifier that is known here")
+    _check(ai, field, value, with_check_digit=with_check_digit)
+
+
+def _check(ai: str, field: _Field, value: str, *, with_check_digit: bool = True) -> None:
+    if not field.pattern.fullmatch(value):
+        raise Gs1Error(f"({ai}): {value!r} has a wrong length or a character that may not be there")
+    if with_check_digit and field.checked and not has_check_digit(value[: field.checked]):
+        raise Gs1Error(f"({ai}): the check digit of {value[: field.checked]} does not hold")
+    if field.is_date and not _is_date(value):
+        raise Gs1Error(f"({ai}): {value} is no date (YYMMDD)")
 
 
 def _identifier(text: str) -> tuple[str, _Field]:

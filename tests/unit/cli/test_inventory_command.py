@@ -9,6 +9,7 @@ import os
 import shutil
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,9 +17,11 @@ import pytest
 import zxingcpp
 from typer.testing import CliRunner
 
+from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.build import flown_between_m
 from flightd.app.flight_orders import configured_order, going_on
+from flightd.app.recording import FlightSetting, record_setting
 from flightd.cli.main import app
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
@@ -159,27 +162,113 @@ def test_what_is_exported_as_expected_stock_matches_itself(counted: Path, tmp_pa
     assert "=HYPERLINK(1)" in texts
 
 
-def test_epcis_counts_with_gs1_uris(counted: Path, tmp_path: Path) -> None:
-    out = tmp_path / "stock.jsonld"
-    run("export", counted, "--out", out)
+def epcis(store: Path, out: Path, *options: str) -> dict[str, dict[str, Any]]:
+    """The events by the location, as its record and not the event calls it."""
+    run("export", store, "--out", out, *options)
     document = json.loads(out.read_text())
     assert (document["type"], document["schemaVersion"]) == ("EPCISDocument", "2.0")
-    events = {event["readPoint"]["id"]: event for event in document["epcisBody"]["eventList"]}
-    assert sorted(events) == [f"urn:x-flightd:location:A-0{n}" for n in range(1, 5)]
-    assert {(e["type"], e["action"], e["bizStep"]) for e in events.values()} == {
-        ("ObjectEvent", "OBSERVE", "cycle_counting")
-    }
-    assert len({event["eventID"] for event in events.values()}) == 4
-    told = [
-        (event.get("epcList"), [q["epcClass"] for q in event.get("quantityList", [])])
-        for _, event in sorted(events.items())
+    events = document["epcisBody"]["eventList"]
+    assert len({event["eventID"] for event in events}) == len(events)
+    for event in events:
+        assert (event["type"], event["action"], event["bizStep"]) == (
+            "ObjectEvent", "OBSERVE", "cycle_counting",
+        )  # fmt: skip
+        assert event["readPoint"] == event["bizLocation"]
+        # as the standard's schema has it: objects, or a sensor's word of the read point
+        assert event.keys() & {"epcList", "quantityList", "sensorElementList"}
+        assert all(event.get(key) != [] for key in ("epcList", "quantityList", "sensorElementList"))
+    with SqliteStore(store) as opened:
+        looked = [record.code for record in opened.locations() if record.observation]
+    return dict(zip(looked, events, strict=True))
+
+
+def named(event: dict[str, Any]) -> tuple[list[str], list[str]]:
+    """The things and the classes that an event names."""
+    return event.get("epcList", []), [element["epcClass"] for element in event.get("quantityList", [])]
+
+
+def test_epcis_counts_with_gs1_uris(counted: Path, tmp_path: Path) -> None:
+    events = epcis(counted, tmp_path / "stock.jsonld")
+    assert [event["readPoint"]["id"] for event in events.values()] == [
+        f"urn:x-flightd:location:A-0{n}" for n in range(1, 7)
     ]
-    assert told == [
+    assert [named(events[f"A-0{n}"]) for n in range(1, 5)] == [
         (["urn:x-flightd:code:%3DHYPERLINK%281%29"], []),
-        (None, ["https://id.gs1.org/01/09501101530003/10/B%2F1"]),
+        ([], ["https://id.gs1.org/01/09501101530003/10/B%2F1"]),
         (["https://id.gs1.org/01/09501101530003/21/S%201"], []),
         (["https://id.gs1.org/00/395011010013000129"], ["https://id.gs1.org/01/00036602301467"]),
     ]
+
+
+def test_epcis_tells_of_places_without_a_code_too_and_of_none_that_was_not_seen(
+    counted: Path, tmp_path: Path
+) -> None:
+    events = epcis(counted, tmp_path / "stock.jsonld")
+    assert [events[code].get("sensorElementList") for code in ("A-01", "A-05", "A-06")] == [
+        None,
+        [{"sensorReport": [{"type": "urn:x-flightd:location_state", "stringValue": "empty"}]}],
+        [{"sensorReport": [{"type": "urn:x-flightd:location_state", "stringValue": "occluded"}]}],
+    ]
+    assert "A-07" not in events
+
+
+GLN = "9501101530003"
+
+
+def test_epcis_names_locations_by_their_gln(tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    with SqliteStore(store) as opened:
+        opened.commit(look("A-01", 1, code("PALLET")))
+        opened.commit(
+            look("A-02", 2, code("PALLET 2"), code(f"414{GLN}254B", "Data Matrix", a414=GLN, a254="B"))
+        )
+        opened.commit(look(f"(414){GLN}(254)A/3", 3, state="empty"))
+        opened.commit(look(f"https://example.com/414/{GLN}", 4, state="empty"))
+    at = {code: event["readPoint"]["id"] for code, event in epcis(store, tmp_path / "a.jsonld").items()}
+    assert at == {
+        "A-01": "urn:x-flightd:location:A-01",
+        "A-02": f"https://id.gs1.org/414/{GLN}/254/B",
+        f"(414){GLN}(254)A/3": f"https://id.gs1.org/414/{GLN}/254/A%2F3",
+        f"https://example.com/414/{GLN}": f"https://id.gs1.org/414/{GLN}",
+    }
+    events = epcis(store, tmp_path / "b.jsonld", "--gln", GLN)
+    assert events["A-01"]["readPoint"]["id"] == f"https://id.gs1.org/414/{GLN}/254/A-01"
+    assert named(events["A-02"]) == (["urn:x-flightd:code:PALLET%202"], [])
+
+
+def test_epcis_takes_the_key_out_of_a_digital_link(tmp_path: Path) -> None:
+    store, gtin = tmp_path / "store", "09501101530003"
+    links = {
+        "A": f"https://shop.example/x/01/{gtin}/10/B1/21/S1",
+        "B": f"https://shop.example/01/{gtin}",
+        "C": f"https://shop.example/8003/{gtin}",
+        "D": f"https://shop.example/8003/{gtin}9",
+        "E": "https://shop.example/01/09501101530004",
+    }
+    with SqliteStore(store) as opened:
+        for number, (place, text) in enumerate(links.items()):
+            opened.commit(look(place, number, code(text)))
+    events = epcis(store, tmp_path / "stock.jsonld")
+    assert [named(event) for event in events.values()] == [
+        ([f"https://id.gs1.org/01/{gtin}/21/S1"], []),
+        ([], [f"https://id.gs1.org/01/{gtin}"]),
+        ([], [f"https://id.gs1.org/8003/{gtin}"]),
+        ([f"https://id.gs1.org/8003/{gtin}9"], []),
+        (["urn:x-flightd:code:https%3A%2F%2Fshop.example%2F01%2F09501101530004"], []),
+    ]
+
+
+def test_a_gln_that_is_none_is_refused(counted: Path, tmp_path: Path) -> None:
+    out = tmp_path / "stock.jsonld"
+    assert "the check digit of 9501101530004 does not hold" in error_of(
+        "export", counted, "--out", out, "--gln", "9501101530004"
+    )
+    assert "only EPCIS has it" in error_of("export", counted, "--out", tmp_path / "s.csv", "--gln", GLN)
+    with SqliteStore(counted) as store:
+        store.commit(look("a location with a long name", 1, state="empty"))
+    assert "location a location with a long name cannot be a place" in error_of(
+        "export", counted, "--out", out, "--gln", GLN
+    )
 
 
 def test_the_comparison_names_differences_and_makes_a_mission_that_loads(
@@ -275,7 +364,7 @@ def test_bad_arguments_are_refused(counted: Path, tmp_path: Path) -> None:
     said = error_of("export", counted, "--out", tmp_path / "stock.json", "--format", "epcis")
     assert "its ending says json, --format says epcis" in said
     assert said.endswith("name the file stock.jsonld")
-    assert "give both" in error_of("compare", counted, stock, "--recount", tmp_path / "r.toml")
+    assert "no flight.mcap beside" in error_of("compare", counted, stock, "--recount", tmp_path / "r.toml")
     elsewhere = tmp_path / "deep" / "r.toml"
     config = CONFIGS / "sim.toml"
     assert "beside" in error_of("compare", counted, stock, "--recount", elsewhere, "--config", config)
@@ -291,3 +380,107 @@ def test_a_sites_locations_are_planned(tmp_path: Path) -> None:
     bare = tmp_path / "bare.toml"
     assert RUNNER.invoke(app, ["map", "new", str(bare)]).exit_code == 0
     assert "add a [[rack]]" in error_of("plan", tmp_path / "store", bare)
+
+
+@pytest.fixture
+def flown(tmp_path: Path) -> Path:
+    """The folder of a flight over the small racks: its log, and a count with doubts in both aisles."""
+    folder = tmp_path / "flown"
+    site = load_site(CONFIGS / "site-racks-small.toml")
+    config = load_config(CONFIGS / "sim.toml").with_values(
+        inventory={"run": "monday"}, mission={"resume": True, "progress": tmp_path / "left.json"}
+    )
+    order = configured_order(config)
+    with SqliteStore(folder) as store:
+        store.plan(PlannedLocation(place.code, place.node) for place in site.locations.values())
+        for number, place in enumerate(site.locations.values()):
+            state = ("unreadable", "occluded", "empty")[number % 3]
+            store.commit(Observation("monday", place.code, number + 1, LocationState(state), 0.9))
+    with McapRecorder(folder / "flight.mcap") as recorder:
+        record_setting(recorder, 1, FlightSetting(config, site, order))
+    return folder
+
+
+def recounted(flown: Path, out: Path, *options: str) -> tuple[dict[str, str], tuple[str, ...]]:
+    """The doubtful locations with their reasons, and the nodes of the mission that is written for them."""
+    books = flown / "books.csv"
+    books.write_text("location,code\n")
+    told = json.loads(run("compare", flown, books, "--recount", out, *options, "--json"))
+    nodes = load_config(out).mission.nodes
+    assert tuple(told["recount_nodes"]) == nodes
+    return told["recount"], nodes
+
+
+def test_a_recount_needs_no_configuration_beside_the_flight_that_knows_it(
+    flown: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "recount.toml"
+    doubtful, nodes = recounted(flown, out)
+    site, config = load_site(CONFIGS / "site-racks-small.toml"), load_config(out)
+    assert load_site(config.mission.site) == site
+    assert {site.locations[code].node for code in doubtful} == set(nodes)
+    assert set(doubtful.values()) == {"unreadable", "occluded"}
+    assert config.front_camera == load_config(CONFIGS / "sim.toml").front_camera
+    assert (config.inventory.run, config.mission.resume) == ("monday recount", False)
+    order = configured_order(config)
+    assert going_on(order, config.inventory.run, site, flown).nodes == nodes
+    elsewhere = tmp_path / "elsewhere"
+    shutil.copytree(flown, elsewhere)
+    (elsewhere / "flight.mcap").unlink()
+    books = flown / "books.csv"
+    assert "add --log FLIGHT.mcap or --config F" in error_of("compare", elsewhere, books, "--recount", out)
+    run("compare", elsewhere, books, "--recount", out, "--log", flown / "flight.mcap")
+
+
+def test_a_recount_is_limited_to_what_is_named(flown: Path, tmp_path: Path) -> None:
+    out, site = tmp_path / "recount.toml", load_site(CONFIGS / "site-racks-small.toml")
+    every, _ = recounted(flown, out)
+    in_a, nodes = recounted(flown, out, "--aisles", "A")
+    assert in_a
+    assert in_a.keys() == {code for code in every if site.locations[code].aisle == "A"}
+    assert {site.nodes[node].aisle for node in nodes} == {"A"}
+    two = sorted({site.locations[code].node for code in every})[:2]
+    _, nodes = recounted(flown, out, "--nodes", ",".join(two))
+    assert set(nodes) == set(two)
+    occluded, _ = recounted(flown, out, "--states", "occluded")
+    assert occluded == {code: why for code, why in every.items() if why == "occluded"}
+    assert recounted(flown, out, "--reasons", "unreadable")[0].keys() == every.keys() - occluded.keys()
+    some = list(every)[3:5]
+    assert list(recounted(flown, out, "--locations", ", ".join(some))[0]) == some
+    assert len(recounted(flown, out, "--at-most", "4")[0]) == 4
+
+
+def test_a_recount_of_so_many_begins_with_differences(flown: Path, tmp_path: Path) -> None:
+    out, books = tmp_path / "recount.toml", flown / "books.csv"
+    (late,) = list(load_site(CONFIGS / "site-racks-small.toml").locations)[-1:]
+    books.write_text(f"location,code\n{late},PALLET-9\n")
+    told = json.loads(run("compare", flown, books, "--recount", out, "--at-most", "1", "--json"))
+    assert told["recount"] == {late: "empty_but_expected"}
+
+
+@pytest.mark.parametrize(
+    ("option", "name"),
+    [
+        ("--aisles", "Z"),
+        ("--nodes", "Z9"),
+        ("--locations", "nowhere"),
+        ("--states", "lost"),
+        ("--reasons", "whim"),
+    ],
+)
+def test_a_limit_that_names_nothing_is_refused(flown: Path, tmp_path: Path, option: str, name: str) -> None:
+    books = flown / "books.csv"
+    books.write_text("location,code\n")
+    said = error_of("compare", flown, books, "--recount", tmp_path / "r.toml", option, name)
+    assert f"{option} {name}: unknown here; there are " in said
+
+
+def test_a_misspelt_location_of_the_books_is_named_with_its_line(counted: Path, tmp_path: Path) -> None:
+    books = tmp_path / "books.csv"
+    books.write_text("location,code\nA-01,PALLET-1\nA-O2,PALLET-2\nA-O2,PALLET-3\n")
+    told = RUNNER.invoke(app, ["inventory", "compare", str(counted), str(books), "--json"])
+    assert told.exit_code == 0
+    assert json.loads(told.stdout)["unknown_locations"] == [{"location": "A-O2", "line": 3}]
+    assert f"{books}: line 3: A-O2: {counted} knows no such location" in told.stderr
+    assert "line 4" not in told.stderr
+    assert "A-01" not in told.stderr

@@ -135,6 +135,17 @@ def test_gs1_elements_come_with_the_read() -> None:
     assert read.gs1 == (("01", "09501101530003"), ("10", "AB-123"), ("21", "X1"))
 
 
+def test_a_digital_link_gives_its_elements_and_keeps_its_text() -> None:
+    text = "https://example.com/01/09501101530003/21/X1"
+    (read,) = read_codes(on_shelf(qr(text, 4), 100, 100))
+    assert (read.text, read.gs1) == (text, (("01", "09501101530003"), ("21", "X1")))
+    (read,) = read_codes(on_shelf(qr("https://example.com/01/09501101530004", 4), 100, 100))
+    assert read.gs1 == ()
+    assert "check digit" in read.gs1_problem
+    (read,) = read_codes(on_shelf(qr("https://example.com/about", 4), 100, 100))
+    assert (read.gs1, read.gs1_problem) == ((), "")
+
+
 def test_pictures_without_codes_give_nothing() -> None:
     rng = np.random.default_rng(5)
     noise = rng.integers(0, 256, (480, 640), np.uint8)

@@ -1,0 +1,87 @@
+"""A store for who only looks: as it is where he may write, through a copy where he may not.
+
+SQLite's write-ahead log wants files beside the database, and a log that a power cut left must be taken up
+before the database says the truth; on a read-only medium, or in a folder of another user, neither can be.
+A copy of a few megabytes can do both.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from flightd.adapters.store.evidence_pictures import EvidenceFolder
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.errors import InputError, UnavailableError
+
+_DATABASE = "inventory.db"
+_PARTS = (_DATABASE, f"{_DATABASE}-wal")
+_TRIES = 5
+
+
+@contextmanager
+def opened_for_reading(folder: Path) -> Iterator[SqliteStore]:
+    """The store in `folder`, to look at; nothing that is written to it need stay.
+
+    Raises what `SqliteStore` raises, and UnavailableError for one that changes too fast to be copied."""
+    if not (folder / _DATABASE).exists() or _is_writable(folder):
+        with SqliteStore(folder, create=False) as store:
+            yield store
+        return
+    with TemporaryDirectory(prefix="flightd-inventory-") as beside:
+        copy = Path(beside)
+        _copied(folder, copy)
+        with _opened(copy, folder) as store:
+            store.folder, store.evidence = folder, EvidenceFolder(folder / "evidence")
+            yield store
+
+
+def _is_writable(folder: Path) -> bool:
+    """Whether SQLite can work there: in the folder, and in every file of the database."""
+    files = [path for path in folder.glob(f"{_DATABASE}*") if path.is_file()]
+    effective = os.access in os.supports_effective_ids
+    may = all(os.access(path, os.W_OK, effective_ids=effective) for path in files)
+    return may and os.access(folder, os.W_OK | os.X_OK, effective_ids=effective)
+
+
+def _opened(copy: Path, folder: Path) -> SqliteStore:
+    """The copied store; what is wrong with it is said of the original."""
+    try:
+        return SqliteStore(copy, create=False)
+    except (InputError, UnavailableError) as err:
+        raise type(err)(str(err).replace(str(copy), str(folder))) from None
+
+
+def _copied(folder: Path, copy: Path) -> None:
+    """Copy the database with its log, as they were at one moment."""
+    for _ in range(_TRIES):
+        before = _state(folder)
+        try:
+            for name in _PARTS:
+                (copy / name).unlink(missing_ok=True)
+                if (folder / name).exists():
+                    shutil.copyfile(folder / name, copy / name)
+        except FileNotFoundError:
+            continue  # a writer that ends takes its log away
+        except OSError as err:
+            raise UnavailableError(
+                f"cannot be read: {err.strerror or err}", file=folder / _DATABASE
+            ) from None
+        if _state(folder) == before:
+            return
+    raise UnavailableError("is being written all the time", file=folder / _DATABASE, remedy="try again")
+
+
+def _state(folder: Path) -> list[tuple[str, int, int]]:
+    """Name, size and time of change of the parts that are there."""
+    found = []
+    for name in _PARTS:
+        path = folder / name
+        if path.exists():
+            told = path.stat()
+            found.append((name, told.st_size, told.st_mtime_ns))
+    return found
