@@ -57,7 +57,7 @@ def test_the_factory_settings_of_arducopter_are_named_and_mended() -> None:
             assert wrong == {"GUID_TIMEOUT", "FS_GCS_TIMEOUT", "FS_THR_ENABLE", "BATT_FS_LOW_ACT"}
             assert "ARMING_SKIPCHK" in report.unread  # a name of 4.7
             assert await examination.fix(report.findings) == []
-            assert peer.parameters["GUID_TIMEOUT"] == 0.3
+            assert peer.parameters["GUID_TIMEOUT"] == pytest.approx(0.3)
             assert (await examination.report()).findings == ()
 
     virtual(test())
