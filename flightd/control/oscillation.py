@@ -23,6 +23,9 @@ _EASED = 0.6
 _LEAST_EASE = 0.35
 _SETTLES_NS = 1_000_000_000
 """So long a loop that was slowed down has to come to rest."""
+_CALM_NS = 8_000_000_000
+"""After so long without a swing the loop is tried faster again, once: what made it swing may have been
+learnt meanwhile."""
 
 
 class _Axis:
@@ -67,7 +70,10 @@ class OscillationMonitor:
 
     def __init__(self) -> None:
         self._axes = _Axis(), _Axis()
-        self._eased_ns: int | None = None
+        self._found_ns: int | None = None
+        self._calm_since_ns = 0
+        self._most = 1.0
+        self._tried = False
         self.ease = 1.0
         """How fast the loop may answer, as a share of what is configured."""
         self.swings = False
@@ -76,6 +82,7 @@ class OscillationMonitor:
     def rest(self) -> None:
         """Nothing is steered: what moves now is no loop's doing."""
         self._axes = _Axis(), _Axis()
+        self.swings = False
 
     def step(self, now_ns: int, off_x_mps: float, off_y_mps: float) -> None:
         """Take the velocity against that of the reference, m/s, grid axes."""
@@ -83,9 +90,16 @@ class OscillationMonitor:
             return
         along_x, along_y = self._axes
         swings_x, swings_y = along_x.step(now_ns, off_x_mps), along_y.step(now_ns, off_y_mps)
-        settles = self._eased_ns is not None and now_ns - self._eased_ns < _SETTLES_NS
-        if (swings_x or swings_y) and not settles:
-            self.ease = max(self.ease * _EASED, _LEAST_EASE)
-            self._eased_ns, settles = now_ns, True
-            self.rest()
-        self.swings = settles
+        self.swings = self._found_ns is not None and now_ns - self._found_ns < _SETTLES_NS
+        if (swings_x or swings_y) and not self.swings:
+            self._slow_down(now_ns)
+        elif self.ease < self._most and now_ns - self._calm_since_ns > _CALM_NS:
+            self.ease, self._calm_since_ns, self._tried = min(self.ease / _EASED, self._most), now_ns, True
+
+    def _slow_down(self, now_ns: int) -> None:
+        self.ease = max(self.ease * _EASED, _LEAST_EASE)
+        if self._tried:  # it was not the first seconds of a flight that knew little
+            self._most = self.ease
+        self.rest()
+        self._found_ns = self._calm_since_ns = now_ns
+        self.swings = True

@@ -345,7 +345,7 @@ HAZARDS: tuple[Hazard, ...] = (
         "half swings of the velocity about the reference's above 0.3 m/s: three, none smaller than four"
         " fifths of the one before, or two that grow: the position loop is too fast for what is late in it",
         Action.HOLD,
-        "slowed down to 60 % for the rest of the flight, then to 36 %; " + _HOLD,
+        "slowed down to 60 %, then to 36 %, tried faster again once after 8 s; " + _HOLD,
         _FAST,
     ),
     Hazard(

@@ -66,6 +66,22 @@ def test_each_time_the_loop_is_slowed_down_but_never_below_the_least() -> None:
     assert sorted(eases, reverse=True) == [1.0, 0.6, 0.36, 0.35]
 
 
+def calm(monitor: OscillationMonitor, from_s: float, seconds: float) -> None:
+    for tick in range(round(seconds * 1e9 / TICK_NS)):
+        monitor.step(round(from_s * 1e9) + tick * TICK_NS, 0.0, 0.0)
+
+
+def test_after_a_calm_while_it_is_tried_faster_again_but_only_once() -> None:
+    monitor = OscillationMonitor()
+    swung(monitor, swing(1.0, 0.0, 4.0))
+    calm(monitor, 3.0, 12.0)
+    assert monitor.ease == 1.0
+    assert not monitor.swings
+    swung(monitor, swing(1.0, 0.0, 4.0), start_ns=16_000_000_000)
+    calm(monitor, 20.0, 30.0)
+    assert monitor.ease == 0.6
+
+
 def test_what_moves_while_nothing_is_steered_counts_for_nothing() -> None:
     monitor = OscillationMonitor()
     off = swing(1.0, 0.0, 4.0)
