@@ -197,6 +197,7 @@ class Pilot:
             frames_arrive=estimator.frames.age_s(now_ns) < _FRAMES_ARRIVE_S,
             x_age_s=estimator.sight_age_s(now_ns, x_ns),
             y_age_s=estimator.sight_age_s(now_ns, y_ns),
+            commanded=self._commanded,
             features_age_s=estimator.sight_age_s(now_ns, features_ns),
             telemetry_age_s=math.inf if v is None else estimator.telemetry_age_s(now_ns, v.attitude.stamp_ns),
             vehicle=v,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from flightd.config.mission import MissionConfig
 from flightd.control.flight_controller import Reference
 from flightd.core.refusal import Refusal
-from flightd.core.types import HEALTHY, Demand, GridPose, Health, Phase, VehicleState
+from flightd.core.types import HEALTHY, AttitudeSetpoint, Demand, GridPose, Health, Phase, VehicleState
 from flightd.tracking.battery_charge import Charge, told_charge
 
 CEILING_MARGIN_M = 0.5
@@ -71,7 +71,7 @@ class MissionInputs:
     While the position is sought again, `rivals` are the nodes where the drone may be with their
     probability, and `way_out` a move that is safe at all of them.  `failed`: a step before this one raised
     an error.  `unfit` is what this computer's check before the flight found, `aisle_closed` what the
-    interlock says."""
+    interlock says; `commanded` the setpoint that is in force."""
 
     now_ns: int
     dt_s: float
@@ -94,6 +94,7 @@ class MissionInputs:
     unfit: Refusal | None = None
     aisle_closed: bool = True
     features_age_s: float = math.inf
+    commanded: AttitudeSetpoint | None = None
 
     @property
     def sight_s(self) -> float:

@@ -33,6 +33,9 @@ _STILL_M = 0.04
 _STILL_RAD = math.radians(2.0)
 _TOUCHES_S, _FLIES_S = 0.3, 0.5
 """Down and still, or kept from sinking, for so long it touches; moving for so long it flies again."""
+_DEFIES_RAD, _DEFIES_STILL_RAD, _DEFIES_S = math.radians(3.0), math.radians(1.0), 0.4
+"""An attitude that stays as it is for so long, though another one is commanded, is held by the floor, so be
+the range finder and the climb rate what they may."""
 _MOVES_MPS, _MOVES_M = 0.3, 0.15
 """What touches moves again when it climbs or sinks by more, or is so much higher: a told climb wanders by a
 third of it on the floor."""
@@ -49,6 +52,7 @@ class Standstill:
         self._since: tuple[int, float, Attitude] | None = None
         self._blocked_s = self._moving_s = self._sank_s = 0.0
         self._touched_m = math.nan
+        self._held: tuple[int, Attitude] | None = None
         self.touches = False
         """It stands on something: who stands does not follow a lean, and the position loop would ask for more
         and more of it."""
@@ -60,7 +64,7 @@ class Standstill:
 
     def begin(self) -> None:
         """A landing begins."""
-        self._since = None
+        self._since = self._held = None
         self._blocked_s, self._sank_s, self.touches = 0.0, 0.0, False
 
     def step(self, s: MissionInputs, *, sinks: bool) -> float:
@@ -74,7 +78,7 @@ class Standstill:
         is_held = sinks and abs(climb_mps) <= _STILL_MPS and may_touch
         self._blocked_s = self._blocked_s + s.dt_s if is_held else 0.0
         still_s = self._stood_s(s, sinks=sinks)
-        if max(still_s, self._blocked_s) > _TOUCHES_S:
+        if max(still_s, self._blocked_s) > _TOUCHES_S or self._defies(s, sinks=sinks):
             if not self.touches:
                 self._touched_m = s.height_m
             self.touches, self._moving_s = True, 0.0
@@ -83,6 +87,19 @@ class Standstill:
             self._moving_s = self._moving_s + s.dt_s if moves else 0.0
             self.touches = self._moving_s <= _FLIES_S
         return still_s
+
+    def _defies(self, s: MissionInputs, *, sinks: bool) -> bool:
+        """It does not follow the lean that is commanded."""
+        v, wanted, before = s.vehicle, s.commanded, self._held
+        if v is None or wanted is None or not sinks or s.telemetry_age_s > self._hold_s:
+            self._held = None
+            return False
+        told = v.attitude
+        off_rad = max(abs(wanted.roll_rad - told.roll_rad), abs(wanted.pitch_rad - told.pitch_rad))
+        if before is None or off_rad < _DEFIES_RAD or _turned_rad(before[1], told) > _DEFIES_STILL_RAD:
+            self._held = s.now_ns, told
+            return False
+        return (s.now_ns - before[0]) * 1e-9 > _DEFIES_S
 
     def _stood_s(self, s: MissionInputs, *, sinks: bool) -> float:
         v = s.vehicle
@@ -104,9 +121,11 @@ def _is_steady(height_m: float, climb_mps: float) -> bool:
 
 
 def _is_still(before: tuple[float, Attitude], now: tuple[float, Attitude]) -> bool:
-    a, b = before[1], now[1]
-    turned_rad = max(abs(a.roll_rad - b.roll_rad), abs(a.pitch_rad - b.pitch_rad))
-    return not abs(before[0] - now[0]) > _STILL_M and turned_rad < _STILL_RAD
+    return not abs(before[0] - now[0]) > _STILL_M and _turned_rad(before[1], now[1]) < _STILL_RAD
+
+
+def _turned_rad(a: Attitude, b: Attitude) -> float:
+    return max(abs(a.roll_rad - b.roll_rad), abs(a.pitch_rad - b.pitch_rad))
 
 
 class ReckonedHeight:

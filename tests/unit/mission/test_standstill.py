@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import random
 
 import pytest
 
 from flightd.config.mission import MissionConfig
-from flightd.core.types import Attitude, LandedState, VehicleState
+from flightd.core.types import Attitude, AttitudeSetpoint, LandedState, VehicleState
 from flightd.mission.flight.touchdown import Standstill
 from flightd.mission.guidance import MissionInputs
 
@@ -15,13 +16,27 @@ TICK_NS = 20_000_000
 PARAMS = MissionConfig(site="site-demo.toml")
 
 
-def told(tick: int, height_m: float, climb_mps: float) -> MissionInputs:
+def told(
+    tick: int, height_m: float, climb_mps: float, roll_rad: float = 0.0, wanted_rad: float = 0.0
+) -> MissionInputs:
     now_ns = tick * TICK_NS
-    attitude = Attitude(now_ns, 0.0, 0.0, 0.0)
+    attitude = Attitude(now_ns, roll_rad, 0.0, 0.0)
     vehicle = VehicleState(
         attitude, height_m, now_ns, climb_mps, "LAND", True, True, LandedState.IN_AIR, 0.9, 12.0, now_ns
     )
-    return MissionInputs(now_ns, TICK_NS * 1e-9, None, True, height_m, True, 0.0, 0.0, 0.0, vehicle)
+    return MissionInputs(
+        now_ns,
+        TICK_NS * 1e-9,
+        None,
+        True,
+        height_m,
+        True,
+        0.0,
+        0.0,
+        0.0,
+        vehicle,
+        commanded=AttitudeSetpoint(now_ns, wanted_rad, 0.0),
+    )
 
 
 @pytest.mark.parametrize("height_m", [0.1, 1.62])
@@ -47,3 +62,21 @@ def test_one_that_rises_flies(rises_mps: float, height_m: float) -> None:
     for tick in range(100, 250):
         stands.step(told(tick, height_m + rises_mps * (tick - 100) * 0.02, rises_mps), sinks=True)
     assert not stands.touches
+
+
+def test_what_does_not_follow_a_lean_stands_whatever_its_sensors_tell() -> None:
+    stands = Standstill(PARAMS)
+    for tick in range(100):
+        stands.step(told(tick, math.nan, 0.22, 0.005 * (tick % 2), 0.07), sinks=True)
+        assert stands.touches == (tick * 0.02 > 0.4)
+
+
+def test_what_follows_its_lean_late_flies() -> None:
+    """The autopilot's lag and the telemetry's delay are 0.3 s of a swing."""
+    stands = Standstill(PARAMS)
+    for tick in range(500):
+        wanted, roll = (
+            math.radians(8.0) * math.sin(math.tau * (tick * 0.02 - late) / 1.5) for late in (0.0, 0.3)
+        )
+        stands.step(told(tick, math.nan, 0.22, roll, wanted), sinks=True)
+        assert not stands.touches
