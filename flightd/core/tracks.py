@@ -56,15 +56,17 @@ class SensorEstimate:
     """What the lines say of the drone's own sensors, beyond the configuration, with standard deviations.
 
     Frames are exposed `delay_s` later than their stamps say: the camera's delay is that much shorter than
-    configured, against the attitude's.  The camera sits rolled and pitched by `mount` more than configured,
-    the told roll and pitch are too small by `tilt`, lengths are longer by `scale_share`.  `shake_rad` is what
-    the picture shakes against the attitude from frame to frame (rms)."""
+    configured, against the attitude's.  The camera sits rolled, pitched and turned by `mount` more than
+    configured, the told roll and pitch are too small by `tilt`, lengths are longer by `scale_share`.
+    `shake_rad` is what the picture shakes against the attitude from frame to frame (rms)."""
 
     delay_s: float = math.nan
     delay_sigma_s: float = math.nan
     mount_roll_rad: float = math.nan
     mount_pitch_rad: float = math.nan
     mount_sigma_rad: float = math.nan
+    mount_yaw_rad: float = math.nan
+    mount_yaw_sigma_rad: float = math.nan
     tilt_roll_rad: float = math.nan
     tilt_pitch_rad: float = math.nan
     tilt_sigma_rad: float = math.nan

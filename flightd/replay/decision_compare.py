@@ -90,11 +90,10 @@ def replay_decisions(log: FlightLog, step: Step) -> Comparison:
         decision = recorded.pop(entry.stamp_ns, None)
         if decision is None:
             missing += 1
-        elif decision != replayed:
+        elif here := list(_differences(decision, replayed, (entry.stamp_ns - start_ns) / 1e9)):
             differing += 1
-            time_s = (entry.stamp_ns - start_ns) / 1e9
             worst: dict[str, _Difference] = {}
-            for difference in _differences(decision, replayed, time_s):
+            for difference in here:
                 before = worst.get(difference.field)
                 if before is None or difference.size > before.size:
                     worst[difference.field] = difference
@@ -142,11 +141,12 @@ def _number(value: object) -> object:
 
 
 def _differences(recorded: Any, replayed: Any, time_s: float, field: str = "") -> Iterator[_Difference]:
-    """The leaves in which two JSON values differ; all items of a list count as one field."""
+    """The leaves in which two JSON values differ; all items of a list count as one field.  What an older
+    version did not tell yet is none."""
     if recorded == replayed:
         return
     if isinstance(recorded, dict) and isinstance(replayed, dict):
-        for key in recorded.keys() | replayed.keys():
+        for key in recorded:
             inner = f"{field}.{key}" if field else key
             yield from _differences(recorded.get(key), replayed.get(key), time_s, inner)
     elif isinstance(recorded, list) and isinstance(replayed, list) and len(recorded) == len(replayed):

@@ -116,6 +116,7 @@ def sensor_rows(found: FittedSensors, camera: CameraConfig, online: SensorEstima
             "camera.mount_yaw_deg",
             camera.mount_yaw_deg,
             *turned(Sensor.MOUNT_YAW),
+            seen=(degrees(online.mount_yaw_rad), degrees(online.mount_yaw_sigma_rad)),
         ),
         row(
             Sensor.FOCAL,

@@ -155,6 +155,8 @@ class FloorFilter:
             mount_roll_rad=self.mean(MOUNT_ROLL),
             mount_pitch_rad=self.mean(MOUNT_PITCH),
             mount_sigma_rad=max(self.sigma(MOUNT_ROLL), self.sigma(MOUNT_PITCH)),
+            mount_yaw_rad=self.mean(MOUNT_YAW),
+            mount_yaw_sigma_rad=self.sigma(MOUNT_YAW),
             tilt_roll_rad=self.mean(ROLL),
             tilt_pitch_rad=self.mean(PITCH),
             tilt_sigma_rad=max(self.sigma(ROLL), self.sigma(PITCH)),

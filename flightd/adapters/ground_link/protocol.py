@@ -110,6 +110,8 @@ class SensorReport(msgspec.Struct, frozen=True):
     tilt_roll_deg: Annotated[float, Meta(description="the roll that is told is too small by this")]
     tilt_pitch_deg: Annotated[float, Meta(description="the pitch that is told is too small by this")]
     tilt_sigma_deg: Annotated[float, Meta(description="standard deviation of the tilt")]
+    mount_yaw_deg: Annotated[float, Meta(description="the camera turned in its mount, clockwise from above")]
+    mount_yaw_sigma_deg: Annotated[float, Meta(description="standard deviation of that turn")]
     shake_deg: Annotated[float, Meta(description="the picture against the attitude, frame by frame, rms")]
 
 

@@ -74,6 +74,8 @@ def _sensors(known: SensorEstimate) -> SensorReport:
         tilt_roll_deg=degrees(known.tilt_roll_rad),
         tilt_pitch_deg=degrees(known.tilt_pitch_rad),
         tilt_sigma_deg=degrees(known.tilt_sigma_rad),
+        mount_yaw_deg=degrees(known.mount_yaw_rad),
+        mount_yaw_sigma_deg=degrees(known.mount_yaw_sigma_rad),
         shake_deg=degrees(known.shake_rad),
     )
 

@@ -30,6 +30,7 @@ def _estimated(seen: SensorEstimate, latency_s: float) -> Known:
         camera_delay_s=latency_s - seen.delay_s,
         mount_roll_deg=math.degrees(seen.mount_roll_rad),
         mount_pitch_deg=math.degrees(seen.mount_pitch_rad),
+        mount_yaw_deg=math.degrees(seen.mount_yaw_rad),
         tilt=(-math.degrees(seen.tilt_roll_rad), -math.degrees(seen.tilt_pitch_rad)),
     )
 
@@ -40,6 +41,7 @@ def _sigma(seen: SensorEstimate) -> Known:
         camera_delay_s=seen.delay_sigma_s,
         mount_roll_deg=mount_deg,
         mount_pitch_deg=mount_deg,
+        mount_yaw_deg=math.degrees(seen.mount_yaw_sigma_rad),
         tilt=(tilt_deg, tilt_deg),
     )
     return known | {"tilt_bias_deg": known["tilt_roll_deg"]}
@@ -62,8 +64,8 @@ def _rounded(
     camera_delay_s: float,
     mount_roll_deg: float,
     mount_pitch_deg: float,
+    mount_yaw_deg: float,
     tilt: tuple[float, float],
-    mount_yaw_deg: float = math.nan,
 ) -> Known:
     values = {
         "camera_delay_s": camera_delay_s,

@@ -65,7 +65,8 @@ def status_lines(report: StatusReport) -> list[str]:
             f"sensors  beyond the configuration: delay {seen.delay_ms:+.0f} ms"
             f" (sigma {seen.delay_sigma_ms:.0f}),"
             f" mount roll {seen.mount_roll_deg:+.1f} pitch {seen.mount_pitch_deg:+.1f} deg"
-            f" (sigma {seen.mount_sigma_deg:.1f}), attitude {seen.tilt_roll_deg:+.1f}"
+            f" (sigma {seen.mount_sigma_deg:.1f}) yaw {seen.mount_yaw_deg:+.1f}"
+            f" (sigma {seen.mount_yaw_sigma_deg:.1f}), attitude {seen.tilt_roll_deg:+.1f}"
             f" {seen.tilt_pitch_deg:+.1f} deg (sigma {seen.tilt_sigma_deg:.1f})"
         )
     lines.append(

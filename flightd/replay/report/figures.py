@@ -215,9 +215,10 @@ def _delay(flight: RecordedFlight) -> Figure | None:
     seen = flight.sensors
     if not seen.is_known:
         return None
-    mount = " and ".join(number(math.degrees(a), 1) for a in (seen.mount_roll_rad, seen.mount_pitch_rad))
+    mount = (seen.mount_roll_rad, seen.mount_pitch_rad, seen.mount_yaw_rad)
+    off = " / ".join("-" if math.isnan(angle) else number(math.degrees(angle), 1) for angle in mount)
     sigma = number(seen.delay_sigma_s * 1e3, 1)
-    note = f"± {sigma}, more than configured; mounted {mount}° off in roll and pitch"
+    note = f"± {sigma}, more than configured; mounted {off}° off in roll, pitch and yaw"
     return Figure("Camera delay", f"{-seen.delay_s * 1e3:+.0f}", "ms", note)
 
 
