@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -100,6 +101,18 @@ def test_a_decision_of_another_kind_is_beyond_any_tolerance(log: Path) -> None:
     comparison = replay_decisions(read_log(log), changed)
     assert {drift.field for drift in comparison.drifts} == {"goal", "setpoint"}
     assert not comparison.within(1e9)
+
+
+def test_what_an_older_version_did_not_record_is_no_difference(log: Path) -> None:
+    recorded = read_log(log, {Topic.TICK, Topic.DECISION})
+    messages: list[Any] = [entry.message for entry in recorded.entries if entry.topic == Topic.DECISION]
+    sensors = [message["tracks"]["sensors"] for message in messages if message["tracks"] is not None]
+    for one in sensors:
+        del one["mount_yaw_rad"]
+    assert replay_decisions(recorded, _step()).identical
+    for one in sensors:
+        one["mount_roll_rad"] = 0.1
+    assert not replay_decisions(recorded, _step()).identical
 
 
 def test_gaps_in_the_record_are_told(log: Path) -> None:
