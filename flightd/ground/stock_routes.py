@@ -99,7 +99,7 @@ class StockAnswers:
         names = await self.off_loop(self._stores.names)
         return as_json(
             {
-                "folder": self._stores.is_named,
+                "folder": self._stores.title,
                 "stores": [{"name": name, "written_s": ns / 1e9} for name, ns in names],
                 "drones": list(self._drones),
             }

@@ -46,9 +46,9 @@ class Stores:
         self._sites: dict[Path, tuple[str, Site | None]] = {}
 
     @property
-    def is_named(self) -> bool:
-        """Whether the station was told a folder."""
-        return self._root is not None
+    def title(self) -> str:
+        """The name of the folder, for people; empty where the station was told none."""
+        return "" if self._root is None else self._root.resolve().name or "/"
 
     def names(self) -> list[tuple[str, int]]:
         """Every store and when it was written last (UTC, ns), newest first."""

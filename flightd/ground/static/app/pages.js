@@ -9,6 +9,12 @@ export const PAGES = [
     styles: ["live.css", "map.css"],
     load: () => import("./live/live_page.js"),
   },
+  {
+    path: "/stock",
+    title: "Stock",
+    styles: ["stock.css"],
+    load: () => import("./stock/stock_page.js"),
+  },
 ];
 
 // The page at a path, or undefined: the longest one that it lies under.
