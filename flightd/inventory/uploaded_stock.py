@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from flightd.inventory.code_equality import code_key
 from flightd.inventory.stock_columns import StockColumns
 from flightd.inventory.stock_table import StockTable, is_rounded
 
@@ -14,13 +15,17 @@ _NUMBER = re.compile(r"[\d.,' ]*\d[\d.,' ]*")
 
 @dataclass(frozen=True, slots=True)
 class UploadedStock:
-    """`expected` as `compare_stock` takes it, `quantities` by place and code as they are written, and one
-    line for each row that was left out."""
+    """`expected` as `compare_stock` takes it, `quantities` by place and code however they are written, and
+    one line for each row that was left out."""
 
     expected: dict[str, list[str]]
     quantities: dict[tuple[str, str], str]
     problems: tuple[str, ...]
     rows: int
+
+    def quantity(self, place: str, code: str) -> str:
+        """As the books write it; empty where they do not say."""
+        return self.quantities.get((place.casefold(), code_key(code)), "")
 
 
 def uploaded_stock(table: StockTable, columns: StockColumns) -> UploadedStock:
@@ -43,7 +48,7 @@ def uploaded_stock(table: StockTable, columns: StockColumns) -> UploadedStock:
         codes = expected.setdefault(place, [])
         if code and not _ZERO.fullmatch(quantity):
             codes.append(code)
-            quantities[place, code] = quantity
+            quantities[place.casefold(), code_key(code)] = quantity
     return UploadedStock(expected, quantities, tuple(problems), len(table.rows) - first)
 
 
