@@ -24,7 +24,7 @@ export default function StockPage({ route }) {
       <div class="stock-main">
         <h2 class="stock-title">Stock <small>${counted} of ${codes.length} places counted</small></h2>
         ${trouble && html`<p class="stock-trouble" role="alert">${trouble}</p>`}
-        <${FindCard} />
+        <${FindCard} onChoose=${choose} />
         ${codes.length > 0 && html`<${Elevations} onChoose=${choose} />`}
         ${codes.length === 0 && !trouble && html`<p class="quiet">Nothing was counted yet.</p>`}
         <${ExpectedCard} onChoose=${choose} />
