@@ -43,7 +43,7 @@ def ground(
     ] = "127.0.0.1:8080",
     folder: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Where inventories and logs lie; they are read, never changed."),
+        typer.Option(metavar="DIR", help="Where inventories and logs lie: they are read, and never changed."),
     ] = None,
     key: Annotated[
         Path | None, typer.Option(envvar="FLIGHTCTL_KEY", help="Your secret key: NAME.key_secret.")

@@ -44,7 +44,7 @@ export async function loadSources(wanted) {
 export function show(source) {
   change({
     source, tag: "", fronts: [], places: {}, fresh: new Set(), trouble: "", found: null, words: "", chosen: "", looks: null,
-    expected: null,
+    expected: null, decisions: {},
   });
   return loadPlaces();
 }

@@ -17,6 +17,8 @@ const EMPTY = {
   chosen: "", // code of the place in the card
   looks: null, // {code, looks} or {code, trouble}
   expected: null, // see expected_stock.js
+  decisions: {}, // of each place, oldest first: see decisions.js
+  withClosed: false, // places that were decided are listed too
 };
 
 export const stock = () => state.stock ?? EMPTY;
