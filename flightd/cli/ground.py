@@ -18,7 +18,7 @@ EXAMPLES = """Examples:
   flightd ground                               the flightd on this machine; open http://127.0.0.1:8080
   flightd ground --drone north=drone-1 --key ann.key_secret --server-key drone-1.key
   flightd ground --drone a=127.0.0.1 --drone b=127.0.0.1:6571/6572    two simulators, by their ports
-  flightd ground --folder out                  with the inventories and logs under out
+  flightd ground --folder out                  with the flights and inventories under out
   flightd ground --listen 127.0.0.1:9000
 """
 
@@ -43,7 +43,7 @@ def ground(
     ] = "127.0.0.1:8080",
     folder: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Where inventories and logs lie: they are read, and never changed."),
+        typer.Option(metavar="DIR", help="Where flights and inventories lie; they are read, never changed."),
     ] = None,
     key: Annotated[
         Path | None, typer.Option(envvar="FLIGHTCTL_KEY", help="Your secret key: NAME.key_secret.")
