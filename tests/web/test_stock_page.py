@@ -309,3 +309,19 @@ def test_places_that_need_a_look_are_a_queue_with_who_looks_and_what_was_decided
         with SqliteStore(folder / "monday") as store:
             store.commit(look("AL-02-2-1", LocationState.UNREADABLE, at_s=60))
         expect(page.get_by_role("heading", name="4 places to look at")).to_be_visible()
+
+
+def test_a_store_that_a_flight_begins_is_shown_instead_of_what_the_drone_tells(
+    browser: Browser, tmp_path: Path
+) -> None:
+    with station(["demo=127.0.0.1:1/1"], folder=tmp_path) as url, opened(browser, f"{url}/stock") as page:
+        chosen = page.get_by_role("combobox", name=re.compile("^Inventory"))
+        expect(chosen).to_have_value("drone/demo")
+        expect(page.get_by_role("alert").filter(has_text="cannot be reached")).to_be_visible()
+        counted_store(tmp_path / "tuesday")
+        expect(chosen).to_have_value("store/tuesday", timeout=15_000)
+        expect(cell(page, "AL-01-1-1")).to_be_visible()
+        chosen.select_option("drone/demo")
+        expect(page.get_by_role("alert").filter(has_text="cannot be reached")).to_be_visible()
+        page.wait_for_timeout(11_000)
+        expect(chosen).to_have_value("drone/demo")

@@ -6,6 +6,7 @@ const EMPTY = {
   stores: null, // [{name, written_s}], newest first; null: not asked yet
   drones: [],
   source: null, // {kind: "store" | "drone", name}
+  picked: false, // the person has said which
   tag: "", // of what is shown, as the station names it
   fronts: [],
   places: {}, // code -> {state, texts, confidence, pending, seen_s}
