@@ -10,6 +10,7 @@ import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import uvicorn
 
@@ -90,14 +91,17 @@ def opened(listening: Listening) -> tuple[socket.socket, Listening]:
 
 
 def run(
-    drones: Sequence[tuple[str, Address]], listening: Listening, on_ready: Callable[[Listening], None]
+    drones: Sequence[tuple[str, Address]],
+    listening: Listening,
+    on_ready: Callable[[Listening], None],
+    folder: Path | None = None,
 ) -> signal.Signals | None:
     """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had."""
     listener, where = opened(listening)
     came: list[signal.Signals] = []
 
     async def until_signal() -> None:
-        serving = asyncio.ensure_future(serve(drones, listener, where, on_ready))
+        serving = asyncio.ensure_future(serve(drones, listener, where, on_ready, folder))
         end_on_signals(serving, came)
         with contextlib.suppress(asyncio.CancelledError):
             await serving
@@ -112,12 +116,13 @@ async def serve(
     listener: socket.socket,
     where: Listening,
     on_ready: Callable[[Listening], None] = lambda _: None,
+    folder: Path | None = None,
 ) -> None:
-    """Serve until cancelled; the pages are told that it ends."""
+    """Serve until cancelled; the pages are told that it ends.  Inventories and logs lie under `folder`."""
     hub = Hub(drones)
     server = _Server(
         uvicorn.Config(
-            application(hub, own_hosts(where.host, where.port)),
+            application(hub, own_hosts(where.host, where.port), folder),
             http="h11",
             ws="websockets-sansio",
             lifespan="off",

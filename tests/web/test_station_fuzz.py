@@ -7,6 +7,7 @@ import json
 import logging
 import random
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import pytest
 from websockets.asyncio.client import ClientConnection
@@ -19,10 +20,12 @@ from tests.fuzz.mutate import spoil_bytes, spoil_text
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.ground_link import address_of, local, serving, telling
 from tests.web.served import JSON, Station, served, told
+from tests.web.stock_rig import counted_store
 
 NOBODY = ("demo", Address("127.0.0.1", 1, 1))
 REQUESTS, ACTS, MESSAGES = 300, 200, 150
 _AT_ONCE = 20
+BOOKS = "place;code\nAL-01-1-1;340123450002439853\n"
 PAGE_WORDS = (
     '{"say":"want","pictures":[{"drone":"demo","camera":"down"}]}',
     '{"say":"drawn"}',
@@ -41,6 +44,11 @@ def requests(station: Station, draw: random.Random) -> list[bytes]:
         "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n",
         f"POST /drones/demo/acts HTTP/1.1\r\nHost: {host}\r\nOrigin: {station.origin}\r\n"
         f"Content-Type: application/json\r\nContent-Length: {len(ACT_WORDS[0])}\r\n\r\n{ACT_WORDS[0]}",
+        f"GET /api/stock/find?store=monday&text=%2800%29340123450002439853 HTTP/1.1\r\nHost: {host}\r\n"
+        "Connection: close\r\n\r\n",
+        f"POST /api/stock/compare?store=monday&place=0&code=1&quantity=&heading=yes HTTP/1.1\r\n"
+        f"Host: {host}\r\nOrigin: {station.origin}\r\nContent-Type: application/octet-stream\r\n"
+        f"Content-Length: {len(BOOKS)}\r\nConnection: close\r\n\r\n{BOOKS}",
     ]
     corpus = [request.encode() for request in whole]
     made = [spoil_bytes(draw, corpus) for _ in range(REQUESTS)]
@@ -49,10 +57,11 @@ def requests(station: Station, draw: random.Random) -> list[bytes]:
 
 @in_real_time
 async def test_malformed_requests_are_refused_and_the_next_page_is_served(
-    caplog: pytest.LogCaptureFixture,
+    caplog: pytest.LogCaptureFixture, tmp_path: Path
 ) -> None:
     draw = random.Random(1)
-    async with served(NOBODY) as station:
+    counted_store(tmp_path / "monday")
+    async with served(NOBODY, folder=tmp_path) as station:
         made = requests(station, draw)
         for first in range(0, len(made), _AT_ONCE):
             answers = await asyncio.gather(
