@@ -17,8 +17,8 @@ which spreadsheets and warehouse systems change.  The serials and batches of an 
 from __future__ import annotations
 
 import re
-from urllib.parse import parse_qsl, unquote, urlsplit
 
+from flightd.vision.shelf.digital_link import parse_digital_link
 from flightd.vision.shelf.gs1 import FNC1, Elements, Gs1Error, has_check_digit, parse_element_string
 
 _AIM = re.compile(r"^\][A-Za-z][0-9A-Za-z]")
@@ -33,23 +33,6 @@ _GTIN_DIGITS = range(8, 15)
 _SSCC_DIGITS = 18
 _QUALIFIERS = ("22", "10", "21")
 """Of an article (01): variant, batch, serial number."""
-_LINK_NAMES = {"gtin": "01", "sscc": "00", "lot": "10", "ser": "21", "cpv": "22"}
-_LINK_KEYS = (
-    "00",
-    "01",
-    "253",
-    "255",
-    "401",
-    "402",
-    "414",
-    "417",
-    "8003",
-    "8004",
-    "8006",
-    "8010",
-    "8017",
-    "8018",
-)
 _LONGEST = 2048
 
 
@@ -76,7 +59,7 @@ def code_key(text: str) -> str:
 def _elements(text: str) -> Elements:
     """The GS1 elements in it, by whatever notation it is in; none where it has none."""
     if "://" in text[:8]:
-        return _digital_link(text)
+        return _linked(text)
     if _PARENTHESISED.match(text):
         return _parsed(_without_parentheses(text))
     found = _parsed(text)
@@ -98,26 +81,12 @@ def _without_parentheses(text: str) -> str:
     return "".join(f"{ai}{value.replace(' ', '')}{FNC1}" for ai, value in pairs)
 
 
-def _digital_link(uri: str) -> Elements:
-    """The elements of a GS1 Digital Link URI; none for any other address."""
+def _linked(address: str) -> Elements:
+    """The elements of a GS1 Digital Link; none of any other address, or of one that is damaged."""
     try:
-        parts = urlsplit(uri)
-    except ValueError:
+        return parse_digital_link(address)
+    except Gs1Error:
         return ()
-    if parts.scheme.lower() not in {"http", "https"}:
-        return ()
-    steps = [unquote(step) for step in parts.path.split("/") if step]
-    names = [_LINK_NAMES.get(step.lower(), step) for step in steps]
-    asked = [(_LINK_NAMES.get(name, name), value) for name, value in parse_qsl(parts.query)]
-    besides = [pair for pair in asked if pair[0] in _QUALIFIERS]
-    for start, name in enumerate(names):
-        pairs = [*zip(names[start::2], steps[start + 1 :: 2], strict=False), *besides]
-        if name in _LINK_KEYS and (len(names) - start) % 2 == 0:
-            padded = [(ai, value.zfill(14) if ai == "01" else value) for ai, value in pairs]
-            found = _parsed("".join(f"{ai}{value}{FNC1}" for ai, value in padded))
-            if found:
-                return found
-    return ()
 
 
 def _named(elements: Elements) -> str:

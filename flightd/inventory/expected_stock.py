@@ -28,11 +28,12 @@ def read_stock(path: Path) -> dict[str, list[str]]:
 
 
 def unknown_locations(path: Path, known: Collection[str]) -> tuple[UnknownLocation, ...]:
-    """The locations of the books that are not `known`, in the order of the file: of other halls, or misspelt.
-    Errors as `read_stock`."""
+    """The locations of the books that are not `known`, in the order of the file: of other halls, or misspelt;
+    their case is none of it.  Errors as `read_stock`."""
     first: dict[str, int] = {}
+    folded = {location.casefold() for location in known}
     for line, location, _ in _rows(path):
-        if location not in known:
+        if location.casefold() not in folded:
             first.setdefault(location, line)
     return tuple(UnknownLocation(location, line) for location, line in first.items())
 

@@ -28,6 +28,8 @@ _QUALIFIERS: Final = {
     "8018": ("8019",),
 }
 """The primary keys, and what may stand behind each of them in the path, in this order."""
+_NAMES: Final = {"gtin": "01", "sscc": "00", "cpv": "22", "lot": "10", "ser": "21"}
+"""Which the first versions of the standard let stand for identifiers."""
 _GTIN_DIGITS: Final = 14
 _SHORT_GTINS: Final = frozenset((8, 12, 13))
 _RESOLVER: Final = "https://id.gs1.org"
@@ -46,14 +48,16 @@ def parse_digital_link(text: str) -> Elements:
     if address.scheme.lower() not in {"http", "https"} or not address.netloc:
         return ()
     parts = [part for part in address.path.split("/") if part]
-    for start, ai in enumerate(parts[:-1]):
+    for start, name in enumerate(parts[:-1]):
+        ai = _identifier(name)
         qualifiers = _pairs(parts[start + 2 :])
         if ai not in _QUALIFIERS or qualifiers is None or not _in_order(qualifiers, _QUALIFIERS[ai]):
             continue
         value = _padded(ai, unquote(parts[start + 1]))
         if not _has_form(ai, value):
             continue
-        attributes = tuple((name, told) for name, told in parse_qsl(address.query) if name.isdecimal())
+        asked = ((_identifier(name), told) for name, told in parse_qsl(address.query))
+        attributes = tuple((name, told) for name, told in asked if name.isdecimal())
         elements = ((ai, value), *qualifiers, *attributes)
         for identifier, told in elements:
             check_element(identifier, told)
@@ -70,7 +74,13 @@ def _pairs(parts: list[str]) -> Elements | None:
     """Identifiers and values by turns; None for an odd number of parts."""
     if len(parts) % 2:
         return None
-    return tuple((ai, unquote(value)) for ai, value in zip(parts[::2], parts[1::2], strict=True))
+    return tuple(
+        (_identifier(name), unquote(value)) for name, value in zip(parts[::2], parts[1::2], strict=True)
+    )
+
+
+def _identifier(name: str) -> str:
+    return _NAMES.get(name.lower(), name)
 
 
 def _in_order(qualifiers: Elements, allowed: tuple[str, ...]) -> bool:
