@@ -6,12 +6,11 @@ import asyncio
 import contextlib
 from collections.abc import Iterable
 from functools import partial
-from pathlib import Path
 
 import msgspec
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import FileResponse, Response
+from starlette.responses import Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
@@ -22,8 +21,8 @@ from flightd.ground.browser import Browser
 from flightd.ground.guards import Guard
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES, read_act, read_page_message
+from flightd.ground.pages import STATIC, first_page
 
-STATIC = Path(__file__).with_name("static")
 _NOT_OURS = 1008
 """WebSocket: a message that is against the rules."""
 _FULL = 1013
@@ -33,16 +32,12 @@ _FULL = 1013
 def application(hub: Hub, hosts: Iterable[str]) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked."""
     routes = [
-        Route("/", _page, methods=["GET"]),
+        first_page(),
         WebSocketRoute("/live", partial(_live, hub)),
         Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
     return Guard(Starlette(routes=routes), hosts)
-
-
-async def _page(_request: Request) -> Response:
-    return FileResponse(STATIC / "index.html")
 
 
 async def _live(hub: Hub, socket: WebSocket) -> None:

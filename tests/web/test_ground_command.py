@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from flightd.core.errors import InputError
-from flightd.ground.application import STATIC
 from flightd.ground.drone_names import drone_addresses
 from flightd.ground.guards import own_hosts
+from flightd.ground.pages import STATIC
 from flightd.ground.server import Listening
 
 ROOT = Path(__file__).parents[2]

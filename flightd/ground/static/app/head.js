@@ -1,17 +1,31 @@
-// The head: which site and drone, how well it is heard, and STOP, always in reach.
+// The head: pages, which site and drone, how well it is heard, and STOP, always in reach.
 import { act } from "./acts.js";
 import { html } from "./html.js";
 import { hears } from "./hearing.js";
+import { PAGES } from "./pages.js";
 import { shown, state, update } from "./store.js";
 
 export function Head() {
   return html`
     <header class="head">
       <h1 class="brand"><img src="/static/icon.svg" alt="" width="28" height="28" /><span>flightd</span></h1>
+      <${Pages} />
       <${Drones} />
       <${Hearing} />
       <${Stop} />
     </header>
+  `;
+}
+
+function Pages() {
+  return html`
+    <nav class="pages" aria-label="Pages">
+      ${PAGES.map(
+        (page) => html`
+          <a key=${page.path} href=${page.path} aria-current=${page === state.route.page ? "page" : null}>${page.title}</a>
+        `,
+      )}
+    </nav>
   `;
 }
 

@@ -1,16 +1,38 @@
-// The frame of every page: head with STOP, what is wrong with the connection, the live page.
+// The frame of every page: head with STOP, what is wrong with the connection, and the page that is gone to.
 import { Head } from "./head.js";
 import { html } from "./html.js";
-import { LivePage } from "./live/live_page.js";
+import { forget, loaded } from "./page_loader.js";
 import { Silence } from "./silence.js";
+import { state, update } from "./store.js";
 
 export function Page() {
   return html`
-    <a class="skip" href="#main">To the flight</a>
+    <a class="skip" href="#main">To the page</a>
     <${Head} />
     <main id="main" tabindex="-1">
       <${Silence} />
-      <${LivePage} />
+      <${Shown} route=${state.route} />
     </main>
   `;
 }
+
+function Shown({ route }) {
+  const { page } = route;
+  if (!page) {
+    return html`<section class="card empty"><h2>There is no such page</h2>
+      <p>Nothing is at <code>${route.path}</code>. <a href="/">To the flight</a></p></section>`;
+  }
+  const { component: Component, failed } = loaded(page, redraw);
+  if (Component) return html`<${Component} key=${page.path} route=${route} />`;
+  if (!failed) return html`<p class="loading quiet" role="status">Loading …</p>`;
+  const again = () => {
+    forget(page);
+    redraw();
+  };
+  return html`
+    <section class="card empty"><h2>The page cannot be loaded</h2>
+      <p>The ground station does not send it. <button class="tab" onClick=${again}>Try again</button></p></section>
+  `;
+}
+
+const redraw = () => update(() => {});

@@ -16,6 +16,7 @@ const TRACK_STEP_M = 0.05;
 const TRACK_KEPT = 4000;
 
 export const state = {
+  route: null, // page, path below it and query: see router.js
   station: null, // version, drones, browsers
   drones: new Map(),
   selected: "", // drone that is shown and commanded

@@ -10,7 +10,7 @@ import { FloorMap } from "./floor_map.js";
 import { Hazards } from "./hazards.js";
 import { Phase } from "./phase.js";
 
-export function LivePage() {
+export default function LivePage() {
   const { welcome, status } = shown();
   if (!welcome) {
     return html`<section class="card empty"><h2>No drone yet</h2>

@@ -1,0 +1,18 @@
+// The pages of the station.  Each lies in a folder of its own and is fetched when it is first shown.
+//
+// `path` is where it is, with everything below it; `load` gives the module whose `default` is its component,
+// called with {route}; `styles` are its own, over and above base.css and frame.css.
+export const PAGES = [
+  {
+    path: "/",
+    title: "Live",
+    styles: ["live.css", "map.css"],
+    load: () => import("./live/live_page.js"),
+  },
+];
+
+// The page at a path, or undefined: the longest one that it lies under.
+export function pageAt(path) {
+  const under = PAGES.filter((page) => path === page.path || (page.path !== "/" && path.startsWith(`${page.path}/`)));
+  return under.sort((a, b) => b.path.length - a.path.length)[0];
+}

@@ -1,0 +1,52 @@
+// Moves between the pages: real paths in one document, so that the way to the drone stays open meanwhile.
+import { pageAt } from "./pages.js";
+import { state, update } from "./store.js";
+
+// Where the person is: `page` of PAGES (undefined: none is there), `rest` of the path below it, query and hash.
+function routeOf({ pathname, search, hash }) {
+  const page = pageAt(pathname);
+  const rest = page && pathname.slice(page.path.length).replace(/^\//, "");
+  return { page, path: pathname, rest, query: new URLSearchParams(search), hash };
+}
+
+// `replace` leaves no step to go back to: for what is chosen on a page rather than gone to.
+export function goTo(href, { replace = false } = {}) {
+  const url = new URL(href, location.href);
+  if (url.href !== location.href) history[replace ? "replaceState" : "pushState"](null, "", url);
+  arrive();
+}
+
+// Follow where the address bar points, and links to our own pages without leaving the document.
+export function followLinks() {
+  window.addEventListener("popstate", arrive);
+  document.addEventListener("click", (event) => {
+    const link = event.target.closest?.("a[href]");
+    if (!link || !isOurs(link) || isForTheBrowser(event)) return;
+    event.preventDefault();
+    goTo(link.href);
+  });
+  arrive();
+}
+
+function isOurs(link) {
+  const isElsewhere = link.origin !== location.origin || link.target || link.hasAttribute("download");
+  const isWithin = link.hash && link.pathname === location.pathname && link.search === location.search;
+  return !isElsewhere && !isWithin && pageAt(link.pathname) !== undefined;
+}
+
+// Another tab, a download, a menu: what the person asks of the browser itself.
+function isForTheBrowser(event) {
+  return event.defaultPrevented || event.button !== 0 || event.ctrlKey || event.metaKey || event.shiftKey || event.altKey;
+}
+
+function arrive() {
+  const from = state.route;
+  const route = routeOf(location);
+  document.title = route.page ? `${route.page.title} · flightd` : "flightd";
+  update((s) => {
+    s.route = route;
+  });
+  if (!from || from.page === route.page) return;
+  window.scrollTo(0, 0);
+  document.getElementById("main")?.focus({ preventScroll: true }); // the next Tab is the new page's first
+}

@@ -1,0 +1,104 @@
+"""From page to page of the station: one document, one way to the drone, STOP in reach everywhere."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.web.chromium import NARROW, WIDE, hindrances, opened, running, station
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
+from playwright.sync_api import expect
+
+NOWHERE = "There is no such page"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with running() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    """A station whose drone nobody flies."""
+    with station(["demo=127.0.0.1:1/1"]) as url:
+        yield url
+
+
+def lose_the_way(page: Page) -> None:
+    """As a bookmark of a page that is gone, or a later version's, does."""
+    page.evaluate("history.pushState(null, '', '/gone'); dispatchEvent(new PopStateEvent('popstate'))")
+    expect(page.get_by_role("heading", name=NOWHERE)).to_be_visible()
+
+
+@pytest.mark.parametrize("size", [WIDE, NARROW])
+def test_the_link_of_the_page_that_is_shown_is_the_current_one(
+    browser: Browser, url: str, size: tuple[int, int]
+) -> None:
+    with opened(browser, url, size) as page:
+        here = page.get_by_role("navigation", name="Pages").get_by_role("link", name="Live")
+        expect(here).to_have_attribute("aria-current", "page")
+        expect(page).to_have_title("Live · flightd")
+        lose_the_way(page)
+        expect(here).not_to_have_attribute("aria-current", re.compile(""))
+        expect(page.get_by_role("button", name="STOP")).to_be_in_viewport(ratio=1.0)
+        expect(here).to_be_in_viewport(ratio=1.0)
+        assert page.evaluate("document.documentElement.scrollWidth") == size[0]
+        assert hindrances(page) == []
+
+
+def test_moving_keeps_the_document_and_its_link_to_the_drones(browser: Browser, url: str) -> None:
+    sockets: list[str] = []
+    with opened(browser, url) as page:
+        page.evaluate("window.sameDocument = true")
+        page.on("websocket", lambda socket: sockets.append(socket.url))
+        lose_the_way(page)
+        page.get_by_role("link", name="Live", exact=True).click()
+        expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
+        expect(page).to_have_url(f"{url}/")
+        page.go_back()
+        expect(page.get_by_role("heading", name=NOWHERE)).to_be_visible()
+        page.go_forward()
+        expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
+        assert page.evaluate("window.sameDocument")
+    assert sockets == [], "another one would mean that the first was closed: nobody attended meanwhile"
+
+
+def test_one_moves_by_keyboard_and_goes_on_with_the_new_pages_first_thing(browser: Browser, url: str) -> None:
+    with opened(browser, url) as page:
+        lose_the_way(page)
+        page.get_by_role("link", name="Live", exact=True).focus()
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
+        expect(page.get_by_role("main")).to_be_focused()
+
+
+def test_a_link_that_the_browser_is_asked_to_open_elsewhere_is_left_to_it(browser: Browser, url: str) -> None:
+    with opened(browser, url) as page:
+        lose_the_way(page)
+        with page.context.expect_page() as other:
+            page.get_by_role("link", name="Live", exact=True).click(modifiers=["Control"])
+        expect(other.value).to_have_title("Live · flightd")
+        expect(page.get_by_role("heading", name=NOWHERE)).to_be_visible()
+
+
+@pytest.mark.parametrize("missing", ["**/style/live.css", "**/live/live_page.js", "**/live/facts.js"])
+def test_a_page_that_cannot_be_had_says_so_and_is_tried_again(
+    browser: Browser, url: str, missing: str
+) -> None:
+    with opened(browser, url) as page:
+        expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
+        page.route(missing, lambda route: route.abort())
+        page.reload()
+        expect(page.get_by_role("heading", name="The page cannot be loaded")).to_be_visible()
+        expect(page.get_by_role("button", name="STOP")).to_be_visible()
+        page.unroute(missing)
+        page.get_by_role("button", name="Try again").click()
+        expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
