@@ -17,6 +17,7 @@ EXAMPLES = """Examples:
   flightd ground --drone north=drone-1 --key ann.key_secret --server-key drone-1.key
   flightd ground --drone a=127.0.0.1 --drone b=127.0.0.1:6571/6572    two simulators, by their ports
   flightd ground --listen 127.0.0.1:9000
+  flightd ground --folder out                  and the flights below out: their list, played back, compared
 """
 
 
@@ -38,6 +39,10 @@ def ground(
     listen: Annotated[
         str, typer.Option(metavar="ADDRESS", help="Where browsers find the page: of this machine only.")
     ] = "127.0.0.1:8080",
+    folder: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Where flights lie: every log below it is listed."),
+    ] = None,
     key: Annotated[
         Path | None, typer.Option(envvar="FLIGHTCTL_KEY", help="Your secret key: NAME.key_secret.")
     ] = None,
@@ -64,9 +69,19 @@ def ground(
     from flightd.ground.drone_names import drone_addresses
 
     drones = drone_addresses(drone or (), key, server_key or ())
-    ended_by = run(drones, Listening.read(listen), _say_where)
+    ended_by = run(drones, Listening.read(listen), _say_where, _checked(folder))
     if ended_by is not None:
         print(f"flightd: the ground station was ended by {ended_by.name}", file=sys.stderr)
+
+
+def _checked(folder: Path | None) -> Path | None:
+    from flightd.core.errors import InputError
+
+    if folder is not None and not folder.is_dir():
+        raise InputError(
+            "is no folder", file=folder, key="--folder", remedy="name the one that holds the flights"
+        )
+    return folder
 
 
 def _say_where(where: Listening) -> None:

@@ -18,6 +18,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
 from flightd.ground.browser import Browser
+from flightd.ground.flights.flights import Flights
+from flightd.ground.flights.routes import flight_routes
 from flightd.ground.guards import Guard
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES, read_act, read_page_message
@@ -29,12 +31,13 @@ _FULL = 1013
 """WebSocket: try again later."""
 
 
-def application(hub: Hub, hosts: Iterable[str]) -> ASGIApp:
+def application(hub: Hub, hosts: Iterable[str], flights: Flights) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked."""
     routes = [
         first_page(),
         WebSocketRoute("/live", partial(_live, hub)),
         Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
+        *flight_routes(flights),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
     return Guard(Starlette(routes=routes), hosts)

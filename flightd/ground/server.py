@@ -10,6 +10,7 @@ import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import uvicorn
 
@@ -17,6 +18,7 @@ from flightd.adapters.ground_link.client import Address
 from flightd.config.ground import is_loopback
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.application import application
+from flightd.ground.flights.flights import Flights
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
@@ -90,14 +92,17 @@ def opened(listening: Listening) -> tuple[socket.socket, Listening]:
 
 
 def run(
-    drones: Sequence[tuple[str, Address]], listening: Listening, on_ready: Callable[[Listening], None]
+    drones: Sequence[tuple[str, Address]],
+    listening: Listening,
+    on_ready: Callable[[Listening], None],
+    folder: Path | None = None,
 ) -> signal.Signals | None:
     """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had."""
     listener, where = opened(listening)
     came: list[signal.Signals] = []
 
     async def until_signal() -> None:
-        serving = asyncio.ensure_future(serve(drones, listener, where, on_ready))
+        serving = asyncio.ensure_future(serve(drones, listener, where, on_ready, folder))
         end_on_signals(serving, came)
         with contextlib.suppress(asyncio.CancelledError):
             await serving
@@ -112,12 +117,13 @@ async def serve(
     listener: socket.socket,
     where: Listening,
     on_ready: Callable[[Listening], None] = lambda _: None,
+    folder: Path | None = None,
 ) -> None:
-    """Serve until cancelled; the pages are told that it ends."""
-    hub = Hub(drones)
+    """Serve until cancelled; the pages are told that it ends.  `folder` is where flights lie."""
+    hub, flights = Hub(drones), Flights(folder)
     server = _Server(
         uvicorn.Config(
-            application(hub, own_hosts(where.host, where.port)),
+            application(hub, own_hosts(where.host, where.port), flights),
             http="h11",
             ws="websockets-sansio",
             lifespan="off",
@@ -135,6 +141,7 @@ async def serve(
     )
     async with asyncio.TaskGroup() as tasks:
         station = tasks.create_task(hub.run(), name="hub")
+        tasks.create_task(flights.run(), name="flights")
         serving = tasks.create_task(server.serve([listener]), name="pages")
         try:
             while not server.started:  # noqa: ASYNC110 - it tells nobody

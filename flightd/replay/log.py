@@ -138,6 +138,7 @@ class LogReader:
             if metadata.name == "flightd":
                 self.metadata.update(metadata.metadata)
 
+
 def decoded_message(path: Path, topic: str, payload: bytes) -> object:
     """A payload as the message that was recorded on `topic` of the log at `path`.  InputError if it does not
     fit."""

@@ -27,12 +27,14 @@ T = TypeVar("T")
 @dataclass(frozen=True, slots=True)
 class SkimmedLog:
     """`whole`: it was closed as it should be.  `first_ns`, `last_ns`: stamps of the first and the last
-    message of the flight, equal where there is none.  `site` is its name, "" where no map is recorded."""
+    message of the flight, equal where there is none.  `site` is its name and `vehicle` its kind, "" where
+    that is not recorded."""
 
     whole: bool
     first_ns: int = 0
     last_ns: int = 0
     site: str = ""
+    vehicle: str = ""
     order: FlightOrder | None = None
     last_status: Status | None = None
     metadata: Mapping[str, str] = field(default_factory=dict)
@@ -46,17 +48,20 @@ def skim(path: Path) -> SkimmedLog:
     """Look at a log.  InputError if it cannot be opened or is not MCAP; what is damaged in it is passed
     over."""
     with LogChunks(path) as log:
-        site, order, first_ns = "", None, 0
+        site, vehicle, order, first_ns = "", "", None, 0
         for found in log.messages(log.chunks[:_FIRST_CHUNKS]):
             if found.topic == Topic.MAP:
                 site = _site_name(_decoded(Document, found.payload))
+            elif found.topic == Topic.CONFIG:
+                vehicle = _vehicle_kind(_decoded(Document, found.payload))
             elif found.topic == Topic.ORDER:
                 order = _decoded(FlightOrder, found.payload)
             elif found.topic not in RETAINED:
                 first_ns = min(first_ns or found.stamp_ns, found.stamp_ns)
         last_ns, newest = _end(log)
         last_ns = max(last_ns, first_ns)
-        return SkimmedLog(log.whole, first_ns or last_ns, last_ns, site, order, newest, log.metadata)
+        first_ns = first_ns or last_ns
+        return SkimmedLog(log.whole, first_ns, last_ns, site, vehicle, order, newest, log.metadata)
 
 
 def _end(log: LogChunks) -> tuple[int, Status | None]:
@@ -86,6 +91,23 @@ def _decoded(kind: type[T], payload: bytes) -> T | None:
         return converted(with_nan(msgspec.json.decode(payload)), kind)
     except (msgspec.MsgspecError, ValueError, TypeError):
         return None
+
+
+class _VehicleSection(msgspec.Struct):
+    kind: str = ""
+
+
+class _ConfigHead(msgspec.Struct):
+    vehicle: _VehicleSection = msgspec.field(default_factory=_VehicleSection)
+
+
+def _vehicle_kind(document: Document | None) -> str:
+    if document is None:
+        return ""
+    try:
+        return msgspec.json.decode(document.text, type=_ConfigHead).vehicle.kind
+    except msgspec.MsgspecError:
+        return ""
 
 
 def _site_name(document: Document | None) -> str:

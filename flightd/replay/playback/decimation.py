@@ -50,7 +50,7 @@ def decimated(t_s: Array, values: Array, grid: TimeGrid) -> Array:
     inside = (stretch >= 0) & (stretch < grid.stretches)
     if inside.any():
         _fill(found, stretch[inside], numbers[inside])
-    _join(found, grid, times, numbers, stretch)
+    _join(found, grid, times, numbers)
     return found
 
 
@@ -64,7 +64,7 @@ def _fill(found: Array, stretch: NDArray[np.int64], numbers: Array) -> None:
     found[where + 1] = np.where(rising, highest, lowest)
 
 
-def _join(found: Array, grid: TimeGrid, times: Array, numbers: Array, stretch: NDArray[np.int64]) -> None:
+def _join(found: Array, grid: TimeGrid, times: Array, numbers: Array) -> None:
     """Stretches between two samples that are not too far apart lie on the straight line between them."""
     empty = np.isnan(found)
     if not empty.any():

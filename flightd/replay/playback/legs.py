@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 from flightd.core.flight_order import FlightOrder
 from flightd.replay.playback.flight import Leg, Moment
-from flightd.site.site import NoWayError, Site
+from flightd.site.site import Site
+from flightd.site.ways import NoWayError
 
 
 def legs_of(site: Site | None, moments: Sequence[Moment], order: FlightOrder | None) -> tuple[Leg, ...]:
-    """The goals in the order in which the mission named them, and those of the order that it never came to."""
+    """The goals in the order in which the mission named them, then those that it never came to."""
     goals: list[tuple[float | None, str]] = []
     for moment in moments:
         if moment.goal and (not goals or goals[-1][1] != moment.goal):

@@ -17,7 +17,7 @@ from flightd.core.topics import RETAINED, Document, Topic
 from flightd.core.types import AttitudeSetpoint, Event, GridPose, Status, VehicleState
 from flightd.replay.log import Entry, LogReader
 from flightd.replay.playback.decimation import TimeGrid, decimated
-from flightd.replay.playback.flight import Array, Moment, PlayedEvent, Playback, PoseTrack
+from flightd.replay.playback.flight import Array, Moment, Playback, PlayedEvent, PoseTrack
 from flightd.replay.playback.legs import legs_of
 from flightd.replay.playback.pictures import recorded_lens
 from flightd.replay.playback.quantities import hover_error_m, quantities, rms, within
@@ -37,8 +37,11 @@ from flightd.site.site import Site
 from flightd.site.site_file import parse_site
 
 _TOPICS = frozenset(
-    {Topic.POSE, Topic.VEHICLE, Topic.SETPOINT, Topic.STATUS, Topic.EVENT, Topic.MAP, Topic.ORDER, Topic.CONFIG}
-)
+    {
+        Topic.POSE, Topic.VEHICLE, Topic.SETPOINT, Topic.STATUS, Topic.EVENT, Topic.MAP, Topic.ORDER,
+        Topic.CONFIG,
+    }
+)  # fmt: skip
 _FINEST_S = 0.01
 _MOST_STRETCHES = 40_000
 """Longer flights than seven minutes are kept more coarsely than they were recorded, peaks included."""

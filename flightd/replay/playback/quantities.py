@@ -58,9 +58,7 @@ def quantities(
     return found
 
 
-def _cross_track(
-    site: Site | None, moments: Sequence[Moment], legs: Sequence[Leg], poses: Columns
-) -> Array:
+def _cross_track(site: Site | None, moments: Sequence[Moment], legs: Sequence[Leg], poses: Columns) -> Array:
     """Beside the leg while it is followed; over a node the hover error tells."""
     if site is None:
         return np.full(poses["t_s"].shape, math.nan)

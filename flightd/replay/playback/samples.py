@@ -36,14 +36,12 @@ class Table:
         rows = np.frombuffer(self._values, np.float64) if self._values else np.zeros(0)
         order = np.argsort(stamps, kind="stable")
         rows = rows.reshape(len(stamps), len(self._names))[order]
-        t_s = (stamps[order] - start_ns) * 1e-9
+        t_s: Array = (stamps[order] - start_ns).astype(np.float64) * 1e-9
         return {"t_s": t_s, **{name: rows[:, place] for place, name in enumerate(self._names)}}
 
 
 def pose_table() -> Table:
-    return Table(
-        "x_m", "y_m", "yaw_rad", "height_m", "speed_mps", "sigma_x_m", "sigma_y_m", "sigma_yaw_rad"
-    )
+    return Table("x_m", "y_m", "yaw_rad", "height_m", "speed_mps", "sigma_x_m", "sigma_y_m", "sigma_yaw_rad")
 
 
 def add_pose(table: Table, pose: GridPose) -> None:
@@ -64,9 +62,7 @@ def vehicle_table() -> Table:
 
 def add_vehicle(table: Table, state: VehicleState) -> None:
     attitude = state.attitude
-    table.add(
-        attitude.stamp_ns, attitude.roll_rad, attitude.pitch_rad, state.height_m, state.battery_frac
-    )
+    table.add(attitude.stamp_ns, attitude.roll_rad, attitude.pitch_rad, state.height_m, state.battery_frac)
 
 
 def setpoint_table() -> Table:
