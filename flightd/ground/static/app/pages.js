@@ -9,6 +9,12 @@ export const PAGES = [
     styles: ["live.css", "map.css"],
     load: () => import("./live/live_page.js"),
   },
+  {
+    path: "/flights",
+    title: "Flights",
+    styles: ["live.css", "map.css", "../vendor/uplot.css", "flights.css", "replay.css"],
+    load: () => import("./flights/flights_page.js"),
+  },
 ];
 
 // The page at a path, or undefined: the longest one that it lies under.
