@@ -21,6 +21,7 @@ from flightd.ground.browser import Browser
 from flightd.ground.flights.flights import Flights
 from flightd.ground.flights.routes import flight_routes
 from flightd.ground.guards import Guard
+from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES, read_act, read_page_message
 from flightd.ground.pages import STATIC, first_page
@@ -38,6 +39,7 @@ def application(hub: Hub, hosts: Iterable[str], flights: Flights) -> ASGIApp:
         WebSocketRoute("/live", partial(_live, hub)),
         Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
         *flight_routes(flights),
+        *guide_routes(),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
     return Guard(Starlette(routes=routes), hosts)

@@ -1,6 +1,6 @@
 // The curves of a flight as they come from the station: fetched anew whenever another stretch of time is shown.
+import { askJson } from "../fetching.js";
 import { useEffect, useState } from "../html.js";
-import { askJson } from "./flights_state.js";
 
 const STRETCHES = 700;
 

@@ -1,5 +1,6 @@
 // What is known of the flights: the list, those that were opened, and where their playback is.
 // It lies in the store as `flights`; everything is fetched when it is first shown.
+import { askJson } from "../fetching.js";
 import { state, update } from "../store.js";
 
 const LIST_AGAIN_MS = 6000;
@@ -84,13 +85,6 @@ function keep(id, told) {
       return { open };
     }),
   );
-}
-
-export async function askJson(url) {
-  const answer = await fetch(url);
-  const told = await answer.json().catch(() => ({}));
-  if (!answer.ok) throw new Error(told.refused ?? `the ground station answers ${answer.status}`);
-  return told;
 }
 
 export function turnChosen(id) {
