@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flightd.core.errors import InputError
+
 if TYPE_CHECKING:
     from flightd.ground.server import Listening
 
@@ -16,8 +18,8 @@ EXAMPLES = """Examples:
   flightd ground                               the flightd on this machine; open http://127.0.0.1:8080
   flightd ground --drone north=drone-1 --key ann.key_secret --server-key drone-1.key
   flightd ground --drone a=127.0.0.1 --drone b=127.0.0.1:6571/6572    two simulators, by their ports
+  flightd ground --folder out                  with the flights and inventories under out
   flightd ground --listen 127.0.0.1:9000
-  flightd ground --folder out                  and the flights below out: their list, played back, compared
 """
 
 
@@ -41,7 +43,7 @@ def ground(
     ] = "127.0.0.1:8080",
     folder: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Where flights lie: every log below it is listed."),
+        typer.Option(metavar="DIR", help="Where flights and inventories lie; they are read, never changed."),
     ] = None,
     key: Annotated[
         Path | None, typer.Option(envvar="FLIGHTCTL_KEY", help="Your secret key: NAME.key_secret.")
@@ -68,20 +70,12 @@ def ground(
         raise missing_extra("ground", "flightd ground") from None
     from flightd.ground.drone_names import drone_addresses
 
+    if folder is not None and not folder.is_dir():
+        raise InputError("there is no such folder", key=f"--folder {folder}")
     drones = drone_addresses(drone or (), key, server_key or ())
-    ended_by = run(drones, Listening.read(listen), _say_where, _checked(folder))
+    ended_by = run(drones, Listening.read(listen), _say_where, folder)
     if ended_by is not None:
         print(f"flightd: the ground station was ended by {ended_by.name}", file=sys.stderr)
-
-
-def _checked(folder: Path | None) -> Path | None:
-    from flightd.core.errors import InputError
-
-    if folder is not None and not folder.is_dir():
-        raise InputError(
-            "is no folder", file=folder, key="--folder", remedy="name the one that holds the flights"
-        )
-    return folder
 
 
 def _say_where(where: Listening) -> None:

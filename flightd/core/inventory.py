@@ -30,6 +30,16 @@ class LocationState(enum.StrEnum):
         return self in {LocationState.READ, LocationState.SEVERAL, LocationState.EMPTY}
 
 
+class Standing(enum.IntEnum):
+    """Whether a look counts; where two stores differ, the greater one holds."""
+
+    PENDING = 0
+    """The place that it was seen at is not proven yet."""
+    CONFIRMED = 1
+    WITHDRAWN = 2
+    """Where the drone was, was contradicted: it may have been another place."""
+
+
 @dataclass(frozen=True, slots=True)
 class PlannedLocation:
     """A place that must be counted, and the node of the map it is counted from."""

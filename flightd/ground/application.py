@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 from collections.abc import Iterable
 from functools import partial
+from pathlib import Path
 
 import msgspec
 from starlette.applications import Starlette
@@ -25,6 +26,8 @@ from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES, read_act, read_page_message
 from flightd.ground.pages import STATIC, first_page
+from flightd.ground.stock_routes import stock_routes
+from flightd.ground.stores import Stores
 
 _NOT_OURS = 1008
 """WebSocket: a message that is against the rules."""
@@ -32,12 +35,14 @@ _FULL = 1013
 """WebSocket: try again later."""
 
 
-def application(hub: Hub, hosts: Iterable[str], flights: Flights) -> ASGIApp:
-    """The whole station as ASGI; `hosts` are the names under which it may be asked."""
+def application(hub: Hub, hosts: Iterable[str], folder: Path | None, flights: Flights) -> ASGIApp:
+    """The whole station as ASGI; `hosts` are the names under which it may be asked, inventories and `flights`
+    lie under `folder`."""
     routes = [
         first_page(),
         WebSocketRoute("/live", partial(_live, hub)),
         Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
+        *stock_routes(Stores(folder), hub.drones),
         *flight_routes(flights),
         *guide_routes(),
         Mount("/static", StaticFiles(directory=STATIC)),

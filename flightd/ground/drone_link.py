@@ -112,6 +112,12 @@ class DroneLink:
         finally:
             self._acting -= 1
 
+    async def inventory(self) -> tuple[dict[str, str], ...]:
+        """What it has counted on this flight, place by place.  As `GroundClient` raises."""
+        if self._client is None:
+            raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
+        return await self._client.inventory()
+
     async def _connected(self) -> None:
         """Everything on one connection, until something of it fails."""
         async with GroundClient(self._address, "flightd ground", _ANSWER_S) as client:

@@ -119,11 +119,11 @@ async def serve(
     on_ready: Callable[[Listening], None] = lambda _: None,
     folder: Path | None = None,
 ) -> None:
-    """Serve until cancelled; the pages are told that it ends.  `folder` is where flights lie."""
+    """Serve until cancelled; the pages are told that it ends.  Inventories and flights lie under `folder`."""
     hub, flights = Hub(drones), Flights(folder)
     server = _Server(
         uvicorn.Config(
-            application(hub, own_hosts(where.host, where.port), flights),
+            application(hub, own_hosts(where.host, where.port), folder, flights),
             http="h11",
             ws="websockets-sansio",
             lifespan="off",

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from flightd.adapters.store.evidence import EvidenceFolder
+from flightd.adapters.store.read_only import connect_read_only
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (
     CountPose,
@@ -25,14 +26,13 @@ from flightd.core.inventory import (
     LocationState,
     Observation,
     PlannedLocation,
+    Standing,
 )
 from flightd.core.types import CodeRead
 
 _VERSION = 2
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
-_PENDING, _CONFIRMED, _WITHDRAWN = range(3)
-"""Standing of an observation; where two stores differ, the greater one holds."""
 _FROM_1 = "ALTER TABLE observation ADD COLUMN standing INTEGER NOT NULL DEFAULT 1"
 _SCHEMA = """
 CREATE TABLE location (
@@ -71,38 +71,73 @@ class SqliteStore:
     Safe from any thread of one process; a second process may read meanwhile.
     """
 
-    def __init__(self, folder: Path, *, create: bool = True) -> None:
+    def __init__(self, folder: Path, *, create: bool = True, read_only: bool = False) -> None:
         """Open the store, making it when `create`.  Raises InputError for what is no inventory (or is
-        missing), UnavailableError when the disk refuses."""
+        missing), UnavailableError when the disk refuses.
+
+        `read_only` never makes one and leaves no trace of its own beside it, whoever writes it meanwhile."""
         self.folder = folder
+        create = create and not read_only
         self._file = folder / "inventory.db"
         if not create and not self._file.exists():
             raise InputError(f"{folder}: holds no inventory.db; give the folder of an inventory")
         self._lock = threading.RLock()
         self.evidence = EvidenceFolder(folder / "evidence")
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(
-                self._file, timeout=10.0, isolation_level=None, check_same_thread=False
-            )
+            if read_only:
+                self._db = connect_read_only(self._file)
+            else:
+                folder.mkdir(parents=True, exist_ok=True)
+                self._db = sqlite3.connect(
+                    self._file, timeout=10.0, isolation_level=None, check_same_thread=False
+                )
         except (OSError, sqlite3.Error) as err:
             raise UnavailableError(f"{self._file}: cannot be opened: {err}") from err
         try:
-            self._prepare()
+            (self._recognise if read_only else self._prepare)()
         except BaseException:
             self._db.close()
             raise
         if create:
             self.evidence.clean()
 
-    def _prepare(self) -> None:
+    def _recognise(self) -> None:
+        """Refuse what this program cannot read as it is."""
+        with self._problems_named():
+            version, application = self._marks()
+            if application != _APPLICATION:
+                raise InputError(f"{self._file}: a database, but no inventory; choose another folder")
+            if version != _VERSION:
+                remedy = (
+                    f"flightd inventory show {self.folder}" if version == 1 else "the flightd that wrote it"
+                )
+                problem = f"format {version}, known here is {_VERSION}"
+                raise InputError(f"{self._file}: {problem}", remedy=f"open it once with {remedy}")
+
+    def _marks(self) -> tuple[int, int]:
+        """The format's version and the application id."""
+        version, application = (
+            int(self._db.execute(f"PRAGMA {name}").fetchone()[0])
+            for name in ("user_version", "application_id")
+        )
+        return version, application
+
+    @contextmanager
+    def _problems_named(self) -> Iterator[None]:
         try:
+            yield
+        except sqlite3.DatabaseError as err:
+            if isinstance(err, sqlite3.OperationalError):
+                raise UnavailableError(f"{self._file}: {err}") from err
+            raise InputError(f"{self._file}: no inventory, or a damaged one: {err}") from err
+
+    def _prepare(self) -> None:
+        with self._problems_named():
             self._db.execute("PRAGMA journal_mode = WAL")
             self._db.execute("PRAGMA synchronous = FULL")
             self._db.execute("PRAGMA foreign_keys = ON")
             with self._transaction():
-                version = self._db.execute("PRAGMA user_version").fetchone()[0]
-                application = self._db.execute("PRAGMA application_id").fetchone()[0]
+                version, application = self._marks()
                 tables = self._db.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
                 if not tables:
                     # one transaction: a power cut leaves an empty file or a whole one
@@ -118,10 +153,6 @@ class SqliteStore:
                 elif version != _VERSION:
                     problem = f"format {version}, known here is {_VERSION}"
                     raise InputError(f"{self._file}: {problem}; use the flightd that wrote it")
-        except sqlite3.DatabaseError as err:
-            if isinstance(err, sqlite3.OperationalError):
-                raise UnavailableError(f"{self._file}: {err}") from err
-            raise InputError(f"{self._file}: no inventory, or a damaged one: {err}") from err
 
     def __enter__(self) -> Self:
         return self
@@ -173,15 +204,15 @@ class SqliteStore:
     def commit(self, observation: Observation, confirmed: bool = True) -> None:
         """Record one look.  A location never planned becomes known, with the node it was seen from."""
         with self._transaction():
-            self._insert(observation, _CONFIRMED if confirmed else _PENDING)
+            self._insert(observation, Standing.CONFIRMED if confirmed else Standing.PENDING)
 
     def settle(self, run: str, locations: Iterable[str], confirmed: bool) -> None:
         """Confirm or withdraw what is pending of a run at these locations."""
-        standing = _CONFIRMED if confirmed else _WITHDRAWN
+        standing = Standing.CONFIRMED if confirmed else Standing.WITHDRAWN
         with self._transaction():
             self._db.executemany(
                 "UPDATE observation SET standing = ? WHERE location = ? AND run = ? AND standing = ?",
-                [(standing, location, run, _PENDING) for location in locations],
+                [(standing, location, run, Standing.PENDING) for location in locations],
             )
 
     def withdraw_pending(self, run: str) -> None:
@@ -189,14 +220,15 @@ class SqliteStore:
         with self._transaction():
             self._db.execute(
                 "UPDATE observation SET standing = ? WHERE run = ? AND standing = ?",
-                (_WITHDRAWN, run, _PENDING),
+                (Standing.WITHDRAWN, run, Standing.PENDING),
             )
 
     def counted(self, run: str) -> frozenset[str]:
         """The locations with a confirmed look of a run, whatever it told."""
         with self._reading():
             rows = self._db.execute(
-                "SELECT DISTINCT location FROM observation WHERE run = ? AND standing = ?", (run, _CONFIRMED)
+                "SELECT DISTINCT location FROM observation WHERE run = ? AND standing = ?",
+                (run, Standing.CONFIRMED),
             ).fetchall()
         return frozenset(row[0] for row in rows)
 
@@ -230,7 +262,7 @@ class SqliteStore:
         greatest id)."""
         with self._reading():
             looks = self._observations()
-            newest = {seen.location: seen for seen, standing in looks if standing == _CONFIRMED}
+            newest = {seen.location: seen for seen, standing in looks if standing == Standing.CONFIRMED}
             rows = self._db.execute("SELECT code, node FROM location ORDER BY code").fetchall()
         return [LocationRecord(code, node, newest.get(code)) for code, node in rows]
 
@@ -238,6 +270,11 @@ class SqliteStore:
         """Every look at one location, oldest first, pending and withdrawn ones too."""
         with self._reading():
             return [seen for seen, _ in self._observations(location)]
+
+    def looks(self, location: str | None = None) -> list[tuple[Observation, Standing]]:
+        """All looks, or those at one location, each with its standing, oldest first."""
+        with self._reading():
+            return [(seen, Standing(standing)) for seen, standing in self._observations(location)]
 
     def _observations(self, location: str | None = None) -> list[tuple[Observation, int]]:
         """All looks, or those at one location, with their standing, oldest first."""

@@ -10,6 +10,12 @@ export const PAGES = [
     load: () => import("./live/live_page.js"),
   },
   {
+    path: "/stock",
+    title: "Stock",
+    styles: ["stock.css"],
+    load: () => import("./stock/stock_page.js"),
+  },
+  {
     path: "/flights",
     title: "Flights",
     styles: ["live.css", "map.css", "../vendor/uplot.css", "flights.css", "replay.css"],

@@ -17,6 +17,7 @@ const TRACK_KEPT = 4000;
 
 export const state = {
   route: null, // page, path below it and query: see router.js
+  stock: null, // see stock/stock_state.js
   station: null, // version, drones, browsers
   drones: new Map(),
   selected: "", // drone that is shown and commanded

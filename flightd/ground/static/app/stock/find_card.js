@@ -1,0 +1,110 @@
+// Which inventory is shown, what is looked for in it, and how many places are in which state.
+import { html, useEffect, useRef } from "../html.js";
+import { STATES } from "./states.js";
+import { change, differs, isShown, stock } from "./stock_state.js";
+import { exportUrl, search, show } from "./stock_source.js";
+
+const TYPING_MS = 250;
+const FORMATS = { csv: "CSV", xlsx: "XLSX", json: "JSON", epcis: "EPCIS" };
+
+export function FindCard() {
+  return html`
+    <section class="card find" aria-label="Find and filter">
+      <div class="find-row">
+        <${Source} />
+        <${Search} />
+        <${Downloads} />
+      </div>
+      <${StateFilters} />
+    </section>
+  `;
+}
+
+const valueOf = ({ kind, name }) => `${kind}/${name}`;
+
+function Source() {
+  const { source, stores, drones, folder } = stock();
+  const all = [
+    ...stores.map(({ name }) => ({ kind: "store", name, words: name === "." ? folder : name })),
+    ...drones.map((name) => ({ kind: "drone", name, words: `${name}, as it tells now` })),
+  ];
+  const choose = (event) => show(all.find((one) => valueOf(one) === event.target.value));
+  return html`
+    <label class="field">Inventory
+      <select value=${source ? valueOf(source) : ""} onChange=${choose}>
+        ${all.map((one) => html`<option key=${valueOf(one)} value=${valueOf(one)}>${one.words}</option>`)}
+      </select>
+    </label>
+  `;
+}
+
+function Search() {
+  const timer = useRef(0);
+  const box = useRef(null);
+  const { found, source } = stock();
+  useEffect(() => () => clearTimeout(timer.current), []);
+  useEffect(() => {
+    if (box.current) box.current.value = stock().words;
+  }, [source]);
+  const onInput = (event) => {
+    clearTimeout(timer.current);
+    const words = event.target.value;
+    timer.current = setTimeout(() => search(words), TYPING_MS);
+  };
+  const onKeyDown = (event) => {
+    if (event.key !== "Enter") return;
+    clearTimeout(timer.current);
+    search(event.target.value);
+  };
+  return html`
+    <label class="field search">Code or place
+      <input type="search" ref=${box} maxlength="200" spellcheck=${false} autocomplete="off" onInput=${onInput} onKeyDown=${onKeyDown} />
+      <span class="quiet" role="status">${found && (found.size === 1 ? "1 place" : `${found.size} places`)}</span>
+    </label>
+  `;
+}
+
+function Downloads() {
+  const { source } = stock();
+  if (source?.kind !== "store") return null;
+  return html`
+    <div class="downloads" role="group" aria-label="Download the inventory">
+      ${Object.entries(FORMATS).map(
+        ([format, name]) => html`<a key=${format} class="order" href=${exportUrl(source, format)} download>${name}</a>`,
+      )}
+    </div>
+  `;
+}
+
+function StateFilters() {
+  const { places, states, expected } = stock();
+  const counts = {};
+  for (const { state } of Object.values(places)) counts[state] = (counts[state] ?? 0) + 1;
+  const toggle = (name) => {
+    const next = new Set(states);
+    if (!next.delete(name)) next.add(name);
+    change({ states: next });
+  };
+  const chips = Object.entries(STATES)
+    .filter(([name]) => counts[name] || states.has(name))
+    .map(([name, { name: words, means }]) => ({ name, words, means, count: counts[name] ?? 0 }));
+  if (expected?.outcomes) {
+    const count = Object.keys(places).filter((code) => differs(code, expected)).length;
+    chips.push({ name: "differs", words: "Not as expected", means: "differs from the uploaded stock", count });
+  }
+  const picked = states.size ? Object.keys(places).filter((code) => isShown(code, stock())).length : null;
+  return html`
+    <div class="states" role="group" aria-label="States">
+      ${chips.map(
+        ({ name, words, means, count }) => html`
+          <button key=${name} class="state-chip" aria-pressed=${states.has(name)} title=${means} onClick=${() => toggle(name)}>
+            <i class=${name === "differs" ? "cell differs" : `cell state-${name}`} aria-hidden="true">${STATES[name]?.mark}</i>${words}
+            <b>${count}</b>
+          </button>
+        `,
+      )}
+      ${picked !== null &&
+      html`<button class="state-chip" onClick=${() => change({ states: new Set() })}>Show all</button>`}
+    </div>
+  `;
+}

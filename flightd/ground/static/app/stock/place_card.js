@@ -1,0 +1,177 @@
+// One place: its picture with the codes' outlines, what was read, how sure, and its history over the runs.
+import { html, useEffect, useState } from "../html.js";
+import { time } from "../words.js";
+import { differs, inOrder, isShown, stock } from "./stock_state.js";
+import { STATES } from "./states.js";
+import { outlinesOf, pictureUrl } from "./stock_source.js";
+
+const STANDINGS = { pending: "not booked yet", confirmed: "", withdrawn: "withdrawn" };
+const DAY = new Intl.DateTimeFormat([], { year: "numeric", month: "short", day: "numeric" });
+
+export function PlaceCard({ onChoose }) {
+  const known = stock();
+  const { chosen, places, looks } = known;
+  const [shownLook, showLook] = useState(0);
+  useEffect(() => showLook(0), [chosen]);
+  const place = places[chosen];
+  if (!place) return null;
+  const told = looks?.code === chosen ? looks : null;
+  const look = told?.looks[shownLook] ?? told?.looks[0];
+  const onKeyDown = (event) => {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (step && !event.ctrlKey && !event.altKey && !event.metaKey) walk(step);
+  };
+  const walk = (step) => {
+    const next = nextShown(known, step);
+    if (next) onChoose(next);
+  };
+  return html`
+    <section class="card place" aria-labelledby="place" onKeyDown=${onKeyDown}>
+      <div class="place-head">
+        <h2 id="place">${chosen}</h2>
+        <button class="order" onClick=${() => walk(-1)} disabled=${!nextShown(known, -1)} aria-label="Previous place">←</button>
+        <button class="order" onClick=${() => walk(1)} disabled=${!nextShown(known, 1)} aria-label="Next place">→</button>
+        <button class="order" onClick=${() => onChoose("")} aria-label="Close">Close</button>
+      </div>
+      <p class="place-state" role="status">
+        <i class=${`cell state-${place.state}`} aria-hidden="true">${STATES[place.state].mark}</i>
+        <strong>${STATES[place.state].name}</strong>
+        <span class="quiet">${place.pending ? "not booked yet" : STATES[place.state].means}</span>
+      </p>
+      <p class="quiet">${whereIs(chosen, known.fronts)}</p>
+      <${Outcome} />
+      ${told?.trouble && html`<p class="refusal">${told.trouble}</p>`}
+      ${look?.evidence && html`<${Picture} key=${look.evidence} look=${look} place=${chosen} />`}
+      ${look ? html`<${Facts} look=${look} />` : html`<${Told} place=${place} />`}
+      ${told?.looks.length > 0 && html`<${History} looks=${told.looks} shown=${look} onShow=${showLook} />`}
+    </section>
+  `;
+}
+
+function nextShown(known, step) {
+  const codes = inOrder(known.fronts);
+  for (let at = codes.indexOf(known.chosen) + step; at >= 0 && at < codes.length; at += step) {
+    if (isShown(codes[at], known)) return codes[at];
+  }
+  return undefined;
+}
+
+function whereIs(code, fronts) {
+  for (const { aisle, side, spots } of fronts) {
+    const spot = spots.find(([other]) => other === code);
+    if (!spot) continue;
+    const [, bay, level, position] = spot;
+    if (!bay) return "";
+    return `${side ? `Aisle ${aisle}, ${side}` : `Rack ${aisle}`} · bay ${bay} · level ${level} · position ${position}`;
+  }
+  return "";
+}
+
+function Outcome() {
+  const { chosen, expected } = stock();
+  const lines = expected?.lines?.filter((line) => line.location === chosen || line.found_at === chosen) ?? [];
+  if (!lines.length) return null;
+  return html`
+    <ul class=${differs(chosen, expected) ? "outcomes differing" : "outcomes"} aria-label="Against the expected stock">
+      ${lines.map(
+        ({ outcome, text, found, found_at: at, location }) => html`
+          <li><strong>${outcome.replaceAll("_", " ")}</strong> ${text}
+            ${found && html` <span>${found} is there</span>`}
+            ${at && html` <span>${location === chosen ? `found at ${at}` : `expected at ${location}`}</span>`}
+          </li>
+        `,
+      )}
+    </ul>
+  `;
+}
+
+function Picture({ look, place }) {
+  const { source } = stock();
+  const [outlines, setOutlines] = useState([]);
+  const [failed, setFailed] = useState(false);
+  useEffect(() => {
+    let gone = false;
+    outlinesOf(source, look.evidence)
+      .then((found) => gone || setOutlines(found))
+      .catch(() => {}); // the picture is shown without them
+    return () => {
+      gone = true;
+    };
+  }, [look.evidence]);
+  if (failed) return html`<p class="quiet">Its picture was not kept.</p>`;
+  const read = new Set(look.reads.map(({ text }) => text));
+  return html`
+    <figure class="evidence">
+      <img src=${pictureUrl(source, look.evidence)} alt=${`What the camera saw at ${place}`} onError=${() => setFailed(true)} />
+      <svg viewBox="0 0 1 1" preserveAspectRatio="none" aria-hidden="true">
+        ${outlines.map(
+          ({ text, corners }) =>
+            html`<polygon class=${read.has(text) ? "outline stock-code" : "outline"} points=${corners.join(" ")} />`,
+        )}
+      </svg>
+    </figure>
+  `;
+}
+
+function Facts({ look }) {
+  const { pose } = look;
+  const facts = [
+    ["Confidence", `${Math.floor(look.confidence * 100)} %`],
+    ["Looked at", when(look.utc)],
+    ["Run", look.run],
+    ["From", pose && `node ${pose.node}, ${pose.height_m.toFixed(2)} m`],
+    ["Standing", STANDINGS[look.standing]],
+  ];
+  return html`
+    <div class="facts">
+      ${look.reads.map((read) => html`<${Read} read=${read} />`)}
+      <dl>
+        ${facts.filter(([, value]) => value).map(([name, value]) => html`<div key=${name}><dt>${name}</dt><dd>${value}</dd></div>`)}
+      </dl>
+    </div>
+  `;
+}
+
+function Read({ read }) {
+  const elements = Object.entries(read.gs1);
+  return html`
+    <p class="read-code">
+      <code>${visible(read.text)}</code>
+      <span class="quiet">${read.symbology}${elements.length > 0 && ` · ${elements.map(([ai, value]) => `(${ai}) ${value}`).join(" ")}`}</span>
+    </p>
+  `;
+}
+
+// What a drone tells of a place has no picture and no history.
+function Told({ place }) {
+  return html`${place.texts.map((text) => html`<p class="read-code"><code>${visible(text)}</code></p>`)}`;
+}
+
+const visible = (text) => text.replaceAll("\u001d", "␝");
+
+function History({ looks, shown, onShow }) {
+  return html`
+    <div class="history">
+      <h3 id="history">${looks.length === 1 ? "One look" : `${looks.length} looks`}</h3>
+      <ol aria-labelledby="history">
+        ${looks.map(
+          (look, i) => html`
+            <li key=${i}>
+              <button aria-pressed=${look === shown} onClick=${() => onShow(i)}>
+                <i class=${`cell state-${look.state}`} aria-hidden="true">${STATES[look.state].mark}</i>
+                <span>${when(look.utc)}</span>
+                <span>${STATES[look.state].name}${STANDINGS[look.standing] && `, ${STANDINGS[look.standing]}`}</span>
+                <span class="quiet">${look.reads.map(({ text }) => visible(text)).join(", ")}</span>
+              </button>
+            </li>
+          `,
+        )}
+      </ol>
+    </div>
+  `;
+}
+
+function when(utc) {
+  const date = new Date(utc);
+  return `${DAY.format(date)} ${time(date)}`;
+}

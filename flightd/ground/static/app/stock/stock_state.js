@@ -1,0 +1,45 @@
+// What the page knows: which inventory is shown, its places as the station read them last, and what is chosen.
+import { state, update } from "../store.js";
+
+const EMPTY = {
+  folder: "", // name of the folder in which inventories lie; empty: the station was told none
+  stores: null, // [{name, written_s}], newest first; null: not asked yet
+  drones: [],
+  source: null, // {kind: "store" | "drone", name}
+  tag: "", // of what is shown, as the station names it
+  fronts: [],
+  places: {}, // code -> {state, texts, confidence, pending, seen_s}
+  fresh: new Set(), // places that changed with the newest answer
+  trouble: "",
+  states: new Set(), // that are picked out; empty: all
+  words: "", // that are looked for
+  found: null, // codes of places that the words mean; null: none are looked for
+  chosen: "", // code of the place in the card
+  looks: null, // {code, looks} or {code, trouble}
+  expected: null, // see expected_stock.js
+};
+
+export const stock = () => state.stock ?? EMPTY;
+
+export function change(changes) {
+  update((s) => {
+    s.stock = { ...(s.stock ?? EMPTY), ...changes };
+  });
+}
+
+export function sourceQuery(source) {
+  return `${source.kind}=${encodeURIComponent(source.name)}`;
+}
+
+// The places in the order in which one walks along them: front by front, level by level.
+export const inOrder = (fronts) => fronts.flatMap((front) => front.spots.map(([code]) => code));
+
+// Whether a place is among those that are picked out by states and words.
+export function isShown(code, { places, states, found, expected }) {
+  const place = places[code];
+  if (!place) return false;
+  const fits = !states.size || states.has(place.state) || (states.has("differs") && differs(code, expected));
+  return fits && (!found || found.has(code));
+}
+
+export const differs = (code, expected) => Boolean(expected?.outcomes?.[code]);

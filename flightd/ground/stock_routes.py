@@ -1,0 +1,200 @@
+"""The page Stock: what was counted, place by place, with its pictures and its history; nothing is changed."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any, Protocol, TypeAlias, TypeVar
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
+from flightd.core.inventory import Observation, Standing
+from flightd.ground.evidence_outlines import outlines
+from flightd.ground.pages import page
+from flightd.ground.stores import StockView, Stores
+from flightd.inventory.code_search import found_places
+from flightd.inventory.elevation import fronts_of
+from flightd.inventory.export.formats import FORMATS
+from flightd.inventory.export.json_document import observation_json
+from flightd.inventory.place_view import view_of_told
+
+T = TypeVar("T")
+_MOST_WORDS = 200
+_AT_ONCE = 2
+"""So many questions are read from the disk at a time: the way to the drones comes first."""
+_KINDS = {
+    "csv": "text/csv; charset=utf-8",
+    "xlsx": "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
+    "json": "application/json",
+    "epcis": "application/ld+json",
+}
+
+
+class CountingDrone(Protocol):
+    """A drone that tells what it has counted."""
+
+    async def inventory(self) -> tuple[dict[str, str], ...]:
+        """Place by place.  UnavailableError where it cannot be reached, RunError where it does not count."""
+        ...
+
+
+_Answer: TypeAlias = Callable[[Request], Awaitable[Response]]
+
+
+def stock_routes(stores: Stores, drones: dict[str, Any]) -> list[BaseRoute]:
+    """The page and what it asks; `drones` are `CountingDrone` by name."""
+    asked = StockAnswers(stores, drones)
+    ways: dict[str, _Answer] = {
+        "": asked.stores,
+        "/places": asked.places,
+        "/place": asked.place,
+        "/find": asked.find,
+        "/picture": asked.picture,
+        "/outlines": asked.outlines,
+        "/export": asked.export,
+    }
+    reads = [Route(f"/api/stock{way}", answered(answer), methods=["GET"]) for way, answer in ways.items()]
+    return [*page("/stock"), *reads]
+
+
+def answered(answer: _Answer) -> _Answer:
+    """What goes wrong as a status and one line for a person."""
+
+    async def guarded(request: Request) -> Response:
+        try:
+            return await answer(request)
+        except InputError as err:
+            return as_json({"refused": str(err)}, 404 if request.method == "GET" else 400)
+        except (UnavailableError, TransientError) as err:
+            return as_json({"refused": str(err)}, 503)
+        except FlightdError as err:
+            return as_json({"refused": str(err).removeprefix("refused: ")}, 409)
+
+    return guarded
+
+
+def as_json(value: object, status: int = 200, headers: dict[str, str] | None = None) -> Response:
+    return Response(msgspec.json.encode(value), status, headers, "application/json")
+
+
+class StockAnswers:
+    """What the page may ask.  Stores are read in threads, few at a time."""
+
+    def __init__(self, stores: Stores, drones: dict[str, CountingDrone]) -> None:
+        self._stores = stores
+        self._drones = drones
+        self._reading = asyncio.Semaphore(_AT_ONCE)
+
+    async def off_loop(self, work: Callable[..., T], *arguments: Any) -> T:
+        """The work's result, done in a thread."""
+        async with self._reading:
+            return await asyncio.to_thread(work, *arguments)
+
+    async def stores(self, _request: Request) -> Response:
+        """The inventories that can be shown: stores, and what the drones tell themselves."""
+        names = await self.off_loop(self._stores.names)
+        return as_json(
+            {
+                "folder": self._stores.title,
+                "stores": [{"name": name, "written_s": ns / 1e9} for name, ns in names],
+                "drones": list(self._drones),
+            }
+        )
+
+    async def view(self, request: Request) -> StockView:
+        """The inventory that a request is about: `?store=NAME` or `?drone=NAME`."""
+        name = request.query_params.get("drone")
+        if name is None:
+            return await self.off_loop(self._stores.view, request.query_params.get("store", ""))
+        drone = self._drones.get(name)
+        if drone is None:
+            raise InputError(f"there is no drone {name!r}")
+        told = await drone.inventory()
+        places = tuple(view_of_told(place) for place in told)
+        codes = [place.code for place in places]
+        return StockView(f"{hash(places):x}", fronts_of(codes), places, ())
+
+    async def places(self, request: Request) -> Response:
+        """Every front with its spots, and every place with its state.  304 while nothing has changed."""
+        view = await self.view(request)
+        tag = f'"{view.stamp}"'
+        if request.headers.get("if-none-match") == tag:
+            return Response(status_code=304, headers={"ETag": tag})
+        document = await self.off_loop(_document, view)
+        return Response(document, headers={"ETag": tag}, media_type="application/json")
+
+    async def place(self, request: Request) -> Response:
+        """One place with all its looks, newest first."""
+        asked = request.query_params
+        looks = await self.off_loop(self._stores.looks, asked.get("store", ""), asked.get("code", ""))
+        return as_json({"code": asked.get("code", ""), "looks": _looks(looks)})
+
+    async def find(self, request: Request) -> Response:
+        """The places that words mean: by code, in whatever notation, or by the place's own name."""
+        words = request.query_params.get("text", "").strip()
+        if len(words) > _MOST_WORDS:
+            raise InputError(f"at most {_MOST_WORDS} characters are looked for")
+        view = await self.view(request)
+        return as_json({"found": await self.off_loop(found_places, words, view.places)})
+
+    async def picture(self, request: Request) -> Response:
+        """A picture that was kept as evidence; its name is its content's, it never changes."""
+        asked = request.query_params
+        jpeg = await self.off_loop(self._stores.picture, asked.get("store", ""), asked.get("name", ""))
+        return Response(
+            jpeg, headers={"Cache-Control": "private, immutable, max-age=86400"}, media_type="image/jpeg"
+        )
+
+    async def outlines(self, request: Request) -> Response:
+        """Where in a picture the codes are."""
+        asked = request.query_params
+        jpeg = await self.off_loop(self._stores.picture, asked.get("store", ""), asked.get("name", ""))
+        found = await self.off_loop(outlines, jpeg)
+        return as_json({"outlines": [{"text": text, "corners": corners} for text, corners in found]})
+
+    async def export(self, request: Request) -> Response:
+        """The whole inventory in a format of `flightd inventory export`."""
+        kind = request.query_params.get("format", "")
+        if kind not in FORMATS:
+            raise InputError(f"no format is called {kind!r}; choose one of {', '.join(FORMATS)}")
+        view = await self.off_loop(self._stores.view, request.query_params.get("store", ""))
+        data = await self.off_loop(FORMATS[kind].write, view.records)
+        return download(data, f"inventory{FORMATS[kind].suffix}", _KINDS[kind])
+
+
+def download(data: bytes, name: str, kind: str) -> Response:
+    """A file for the person to keep."""
+    return Response(data, headers={"Content-Disposition": f'attachment; filename="{name}"'}, media_type=kind)
+
+
+def _document(view: StockView) -> bytes:
+    fronts = [
+        {
+            "aisle": front.aisle,
+            "side": front.side,
+            "mirrored": front.mirrored,
+            "placed": front.placed,
+            "spots": [(spot.code, spot.bay, spot.level, spot.position) for spot in front.spots],
+        }
+        for front in view.fronts
+    ]
+    places = {
+        place.code: {
+            "state": place.state,
+            "texts": place.texts,
+            "confidence": place.confidence,
+            "pending": place.pending,
+            "seen_s": place.utc_ns / 1e9 if place.utc_ns else None,
+        }
+        for place in view.places
+    }
+    return msgspec.json.encode({"fronts": fronts, "places": places})
+
+
+def _looks(looks: Sequence[tuple[Observation, Standing]]) -> list[dict[str, object]]:
+    newest_first = sorted(looks, key=lambda look: look[0].utc_ns, reverse=True)
+    return [{**observation_json(seen), "standing": standing.name.lower()} for seen, standing in newest_first]

@@ -1,0 +1,161 @@
+"""The inventories that lie under the station's folder: found by themselves, read and never changed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.errors import FlightdError, InputError
+from flightd.core.inventory import LocationRecord, Observation, Standing
+from flightd.core.topics import Document, Topic
+from flightd.inventory.elevation import Front, fronts_of
+from flightd.inventory.place_view import PlaceView, place_views
+from flightd.replay.log import LogReader
+from flightd.site.site import Site
+from flightd.site.site_file import parse_site
+from flightd.vision.shelf.evidence_jpeg import MOST_BYTES
+
+_FILE, _LOG, _TRUTH = "inventory.db", "*.mcap", "truth.mcap"
+_DEPTH = 4
+_MOST_FOLDERS, _MOST_STORES = 5_000, 500
+_Stamp: TypeAlias = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StockView:
+    """A store at one moment.  `stamp` is another whenever anything in it is."""
+
+    stamp: str
+    fronts: tuple[Front, ...]
+    places: tuple[PlaceView, ...]
+    records: tuple[LocationRecord, ...]
+
+
+class Stores:
+    """Under `root`: each folder with an `inventory.db`, named by its path from there (`.`: root itself).
+
+    Safe from any thread.  Nothing that a browser says is ever made a path: names are looked up."""
+
+    def __init__(self, root: Path | None) -> None:
+        self._root = root
+        self._views: dict[str, StockView] = {}
+        self._sites: dict[Path, tuple[str, Site | None]] = {}
+
+    @property
+    def title(self) -> str:
+        """The name of the folder, for people; empty where the station was told none."""
+        return "" if self._root is None else self._root.resolve().name or "/"
+
+    def names(self) -> list[tuple[str, int]]:
+        """Every store and when it was written last (UTC, ns), newest first."""
+        if self._root is None:
+            return []
+        found = [(_name(folder, self._root), _written_ns(folder)) for folder in _folders(self._root)]
+        return sorted(found, key=lambda store: (-store[1], store[0]))
+
+    def view(self, name: str) -> StockView:
+        """A store as it is now.  InputError where there is none of the name, as `SqliteStore` raises."""
+        folder = self._folder(name)
+        stamp = _text(_stamp(folder))
+        known = self._views.get(name)
+        if known is not None and known.stamp == stamp:
+            return known
+        with SqliteStore(folder, read_only=True) as store:
+            records, looks = tuple(store.locations()), store.looks()
+        codes = [record.code for record in records]
+        view = StockView(stamp, fronts_of(codes, self._site(folder)), place_views(records, looks), records)
+        self._views[name] = view
+        return view
+
+    def looks(self, name: str, code: str) -> Sequence[tuple[Observation, Standing]]:
+        """Every look at a place, oldest first.  InputError for one that the store does not know."""
+        with SqliteStore(self._folder(name), read_only=True) as store:
+            if all(record.code != code for record in store.locations()):
+                raise InputError(f"there is no place {code!r}")
+            return store.looks(code)
+
+    def picture(self, name: str, picture: str) -> bytes:
+        """The JPEG that a look kept as evidence.  InputError where there is none."""
+        if len(picture) != 64 or not set(picture) <= set("0123456789abcdef"):
+            raise InputError("not the name of a picture")
+        file = self._folder(name) / "evidence" / picture[:2] / f"{picture}.jpg"
+        try:
+            if file.is_file() and file.stat().st_size <= MOST_BYTES:
+                return file.read_bytes()
+        except OSError:
+            pass
+        raise InputError("this picture was not kept")
+
+    def _folder(self, name: str) -> Path:
+        for folder in _folders(self._root) if self._root is not None else ():
+            if self._root is not None and _name(folder, self._root) == name:
+                return folder
+        raise InputError(f"there is no inventory {name!r}")
+
+    def _site(self, folder: Path) -> Site | None:
+        """The map that the newest flight log beside the store was flown by; None without one."""
+        logs = [log for log in folder.glob(_LOG) if log.name != _TRUTH]
+        log = max(logs, key=_changed_ns, default=None)
+        if log is None:
+            return None
+        known = self._sites.get(folder)
+        if known is None or known[0] != log.name or known[1] is None:  # a log that begins has no map yet
+            self._sites[folder] = known = log.name, _map_of(log)
+        return known[1]
+
+
+def _map_of(log: Path) -> Site | None:
+    try:
+        for entry in LogReader(log).entries({Topic.MAP}):
+            if isinstance(entry.message, Document):
+                return parse_site(entry.message.text, f"{log} (map)")
+    except FlightdError:
+        pass  # the places are shown by their codes then
+    return None
+
+
+def _folders(root: Path) -> Iterator[Path]:
+    """Folders with a store, not those behind links."""
+    found = 0
+    for looked, (folder, below, files) in enumerate(os.walk(root)):
+        here = Path(folder)
+        if _FILE in files:
+            yield here
+            found += 1
+        deep = len(here.relative_to(root).parts) >= _DEPTH
+        below[:] = [] if deep else sorted(n for n in below if not n.startswith(".") and n != "evidence")
+        if looked >= _MOST_FOLDERS or found >= _MOST_STORES:
+            return
+
+
+def _name(folder: Path, root: Path) -> str:
+    return folder.relative_to(root).as_posix()
+
+
+def _stamp(folder: Path) -> _Stamp:
+    """What changes whenever the store does: size and time of the file and of its log."""
+    return tuple(_size_and_time(folder / f"{_FILE}{part}") for part in ("", "-wal"))
+
+
+def _text(stamp: _Stamp) -> str:
+    return "-".join(f"{size:x}.{time:x}" for size, time in stamp)
+
+
+def _written_ns(folder: Path) -> int:
+    return max(time for _, time in _stamp(folder))
+
+
+def _changed_ns(file: Path) -> int:
+    return _size_and_time(file)[1]
+
+
+def _size_and_time(file: Path) -> tuple[int, int]:
+    try:
+        stat = file.stat()
+    except OSError:
+        return 0, 0
+    return stat.st_size, stat.st_mtime_ns

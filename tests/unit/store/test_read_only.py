@@ -1,0 +1,76 @@
+"""A store that is only read: it shows what a writer has committed, and nothing beside it changes."""
+
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.inventory import LocationState, Observation, PlannedLocation, Standing
+
+EMPTY = Observation("monday", "A-1", 5, LocationState.EMPTY, 0.9)
+
+
+def files(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir() if path.name != "evidence"}
+
+
+def test_it_shows_what_a_writer_commits_meanwhile(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as writer:
+        writer.plan([PlannedLocation("A-1", "N1")])
+        with SqliteStore(tmp_path, read_only=True) as reader:
+            assert [record.state for record in reader.locations()] == [LocationState.NOT_VISITED]
+        writer.commit(EMPTY, confirmed=False)
+        before = files(tmp_path)
+        with SqliteStore(tmp_path, read_only=True) as reader:
+            assert reader.looks("A-1") == [(EMPTY, Standing.PENDING)]
+            writer.settle("monday", ["A-1"], confirmed=False)
+            assert reader.looks() == [(EMPTY, Standing.WITHDRAWN)]
+        assert files(tmp_path) == before
+
+
+def test_it_leaves_no_file_beside_a_store_that_nobody_writes(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as writer:
+        writer.commit(EMPTY)
+    before = files(tmp_path)
+    assert before == {"inventory.db"}
+    with SqliteStore(tmp_path, read_only=True) as reader:
+        assert reader.history("A-1") == [EMPTY]
+        with pytest.raises(UnavailableError, match="cannot be written: attempt to write a readonly"):
+            reader.commit(EMPTY)
+    assert files(tmp_path) == before
+
+
+def test_a_log_without_its_index_is_left_to_a_writer(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as writer:
+        writer.commit(EMPTY)
+        (tmp_path / "inventory.db-shm").unlink()
+        with pytest.raises(UnavailableError, match="was cut off; flightd inventory show"):
+            SqliteStore(tmp_path, read_only=True)
+        assert "inventory.db-shm" not in files(tmp_path)
+
+
+def test_what_is_no_store_of_today_is_refused_and_not_made_one(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"holds no inventory\.db"):
+        SqliteStore(tmp_path / "none", read_only=True)
+    assert not (tmp_path / "none").exists()
+    file = tmp_path / "inventory.db"
+    file.write_bytes(b"no database at all" * 100)
+    with pytest.raises(InputError, match="no inventory, or a damaged one"):
+        SqliteStore(tmp_path, read_only=True)
+    file.unlink()
+    with SqliteStore(tmp_path):
+        pass
+    with sqlite3.connect(file) as changed:
+        changed.execute("PRAGMA user_version = 1")
+    changed.close()
+    with pytest.raises(InputError, match="format 1, known here is 2; open it once with flightd inventory"):
+        SqliteStore(tmp_path, read_only=True)
+    with sqlite3.connect(file) as changed:
+        changed.execute("PRAGMA application_id = 7")
+    changed.close()
+    with pytest.raises(InputError, match="no inventory; choose another folder"):
+        SqliteStore(tmp_path, read_only=True)

@@ -1,0 +1,57 @@
+"""An inventory as a counting flight leaves it: fronts of two aisles, looks in every state, pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import segno
+
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation
+from flightd.core.types import CodeRead
+from flightd.vision.shelf.evidence_jpeg import evidence_jpeg
+
+SSCC = "340123450002439853"
+RUN = "2026-W47"
+_NS = 1_700_000_000 * 10**9
+POSE = CountPose("A1", 0.1, 0.0, 0.9, -1.57)
+
+
+def picture_of(text: str) -> bytes:
+    """A JPEG in which the QR code of the text is."""
+    modules = np.array([list(row) for row in segno.make_qr(text).matrix], np.uint8)
+    code = np.kron(1 - modules, np.ones((5, 5), np.uint8)) * 255
+    picture = np.full((360, 480), 200, np.uint8)
+    picture[60 : 60 + code.shape[0], 240 : 240 + code.shape[1]] = code
+    return evidence_jpeg(np.repeat(picture[:, :, None], 3, axis=2))
+
+
+def code(text: str, *gs1: tuple[str, str]) -> CodeRead:
+    return CodeRead("QR Code", text, (), True, 3, 1.0, gs1)
+
+
+def look(
+    location: str, state: LocationState, *reads: CodeRead, run: str = RUN, at_s: int = 0, evidence: str = ""
+) -> Observation:
+    return Observation(run, location, _NS + at_s * 10**9, state, 0.98, reads, POSE, evidence)
+
+
+def counted_store(folder: Path) -> None:
+    """Eight places of aisle A (side L) and two of aisle B, of which the last nobody saw; `A-GATE` stands
+    nowhere on a rack."""
+    with SqliteStore(folder) as store:
+        codes = [f"AL-{bay:02}-{level}-1" for bay in (1, 2, 3, 4) for level in (1, 2)]
+        store.plan(PlannedLocation(place, "A1") for place in [*codes, "BL-01-1-1", "BL-01-1-2", "A-GATE"])
+        kept = store.keep_evidence(picture_of(f"00{SSCC}"))
+        store.commit(look("AL-01-1-1", LocationState.UNREADABLE, run="2026-W46", at_s=-604_800))
+        store.commit(look("AL-01-1-1", LocationState.READ, code(f"00{SSCC}", ("00", SSCC)), evidence=kept))
+        store.commit(look("AL-01-2-1", LocationState.READ, code("4006381333931")))
+        store.commit(look("AL-02-1-1", LocationState.EMPTY))
+        store.commit(look("AL-02-2-1", LocationState.UNREADABLE))
+        store.commit(look("AL-03-1-1", LocationState.OCCLUDED))
+        store.commit(look("AL-03-2-1", LocationState.SEVERAL, code("PAL-7/L1"), code("PAL-8/L1")))
+        store.commit(look("AL-04-1-1", LocationState.READ, code("PAL-9/L1")), confirmed=False)
+        store.settle(RUN, ["AL-04-1-1"], confirmed=False)
+        store.commit(look("AL-04-2-1", LocationState.READ, code("<b>PAL-10</b>")))
+        store.commit(look("BL-01-1-1", LocationState.READ, code("=1+2")))

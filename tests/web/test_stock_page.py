@@ -1,0 +1,192 @@
+"""The page Stock in a real browser: every place with its state, filling live; by mouse and by keys alone."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.inventory import LocationState
+from tests.web.chromium import NARROW, WIDE, hindrances, opened, running, station
+from tests.web.stock_rig import RUN, SSCC, code, counted_store, look
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Locator, Page
+
+pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
+from playwright.sync_api import expect
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with running() as browser:
+        yield browser
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    counted_store(tmp_path / "monday")
+    return tmp_path
+
+
+@pytest.fixture
+def url(folder: Path) -> Iterator[str]:
+    with station(["demo=127.0.0.1:1/1"], folder=folder) as url:
+        yield f"{url}/stock"
+
+
+def cell(page: Page, place: str) -> Locator:
+    return page.get_by_role("button", name=re.compile(rf"^{re.escape(place)},"))
+
+
+def test_every_place_stands_on_its_front_with_its_state(browser: Browser, url: str) -> None:
+    with opened(browser, url) as page:
+        expect(page.get_by_role("heading", name="Stock 6 of 11 places counted")).to_be_visible()
+        states = page.get_by_role("group", name="States")
+        for words, count in {
+            "Read": 4, "Several codes": 1, "Empty": 1, "Unreadable": 1, "Occluded": 1, "Contradicted": 1,
+            "Never counted": 2,
+        }.items():  # fmt: skip
+            expect(states.get_by_role("button", name=re.compile(rf"{words} {count}$"))).to_be_visible()
+        front = page.get_by_role("region", name="Rack AL")
+        high, low = (cell(page, f"AL-01-{level}-1").bounding_box() for level in (2, 1))
+        last = cell(page, "AL-04-1-1").bounding_box()
+        assert high
+        assert low
+        assert last
+        assert high["y"] < low["y"], "the highest level is on top"
+        assert low["x"] < last["x"]
+        expect(front.get_by_role("button", name="AL-04-1-1, contradicted")).to_be_visible()
+        expect(page.get_by_role("region", name="Places whose rack is not known")).to_contain_text("0 of 1")
+        assert hindrances(page) == []
+
+
+def test_a_click_shows_picture_outline_code_and_history(browser: Browser, url: str) -> None:
+    with opened(browser, url) as page:
+        cell(page, "AL-01-1-1").click()
+        card = page.get_by_role("region", name="AL-01-1-1")
+        expect(card.get_by_role("img", name="What the camera saw at AL-01-1-1")).to_be_visible()
+        expect(card.locator("polygon.stock-code")).to_have_count(1)
+        points = card.locator("polygon").get_attribute("points") or ""
+        lefts = sorted(float(pair.split(",")[0]) for pair in points.split())[:2]
+        assert all(0.5 <= left < 0.56 for left in lefts), "it begins in the middle of the picture"
+        expect(card.get_by_role("code")).to_have_text(f"00{SSCC}")
+        expect(card.get_by_text(f"(00) {SSCC}")).to_be_visible()
+        expect(card.get_by_text("98 %")).to_be_visible()
+        looks = card.get_by_role("list").get_by_role("listitem")
+        expect(looks).to_have_count(2)
+        looks.nth(1).get_by_role("button").click()
+        expect(card.get_by_text("2026-W46")).to_be_visible()
+        expect(card.get_by_role("img")).to_have_count(0)
+        assert hindrances(page) == []
+        page.reload()
+        expect(card.get_by_role("img")).to_be_visible()
+        card.get_by_role("button", name="Close").click()
+        expect(card).to_be_hidden()
+
+
+def test_it_is_walked_and_searched_by_keys_alone(browser: Browser, url: str) -> None:
+    with opened(browser, url) as page:
+        expect(cell(page, "AL-01-2-1")).to_be_visible()
+        for _ in range(30):
+            page.keyboard.press("Tab")
+            if page.evaluate("document.activeElement.dataset.code ?? ''") == "AL-01-2-1":
+                break
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("region", name="AL-01-2-1")).to_be_visible()
+        for key, place in {
+            "ArrowDown": "AL-01-1-1", "ArrowRight": "AL-02-1-1", "End": "AL-04-1-1", "Home": "AL-01-1-1",
+        }.items():  # fmt: skip
+            page.keyboard.press(key)
+            expect(page.get_by_role("heading", name=place, exact=True)).to_be_visible()
+            expect(cell(page, place)).to_be_focused()
+        page.keyboard.press("End")
+        page.keyboard.press("ArrowRight")
+        expect(page.get_by_role("heading", name="BL-01-1-1", exact=True)).to_be_visible()
+        page.get_by_role("searchbox", name="Code or place").focus()
+        page.keyboard.type(f"(00){SSCC}")
+        expect(page.get_by_text("1 place", exact=True)).to_be_visible()
+        page.get_by_role("button", name="Previous place").focus()
+        page.keyboard.press("ArrowLeft")
+        expect(page.get_by_role("heading", name="AL-01-1-1", exact=True)).to_be_visible()
+        expect(page.get_by_role("button", name="Next place")).to_be_disabled()
+        page.keyboard.press("Escape")
+        expect(page.get_by_role("button", name="STOPPING")).to_be_visible()
+
+
+def test_states_pick_out_what_next_and_previous_go_through(browser: Browser, url: str) -> None:
+    with opened(browser, url) as page:
+        states = page.get_by_role("group", name="States")
+        for name in ("Unreadable 1", "Occluded 1"):
+            states.get_by_role("button", name=re.compile(name)).click()
+        expect(cell(page, "AL-01-1-1")).to_have_class(re.compile("aside"))
+        cell(page, "AL-02-2-1").click()
+        page.get_by_role("button", name="Previous place").click()
+        expect(page.get_by_role("heading", name="AL-03-1-1", exact=True)).to_be_visible()
+        expect(page.get_by_role("button", name="Previous place")).to_be_disabled()
+        states.get_by_role("button", name="Show all").click()
+        expect(page.get_by_role("button", name="Previous place")).to_be_enabled()
+
+
+def test_it_fills_while_a_flight_counts(browser: Browser, url: str, folder: Path) -> None:
+    with SqliteStore(folder / "monday") as store, opened(browser, url) as page:
+        expect(cell(page, "BL-01-1-2")).to_have_accessible_name("BL-01-1-2, never counted")
+        store.commit(look("BL-01-1-2", LocationState.READ, code("PAL-11/L1"), at_s=60), confirmed=False)
+        expect(cell(page, "BL-01-1-2")).to_have_accessible_name("BL-01-1-2, read, not booked yet, PAL-11/L1")
+        cell(page, "BL-01-1-2").click()
+        expect(page.get_by_role("region", name="BL-01-1-2")).to_contain_text("not booked yet")
+        store.settle(RUN, ["BL-01-1-2"], confirmed=True)
+        expect(cell(page, "BL-01-1-2")).to_have_accessible_name("BL-01-1-2, read, PAL-11/L1")
+        expect(page.get_by_role("heading", name="Stock 7 of 11 places counted")).to_be_visible()
+
+
+def test_what_labels_say_is_text_and_never_a_formula(browser: Browser, url: str, tmp_path: Path) -> None:
+    with opened(browser, url) as page:
+        cell(page, "AL-04-2-1").click()
+        expect(page.get_by_role("region", name="AL-04-2-1").locator("code")).to_have_text("<b>PAL-10</b>")
+        saved = {}
+        for name in ("CSV", "XLSX", "JSON", "EPCIS"):
+            with page.expect_download() as download:
+                page.get_by_role("link", name=name, exact=True).click()
+            saved[name] = tmp_path / download.value.suggested_filename
+            download.value.save_as(saved[name])
+    assert [path.name for path in saved.values()] == [
+        "inventory.csv", "inventory.xlsx", "inventory.json", "inventory.jsonld"
+    ]  # fmt: skip
+    rows = {row["location"]: row for row in csv.DictReader(io.StringIO(saved["CSV"].read_text()))}
+    assert rows["BL-01-1-1"]["text"] == "'=1+2"
+    assert rows["AL-02-1-1"]["state"] == "empty"
+    assert zipfile.is_zipfile(saved["XLSX"])
+    assert len(json.loads(saved["JSON"].read_text())["locations"]) == 11
+    assert json.loads(saved["EPCIS"].read_text())["type"] == "EPCISDocument"
+
+
+@pytest.mark.parametrize(("size", "scheme"), [(NARROW, "light"), (NARROW, "dark"), (WIDE, "dark")])
+def test_it_is_for_everybody_on_every_screen(
+    browser: Browser, url: str, size: tuple[int, int], scheme: str
+) -> None:
+    with opened(browser, url, size, scheme) as page:
+        cell(page, "AL-01-1-1").click()
+        expect(page.get_by_role("img", name=re.compile("What the camera saw"))).to_be_visible()
+        assert page.evaluate("document.documentElement.scrollWidth") == size[0]
+        expect(page.get_by_role("button", name="STOP")).to_be_in_viewport(ratio=1.0)
+        expect(cell(page, "AL-01-1-1")).to_be_in_viewport(ratio=1.0)
+        assert hindrances(page) == []
+
+
+def test_moving_to_the_flight_and_back_keeps_what_was_chosen(browser: Browser, url: str) -> None:
+    with opened(browser, url) as page:
+        cell(page, "AL-02-1-1").click()
+        page.get_by_role("link", name="Live").click()
+        expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
+        expect(page.get_by_role("main")).to_be_focused()
+        page.go_back()
+        expect(page.get_by_role("heading", name="AL-02-1-1", exact=True)).to_be_visible()
