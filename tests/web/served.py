@@ -7,6 +7,7 @@ import contextlib
 import json
 from collections.abc import AsyncIterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from websockets.asyncio.client import ClientConnection, connect
@@ -80,12 +81,12 @@ class Station:
 
 
 @contextlib.asynccontextmanager
-async def served(*drones: tuple[str, Address]) -> AsyncIterator[Station]:
-    """A station that serves meanwhile."""
+async def served(*drones: tuple[str, Address], folder: Path | None = None) -> AsyncIterator[Station]:
+    """A station that serves meanwhile; flights lie below `folder`."""
     listener, where = opened(Listening("127.0.0.1", 0))
     ready = asyncio.Event()
     with listener:
-        serving = asyncio.ensure_future(serve(drones, listener, where, lambda _: ready.set()))
+        serving = asyncio.ensure_future(serve(drones, listener, where, lambda _: ready.set(), folder))
         try:
             await asyncio.wait_for(ready.wait(), 20)
             yield Station(where)

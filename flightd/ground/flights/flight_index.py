@@ -41,6 +41,7 @@ class FlightIndex:
         self._trouble = ""
         self._unread = 0
         self._looked = False
+        self._looked_s = 0.0
         self._version = 0
         self._told: tuple[int, bytes] = (-1, b"")
         self._asked = asyncio.Event()
@@ -56,7 +57,7 @@ class FlightIndex:
                 self._trouble = ""
             except FlightdError as err:
                 self._trouble = str(err)
-            self._looked = True
+            self._looked, self._looked_s = True, asyncio.get_running_loop().time()
             await self._tell()
             await asyncio.sleep(_FRESH_S)
 
@@ -83,7 +84,7 @@ class FlightIndex:
     async def log(self, log_id: str) -> FoundLog | None:
         """The log of that id; None where there is none.  Looks through the folder where it does not know
         it."""
-        if log_id not in self._found:
+        if log_id not in self._found and not self._is_fresh():
             version = self._version
             self._asked.set()
             with contextlib.suppress(TimeoutError):
@@ -112,6 +113,10 @@ class FlightIndex:
                 self._rows[log.id] = (log.stamp, row)
             self._unread = len(unread)
             await self._tell()
+
+    def _is_fresh(self) -> bool:
+        """The folder was looked through a moment ago."""
+        return self._looked and asyncio.get_running_loop().time() - self._looked_s < _FRESH_S
 
     def _is_unread(self, log: FoundLog) -> bool:
         known = self._rows.get(log.id)

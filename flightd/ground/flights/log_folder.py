@@ -83,7 +83,7 @@ def path_of(root: Path, relative: str) -> Path:
         real, inside = path.resolve(strict=True), root.resolve(strict=True)
     except (OSError, ValueError, RuntimeError):
         raise InputError("the log is gone") from None
-    if real != inside / relative or not real.is_file():
+    if real != inside / relative or not real.is_relative_to(inside) or not real.is_file():
         raise InputError("the log does not lie in the folder")
     return real
 
