@@ -26,8 +26,7 @@ from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES, read_act, read_page_message
 from flightd.ground.pages import STATIC, first_page
-from flightd.ground.stock_routes import stock_routes
-from flightd.ground.stores import Stores
+from flightd.ground.stock_page import stock_page
 
 _NOT_OURS = 1008
 """WebSocket: a message that is against the rules."""
@@ -42,7 +41,7 @@ def application(hub: Hub, hosts: Iterable[str], folder: Path | None, flights: Fl
         first_page(),
         WebSocketRoute("/live", partial(_live, hub)),
         Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
-        *stock_routes(Stores(folder), hub.drones),
+        *stock_page(folder, hub.drones),
         *flight_routes(flights),
         *guide_routes(),
         Mount("/static", StaticFiles(directory=STATIC)),

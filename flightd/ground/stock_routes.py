@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeAlias, TypeVar
 
 import msgspec
@@ -45,9 +45,8 @@ class CountingDrone(Protocol):
 _Answer: TypeAlias = Callable[[Request], Awaitable[Response]]
 
 
-def stock_routes(stores: Stores, drones: dict[str, Any]) -> list[BaseRoute]:
-    """The page and what it asks; `drones` are `CountingDrone` by name."""
-    asked = StockAnswers(stores, drones)
+def stock_routes(asked: StockAnswers) -> list[BaseRoute]:
+    """The page, and what it asks."""
     ways: dict[str, _Answer] = {
         "": asked.stores,
         "/places": asked.places,
@@ -84,7 +83,7 @@ def as_json(value: object, status: int = 200, headers: dict[str, str] | None = N
 class StockAnswers:
     """What the page may ask.  Stores are read in threads, few at a time."""
 
-    def __init__(self, stores: Stores, drones: dict[str, CountingDrone]) -> None:
+    def __init__(self, stores: Stores, drones: Mapping[str, CountingDrone]) -> None:
         self._stores = stores
         self._drones = drones
         self._reading = asyncio.Semaphore(_AT_ONCE)
@@ -105,11 +104,15 @@ class StockAnswers:
             }
         )
 
+    async def store_view(self, request: Request) -> StockView:
+        """The store that a request is about: `?store=NAME`."""
+        return await self.off_loop(self._stores.view, request.query_params.get("store", ""))
+
     async def view(self, request: Request) -> StockView:
         """The inventory that a request is about: `?store=NAME` or `?drone=NAME`."""
         name = request.query_params.get("drone")
         if name is None:
-            return await self.off_loop(self._stores.view, request.query_params.get("store", ""))
+            return await self.store_view(request)
         drone = self._drones.get(name)
         if drone is None:
             raise InputError(f"there is no drone {name!r}")
@@ -161,7 +164,7 @@ class StockAnswers:
         kind = request.query_params.get("format", "")
         if kind not in FORMATS:
             raise InputError(f"no format is called {kind!r}; choose one of {', '.join(FORMATS)}")
-        view = await self.off_loop(self._stores.view, request.query_params.get("store", ""))
+        view = await self.store_view(request)
         data = await self.off_loop(FORMATS[kind].write, view.records)
         return download(data, f"inventory{FORMATS[kind].suffix}", _KINDS[kind])
 

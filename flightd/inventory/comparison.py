@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from flightd.core.inventory import LocationRecord, LocationState
+from flightd.inventory.code_equality import code_key
 
 
 class ComparisonOutcome(enum.StrEnum):
@@ -46,20 +47,29 @@ def compare_stock(
     """Every expected code and every code found, each with its one outcome, by location.
 
     `expected` gives the codes of each location; an empty list says that nothing may be there.  A location
-    of the books that the count does not know is uncounted.
+    of the books that the count does not know is uncounted.  Codes are the same by `code_equality`, and told
+    as the books write them; locations are the same whatever their case.
     """
+    spellings: dict[str, str] = {}
+
+    def spelled(texts: Iterable[str]) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(spellings.setdefault(code_key(text), text) for text in texts))
+
     known = {record.code: record for record in records}
-    wanted = {location: frozenset(texts) for location, texts in expected.items()}
+    wanted: dict[str, frozenset[str]] = {}
+    for location, codes in _at_known_places(expected, known):
+        wanted[location] = wanted.get(location, frozenset()) | frozenset(spelled(codes))
+    seen = {code: spelled(record.texts) for code, record in known.items()}
     places: defaultdict[str, list[str]] = defaultdict(list)
-    for record in known.values():
-        for text in record.texts:
-            places[text].append(record.code)
+    for code, texts in seen.items():
+        for text in texts:
+            places[text].append(code)
     wanted_anywhere = frozenset(text for texts in wanted.values() for text in texts)
     lines: list[Difference] = []
     explained: set[tuple[str, str]] = set()
     for location in sorted(wanted):
         counted = known.get(location)
-        unexpected = [t for t in (counted.texts if counted else ()) if t not in wanted_anywhere]
+        unexpected = [t for t in seen.get(location, ()) if t not in wanted_anywhere]
         for text in sorted(wanted[location]):
             line = _expected_code(location, text, counted, unexpected, places[text], wanted, explained)
             explained |= {(line.location, text), (line.found_at, text), (location, line.found)}
@@ -67,10 +77,19 @@ def compare_stock(
     lines += [
         Difference(ComparisonOutcome.UNEXPECTED, record.code, text, confidence=_confidence(record))
         for record in known.values()
-        for text in record.texts
+        for text in seen[record.code]
         if (record.code, text) not in explained
     ]
     return tuple(sorted(lines, key=lambda line: (line.location, line.text)))
+
+
+def _at_known_places(
+    expected: Mapping[str, Sequence[str]], known: Mapping[str, LocationRecord]
+) -> Iterable[tuple[str, Sequence[str]]]:
+    """What is expected, each location as the count writes it."""
+    folded = {code.casefold(): code for code in known}
+    for location, texts in expected.items():
+        yield (location if location in known else folded.get(location.casefold(), location)), texts
 
 
 def _expected_code(

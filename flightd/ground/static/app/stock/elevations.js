@@ -96,8 +96,7 @@ function cell({ code }, known, inTabOrder) {
   if (known.fresh.has(code)) classes.push("fresh");
   if (!isShown(code, known)) classes.push("aside");
   if (differs(code, known.expected)) classes.push("differs");
-  const outcome = known.expected?.outcomes?.[code];
-  const words = placeWords(code, place) + (outcome ? `, ${outcome.replaceAll("_", " ")}` : "");
+  const words = placeWords(code, place) + (differs(code, known.expected) ? ", not as expected" : "");
   return html`
     <button
       key=${code}

@@ -1,18 +1,18 @@
 // Which inventory is shown, what is looked for in it, and how many places are in which state.
 import { html, useEffect, useRef } from "../html.js";
 import { STATES } from "./states.js";
-import { change, differs, isShown, stock } from "./stock_state.js";
+import { change, differs, inOrder, isShown, stock } from "./stock_state.js";
 import { exportUrl, search, show } from "./stock_source.js";
 
 const TYPING_MS = 250;
 const FORMATS = { csv: "CSV", xlsx: "XLSX", json: "JSON", epcis: "EPCIS" };
 
-export function FindCard() {
+export function FindCard({ onChoose }) {
   return html`
     <section class="card find" aria-label="Find and filter">
       <div class="find-row">
         <${Source} />
-        <${Search} />
+        <${Search} onChoose=${onChoose} />
         <${Downloads} />
       </div>
       <${StateFilters} />
@@ -38,7 +38,7 @@ function Source() {
   `;
 }
 
-function Search() {
+function Search({ onChoose }) {
   const timer = useRef(0);
   const box = useRef(null);
   const { found, source } = stock();
@@ -51,10 +51,12 @@ function Search() {
     const words = event.target.value;
     timer.current = setTimeout(() => search(words), TYPING_MS);
   };
-  const onKeyDown = (event) => {
+  const onKeyDown = async (event) => {
     if (event.key !== "Enter") return;
     clearTimeout(timer.current);
-    search(event.target.value);
+    await search(event.target.value);
+    const first = inOrder(stock().fronts).find((code) => stock().found?.has(code));
+    if (first) onChoose(first);
   };
   return html`
     <label class="field search">Code or place

@@ -1,6 +1,7 @@
 // One place: its picture with the codes' outlines, what was read, how sure, and its history over the runs.
 import { html, useEffect, useState } from "../html.js";
 import { time } from "../words.js";
+import { outcomeWords } from "./expected_card.js";
 import { differs, inOrder, isShown, stock } from "./stock_state.js";
 import { STATES } from "./states.js";
 import { outlinesOf, pictureUrl } from "./stock_source.js";
@@ -75,7 +76,7 @@ function Outcome() {
     <ul class=${differs(chosen, expected) ? "outcomes differing" : "outcomes"} aria-label="Against the expected stock">
       ${lines.map(
         ({ outcome, text, found, found_at: at, location }) => html`
-          <li><strong>${outcome.replaceAll("_", " ")}</strong> ${text}
+          <li><strong>${outcomeWords(outcome)}</strong> ${text}
             ${found && html` <span>${found} is there</span>`}
             ${at && html` <span>${location === chosen ? `found at ${at}` : `expected at ${location}`}</span>`}
           </li>

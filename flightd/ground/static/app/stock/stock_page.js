@@ -2,6 +2,7 @@
 import { html, useEffect } from "../html.js";
 import { goTo } from "../router.js";
 import { Elevations, placeCell } from "./elevations.js";
+import { ExpectedCard } from "./expected_card.js";
 import { FindCard } from "./find_card.js";
 import { PlaceCard } from "./place_card.js";
 import { change, stock } from "./stock_state.js";
@@ -23,9 +24,10 @@ export default function StockPage({ route }) {
       <div class="stock-main">
         <h2 class="stock-title">Stock <small>${counted} of ${codes.length} places counted</small></h2>
         ${trouble && html`<p class="stock-trouble" role="alert">${trouble}</p>`}
-        <${FindCard} />
+        <${FindCard} onChoose=${choose} />
         ${codes.length > 0 && html`<${Elevations} onChoose=${choose} />`}
         ${codes.length === 0 && !trouble && html`<p class="quiet">Nothing was counted yet.</p>`}
+        <${ExpectedCard} onChoose=${choose} />
       </div>
       <${PlaceCard} onChoose=${choose} />
     </div>

@@ -1,0 +1,135 @@
+// The expected stock: upload, which column is what, and every difference to the count.
+import { html, useEffect, useRef } from "../html.js";
+import { choose, compareAgain, download, forget, upload } from "./expected_stock.js";
+import { stock } from "./stock_state.js";
+
+const OUTCOMES = {
+  match: "as expected",
+  missing: "missing",
+  wrong: "another code there",
+  moved: "elsewhere",
+  unexpected: "unexpected",
+  empty_but_expected: "empty",
+  uncounted: "not countable",
+};
+export const outcomeWords = (outcome) => OUTCOMES[outcome] ?? outcome;
+
+export function ExpectedCard({ onChoose }) {
+  const { expected, source, tag } = stock();
+  useEffect(() => {
+    if (expected?.chosen && !expected.busy && expected.tag !== tag) compareAgain();
+  }, [tag]);
+  if (source?.kind !== "store") return null;
+  return html`
+    <section class="card expected" aria-labelledby="expected">
+      <div class="expected-head">
+        <h3 id="expected">Expected stock</h3>
+        <${Choose} words=${expected ? "Another file" : "Upload CSV or XLSX"} />
+        ${expected && html`<button class="order" onClick=${forget}>Remove</button>`}
+      </div>
+      ${!expected &&
+      html`<p class="quiet">What your books say lies where. It is compared with the count here, and kept nowhere.</p>`}
+      ${expected?.busy && html`<p class="quiet" role="status">Comparing ${expected.name} …</p>`}
+      ${expected?.trouble && html`<p class="refusal" role="alert">${expected.name}: ${expected.trouble}</p>`}
+      ${expected?.columns && html`<${Columns} /><${Outcomes} /><${Differences} onChoose=${onChoose} />`}
+    </section>
+  `;
+}
+
+function Choose({ words }) {
+  const input = useRef(null);
+  const onChange = () => {
+    const [file] = input.current.files;
+    input.current.value = ""; // the same file again is a change too
+    if (file) upload(file);
+  };
+  return html`
+    <button class="order" onClick=${() => input.current.click()}>${words}</button>
+    <input ref=${input} hidden type="file" accept=".csv,.tsv,.txt,.xlsx" onChange=${onChange} />
+  `;
+}
+
+function Columns() {
+  const { expected } = stock();
+  const { columns, chosen, sample, kind, rows, name } = expected;
+  const pick = (role, words, optional) => html`
+    <label class="field">${words}
+      <select value=${chosen[role] ?? ""} onChange=${(event) => choose({ [role]: event.target.value === "" ? null : Number(event.target.value) })}>
+        ${optional && html`<option value="">none</option>`}
+        ${columns.map((column, i) => html`<option key=${i} value=${i}>${column}</option>`)}
+      </select>
+    </label>
+  `;
+  const roles = { [chosen.place]: "place", [chosen.code]: "code", [chosen.quantity ?? -1]: "quantity" };
+  return html`
+    <p class="quiet">${name}: ${kind}, ${rows} rows</p>
+    <div class="find-row">
+      ${pick("place", "Places are in")}${pick("code", "Codes are in")}${pick("quantity", "Quantities are in", true)}
+      <label class="check"><input type="checkbox" checked=${chosen.heading} onChange=${(event) => choose({ heading: event.target.checked })} /> The first row names the columns</label>
+    </div>
+    <details>
+      <summary>The first rows</summary>
+      <div class="table-scroll" tabindex="0" role="group" aria-label="The first rows">
+        <table>
+          <thead><tr>${columns.map((column, i) => html`<th key=${i} scope="col">${column}${roles[i] && html` <small>${roles[i]}</small>`}</th>`)}</tr></thead>
+          <tbody>${sample.map((row, i) => html`<tr key=${i}>${row.map((cell, j) => html`<td key=${j}>${cell}</td>`)}</tr>`)}</tbody>
+        </table>
+      </div>
+    </details>
+    <${Problems} />
+  `;
+}
+
+function Problems() {
+  const { problems, problem_count: count } = stock().expected;
+  if (!count) return null;
+  return html`
+    <div class="obstacles left-out">
+      <p>${count === 1 ? "One row is left out:" : `${count} rows are left out:`}</p>
+      <ul>${problems.map((problem) => html`<li key=${problem}>${problem}</li>`)}</ul>
+      ${count > problems.length && html`<p>and ${count - problems.length} more</p>`}
+    </div>
+  `;
+}
+
+function Outcomes() {
+  const { outcome_counts: counts } = stock().expected;
+  return html`
+    <div class="find-row">
+      <ul class="outcome-counts" aria-label="Outcomes">
+        ${Object.entries(counts)
+          .filter(([, count]) => count)
+          .map(([outcome, count]) => html`<li key=${outcome} class=${`outcome-${outcome}`}><b>${count}</b> ${outcomeWords(outcome)}</li>`)}
+      </ul>
+      <div class="downloads" role="group" aria-label="Download the comparison">
+        <button class="order" onClick=${() => download("csv")}>Comparison CSV</button>
+        <button class="order" onClick=${() => download("json")}>Comparison JSON</button>
+      </div>
+    </div>
+  `;
+}
+
+function Differences({ onChoose }) {
+  const { expected, places } = stock();
+  const { lines, difference_count: count } = expected;
+  if (!count) return html`<p class="ready"><span class="dot" />No difference.</p>`;
+  return html`
+    <div class="table-scroll" tabindex="0" role="group" aria-label="Differences">
+      <table>
+        <thead><tr><th scope="col">Place</th><th scope="col">Outcome</th><th scope="col">Expected</th><th scope="col">Found</th></tr></thead>
+        <tbody>
+          ${lines.map((line, i) => html`
+            <tr key=${i}>
+              <td>${places[line.location] ? html`<button class="link" onClick=${() => onChoose(line.location)}>${line.location}</button>` : line.location}</td>
+              <td>${outcomeWords(line.outcome)}</td>
+              <td>${line.outcome === "unexpected" ? "" : line.text}${line.quantity && html` <small>quantity ${line.quantity}</small>`}</td>
+              <td>${line.outcome === "unexpected" ? line.text : line.found}
+                ${line.found_at && html`at <button class="link" onClick=${() => onChoose(line.found_at)}>${line.found_at}</button>`}</td>
+            </tr>
+          `)}
+        </tbody>
+      </table>
+    </div>
+    ${count > lines.length && html`<p class="quiet">${count - lines.length} more: download the comparison.</p>`}
+  `;
+}

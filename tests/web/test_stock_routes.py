@@ -1,0 +1,229 @@
+"""What the page Stock asks of the station: answered from what lies under its folder alone."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import pytest
+from mcap.writer import Writer
+
+from flightd.adapters.ground_link.client import Address
+from flightd.adapters.ground_link.link import ZmqGround
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.inventory import LocationState, PlannedLocation
+from flightd.core.topics import Topic
+from flightd.inventory.stock_table import MOST_BYTES
+from flightd.runtime.clock import LoopClock
+from flightd.site.site import Site
+from flightd.site.site_file import load_site, site_toml
+from tests.rigs.event_loops import in_real_time
+from tests.rigs.ground_link import SITE, address_of, local, serving
+from tests.rigs.waiting import until
+from tests.web.served import Station, served
+from tests.web.stock_rig import SSCC, counted_store, look
+
+NOBODY = ("demo", Address("127.0.0.1", 1, 1))
+UPLOAD = {"Content-Type": "application/octet-stream"}
+BOOKS = f"place,code\nAL-01-1-1,{SSCC}\n".encode()
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    counted_store(tmp_path / "hall" / "monday")
+    return tmp_path / "hall"
+
+
+async def got(station: Station, way: str) -> tuple[int, Any]:
+    code, text = await station.ask("GET", f"/api/stock{way}")
+    return code, json.loads(text)
+
+
+async def posted(station: Station, way: str, body: bytes, **headers: str) -> tuple[int, Any]:
+    code, text = await station.ask(
+        "POST", f"/api/stock{way}", {"Origin": station.origin, **UPLOAD, **headers}, body
+    )
+    return code, json.loads(text) if text.startswith("{") else text
+
+
+@in_real_time
+async def test_stores_are_found_newest_first_and_named_by_their_path(folder: Path) -> None:
+    shutil.copytree(folder / "monday", folder / "week" / "tuesday")
+    (folder / ".hidden").symlink_to(folder / "monday")
+    (folder / "link").symlink_to(folder / "monday")
+    os.utime(folder / "monday" / "inventory.db", ns=(1, 1))
+    async with served(NOBODY, folder=folder) as station:
+        code, told = await got(station, "")
+        assert (code, told["folder"], told["drones"]) == (200, "hall", ["demo"])
+        assert [store["name"] for store in told["stores"]] == ["week/tuesday", "monday"]
+    async with served(NOBODY) as station:
+        assert (await got(station, ""))[1] == {"folder": "", "stores": [], "drones": ["demo"]}
+        assert (await got(station, "/places?store=monday"))[0] == 404
+
+
+@in_real_time
+async def test_places_are_told_again_only_when_something_has_changed(folder: Path) -> None:
+    async with served(NOBODY, folder=folder) as station:
+        head, text = await station.answer("GET", "/api/stock/places?store=monday")
+        tag = next(line for line in head.splitlines() if line.lower().startswith("etag")).split(" ")[1]
+        assert json.loads(text)["places"]["AL-01-1-1"]["texts"] == [f"00{SSCC}"]
+        asked = {"If-None-Match": tag}
+        assert (await station.ask("GET", "/api/stock/places?store=monday", asked))[0] == 304
+        with SqliteStore(folder / "monday") as store:
+            store.commit(look("BL-01-1-2", LocationState.EMPTY, at_s=60))
+            code, text = await station.ask("GET", "/api/stock/places?store=monday", asked)
+        assert (code, json.loads(text)["places"]["BL-01-1-2"]["state"]) == (200, "empty")
+
+
+def flown_log(file: Path, site: Site) -> None:
+    """A log of which only the map was written yet."""
+    with file.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("map", "jsonschema", b"{}")
+        channel = writer.register_channel(Topic.MAP, "json", schema)
+        writer.add_message(channel, 1, json.dumps({"text": site_toml(site)}).encode(), 1)
+        writer.finish()
+
+
+@in_real_time
+async def test_a_flight_log_beside_a_store_says_where_its_places_are(folder: Path) -> None:
+    site = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
+    with SqliteStore(folder / "monday") as store:
+        store.plan(PlannedLocation(place.code, place.node) for place in site.locations.values())
+    (folder / "monday" / "flight.mcap").write_bytes(b"no log yet")
+    async with served(NOBODY, folder=folder) as station:
+        _, told = await got(station, "/places?store=monday")
+        assert [(front["aisle"], front["side"]) for front in told["fronts"]][:2] == [("AL", ""), ("AR", "")]
+        flown_log(folder / "monday" / "flight.mcap", site)
+        with SqliteStore(folder / "monday") as store:
+            store.commit(look("BR-04-2-1", LocationState.EMPTY, at_s=60))
+        _, told = await got(station, "/places?store=monday")
+        fronts = {(front["aisle"], front["side"]): front for front in told["fronts"]}
+        assert fronts["A", "right"]["mirrored"]
+        assert [len(front["spots"]) for front in fronts.values()] == [16, 8, 8, 16, 1]
+
+
+@in_real_time
+async def test_what_a_drone_has_counted_is_asked_over_its_link() -> None:
+    told = (
+        {"location": "AL-01-1-1", "state": "read", "standing": "pending", "texts": "PAL-7", "node": "A1"},
+    )
+    with ZmqGround(local(), SITE, LoopClock(), inventory=lambda: told) as link:
+        async with asyncio.TaskGroup() as tasks:
+            running = tasks.create_task(link.run())
+            async with served(("demo", address_of(link))) as station:
+                await until(lambda: link.requests > 2)
+                code, places = await got(station, "/places?drone=demo")
+                assert (code, places["places"]["AL-01-1-1"]["state"]) == (200, "read")
+                assert places["places"]["AL-01-1-1"]["pending"]
+                assert (await got(station, "/find?drone=demo&text=pal-7"))[1] == {"found": ["AL-01-1-1"]}
+                code, told_no = await posted(station, "/compare?drone=demo", BOOKS)
+                assert (code, told_no["refused"]) == (400, "there is no inventory ''")
+            running.cancel()
+    async with serving(local()) as link, served(("demo", address_of(link))) as station:
+        await until(lambda: link.requests > 2)
+        code, places = await got(station, "/places?drone=demo")
+        assert code >= 400
+        assert "keeps no inventory" in places["refused"]
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        "/places?store=", "/places?store=..", "/places?store=/etc", "/places?store=monday/../monday",
+        "/places", "/places?store=monday%00", "/places?drone=other", "/place?store=monday&code=none",
+        "/place?store=monday",
+        "/picture?store=monday&name=../../inventory.db", f"/picture?store=monday&name={'a' * 64}",
+        f"/picture?store=monday&name={'A' * 64}", "/picture?store=monday&name=", "/export?store=monday",
+        "/export?store=monday&format=exe", f"/find?store=monday&text={'x' * 201}",
+        f"/outlines?store=monday&name={'a' * 64}",
+    ],
+)  # fmt: skip
+@in_real_time
+async def test_what_is_not_there_is_refused_in_words(folder: Path, way: str) -> None:
+    async with served(NOBODY, folder=folder) as station:
+        code, told = await got(station, way)
+        assert code == 404
+        assert told["refused"]
+        assert str(folder) not in told["refused"]
+
+
+@in_real_time
+async def test_a_damaged_store_is_named_and_the_others_are_shown(folder: Path) -> None:
+    (folder / "broken").mkdir()
+    (folder / "broken" / "inventory.db").write_bytes(b"nothing of ours" * 300)
+    async with served(NOBODY, folder=folder) as station:
+        code, told = await got(station, "/places?store=broken")
+        assert code == 404
+        assert "no inventory, or a damaged one" in told["refused"]
+        assert (await got(station, "/places?store=monday"))[0] == 200
+
+
+@in_real_time
+async def test_a_code_is_found_in_any_notation(folder: Path) -> None:
+    async with served(NOBODY, folder=folder) as station:
+        for text, places in {
+            f"(00){SSCC}": ["AL-01-1-1"], f"https://id.gs1.org/00/{SSCC}": ["AL-01-1-1"],
+            "04006381333931": ["AL-01-2-1"], "pal-7": ["AL-03-2-1"], "bl-01-1-2": ["BL-01-1-2"],
+            "BL-": ["BL-01-1-1", "BL-01-1-2"], "nothing": [], " ": [],
+        }.items():  # fmt: skip
+            code, told = await got(station, f"/find?store=monday&text={quote(text)}")
+            assert (code, told["found"]) == (200, places), text
+
+
+@in_real_time
+async def test_an_upload_needs_our_own_page_and_stays_within_bounds(folder: Path) -> None:
+    async with served(NOBODY, folder=folder) as station:
+        way = "/compare?store=monday"
+        code, told = await posted(station, way, BOOKS)
+        assert (code, told["outcome_counts"]["match"], told["rows"]) == (200, 1, 1)
+        for headers in ({"Origin": "http://evil.example"}, {"Sec-Fetch-Site": "cross-site"}):
+            assert (await posted(station, way, BOOKS, **headers))[0] == 403
+        assert (await station.ask("POST", f"/api/stock{way}", UPLOAD, BOOKS))[0] == 403, "no Origin"
+        assert (await posted(station, way, BOOKS, **{"Content-Type": "text/csv"}))[0] == 415
+        assert (await posted(station, "/compare?store=none", BOOKS))[0] == 400
+        code, told = await posted(station, way, b"x" * (MOST_BYTES + 1))
+        assert (code, told["refused"]) == (400, "the file has more than 8 MB")
+        for columns in (
+            "place=0&code=0",
+            "place=9&code=1",
+            "place=-1&code=1",
+            "place=x&code=1",
+            "place=0&code=",
+        ):
+            assert (await posted(station, f"{way}&{columns}&heading=yes", BOOKS))[0] == 400, columns
+        code, told = await posted(station, f"{way}&format=exe", BOOKS)
+        assert (code, told["refused"]) == (400, "no format is called 'exe'; choose one of csv, json")
+        head, _ = await station.answer(
+            "POST", f"/api/stock{way}&format=csv", {"Origin": station.origin, **UPLOAD}, BOOKS
+        )
+        assert 'content-disposition: attachment; filename="comparison.csv"' in head.lower()
+
+
+@in_real_time
+async def test_an_endless_upload_is_cut_off(folder: Path) -> None:
+    async with served(NOBODY, folder=folder) as station:
+        host = f"{station.where.host}:{station.where.port}"
+        head = (
+            f"POST /api/stock/compare?store=monday HTTP/1.1\r\nHost: {host}\r\nOrigin: {station.origin}\r\n"
+            f"Content-Type: {UPLOAD['Content-Type']}\r\nTransfer-Encoding: chunked\r\n"
+            "Connection: close\r\n\r\n"
+        )
+        chunk = b"%x\r\n%b\r\n" % (1_000_000, b"x" * 1_000_000)
+        answer = await station.say(head.encode() + chunk * 9)
+        assert answer.startswith(b"HTTP/1.1 400"), answer[:200]
+
+
+@in_real_time
+async def test_many_questions_at_once_leave_the_way_to_the_drones_free(folder: Path) -> None:
+    async with served(NOBODY, folder=folder) as station:
+        many = [asyncio.ensure_future(got(station, "/export?store=monday&format=json")) for _ in range(20)]
+        code, _ = await asyncio.wait_for(station.act("demo", id="12345678", command="stop"), 5)
+        assert code == 503, "nobody flies there, and that is known at once"
+        assert {(await answer)[0] for answer in many} == {200}
