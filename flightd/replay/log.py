@@ -144,7 +144,7 @@ def decoded_message(path: Path, topic: str, payload: bytes) -> object:
     fit."""
     try:
         return _decoder(MESSAGE_TYPES.get(topic, dict))(payload)
-    except (msgspec.MsgspecError, KeyError, TypeError, ValueError) as err:
+    except (msgspec.MsgspecError, KeyError, NotImplementedError, TypeError, ValueError) as err:
         raise InputError(
             f"is not what this version records ({err})", file=path, key=f"a message on {topic}"
         ) from None

@@ -14,9 +14,11 @@ from typing import Any
 import pytest
 
 from flightd.core.errors import InputError, TransientError, UnavailableError
+from flightd.ground.flights.flight_index import FlightIndex
 from flightd.ground.flights.reading_process import MOST_WAITING, ReadingProcess
 from tests.replay.synthetic_flight import write_flight
 from tests.rigs.event_loops import in_real_time
+from tests.rigs.waiting import until
 from tests.web.served import Station, served
 
 
@@ -84,7 +86,7 @@ async def test_whoever_knows_the_list_is_not_sent_it_again(folder: Path) -> None
         await listed(station)
         version = (await asked(station, "/api/flights"))["version"]
         assert (await asked(station, f"/api/flights?known={version}"))["rows"] is None
-        for other in ("", "x", "-1", "9" * 400):
+        for other in ("", "x", "-1", "9" * 6000):
             assert len((await asked(station, f"/api/flights?known={other}"))["rows"]) == 3
 
 
@@ -123,7 +125,8 @@ async def test_pictures_come_one_by_one_behind_their_heads(folder: Path) -> None
         assert head["seq"] == pictures[4]["seq"]
         assert len(head["lines"]) in {1, 2}
         assert body[4 + length :].startswith(b"\xff\xd8")
-        assert (await station.ask("GET", f"/api/flights/{flight}/pictures/{len(pictures)}"))[0] == 404
+        for other in (str(len(pictures)), "-1", "x", "9" * 6000):
+            assert (await station.ask("GET", f"/api/flights/{flight}/pictures/{other}"))[0] == 404
 
 
 OTHER_WAYS = (
@@ -264,6 +267,37 @@ async def test_a_job_that_kills_or_blocks_its_process_costs_that_job_only() -> N
 
 def _opened(path: str) -> None:
     raise InputError("cannot open the flight log", file=path)
+
+
+class _FallibleReader:
+    """Reads here; one log costs it its life, whatever is read with it."""
+
+    def __init__(self, deadly: str) -> None:
+        self._deadly = deadly
+        self.deaths = 0
+
+    async def run(self, function: Any, within_s: float, *args: Any) -> Any:
+        if any(self._deadly == log.relative for logs in args[1:] for log in logs):
+            self.deaths += 1
+            raise TransientError("the process that reads logs failed")
+        return function(*args)
+
+
+@in_real_time
+async def test_a_log_that_kills_its_reader_costs_no_other_log_its_row(folder: Path) -> None:
+    reader = _FallibleReader("alone/flight.mcap")
+    index = FlightIndex(folder, reader)
+    running = asyncio.ensure_future(index.run())
+    try:
+        await until(lambda: json.loads(index.listing())["looked"])
+        told = json.loads(index.listing())
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+    rows = {row["path"]: row for row in told["rows"]}
+    assert rows["alone/flight.mcap"]["trouble"] == "the process that reads logs failed"
+    assert rows["judged/flight.mcap"]["outcome"] == "completed"
+    assert reader.deaths == 2, "with the others, and alone"
 
 
 @in_real_time

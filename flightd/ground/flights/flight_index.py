@@ -10,8 +10,8 @@ from typing import Any, Protocol, TypeVar
 
 import msgspec
 
-from flightd.core.errors import FlightdError
-from flightd.ground.flights.flight_row import FlightRow, read_rows
+from flightd.core.errors import FlightdError, TransientError
+from flightd.ground.flights.flight_row import FlightRow, read_rows, unreadable
 from flightd.ground.flights.log_folder import FoundLog, FoundLogs, find_logs
 
 _FRESH_S = 3.0
@@ -83,10 +83,10 @@ class FlightIndex:
 
     async def log(self, log_id: str) -> FoundLog | None:
         """The log of that id; None where there is none.  Looks through the folder where it does not know
-        it."""
+        it, and again soon where it does."""
+        self._asked.set()
         if log_id not in self._found and not self._is_fresh():
             version = self._version
-            self._asked.set()
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(_WITHIN_S), self._changed:
                     await self._changed.wait_for(
@@ -108,8 +108,7 @@ class FlightIndex:
         await self._tell()
         while unread:
             batch, unread = tuple(unread[:_AT_ONCE]), unread[_AT_ONCE:]
-            rows = await self._reader.run(read_rows, _WITHIN_S, self._root, batch)
-            for log, row in zip(batch, rows, strict=True):
+            for log, row in zip(batch, await self._read(batch), strict=True):
                 self._rows[log.id] = (log.stamp, row)
             self._unread = len(unread)
             await self._tell()
@@ -117,6 +116,16 @@ class FlightIndex:
     def _is_fresh(self) -> bool:
         """The folder was looked through a moment ago."""
         return self._looked and asyncio.get_running_loop().time() - self._looked_s < _FRESH_S
+
+    async def _read(self, logs: tuple[FoundLog, ...]) -> tuple[FlightRow, ...]:
+        """A row for each; where they cannot be read together, one by one, so that a log that costs the
+        reader its life costs no other its row."""
+        try:
+            return await self._reader.run(read_rows, _WITHIN_S, self._root, logs)
+        except TransientError as err:
+            if len(logs) == 1:
+                return (unreadable(logs[0], err.what),)
+        return tuple([row for log in logs for row in await self._read((log,))])
 
     def _is_unread(self, log: FoundLog) -> bool:
         known = self._rows.get(log.id)

@@ -59,8 +59,13 @@ def read_rows(root: Path, logs: tuple[FoundLog, ...]) -> tuple[FlightRow, ...]:
     return tuple(_row(root, log) for log in logs)
 
 
+def unreadable(log: FoundLog, trouble: str) -> FlightRow:
+    """The row of a log of which nothing is known but why."""
+    return FlightRow(log.id, log.shown_path, log.size, trouble=trouble, started_s=log.mtime_ns * 1e-9)
+
+
 def _row(root: Path, log: FoundLog) -> FlightRow:
-    blank = FlightRow(log.id, log.shown_path, log.size, started_s=log.mtime_ns * 1e-9)
+    blank = unreadable(log, "")
     try:
         path = path_of(root, log.relative)
         skimmed = skim(path)

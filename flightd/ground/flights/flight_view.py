@@ -20,6 +20,7 @@ from flightd.replay.playback.loader import load_playback
 from flightd.replay.playback.pictures import PicturePlace, find_pictures, read_picture
 
 MOST_STRETCHES = 2000
+_MOST_REPORT_BYTES = 48 << 20
 _DIGITS = 4
 
 
@@ -79,6 +80,8 @@ def read_report(root: Path, relative: str) -> bytes:
     path = path_of(root, relative)
     made = beside(path, "report.html")
     if made is not None and made.stat().st_mtime_ns >= path.stat().st_mtime_ns:
+        if made.stat().st_size > _MOST_REPORT_BYTES:
+            raise InputError("the report beside the log is too large to be shown here")
         return made.read_bytes()
     for name in ("summary.json", "truth.mcap", "inventory.db", "evidence"):
         if path.with_name(name).is_symlink():

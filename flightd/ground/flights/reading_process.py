@@ -20,6 +20,7 @@ _MOST_MEMORY_BYTES = 4 << 30
 _NICE = 10
 """Whoever flies on this machine goes first."""
 _START_S = 60.0
+_SHOWN_CHARS = 120
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -114,3 +115,5 @@ def _done(job: _Job) -> object:
         return _Failed(UnavailableError("the log is too large to be read here"))
     except OSError as err:
         return _Failed(UnavailableError(f"cannot be read: {err.strerror or err}"))
+    except Exception as err:  # noqa: BLE001 - the last line before the process: a log may be anything
+        return _Failed(TransientError(f"cannot be read: {type(err).__name__}: {str(err)[:_SHOWN_CHARS]}"))

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import msgspec
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route
 
 from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
@@ -17,6 +17,7 @@ from flightd.ground.pages import page
 _JSON = "application/json"
 _BINARY = "application/octet-stream"
 _SERIES_STRETCHES = 900
+_MOST_DIGITS = 16
 _REPORT_HEADERS = {
     "Content-Security-Policy": (
         "sandbox allow-scripts; default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
@@ -38,12 +39,8 @@ def flight_routes(flights: Flights) -> list[BaseRoute]:
         async def guarded(request: Request) -> Response:
             try:
                 return await answer(flights, request)
-            except InputError as err:
-                return _refused(404, err)
-            except (UnavailableError, TransientError) as err:
-                return _refused(503, err)
             except FlightdError as err:
-                return _refused(409, err)
+                return Response(msgspec.json.encode({"refused": err.what}), _status(err), media_type=_JSON)
 
         return Route(path, guarded, methods=["GET"])
 
@@ -51,7 +48,7 @@ def flight_routes(flights: Flights) -> list[BaseRoute]:
         at("/api/flights", _list),
         at("/api/flights/{flight}", _head),
         at("/api/flights/{flight}/series", _series),
-        at("/api/flights/{flight}/pictures/{place:int}", _picture),
+        at("/api/flights/{flight}/pictures/{place}", _picture),
         at("/api/flights/{flight}/report", _report),
         *page("/flights"),
     ]
@@ -60,9 +57,8 @@ def flight_routes(flights: Flights) -> list[BaseRoute]:
 async def _list(flights: Flights, request: Request) -> Response:
     if flights.index is None:
         return Response(b'{"folder":false}', media_type=_JSON)
-    known = request.query_params.get("known", "")
-    listing = flights.index.listing(int(known) if known.isascii() and known.isdigit() else -1)
-    return Response(listing, media_type=_JSON)
+    known = _whole(request.query_params.get("known", ""))
+    return Response(flights.index.listing(-1 if known is None else known), media_type=_JSON)
 
 
 async def _head(flights: Flights, request: Request) -> Response:
@@ -86,13 +82,27 @@ async def _series(flights: Flights, request: Request) -> Response:
 
 
 async def _picture(flights: Flights, request: Request) -> Response:
-    content = await flights.picture(request.path_params["flight"], request.path_params["place"])
+    place = _whole(request.path_params["place"])
+    if place is None:
+        raise InputError("the flight has no such picture")
+    content = await flights.picture(request.path_params["flight"], place)
     return Response(content, media_type=_BINARY, headers={"Cache-Control": "private, max-age=600"})
 
 
 async def _report(flights: Flights, request: Request) -> Response:
-    return HTMLResponse(await flights.report(request.path_params["flight"]), headers=_REPORT_HEADERS)
+    try:
+        page = await flights.report(request.path_params["flight"])
+    except FlightdError as err:  # a person looks at it, not our page
+        return PlainTextResponse(f"The report cannot be shown: {err.what}.\n", _status(err))
+    return HTMLResponse(page, headers=_REPORT_HEADERS)
 
 
-def _refused(status: int, err: FlightdError) -> Response:
-    return Response(msgspec.json.encode({"refused": err.what}), status, media_type=_JSON)
+def _whole(text: str) -> int | None:
+    """A whole number that is none too long, else None."""
+    return int(text) if len(text) < _MOST_DIGITS and text.isascii() and text.isdigit() else None
+
+
+def _status(err: FlightdError) -> int:
+    if isinstance(err, InputError):
+        return 404
+    return 503 if isinstance(err, UnavailableError | TransientError) else 409

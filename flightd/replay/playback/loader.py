@@ -45,6 +45,8 @@ _TOPICS = frozenset(
 _FINEST_S = 0.01
 _MOST_STRETCHES = 40_000
 """Longer flights than seven minutes are kept more coarsely than they were recorded, peaks included."""
+_MOST_VALUE = 1e30
+"""No quantity is larger, whatever a log says; float32 holds it."""
 _MOST_POSES = 4000
 _MOST_EVENTS = 5000
 _MOST_MOMENTS = 20_000
@@ -133,7 +135,8 @@ def load_playback(path: Path) -> Playback:
         seen=seen_floor(path, start_ns, duration_s),
         grid=grid,
         columns={
-            name: decimated(t_s, values, grid).astype(np.float32) for name, (t_s, values) in found.items()
+            name: np.clip(decimated(t_s, values, grid), -_MOST_VALUE, _MOST_VALUE).astype(np.float32)
+            for name, (t_s, values) in found.items()
         },
         estimated=_estimated(site, moments, poses, found),
     )

@@ -58,9 +58,11 @@ function ReplayHead({ id, flight, row }) {
         <p class="quiet"><a href="/flights">Flights</a>${row?.path && html` / <span class="path">${row.path}</span>`}</p>
         <h2>${title(row, flight)} ${row?.verdict && html`<span class=${`badge ${tone(row)}`}>${verdictWords(row)}</span>`}</h2>
         ${row && html`<p class="quiet"><time title=${fullDate(row)}>${date(row)}</time> · ${outcomeWords(row)}${row.reason && `: ${row.reason}`}${row.faults.length > 0 && ` · ${faultWords(row)}`}</p>`}
-        ${flight.damage && html`<p class="bad-line">The log is ${flight.damage}: what you see is what was recorded.</p>`}
+        ${row?.running && html`<p class="quiet">The log is being recorded: it goes on after the last time that is shown.</p>`}
+        ${flight.damage && !row?.running && html`<p class="bad-line">The log is ${flight.damage}: what you see is what was recorded.</p>`}
       </div>
       <div class="ways">
+        ${row?.running && html`<button class="order" onClick=${() => forgetFlight(id)}>Read again</button>`}
         <a class="order link" href=${`/api/flights/${id}/report`} target="_blank" rel="noopener">Report</a>
       </div>
       ${row && html`<${Figures} row=${row} flight=${flight} />`}
