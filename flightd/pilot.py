@@ -149,7 +149,7 @@ class Pilot:
         setpoint = self._commanded = self._steering.step(
             inputs, guidance, push_mps2, stand_yaw_rad, known.lead, known.conditions
         )
-        self._plausibility.steered(guidance, pose)
+        self._plausibility.steered(now_ns, guidance, pose)
         mission = self._mission
         findings, settled = self._scanner.drain()
         return TickOutput(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from starlette.routing import BaseRoute
 
+from flightd.ground.decision_routes import decision_routes
 from flightd.ground.expected_stock_routes import expected_stock_routes
 from flightd.ground.stock_routes import CountingDrone, StockAnswers, stock_routes
 from flightd.ground.stores import Stores
@@ -15,4 +16,4 @@ from flightd.ground.stores import Stores
 def stock_page(folder: Path | None, drones: Mapping[str, CountingDrone]) -> list[BaseRoute]:
     """Its routes, over the inventories under `folder` and what the drones tell that they have counted."""
     asked = StockAnswers(Stores(folder), drones)
-    return [*stock_routes(asked), *expected_stock_routes(asked)]
+    return [*stock_routes(asked), *expected_stock_routes(asked), *decision_routes(asked, folder)]

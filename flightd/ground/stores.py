@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ from flightd.vision.shelf.evidence_jpeg import MOST_BYTES
 
 _FILE, _LOG, _TRUTH = "inventory.db", "*.mcap", "truth.mcap"
 _DEPTH = 4
+_VIEWS_KEPT = 8
 _MOST_FOLDERS, _MOST_STORES = 5_000, 500
 _Stamp: TypeAlias = tuple[tuple[int, int], ...]
 
@@ -42,7 +44,8 @@ class Stores:
 
     def __init__(self, root: Path | None) -> None:
         self._root = root
-        self._views: dict[str, StockView] = {}
+        self._known: dict[str, Path] = {}
+        self._views: OrderedDict[str, StockView] = OrderedDict()
         self._sites: dict[Path, tuple[str, Site | None]] = {}
 
     @property
@@ -69,14 +72,17 @@ class Stores:
         codes = [record.code for record in records]
         view = StockView(stamp, fronts_of(codes, self._site(folder)), place_views(records, looks), records)
         self._views[name] = view
+        while len(self._views) > _VIEWS_KEPT:
+            self._views.pop(next(iter(self._views)), None)
         return view
 
     def looks(self, name: str, code: str) -> Sequence[tuple[Observation, Standing]]:
         """Every look at a place, oldest first.  InputError for one that the store does not know."""
         with SqliteStore(self._folder(name), read_only=True) as store:
-            if all(record.code != code for record in store.locations()):
+            looks = store.looks(code)
+            if not looks and all(record.code != code for record in store.locations()):
                 raise InputError(f"there is no place {code!r}")
-            return store.looks(code)
+        return looks
 
     def picture(self, name: str, picture: str) -> bytes:
         """The JPEG that a look kept as evidence.  InputError where there is none."""
@@ -91,10 +97,14 @@ class Stores:
         raise InputError("this picture was not kept")
 
     def _folder(self, name: str) -> Path:
-        for folder in _folders(self._root) if self._root is not None else ():
-            if self._root is not None and _name(folder, self._root) == name:
-                return folder
-        raise InputError(f"there is no inventory {name!r}")
+        known = self._known.get(name)
+        if known is not None and (known / _FILE).is_file():
+            return known
+        if self._root is not None:
+            self._known = {_name(folder, self._root): folder for folder in _folders(self._root)}
+        if name not in self._known:
+            raise InputError(f"there is no inventory {name!r}")
+        return self._known[name]
 
     def _site(self, folder: Path) -> Site | None:
         """The map that the newest flight log beside the store was flown by; None without one."""
@@ -110,9 +120,10 @@ class Stores:
 
 def _map_of(log: Path) -> Site | None:
     try:
-        for entry in LogReader(log).entries({Topic.MAP}):
-            if isinstance(entry.message, Document):
-                return parse_site(entry.message.text, f"{log} (map)")
+        for entry in LogReader(log).entries({Topic.MAP, Topic.STATUS}):
+            if not isinstance(entry.message, Document):
+                break  # the flight has begun, and the map comes before
+            return parse_site(entry.message.text, f"{log} (map)")
     except FlightdError:
         pass  # the places are shown by their codes then
     return None

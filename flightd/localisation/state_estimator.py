@@ -76,6 +76,7 @@ class StateEstimator:
         self.response = AttitudeResponse()
         self._telemetry_s = 0.0
         self._attitude_ns = 0
+        self._obeys = False
         self.frames = FrameMonitor()
         self.learnt = learnt
         """What the last flight has learnt of the sensors, or those before it."""
@@ -125,8 +126,7 @@ class StateEstimator:
     def take(self, tick: TickInput, commanded: AttitudeSetpoint | None) -> None:
         """Telemetry first: a frame needs the attitude and height of its exposure.  `commanded` is what went
         out with the last tick."""
-        v = tick.vehicle
-        obeys = v is not None and v.in_control and v.may_fly
+        obeys = self._obeys_now(tick)
         self.response.sent(tick.now_ns, commanded if obeys else None)
         for sample in tick.attitudes:
             late_s = (tick.now_ns - sample.stamp_ns) * 1e-9
@@ -147,6 +147,14 @@ class StateEstimator:
             lines = self._waiting.popleft()
             self._judged_ns = lines.stamp_ns
             self._take_frame(lines)
+
+    def _obeys_now(self, tick: TickInput) -> bool:
+        """Whether the vehicle does as it is told; one that fell silent goes on with what it did."""
+        v = tick.vehicle
+        silent = not tick.attitudes and self.telemetry_age_s(tick.now_ns, self._attitude_ns) > _SILENT_S
+        if v is None or not silent:
+            self._obeys = v is not None and v.in_control and v.may_fly
+        return self._obeys
 
     def telemetry_age_s(self, now_ns: int, stamp_ns: int) -> float:
         """How much older a told attitude is than attitudes are on their usual way: that is bridged by what

@@ -35,7 +35,8 @@ class Warnings:
     height, `height_stuck` that the height does not follow the climb of the vehicle, `climb_wrong` that
     the climb does not follow the height, by `climb_error_mps` (how much too great it is told),
     `push_mps2` the acceleration that no lean explains, `off_m` the distance from the reference while
-    steering, `headroom_m` the way up to the ceiling's margin, `outside_m` how far outside the corridor, whose
+    steering, `swings` that the drone swings about it, `headroom_m` the way up to the ceiling's margin,
+    `outside_m` how far outside the corridor, whose
     nearest line is at `line_m`; `tick_s` the mean time between ticks."""
 
     frame_age_s: float = 0.0
@@ -48,6 +49,7 @@ class Warnings:
     climb_error_mps: float = 0.0
     push_mps2: float = 0.0
     off_m: float = 0.0
+    swings: bool = False
     headroom_m: float = math.inf
     outside_m: float = 0.0
     line_m: tuple[float, float] = (0.0, 0.0)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from flightd.config.schema import Config
 from flightd.core.types import EventLevel
+from flightd.mission.debounce_timer import DebounceTimer
 from flightd.mission.event_log import EventLog
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.orders import StartOrder
 from flightd.mission.reasons import Plain, Reason, StartsIn, Unfit, in_words
-from flightd.mission.safety.hazard_monitor import DebounceTimer
 from flightd.mission.safety.readiness import not_fresh, obstacles
 from flightd.mission.triggers import Trigger
 

@@ -45,6 +45,7 @@ class Trigger(enum.Enum):
     HEIGHT_WRONG = "height sources disagree"
     CORRIDOR_LEFT = "corridor left"
     OVERLOAD = "too slow to fly by"
+    SWINGS = "it swings about its place"
     LINES_LOST = "lines lost"
     HOLD = "pause ordered"
     POSITION_DOUBTED = "position doubted"

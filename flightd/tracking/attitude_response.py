@@ -25,7 +25,7 @@ _FIRST_BANDWIDTH_RADPS, _BANDWIDTH_SIGMA = 10.0, 0.3
 """Before anything was seen of it; the bandwidth's is that of its logarithm."""
 _YAW_LAG_S = 0.2
 _STEP_S = 0.02
-_KEPT = 250
+_KEPT = 600
 """So many ticks are remembered at least."""
 _MEMORY_S = 8.0
 """Of what was seen while the vehicle was moved; of a hover nothing is learnt, and nothing forgotten."""
@@ -34,8 +34,10 @@ _INDEPENDENT_PER_S = 6.0
 """Errors of a model follow each other: so many of them a second tell something new."""
 _STEADY_S = 2.0
 """A constant difference between attitude and setpoint (trim) says nothing of the delay."""
-_FORESEEN_NS = 3_000_000_000
-"""Of a vehicle that fell silent no more is foreseen: what it does by then nobody knows."""
+_FORESEEN_NS = 9_000_000_000
+"""Of a vehicle that fell silent no more is foreseen: by then it has been held, and brought down by setpoints
+that brake its drift; what it does later nobody knows."""
+_MOST_STEPS = 150
 _LEAST_RAD = math.radians(0.15)
 _SHARED_S = 0.02
 """Most that the delay believed moves at once."""
@@ -126,7 +128,7 @@ class AttitudeResponse:
         if told is None or math.isinf(self._kept.oldest_ns):
             return []
         ahead_ns = min(now_ns + round(self.delay_s * 1e9) - told.stamp_ns, _FORESEEN_NS)
-        steps = math.ceil(ahead_ns * 1e-9 / _STEP_S)
+        steps = min(math.ceil(ahead_ns * 1e-9 / _STEP_S), _MOST_STEPS)
         if steps <= 0 or told.stamp_ns < self._kept.oldest_ns:
             return []
         after_ns = np.linspace(0.0, ahead_ns, steps + 1)

@@ -202,6 +202,12 @@ class FloorFilter:
         self._begin_anew([PSI, PSI_RATE])
         self._x[PSI], self._p[PSI, PSI] = offset_rad, sigma_rad**2
 
+    def turn_mount_by(self, angle_rad: float) -> None:
+        """The camera has turned in its mount, clockwise as seen from above; the heading is as before."""
+        turned_rad = self.mean(MOUNT_YAW) + angle_rad
+        self._begin_anew([MOUNT_YAW])
+        self._x[MOUNT_YAW] = turned_rad
+
     def forget(self) -> None:
         """Know no line and no motion any more; what was learnt of the sensors stays."""
         self._drop(range(len(self.held)))

@@ -1,37 +1,82 @@
-"""Lines against the vehicle's own heading: who is right when they contradict each other."""
+"""Lines against the vehicle's own heading: who is right when they contradict each other.  Pure."""
 
 from __future__ import annotations
 
+import enum
 import math
+from collections import deque
 from statistics import median
+
+from flightd.core.geometry import wrap_pi
+from flightd.core.types import Attitude
 
 _SAME_RAD = math.radians(3.0)
 _DISPUTE_NS, _SHOWN_NS = 600_000_000, 1_500_000_000
+_AT_ONCE_NS = 300_000_000
+"""What turns within this time leaps: no drone turns its camera so, and no compass is led astray so fast."""
+_LEAP_RAD, _FASTEST_RADPS = math.radians(3.0), 2.0
+"""A told heading that turns by more than this between two samples leaps."""
+_SHARE = 0.5
+"""Of a leap by more than this share of an error that error comes."""
+
+
+class Turned(enum.Enum):
+    """What has turned where all lines contradict the heading: what is told of it, or the camera's mount."""
+
+    HEADING = enum.auto()
+    CAMERA = enum.auto()
 
 
 class HeadingDispute:
-    """Lines that all contradict the vehicle's heading, and by the same angle, frame after frame."""
+    """Lines that all contradict the vehicle's heading, and by the same angle, frame after frame.  Whose fault
+    it is shows in who leapt: a mount that was knocked turns the picture at once while the told heading goes
+    on as before.  Call `told` with each attitude, `step` with each frame."""
 
     def __init__(self) -> None:
         self.error_rad = 0.0
         self._since_ns = 0
         self._settled_ns: int | None = None
+        self._agreed_ns: int | None = None
+        self._first_rad = 0.0
+        self._heading: Attitude | None = None
+        self._leaps: deque[tuple[int, float]] = deque(maxlen=64)
 
-    def step(self, told: list[float], agreed: bool, stamp_ns: int) -> bool:
-        """Take what one frame's lines say; True when the lines have it.  The error is then shown for a
-        while longer, so that nobody overlooks it."""
+    def told(self, sample: Attitude) -> None:
+        """Take a sample of telemetry."""
+        last, self._heading = self._heading, sample
+        if last is None:
+            return
+        turn_rad, dt_s = wrap_pi(sample.yaw_rad - last.yaw_rad), (sample.stamp_ns - last.stamp_ns) * 1e-9
+        if abs(turn_rad) > _LEAP_RAD + _FASTEST_RADPS * max(dt_s, 0.0):
+            self._leaps.append((sample.stamp_ns, turn_rad))
+
+    def step(self, told: list[float], agreed: bool, stamp_ns: int) -> Turned | None:
+        """Take what one frame's lines say; what has turned once the lines have it.  The error is then shown
+        for a while longer, so that nobody overlooks it."""
         if self._settled_ns is not None:
             if stamp_ns - self._settled_ns > _SHOWN_NS:
                 self._settled_ns, self.error_rad = None, 0.0
-            return False
+            return None
         if agreed or not told:
             self.error_rad = 0.0
-            return False
+            if agreed:
+                self._agreed_ns = stamp_ns
+            return None
         error = median(told)
+        if not self.error_rad:
+            at_once = self._agreed_ns is not None and stamp_ns - self._agreed_ns < _AT_ONCE_NS
+            self._first_rad = error if at_once else 0.0
         if not self.error_rad or abs(error - self.error_rad) > _SAME_RAD:
             self._since_ns = stamp_ns
         self.error_rad = error
         if stamp_ns - self._since_ns < _DISPUTE_NS:
-            return False
+            return None
         self._settled_ns = stamp_ns
-        return True
+        return self._turned(error)
+
+    def _turned(self, error_rad: float) -> Turned:
+        picture_leapt = abs(error_rad - self._first_rad) < _SHARE * abs(error_rad)
+        agreed_ns = self._agreed_ns or 0
+        leapt_rad = sum(turn for stamp_ns, turn in self._leaps if stamp_ns > agreed_ns - _AT_ONCE_NS)
+        explained = abs(error_rad + leapt_rad) < _SHARE * abs(error_rad)
+        return Turned.CAMERA if picture_leapt and not explained else Turned.HEADING

@@ -22,7 +22,7 @@ from flightd.tracking.attitude_history import AttitudeHistory
 from flightd.tracking.feature_trust import FeatureTrust
 from flightd.tracking.floor_filter import FloorFilter
 from flightd.tracking.ground_junctions import floor_junctions
-from flightd.tracking.heading_dispute import HeadingDispute
+from flightd.tracking.heading_dispute import HeadingDispute, Turned
 from flightd.tracking.line_sight import (
     FeatureSight,
     Rates,
@@ -167,6 +167,7 @@ class LineTracker:
 
     def attitude(self, sample: Attitude) -> None:
         self._history.add(sample)
+        self._dispute.told(sample)
         if not self._headed:
             self._headed = True
             offset = wrap_pi(self._start_yaw_rad - sample.yaw_rad)
@@ -398,14 +399,17 @@ class LineTracker:
         )
 
     def _settle_dispute(self, on_floor: list[GroundLine], attitude: Attitude) -> None:
-        """Believe lines that all contradict the heading for long."""
+        """Believe lines that all contradict the heading for long: it, or the camera's mount, has turned."""
         held = self._filter
         yaw, sigma = attitude.yaw_rad + held.mean(PSI), held.sigma(PSI)
         turns = [turn_of(line, yaw) for line in on_floor]
         agreed = any(
             agrees(turn, line.sigma_theta_rad, sigma) for turn, line in zip(turns, on_floor, strict=True)
         )
-        if self._dispute.step([-turn for turn in turns], agreed, attitude.stamp_ns):
+        turned = self._dispute.step([-turn for turn in turns], agreed, attitude.stamp_ns)
+        if turned is Turned.CAMERA:
+            held.turn_mount_by(self._dispute.error_rad)
+        elif turned is Turned.HEADING:
             held.turn_to(held.mean(PSI) + self._dispute.error_rad, self._params.start_yaw_sigma_rad)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from flightd.config.mission import Heading
 from flightd.core.types import AttitudeSetpoint, Event, Phase, Status
 from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
-from flightd.sim.judge.evidence import FlightEvidence
+from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
 from flightd.site.site_file import load_site
 

@@ -273,3 +273,55 @@ def test_a_file_that_is_no_table_is_refused_in_words(browser: Browser, url: str,
         expect(page.get_by_text("photo.csv: neither text nor a workbook; save it as CSV")).to_be_visible()
         assert page.evaluate("document.documentElement.scrollWidth") == NARROW[0]
         assert hindrances(page) == []
+
+
+def test_places_that_need_a_look_are_a_queue_with_who_looks_and_what_was_decided(
+    browser: Browser, url: str, folder: Path
+) -> None:
+    with opened(browser, url) as page, opened(browser, url, NARROW, "dark") as other:
+        queue = page.get_by_role("list", name="4 places to look at")
+        expect(queue.get_by_role("button")).to_have_text(
+            [
+                re.compile("AL-03-1-1.*Occluded"),
+                re.compile("AL-04-1-1.*Contradicted"),
+                re.compile("AL-02-2-1.*Unreadable"),
+                re.compile("AL-03-2-1.*Several codes"),
+            ]
+        )
+        queue.get_by_role("button", name="AL-02-2-1").click()
+        form = page.get_by_role("group", name="Decision")
+        form.get_by_role("button", name="I look").click()
+        expect(form.get_by_text("Say who you are first.")).to_be_visible()
+        form.get_by_label("Who").fill("Ann")
+        form.get_by_label("Note").fill("<b>torn</b>")
+        form.get_by_role("button", name="I look").click()
+        expect(form.get_by_role("button", name="I look")).to_have_attribute("aria-pressed", "true")
+        expect(other.get_by_text("is looked at, Ann: <b>torn</b>")).to_be_visible()
+        form.get_by_role("button", name="Put right").focus()
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("heading", name="3 places to look at")).to_be_visible()
+        expect(form.get_by_role("list", name="Decided so far").get_by_role("listitem")).to_have_count(2)
+        page.get_by_role("button", name="1 closed place").click()
+        assert hindrances(page) == []
+        other.get_by_role("button", name=re.compile("AL-03-1-1.*Occluded")).click()
+        assert hindrances(other) == []
+        assert other.evaluate("document.documentElement.scrollWidth") == NARROW[0]
+        with SqliteStore(folder / "monday") as store:
+            store.commit(look("AL-02-2-1", LocationState.UNREADABLE, at_s=60))
+        expect(page.get_by_role("heading", name="4 places to look at")).to_be_visible()
+
+
+def test_a_store_that_a_flight_begins_is_shown_instead_of_what_the_drone_tells(
+    browser: Browser, tmp_path: Path
+) -> None:
+    with station(["demo=127.0.0.1:1/1"], folder=tmp_path) as url, opened(browser, f"{url}/stock") as page:
+        chosen = page.get_by_role("combobox", name=re.compile("^Inventory"))
+        expect(chosen).to_have_value("drone/demo")
+        expect(page.get_by_role("alert").filter(has_text="cannot be reached")).to_be_visible()
+        counted_store(tmp_path / "tuesday")
+        expect(chosen).to_have_value("store/tuesday", timeout=15_000)
+        expect(cell(page, "AL-01-1-1")).to_be_visible()
+        chosen.select_option("drone/demo")
+        expect(page.get_by_role("alert").filter(has_text="cannot be reached")).to_be_visible()
+        page.wait_for_timeout(11_000)
+        expect(chosen).to_have_value("drone/demo")

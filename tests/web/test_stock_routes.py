@@ -227,3 +227,49 @@ async def test_many_questions_at_once_leave_the_way_to_the_drones_free(folder: P
         code, _ = await asyncio.wait_for(station.act("demo", id="12345678", command="stop"), 5)
         assert code == 503, "nobody flies there, and that is known at once"
         assert {(await answer)[0] for answer in many} == {200}
+
+
+JSON_DECISION = {"id": "12345678", "place": "AL-02-2-1", "what": "looking", "who": " Ann ", "note": "=1+2"}
+
+
+@in_real_time
+async def test_a_decision_is_noted_once_for_the_look_that_is_shown(folder: Path) -> None:
+    async with served(NOBODY, folder=folder) as station:
+        headers = {"Content-Type": "application/json"}
+        way, body = "/decisions?store=monday", json.dumps(JSON_DECISION).encode()
+        for _ in range(2):
+            code, noted = await posted(station, way, body, **headers)
+            assert (code, noted["who"], noted["note"]) == (200, "Ann", "=1+2")
+        _, told = await got(station, way)
+        _, places = await got(station, "/places?store=monday")
+        assert [one["seen_s"] for one in told["decisions"]] == [places["places"]["AL-02-2-1"]["seen_s"]]
+        assert (await got(station, "/decisions?store=none"))[1] == {"decisions": []}
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"what": "burn"}, {"who": ""}, {"who": "  "}, {"who": "x" * 61}, {"note": "x" * 501}, {"id": "short"},
+        {"place": "nowhere"}, {"place": ""}, {"more": 1}, {"note": "x" * 5000},
+    ],
+)  # fmt: skip
+@in_real_time
+async def test_what_is_no_decision_is_refused_and_not_noted(folder: Path, changed: dict[str, object]) -> None:
+    async with served(NOBODY, folder=folder) as station:
+        headers = {"Content-Type": "application/json"}
+        code, told = await posted(
+            station, "/decisions?store=monday", json.dumps(JSON_DECISION | changed).encode(), **headers
+        )
+        assert (code, bool(told["refused"])) == (400, True)
+        assert not (folder / "ground.db").exists()
+
+
+@in_real_time
+async def test_a_decision_needs_our_own_page(folder: Path) -> None:
+    async with served(NOBODY, folder=folder) as station:
+        body = json.dumps(JSON_DECISION).encode()
+        evil = {"Content-Type": "application/json", "Origin": "http://evil.example"}
+        assert (await posted(station, "/decisions?store=monday", body, **evil))[0] == 403
+        assert (await posted(station, "/decisions?store=monday", body))[0] == 415
+    async with served(NOBODY) as station:
+        assert (await station.ask("GET", "/api/stock/decisions?store=monday"))[0] == 404

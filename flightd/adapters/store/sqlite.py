@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
-from flightd.adapters.store.evidence import EvidenceFolder
+from flightd.adapters.store.evidence_pictures import EvidenceFolder
 from flightd.adapters.store.read_only import connect_read_only
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (

@@ -11,7 +11,7 @@ from typing import Protocol
 import cv2
 
 from flightd.app.absent_parts import NO_GROUND
-from flightd.app.detection.detector_pool import FramePool, Work
+from flightd.app.frame_pool import FramePool, Work
 from flightd.core.preview import CameraName, Preview, found_areas
 from flightd.core.scanning import CodeSet, Place
 from flightd.core.types import Image

@@ -14,7 +14,7 @@ from flightd.core.tracks import last_known
 from flightd.core.types import AttitudeSetpoint, Event, Status
 from flightd.mission.safety.hazard_table import HAZARDS
 from flightd.replay.log import Entry, read_log
-from flightd.sim.judge.evidence import FlightEvidence
+from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore, score
 from flightd.sim.judge.hazard_verdict import HazardVerdict, judged_hazard
 from flightd.sim.judge.verdict import JudgedFault, judged

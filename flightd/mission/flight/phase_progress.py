@@ -7,13 +7,13 @@ import math
 from flightd.config.schema import Config
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Phase
+from flightd.mission.debounce_timer import DebounceTimer
 from flightd.mission.flight.smoothed_motion import SmoothedMotion
 from flightd.mission.flight.touchdown import AIM_S
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.machine import State
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.safety.found_flying import FoundFlyingCheck
-from flightd.mission.safety.hazard_monitor import DebounceTimer
 from flightd.mission.scan.no_scan import AnyScanner
 from flightd.mission.scan.shelf_scan import ShelfScan
 from flightd.mission.triggers import Trigger

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 from flightd.config.mission import MissionConfig
 from flightd.core.types import Phase
+from flightd.mission.debounce_timer import DebounceTimer
 from flightd.mission.guidance import MissionInputs
-from flightd.mission.safety.hazard_monitor import DebounceTimer
 from flightd.mission.triggers import Trigger
 
 _JUMP_M = 0.3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from flightd.config.control import ControlConfig
 from flightd.control.flight_controller import CALM, Conditions, FlightController, Motion
@@ -53,7 +54,8 @@ class Steering:
             wanted = control.rest(now_ns, motion, reference, dt_s, push, dead_reckoned=guidance.dead_reckoned)
             age_s = min(inputs.telemetry_age_s, inputs.sight_s)
         else:
-            wanted = control.step(now_ns, motion, reference, dt_s, conditions)
+            ease = conditions.ease * self._plausibility.oscillation.ease
+            wanted = control.step(now_ns, motion, reference, dt_s, replace(conditions, ease=ease))
             # above the pad the mission steers on without lines: by the mat, or the motion last known
             by_mat = inputs.by_pad or (guidance.phase is Phase.LAND and sight_s < _TOUCHDOWN_S)
             age_s = inputs.telemetry_age_s if by_mat else max(sight_s, inputs.telemetry_age_s)

@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 from flightd.config.schema import Config
 from flightd.core.types import VehicleState
+from flightd.mission.debounce_timer import DebounceTimer
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.safety.hazard_table import Action, triggers_of
 from flightd.mission.safety.view_monitor import FloorViewMonitor
@@ -42,22 +43,6 @@ class FlightContext:
     leg_along_x: bool | None
     holds: bool = False
     at_height: bool = True
-
-
-class DebounceTimer:
-    """For how long something has held without a break."""
-
-    def __init__(self) -> None:
-        self._since_ns: int | None = None
-
-    def step(self, condition: bool, now_ns: int) -> float:
-        """Seconds for which `condition` has held; 0 while it does not."""
-        if not condition:
-            self._since_ns = None
-            return 0.0
-        if self._since_ns is None:
-            self._since_ns = now_ns
-        return (now_ns - self._since_ns) * 1e-9
 
 
 class Counted:
@@ -175,6 +160,7 @@ class HazardMonitor:
             Trigger.HEIGHT_WRONG: (w.height_doubted, h.disagree_s),
             Trigger.ATTITUDE_WRONG: (abs(w.heading_error_rad) > h.heading_rad, h.disagree_s),
             Trigger.WIND: (w.push_mps2 > h.expert.push_mps2 or w.off_m > h.expert.off_m, h.expert.push_s),
+            Trigger.SWINGS: (w.swings, 0.0),
             Trigger.CEILING_LEFT: (w.headroom_m < 0.0, h.expert.outside_s),
             Trigger.CORRIDOR_LEFT: (w.outside_m > 0.0, h.expert.outside_s),
         }

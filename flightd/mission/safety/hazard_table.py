@@ -172,6 +172,14 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "camera_turned",
+        Trigger.ATTITUDE_WRONG,
+        "the same, where the picture leapt and the told heading did not",
+        Action.LAND,
+        "the camera is taken to be turned in its mount by so much; land by the lines",
+        "tests/sim/hazards/test_lasting_faults.py",
+    ),
+    Hazard(
         "battery_low",
         Trigger.BATTERY_LOW,
         "charge below `mission.battery_home`, a cell below `battery.cell_home_v` for 2 s, or what flying took"
@@ -329,6 +337,15 @@ HAZARDS: tuple[Hazard, ...] = (
         " average by more than 40 ms, for `hazards.overload_s`",
         Action.HOLD,
         _HOLD,
+        _FAST,
+    ),
+    Hazard(
+        "swings",
+        Trigger.SWINGS,
+        "half swings of the velocity about the reference's above 0.3 m/s: three, none smaller than four"
+        " fifths of the one before, or two that grow: the position loop is too fast for what is late in it",
+        Action.HOLD,
+        "slowed down to 60 % for the rest of the flight, then to 36 %; " + _HOLD,
         _FAST,
     ),
     Hazard(

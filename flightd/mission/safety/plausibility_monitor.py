@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from flightd.config.schema import Config
+from flightd.control.oscillation import OscillationMonitor
 from flightd.core.tracks import TrackSet
 from flightd.core.types import GridPose, Health
 from flightd.mission.guidance import Guidance, Guide, Warnings
@@ -35,6 +36,7 @@ class PlausibilityMonitor:
         self._tick_s = 0.02
         self._off_m = 0.0
         self._doubt = False
+        self.oscillation = OscillationMonitor()
         self.push_mps2 = (0.0, 0.0)
         """The mean push of the last seconds in which lines were seen, map axes."""
 
@@ -77,6 +79,7 @@ class PlausibilityMonitor:
             climb_error_mps=0.0 if climb is None else climb.error_mps(now_ns),
             push_mps2=math.hypot(*self.push_mps2),
             off_m=self._off_m,
+            swings=self.oscillation.swings,
             headroom_m=self._ceiling_m - height_m,
             outside_m=outside_m,
             line_m=line_m,
@@ -84,12 +87,16 @@ class PlausibilityMonitor:
             health=health,
         )
 
-    def steered(self, guidance: Guidance, pose: GridPose | None) -> None:
-        """What the mission made of it: how far the drone is from where it should be."""
+    def steered(self, now_ns: int, guidance: Guidance, pose: GridPose | None) -> None:
+        """What the mission made of it: how far the drone is from where it should be, and how fast beside
+        that."""
         self._off_m = 0.0
-        if guidance.guide is Guide.STEER and pose is not None:
-            reference = guidance.reference
-            self._off_m = math.hypot(reference.x_m - pose.x_m, reference.y_m - pose.y_m)
+        if guidance.guide is not Guide.STEER or pose is None:
+            self.oscillation.rest()
+            return
+        reference = guidance.reference
+        self._off_m = math.hypot(reference.x_m - pose.x_m, reference.y_m - pose.y_m)
+        self.oscillation.step(now_ns, pose.vx_mps - reference.vx_mps, pose.vy_mps - reference.vy_mps)
 
     def height_m(self, reported_m: float) -> float:
         """The height by which to climb: NaN while the lines contradict it."""

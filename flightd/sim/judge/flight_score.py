@@ -17,7 +17,7 @@ import numpy as np
 
 from flightd.core.types import AT_STOP, Event, EventLevel, Phase
 from flightd.sim.judge.clearance import clearances
-from flightd.sim.judge.evidence import FlightEvidence
+from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.meant_leg import off_leg
 from flightd.sim.judge.motion import OFF_FLOOR_M, TrueMotion, Values
 

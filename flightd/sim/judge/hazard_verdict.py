@@ -9,8 +9,8 @@ from itertools import groupby
 
 from flightd.core.types import Event, Phase
 from flightd.mission.safety.hazard_table import PHASE_OF, Action, Hazard
-from flightd.sim.judge.evidence import FlightEvidence
 from flightd.sim.judge.expectation import Expectation
+from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore
 from flightd.sim.judge.verdict import DOWN_S, MISSION_KINDS, JudgedFault
 from flightd.sim.plant.kinematics import Kinematics

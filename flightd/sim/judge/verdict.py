@@ -10,7 +10,7 @@ import numpy as np
 
 from flightd.mission.safety.hazard_table import Action
 from flightd.sim.judge.clearance import clearances
-from flightd.sim.judge.evidence import FlightEvidence
+from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore, longest_uncontrolled, off_leg_in_air, overshoot
 from flightd.sim.judge.motion import OFF_FLOOR_M
 

@@ -105,6 +105,13 @@ class LinkFault(_Fault):
     ]
 
 
+class AttitudeSlow(_Fault):
+    """The airframe answers more slowly: the bandwidth of its attitude is this share of what it was."""
+
+    kind: Literal["attitude_slow"]
+    share: float = Field(0.3, gt=0, le=1)
+
+
 class AttitudeBiased(_Fault):
     """The autopilot's estimate is off by so much: it tells so, and flies by it."""
 
@@ -299,6 +306,7 @@ Fault: TypeAlias = Annotated[
     | CameraTurned
     | BareFloor
     | LinkFault
+    | AttitudeSlow
     | AttitudeBiased
     | HeightBiased
     | HeightLost

@@ -7,7 +7,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -21,6 +21,7 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import Wind, WindParams
 from flightd.sim.scenario.fault_schema import (
     AttitudeBiased,
+    AttitudeSlow,
     BareFloor,
     BatteryDrop,
     CameraDisordered,
@@ -157,6 +158,7 @@ class WorldFaults:
         self._airframe = airframe
         self._vehicle = vehicle
         self._calm = airframe.wind
+        self._whole = airframe.params
         self._tell = tell
 
     async def run(self, clock: Clock, truth_at: Callable[[int], Kinematics], recorder: Recorder) -> None:
@@ -182,6 +184,10 @@ class WorldFaults:
             case WindChange():
                 wind = WindParams(fault.mean_x_mps, fault.mean_y_mps, fault.gust_mps)
                 self._airframe.wind = Wind(wind, 7) if on else self._calm
+            case AttitudeSlow():
+                whole_radps = self._whole.attitude_bandwidth_radps
+                bandwidth_radps = whole_radps * fault.share if on else whole_radps
+                self._airframe.params = replace(self._whole, attitude_bandwidth_radps=bandwidth_radps)
             case _ if isinstance(self._vehicle, AutopilotPeer):
                 _break(self._vehicle, fault, on)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -85,6 +85,11 @@ def silence(flight: IdealFlight) -> None:
     flight.ground_silent_s = 60.0
 
 
+def slow_down(flight: IdealFlight) -> None:
+    whole = flight.airframe.params
+    flight.airframe.params = replace(whole, attitude_bandwidth_radps=0.3 * whole.attitude_bandwidth_radps)
+
+
 TRIALS: dict[str, Trial] = {
     "pilot": Trial(pilot, found_s=0.1),
     "stop": Trial(order(CommandKind.STOP), found_s=0.05),
@@ -112,6 +117,7 @@ TRIALS: dict[str, Trial] = {
     "detector_killed": Trial(fault(health=Health(0.08, 1)), ends=Phase.DONE, found_s=0.05),
     "detector_hung": Trial(fault(health=Health(0.08, 2)), ends=Phase.DONE, found_s=0.05),
     "overload": Trial(fault(health=Health(0.4)), found_s=3.2),
+    "swings": Trial(slow_down, ends=Phase.DONE, found_s=20.0),
     "clock_jump": Trial(fault(stamps_refused=40), ends=Phase.DONE, found_s=0.05),
     "loop_stalled": Trial(fault(stall_ns=700_000_000), ends=Phase.DONE, found_s=0.75),
     "clock_unsure": Trial(

@@ -309,6 +309,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.FRAMES_STALE: warned(frame_age_s=9.0),
     Trigger.HEIGHT_WRONG: warned(height_doubted=True),
     Trigger.CORRIDOR_LEFT: warned(outside_m=1.0),
+    Trigger.SWINGS: warned(swings=True),
     Trigger.OVERLOAD: sick(latency_p99_s=9.0),
     Trigger.LINES_LOST: sensed(x_age_s=9.0, y_age_s=9.0),
     Trigger.HOLD: replace(sensed(ground_silent_s=9.0), params=_HELD),

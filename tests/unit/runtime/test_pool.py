@@ -12,7 +12,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from flightd.app.detection.detector_pool import Detection, DetectorPool, FramePool, Work
+from flightd.app.detection.detector_pool import Detection, DetectorPool
+from flightd.app.frame_pool import FramePool, Work
 from flightd.app.simulation.lockstep import LockstepDetectors
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.core.types import Image, LineSet

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from flightd.core.types import AttitudeSetpoint, Event, EventLevel, Phase
-from flightd.sim.judge.evidence import FlightEvidence
+from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import score
 from flightd.sim.judge.verdict import KINDS, judged
 from flightd.sim.plant.kinematics import ArmedChange

@@ -28,7 +28,10 @@ function Source() {
     ...stores.map(({ name }) => ({ kind: "store", name, words: name === "." ? folder : name })),
     ...drones.map((name) => ({ kind: "drone", name, words: `${name}, as it tells now` })),
   ];
-  const choose = (event) => show(all.find((one) => valueOf(one) === event.target.value));
+  const choose = (event) => {
+    change({ picked: true });
+    show(all.find((one) => valueOf(one) === event.target.value));
+  };
   return html`
     <label class="field">Inventory
       <select value=${source ? valueOf(source) : ""} onChange=${choose}>

@@ -1,6 +1,7 @@
 // One place: its picture with the codes' outlines, what was read, how sure, and its history over the runs.
 import { html, useEffect, useState } from "../html.js";
 import { time } from "../words.js";
+import { DecisionForm } from "./decision_form.js";
 import { outcomeWords } from "./expected_card.js";
 import { differs, inOrder, isShown, stock } from "./stock_state.js";
 import { STATES } from "./states.js";
@@ -20,7 +21,7 @@ export function PlaceCard({ onChoose }) {
   const look = told?.looks[shownLook] ?? told?.looks[0];
   const onKeyDown = (event) => {
     const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (step && !event.ctrlKey && !event.altKey && !event.metaKey) walk(step);
+    if (step && event.target.tagName !== "INPUT" && !event.ctrlKey && !event.altKey && !event.metaKey) walk(step);
   };
   const walk = (step) => {
     const next = nextShown(known, step);
@@ -44,6 +45,7 @@ export function PlaceCard({ onChoose }) {
       ${told?.trouble && html`<p class="refusal">${told.trouble}</p>`}
       ${look?.evidence && html`<${Picture} key=${look.evidence} look=${look} place=${chosen} />`}
       ${look ? html`<${Facts} look=${look} />` : html`<${Told} place=${place} />`}
+      <${DecisionForm} key=${chosen} />
       ${told?.looks.length > 0 && html`<${History} looks=${told.looks} shown=${look} onShow=${showLook} />`}
     </section>
   `;

@@ -1,7 +1,9 @@
 // The page Stock: every place of an inventory as it stands, filling while a flight counts.
 import { html, useEffect } from "../html.js";
 import { goTo } from "../router.js";
+import { loadDecisions } from "./decisions.js";
 import { Elevations, placeCell } from "./elevations.js";
+import { ExceptionsCard } from "./exceptions_card.js";
 import { ExpectedCard } from "./expected_card.js";
 import { FindCard } from "./find_card.js";
 import { PlaceCard } from "./place_card.js";
@@ -11,6 +13,7 @@ import { COUNTED } from "./states.js";
 
 const AGAIN_MS = { store: 1000, drone: 2000 };
 const SOURCES_MS = 10000;
+const DECISIONS_MS = 4000;
 
 export default function StockPage({ route }) {
   useEffect(() => stay(route), []);
@@ -27,6 +30,7 @@ export default function StockPage({ route }) {
         <${FindCard} onChoose=${choose} />
         ${codes.length > 0 && html`<${Elevations} onChoose=${choose} />`}
         ${codes.length === 0 && !trouble && html`<p class="quiet">Nothing was counted yet.</p>`}
+        <${ExceptionsCard} onChoose=${choose} />
         <${ExpectedCard} onChoose=${choose} />
       </div>
       <${PlaceCard} onChoose=${choose} />
@@ -58,12 +62,14 @@ function stay(route) {
     if (!document.hidden) await loadPlaces();
     if (asking) timer = setTimeout(again, AGAIN_MS[stock().source?.kind] ?? SOURCES_MS);
   };
-  first.then(again);
+  first.then(again).then(loadDecisions);
+  const decisions = setInterval(() => document.hidden || loadDecisions(), DECISIONS_MS);
   const sources = setInterval(() => document.hidden || loadSources(null), SOURCES_MS);
   return () => {
     asking = false;
     clearTimeout(timer);
     clearInterval(sources);
+    clearInterval(decisions);
   };
 }
 

@@ -33,8 +33,12 @@ export async function loadSources(wanted) {
       ...drones.map((name) => ({ kind: "drone", name })),
     ];
     const is = (a) => (b) => b && a && a.kind === b.kind && a.name === b.name;
-    const source = known.find(is(stock().source)) ?? known.find(is(wanted)) ?? known[0] ?? null;
-    change({ folder, stores, drones, trouble: "" });
+    const named = known.find(is(wanted));
+    const current = known.find(is(stock().source));
+    // a store has pictures and history: one that appears takes the place of a drone that nobody picked
+    const stays = current && (current.kind === "store" || stock().picked || stock().chosen);
+    const source = stays ? current : (named ?? known[0] ?? null);
+    change({ folder, stores, drones, trouble: "", picked: stock().picked || Boolean(named) });
     if (!is(source)(stock().source)) show(source);
   } catch (error) {
     change({ trouble: error.message });
@@ -44,7 +48,7 @@ export async function loadSources(wanted) {
 export function show(source) {
   change({
     source, tag: "", fronts: [], places: {}, fresh: new Set(), trouble: "", found: null, words: "", chosen: "", looks: null,
-    expected: null,
+    expected: null, decisions: {},
   });
   return loadPlaces();
 }

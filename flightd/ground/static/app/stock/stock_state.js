@@ -6,6 +6,7 @@ const EMPTY = {
   stores: null, // [{name, written_s}], newest first; null: not asked yet
   drones: [],
   source: null, // {kind: "store" | "drone", name}
+  picked: false, // the person has said which
   tag: "", // of what is shown, as the station names it
   fronts: [],
   places: {}, // code -> {state, texts, confidence, pending, seen_s}
@@ -17,6 +18,8 @@ const EMPTY = {
   chosen: "", // code of the place in the card
   looks: null, // {code, looks} or {code, trouble}
   expected: null, // see expected_stock.js
+  decisions: {}, // of each place, oldest first: see decisions.js
+  withClosed: false, // places that were decided are listed too
 };
 
 export const stock = () => state.stock ?? EMPTY;

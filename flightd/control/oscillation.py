@@ -1,0 +1,91 @@
+"""A position loop that swings by itself: found by its velocity, and slowed down.  Pure.
+
+A loop whose gains are too high for the delay in it swings about its reference ever wider, or as wide as its
+limits let it.  A gust pushes once; what swings to and fro, and no less each time, is the loop.  Slower it is
+stable again: gains lowered with the damping kept ask for less phase at the crossover (K. J. Astrom, R. M.
+Murray, Feedback Systems, 2008, ch. 9: delay margin).
+"""
+
+from __future__ import annotations
+
+import math
+
+_LEAST_MPS = 0.3
+"""Half swings that stay slower are none: gusts make as much."""
+_SHORTEST_S, _LONGEST_S = 0.15, 2.5
+"""Of a half swing: shorter is noise, slower is guidance."""
+_HALF_SWINGS = 3
+_DECAY = 0.8
+"""A half swing of less than this share of the one before it dies away."""
+_GROWN, _GROWN_MPS = 1.4, 0.5
+"""One of more than this share of that before it, and so fast, grows: two of them tell it."""
+_EASED = 0.6
+_LEAST_EASE = 0.35
+_SETTLES_NS = 1_000_000_000
+"""So long a loop that was slowed down has to come to rest."""
+
+
+class _Axis:
+    """The half swings of one axis."""
+
+    def __init__(self) -> None:
+        self._since_ns = 0
+        self._peak_mps = 0.0
+        self._swings = 0
+        self._before_mps = 0.0
+
+    def step(self, now_ns: int, off_mps: float) -> bool:
+        """Take the velocity against that of the reference; True once it swings on."""
+        if off_mps * self._peak_mps < 0.0:
+            self._turn(now_ns)
+        if abs(off_mps) > abs(self._peak_mps):
+            self._peak_mps = off_mps
+        if (now_ns - self._since_ns) * 1e-9 > _LONGEST_S:
+            self._swings = 0
+        counts = self._counts()
+        peak_mps = abs(self._peak_mps)
+        grows = counts and self._swings > 0 and peak_mps > max(_GROWN * self._before_mps, _GROWN_MPS)
+        return grows or self._swings + counts >= _HALF_SWINGS
+
+    def _turn(self, now_ns: int) -> None:
+        lasted_s = (now_ns - self._since_ns) * 1e-9
+        if lasted_s < _SHORTEST_S and abs(self._peak_mps) < _LEAST_MPS:
+            self._peak_mps = 0.0  # a flicker about nought
+            return
+        self._swings = self._swings + 1 if self._counts() else 0
+        self._before_mps = abs(self._peak_mps)
+        self._since_ns, self._peak_mps = now_ns, 0.0
+
+    def _counts(self) -> bool:
+        """The half swing in hand is one, by what it has come to so far."""
+        peak_mps = abs(self._peak_mps)
+        return peak_mps > _LEAST_MPS and (not self._swings or peak_mps > _DECAY * self._before_mps)
+
+
+class OscillationMonitor:
+    """Call `step` at each tick that is steered, `rest` at any other."""
+
+    def __init__(self) -> None:
+        self._axes = _Axis(), _Axis()
+        self._eased_ns: int | None = None
+        self.ease = 1.0
+        """How fast the loop may answer, as a share of what is configured."""
+        self.swings = False
+        """It swings, or was slowed down for it less than a second ago."""
+
+    def rest(self) -> None:
+        """Nothing is steered: what moves now is no loop's doing."""
+        self._axes = _Axis(), _Axis()
+
+    def step(self, now_ns: int, off_x_mps: float, off_y_mps: float) -> None:
+        """Take the velocity against that of the reference, m/s, grid axes."""
+        if not math.isfinite(off_x_mps + off_y_mps):
+            return
+        along_x, along_y = self._axes
+        swings_x, swings_y = along_x.step(now_ns, off_x_mps), along_y.step(now_ns, off_y_mps)
+        settles = self._eased_ns is not None and now_ns - self._eased_ns < _SETTLES_NS
+        if (swings_x or swings_y) and not settles:
+            self.ease = max(self.ease * _EASED, _LEAST_EASE)
+            self._eased_ns, settles = now_ns, True
+            self.rest()
+        self.swings = settles

@@ -1,0 +1,96 @@
+"""Decisions of people about places that need a look, for the page Stock."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from flightd.adapters.ground_link.protocol import DECODE_ERRORS
+from flightd.core.errors import InputError
+from flightd.ground.decision_book import Decided, Decision, DecisionBook
+from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+from flightd.ground.stock_routes import StockAnswers, answered, as_json
+
+
+class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A decision as the page sends it; sent again with the same `id` it is noted once."""
+
+    id: Annotated[str, Meta(min_length=8, max_length=64)]
+    place: Annotated[str, Meta(min_length=1, max_length=200)]
+    what: Decided
+    who: Annotated[str, Meta(min_length=1, max_length=60)]
+    note: Annotated[str, Meta(max_length=500)] = ""
+
+
+_decode: Callable[[bytes], Said] = msgspec.json.Decoder(Said).decode
+
+
+def decision_routes(asked: StockAnswers, folder: Path | None) -> list[BaseRoute]:
+    """GET them all, POST one; none without a folder to keep them in."""
+    if folder is None:
+        return []
+    book = DecisionBook(folder)
+
+    async def told(request: Request) -> Response:
+        decisions = await asked.off_loop(book.decisions, request.query_params.get("store", ""))
+        return as_json({"decisions": [_document(decision) for decision in decisions]})
+
+    async def note(request: Request) -> Response:
+        if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
+            return as_json({"refused": "a decision is JSON"}, 415)
+        said = _read(await _body(request))
+        view = await asked.store_view(request)
+        place = next((place for place in view.places if place.code == said.place), None)
+        if place is None:
+            raise InputError(f"there is no place {said.place!r}")
+        decision = Decision(
+            said.id, said.place, time.time_ns(), place.utc_ns, said.what, said.who.strip(), said.note.strip()
+        )
+        await asked.off_loop(book.add, request.query_params.get("store", ""), decision)
+        return as_json(_document(decision))
+
+    return [
+        Route("/api/stock/decisions", answered(told), methods=["GET"]),
+        Route("/api/stock/decisions", answered(note), methods=["POST"]),
+    ]
+
+
+def _read(body: bytes) -> Said:
+    try:
+        said = _decode(body)
+    except DECODE_ERRORS as err:
+        raise InputError(f"not a decision: {err}") from None
+    if not said.who.strip():
+        raise InputError("not a decision: nobody made it")
+    return said
+
+
+async def _body(request: Request) -> bytes:
+    body = b""
+    try:
+        async for part in request.stream():
+            body += part
+            if len(body) > MAX_PAGE_MESSAGE_BYTES:
+                raise InputError("too long for a decision")
+    except ClientDisconnect:
+        raise InputError("it breaks off") from None
+    return body
+
+
+def _document(decision: Decision) -> dict[str, object]:
+    return {
+        "place": decision.place,
+        "at_s": decision.utc_ns / 1e9,
+        "seen_s": decision.seen_ns / 1e9 if decision.seen_ns else None,
+        "what": decision.what.value,
+        "who": decision.who,
+        "note": decision.note,
+    }

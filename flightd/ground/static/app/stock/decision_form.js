@@ -1,0 +1,53 @@
+// What a person decides about the place in the card, with a name and a note; and what was decided before.
+import { html, useState } from "../html.js";
+import { time } from "../words.js";
+import { DECISIONS, decide, needsALook, setWho, standing, who } from "./decisions.js";
+import { stock } from "./stock_state.js";
+
+const DAY = new Intl.DateTimeFormat([], { month: "short", day: "numeric" });
+
+export function DecisionForm() {
+  const known = stock();
+  const { chosen, source, decisions } = known;
+  const [note, setNote] = useState("");
+  const [name, setName] = useState(who());
+  const [outcome, setOutcome] = useState({ text: "", good: true });
+  const before = decisions[chosen] ?? [];
+  if (source.kind !== "store" || (!needsALook(chosen, known) && !before.length)) return null;
+  const now = standing(chosen, known)?.what ?? "open";
+  const send = async (what) => {
+    if (!name.trim()) return setOutcome({ text: "Say who you are first.", good: false });
+    setWho(name.trim());
+    try {
+      await decide(chosen, what, note);
+      setNote("");
+      setOutcome({ text: "Noted.", good: true });
+    } catch (error) {
+      setOutcome({ text: error.message, good: false });
+    }
+  };
+  return html`
+    <div class="decision" role="group" aria-label="Decision">
+      <label class="field">Who
+        <input value=${name} maxlength="60" autocomplete="name" onInput=${(event) => setName(event.target.value)} />
+      </label>
+      <label class="field">Note
+        <input value=${note} maxlength="500" onInput=${(event) => setNote(event.target.value)} />
+      </label>
+      <div class="decision-orders">
+        ${Object.entries(DECISIONS)
+          .filter(([what]) => what !== "open" || now !== "open")
+          .map(([what, { order }]) => html`<button key=${what} class="order" aria-pressed=${now === what} onClick=${() => send(what)}>${order}</button>`)}
+      </div>
+      <p class=${outcome.good ? "quiet" : "refusal"} role="status">${outcome.text}</p>
+      ${before.length > 0 &&
+      html`
+        <ol class="decided" aria-label="Decided so far">
+          ${before.toReversed().map(({ at_s: at, what, who: by, note: said }) => html`
+            <li key=${at}><span class="quiet">${DAY.format(at * 1000)} ${time(at * 1000)}</span> ${DECISIONS[what].name}, ${by}${said && `: ${said}`}</li>
+          `)}
+        </ol>
+      `}
+    </div>
+  `;
+}

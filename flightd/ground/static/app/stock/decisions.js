@@ -1,0 +1,67 @@
+// What people decided about places that need a look, and which of them are still open.
+import { asked } from "./stock_source.js";
+import { change, differs, inOrder, sourceQuery, stock } from "./stock_state.js";
+
+export const DECISIONS = {
+  looking: { order: "I look", name: "is looked at" },
+  put_right: { order: "Put right", name: "put right" },
+  count_again: { order: "Count again", name: "to be counted again" },
+  fine: { order: "Fine as it is", name: "fine as it is" },
+  open: { order: "Open again", name: "open again" },
+};
+const NEEDS_A_LOOK = new Set(["several", "unreadable", "occluded", "contradicted"]);
+const CLOSING = new Set(["put_right", "fine"]);
+const WHO = "flightd.who";
+
+export async function loadDecisions() {
+  const { source } = stock();
+  if (source?.kind !== "store") return;
+  try {
+    const { decisions } = await (await asked(`/decisions?${sourceQuery(source)}`)).json();
+    if (stock().source !== source) return;
+    const byPlace = {};
+    for (const decision of decisions) (byPlace[decision.place] ??= []).push(decision);
+    if (JSON.stringify(byPlace) !== JSON.stringify(stock().decisions)) change({ decisions: byPlace });
+  } catch (error) {
+    change({ trouble: error.message });
+  }
+}
+
+// The newest decision that holds for what is shown of a place: one about an older look does not.
+export function standing(code, { decisions, places }) {
+  const newest = decisions[code]?.at(-1);
+  return newest && (newest.seen_s ?? 0) >= (places[code]?.seen_s ?? 0) ? newest : undefined;
+}
+
+export const needsALook = (code, { places, expected }) =>
+  NEEDS_A_LOOK.has(places[code]?.state) || differs(code, expected);
+
+// The places that need a look: {code, decision, open}, in the order in which one walks along them.
+export function exceptions(known) {
+  return inOrder(known.fronts)
+    .filter((code) => needsALook(code, known))
+    .map((code) => {
+      const decision = standing(code, known);
+      return { code, decision, open: !CLOSING.has(decision?.what) };
+    });
+}
+
+export const who = () => localStorage.getItem(WHO) ?? "";
+
+export const setWho = (name) => localStorage.setItem(WHO, name);
+
+// Note a decision; throws an Error with words for a person.
+export async function decide(place, what, note) {
+  const { source } = stock();
+  await asked(`/decisions?${sourceQuery(source)}`, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify({ id: newId(), place, what, who: who(), note }),
+  });
+  await loadDecisions();
+}
+
+function newId() {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
+}

@@ -1,0 +1,46 @@
+"""Faults that stay, flown whole: how far the drone drifts until it is down."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from flightd.app.simulation.judgement import judge_flight
+from flightd.app.simulation.launch import fly
+from flightd.app.simulation.prepare import SimOptions, prepare
+from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
+from flightd.core.errors import RunError
+from flightd.core.topics import Topic
+from flightd.replay.log import read_log
+from flightd.sim.judge.verdict import SAFETY_KINDS
+from flightd.sim.scenario.scenario import Scenario
+
+
+def flown_since(folder: Path, fault: dict[str, object]) -> list[dict[str, float]]:
+    """The true motion from two seconds after a fault on the leg along y = 0 began; nothing is unsafe."""
+    scenario = Scenario.model_validate({"fault": [{"at_x_m": 2.3, "at_y_m": 0.0} | fault]})
+    simulation = prepare(SimOptions(seed=11), scenario, folder, lambda _: None, sweep_route=SHORT_ROUTE)
+    try:
+        fly(simulation)
+    except RunError as err:
+        pytest.fail(str(err))
+    assert not [fault for fault in judge_flight(simulation).faults if fault.kind in SAFETY_KINDS]
+    log = read_log(folder / "truth.mcap", {Topic.TRUTH, Topic.FAULT})
+    begun_ns = next(entry.stamp_ns for entry in log.entries if entry.topic == Topic.FAULT)
+    truth = [entry.message for entry in log.entries if entry.topic == Topic.TRUTH]
+    assert truth[-1]["height_m"] < 0.15
+    return [k for k in truth if k["stamp_ns"] > begun_ns + 2_000_000_000]
+
+
+def test_one_that_is_never_heard_again_comes_down_where_it_came_to_rest(tmp_path: Path) -> None:
+    truth = flown_since(tmp_path, {"kind": "telemetry_silent"})
+    first, last = truth[0], truth[-1]
+    assert math.hypot(last["x_m"] - first["x_m"], last["y_m"] - first["y_m"]) < 0.4
+
+
+@pytest.mark.parametrize("turn_deg", [-25.0, 20.0])
+def test_a_knocked_camera_does_not_lead_it_off_the_line(tmp_path: Path, turn_deg: float) -> None:
+    truth = flown_since(tmp_path, {"kind": "camera_turned", "turn_deg": turn_deg})
+    assert max(abs(k["y_m"]) for k in truth) < 0.4

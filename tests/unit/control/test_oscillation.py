@@ -1,0 +1,84 @@
+"""A loop that swings by itself is found and slowed down; gusts and guidance are not."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flightd.control.oscillation import OscillationMonitor
+
+TICK_NS = 20_000_000
+
+
+def swung(monitor: OscillationMonitor, off_mps: list[float], start_ns: int = 0) -> float | None:
+    """When it was found first, s, given velocities off along x, one a tick."""
+    for tick, off in enumerate(off_mps):
+        now_ns = start_ns + tick * TICK_NS
+        monitor.step(now_ns, off, 0.0)
+        if monitor.swings:
+            return now_ns * 1e-9
+    return None
+
+
+def swing(period_s: float, growth_per_s: float, seconds: float, first_mps: float = 0.35) -> list[float]:
+    ticks = range(round(seconds * 1e9 / TICK_NS))
+    return [
+        first_mps * math.exp(growth_per_s * (t := tick * TICK_NS * 1e-9)) * math.sin(math.tau * t / period_s)
+        for tick in ticks
+    ]
+
+
+@pytest.mark.parametrize("period_s", [0.5, 1.0, 1.3])
+def test_a_limit_cycle_is_found_within_two_seconds(period_s: float) -> None:
+    assert (swung(OscillationMonitor(), swing(period_s, 0.05, 5.0)) or math.inf) <= 2.0
+
+
+def test_one_that_grows_is_found_by_its_second_half_swing() -> None:
+    assert (swung(OscillationMonitor(), swing(2.0, 0.7, 5.0, 0.4)) or math.inf) <= 2.0
+
+
+def test_one_that_dies_away_is_none() -> None:
+    assert swung(OscillationMonitor(), swing(1.0, -0.6, 6.0, 1.0)) is None
+
+
+def test_gusts_are_none() -> None:
+    """First-order noise of the strength and the correlation of what gusts make of the velocity."""
+    draw, monitor, off, found = random.Random(4), OscillationMonitor(), 0.0, 0
+    for tick in range(50 * 300):
+        off += 0.02 / 0.4 * -off + 0.08 * math.sqrt(2.0 * 0.02 / 0.4) * draw.gauss(0.0, 1.0)
+        monitor.step(tick * TICK_NS, off, 0.0)
+        found += monitor.swings
+    assert not found
+
+
+def test_each_time_the_loop_is_slowed_down_but_never_below_the_least() -> None:
+    monitor = OscillationMonitor()
+    eases = {1.0}
+    for again in range(6):
+        swung(monitor, swing(1.0, 0.0, 4.0), start_ns=again * 10_000_000_000)
+        eases.add(round(monitor.ease, 3))
+        for tick in range(200, 400):
+            monitor.step(again * 10_000_000_000 + tick * TICK_NS, 0.0, 0.0)
+    assert sorted(eases, reverse=True) == [1.0, 0.6, 0.36, 0.35]
+
+
+def test_what_moves_while_nothing_is_steered_counts_for_nothing() -> None:
+    monitor = OscillationMonitor()
+    off = swing(1.0, 0.0, 4.0)
+    for tick, value in enumerate(off):
+        if tick % 30 == 0:
+            monitor.rest()
+        monitor.step(tick * TICK_NS, value, 0.0)
+    assert monitor.ease == 1.0
+
+
+@given(st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=80))
+def test_no_velocity_upsets_it(values: list[float]) -> None:
+    monitor = OscillationMonitor()
+    for tick, value in enumerate(values):
+        monitor.step(tick * TICK_NS, value, -value)
+    assert 0.35 <= monitor.ease <= 1.0
