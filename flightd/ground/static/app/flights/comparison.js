@@ -2,7 +2,7 @@
 import { html, useMemo, useState } from "../html.js";
 import { phaseWords } from "../words.js";
 import { isMark, momentAt, phaseSpans, takeOff } from "./at_time.js";
-import { date, difference, FIGURES, isEstimate, outcomeWords, told, tone, verdictWords, withEstimates } from "./figures.js";
+import { date, differenceIn, FIGURES, isEstimate, outcomeWords, told, tone, verdictWords, withEstimates } from "./figures.js";
 import { flightsState, opened } from "./flights_state.js";
 import { Playhead } from "./playhead.js";
 import { usePlayback } from "./playing.js";
@@ -87,7 +87,7 @@ function FigureTable({ flights, says }) {
 }
 
 function FigureRow({ figure, rows }) {
-  const { text, better } = difference(figure, ...rows);
+  const { text, better } = differenceIn(figure.key, ...rows);
   const [tone, word] = better === null ? ["", ""] : better ? ["better", "better"] : ["worse", "worse"];
   return html`
     <tr>

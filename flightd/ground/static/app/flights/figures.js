@@ -28,7 +28,8 @@ export function withEstimates(row, flight) {
 export const isEstimate = (figure, row) => figure.of(row.estimated ?? {}) != null;
 
 // The difference from `a` to `b` in words, and whether `b` is the better one (null: neither).
-export function difference(figure, a, b) {
+export function differenceIn(key, a, b) {
+  const figure = FIGURES.find((one) => one.key === key);
   const [from, to] = [figure.of(a), figure.of(b)];
   if (from == null || to == null) return { text: "–", better: null };
   const by = to - from;

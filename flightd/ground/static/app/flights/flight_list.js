@@ -4,7 +4,7 @@ import { goTo } from "../router.js";
 import { capital, count } from "../words.js";
 import { date, faultWords, FIGURES, fullDate, outcomeWords, told, tone, verdictWords } from "./figures.js";
 import { flightsState, turnChosen, watchList } from "./flights_state.js";
-import { COLUMNS, readSelection, selected, selectionHref, SHOWN } from "./selection.js";
+import { COLUMNS, readSelection, selectedBy, selectionHref, SHOWN } from "./selection.js";
 
 const AT_ONCE = 100;
 
@@ -15,7 +15,7 @@ export function FlightList({ route }) {
   const [most, setMost] = useState(AT_ONCE);
   const choose = (change) => goTo(selectionHref({ ...selection, ...change }), { replace: true });
   if (!list.folder) return html`<${NoFolder} />`;
-  const rows = selected(list.rows, selection);
+  const rows = selectedBy(list.rows, route.query);
   return html`
     <div class="flights">
       <div class="flights-head">

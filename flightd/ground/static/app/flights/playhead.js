@@ -23,7 +23,7 @@ export function Playhead({ span, lanes, says }) {
       </div>
       <div class="controls">
         <button class="order play" onClick=${() => turnRunning(span)}>${running ? "Pause" : "Play"} <kbd>Space</kbd></button>
-        <output class="now">${fineClock(at)} <span class="quiet">of ${fineClock(span.high)}</span></output>
+        <span class="now">${fineClock(at)} <span class="quiet">of ${fineClock(span.high)}</span></span>
         <label><span class="word">Speed</span>
           <select value=${speed} onChange=${(event) => setPlaying({ speed: Number(event.target.value) })}>
             ${SPEEDS.map((one) => html`<option key=${one} value=${one}>${one} ×</option>`)}

@@ -46,7 +46,7 @@ export function Plot({ plot, curves, data, shown, bands, marks, at, values, onSe
         <strong>${plot.name} <small class="quiet">${plot.unit}</small></strong>
         ${curves.map(
           (curve, place) => html`
-            <span key=${curve.key} class="curve"><i class=${`line-${curve.role}`} />${curve.name} <output>${number(values[place], plot.digits).replace("-", "−")}</output></span>
+            <span key=${curve.key} class="curve"><i class=${`line-${curve.role}`} />${curve.name} <b>${number(values[place], plot.digits).replace("-", "−")}</b></span>
           `,
         )}
       </figcaption>

@@ -52,13 +52,16 @@ export function selectionHref({ words, shown, column, way }) {
   return `/flights${query.size ? `?${query}` : ""}`;
 }
 
-export function selected(rows, { words, shown, column, way }) {
+function selected(rows, { words, shown, column, way }) {
   const wanted = words.toLocaleLowerCase().split(/\s+/).filter(Boolean);
   const sign = way === "down" ? -1 : 1;
   return rows
     .filter((row) => isShown(row, shown) && wanted.every((word) => everything(row).includes(word)))
     .sort((a, b) => sign * column.compare(a, b, sign) || b.started_s - a.started_s);
 }
+
+// The rows that an address chooses.
+export const selectedBy = (rows, query) => selected(rows, readSelection(new URLSearchParams(query)));
 
 function isShown(row, shown) {
   if (shown === "good" || shown === "bad") return row.verdict === shown;
