@@ -44,6 +44,9 @@ def test_a_page_is_read(
     with opened(browser, f"{url}/guide/{topic}", size, scheme) as page:
         heading(page, title)
         assert page.evaluate("document.documentElement.scrollWidth") == size[0]
+        pages = page.get_by_role("navigation", name="Pages", exact=True)
+        for name in ("Live", "Stock", "Flights", "Guide"):
+            expect(pages.get_by_role("link", name=name)).to_be_in_viewport(ratio=1.0)
         assert hindrances(page) == []
 
 
