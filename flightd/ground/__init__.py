@@ -2,4 +2,8 @@
 
 drone --ZMQ--> `drone_link` -> `hub` -> one `browser` each --WebSocket--> page (`static/`)
 page --HTTP POST--> `application` -> `acts` -> `drone_link` --ZMQ--> drone
+
+A page is a folder in `static/app`, an entry in `static/app/pages.js` and a module of routes, `pages.page`
+among them, mounted by `application`.  Stock: `stock_page` -> `stock_routes`, `expected_stock_routes`,
+`decision_routes` -> `stores` (inventories, read-only), `decision_book` (the station's own file).
 """

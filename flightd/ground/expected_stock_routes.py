@@ -67,6 +67,8 @@ class _Compared:
     columns: StockColumns
     stock: UploadedStock
     lines: tuple[Difference, ...]
+    unknown_places: tuple[str, ...]
+    """Of the books, in their order: of another hall, or misspelt."""
 
 
 def _answer(data: bytes, view: StockView, asked: QueryParams) -> Response:
@@ -87,7 +89,9 @@ def _compared(data: bytes, view: StockView, asked: QueryParams) -> _Compared:
     guessed = guess_columns(table, places, [text for record in view.records for text in record.texts])
     columns = _columns(asked, guessed).checked(table)
     stock = uploaded_stock(table, columns)
-    return _Compared(table, columns, stock, compare_stock(view.records, stock.expected))
+    known = {place.casefold() for place in places}
+    unknown = tuple(place for place in stock.expected if place.casefold() not in known)
+    return _Compared(table, columns, stock, compare_stock(view.records, stock.expected), unknown)
 
 
 def _columns(asked: QueryParams, guessed: StockColumns) -> StockColumns:
@@ -126,6 +130,8 @@ def _document(compared: _Compared) -> dict[str, Any]:
         "rows": stock.rows,
         "problems": stock.problems[:_MOST_PROBLEMS],
         "problem_count": len(stock.problems),
+        "unknown_places": compared.unknown_places[:_MOST_PROBLEMS],
+        "unknown_place_count": len(compared.unknown_places),
         "outcome_counts": {outcome.value: count for outcome, count in outcome_counts(lines).items()},
         "difference_count": len(differences),
         "lines": [_line(line, stock) for line in differences[:_MOST_LINES]],

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import segno
+from mcap.writer import Writer
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation
+from flightd.core.topics import Topic
 from flightd.core.types import CodeRead
+from flightd.site.site import Site
+from flightd.site.site_file import load_site, site_toml
 from flightd.vision.shelf.evidence_jpeg import evidence_jpeg
 
 SSCC = "340123450002439853"
 RUN = "2026-W47"
+RACKS = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
+"""Two aisles with fronts on both sides."""
 _NS = 1_700_000_000 * 10**9
 POSE = CountPose("A1", 0.1, 0.0, 0.9, -1.57)
 
@@ -55,3 +62,14 @@ def counted_store(folder: Path) -> None:
         store.settle(RUN, ["AL-04-1-1"], confirmed=False)
         store.commit(look("AL-04-2-1", LocationState.READ, code("<b>PAL-10</b>")))
         store.commit(look("BL-01-1-1", LocationState.READ, code("=1+2")))
+
+
+def flown_log(file: Path, site: Site) -> None:
+    """A log of which only the map was written yet."""
+    with file.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("map", "jsonschema", b"{}")
+        channel = writer.register_channel(Topic.MAP, "json", schema)
+        writer.add_message(channel, 1, json.dumps({"text": site_toml(site)}).encode(), 1)
+        writer.finish()

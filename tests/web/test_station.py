@@ -274,7 +274,16 @@ async def test_another_origin_can_neither_read_nor_command() -> None:
 @in_real_time
 async def test_every_answer_forbids_what_is_not_our_own_and_the_page_holds_nothing_inline() -> None:
     async with served(("demo", NOBODY)) as station:
-        for path in ("/", "/static/app/main.js", "/static/none.js", "/nowhere", "/static/../server.py"):
+        for path in (
+            "/",
+            "/stock",
+            "/stock/below",
+            "/api/stock",
+            "/static/app/main.js",
+            "/static/none.js",
+            "/nowhere",
+            "/static/../server.py",
+        ):
             head, _ = await station.answer("GET", path)
             for name, value in HEADERS.items():
                 assert f"{name}: {value}".lower() in head.lower(), (path, name)
@@ -282,6 +291,7 @@ async def test_every_answer_forbids_what_is_not_our_own_and_the_page_holds_nothi
         assert "unsafe" not in policy
         assert "default-src 'none'" in policy
         _, page = await station.answer("GET", "/")
+        assert (await station.answer("GET", "/stock"))[1] == page, "one document for every page"
         assert "style=" not in page
         assert page.count("<script") == page.count('<script type="module" src="/static/')
 

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.inventory import LocationState
+from flightd.core.inventory import LocationState, PlannedLocation
 from tests.web.chromium import NARROW, WIDE, hindrances, opened, running, station
-from tests.web.stock_rig import RUN, SSCC, code, counted_store, look
+from tests.web.stock_rig import RACKS, RUN, SSCC, code, counted_store, flown_log, look
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -200,6 +200,7 @@ BOOKS = (
     "AL-03-2-1;1;pal-7/l1\n"
     "AL-04-2-1;;\n"
     ";1;X\n"
+    "AZ-99;1;X\n"
 )
 
 
@@ -224,9 +225,11 @@ def test_the_books_are_uploaded_and_every_difference_is_shown(
         assert page.evaluate("window.lastClicked") == "file", "the key opens what chooses a file"
         upload(page, books)
         expect(outcomes(page)).to_have_text(
-            ["3 as expected", "3 unexpected", "1 empty", "1 not countable"]
+            ["3 as expected", "3 unexpected", "1 empty", "2 not countable"]
         )  # fmt: skip
         expect(page.get_by_text("row 8: no place")).to_be_visible()
+        expect(page.get_by_text("One place of the file is not in this inventory:")).to_be_visible()
+        expect(page.get_by_role("listitem").filter(has_text="AZ-99")).to_be_visible()
         expect(page.get_by_label("Quantities are in")).to_have_value("1")
         table = page.get_by_role("group", name="Differences")
         expect(table.get_by_role("row", name="AL-02-1-1 empty =HYPERLINK(0) quantity 3")).to_be_visible()
@@ -236,7 +239,7 @@ def test_the_books_are_uploaded_and_every_difference_is_shown(
         table.get_by_role("button", name="AL-03-2-1").click()
         card = page.get_by_role("region", name="AL-03-2-1")
         expect(card.get_by_role("list", name="Against the expected stock")).to_contain_text(
-            "unexpected PAL-8/L1"
+            "unexpected: PAL-8/L1"
         )
         assert hindrances(page) == []
         with page.expect_download() as download:
@@ -325,3 +328,22 @@ def test_a_store_that_a_flight_begins_is_shown_instead_of_what_the_drone_tells(
         expect(page.get_by_role("alert").filter(has_text="cannot be reached")).to_be_visible()
         page.wait_for_timeout(11_000)
         expect(chosen).to_have_value("drone/demo")
+
+
+def test_a_front_on_the_right_runs_to_the_left_as_who_stands_before_it_sees_it(
+    browser: Browser, tmp_path: Path
+) -> None:
+    with SqliteStore(tmp_path / "racks") as store:
+        store.plan(PlannedLocation(place.code, place.node) for place in RACKS.locations.values())
+    flown_log(tmp_path / "racks" / "flight.mcap", RACKS)
+    with station([], folder=tmp_path) as url, opened(browser, f"{url}/stock") as page:
+        expect(page.get_by_role("region", name="Aisle A, right")).to_be_visible()
+        cell(page, "BR-04-2-2").click()
+        for key, place in {
+            "ArrowRight": "BR-04-2-1", "End": "BR-01-2-1", "ArrowDown": "BR-01-1-1", "Home": "BR-04-1-2",
+            "ArrowLeft": "BL-02-1-2", "ArrowUp": "BL-02-2-2",
+        }.items():  # fmt: skip
+            page.keyboard.press(key)
+            expect(page.get_by_role("heading", name=place, exact=True)).to_be_visible()
+        words = "Aisle B, left · bay 2 · level 2 · position 2"
+        expect(page.get_by_role("region", name="BL-02-2-2").get_by_text(words)).to_be_visible()

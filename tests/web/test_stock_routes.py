@@ -11,22 +11,18 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
-from mcap.writer import Writer
 
 from flightd.adapters.ground_link.client import Address
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.inventory import LocationState, PlannedLocation
-from flightd.core.topics import Topic
 from flightd.inventory.stock_table import MOST_BYTES
 from flightd.runtime.clock import LoopClock
-from flightd.site.site import Site
-from flightd.site.site_file import load_site, site_toml
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.ground_link import SITE, address_of, local, serving
 from tests.rigs.waiting import until
 from tests.web.served import Station, served
-from tests.web.stock_rig import SSCC, counted_store, look
+from tests.web.stock_rig import RACKS, SSCC, counted_store, flown_log, look
 
 NOBODY = ("demo", Address("127.0.0.1", 1, 1))
 UPLOAD = {"Content-Type": "application/octet-stream"}
@@ -80,27 +76,15 @@ async def test_places_are_told_again_only_when_something_has_changed(folder: Pat
         assert (code, json.loads(text)["places"]["BL-01-1-2"]["state"]) == (200, "empty")
 
 
-def flown_log(file: Path, site: Site) -> None:
-    """A log of which only the map was written yet."""
-    with file.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start()
-        schema = writer.register_schema("map", "jsonschema", b"{}")
-        channel = writer.register_channel(Topic.MAP, "json", schema)
-        writer.add_message(channel, 1, json.dumps({"text": site_toml(site)}).encode(), 1)
-        writer.finish()
-
-
 @in_real_time
 async def test_a_flight_log_beside_a_store_says_where_its_places_are(folder: Path) -> None:
-    site = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
     with SqliteStore(folder / "monday") as store:
-        store.plan(PlannedLocation(place.code, place.node) for place in site.locations.values())
+        store.plan(PlannedLocation(place.code, place.node) for place in RACKS.locations.values())
     (folder / "monday" / "flight.mcap").write_bytes(b"no log yet")
     async with served(NOBODY, folder=folder) as station:
         _, told = await got(station, "/places?store=monday")
         assert [(front["aisle"], front["side"]) for front in told["fronts"]][:2] == [("AL", ""), ("AR", "")]
-        flown_log(folder / "monday" / "flight.mcap", site)
+        flown_log(folder / "monday" / "flight.mcap", RACKS)
         with SqliteStore(folder / "monday") as store:
             store.commit(look("BR-04-2-1", LocationState.EMPTY, at_s=60))
         _, told = await got(station, "/places?store=monday")

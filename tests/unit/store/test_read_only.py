@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
 from pathlib import Path
 
@@ -42,6 +43,20 @@ def test_it_leaves_no_file_beside_a_store_that_nobody_writes(tmp_path: Path) -> 
         with pytest.raises(UnavailableError, match="cannot be written: attempt to write a readonly"):
             reader.commit(EMPTY)
     assert files(tmp_path) == before
+
+
+def test_what_a_writer_that_was_killed_left_in_its_log_is_read(tmp_path: Path) -> None:
+    killed = tmp_path / "killed"
+    with SqliteStore(tmp_path / "flown") as writer:
+        writer.commit(EMPTY)
+        shutil.copytree(tmp_path / "flown", killed)
+    assert files(killed) == {"inventory.db", "inventory.db-wal", "inventory.db-shm"}
+    index = (killed / "inventory.db-shm").read_bytes()
+    for left in (index, bytes(len(index))):
+        (killed / "inventory.db-shm").write_bytes(left)
+        with SqliteStore(killed, read_only=True) as reader:
+            assert reader.history("A-1") == [EMPTY]
+        assert (killed / "inventory.db-shm").read_bytes() == left
 
 
 def test_a_log_without_its_index_is_left_to_a_writer(tmp_path: Path) -> None:

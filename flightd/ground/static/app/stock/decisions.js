@@ -46,9 +46,26 @@ export function exceptions(known) {
     });
 }
 
-export const who = () => localStorage.getItem(WHO) ?? "";
+let name = remembered();
 
-export const setWho = (name) => localStorage.setItem(WHO, name);
+export const who = () => name;
+
+export function setWho(said) {
+  name = said;
+  try {
+    localStorage.setItem(WHO, said);
+  } catch {
+    // a browser that keeps nothing asks again after the page was loaded anew
+  }
+}
+
+function remembered() {
+  try {
+    return localStorage.getItem(WHO) ?? "";
+  } catch {
+    return "";
+  }
+}
 
 // Note a decision; throws an Error with words for a person.
 export async function decide(place, what, note) {

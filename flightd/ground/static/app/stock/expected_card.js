@@ -81,13 +81,28 @@ function Columns() {
 }
 
 function Problems() {
-  const { problems, problem_count: count } = stock().expected;
-  if (!count) return null;
+  const { expected } = stock();
+  return html`
+    <${LeftOut}
+      title=${(many) => (many === 1 ? "One row is left out:" : `${many} rows are left out:`)}
+      lines=${expected.problems}
+      total=${expected.problem_count}
+    />
+    <${LeftOut}
+      title=${(many) => (many === 1 ? "One place of the file is not in this inventory:" : `${many} places of the file are not in this inventory:`)}
+      lines=${expected.unknown_places}
+      total=${expected.unknown_place_count}
+    />
+  `;
+}
+
+function LeftOut({ title, lines, total }) {
+  if (!total) return null;
   return html`
     <div class="obstacles left-out">
-      <p>${count === 1 ? "One row is left out:" : `${count} rows are left out:`}</p>
-      <ul>${problems.map((problem) => html`<li key=${problem}>${problem}</li>`)}</ul>
-      ${count > problems.length && html`<p>and ${count - problems.length} more</p>`}
+      <p>${title(total)}</p>
+      <ul>${lines.map((line) => html`<li key=${line}>${line}</li>`)}</ul>
+      ${total > lines.length && html`<p>and ${total - lines.length} more</p>`}
     </div>
   `;
 }

@@ -78,9 +78,9 @@ function Outcome() {
     <ul class=${differs(chosen, expected) ? "outcomes differing" : "outcomes"} aria-label="Against the expected stock">
       ${lines.map(
         ({ outcome, text, found, found_at: at, location }) => html`
-          <li><strong>${outcomeWords(outcome)}</strong> ${text}
-            ${found && html` <span>${found} is there</span>`}
-            ${at && html` <span>${location === chosen ? `found at ${at}` : `expected at ${location}`}</span>`}
+          <li><strong>${outcomeWords(outcome)}</strong>${outcome === "unexpected" ? ": " : ", expected: "}${text}
+            ${found && html`<span>, there is ${found}</span>`}
+            ${at && html`<span>, ${location === chosen ? `found at ${at}` : `by the books at ${location}`}</span>`}
           </li>
         `,
       )}
