@@ -30,6 +30,7 @@ T = TypeVar("T")
 class _Job:
     function: Callable[..., Any]
     args: tuple[Any, ...]
+    named: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ class ReadingProcess:
         self._child: Child | None = None
         self._ready = asyncio.Event()
 
-    async def run(self, function: Callable[P, T], within_s: float, *args: P.args, **_: P.kwargs) -> T:
+    async def run(self, function: Callable[P, T], within_s: float, *args: P.args, **named: P.kwargs) -> T:
         """What `function` (of a module, with picklable arguments) returns over there.
 
         FlightdErrors come through; UnavailableError when too much waits already, TransientError when the
@@ -56,7 +57,7 @@ class ReadingProcess:
         self._waiting += 1
         try:
             async with self._turn:
-                answer = await self._answer(_Job(function, args), within_s)
+                answer = await self._answer(_Job(function, args, named), within_s)
         finally:
             self._waiting -= 1
         if isinstance(answer, _Failed):
@@ -108,7 +109,7 @@ def _begin() -> Callable[[_Job], object]:
 
 def _done(job: _Job) -> object:
     try:
-        return job.function(*job.args)
+        return job.function(*job.args, **job.named)
     except FlightdError as err:
         return _Failed(err)
     except MemoryError:
