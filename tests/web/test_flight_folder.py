@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import shutil
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.core.errors import InputError
 from flightd.ground.flights import log_folder
 from flightd.ground.flights.flight_row import FlightRow, read_rows
@@ -215,3 +217,17 @@ def test_the_cache_keeps_what_was_used_last_and_never_more_than_it_may() -> None
     cache.put("huge", "H", 11)
     cache.put("a", "A2", 1)
     assert (cache.get("huge"), cache.get("a"), cache.bytes, len(cache)) == (None, "A2", 5, 2)
+
+
+def test_the_date_is_what_the_log_says_else_when_it_was_written(flown: Path, tmp_path: Path) -> None:
+    said = tmp_path / "said" / "flight.mcap"
+    said.parent.mkdir()
+    with McapRecorder(said, when_full=wait_for_disk, metadata={"started": "2026-03-04 05:06:07 UTC"}):
+        pass
+    silent = copied(flown, tmp_path / "silent")
+    os.utime(silent, (1_700_000_000,) * 2)
+    rows = {row.path: row for row in read_rows(tmp_path, find_logs(tmp_path).logs)}
+    assert rows["said/flight.mcap"].started_s == datetime(2026, 3, 4, 5, 6, 7, tzinfo=UTC).timestamp()
+    assert rows["said/flight.mcap"].trouble == "holds no flight"
+    lasted_s = 1_700_000_000 - rows["silent/flight.mcap"].started_s
+    assert 60 < lasted_s < 120, "the flight's length before it was written last"
