@@ -257,10 +257,10 @@ def test_two_flights_are_compared(size: tuple[int, int], scheme: str, browser: B
         expect(cross).to_contain_text("8.1")
         expect(cross).to_contain_text("+7.0 cm")
         expect(cross).to_contain_text("worse")
+        expect(page.get_by_role("img", name="Height, m, over time")).to_be_visible()
         page.keyboard.press("PageUp")
         expect(page.get_by_role("img", name="The first flight's drone")).to_have_count(1)
         expect(page.get_by_role("img", name="The second flight's drone")).to_have_count(1)
-        expect(page.get_by_role("img", name="Height, m, over time")).to_be_visible()
         assert page.evaluate("document.documentElement.scrollWidth") == size[0]
         assert hindrances(page) == []
 
