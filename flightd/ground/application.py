@@ -19,7 +19,10 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
 from flightd.ground.browser import Browser
+from flightd.ground.flights.flights import Flights
+from flightd.ground.flights.routes import flight_routes
 from flightd.ground.guards import Guard
+from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES, read_act, read_page_message
 from flightd.ground.pages import STATIC, first_page
@@ -31,14 +34,16 @@ _FULL = 1013
 """WebSocket: try again later."""
 
 
-def application(hub: Hub, hosts: Iterable[str], folder: Path | None = None) -> ASGIApp:
-    """The whole station as ASGI; `hosts` are the names under which it may be asked, inventories and logs lie
-    under `folder`."""
+def application(hub: Hub, hosts: Iterable[str], folder: Path | None, flights: Flights) -> ASGIApp:
+    """The whole station as ASGI; `hosts` are the names under which it may be asked, inventories and `flights`
+    lie under `folder`."""
     routes = [
         first_page(),
         WebSocketRoute("/live", partial(_live, hub)),
         Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
         *stock_page(folder, hub.drones),
+        *flight_routes(flights),
+        *guide_routes(),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
     return Guard(Starlette(routes=routes), hosts)

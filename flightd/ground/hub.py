@@ -35,6 +35,7 @@ class Hub:
         async with asyncio.TaskGroup() as tasks:
             for name, drone in self.drones.items():
                 tasks.create_task(drone.run(), name=f"drone {name}")
+            await asyncio.Event().wait()  # a station may have no drone at all
 
     @property
     def browsers(self) -> int:

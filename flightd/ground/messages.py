@@ -8,7 +8,7 @@ page: `PageMessage` over the WebSocket, `Act` by POST.  What a drone says is pas
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeAlias, TypeVar
 
 import msgspec
@@ -91,17 +91,21 @@ def topic_message(drone: str, topic: str, value: Any) -> str:
 
 def picture_message(key: PictureKey, answer: PictureAnswer, age_ms: float | None, jpeg: bytes) -> bytes:
     """A picture as it goes to the page; `age_ms` since its exposure, as far as the station knows it."""
-    head = _encode(
-        {
-            "drone": key.drone,
-            "camera": key.camera,
-            "seq": answer.seq,
-            "age_ms": age_ms,
-            "lines": answer.lines,
-            "areas": answer.areas,
-        }
-    )
-    return struct.pack(">I", len(head)) + head + jpeg
+    head = {
+        "drone": key.drone,
+        "camera": key.camera,
+        "seq": answer.seq,
+        "age_ms": age_ms,
+        "lines": answer.lines,
+        "areas": answer.areas,
+    }
+    return framed_picture(head, jpeg)
+
+
+def framed_picture(head: Mapping[str, Any], jpeg: bytes) -> bytes:
+    """A picture behind its JSON head, whose length in four bytes comes first."""
+    encoded = _encode(head)
+    return struct.pack(">I", len(encoded)) + encoded + jpeg
 
 
 def read_page_message(text: str | bytes) -> PageMessage:

@@ -18,6 +18,7 @@ from flightd.adapters.ground_link.client import Address
 from flightd.config.ground import is_loopback
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.application import application
+from flightd.ground.flights.flights import Flights
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
@@ -118,11 +119,11 @@ async def serve(
     on_ready: Callable[[Listening], None] = lambda _: None,
     folder: Path | None = None,
 ) -> None:
-    """Serve until cancelled; the pages are told that it ends.  Inventories and logs lie under `folder`."""
-    hub = Hub(drones)
+    """Serve until cancelled; the pages are told that it ends.  Inventories and flights lie under `folder`."""
+    hub, flights = Hub(drones), Flights(folder)
     server = _Server(
         uvicorn.Config(
-            application(hub, own_hosts(where.host, where.port), folder),
+            application(hub, own_hosts(where.host, where.port), folder, flights),
             http="h11",
             ws="websockets-sansio",
             lifespan="off",
@@ -140,6 +141,7 @@ async def serve(
     )
     async with asyncio.TaskGroup() as tasks:
         station = tasks.create_task(hub.run(), name="hub")
+        tasks.create_task(flights.run(), name="flights")
         serving = tasks.create_task(server.serve([listener]), name="pages")
         try:
             while not server.started:  # noqa: ASYNC110 - it tells nobody

@@ -99,7 +99,7 @@ class LogReader:
             for channel_id, stamp_ns, payload in self._messages(stream):
                 topic = self._channels.get(channel_id)
                 if topic is not None and (topics is None or topic in topics):
-                    yield Entry(topic, stamp_ns, self._decode(topic, payload))
+                    yield Entry(topic, stamp_ns, decoded_message(self._path, topic, payload))
 
     def _messages(self, stream: BinaryIO) -> Iterator[_Message]:
         """Channel, stamp and payload of each message; what is damaged is passed over and noted."""
@@ -138,13 +138,16 @@ class LogReader:
             if metadata.name == "flightd":
                 self.metadata.update(metadata.metadata)
 
-    def _decode(self, topic: str, payload: bytes) -> object:
-        try:
-            return _decoder(MESSAGE_TYPES.get(topic, dict))(payload)
-        except (msgspec.MsgspecError, KeyError, TypeError, ValueError) as err:
-            raise InputError(
-                f"is not what this version records ({err})", file=self._path, key=f"a message on {topic}"
-            ) from None
+
+def decoded_message(path: Path, topic: str, payload: bytes) -> object:
+    """A payload as the message that was recorded on `topic` of the log at `path`.  InputError if it does not
+    fit."""
+    try:
+        return _decoder(MESSAGE_TYPES.get(topic, dict))(payload)
+    except (msgspec.MsgspecError, KeyError, NotImplementedError, TypeError, ValueError) as err:
+        raise InputError(
+            f"is not what this version records ({err})", file=path, key=f"a message on {topic}"
+        ) from None
 
 
 def check_is_log(path: Path) -> None:

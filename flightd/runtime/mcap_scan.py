@@ -39,6 +39,14 @@ class RawRecord(NamedTuple):
     content: bytes
 
 
+class RecordSpan(NamedTuple):
+    """Where one whole record lies in the file; its content begins `RECORD_HEAD` behind `offset`."""
+
+    offset: int
+    end: int
+    opcode: int
+
+
 class DamagedRecordError(Exception):
     """A record that is not what its opcode says."""
 
@@ -50,8 +58,9 @@ class RecordType(Protocol[RecordT_co]):
     def read(stream: ReadDataStream) -> RecordT_co: ...
 
 
-def raw_records(read_at: ReadAt, start: int, size: int) -> Iterator[RawRecord]:
-    """The whole records from `start` on, up to the first that does not fit into `size` bytes."""
+def record_spans(read_at: ReadAt, start: int, size: int) -> Iterator[RecordSpan]:
+    """Where the whole records from `start` on lie, up to the first that does not fit into `size` bytes;
+    only their heads are read."""
     offset = start
     while offset + RECORD_HEAD <= size:
         head = read_at(offset, RECORD_HEAD)
@@ -61,11 +70,18 @@ def raw_records(read_at: ReadAt, start: int, size: int) -> Iterator[RawRecord]:
         end = content_at + int.from_bytes(head[1:], "little")
         if end > size or end - content_at > LIMIT_BYTES:
             return
+        yield RecordSpan(offset, end, head[0])
+        offset = end
+
+
+def raw_records(read_at: ReadAt, start: int, size: int) -> Iterator[RawRecord]:
+    """The whole records from `start` on, up to the first that does not fit into `size` bytes."""
+    for offset, end, opcode in record_spans(read_at, start, size):
+        content_at = offset + RECORD_HEAD
         content = read_at(content_at, end - content_at)
         if len(content) < end - content_at:
             return
-        yield RawRecord(offset, end, head[0], content)
-        offset = end
+        yield RawRecord(offset, end, opcode, content)
 
 
 def parse(kind: RecordType[RecordT_co], content: bytes) -> RecordT_co:

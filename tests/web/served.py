@@ -82,7 +82,7 @@ class Station:
 
 @contextlib.asynccontextmanager
 async def served(*drones: tuple[str, Address], folder: Path | None = None) -> AsyncIterator[Station]:
-    """A station that serves meanwhile."""
+    """A station that serves meanwhile; flights lie below `folder`."""
     listener, where = opened(Listening("127.0.0.1", 0))
     ready = asyncio.Event()
     with listener:

@@ -15,6 +15,18 @@ export const PAGES = [
     styles: ["stock.css"],
     load: () => import("./stock/stock_page.js"),
   },
+  {
+    path: "/flights",
+    title: "Flights",
+    styles: ["live.css", "map.css", "../vendor/uplot.css", "flights.css", "replay.css"],
+    load: () => import("./flights/flights_page.js"),
+  },
+  {
+    path: "/guide",
+    title: "Guide",
+    styles: ["guide.css"],
+    load: () => import("./guide/guide_page.js"),
+  },
 ];
 
 // The page at a path, or undefined: the longest one that it lies under.

@@ -5,7 +5,7 @@ import { shown, state } from "../store.js";
 import { age, count } from "../words.js";
 
 const NAMES = { down: "Down camera", front: "Front camera" };
-const WIDTH = 640;
+export const WIDTH = 640;
 
 export function Camera({ camera }) {
   const canvas = useRef(null);
@@ -38,13 +38,14 @@ function caption(seen, found) {
   return `${found}, ${age(since / 1000)} old`;
 }
 
-function foundWords({ lines, areas }) {
+export function foundWords({ lines, areas }) {
   const codes = areas.filter((area) => area.kind === "code").length;
   const parts = [lines.length && count(lines.length, "line"), codes && count(codes, "code")].filter(Boolean);
   return parts.join(", ") || "nothing found";
 }
 
-function drawPicture(canvas, picture, head) {
+// `picture` is an ImageBitmap, `head` says what was found in it: `lines` and `areas`.
+export function drawPicture(canvas, picture, head) {
   const height = Math.round((WIDTH * picture.height) / picture.width);
   if (canvas.height !== height) canvas.height = height;
   const context = canvas.getContext("2d");

@@ -1,0 +1,137 @@
+"""The list of flights: kept up to date while somebody asks for it, read bit by bit, newest first."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import msgspec
+
+from flightd.core.errors import FlightdError, TransientError
+from flightd.ground.flights.flight_row import FlightRow, read_rows, unreadable
+from flightd.ground.flights.log_folder import FoundLog, FoundLogs, find_logs
+
+_FRESH_S = 3.0
+"""The folder is looked through again at most this often."""
+_AT_ONCE = 12
+"""So many logs are read before the list is told anew."""
+_WITHIN_S = 60.0
+
+T = TypeVar("T")
+
+
+class Reader(Protocol):
+    """Runs functions outside the loop (`ReadingProcess`)."""
+
+    async def run(self, function: Callable[..., T], within_s: float, *args: Any) -> T: ...
+
+
+class FlightIndex:
+    """`run` keeps it going; `listing` is what is known now, as JSON."""
+
+    def __init__(self, root: Path, reader: Reader) -> None:
+        self._root = root
+        self._reader = reader
+        self._found: dict[str, FoundLog] = {}
+        self._rows: dict[str, tuple[tuple[int, ...], FlightRow]] = {}
+        self._cut = False
+        self._trouble = ""
+        self._unread = 0
+        self._looked = False
+        self._looked_s = 0.0
+        self._version = 0
+        self._told: tuple[int, bytes] = (-1, b"")
+        self._asked = asyncio.Event()
+        self._changed = asyncio.Condition()
+
+    async def run(self) -> None:
+        """Look again whenever somebody asked, until cancelled."""
+        while True:
+            await self._asked.wait()
+            self._asked.clear()
+            try:
+                await self._look()
+                self._trouble = ""
+            except FlightdError as err:
+                self._trouble = str(err)
+            self._looked, self._looked_s = True, asyncio.get_running_loop().time()
+            await self._tell()
+            await asyncio.sleep(_FRESH_S)
+
+    def listing(self, known: int = -1) -> bytes:
+        """JSON: `version`, `rows` (None where the asker knows this version), how many are `unread` yet.
+
+        Asking makes it look again, soon."""
+        self._asked.set()
+        if known == self._version:
+            return msgspec.json.encode({"version": self._version, "unread": self._unread, "rows": None})
+        if self._told[0] != self._version:
+            rows = [self._rows[log_id][1] for log_id in self._found if log_id in self._rows]
+            document = {
+                "version": self._version,
+                "looked": self._looked,
+                "unread": self._unread,
+                "cut": self._cut,
+                "trouble": self._trouble,
+                "rows": rows,
+            }
+            self._told = (self._version, msgspec.json.encode(document))
+        return self._told[1]
+
+    async def log(self, log_id: str) -> FoundLog | None:
+        """The log of that id; None where there is none.  Looks through the folder where it does not know
+        it, and again soon where it does."""
+        self._asked.set()
+        if log_id not in self._found and not self._is_fresh():
+            version = self._version
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(_WITHIN_S), self._changed:
+                    await self._changed.wait_for(
+                        lambda: log_id in self._found or (self._looked and self._version > version)
+                    )
+        return self._found.get(log_id)
+
+    def row(self, log_id: str) -> FlightRow | None:
+        """The row of a flight, None while it was not read."""
+        return self._rows[log_id][1] if log_id in self._rows else None
+
+    async def _look(self) -> None:
+        found: FoundLogs = await self._reader.run(find_logs, _WITHIN_S, self._root)
+        self._found = {log.id: log for log in found.logs}
+        self._cut = found.cut
+        self._rows = {key: row for key, row in self._rows.items() if key in self._found}
+        unread = [log for log in found.logs if self._is_unread(log)]
+        self._unread = len(unread)
+        await self._tell()
+        while unread:
+            batch, unread = tuple(unread[:_AT_ONCE]), unread[_AT_ONCE:]
+            for log, row in zip(batch, await self._read(batch), strict=True):
+                self._rows[log.id] = (log.stamp, row)
+            self._unread = len(unread)
+            await self._tell()
+
+    def _is_fresh(self) -> bool:
+        """The folder was looked through a moment ago."""
+        return self._looked and asyncio.get_running_loop().time() - self._looked_s < _FRESH_S
+
+    async def _read(self, logs: tuple[FoundLog, ...]) -> tuple[FlightRow, ...]:
+        """A row for each; where they cannot be read together, one by one, so that a log that costs the
+        reader its life costs no other its row."""
+        try:
+            return await self._reader.run(read_rows, _WITHIN_S, self._root, logs)
+        except TransientError as err:
+            if len(logs) == 1:
+                return (unreadable(logs[0], err.what),)
+        return tuple([row for log in logs for row in await self._read((log,))])
+
+    def _is_unread(self, log: FoundLog) -> bool:
+        known = self._rows.get(log.id)
+        return known is None or known[0] != log.stamp or known[1].running
+
+    async def _tell(self) -> None:
+        self._version += 1
+        async with self._changed:
+            self._changed.notify_all()

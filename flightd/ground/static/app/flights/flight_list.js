@@ -1,0 +1,169 @@
+// The list of flights: sorted, filtered, and two of them chosen to be compared.
+import { html, useEffect, useRef, useState } from "../html.js";
+import { goTo } from "../router.js";
+import { capital, count } from "../words.js";
+import { date, faultWords, FIGURES, fullDate, outcomeWords, told, tone, verdictWords } from "./figures.js";
+import { flightsState, turnChosen, watchList } from "./flights_state.js";
+import { COLUMNS, readSelection, selectedBy, selectionHref, SHOWN } from "./selection.js";
+
+const AT_ONCE = 100;
+
+export function FlightList({ route }) {
+  useEffect(watchList, []);
+  const { list, chosen } = flightsState();
+  const selection = readSelection(route.query);
+  const [most, setMost] = useState(AT_ONCE);
+  const choose = (change) => goTo(selectionHref({ ...selection, ...change }), { replace: true });
+  if (!list.folder) return html`<${NoFolder} />`;
+  const rows = selectedBy(list.rows, route.query);
+  return html`
+    <div class="flights">
+      <div class="flights-head">
+        <h2>Flights</h2>
+        <${Search} selection=${selection} choose=${choose} />
+        <${Compare} chosen=${chosen} rows=${list.rows} />
+      </div>
+      <p class="quiet" role="status">${stateWords(list, rows)}</p>
+      ${list.trouble && html`<p class="bad-line">${capital(list.trouble)}</p>`}
+      ${rows.length > 0 &&
+      html`<${Table} rows=${rows.slice(0, most)} selection=${selection} choose=${choose} chosen=${chosen} />`}
+      ${rows.length > most &&
+      html`<button class="order more" onClick=${() => setMost(most + AT_ONCE)}>
+        Show ${Math.min(AT_ONCE, rows.length - most)} more of ${rows.length}
+      </button>`}
+    </div>
+  `;
+}
+
+function NoFolder() {
+  return html`
+    <section class="card empty"><h2>No folder of flights</h2>
+      <p>Start the station with one: <code>flightd ground --folder out</code> lists every flight log below <code>out</code>.</p>
+    </section>
+  `;
+}
+
+function stateWords(list, rows) {
+  if (!list.looked && !list.rows.length) return "Looking through the folder …";
+  const shown = rows.length === list.rows.length ? "" : `${rows.length} of `;
+  const parts = [`${shown}${count(list.rows.length, "flight")}`];
+  if (list.unread) parts.push(`${list.unread} still to be read`);
+  if (list.cut) parts.push("more lie there than are listed");
+  return parts.join(", ");
+}
+
+function Search({ selection, choose }) {
+  const field = useRef(null);
+  useEffect(() => {
+    const onKey = (event) => {
+      if (event.key !== "/" || event.target.closest?.("input, textarea, select")) return;
+      event.preventDefault();
+      field.current?.focus();
+    };
+    window.addEventListener("keydown", onKey);
+    return () => window.removeEventListener("keydown", onKey);
+  }, []);
+  return html`
+    <div class="search" role="search">
+      <label class="unseen" for="flight-words">Search flights</label>
+      <input
+        id="flight-words" type="search" ref=${field} placeholder="Search: site, node, reason …  ( / )" value=${selection.words}
+        onInput=${(event) => choose({ words: event.target.value })}
+      />
+      <label class="unseen" for="flight-show">Show</label>
+      <select id="flight-show" value=${selection.shown} onChange=${(event) => choose({ shown: event.target.value })}>
+        ${SHOWN.map(([key, name]) => html`<option key=${key} value=${key}>${name}</option>`)}
+      </select>
+    </div>
+  `;
+}
+
+function Compare({ chosen, rows }) {
+  const there = chosen.filter((id) => rows.some((row) => row.id === id));
+  if (there.length < 2) {
+    return html`<p class="quiet compare-hint">${there.length ? "Choose one more to compare" : "Choose two to compare"}</p>`;
+  }
+  return html`<a class="order link" href=${`/flights/compare?a=${there[0]}&b=${there[1]}`}>Compare both</a>`;
+}
+
+function Table({ rows, selection, choose, chosen }) {
+  const body = useRef(null);
+  return html`
+    <table class="card list" role="table">
+      <thead role="rowgroup">
+        <tr role="row">
+          <th role="columnheader" scope="col"><span class="unseen">Compare</span></th>
+          ${COLUMNS.map((column) => html`<${Head} key=${column.key} column=${column} selection=${selection} choose=${choose} />`)}
+        </tr>
+      </thead>
+      <tbody role="rowgroup" ref=${body} onKeyDown=${(event) => moveInRows(event, body.current)}>
+        ${rows.map((row) => html`<${Row} key=${row.id} row=${row} isChosen=${chosen.includes(row.id)} />`)}
+      </tbody>
+    </table>
+  `;
+}
+
+function Head({ column, selection, choose }) {
+  const isSorted = selection.column === column;
+  const sorted = { up: "ascending", down: "descending" }[selection.way];
+  const turn = () => {
+    const other = selection.way === "up" ? "down" : "up";
+    choose({ column, way: isSorted ? other : column.first });
+  };
+  return html`
+    <th role="columnheader" scope="col" class=${column.figure ? "figure-cell" : `${column.key}-cell`} aria-sort=${isSorted ? sorted : null}>
+      <button onClick=${turn}>
+        ${column.name}${column.unit && html` <small>${column.unit}</small>`}
+        <span class="arrow" aria-hidden="true">${isSorted ? { up: "▲", down: "▼" }[selection.way] : ""}</span>
+      </button>
+    </th>
+  `;
+}
+
+// From row to row by the arrow keys; Enter opens, Space chooses.
+function moveInRows(event, body) {
+  const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+  const row = event.target.closest("tr");
+  if (!row || event.target.matches("input")) return;
+  if (event.key === " ") {
+    event.preventDefault();
+    row.querySelector("input")?.click();
+    return;
+  }
+  if (!step) return;
+  const links = [...body.querySelectorAll("a.open")];
+  links[links.indexOf(row.querySelector("a.open")) + step]?.focus();
+  event.preventDefault();
+}
+
+function Row({ row, isChosen }) {
+  const name = `${row.site || row.path}, ${date(row)}`;
+  return html`
+    <tr role="row" class=${isChosen ? "chosen" : ""}>
+      <td role="cell" class="pick">
+        <input type="checkbox" checked=${isChosen} aria-label=${`Compare ${name}`} onChange=${() => turnChosen(row.id)} />
+      </td>
+      <td role="cell" class="date-cell"><a class="open" href=${`/flights/${row.id}`} title=${fullDate(row)}>${date(row)}</a></td>
+      <td role="cell" class="site-cell">${row.site || "–"}</td>
+      <td role="cell" class="drone-cell">${row.drone || "–"}${row.world && html` <span class="quiet">${row.world}</span>`}</td>
+      <td role="cell" class="mission-cell">${row.mission || "–"}</td>
+      <td role="cell" class="outcome-cell">
+        <span class=${`how ${row.outcome === "completed" ? "good" : row.outcome === "aborted" ? "bad" : "open"}`}>${outcomeWords(row)}</span>
+        ${row.reason && html`<span class="quiet reason">${row.reason}</span>`}
+        ${row.trouble && html`<span class="quiet trouble-line">${capital(row.trouble)}</span>`}
+      </td>
+      <td role="cell" class="verdict-cell">
+        ${row.verdict ? html`<span class=${`badge ${tone(row)}`}>${verdictWords(row)}</span>` : "–"}
+        ${row.faults.length > 0 && html`<span class="quiet reason">${faultWords(row)}</span>`}
+      </td>
+      ${FIGURES.map(
+        (figure) => html`
+          <td role="cell" key=${figure.key} class=${figure.of(row) == null ? "figure-cell unknown" : "figure-cell"}>
+            <span class="label" aria-hidden="true">${figure.name}</span>${told(figure, row)}
+            ${figure.unit && told(figure, row) !== "–" && html`<span class="unit"> ${figure.unit}</span>`}
+          </td>
+        `,
+      )}
+    </tr>
+  `;
+}
