@@ -96,7 +96,7 @@ def row_of(
         trouble=trouble or ("" if last is not None else "holds no flight"),
         started_s=_started_s(skimmed, blank.started_s),
         site=skimmed.site,
-        drone=_text(summary, "vehicle") or skimmed.metadata.get("vehicle", "") or skimmed.vehicle,
+        drone=skimmed.metadata.get("drone", "") or _text(summary, "vehicle") or skimmed.vehicle,
         world=_text(summary, "world"),
         mission=_mission(skimmed.order),
         outcome=outcome,
