@@ -138,6 +138,7 @@ class Pilot:
         armed = tick.vehicle is not None and tick.vehicle.armed
         if armed is not self._estimator.armed:
             self._estimator.begin(self._mission.stand, armed=armed)
+            self._plausibility.begin()
         self._estimator.take(tick, self._commanded)
         known = self._estimator.step(now_ns)
         pose, tracks = known.pose, known.tracks

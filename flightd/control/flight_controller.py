@@ -101,9 +101,11 @@ class FlightController:
         push_mps2: tuple[float, float],
         *,
         dead_reckoned: bool,
+        ease: float = 1.0,
     ) -> AttitudeSetpoint:
-        """Come to rest by the velocity alone (`dead_reckoned`: it is known), then lean only against the
-        steady push as it was last known (grid axes), at most `_TRIM_MPS2`; straight, height held."""
+        """Come to rest by the velocity alone (`dead_reckoned`: it is known), `ease` times as fast as
+        configured, then lean only against the steady push as it was last known (grid axes), at most
+        `_TRIM_MPS2`; straight, height held."""
         gains, most = self._gains, self._most_mps2
         trim = most if dead_reckoned else _TRIM_MPS2
         ax, ay = (-min(max(push, -trim), trim) for push in push_mps2)
@@ -111,8 +113,8 @@ class FlightController:
         if not all(map(math.isfinite, moving)):
             return self.level(now_ns, motion, reference, dt_s)
         if dead_reckoned:
-            ax = min(max(ax - gains.kd * motion.vx_mps, -most), most)
-            ay = min(max(ay - gains.kd * motion.vy_mps, -most), most)
+            ax = min(max(ax - ease * gains.kd * motion.vx_mps, -most), most)
+            ay = min(max(ay - ease * gains.kd * motion.vy_mps, -most), most)
         cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
         return AttitudeSetpoint(
             now_ns,

@@ -20,44 +20,57 @@ _DECAY = 0.8
 _GROWN, _GROWN_MPS = 1.4, 0.5
 """One of more than this share of that before it, and so fast, grows: two of them tell it."""
 _EASED = 0.6
-_LEAST_EASE = 0.35
+LEAST_EASE = 0.35
+"""The slowest at which a drone is still held against the air."""
 _SETTLES_NS = 1_000_000_000
-"""So long a loop that was slowed down has to come to rest."""
+"""So long a loop that was slowed down has to come to rest before it is slowed down again."""
+_RESTS_NS = 1_200_000_000
+"""What was slower than a half swing for so long swings no more."""
 _CALM_NS = 8_000_000_000
 """After so long without a swing the loop is tried faster again, once: what made it swing may have been
 learnt meanwhile."""
+_SMOOTH_S = 0.06
+"""A leap of the estimate is over sooner, and no swing."""
+_TURN_MPS = 0.1
+"""A swing has turned when it is as fast as this the other way: noise about nought is no turn."""
 
 
 class _Axis:
     """The half swings of one axis."""
 
     def __init__(self) -> None:
-        self._since_ns = 0
+        self._since_ns: int | None = None
+        self._last_ns = 0
+        self._slow_mps = 0.0
         self._peak_mps = 0.0
         self._swings = 0
         self._before_mps = 0.0
 
     def step(self, now_ns: int, off_mps: float) -> bool:
         """Take the velocity against that of the reference; True once it swings on."""
-        if off_mps * self._peak_mps < 0.0:
-            self._turn(now_ns)
-        if abs(off_mps) > abs(self._peak_mps):
+        if self._since_ns is None:
+            self._since_ns = self._last_ns = now_ns
+        dt_s, self._last_ns = (now_ns - self._last_ns) * 1e-9, now_ns
+        self._slow_mps += min(max(dt_s / _SMOOTH_S, 0.0), 1.0) * (off_mps - self._slow_mps)
+        off_mps = self._slow_mps
+        if off_mps * self._peak_mps < 0.0 and abs(off_mps) > _TURN_MPS:
+            self._turn(now_ns, self._since_ns)
+        if off_mps * self._peak_mps >= 0.0 and abs(off_mps) > abs(self._peak_mps):
             self._peak_mps = off_mps
-        if (now_ns - self._since_ns) * 1e-9 > _LONGEST_S:
+        lasted_s = (now_ns - self._since_ns) * 1e-9
+        if lasted_s > _LONGEST_S:
             self._swings = 0
-        counts = self._counts()
+        counts = self._counts() and lasted_s > _SHORTEST_S
         peak_mps = abs(self._peak_mps)
         grows = counts and self._swings > 0 and peak_mps > max(_GROWN * self._before_mps, _GROWN_MPS)
         return grows or self._swings + counts >= _HALF_SWINGS
 
-    def _turn(self, now_ns: int) -> None:
-        lasted_s = (now_ns - self._since_ns) * 1e-9
-        if lasted_s < _SHORTEST_S and abs(self._peak_mps) < _LEAST_MPS:
-            self._peak_mps = 0.0  # a flicker about nought
-            return
-        self._swings = self._swings + 1 if self._counts() else 0
-        self._before_mps = abs(self._peak_mps)
-        self._since_ns, self._peak_mps = now_ns, 0.0
+    def _turn(self, now_ns: int, since_ns: int) -> None:
+        if (now_ns - since_ns) * 1e-9 >= _SHORTEST_S:
+            self._swings = self._swings + 1 if self._counts() else 0
+            self._before_mps = abs(self._peak_mps)
+            self._since_ns = now_ns
+        self._peak_mps = 0.0
 
     def _counts(self) -> bool:
         """The half swing in hand is one, by what it has come to so far."""
@@ -71,17 +84,19 @@ class OscillationMonitor:
     def __init__(self) -> None:
         self._axes = _Axis(), _Axis()
         self._found_ns: int | None = None
-        self._calm_since_ns = 0
+        self._fast_ns = 0
+        self._calm_since_ns: int | None = None
         self._most = 1.0
         self._tried = False
         self.ease = 1.0
         """How fast the loop may answer, as a share of what is configured."""
         self.swings = False
-        """It swings, or was slowed down for it less than a second ago."""
+        """It swings, or has hardly come to rest."""
 
     def rest(self) -> None:
         """Nothing is steered: what moves now is no loop's doing."""
         self._axes = _Axis(), _Axis()
+        self._calm_since_ns = None
         self.swings = False
 
     def step(self, now_ns: int, off_x_mps: float, off_y_mps: float) -> None:
@@ -90,16 +105,21 @@ class OscillationMonitor:
             return
         along_x, along_y = self._axes
         swings_x, swings_y = along_x.step(now_ns, off_x_mps), along_y.step(now_ns, off_y_mps)
-        self.swings = self._found_ns is not None and now_ns - self._found_ns < _SETTLES_NS
-        if (swings_x or swings_y) and not self.swings:
+        if max(abs(off_x_mps), abs(off_y_mps)) > _LEAST_MPS:
+            self._fast_ns = now_ns
+        settles = self._found_ns is not None and now_ns - self._found_ns < _SETTLES_NS
+        self.swings = settles or (self.swings and now_ns - self._fast_ns < _RESTS_NS)
+        if (swings_x or swings_y) and not settles:
             self._slow_down(now_ns)
+        if self.swings or self._calm_since_ns is None:
+            self._calm_since_ns = now_ns
         elif self.ease < self._most and now_ns - self._calm_since_ns > _CALM_NS:
             self.ease, self._calm_since_ns, self._tried = min(self.ease / _EASED, self._most), now_ns, True
 
     def _slow_down(self, now_ns: int) -> None:
-        self.ease = max(self.ease * _EASED, _LEAST_EASE)
+        self.ease = max(self.ease * _EASED, LEAST_EASE)
         if self._tried:  # it was not the first seconds of a flight that knew little
             self._most = self.ease
-        self.rest()
-        self._found_ns = self._calm_since_ns = now_ns
+        self._axes = _Axis(), _Axis()
+        self._found_ns = now_ns
         self.swings = True

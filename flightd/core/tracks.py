@@ -65,14 +65,14 @@ class SensorEstimate:
     mount_roll_rad: float = math.nan
     mount_pitch_rad: float = math.nan
     mount_sigma_rad: float = math.nan
-    mount_yaw_rad: float = math.nan
-    mount_yaw_sigma_rad: float = math.nan
     tilt_roll_rad: float = math.nan
     tilt_pitch_rad: float = math.nan
     tilt_sigma_rad: float = math.nan
     scale_share: float = math.nan
     scale_sigma: float = math.nan
     shake_rad: float = math.nan
+    mount_yaw_rad: float = math.nan
+    mount_yaw_sigma_rad: float = math.nan
 
     @property
     def is_known(self) -> bool:

@@ -25,7 +25,7 @@ _FIRST_BANDWIDTH_RADPS, _BANDWIDTH_SIGMA = 10.0, 0.3
 """Before anything was seen of it; the bandwidth's is that of its logarithm."""
 _YAW_LAG_S = 0.2
 _STEP_S = 0.02
-_KEPT = 600
+_KEPT = 1200
 """So many ticks are remembered at least."""
 _MEMORY_S = 8.0
 """Of what was seen while the vehicle was moved; of a hover nothing is learnt, and nothing forgotten."""

@@ -16,6 +16,8 @@ _AT_ONCE_NS = 300_000_000
 """What turns within this time leaps: no drone turns its camera so, and no compass is led astray so fast."""
 _LEAP_RAD, _FASTEST_RADPS = math.radians(3.0), 2.0
 """A told heading that turns by more than this between two samples leaps."""
+_GAP_S = 0.1
+"""Between samples further apart a leap does not show."""
 _SHARE = 0.5
 """Of a leap by more than this share of an error that error comes."""
 
@@ -37,7 +39,9 @@ class HeadingDispute:
         self._since_ns = 0
         self._settled_ns: int | None = None
         self._agreed_ns: int | None = None
-        self._first_rad = 0.0
+        self._agreed_rad = 0.0
+        self._leap_rad = 0.0
+        self._gap_ns = 0
         self._heading: Attitude | None = None
         self._leaps: deque[tuple[int, float]] = deque(maxlen=64)
 
@@ -47,6 +51,8 @@ class HeadingDispute:
         if last is None:
             return
         turn_rad, dt_s = wrap_pi(sample.yaw_rad - last.yaw_rad), (sample.stamp_ns - last.stamp_ns) * 1e-9
+        if dt_s > _GAP_S:
+            self._gap_ns = sample.stamp_ns
         if abs(turn_rad) > _LEAP_RAD + _FASTEST_RADPS * max(dt_s, 0.0):
             self._leaps.append((sample.stamp_ns, turn_rad))
 
@@ -59,13 +65,13 @@ class HeadingDispute:
             return None
         if agreed or not told:
             self.error_rad = 0.0
-            if agreed:
-                self._agreed_ns = stamp_ns
+            if agreed and told:
+                self._agreed_ns, self._agreed_rad = stamp_ns, min(told, key=abs)
             return None
         error = median(told)
         if not self.error_rad:
             at_once = self._agreed_ns is not None and stamp_ns - self._agreed_ns < _AT_ONCE_NS
-            self._first_rad = error if at_once else 0.0
+            self._leap_rad = error - self._agreed_rad if at_once else 0.0
         if not self.error_rad or abs(error - self.error_rad) > _SAME_RAD:
             self._since_ns = stamp_ns
         self.error_rad = error
@@ -75,8 +81,10 @@ class HeadingDispute:
         return self._turned(error)
 
     def _turned(self, error_rad: float) -> Turned:
-        picture_leapt = abs(error_rad - self._first_rad) < _SHARE * abs(error_rad)
         agreed_ns = self._agreed_ns or 0
+        picture_leapt = abs(error_rad - self._leap_rad) < _SHARE * abs(error_rad)
+        if self._gap_ns > agreed_ns - _AT_ONCE_NS:
+            return Turned.HEADING  # nobody knows what the told heading did
         leapt_rad = sum(turn for stamp_ns, turn in self._leaps if stamp_ns > agreed_ns - _AT_ONCE_NS)
         explained = abs(error_rad + leapt_rad) < _SHARE * abs(error_rad)
         return Turned.CAMERA if picture_leapt and not explained else Turned.HEADING

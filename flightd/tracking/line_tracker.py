@@ -122,6 +122,7 @@ class LineTracker:
         self.rejected = 0
         self._widths = WidthHeights()
         self._dispute = HeadingDispute()
+        self._knocked = False
 
     @property
     def heading_error_rad(self) -> float:
@@ -154,8 +155,9 @@ class LineTracker:
         return self._filter.sigma(DELAY)
 
     def learnt(self) -> LearntSensors | None:
-        """What is known of the sensors, for the tracker after this one; None before a line was seen."""
-        return self._filter.learnt() if self._lines_ns else None
+        """What is known of the sensors, for the tracker after this one; None before a line was seen, and once
+        the camera was knocked: somebody will put it right."""
+        return self._filter.learnt() if self._lines_ns and not self._knocked else None
 
     def assume(self, samples: Iterable[Attitude]) -> None:
         """Take what is assumed of the attitude from the newest sample on, in the place of what was."""
@@ -408,6 +410,7 @@ class LineTracker:
         )
         turned = self._dispute.step([-turn for turn in turns], agreed, attitude.stamp_ns)
         if turned is Turned.CAMERA:
+            self._knocked = True
             held.turn_mount_by(self._dispute.error_rad)
         elif turned is Turned.HEADING:
             held.turn_to(held.mean(PSI) + self._dispute.error_rad, self._params.start_yaw_sigma_rad)

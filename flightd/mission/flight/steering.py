@@ -8,6 +8,7 @@ from dataclasses import replace
 from flightd.config.control import ControlConfig
 from flightd.control.flight_controller import CALM, Conditions, FlightController, Motion
 from flightd.control.limits import Limiter, Surroundings
+from flightd.control.oscillation import LEAST_EASE
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import AttitudeSetpoint, GridPose, Phase
 from flightd.mission.guidance import Guidance, Guide, MissionInputs
@@ -44,18 +45,20 @@ class Steering:
         height_m = self._plausibility.height_m(inputs.height_m)
         motion = self._motion(pose, height_m, dt_s, stand_yaw_rad, lead)
         control, reference = self._control, guidance.reference
-        sight_s = min(inputs.x_age_s, inputs.y_age_s)
+        sight_s, ease = min(inputs.x_age_s, inputs.y_age_s), self._plausibility.oscillation.ease
         if guidance.guide is Guide.NONE:
             control.reset()
             return None
         if guidance.guide is Guide.LEVEL or pose is None:
             wanted, age_s = control.level(now_ns, motion, reference, dt_s), 0.0
         elif guidance.guide is Guide.BRAKE:
-            wanted = control.rest(now_ns, motion, reference, dt_s, push, dead_reckoned=guidance.dead_reckoned)
+            wanted = control.rest(
+                now_ns, motion, reference, dt_s, push, dead_reckoned=guidance.dead_reckoned, ease=ease
+            )
             age_s = min(inputs.telemetry_age_s, inputs.sight_s)
         else:
-            ease = conditions.ease * self._plausibility.oscillation.ease
-            wanted = control.step(now_ns, motion, reference, dt_s, replace(conditions, ease=ease))
+            eased = replace(conditions, ease=max(conditions.ease * ease, LEAST_EASE))
+            wanted = control.step(now_ns, motion, reference, dt_s, eased)
             # above the pad the mission steers on without lines: by the mat, or the motion last known
             by_mat = inputs.by_pad or (guidance.phase is Phase.LAND and sight_s < _TOUCHDOWN_S)
             age_s = inputs.telemetry_age_s if by_mat else max(sight_s, inputs.telemetry_age_s)

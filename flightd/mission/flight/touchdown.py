@@ -36,9 +36,9 @@ _TOUCHES_S, _FLIES_S = 0.3, 0.5
 _DEFIES_RAD, _DEFIES_STILL_RAD, _DEFIES_S = math.radians(3.0), math.radians(1.0), 0.4
 """An attitude that stays as it is for so long, though another one is commanded, is held by the floor, so be
 the range finder and the climb rate what they may."""
-_MOVES_MPS, _MOVES_M = 0.3, 0.15
-"""What touches moves again when it climbs or sinks by more, or is so much higher: a told climb wanders by a
-third of it on the floor."""
+_MOVES_MPS, _MOVES_M, _MOVES_S = 0.3, 0.15, 1.5
+"""What touches moves again when it climbs or sinks by more, or is so much higher or lower, by its range
+finder or by the climb that it told lately: on the floor a told climb wanders by a third of that."""
 
 
 class Standstill:
@@ -52,7 +52,8 @@ class Standstill:
         self._since: tuple[int, float, Attitude] | None = None
         self._blocked_s = self._moving_s = self._sank_s = 0.0
         self._touched_m = math.nan
-        self._held: tuple[int, Attitude] | None = None
+        self._climbed_m = 0.0
+        self._held: Attitude | None = None
         self.touches = False
         """It stands on something: who stands does not follow a lean, and the position loop would ask for more
         and more of it."""
@@ -70,7 +71,9 @@ class Standstill:
     def step(self, s: MissionInputs, *, sinks: bool) -> float:
         """Seconds; 0 while it moves, is higher, or is not heard.  `sinks`: it is commanded to."""
         climb_mps = math.nan if s.vehicle is None else s.vehicle.climb_mps
-        if sinks and climb_mps < -_STILL_MPS:
+        if not sinks:
+            self._sank_s = 0.0  # it has stopped at some height, to aim
+        elif climb_mps < -_STILL_MPS:
             self._sank_s += s.dt_s
         # near the floor or after it sank, whatever its range finder reads: elsewhere a climb rate of 0 may be
         # one that stands still
@@ -80,13 +83,21 @@ class Standstill:
         still_s = self._stood_s(s, sinks=sinks)
         if max(still_s, self._blocked_s) > _TOUCHES_S or self._defies(s, sinks=sinks):
             if not self.touches:
-                self._touched_m = s.height_m
+                self._touched_m, self._climbed_m = s.height_m, 0.0
             self.touches, self._moving_s = True, 0.0
         elif self.touches:
-            moves = abs(climb_mps) > _MOVES_MPS or abs(s.height_m - self._touched_m) > _MOVES_M
-            self._moving_s = self._moving_s + s.dt_s if moves else 0.0
+            moving_s = s.dt_s if self._moves(s, climb_mps, sinks=sinks) else -s.dt_s
+            self._moving_s = max(self._moving_s + moving_s, 0.0)
             self.touches = self._moving_s <= _FLIES_S
         return still_s
+
+    def _moves(self, s: MissionInputs, climb_mps: float, *, sinks: bool) -> bool:
+        """Whether what was taken to touch shows that it flies, or is well above the floor and kept there."""
+        if math.isfinite(climb_mps):
+            self._climbed_m += (climb_mps - self._climbed_m / _MOVES_S) * s.dt_s
+        by_height = abs(s.height_m - self._touched_m) > _MOVES_M
+        by_climb = abs(climb_mps) > _MOVES_MPS or abs(self._climbed_m) > _MOVES_M
+        return by_height or by_climb or (not sinks and s.height_m > _FLOOR_M)
 
     def _defies(self, s: MissionInputs, *, sinks: bool) -> bool:
         """It does not follow the lean that is commanded."""
@@ -96,10 +107,10 @@ class Standstill:
             return False
         told = v.attitude
         off_rad = max(abs(wanted.roll_rad - told.roll_rad), abs(wanted.pitch_rad - told.pitch_rad))
-        if before is None or off_rad < _DEFIES_RAD or _turned_rad(before[1], told) > _DEFIES_STILL_RAD:
-            self._held = s.now_ns, told
+        if before is None or off_rad < _DEFIES_RAD or _turned_rad(before, told) > _DEFIES_STILL_RAD:
+            self._held = told
             return False
-        return (s.now_ns - before[0]) * 1e-9 > _DEFIES_S
+        return (told.stamp_ns - before.stamp_ns) * 1e-9 > _DEFIES_S  # a sample that is repeated tells nothing
 
     def _stood_s(self, s: MissionInputs, *, sinks: bool) -> float:
         v = s.vehicle

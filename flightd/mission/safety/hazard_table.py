@@ -102,9 +102,9 @@ HAZARDS: tuple[Hazard, ...] = (
         None,
         "the autopilot hears neither heartbeats nor setpoints of this computer",
         Action.LAND,
-        "level after half a second, then the autopilot lands by itself (ArduPilot: `FS_GCS_ENABLE`,"
-        " `FS_GCS_TIMEOUT`, `SYSID_MYGCS`; PX4: `COM_OF_LOSS_T`, `COM_OBL_RC_ACT`); without these nothing is"
-        " armed",
+        "level after 0.3 s (PX4: half a second), then the autopilot lands by itself (ArduPilot:"
+        " `FS_GCS_ENABLE`, `FS_GCS_TIMEOUT`, `SYSID_MYGCS`; PX4: `COM_OF_LOSS_T`, `COM_OBL_RC_ACT`); without"
+        " these nothing is armed",
         "tests/protocol/mavlink/test_companion_dead.py",
     ),
     Hazard(
@@ -345,7 +345,7 @@ HAZARDS: tuple[Hazard, ...] = (
         "half swings of the velocity about the reference's above 0.3 m/s: three, none smaller than four"
         " fifths of the one before, or two that grow: the position loop is too fast for what is late in it",
         Action.HOLD,
-        "slowed down to 60 %, then to 36 %, tried faster again once after 8 s; " + _HOLD,
+        "slowed down to 60 %, then to 36 %, tried faster again once after 8 s of calm; " + _HOLD,
         _FAST,
     ),
     Hazard(

@@ -40,6 +40,10 @@ class PlausibilityMonitor:
         self.push_mps2 = (0.0, 0.0)
         """The mean push of the last seconds in which lines were seen, map axes."""
 
+    def begin(self) -> None:
+        """Another flight: how its loop behaves is to be found out anew."""
+        self.oscillation = OscillationMonitor()
+
     def step(
         self,
         now_ns: int,

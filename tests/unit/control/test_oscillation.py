@@ -24,7 +24,7 @@ def swung(monitor: OscillationMonitor, off_mps: list[float], start_ns: int = 0) 
     return None
 
 
-def swing(period_s: float, growth_per_s: float, seconds: float, first_mps: float = 0.35) -> list[float]:
+def swing(period_s: float, growth_per_s: float, seconds: float, first_mps: float = 0.45) -> list[float]:
     ticks = range(round(seconds * 1e9 / TICK_NS))
     return [
         first_mps * math.exp(growth_per_s * (t := tick * TICK_NS * 1e-9)) * math.sin(math.tau * t / period_s)
@@ -98,3 +98,24 @@ def test_no_velocity_upsets_it(values: list[float]) -> None:
     for tick, value in enumerate(values):
         monitor.step(tick * TICK_NS, value, -value)
     assert 0.35 <= monitor.ease <= 1.0
+
+
+def test_leaps_of_the_estimate_are_no_swings() -> None:
+    monitor = OscillationMonitor()
+    for tick in range(500):
+        leap = {0: 0.5, 1: -0.7, 2: 0.6}.get(tick % 50, 0.0)
+        monitor.step(tick * TICK_NS, leap, 0.0)
+        assert not monitor.swings
+
+
+def test_it_swings_until_it_has_come_to_rest() -> None:
+    monitor = OscillationMonitor()
+    off = swing(1.6, 0.0, 12.0, 0.6)
+    shown = []
+    for tick, value in enumerate(off):
+        monitor.step(tick * TICK_NS, value, 0.0)
+        shown.append(monitor.swings)
+    assert all(shown[shown.index(True) :])
+    for tick in range(600, 700):
+        monitor.step(tick * TICK_NS, 0.1, 0.0)
+    assert not monitor.swings

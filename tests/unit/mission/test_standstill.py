@@ -80,3 +80,35 @@ def test_what_follows_its_lean_late_flies() -> None:
         )
         stands.step(told(tick, math.nan, 0.22, roll, wanted), sinks=True)
         assert not stands.touches
+
+
+def test_one_that_stops_to_aim_over_its_pad_is_not_taken_to_stand() -> None:
+    """Its climb begins late once it sinks again, as a real height loop's does."""
+    stands = Standstill(PARAMS)
+    for tick in range(100):
+        stands.step(told(tick, 1.6 - 0.007 * tick, -0.35), sinks=True)
+    for tick in range(100, 150):
+        stands.step(told(tick, 0.85, 0.0), sinks=False)
+    for tick in range(150, 175):
+        stands.step(told(tick, 0.85, -0.05), sinks=True)
+        assert not stands.touches
+
+
+def test_one_that_was_wrongly_taken_to_touch_is_steered_again_when_it_is_kept_up() -> None:
+    stands = Standstill(PARAMS)
+    for tick in range(40):
+        stands.step(told(tick, 0.85, -0.05, 0.0, 0.07), sinks=True)
+    assert stands.touches
+    for tick in range(40, 70):
+        stands.step(told(tick, 0.85, 0.0), sinks=False)
+    assert not stands.touches
+
+
+def test_one_that_sinks_slowly_without_a_height_flies() -> None:
+    stands = Standstill(PARAMS)
+    for tick in range(30):
+        stands.step(told(tick, math.nan, -0.05, 0.0, 0.07), sinks=True)
+    assert stands.touches
+    for tick in range(30, 130):
+        stands.step(told(tick, math.nan, -0.2), sinks=True)
+    assert not stands.touches

@@ -72,7 +72,7 @@ VEHICLE = VehicleState(
     9,
     RecordedRefusal("no"),
 )
-SENSORS = SensorEstimate(0.01, 0.002, 0.02, -0.01, 0.005, 0.001, 0.0, 0.01, 0.0, 0.005, 0.003)
+SENSORS = SensorEstimate(0.01, 0.002, 0.02, -0.01, 0.005, 0.001, 0.0, 0.01, 0.0, 0.005, 0.003, 0.02, 0.004)
 STATUS = Status(
     12, Phase.FOLLOW, "", "A1", "A2", 1, 6, 0.8, 1.5, 300, 2, 29.9, {"total": 71.0}, None, SENSORS, 1.5, -0.2
 )

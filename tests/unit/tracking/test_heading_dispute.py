@@ -15,14 +15,14 @@ ERROR_RAD = math.radians(20.0)
 
 def fly(told_yaw, lines_error, seconds: float = 3.0) -> tuple[Turned | None, float]:  # type: ignore[no-untyped-def]
     """What was found and when, s: `told_yaw` and what the lines say against it, by time; agreement is less
-    than two degrees."""
+    than four degrees."""
     dispute = HeadingDispute()
     for frame in range(round(seconds * 1e9 / FRAME_NS)):
         stamp_ns = frame * FRAME_NS
         at_s = stamp_ns * 1e-9
         dispute.told(Attitude(stamp_ns, 0.0, 0.0, told_yaw(at_s)))
         error = lines_error(at_s)
-        found = dispute.step([error], abs(error) < math.radians(2.0), stamp_ns)
+        found = dispute.step([error], abs(error) < math.radians(4.0), stamp_ns)
         if found is not None:
             return found, at_s
     return None, math.inf
