@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol, TypeAlias, TypeVar
 
 import msgspec
@@ -13,6 +13,7 @@ from starlette.routing import BaseRoute, Route
 
 from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
 from flightd.core.inventory import Observation, Standing
+from flightd.ground.bounded import Threads
 from flightd.ground.evidence_outlines import outlines
 from flightd.ground.pages import page
 from flightd.ground.stores import StockView, Stores
@@ -24,7 +25,7 @@ from flightd.inventory.place_view import view_of_told
 
 T = TypeVar("T")
 _MOST_WORDS = 200
-_AT_ONCE = 2
+_AT_ONCE, _MOST_WAITING = 2, 32
 """So many questions are read from the disk at a time: the way to the drones comes first."""
 _KINDS = {
     "csv": "text/csv; charset=utf-8",
@@ -86,12 +87,11 @@ class StockAnswers:
     def __init__(self, stores: Stores, drones: Mapping[str, CountingDrone]) -> None:
         self._stores = stores
         self._drones = drones
-        self._reading = asyncio.Semaphore(_AT_ONCE)
+        self._reading = Threads(_AT_ONCE, _MOST_WAITING, "too many questions about the stock wait already")
 
     async def off_loop(self, work: Callable[..., T], *arguments: Any) -> T:
-        """The work's result, done in a thread."""
-        async with self._reading:
-            return await asyncio.to_thread(work, *arguments)
+        """The work's result, done in a thread.  UnavailableError where too much waits."""
+        return await self._reading.run(work, *arguments)
 
     async def stores(self, _request: Request) -> Response:
         """The inventories that can be shown: stores, and what the drones tell themselves."""
@@ -103,6 +103,10 @@ class StockAnswers:
                 "drones": list(self._drones),
             }
         )
+
+    async def store_folder(self, request: Request) -> Path:
+        """Where the store lies that a request is about: `?store=NAME`."""
+        return await self.off_loop(self._stores.folder, request.query_params.get("store", ""))
 
     async def store_view(self, request: Request) -> StockView:
         """The store that a request is about: `?store=NAME`."""

@@ -62,7 +62,7 @@ class Stores:
 
     def view(self, name: str) -> StockView:
         """A store as it is now.  InputError where there is none of the name, as `SqliteStore` raises."""
-        folder = self._folder(name)
+        folder = self.folder(name)
         stamp = _text(_stamp(folder))
         known = self._views.get(name)
         if known is not None and known.stamp == stamp:
@@ -78,7 +78,7 @@ class Stores:
 
     def looks(self, name: str, code: str) -> Sequence[tuple[Observation, Standing]]:
         """Every look at a place, oldest first.  InputError for one that the store does not know."""
-        with SqliteStore(self._folder(name), read_only=True) as store:
+        with SqliteStore(self.folder(name), read_only=True) as store:
             looks = store.looks(code)
             if not looks and all(record.code != code for record in store.locations()):
                 raise InputError(f"there is no place {code!r}")
@@ -88,7 +88,7 @@ class Stores:
         """The JPEG that a look kept as evidence.  InputError where there is none."""
         if len(picture) != 64 or not set(picture) <= set("0123456789abcdef"):
             raise InputError("not the name of a picture")
-        file = self._folder(name) / "evidence" / picture[:2] / f"{picture}.jpg"
+        file = self.folder(name) / "evidence" / picture[:2] / f"{picture}.jpg"
         try:
             if file.is_file() and file.stat().st_size <= MOST_BYTES:
                 return file.read_bytes()
@@ -96,7 +96,8 @@ class Stores:
             pass
         raise InputError("this picture was not kept")
 
-    def _folder(self, name: str) -> Path:
+    def folder(self, name: str) -> Path:
+        """Where a store lies.  InputError where there is none of the name."""
         known = self._known.get(name)
         if known is not None and (known / _FILE).is_file():
             return known

@@ -15,7 +15,7 @@ import pytest
 
 from flightd.core.errors import InputError, TransientError, UnavailableError
 from flightd.ground.flights.flight_index import FlightIndex
-from flightd.ground.flights.reading_process import MOST_WAITING, ReadingProcess
+from flightd.ground.reading_process import MOST_WAITING, ReadingProcess
 from tests.replay.synthetic_flight import write_flight
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.waiting import until

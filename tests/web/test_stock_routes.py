@@ -6,6 +6,7 @@ import asyncio
 import json
 import os
 import shutil
+import threading
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -15,7 +16,10 @@ import pytest
 from flightd.adapters.ground_link.client import Address
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationState, PlannedLocation
+from flightd.ground import uploaded_comparison
+from flightd.ground.bounded import Threads
 from flightd.inventory.stock_table import MOST_BYTES
 from flightd.runtime.clock import LoopClock
 from tests.rigs.event_loops import in_real_time
@@ -202,6 +206,50 @@ async def test_an_endless_upload_is_cut_off(folder: Path) -> None:
         chunk = b"%x\r\n%b\r\n" % (1_000_000, b"x" * 1_000_000)
         answer = await station.say(head.encode() + chunk * 9)
         assert answer.startswith(b"HTTP/1.1 400"), answer[:200]
+
+
+@in_real_time
+async def test_more_comparisons_than_may_wait_are_refused_in_one_line(folder: Path) -> None:
+    async with served(NOBODY, folder=folder) as station:
+        host = f"{station.where.host}:{station.where.port}"
+        head = (
+            f"POST /api/stock/compare?store=monday HTTP/1.1\r\nHost: {host}\r\nOrigin: {station.origin}\r\n"
+            f"Content-Type: {UPLOAD['Content-Type']}\r\nContent-Length: 9\r\nConnection: close\r\n\r\n"
+        )
+        slow = [asyncio.ensure_future(station.say(head.encode() + b"pla", 4.0)) for _ in range(4)]
+        await asyncio.sleep(1.0)
+        code, told = await posted(station, "/compare?store=monday", BOOKS)
+        assert (code, told["refused"]) == (503, "too many comparisons wait already; try again in a moment")
+        await asyncio.gather(*slow)
+        async with asyncio.timeout(20):
+            while (await posted(station, "/compare?store=monday", BOOKS))[0] != 200:  # noqa: ASYNC110
+                await asyncio.sleep(0.1)
+
+
+@in_real_time
+async def test_an_upload_is_read_in_another_process_than_the_station(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def here(*_: object) -> None:
+        raise AssertionError("an upload is read in the station's own process")
+
+    monkeypatch.setattr(uploaded_comparison, "read_table", here)
+    async with served(NOBODY, folder=folder) as station:
+        many = b"place,code\n" + b"".join(b"AL-%06d,%030d\n" % (n, n) for n in range(90_000))
+        code, told = await posted(station, "/compare?store=monday", many)
+        assert (code, told["rows"]) == (200, 90_000)
+
+
+@in_real_time
+async def test_more_work_than_may_wait_is_refused() -> None:
+    threads, gate = Threads(1, 2, "too much waits"), threading.Event()
+    held = [asyncio.ensure_future(threads.run(gate.wait, 20.0)) for _ in range(2)]
+    await asyncio.sleep(0)
+    with pytest.raises(UnavailableError, match="too much waits"):
+        await threads.run(abs, -1)
+    gate.set()
+    await asyncio.gather(*held)
+    assert await threads.run(abs, -1) == 1
 
 
 @in_real_time

@@ -8,13 +8,15 @@ from pathlib import Path
 import msgspec
 
 from flightd.core.errors import InputError
+from flightd.ground.bounded import Threads
 from flightd.ground.flights.flight_index import FlightIndex
 from flightd.ground.flights.flight_view import FlightView, read_framed_picture, read_report, read_view
 from flightd.ground.flights.log_folder import FoundLog
-from flightd.ground.flights.reading_process import ReadingProcess
 from flightd.ground.flights.sized_cache import SizedCache
+from flightd.ground.reading_process import ReadingProcess
 
 _WITHIN_S = 180.0
+_PLOTS_AT_ONCE, _MOST_PLOTS = 2, 32
 _VIEWS_BYTES = 96 << 20
 _REPORTS_BYTES = 48 << 20
 
@@ -29,6 +31,7 @@ class Flights:
         self.root = root
         self._listing, self._playing = ReadingProcess(), ReadingProcess()
         self.index = FlightIndex(root, self._listing) if root is not None else None
+        self._plotting = Threads(_PLOTS_AT_ONCE, _MOST_PLOTS, "too many plots wait already")
         self._viewing = asyncio.Lock()
         self._views: SizedCache[_Key, FlightView] = SizedCache(_VIEWS_BYTES)
         self._reports: SizedCache[_Key, bytes] = SizedCache(_REPORTS_BYTES)
@@ -52,7 +55,7 @@ class Flights:
     async def series(self, log_id: str, from_s: float, to_s: float, stretches: int) -> bytes:
         """Its curves between two times (`FlightView.series`)."""
         _, view = await self._view(log_id)
-        return await asyncio.to_thread(view.series, from_s, to_s, stretches)
+        return await self._plotting.run(view.series, from_s, to_s, stretches)
 
     async def picture(self, log_id: str, place: int) -> bytes:
         """Its picture of that place in the flight, as the page takes it."""
