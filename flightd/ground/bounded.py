@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
-from flightd.core.errors import UnavailableError
+from flightd.core.errors import FlightdError, UnavailableError
 
 T = TypeVar("T")
 
@@ -44,3 +44,28 @@ class Threads:
         with self._room.taken():
             async with self._turn:
                 return await asyncio.to_thread(work, *arguments)
+
+
+class Shared(Generic[T]):
+    """One question at a time: whoever asks while it is on its way has its answer, or its error, too."""
+
+    def __init__(self, ask: Callable[[], Awaitable[T]]) -> None:
+        self._ask = ask
+        self._turn = asyncio.Lock()
+        self._answers = 0
+        self._newest: tuple[T] | FlightdError | None = None
+
+    async def answer(self) -> T:
+        """What is answered next.  Raises as the question does."""
+        before = self._answers
+        async with self._turn:
+            if self._newest is None or self._answers == before:
+                try:
+                    self._newest = (await self._ask(),)
+                except FlightdError as err:
+                    self._newest = err
+                self._answers += 1
+            newest = self._newest
+        if isinstance(newest, FlightdError):
+            raise newest
+        return newest[0]

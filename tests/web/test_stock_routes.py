@@ -19,7 +19,7 @@ from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationState, PlannedLocation
 from flightd.ground import uploaded_comparison
-from flightd.ground.bounded import Threads
+from flightd.ground.bounded import Shared, Threads
 from flightd.inventory.stock_table import MOST_BYTES
 from flightd.runtime.clock import LoopClock
 from tests.rigs.event_loops import in_real_time
@@ -238,6 +238,50 @@ async def test_an_upload_is_read_in_another_process_than_the_station(
         many = b"place,code\n" + b"".join(b"AL-%06d,%030d\n" % (n, n) for n in range(90_000))
         code, told = await posted(station, "/compare?store=monday", many)
         assert (code, told["rows"]) == (200, 90_000)
+
+
+@in_real_time
+async def test_a_drone_is_asked_once_for_all_that_want_its_inventory_now() -> None:
+    asked: list[int] = []
+
+    def told() -> tuple[dict[str, str], ...]:
+        asked.append(1)
+        return ({"location": "AL-01-1-1", "state": "empty"},)
+
+    with ZmqGround(local(), SITE, LoopClock(), inventory=told) as link:
+        async with asyncio.TaskGroup() as tasks:
+            running = tasks.create_task(link.run())
+            async with served(("demo", address_of(link))) as station:
+                await until(lambda: link.requests > 2)
+                drone = [asyncio.ensure_future(got(station, "/places?drone=demo")) for _ in range(12)]
+                assert {(await answer)[0] for answer in drone} == {200}
+                assert 1 <= len(asked) < 12
+            running.cancel()
+
+
+@in_real_time
+async def test_an_answer_is_shared_and_so_is_an_error() -> None:
+    calls, gate = 0, asyncio.Event()
+
+    async def ask() -> int:
+        nonlocal calls
+        calls += 1
+        call = calls
+        await gate.wait()
+        if call == 2:
+            raise UnavailableError("silent")
+        return call
+
+    shared = Shared(ask)
+    asking = [asyncio.ensure_future(shared.answer()) for _ in range(5)]
+    await asyncio.sleep(0)
+    asking[0].cancel()
+    await asyncio.sleep(0)
+    gate.set()
+    told = await asyncio.gather(*asking, return_exceptions=True)
+    assert isinstance(told[0], asyncio.CancelledError)
+    assert {str(error) for error in told[1:]} == {"silent"}
+    assert (await shared.answer(), calls) == (3, 3)
 
 
 @in_real_time

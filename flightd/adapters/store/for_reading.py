@@ -28,7 +28,8 @@ def opened_for_reading(folder: Path, *, untouched: bool = False) -> Iterator[Sql
     """The store in `folder`, to look at; nothing that is written to it need stay.
 
     `untouched`: through a copy wherever it lies, so that nothing in the folder changes, its writer's log
-    neither, while a flight counts into it or after one was cut off.  Raises what `SqliteStore` raises, and UnavailableError for one that changes too fast to be copied."""
+    neither, while a flight counts into it or after one was cut off.  Raises what `SqliteStore` raises, and
+    UnavailableError for one that changes too fast to be copied."""
     if not (folder / _DATABASE).exists() or (not untouched and _is_writable(folder)):
         with SqliteStore(folder, create=False) as store:
             yield store

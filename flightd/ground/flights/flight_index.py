@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -14,6 +15,7 @@ from flightd.core.errors import FlightdError, TransientError
 from flightd.ground.flights.flight_row import FlightRow, read_rows, unreadable
 from flightd.ground.flights.log_folder import FoundLog, FoundLogs, find_logs
 
+_LOG = logging.getLogger(__name__)
 _FRESH_S = 3.0
 """The folder is looked through again at most this often."""
 _AT_ONCE = 12
@@ -52,13 +54,16 @@ class FlightIndex:
         while True:
             await self._asked.wait()
             self._asked.clear()
+            trouble = ""
             try:
                 await self._look()
-                self._trouble = ""
             except FlightdError as err:
-                self._trouble = str(err)
+                trouble = str(err)
+            except Exception as err:  # the drones are flown on, whatever a folder does
+                _LOG.exception("the list of flights failed")
+                trouble = f"the list of flights failed: {type(err).__name__}: {err}"
             self._looked, self._looked_s = True, asyncio.get_running_loop().time()
-            await self._tell()
+            await self._tell(trouble)
             await asyncio.sleep(_FRESH_S)
 
     def listing(self, known: int = -1) -> bytes:
@@ -69,18 +74,7 @@ class FlightIndex:
         if known == self._version:
             return msgspec.json.encode({"version": self._version, "unread": self._unread, "rows": None})
         if self._told[0] != self._version:
-            rows = [self._rows[log_id][1] for log_id in self._found if log_id in self._rows]
-            document = {
-                "version": self._version,
-                "looked": self._looked,
-                "unread": self._unread,
-                "cut": self._cut,
-                "trouble": self._trouble,
-                "rows": rows,
-            }
-            self._told = (self._version, msgspec.json.encode(document))
-        return self._told[1]
-
+XX
     async def log(self, log_id: str) -> FoundLog | None:
         """The log of that id; None where there is none.  Looks through the folder where it does not know
         it, and again soon where it does."""
@@ -131,7 +125,15 @@ class FlightIndex:
         known = self._rows.get(log.id)
         return known is None or known[0] != log.stamp or known[1].running
 
-    async def _tell(self) -> None:
-        self._version += 1
+    async def _tell(self, trouble: str | None = None) -> None:
+        """Another version where there is something new to tell; wake who waits for a log in any case."""
+        if trouble is not None:
+            self._trouble = trouble
+        rows = tuple(self._rows[log_id][1] for log_id in self._found if log_id in self._rows)
+        told = (rows, self._cut, self._trouble, self._looked)
+        if told != self._newest:
+            self._newest = told
+            self._version += 1
+        self._looks += 1
         async with self._changed:
             self._changed.notify_all()
