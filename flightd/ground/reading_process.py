@@ -39,6 +39,10 @@ class _Failed:
     error: FlightdError
 
 
+class NotStartedError(TransientError):
+    """There was no process to read anything."""
+
+
 class ReadingProcess:
     """One process, started when it is first needed and again after its death; one job at a time."""
 
@@ -74,7 +78,10 @@ class ReadingProcess:
                 child = await self._started()
         except TimeoutError:
             self.close()
-            raise TransientError("the reading process does not start") from None
+            raise NotStartedError("the reading process does not start") from None
+        except OSError as err:  # no more file descriptors, say
+            self._child = None
+            raise NotStartedError(f"the reading process does not start: {err.strerror or err}") from None
         try:
             async with asyncio.timeout(within_s):
                 return await child.ask(job)

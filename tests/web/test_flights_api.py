@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import json
 import os
 import shutil
+import socket
 import threading
 import time
 from pathlib import Path
@@ -14,6 +16,7 @@ from typing import Any
 import pytest
 
 from flightd.core.errors import InputError, TransientError, UnavailableError
+from flightd.ground.flights import flight_index
 from flightd.ground.flights.flight_index import FlightIndex
 from flightd.ground.reading_process import MOST_WAITING, ReadingProcess
 from tests.replay.synthetic_flight import write_flight
@@ -298,6 +301,81 @@ async def test_a_log_that_kills_its_reader_costs_no_other_log_its_row(folder: Pa
     assert rows["alone/flight.mcap"]["trouble"] == "the process that reads logs failed"
     assert rows["judged/flight.mcap"]["outcome"] == "completed"
     assert reader.deaths == 2, "with the others, and alone"
+
+
+class _OddReader:
+    """Fails as a system without file descriptors does, then reads here."""
+
+    def __init__(self) -> None:
+        self.failures = 1
+
+    async def run(self, function: Any, within_s: float, *args: Any) -> Any:
+        if self.failures:
+            self.failures -= 1
+            raise OSError(errno.EMFILE, "Too many open files")
+        return function(*args)
+
+
+@in_real_time
+async def test_an_error_that_nobody_thought_of_ends_no_list(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(flight_index, "_FRESH_S", 0.05)
+    index = FlightIndex(folder, _OddReader())
+    running = asyncio.ensure_future(index.run())
+    try:
+        await until(lambda: json.loads(index.listing())["looked"] or running.done())
+        told = json.loads(index.listing())
+        assert "Too many open files" in told["trouble"]
+        assert "the list of flights failed" in caplog.text
+        await until(lambda: len(json.loads(index.listing())["rows"]) == 3)
+        assert json.loads(index.listing())["trouble"] == ""
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+
+
+@in_real_time
+async def test_the_list_has_another_version_only_for_what_is_new(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(flight_index, "_FRESH_S", 0.02)
+    shutil.copy(folder / "alone" / "flight.mcap", tmp_path / "a.mcap")
+    reader = _OddReader()
+    reader.failures = 0
+    index = FlightIndex(tmp_path, reader)
+    running = asyncio.ensure_future(index.run())
+    try:
+        await until(lambda: json.loads(index.listing())["looked"])
+        version = json.loads(index.listing())["version"]
+        for _ in range(3):
+            assert await index.log("nowhere") is None
+            await asyncio.sleep(0.05)
+        assert json.loads(index.listing(version)) == {"version": version, "unread": 0, "rows": None}
+        shutil.copy(folder / "alone" / "flight.mcap", tmp_path / "b.mcap")
+        await until(lambda: len(json.loads(index.listing())["rows"]) == 2)
+        assert json.loads(index.listing())["version"] > version
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+
+
+@in_real_time
+async def test_a_process_that_cannot_be_started_is_told_and_started_later(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def none_left() -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    reading = ReadingProcess()
+    try:
+        with monkeypatch.context() as patched:
+            patched.setattr(socket, "socketpair", none_left)
+            with pytest.raises(TransientError, match="does not start: Too many open files"):
+                await reading.run(abs, 60.0, -1)
+        assert await reading.run(abs, 60.0, -2) == 2
+    finally:
+        reading.close()
 
 
 @in_real_time

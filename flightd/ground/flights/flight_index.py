@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -14,6 +15,7 @@ import msgspec
 from flightd.core.errors import FlightdError, TransientError
 from flightd.ground.flights.flight_row import FlightRow, read_rows, unreadable
 from flightd.ground.flights.log_folder import FoundLog, FoundLogs, find_logs
+from flightd.ground.reading_process import NotStartedError
 
 _LOG = logging.getLogger(__name__)
 _FRESH_S = 3.0
@@ -31,6 +33,16 @@ class Reader(Protocol):
     async def run(self, function: Callable[..., T], within_s: float, *args: Any) -> T: ...
 
 
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """What a version of the list says."""
+
+    rows: tuple[FlightRow, ...] = ()
+    cut: bool = False
+    trouble: str = ""
+    looked: bool = False
+
+
 class FlightIndex:
     """`run` keeps it going; `listing` is what is known now, as JSON."""
 
@@ -44,8 +56,10 @@ class FlightIndex:
         self._unread = 0
         self._looked = False
         self._looked_s = 0.0
+        self._looks = 0
         self._version = 0
-        self._told: tuple[int, bytes] = (-1, b"")
+        self._newest = _Told()
+        self._told: tuple[int, msgspec.Raw] = (-1, msgspec.Raw())
         self._asked = asyncio.Event()
         self._changed = asyncio.Condition()
 
@@ -54,16 +68,17 @@ class FlightIndex:
         while True:
             await self._asked.wait()
             self._asked.clear()
-            trouble = ""
             try:
                 await self._look()
+                self._trouble = ""
             except FlightdError as err:
-                trouble = str(err)
-            except Exception as err:  # the drones are flown on, whatever a folder does
+                self._trouble = str(err)
+            except Exception as err:  # noqa: BLE001 - its end would be the station's
                 _LOG.exception("the list of flights failed")
-                trouble = f"the list of flights failed: {type(err).__name__}: {err}"
+                self._trouble = f"the list of flights failed: {type(err).__name__}: {err}"
+            self._looks += 1
             self._looked, self._looked_s = True, asyncio.get_running_loop().time()
-            await self._tell(trouble)
+            await self._tell()
             await asyncio.sleep(_FRESH_S)
 
     def listing(self, known: int = -1) -> bytes:
@@ -74,18 +89,27 @@ class FlightIndex:
         if known == self._version:
             return msgspec.json.encode({"version": self._version, "unread": self._unread, "rows": None})
         if self._told[0] != self._version:
-XX
+            self._told = (self._version, msgspec.Raw(msgspec.json.encode(self._newest.rows)))
+        return msgspec.json.encode(
+            {
+                "version": self._version,
+                "looked": self._newest.looked,
+                "unread": self._unread,
+                "cut": self._newest.cut,
+                "trouble": self._newest.trouble,
+                "rows": self._told[1],
+            }
+        )
+
     async def log(self, log_id: str) -> FoundLog | None:
         """The log of that id; None where there is none.  Looks through the folder where it does not know
         it, and again soon where it does."""
         self._asked.set()
         if log_id not in self._found and not self._is_fresh():
-            version = self._version
+            looks = self._looks
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(_WITHIN_S), self._changed:
-                    await self._changed.wait_for(
-                        lambda: log_id in self._found or (self._looked and self._version > version)
-                    )
+                    await self._changed.wait_for(lambda: log_id in self._found or self._looks > looks)
         return self._found.get(log_id)
 
     def row(self, log_id: str) -> FlightRow | None:
@@ -96,6 +120,7 @@ XX
         found: FoundLogs = await self._reader.run(find_logs, _WITHIN_S, self._root)
         self._found = {log.id: log for log in found.logs}
         self._cut = found.cut
+        self._looks += 1
         self._rows = {key: row for key, row in self._rows.items() if key in self._found}
         unread = [log for log in found.logs if self._is_unread(log)]
         self._unread = len(unread)
@@ -116,6 +141,8 @@ XX
         reader its life costs no other its row."""
         try:
             return await self._reader.run(read_rows, _WITHIN_S, self._root, logs)
+        except NotStartedError:
+            raise  # no log's fault
         except TransientError as err:
             if len(logs) == 1:
                 return (unreadable(logs[0], err.what),)
@@ -125,15 +152,12 @@ XX
         known = self._rows.get(log.id)
         return known is None or known[0] != log.stamp or known[1].running
 
-    async def _tell(self, trouble: str | None = None) -> None:
-        """Another version where there is something new to tell; wake who waits for a log in any case."""
-        if trouble is not None:
-            self._trouble = trouble
+    async def _tell(self) -> None:
+        """A version of its own for what is new; who waits for a log looks in any case."""
         rows = tuple(self._rows[log_id][1] for log_id in self._found if log_id in self._rows)
-        told = (rows, self._cut, self._trouble, self._looked)
-        if told != self._newest:
-            self._newest = told
+        newest = _Told(rows, self._cut, self._trouble, self._looked)
+        if newest != self._newest:
+            self._newest = newest
             self._version += 1
-        self._looks += 1
         async with self._changed:
             self._changed.notify_all()
