@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, TypeVar
@@ -16,6 +17,7 @@ from flightd.core.inventory import Observation, Standing
 from flightd.ground.bounded import Threads
 from flightd.ground.evidence_outlines import outlines
 from flightd.ground.pages import page
+from flightd.ground.shown_text import shown
 from flightd.ground.stores import StockView, Stores
 from flightd.inventory.code_search import found_places
 from flightd.inventory.elevation import fronts_of
@@ -23,6 +25,7 @@ from flightd.inventory.export.formats import FORMATS
 from flightd.inventory.export.json_document import observation_json
 from flightd.inventory.place_view import view_of_told
 
+_LOG = logging.getLogger(__name__)
 T = TypeVar("T")
 _MOST_WORDS = 200
 _AT_ONCE, _MOST_WAITING = 2, 32
@@ -68,13 +71,22 @@ def answered(answer: _Answer) -> _Answer:
         try:
             return await answer(request)
         except InputError as err:
-            return as_json({"refused": str(err)}, 404 if request.method == "GET" else 400)
+            return _refused(str(err), 404 if request.method == "GET" else 400)
         except (UnavailableError, TransientError) as err:
-            return as_json({"refused": str(err)}, 503)
+            return _refused(str(err), 503)
         except FlightdError as err:
-            return as_json({"refused": str(err).removeprefix("refused: ")}, 409)
+            return _refused(str(err).removeprefix("refused: "), 409)
+        except OSError as err:
+            return _refused(f"cannot be read: {err.strerror or err}", 503)
+        except (ArithmeticError, LookupError, TypeError, ValueError) as err:  # of a file that anybody wrote
+            _LOG.exception("%s cannot be answered", request.url.path)
+            return _refused(f"this inventory cannot be shown: {type(err).__name__}", 409)
 
     return guarded
+
+
+def _refused(why: str, status: int) -> Response:
+    return as_json({"refused": shown(why)}, status)
 
 
 def as_json(value: object, status: int = 200, headers: dict[str, str] | None = None) -> Response:

@@ -16,6 +16,7 @@ from flightd.core.errors import FlightdError, TransientError
 from flightd.ground.flights.flight_row import FlightRow, read_rows, unreadable
 from flightd.ground.flights.log_folder import FoundLog, FoundLogs, find_logs
 from flightd.ground.reading_process import NotStartedError
+from flightd.ground.shown_text import shown
 
 _LOG = logging.getLogger(__name__)
 _FRESH_S = 3.0
@@ -155,7 +156,7 @@ class FlightIndex:
     async def _tell(self) -> None:
         """A version of its own for what is new; who waits for a log looks in any case."""
         rows = tuple(self._rows[log_id][1] for log_id in self._found if log_id in self._rows)
-        newest = _Told(rows, self._cut, self._trouble, self._looked)
+        newest = _Told(rows, self._cut, shown(self._trouble), self._looked)
         if newest != self._newest:
             self._newest = newest
             self._version += 1
