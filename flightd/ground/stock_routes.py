@@ -185,6 +185,11 @@ class StockAnswers:
         return download(data, f"inventory{FORMATS[kind].suffix}", _KINDS[kind])
 
 
+def told_seconds(utc_ns: int) -> float | None:
+    """A look's time as the page is told it, None where there was none; it comes back the same."""
+    return utc_ns / 1e9 if utc_ns else None
+
+
 def download(data: bytes, name: str, kind: str) -> Response:
     """A file for the person to keep."""
     return Response(data, headers={"Content-Disposition": f'attachment; filename="{name}"'}, media_type=kind)
@@ -207,7 +212,7 @@ def _document(view: StockView) -> bytes:
             "texts": place.texts,
             "confidence": place.confidence,
             "pending": place.pending,
-            "seen_s": place.utc_ns / 1e9 if place.utc_ns else None,
+            "seen_s": told_seconds(place.utc_ns),
         }
         for place in view.places
     }

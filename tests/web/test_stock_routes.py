@@ -305,7 +305,10 @@ async def test_many_questions_at_once_leave_the_way_to_the_drones_free(folder: P
         assert {(await answer)[0] for answer in many} == {200}
 
 
-JSON_DECISION = {"id": "12345678", "place": "AL-02-2-1", "what": "looking", "who": " Ann ", "note": "=1+2"}
+JSON_DECISION = {
+    "id": "12345678", "place": "AL-02-2-1", "what": "looking", "who": " Ann ", "note": "=1+2",
+    "seen_s": 1_700_000_000.0,
+}  # fmt: skip
 
 
 @in_real_time
@@ -322,11 +325,35 @@ async def test_a_decision_is_noted_once_for_the_look_that_is_shown(folder: Path)
         assert (await got(station, "/decisions?store=none"))[1] == {"decisions": []}
 
 
+@in_real_time
+async def test_no_decision_closes_a_look_that_nobody_saw(folder: Path) -> None:
+    headers, way = {"Content-Type": "application/json"}, "/decisions?store=monday"
+
+    async def decided(station: Station, number: int, **said: object) -> tuple[int, Any]:
+        body = JSON_DECISION | {"id": f"decision-{number}", "what": "fine"} | said
+        return await posted(station, way, json.dumps(body).encode(), **headers)
+
+    async with served(NOBODY, folder=folder) as station:
+        shown = (await got(station, "/places?store=monday"))[1]["places"]["AL-02-2-1"]["seen_s"]
+        with SqliteStore(folder / "monday") as store:
+            store.commit(look("AL-02-2-1", LocationState.OCCLUDED, at_s=60))
+        for number, seen_s in enumerate((shown, None)):
+            code, told = await decided(station, number, seen_s=seen_s)
+            assert (code, told["refused"]) == (
+                409, "the place was looked at again meanwhile; decide about what is shown of it now"
+            )  # fmt: skip
+        assert not (folder / "ground.db").exists()
+        shown = (await got(station, "/places?store=monday"))[1]["places"]["AL-02-2-1"]["seen_s"]
+        code, noted = await decided(station, 2, seen_s=shown)
+        assert (code, noted["seen_s"]) == (200, shown)
+        assert (await decided(station, 3, place="BL-01-1-2", seen_s=None))[0] == 200, "nobody looked there"
+
+
 @pytest.mark.parametrize(
     "changed",
     [
         {"what": "burn"}, {"who": ""}, {"who": "  "}, {"who": "x" * 61}, {"note": "x" * 501}, {"id": "short"},
-        {"place": "nowhere"}, {"place": ""}, {"more": 1}, {"note": "x" * 5000},
+        {"place": "nowhere"}, {"place": ""}, {"more": 1}, {"note": "x" * 5000}, {"seen_s": "now"},
     ],
 )  # fmt: skip
 @in_real_time
