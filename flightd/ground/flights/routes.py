@@ -88,8 +88,13 @@ async def _picture(flights: Flights, request: Request) -> Response:
     place = _whole(request.path_params["place"])
     if place is None:
         raise InputError("the flight has no such picture")
-    content = await flights.picture(request.path_params["flight"], place)
-    return Response(content, media_type=_BINARY, headers={"Cache-Control": "private, max-age=600"})
+    stamp, known = request.query_params.get("stamp", ""), request.headers.get("if-none-match", "")
+    picture = await flights.picture(request.path_params["flight"], place, stamp, known)
+    keep = "private, max-age=600, immutable" if picture.stays else "private, no-cache"
+    headers = {"Cache-Control": keep, "ETag": picture.tag}
+    if not picture.content:
+        return Response(status_code=304, headers=headers)
+    return Response(picture.content, media_type=_BINARY, headers=headers)
 
 
 async def _report(flights: Flights, request: Request) -> Response:
