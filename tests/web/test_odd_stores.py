@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import shutil
 import sqlite3
@@ -11,9 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from starlette.requests import Request
+from starlette.responses import Response
 
-from flightd.core.errors import InputError
+from flightd.core.errors import InputError, RunError
 from flightd.ground.evidence_outlines import outlines
+from flightd.ground.stock_routes import answered
 from flightd.ground.stores import Stores
 from flightd.site.site_file import load_site
 from flightd.vision.shelf.evidence_jpeg import evidence_jpeg, jpeg_size, picture_name
@@ -93,6 +97,26 @@ async def test_a_decision_that_nobody_knows_is_told_in_one_line(folder: Path) ->
         book.close()
         code, told = await got(station, "/decisions?store=monday")
         assert (code, "'burn' is not a valid Decided" in told["refused"]) == (404, True)
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "said"),
+    [
+        (PermissionError(13, "Permission denied", "/x"), 503, "cannot be read: Permission denied"),
+        (ValueError("of a row\nthat is none"), 409, "this inventory cannot be shown: ValueError"),
+        (RunError(os.fsdecode(b"caf\xe9")), 409, r"caf\udce9"),
+    ],
+)
+@in_real_time
+async def test_what_nobody_thought_of_is_an_answer_in_one_line(
+    error: Exception, status: int, said: str
+) -> None:
+    async def fails(_: Request) -> Response:
+        raise error
+
+    request = Request({"type": "http", "method": "GET", "path": "/", "headers": [], "server": ("x", 1)})
+    answer = await answered(fails)(request)
+    assert (answer.status_code, json.loads(bytes(answer.body))) == (status, {"refused": said})
 
 
 def test_neither_links_nor_pipes_are_opened(folder: Path) -> None:
