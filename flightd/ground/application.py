@@ -26,6 +26,7 @@ from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES, read_act, read_page_message
 from flightd.ground.pages import STATIC, first_page
+from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.stock_page import stock_page
 
 _NOT_OURS = 1008
@@ -34,14 +35,16 @@ _FULL = 1013
 """WebSocket: try again later."""
 
 
-def application(hub: Hub, hosts: Iterable[str], folder: Path | None, flights: Flights) -> ASGIApp:
+def application(
+    hub: Hub, hosts: Iterable[str], folder: Path | None, flights: Flights, uploads: ReadingProcess
+) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked, inventories and `flights`
-    lie under `folder`."""
+    lie under `folder`, `uploads` reads what people send."""
     routes = [
         first_page(),
         WebSocketRoute("/live", partial(_live, hub)),
         Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
-        *stock_page(folder, hub.drones),
+        *stock_page(folder, hub.drones, uploads),
         *flight_routes(flights),
         *guide_routes(),
         Mount("/static", StaticFiles(directory=STATIC)),

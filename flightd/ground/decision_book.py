@@ -20,7 +20,7 @@ FILE = "ground.db"
 _APPLICATION, _VERSION = 0x666C7467, 1
 """`fltg`: SQLite's application id, so that another program's file is told apart."""
 _MOST_ROWS = 500_000
-_SCHEMA = """
+SCHEMA = """
 CREATE TABLE decision (
     id TEXT PRIMARY KEY,
     store TEXT NOT NULL,
@@ -74,7 +74,7 @@ class DecisionBook:
 
     def add(self, store: str, decision: Decision) -> None:
         """Note a decision about a place of a store; the same one again changes nothing."""
-        with self._opened() as book, book:
+        with self._opened() as book, _transaction(book):
             if book.execute("SELECT count(*) FROM decision").fetchone()[0] >= _MOST_ROWS:
                 raise UnavailableError(f"{self._file} is full", remedy="put it aside; a new one is made")
             row = (
@@ -93,13 +93,13 @@ class DecisionBook:
                 "ORDER BY utc_ns, rowid",
                 (store,),
             ).fetchall()
-        return [Decision(row[0], row[1], row[2], row[3], Decided(row[4]), *row[5:]) for row in rows]
+            return [Decision(row[0], row[1], row[2], row[3], Decided(row[4]), *row[5:]) for row in rows]
 
     @contextmanager
     def _opened(self) -> Iterator[sqlite3.Connection]:
         with self._lock:
             try:
-                with closing(sqlite3.connect(self._file, timeout=2.0)) as book:
+                with closing(sqlite3.connect(self._file, timeout=2.0, isolation_level=None)) as book:
                     self._prepare(book)
                     yield book
             except sqlite3.OperationalError as err:
@@ -110,17 +110,35 @@ class DecisionBook:
                 raise InputError(f"{self._file}: not the decisions of a ground station: {err}") from err
 
     def _prepare(self, book: sqlite3.Connection) -> None:
+        """Make the tables, all or nothing: a power cut, or another station, may come in between."""
+        if self._is_empty(book):
+            with _transaction(book):
+                if self._is_empty(book):
+                    for statement in SCHEMA.split(";\n"):
+                        book.execute(statement)
+                    book.execute(f"PRAGMA application_id = {_APPLICATION}")
+                    book.execute(f"PRAGMA user_version = {_VERSION}")
+
+    def _is_empty(self, book: sqlite3.Connection) -> bool:
+        """InputError for what is not ours."""
         application, version, tables = (
             book.execute(question).fetchone()[0]
             for question in (
                 "PRAGMA application_id", "PRAGMA user_version", "SELECT count(*) FROM sqlite_schema"
             )
         )  # fmt: skip
-        if not tables:
-            with book:
-                for statement in _SCHEMA.split(";\n"):
-                    book.execute(statement)
-                book.execute(f"PRAGMA application_id = {_APPLICATION}")
-                book.execute(f"PRAGMA user_version = {_VERSION}")
-        elif (application, version) != (_APPLICATION, _VERSION):
+        if tables and (application, version) != (_APPLICATION, _VERSION):
             raise InputError(f"{self._file}: not the decisions of a ground station, or of another version")
+        return not tables
+
+
+@contextmanager
+def _transaction(book: sqlite3.Connection) -> Iterator[None]:
+    book.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        book.execute("COMMIT")
+    except BaseException:
+        if book.in_transaction:
+            book.execute("ROLLBACK")
+        raise

@@ -14,19 +14,21 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from flightd.adapters.ground_link.protocol import DECODE_ERRORS
-from flightd.core.errors import InputError
+from flightd.core.errors import InputError, RunError
 from flightd.ground.decision_book import Decided, Decision, DecisionBook
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
-from flightd.ground.stock_routes import StockAnswers, answered, as_json
+from flightd.ground.stock_routes import StockAnswers, answered, as_json, told_seconds
 
 
 class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A decision as the page sends it; sent again with the same `id` it is noted once."""
+    """A decision as the page sends it; sent again with the same `id` it is noted once.  `seen_s` is the time
+    of the look that the page shows, as it was told (UTC; None: there was none)."""
 
     id: Annotated[str, Meta(min_length=8, max_length=64)]
     place: Annotated[str, Meta(min_length=1, max_length=200)]
     what: Decided
     who: Annotated[str, Meta(min_length=1, max_length=60)]
+    seen_s: float | None
     note: Annotated[str, Meta(max_length=500)] = ""
 
 
@@ -51,6 +53,10 @@ def decision_routes(asked: StockAnswers, folder: Path | None) -> list[BaseRoute]
         place = next((place for place in view.places if place.code == said.place), None)
         if place is None:
             raise InputError(f"there is no place {said.place!r}")
+        if (told_seconds(place.utc_ns) or 0.0) > (said.seen_s or 0.0):
+            raise RunError(
+                "the place was looked at again meanwhile", remedy="decide about what is shown of it now"
+            )
         decision = Decision(
             said.id, said.place, time.time_ns(), place.utc_ns, said.what, said.who.strip(), said.note.strip()
         )
@@ -89,7 +95,7 @@ def _document(decision: Decision) -> dict[str, object]:
     return {
         "place": decision.place,
         "at_s": decision.utc_ns / 1e9,
-        "seen_s": decision.seen_ns / 1e9 if decision.seen_ns else None,
+        "seen_s": told_seconds(decision.seen_ns),
         "what": decision.what.value,
         "who": decision.who,
         "note": decision.note,

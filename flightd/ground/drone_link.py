@@ -14,6 +14,7 @@ from flightd.adapters.ground_link.protocol import Accepted, EventReport, Role, S
 from flightd.core.errors import FlightdError, RunError, TransientError, UnavailableError
 from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind
+from flightd.ground.bounded import Shared
 from flightd.ground.messages import Act, LinkState, PictureKey, picture_message
 
 _LOG = logging.getLogger(__name__)
@@ -79,6 +80,7 @@ class DroneLink:
         self._attends = False
         self._trouble = "connecting"
         self._acting = 0
+        self._inventory = Shared(self._asked_inventory)
 
     async def run(self) -> None:
         """Connect, and again after whatever went wrong."""
@@ -113,7 +115,11 @@ class DroneLink:
             self._acting -= 1
 
     async def inventory(self) -> tuple[dict[str, str], ...]:
-        """What it has counted on this flight, place by place.  As `GroundClient` raises."""
+        """What it has counted on this flight, place by place: asked once for all that want to know now.
+        As `GroundClient` raises."""
+        return await self._inventory.answer()
+
+    async def _asked_inventory(self) -> tuple[dict[str, str], ...]:
         if self._client is None:
             raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
         return await self._client.inventory()

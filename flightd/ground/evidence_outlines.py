@@ -8,12 +8,23 @@ import cv2
 import numpy as np
 
 from flightd.vision.shelf.code_reader import read_codes
+from flightd.vision.shelf.evidence_jpeg import MOST_PIXELS, jpeg_size
 
 
 @lru_cache(maxsize=256)
 def outlines(jpeg: bytes) -> tuple[tuple[str, tuple[tuple[float, float], ...]], ...]:
     """The text and the four corners of each code, as parts of the picture's width and height from its left
     top.  Nothing for what is no picture."""
+    size = jpeg_size(jpeg)
+    if size is None or size[0] * size[1] > MOST_PIXELS:
+        return ()
+    try:
+        return _outlines(jpeg)
+    except cv2.error:  # of a file that is spoilt within
+        return ()
+
+
+def _outlines(jpeg: bytes) -> tuple[tuple[str, tuple[tuple[float, float], ...]], ...]:
     picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
         return ()

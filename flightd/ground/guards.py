@@ -2,8 +2,9 @@
 
 A page of another origin can neither read nor command.  The name in `Host` must be this machine's own, so
 that no foreign name can be pointed here (DNS rebinding); a WebSocket and an act need an `Origin` that is
-ours.  The answers forbid everything that is not our own: no inline script or style, no foreign host, no
-frame.
+ours; and what costs work (`/api/`) is answered to no link or picture in another site's page, which sends no
+`Origin` and could keep the station busy.  The answers forbid everything that is not our own: no inline
+script or style, no foreign host, no frame.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+_OURS = frozenset({"same-origin", "none"})
+"""Of `Sec-Fetch-Site`: our own page, or a person (a bookmark, the address line)."""
 HEADERS = {
     "Content-Security-Policy": _POLICY,
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -72,15 +75,16 @@ class Guard:
         host = headers.get("host", "")
         if host not in self._hosts:
             return "this station is not called that"
+        site = headers.get("sec-fetch-site", "same-origin")
+        if scope["path"].startswith("/api/") and site not in _OURS:
+            return "another site"
         reads = scope["type"] == "http" and scope["method"] in {"GET", "HEAD"}
         origin = headers.get("origin")
         if origin is None:
             return "" if reads else "an act needs the Origin of the station's own page"
         if origin == "null" or urlsplit(origin).netloc != host or not origin.startswith("http://"):
             return "another origin"
-        if headers.get("sec-fetch-site", "same-origin") not in {"same-origin", "none"}:
-            return "another site"
-        return ""
+        return "" if site in _OURS else "another site"
 
 
 def _add_headers(message: MutableMapping[str, Any]) -> None:

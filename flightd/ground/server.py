@@ -22,6 +22,7 @@ from flightd.ground.flights.flights import Flights
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+from flightd.ground.reading_process import ReadingProcess
 from flightd.runtime.ending_signals import end_on_signals
 
 PORT = 8080
@@ -120,10 +121,10 @@ async def serve(
     folder: Path | None = None,
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  Inventories and flights lie under `folder`."""
-    hub, flights = Hub(drones), Flights(folder)
+    hub, flights, uploads = Hub(drones), Flights(folder), ReadingProcess()
     server = _Server(
         uvicorn.Config(
-            application(hub, own_hosts(where.host, where.port), folder, flights),
+            application(hub, own_hosts(where.host, where.port), folder, flights, uploads),
             http="h11",
             ws="websockets-sansio",
             lifespan="off",
@@ -152,3 +153,4 @@ async def serve(
             server.should_exit = True
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.shield(asyncio.wait([serving], timeout=_LEAVE_S + 2.0))
+            uploads.close()

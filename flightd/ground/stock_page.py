@@ -9,11 +9,15 @@ from starlette.routing import BaseRoute
 
 from flightd.ground.decision_routes import decision_routes
 from flightd.ground.expected_stock_routes import expected_stock_routes
+from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.stock_routes import CountingDrone, StockAnswers, stock_routes
 from flightd.ground.stores import Stores
 
 
-def stock_page(folder: Path | None, drones: Mapping[str, CountingDrone]) -> list[BaseRoute]:
-    """Its routes, over the inventories under `folder` and what the drones tell that they have counted."""
+def stock_page(
+    folder: Path | None, drones: Mapping[str, CountingDrone], reading: ReadingProcess
+) -> list[BaseRoute]:
+    """Its routes, over the inventories under `folder` and what the drones tell that they have counted;
+    uploads are read in `reading`."""
     asked = StockAnswers(Stores(folder), drones)
-    return [*stock_routes(asked), *expected_stock_routes(asked), *decision_routes(asked, folder)]
+    return [*stock_routes(asked), *expected_stock_routes(asked, reading), *decision_routes(asked, folder)]

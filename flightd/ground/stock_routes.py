@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
+import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol, TypeAlias, TypeVar
 
 import msgspec
@@ -13,8 +14,10 @@ from starlette.routing import BaseRoute, Route
 
 from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
 from flightd.core.inventory import Observation, Standing
+from flightd.ground.bounded import Threads
 from flightd.ground.evidence_outlines import outlines
 from flightd.ground.pages import page
+from flightd.ground.shown_text import shown
 from flightd.ground.stores import StockView, Stores
 from flightd.inventory.code_search import found_places
 from flightd.inventory.elevation import fronts_of
@@ -22,9 +25,10 @@ from flightd.inventory.export.formats import FORMATS
 from flightd.inventory.export.json_document import observation_json
 from flightd.inventory.place_view import view_of_told
 
+_LOG = logging.getLogger(__name__)
 T = TypeVar("T")
 _MOST_WORDS = 200
-_AT_ONCE = 2
+_AT_ONCE, _MOST_WAITING = 2, 32
 """So many questions are read from the disk at a time: the way to the drones comes first."""
 _KINDS = {
     "csv": "text/csv; charset=utf-8",
@@ -67,13 +71,22 @@ def answered(answer: _Answer) -> _Answer:
         try:
             return await answer(request)
         except InputError as err:
-            return as_json({"refused": str(err)}, 404 if request.method == "GET" else 400)
+            return _refused(str(err), 404 if request.method == "GET" else 400)
         except (UnavailableError, TransientError) as err:
-            return as_json({"refused": str(err)}, 503)
+            return _refused(str(err), 503)
         except FlightdError as err:
-            return as_json({"refused": str(err).removeprefix("refused: ")}, 409)
+            return _refused(str(err).removeprefix("refused: "), 409)
+        except OSError as err:
+            return _refused(f"cannot be read: {err.strerror or err}", 503)
+        except (ArithmeticError, LookupError, TypeError, ValueError) as err:  # of a file that anybody wrote
+            _LOG.exception("%s cannot be answered", request.url.path)
+            return _refused(f"this inventory cannot be shown: {type(err).__name__}", 409)
 
     return guarded
+
+
+def _refused(why: str, status: int) -> Response:
+    return as_json({"refused": shown(why)}, status)
 
 
 def as_json(value: object, status: int = 200, headers: dict[str, str] | None = None) -> Response:
@@ -86,12 +99,11 @@ class StockAnswers:
     def __init__(self, stores: Stores, drones: Mapping[str, CountingDrone]) -> None:
         self._stores = stores
         self._drones = drones
-        self._reading = asyncio.Semaphore(_AT_ONCE)
+        self._reading = Threads(_AT_ONCE, _MOST_WAITING, "too many questions about the stock wait already")
 
     async def off_loop(self, work: Callable[..., T], *arguments: Any) -> T:
-        """The work's result, done in a thread."""
-        async with self._reading:
-            return await asyncio.to_thread(work, *arguments)
+        """The work's result, done in a thread.  UnavailableError where too much waits."""
+        return await self._reading.run(work, *arguments)
 
     async def stores(self, _request: Request) -> Response:
         """The inventories that can be shown: stores, and what the drones tell themselves."""
@@ -103,6 +115,10 @@ class StockAnswers:
                 "drones": list(self._drones),
             }
         )
+
+    async def store_folder(self, request: Request) -> Path:
+        """Where the store lies that a request is about: `?store=NAME`."""
+        return await self.off_loop(self._stores.folder, request.query_params.get("store", ""))
 
     async def store_view(self, request: Request) -> StockView:
         """The store that a request is about: `?store=NAME`."""
@@ -169,6 +185,11 @@ class StockAnswers:
         return download(data, f"inventory{FORMATS[kind].suffix}", _KINDS[kind])
 
 
+def told_seconds(utc_ns: int) -> float | None:
+    """A look's time as the page is told it, None where there was none; it comes back the same."""
+    return utc_ns / 1e9 if utc_ns else None
+
+
 def download(data: bytes, name: str, kind: str) -> Response:
     """A file for the person to keep."""
     return Response(data, headers={"Content-Disposition": f'attachment; filename="{name}"'}, media_type=kind)
@@ -191,7 +212,7 @@ def _document(view: StockView) -> bytes:
             "texts": place.texts,
             "confidence": place.confidence,
             "pending": place.pending,
-            "seen_s": place.utc_ns / 1e9 if place.utc_ns else None,
+            "seen_s": told_seconds(place.utc_ns),
         }
         for place in view.places
     }

@@ -13,12 +13,14 @@ from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import FlightdError, InputError
 from flightd.core.inventory import LocationRecord, Observation, Standing
 from flightd.core.topics import Document, Topic
+from flightd.ground.plain_files import is_plain_file, is_plain_folder, plain_file
+from flightd.ground.shown_text import shown
 from flightd.inventory.elevation import Front, fronts_of
 from flightd.inventory.place_view import PlaceView, place_views
 from flightd.replay.log import LogReader
 from flightd.site.site import Site
 from flightd.site.site_file import parse_site
-from flightd.vision.shelf.evidence_jpeg import MOST_BYTES
+from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, MOST_PIXELS, jpeg_size
 
 _FILE, _LOG, _TRUTH = "inventory.db", "*.mcap", "truth.mcap"
 _DEPTH = 4
@@ -46,12 +48,12 @@ class Stores:
         self._root = root
         self._known: dict[str, Path] = {}
         self._views: OrderedDict[str, StockView] = OrderedDict()
-        self._sites: dict[Path, tuple[str, Site | None]] = {}
+        self._sites: dict[Path, tuple[tuple[str, int, int], Site | None]] = {}
 
     @property
     def title(self) -> str:
         """The name of the folder, for people; empty where the station was told none."""
-        return "" if self._root is None else self._root.resolve().name or "/"
+        return "" if self._root is None else shown(self._root.resolve().name) or "/"
 
     def names(self) -> list[tuple[str, int]]:
         """Every store and when it was written last (UTC, ns), newest first."""
@@ -62,7 +64,7 @@ class Stores:
 
     def view(self, name: str) -> StockView:
         """A store as it is now.  InputError where there is none of the name, as `SqliteStore` raises."""
-        folder = self._folder(name)
+        folder = self.folder(name)
         stamp = _text(_stamp(folder))
         known = self._views.get(name)
         if known is not None and known.stamp == stamp:
@@ -78,7 +80,7 @@ class Stores:
 
     def looks(self, name: str, code: str) -> Sequence[tuple[Observation, Standing]]:
         """Every look at a place, oldest first.  InputError for one that the store does not know."""
-        with SqliteStore(self._folder(name), read_only=True) as store:
+        with SqliteStore(self.folder(name), read_only=True) as store:
             looks = store.looks(code)
             if not looks and all(record.code != code for record in store.locations()):
                 raise InputError(f"there is no place {code!r}")
@@ -88,33 +90,41 @@ class Stores:
         """The JPEG that a look kept as evidence.  InputError where there is none."""
         if len(picture) != 64 or not set(picture) <= set("0123456789abcdef"):
             raise InputError("not the name of a picture")
-        file = self._folder(name) / "evidence" / picture[:2] / f"{picture}.jpg"
-        try:
-            if file.is_file() and file.stat().st_size <= MOST_BYTES:
-                return file.read_bytes()
-        except OSError:
-            pass
+        folder = self.folder(name) / "evidence"
+        if is_plain_folder(folder) and is_plain_folder(folder / picture[:2]):
+            jpeg = plain_file(folder / picture[:2] / f"{picture}.jpg", MOST_BYTES)
+            if jpeg is not None:
+                size = jpeg_size(jpeg)
+                if size is not None and size[0] * size[1] > MOST_PIXELS:
+                    raise InputError("this picture is larger than any camera's")
+                return jpeg
         raise InputError("this picture was not kept")
 
-    def _folder(self, name: str) -> Path:
+    def folder(self, name: str) -> Path:
+        """Where a store lies.  InputError where there is none of the name."""
         known = self._known.get(name)
-        if known is not None and (known / _FILE).is_file():
-            return known
-        if self._root is not None:
-            self._known = {_name(folder, self._root): folder for folder in _folders(self._root)}
-        if name not in self._known:
-            raise InputError(f"there is no inventory {name!r}")
-        return self._known[name]
+        if known is None or not is_plain_file(known / _FILE):
+            if self._root is not None:
+                self._known = {_name(folder, self._root): folder for folder in _folders(self._root)}
+            if name not in self._known:
+                raise InputError(f"there is no inventory {name!r}")
+            known = self._known[name]
+        for part in ("-wal", "-shm"):
+            beside = known / f"{_FILE}{part}"
+            if os.path.lexists(beside) and not is_plain_file(beside):
+                raise InputError(f"the inventory {name!r} has a {beside.name} that is no plain file")
+        return known
 
     def _site(self, folder: Path) -> Site | None:
         """The map that the newest flight log beside the store was flown by; None without one."""
-        logs = [log for log in folder.glob(_LOG) if log.name != _TRUTH]
+        logs = [log for log in folder.glob(_LOG) if log.name != _TRUTH and is_plain_file(log)]
         log = max(logs, key=_changed_ns, default=None)
         if log is None:
             return None
+        stamp = (log.name, *_size_and_time(log))  # a run writes its log anew under the same name
         known = self._sites.get(folder)
-        if known is None or known[0] != log.name or known[1] is None:  # a log that begins has no map yet
-            self._sites[folder] = known = log.name, _map_of(log)
+        if known is None or known[0] != stamp:
+            self._sites[folder] = known = stamp, _map_of(log)
         return known[1]
 
 
@@ -124,7 +134,7 @@ def _map_of(log: Path) -> Site | None:
             if not isinstance(entry.message, Document):
                 break  # the flight has begun, and the map comes before
             return parse_site(entry.message.text, f"{log} (map)")
-    except FlightdError:
+    except (FlightdError, OSError):
         pass  # the places are shown by their codes then
     return None
 
@@ -134,7 +144,7 @@ def _folders(root: Path) -> Iterator[Path]:
     found = 0
     for looked, (folder, below, files) in enumerate(os.walk(root)):
         here = Path(folder)
-        if _FILE in files:
+        if _FILE in files and is_plain_file(here / _FILE):
             yield here
             found += 1
         deep = len(here.relative_to(root).parts) >= _DEPTH
@@ -144,7 +154,7 @@ def _folders(root: Path) -> Iterator[Path]:
 
 
 def _name(folder: Path, root: Path) -> str:
-    return folder.relative_to(root).as_posix()
+    return shown(folder.relative_to(root).as_posix())
 
 
 def _stamp(folder: Path) -> _Stamp:

@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, time
+from typing import IO
 
 from flightd.core.csv_text import exact
 from flightd.core.errors import InputError
@@ -30,7 +31,8 @@ _MOST_UNPACKED = 100_000_000
 _MOST_PARTS = 500
 _LAST_ROW = 2 * MOST_ROWS
 """Of a sheet: so many may be empty in between."""
-_ROW = re.compile(rb'<(?:\w+:)?row\b[^>]*?\sr="(\d{1,20})"')
+_DOCTYPE = b"<!DOCTYPE"
+_BLOCK_BYTES = 1 << 20
 _EXACT = 10**15
 _ROUNDED = re.compile(r"[+-]?\d+([.,]\d+)?[eE]\+?\d+")
 _SEPARATORS = {";": "semicolon", ",": "comma", "\t": "tab", "|": "bar"}
@@ -154,8 +156,12 @@ def _workbook_rows(data: bytes) -> Iterator[list[str]]:
             warnings.simplefilter("ignore")  # of styles that are of no use here
             book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True, keep_links=False)
         try:
-            cells = book.worksheets[0].iter_rows(max_col=MOST_COLUMNS + 1, values_only=True)
-            for row in cells:
+            cells = book.worksheets[0].iter_rows(
+                max_row=_LAST_ROW + 1, max_col=MOST_COLUMNS + 1, values_only=True
+            )
+            for number, row in enumerate(cells, start=1):
+                if number > _LAST_ROW:
+                    raise InputError(f"the workbook has rows beyond {_LAST_ROW:,}", remedy="save it as CSV")
                 yield [_cell_text(value) for value in row]
         finally:
             book.close()
@@ -171,18 +177,20 @@ def _check_parts(data: bytes) -> None:
         parts = package.infolist()
         if len(parts) > _MOST_PARTS or sum(part.file_size for part in parts) > _MOST_UNPACKED:
             raise InputError("the workbook is too large when it is unpacked", remedy="save the sheet as CSV")
-        for part in parts:
-            if part.filename.endswith((".xml", ".rels")):
-                xml = package.read(part)
-                if _defines_entities(xml):
+        for part in parts:  # whatever its name: another part may call it a sheet
+            with package.open(part) as content:
+                if _defines_entities(content):
                     raise InputError("the workbook holds a document type definition, which none needs")
-                if any(int(number[1]) > _LAST_ROW for number in _ROW.finditer(xml)):
-                    raise InputError(f"the workbook has rows beyond {_LAST_ROW:,}", remedy="save it as CSV")
 
 
-def _defines_entities(xml: bytes) -> bool:
-    upper = xml.upper()
-    return any("<!DOCTYPE".encode(encoding) in upper for encoding in ("ascii", "utf-16-le", "utf-16-be"))
+def _defines_entities(content: IO[bytes]) -> bool:
+    """In whatever encoding: those of two and four bytes are ASCII and zeros here."""
+    seen = b""
+    while block := content.read(_BLOCK_BYTES):
+        seen = seen[-len(_DOCTYPE) :] + block.translate(None, b"\0").upper()
+        if _DOCTYPE in seen:
+            return True
+    return False
 
 
 def _cell_text(value: object) -> str:

@@ -129,8 +129,8 @@ class Child:
         self._on_ready = on_ready
         self._on_death = on_death
         self._answer: asyncio.Future[Any] | None = None
-        self._too_late = self._loop.call_later(_START_S, self.kill)
         self._process = LinkedProcess(_answer_requests, (make,), self._received, self._ended)
+        self._too_late = self._loop.call_later(_START_S, self.kill)
 
     @property
     def alive(self) -> bool:

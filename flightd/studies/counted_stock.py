@@ -14,18 +14,18 @@ from flightd.replay.report.stock import CountedStock
 
 
 def counted_beside(
-    log: Path, inventory: Path | None = None, expected: Path | None = None
+    log: Path, inventory: Path | None = None, expected: Path | None = None, *, untouched: bool = False
 ) -> CountedStock | None:
     """What was counted, for the report of `log`: the inventory in `inventory`, or beside the log if there
-    is one; compared with an `expected` stock.  Raises InputError when what is asked for is missing; one that
-    merely lies there and cannot be read is told and left out."""
+    is one; compared with an `expected` stock; `untouched` as `opened_for_reading` has it.  Raises InputError
+    when what is asked for is missing; one that merely lies there and cannot be read is told and left out."""
     stock = read_stock(expected) if expected is not None else None
     folder = inventory or log.parent
     asked = inventory is not None or stock is not None
     if not asked and not (folder / "inventory.db").exists():
         return None
     try:
-        with opened_for_reading(folder) as store:
+        with opened_for_reading(folder, untouched=untouched) as store:
             records, evidence = store.locations(), store.evidence
     except (InputError, UnavailableError) as err:
         if asked:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from flightd.core.errors import InputError, UnavailableError
+from flightd.ground import decision_book
 from flightd.ground.decision_book import FILE, Decided, Decision, DecisionBook
 
 
@@ -61,3 +62,20 @@ def test_a_disk_that_refuses_is_named(tmp_path: Path) -> None:
     (tmp_path / FILE).mkdir()
     with pytest.raises(UnavailableError, match=r"ground\.db: unable to open"):
         DecisionBook(tmp_path).add("monday", decision(1))
+
+
+def test_a_book_is_made_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a power cut between two statements leaves."""
+    whole = decision_book.SCHEMA
+    monkeypatch.setattr(decision_book, "SCHEMA", whole.replace("CREATE INDEX", "CREATE NOTHING"))
+    with pytest.raises(UnavailableError):
+        DecisionBook(tmp_path).add("monday", decision(1))
+    monkeypatch.setattr(decision_book, "SCHEMA", whole)
+    DecisionBook(tmp_path).add("monday", decision(1))
+    assert DecisionBook(tmp_path).decisions("monday") == [decision(1)]
+
+
+def test_stations_that_make_the_same_book_at_once_lose_nothing(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(8) as stations:
+        list(stations.map(lambda n: DecisionBook(tmp_path).add("monday", decision(n)), range(16)))
+    assert len(DecisionBook(tmp_path).decisions("monday")) == 16

@@ -10,13 +10,16 @@ from pathlib import Path
 import pytest
 
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
+from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError
+from flightd.core.inventory import LocationState, PlannedLocation
 from flightd.ground.flights import log_folder
 from flightd.ground.flights.flight_row import FlightRow, read_rows
 from flightd.ground.flights.flight_view import read_report, read_view
 from flightd.ground.flights.log_folder import find_logs, log_id, path_of
 from flightd.ground.flights.sized_cache import SizedCache
 from tests.replay.synthetic_flight import write_flight
+from tests.web.stock_rig import look
 
 
 @pytest.fixture(scope="module")
@@ -152,6 +155,27 @@ def test_what_lies_beside_a_log_as_a_link_is_not_read(name: str, flown: Path, tm
     assert ("true_height_m" in view.columns) == (name != "truth.mcap")
     with pytest.raises(InputError, match=f"{name} beside the log is a link"):
         read_report(tmp_path / "root", row.path)
+
+
+@pytest.mark.parametrize("state", ["closed", "being written", "cut off"])
+def test_a_report_changes_nothing_in_the_folder_of_an_inventory(
+    state: str, flown: Path, tmp_path: Path
+) -> None:
+    log = copied(flown, tmp_path / "root")
+    with SqliteStore(tmp_path / "written") as store:
+        store.plan([PlannedLocation("AL-01-1-1", "A1")])
+        store.commit(look("AL-01-1-1", LocationState.EMPTY))
+        if state != "closed":
+            shutil.copytree(store.folder, log.parent, dirs_exist_ok=True)
+    if state == "closed":
+        shutil.copytree(tmp_path / "written", log.parent, dirs_exist_ok=True)
+    if state == "cut off":
+        (log.parent / "inventory.db-shm").unlink()
+    before = {file.name: file.read_bytes() for file in log.parent.glob("inventory.db*")}
+    changed_ns = log.parent.stat().st_mtime_ns
+    assert b"AL-01-1-1" in read_report(tmp_path / "root", "flight.mcap")
+    assert {file.name: file.read_bytes() for file in log.parent.glob("inventory.db*")} == before
+    assert log.parent.stat().st_mtime_ns == changed_ns
 
 
 @pytest.mark.parametrize(

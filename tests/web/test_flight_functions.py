@@ -141,3 +141,21 @@ def test_a_difference_says_which_flight_did_better(
     key: str, a: dict[str, Any], b: dict[str, Any], text: str, better: bool | None, call: Called
 ) -> None:
     assert call("figures", "differenceIn", key, a, b) == {"text": text, "better": better}
+
+
+@pytest.mark.parametrize(
+    ("row", "known", "another"),
+    [
+        ({"stamp": "b"}, {"listed": "a", "stamp": "a", "row": {"started_s": 10}}, True),
+        ({"stamp": "a"}, {"listed": "a", "stamp": "b", "row": {"started_s": 10}}, False),
+        ({"stamp": "b"}, {"stamp": "b", "row": None}, False),
+        ({"stamp": "b"}, {"listed": "a", "trouble": "gone"}, True),
+        ({"stamp": "b", "running": True, "started_s": 11}, {"listed": "a", "row": {"started_s": 10}}, False),
+        ({"stamp": "b", "running": True, "started_s": 99}, {"listed": "a", "row": {"started_s": 10}}, True),
+        ({"stamp": "b", "running": True, "started_s": 99}, {"listed": "a"}, False),
+    ],
+)
+def test_a_flight_in_the_place_of_the_one_that_was_fetched_is_told_apart(
+    call: Called, row: dict[str, Any], known: dict[str, Any], another: bool
+) -> None:
+    assert call("flights_state", "isAnother", row, known) is another

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import json
 import os
 import shutil
+import socket
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from flightd.core.errors import InputError, TransientError, UnavailableError
+from flightd.ground.flights import flight_index
 from flightd.ground.flights.flight_index import FlightIndex
-from flightd.ground.flights.reading_process import MOST_WAITING, ReadingProcess
+from flightd.ground.flights.flight_view import read_view
+from flightd.ground.flights.flights import Flights
+from flightd.ground.reading_process import MOST_WAITING, ReadingProcess
 from tests.replay.synthetic_flight import write_flight
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.waiting import until
@@ -127,6 +133,86 @@ async def test_pictures_come_one_by_one_behind_their_heads(folder: Path) -> None
         assert body[4 + length :].startswith(b"\xff\xd8")
         for other in (str(len(pictures)), "-1", "x", "9" * 6000):
             assert (await station.ask("GET", f"/api/flights/{flight}/pictures/{other}"))[0] == 404
+
+
+@in_real_time
+async def test_a_flight_that_is_written_anew_is_told_apart_from_the_old_one(
+    folder: Path, tmp_path: Path
+) -> None:
+    log = Path(shutil.copytree(folder / "alone", tmp_path / "alone")) / "flight.mcap"
+    async with served(folder=tmp_path) as station:
+        row = (await listed(station))["alone/flight.mcap"]
+        told = await asked(station, f"/api/flights/{row['id']}")
+        stamp, path = told["stamp"], f"/api/flights/{row['id']}/pictures/4"
+        assert row["stamp"] == told["row"]["stamp"] == stamp
+        assert "max-age" in await head_of(station, f"{path}?stamp={stamp}")
+        head = await head_of(station, path)
+        assert "private, no-cache" in head
+        tag = next(line for line in head.splitlines() if line.lower().startswith("etag")).split(" ")[1]
+        assert (await head_of(station, path, f"If-None-Match: {tag}")).startswith("HTTP/1.1 304")
+        os.utime(log, (1e9, 1e9))
+        async with asyncio.timeout(60):
+            while (await listed(station))["alone/flight.mcap"]["stamp"] == stamp:  # noqa: ASYNC110
+                await asyncio.sleep(0.2)
+        assert (await asked(station, f"/api/flights/{row['id']}"))["stamp"] != stamp
+        assert (await head_of(station, path, f"If-None-Match: {tag}")).startswith("HTTP/1.1 200")
+        code, text = await station.ask("GET", f"{path}?stamp={stamp}")
+        assert (code, json.loads(text)["refused"]) == (409, "the flight was written anew; open it again")
+
+
+async def head_of(station: Station, path: str, *lines: str) -> str:
+    host = f"{station.where.host}:{station.where.port}"
+    words = (f"GET {path} HTTP/1.1", f"Host: {host}", *lines, "Connection: close", "", "")
+    return (await station.say("\r\n".join(words).encode())).partition(b"\r\n\r\n")[0].decode()
+
+
+class _CountingReader(ReadingProcess):
+    """Reads here, and counts how often a whole log is read."""
+
+    views = 0
+
+    async def run(self, function: Any, within_s: float, *args: Any, **named: Any) -> Any:
+        _CountingReader.views += function is read_view
+        return function(*args, **named)
+
+
+@in_real_time
+async def test_a_log_that_is_being_recorded_is_not_read_anew_for_each_curve_and_picture(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(flight_index, "_FRESH_S", 0.05)
+    whole = (folder / "alone" / "flight.mcap").read_bytes()
+    log, size = tmp_path / "flight.mcap", len(whole) // 2
+    log.write_bytes(whole[:size])
+    flights = Flights(tmp_path, _CountingReader)
+    assert flights.index is not None
+    _CountingReader.views = 0
+    running = asyncio.ensure_future(flights.run())
+    try:
+        (row,) = await rows_of(flights.index, lambda row: row["running"])
+        stamp = json.loads(await flights.head(row["id"]))["stamp"]
+        for grown in (1000, 2000):
+            log.write_bytes(whole[: size + grown])
+            (row,) = await rows_of(flights.index, lambda row: row["bytes"] == size + grown)  # noqa: B023
+            assert await flights.series(row["id"], 0.0, 5.0, 10)
+            assert (await flights.picture(row["id"], 1, stamp)).content
+        assert _CountingReader.views == 1
+        assert json.loads(await flights.head(row["id"]))["stamp"] != stamp, "who opens it sees it as it is"
+        log.write_bytes(whole)
+        (row,) = await rows_of(flights.index, lambda row: not row["running"])
+        assert await flights.series(row["id"], 0.0, 5.0, 10)
+        assert _CountingReader.views == 3, "once more when it is whole"
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+
+
+async def rows_of(index: FlightIndex, that: Callable[[dict[str, Any]], bool]) -> list[dict[str, Any]]:
+    def rows() -> list[dict[str, Any]]:
+        return list(json.loads(index.listing())["rows"])
+
+    await until(lambda: bool(rows()) and all(map(that, rows())))
+    return rows()
 
 
 OTHER_WAYS = (
@@ -298,6 +384,81 @@ async def test_a_log_that_kills_its_reader_costs_no_other_log_its_row(folder: Pa
     assert rows["alone/flight.mcap"]["trouble"] == "the process that reads logs failed"
     assert rows["judged/flight.mcap"]["outcome"] == "completed"
     assert reader.deaths == 2, "with the others, and alone"
+
+
+class _OddReader:
+    """Fails as a system without file descriptors does, then reads here."""
+
+    def __init__(self) -> None:
+        self.failures = 1
+
+    async def run(self, function: Any, within_s: float, *args: Any) -> Any:
+        if self.failures:
+            self.failures -= 1
+            raise OSError(errno.EMFILE, "Too many open files")
+        return function(*args)
+
+
+@in_real_time
+async def test_an_error_that_nobody_thought_of_ends_no_list(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(flight_index, "_FRESH_S", 0.05)
+    index = FlightIndex(folder, _OddReader())
+    running = asyncio.ensure_future(index.run())
+    try:
+        await until(lambda: json.loads(index.listing())["looked"] or running.done())
+        told = json.loads(index.listing())
+        assert "Too many open files" in told["trouble"]
+        assert "the list of flights failed" in caplog.text
+        await until(lambda: len(json.loads(index.listing())["rows"]) == 3)
+        assert json.loads(index.listing())["trouble"] == ""
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+
+
+@in_real_time
+async def test_the_list_has_another_version_only_for_what_is_new(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(flight_index, "_FRESH_S", 0.02)
+    shutil.copy(folder / "alone" / "flight.mcap", tmp_path / "a.mcap")
+    reader = _OddReader()
+    reader.failures = 0
+    index = FlightIndex(tmp_path, reader)
+    running = asyncio.ensure_future(index.run())
+    try:
+        await until(lambda: json.loads(index.listing())["looked"])
+        version = json.loads(index.listing())["version"]
+        for _ in range(3):
+            assert await index.log("nowhere") is None
+            await asyncio.sleep(0.05)
+        assert json.loads(index.listing(version)) == {"version": version, "unread": 0, "rows": None}
+        shutil.copy(folder / "alone" / "flight.mcap", tmp_path / "b.mcap")
+        await until(lambda: len(json.loads(index.listing())["rows"]) == 2)
+        assert json.loads(index.listing())["version"] > version
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+
+
+@in_real_time
+async def test_a_process_that_cannot_be_started_is_told_and_started_later(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def none_left() -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    reading = ReadingProcess()
+    try:
+        with monkeypatch.context() as patched:
+            patched.setattr(socket, "socketpair", none_left)
+            with pytest.raises(TransientError, match="does not start: Too many open files"):
+                await reading.run(abs, 60.0, -1)
+        assert await reading.run(abs, 60.0, -2) == 2
+    finally:
+        reading.close()
 
 
 @in_real_time

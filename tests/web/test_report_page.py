@@ -159,7 +159,7 @@ def test_a_label_that_is_a_formula_is_none_in_the_download(browser: Browser, tmp
     from flightd.core.inventory import Observation
     from flightd.core.types import CodeRead
 
-    texts = ("=HYPERLINK(1)", "'+1", 'say "x", y')
+    texts = ("=HYPERLINK(1)", "'+1", 'say "x", y', "A;=1\t-2")
     log = write_flight(tmp_path, truth=False, summary=False)
     with SqliteStore(tmp_path) as store:
         for number, text in enumerate(texts):
@@ -169,5 +169,5 @@ def test_a_label_that_is_a_formula_is_none_in_the_download(browser: Browser, tmp
     with opened(browser, (tmp_path / "report.html").as_uri()) as page:
         text = downloaded(page, "CSV", tmp_path / "stock.csv")
     cells = [row["text"] for row in csv.DictReader(text.splitlines())]
-    assert cells == ["'=HYPERLINK(1)", "''+1", 'say "x", y']
+    assert cells == ["'=HYPERLINK(1)", "''+1", 'say "x", y', "A;'=1\t'-2"]
     assert [exact(cell) for cell in cells] == list(texts)

@@ -175,6 +175,16 @@ async def test_a_drone_that_nobody_flies_is_said_to_be_unheard_and_heard_when_it
 
 
 @in_real_time
+async def test_no_page_of_another_site_makes_the_station_work() -> None:
+    """A picture or a link in it sends no Origin."""
+    async with served(("demo", NOBODY)) as station:
+        for site, code in {"cross-site": 403, "same-site": 403, "same-origin": 200, "none": 200}.items():
+            for path in ("/api/flights", "/api/stock", "/api/guide"):
+                assert (await station.ask("GET", path, {"Sec-Fetch-Site": site}))[0] == code, (site, path)
+        assert (await station.ask("GET", "/", {"Sec-Fetch-Site": "cross-site"}))[0] == 200, "a link to it"
+
+
+@in_real_time
 async def test_two_drones_are_told_and_commanded_apart() -> None:
     async with (
         serving(local()) as a,

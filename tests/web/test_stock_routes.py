@@ -6,6 +6,7 @@ import asyncio
 import json
 import os
 import shutil
+import threading
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -15,7 +16,10 @@ import pytest
 from flightd.adapters.ground_link.client import Address
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationState, PlannedLocation
+from flightd.ground import uploaded_comparison
+from flightd.ground.bounded import Shared, Threads
 from flightd.inventory.stock_table import MOST_BYTES
 from flightd.runtime.clock import LoopClock
 from tests.rigs.event_loops import in_real_time
@@ -205,6 +209,94 @@ async def test_an_endless_upload_is_cut_off(folder: Path) -> None:
 
 
 @in_real_time
+async def test_more_comparisons_than_may_wait_are_refused_in_one_line(folder: Path) -> None:
+    async with served(NOBODY, folder=folder) as station:
+        host = f"{station.where.host}:{station.where.port}"
+        head = (
+            f"POST /api/stock/compare?store=monday HTTP/1.1\r\nHost: {host}\r\nOrigin: {station.origin}\r\n"
+            f"Content-Type: {UPLOAD['Content-Type']}\r\nContent-Length: 9\r\nConnection: close\r\n\r\n"
+        )
+        slow = [asyncio.ensure_future(station.say(head.encode() + b"pla", 4.0)) for _ in range(4)]
+        await asyncio.sleep(1.0)
+        code, told = await posted(station, "/compare?store=monday", BOOKS)
+        assert (code, told["refused"]) == (503, "too many comparisons wait already; try again in a moment")
+        await asyncio.gather(*slow)
+        async with asyncio.timeout(20):
+            while (await posted(station, "/compare?store=monday", BOOKS))[0] != 200:  # noqa: ASYNC110
+                await asyncio.sleep(0.1)
+
+
+@in_real_time
+async def test_an_upload_is_read_in_another_process_than_the_station(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def here(*_: object) -> None:
+        raise AssertionError("an upload is read in the station's own process")
+
+    monkeypatch.setattr(uploaded_comparison, "read_table", here)
+    async with served(NOBODY, folder=folder) as station:
+        many = b"place,code\n" + b"".join(b"AL-%06d,%030d\n" % (n, n) for n in range(90_000))
+        code, told = await posted(station, "/compare?store=monday", many)
+        assert (code, told["rows"]) == (200, 90_000)
+
+
+@in_real_time
+async def test_a_drone_is_asked_once_for_all_that_want_its_inventory_now() -> None:
+    asked: list[int] = []
+
+    def told() -> tuple[dict[str, str], ...]:
+        asked.append(1)
+        return ({"location": "AL-01-1-1", "state": "empty"},)
+
+    with ZmqGround(local(), SITE, LoopClock(), inventory=told) as link:
+        async with asyncio.TaskGroup() as tasks:
+            running = tasks.create_task(link.run())
+            async with served(("demo", address_of(link))) as station:
+                await until(lambda: link.requests > 2)
+                drone = [asyncio.ensure_future(got(station, "/places?drone=demo")) for _ in range(12)]
+                assert {(await answer)[0] for answer in drone} == {200}
+                assert 1 <= len(asked) < 12
+            running.cancel()
+
+
+@in_real_time
+async def test_an_answer_is_shared_and_so_is_an_error() -> None:
+    calls, gate = 0, asyncio.Event()
+
+    async def ask() -> int:
+        nonlocal calls
+        calls += 1
+        call = calls
+        await gate.wait()
+        if call == 2:
+            raise UnavailableError("silent")
+        return call
+
+    shared = Shared(ask)
+    asking = [asyncio.ensure_future(shared.answer()) for _ in range(5)]
+    await asyncio.sleep(0)
+    asking[0].cancel()
+    await asyncio.sleep(0)
+    gate.set()
+    told = await asyncio.gather(*asking, return_exceptions=True)
+    assert isinstance(told[0], asyncio.CancelledError)
+    assert {str(error) for error in told[1:]} == {"silent"}
+    assert (await shared.answer(), calls) == (3, 3)
+
+
+@in_real_time
+async def test_more_work_than_may_wait_is_refused() -> None:
+    threads, gate = Threads(1, 2, "too much waits"), threading.Event()
+    held = [asyncio.ensure_future(threads.run(gate.wait, 20.0)) for _ in range(2)]
+    await asyncio.sleep(0)
+    with pytest.raises(UnavailableError, match="too much waits"):
+        await threads.run(abs, -1)
+    gate.set()
+    await asyncio.gather(*held)
+    assert await threads.run(abs, -1) == 1
+
+
+@in_real_time
 async def test_many_questions_at_once_leave_the_way_to_the_drones_free(folder: Path) -> None:
     async with served(NOBODY, folder=folder) as station:
         many = [asyncio.ensure_future(got(station, "/export?store=monday&format=json")) for _ in range(20)]
@@ -213,7 +305,10 @@ async def test_many_questions_at_once_leave_the_way_to_the_drones_free(folder: P
         assert {(await answer)[0] for answer in many} == {200}
 
 
-JSON_DECISION = {"id": "12345678", "place": "AL-02-2-1", "what": "looking", "who": " Ann ", "note": "=1+2"}
+JSON_DECISION = {
+    "id": "12345678", "place": "AL-02-2-1", "what": "looking", "who": " Ann ", "note": "=1+2",
+    "seen_s": 1_700_000_000.0,
+}  # fmt: skip
 
 
 @in_real_time
@@ -230,11 +325,35 @@ async def test_a_decision_is_noted_once_for_the_look_that_is_shown(folder: Path)
         assert (await got(station, "/decisions?store=none"))[1] == {"decisions": []}
 
 
+@in_real_time
+async def test_no_decision_closes_a_look_that_nobody_saw(folder: Path) -> None:
+    headers, way = {"Content-Type": "application/json"}, "/decisions?store=monday"
+
+    async def decided(station: Station, number: int, **said: object) -> tuple[int, Any]:
+        body = JSON_DECISION | {"id": f"decision-{number}", "what": "fine"} | said
+        return await posted(station, way, json.dumps(body).encode(), **headers)
+
+    async with served(NOBODY, folder=folder) as station:
+        shown = (await got(station, "/places?store=monday"))[1]["places"]["AL-02-2-1"]["seen_s"]
+        with SqliteStore(folder / "monday") as store:
+            store.commit(look("AL-02-2-1", LocationState.OCCLUDED, at_s=60))
+        for number, seen_s in enumerate((shown, None)):
+            code, told = await decided(station, number, seen_s=seen_s)
+            assert (code, told["refused"]) == (
+                409, "the place was looked at again meanwhile; decide about what is shown of it now"
+            )  # fmt: skip
+        assert not (folder / "ground.db").exists()
+        shown = (await got(station, "/places?store=monday"))[1]["places"]["AL-02-2-1"]["seen_s"]
+        code, noted = await decided(station, 2, seen_s=shown)
+        assert (code, noted["seen_s"]) == (200, shown)
+        assert (await decided(station, 3, place="BL-01-1-2", seen_s=None))[0] == 200, "nobody looked there"
+
+
 @pytest.mark.parametrize(
     "changed",
     [
         {"what": "burn"}, {"who": ""}, {"who": "  "}, {"who": "x" * 61}, {"note": "x" * 501}, {"id": "short"},
-        {"place": "nowhere"}, {"place": ""}, {"more": 1}, {"note": "x" * 5000},
+        {"place": "nowhere"}, {"place": ""}, {"more": 1}, {"note": "x" * 5000}, {"seen_s": "now"},
     ],
 )  # fmt: skip
 @in_real_time

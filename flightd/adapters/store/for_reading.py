@@ -24,11 +24,13 @@ _TRIES = 5
 
 
 @contextmanager
-def opened_for_reading(folder: Path) -> Iterator[SqliteStore]:
+def opened_for_reading(folder: Path, *, untouched: bool = False) -> Iterator[SqliteStore]:
     """The store in `folder`, to look at; nothing that is written to it need stay.
 
-    Raises what `SqliteStore` raises, and UnavailableError for one that changes too fast to be copied."""
-    if not (folder / _DATABASE).exists() or _is_writable(folder):
+    `untouched`: through a copy wherever it lies, so that nothing in the folder changes, its writer's log
+    neither, while a flight counts into it or after one was cut off.  Raises what `SqliteStore` raises, and
+    UnavailableError for one that changes too fast to be copied."""
+    if not (folder / _DATABASE).exists() or (not untouched and _is_writable(folder)):
         with SqliteStore(folder, create=False) as store:
             yield store
         return

@@ -187,6 +187,8 @@ class SqliteStore:
                 yield
             except sqlite3.Error as err:
                 raise UnavailableError(f"{self._file}: cannot be read: {err}") from err
+            except (TypeError, ValueError) as err:  # of a row that is none of ours
+                raise InputError(f"{self._file}: no inventory, or a damaged one: {err}") from err
 
     def plan(self, locations: Iterable[PlannedLocation]) -> None:
         """Make locations known; the node of a known one follows the newest plan."""
@@ -283,8 +285,7 @@ class SqliteStore:
             "SELECT observation, symbology, text, sure, agreeing, quality, gs1 FROM code_read "
             "ORDER BY observation, number"
         ):
-            elements = tuple((ai, value) for ai, value in json.loads(gs1))
-            read = CodeRead(symbology, text, (), bool(sure), agreeing, quality, elements)
+            read = CodeRead(symbology, text, (), bool(sure), agreeing, quality, _elements(gs1))
             reads.setdefault(seen, []).append(read)
         rows = self._db.execute(
             "SELECT id, run, location, utc_ns, state, confidence, evidence, "
@@ -310,6 +311,16 @@ class SqliteStore:
                 self._insert(observation, standing)
             after = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
         return int(after - before)
+
+
+def _elements(gs1: str) -> tuple[tuple[str, str], ...]:
+    """ValueError, TypeError for what are no GS1 elements."""
+    elements = tuple((ai, value) for ai, value in json.loads(gs1))
+    for ai, value in elements:
+        f"{ai}{value}".encode()  # half a character is no text
+        if not (isinstance(ai, str) and isinstance(value, str)):
+            raise TypeError("GS1 elements that are no text")
+    return elements
 
 
 def _observation(row: tuple[Any, ...], reads: tuple[CodeRead, ...]) -> Observation:

@@ -1,5 +1,5 @@
 """The flights below a folder: which there are, each played back, its report.
 
-`flight_index` keeps the list, `reading_process` reads logs outside the station's loop, `routes` answers.
+`flight_index` keeps the list, `routes` answers.
 Requests name a flight by its id, never by a path.
 """

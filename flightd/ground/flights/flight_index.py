@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -13,7 +15,10 @@ import msgspec
 from flightd.core.errors import FlightdError, TransientError
 from flightd.ground.flights.flight_row import FlightRow, read_rows, unreadable
 from flightd.ground.flights.log_folder import FoundLog, FoundLogs, find_logs
+from flightd.ground.reading_process import NotStartedError
+from flightd.ground.shown_text import shown
 
+_LOG = logging.getLogger(__name__)
 _FRESH_S = 3.0
 """The folder is looked through again at most this often."""
 _AT_ONCE = 12
@@ -29,6 +34,16 @@ class Reader(Protocol):
     async def run(self, function: Callable[..., T], within_s: float, *args: Any) -> T: ...
 
 
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """What a version of the list says."""
+
+    rows: tuple[FlightRow, ...] = ()
+    cut: bool = False
+    trouble: str = ""
+    looked: bool = False
+
+
 class FlightIndex:
     """`run` keeps it going; `listing` is what is known now, as JSON."""
 
@@ -42,8 +57,10 @@ class FlightIndex:
         self._unread = 0
         self._looked = False
         self._looked_s = 0.0
+        self._looks = 0
         self._version = 0
-        self._told: tuple[int, bytes] = (-1, b"")
+        self._newest = _Told()
+        self._told: tuple[int, msgspec.Raw] = (-1, msgspec.Raw())
         self._asked = asyncio.Event()
         self._changed = asyncio.Condition()
 
@@ -57,6 +74,10 @@ class FlightIndex:
                 self._trouble = ""
             except FlightdError as err:
                 self._trouble = str(err)
+            except Exception as err:  # noqa: BLE001 - its end would be the station's
+                _LOG.exception("the list of flights failed")
+                self._trouble = f"the list of flights failed: {type(err).__name__}: {err}"
+            self._looks += 1
             self._looked, self._looked_s = True, asyncio.get_running_loop().time()
             await self._tell()
             await asyncio.sleep(_FRESH_S)
@@ -69,29 +90,27 @@ class FlightIndex:
         if known == self._version:
             return msgspec.json.encode({"version": self._version, "unread": self._unread, "rows": None})
         if self._told[0] != self._version:
-            rows = [self._rows[log_id][1] for log_id in self._found if log_id in self._rows]
-            document = {
+            self._told = (self._version, msgspec.Raw(msgspec.json.encode(self._newest.rows)))
+        return msgspec.json.encode(
+            {
                 "version": self._version,
-                "looked": self._looked,
+                "looked": self._newest.looked,
                 "unread": self._unread,
-                "cut": self._cut,
-                "trouble": self._trouble,
-                "rows": rows,
+                "cut": self._newest.cut,
+                "trouble": self._newest.trouble,
+                "rows": self._told[1],
             }
-            self._told = (self._version, msgspec.json.encode(document))
-        return self._told[1]
+        )
 
     async def log(self, log_id: str) -> FoundLog | None:
         """The log of that id; None where there is none.  Looks through the folder where it does not know
         it, and again soon where it does."""
         self._asked.set()
         if log_id not in self._found and not self._is_fresh():
-            version = self._version
+            looks = self._looks
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(_WITHIN_S), self._changed:
-                    await self._changed.wait_for(
-                        lambda: log_id in self._found or (self._looked and self._version > version)
-                    )
+                    await self._changed.wait_for(lambda: log_id in self._found or self._looks > looks)
         return self._found.get(log_id)
 
     def row(self, log_id: str) -> FlightRow | None:
@@ -102,6 +121,7 @@ class FlightIndex:
         found: FoundLogs = await self._reader.run(find_logs, _WITHIN_S, self._root)
         self._found = {log.id: log for log in found.logs}
         self._cut = found.cut
+        self._looks += 1
         self._rows = {key: row for key, row in self._rows.items() if key in self._found}
         unread = [log for log in found.logs if self._is_unread(log)]
         self._unread = len(unread)
@@ -122,6 +142,8 @@ class FlightIndex:
         reader its life costs no other its row."""
         try:
             return await self._reader.run(read_rows, _WITHIN_S, self._root, logs)
+        except NotStartedError:
+            raise  # no log's fault
         except TransientError as err:
             if len(logs) == 1:
                 return (unreadable(logs[0], err.what),)
@@ -132,6 +154,11 @@ class FlightIndex:
         return known is None or known[0] != log.stamp or known[1].running
 
     async def _tell(self) -> None:
-        self._version += 1
+        """A version of its own for what is new; who waits for a log looks in any case."""
+        rows = tuple(self._rows[log_id][1] for log_id in self._found if log_id in self._rows)
+        newest = _Told(rows, self._cut, shown(self._trouble), self._looked)
+        if newest != self._newest:
+            self._newest = newest
+            self._version += 1
         async with self._changed:
             self._changed.notify_all()

@@ -27,11 +27,13 @@ _ENDED = {Phase.DONE: "completed", Phase.ABORTED: "aborted", Phase.PILOT: "taken
 
 class FlightRow(msgspec.Struct, frozen=True):
     """`trouble` is what is wrong with the log, in a line; "" for a good one.  Numbers are None where they
-    are not known.  `outcome` is completed, aborted, taken over, unfinished, flying or "" (no flight)."""
+    are not known.  `stamp` is another whenever the log is.  `outcome` is completed, aborted, taken over,
+    unfinished, flying or "" (no flight)."""
 
     id: str
     path: str
     bytes: int
+    stamp: str = ""
     running: bool = False
     trouble: str = ""
     started_s: float = 0.0
@@ -61,7 +63,9 @@ def read_rows(root: Path, logs: tuple[FoundLog, ...]) -> tuple[FlightRow, ...]:
 
 def unreadable(log: FoundLog, trouble: str) -> FlightRow:
     """The row of a log of which nothing is known but why."""
-    return FlightRow(log.id, log.shown_path, log.size, trouble=trouble, started_s=log.mtime_ns * 1e-9)
+    return FlightRow(
+        log.id, log.shown_path, log.size, log.mark, trouble=trouble, started_s=log.mtime_ns * 1e-9
+    )
 
 
 def _row(root: Path, log: FoundLog) -> FlightRow:
@@ -92,6 +96,7 @@ def row_of(
         id=blank.id,
         path=blank.path,
         bytes=blank.bytes,
+        stamp=blank.stamp,
         running=running,
         trouble=trouble or ("" if last is not None else "holds no flight"),
         started_s=_started_s(skimmed, blank.started_s),

@@ -86,7 +86,7 @@ def read_report(root: Path, relative: str) -> bytes:
     for name in ("summary.json", "truth.mcap", "inventory.db", "evidence"):
         if path.with_name(name).is_symlink():
             raise InputError(f"{name} beside the log is a link; a report is made of files in its folder only")
-    return render(load_flight(path), counted_beside(path)).encode()
+    return render(load_flight(path), counted_beside(path, untouched=True)).encode()
 
 
 def _head(played: Playback, pictures: tuple[PicturePlace, ...]) -> bytes:

@@ -36,6 +36,11 @@ class FoundLog:
     stamp: tuple[int, ...]
 
     @property
+    def mark(self) -> str:
+        """The stamp for those who only need to know whether it is the same."""
+        return hashlib.sha256(repr(self.stamp).encode()).hexdigest()[:16]
+
+    @property
     def shown_path(self) -> str:
         """The path for people."""
         return os.fsencode(self.relative).decode(errors="replace")

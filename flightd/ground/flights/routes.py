@@ -13,6 +13,7 @@ from starlette.routing import BaseRoute, Route
 from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
 from flightd.ground.flights.flights import Flights
 from flightd.ground.pages import page
+from flightd.ground.shown_text import shown
 
 _JSON = "application/json"
 _BINARY = "application/octet-stream"
@@ -40,7 +41,9 @@ def flight_routes(flights: Flights) -> list[BaseRoute]:
             try:
                 return await answer(flights, request)
             except FlightdError as err:
-                return Response(msgspec.json.encode({"refused": err.what}), _status(err), media_type=_JSON)
+                return Response(
+                    msgspec.json.encode({"refused": shown(err.what)}), _status(err), media_type=_JSON
+                )
 
         return Route(path, guarded, methods=["GET"])
 
@@ -85,15 +88,20 @@ async def _picture(flights: Flights, request: Request) -> Response:
     place = _whole(request.path_params["place"])
     if place is None:
         raise InputError("the flight has no such picture")
-    content = await flights.picture(request.path_params["flight"], place)
-    return Response(content, media_type=_BINARY, headers={"Cache-Control": "private, max-age=600"})
+    stamp, known = request.query_params.get("stamp", ""), request.headers.get("if-none-match", "")
+    picture = await flights.picture(request.path_params["flight"], place, stamp, known)
+    keep = "private, max-age=600, immutable" if picture.stays else "private, no-cache"
+    headers = {"Cache-Control": keep, "ETag": picture.tag}
+    if not picture.content:
+        return Response(status_code=304, headers=headers)
+    return Response(picture.content, media_type=_BINARY, headers=headers)
 
 
 async def _report(flights: Flights, request: Request) -> Response:
     try:
         page = await flights.report(request.path_params["flight"])
     except FlightdError as err:  # a person looks at it, not our page
-        return PlainTextResponse(f"The report cannot be shown: {err.what}.\n", _status(err))
+        return PlainTextResponse(f"The report cannot be shown: {shown(err.what)}.\n", _status(err))
     return HTMLResponse(page, headers=_REPORT_HEADERS)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from dataclasses import asdict
 from functools import cache
 
@@ -12,19 +13,34 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
 
+from flightd.core.errors import UnavailableError
+from flightd.ground.bounded import Room
 from flightd.ground.guide_pages.rendering import picture_folder, rendered, topics
 from flightd.ground.guide_pages.search import GuideSearch
 from flightd.ground.pages import page
 
 MOST_QUERY_CHARS = 200
+_MOST_WAITING = 32
 
 
 def guide_routes() -> list[BaseRoute]:
     """The page at /guide and all that it asks for."""
+    room = Room(_MOST_WAITING, "too many questions to the guide wait already")
+
+    def at(path: str, answer: Callable[[Request], Awaitable[Response]]) -> Route:
+        async def bounded(request: Request) -> Response:
+            try:
+                with room.taken():
+                    return await answer(request)
+            except UnavailableError as err:
+                return _json({"refused": str(err)}, 503)
+
+        return Route(path, bounded, methods=["GET"])
+
     return [
-        Route("/api/guide", _list, methods=["GET"]),
-        Route("/api/guide/search", _search, methods=["GET"]),
-        Route("/api/guide/pages/{topic}", _page, methods=["GET"]),
+        at("/api/guide", _list),
+        at("/api/guide/search", _search),
+        at("/api/guide/pages/{topic}", _page),
         Mount("/api/guide/pictures", StaticFiles(directory=picture_folder())),
         *page("/guide"),
     ]

@@ -63,7 +63,8 @@
 
   // out to other programs: the rows of `flightd inventory export`, of the places that are shown
 
-  const inert = (cell) => typeof cell === "string" && /^'*[=+\-@\t\r\n]/.test(cell) ? "'" + cell : String(cell);
+  const FORMULA = /(?<=^|[;\t\r\n])(?=['"]*[=+\-@\t\r\n])/g; // as core.csv_text has it
+  const inert = (cell) => (typeof cell === "string" ? cell.replace(FORMULA, "'") : String(cell));
   const quoted = (cell) => /[",\r\n]/.test(cell) ? '"' + cell.replaceAll('"', '""') + '"' : cell;
   const line = (cells) => cells.map((cell) => quoted(inert(cell))).join(",") + "\r\n";
   const rows = () => chosen().flatMap((code) => places[code].rows);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import random
+import time
 import zipfile
 from collections.abc import Sequence
 
@@ -151,7 +152,8 @@ DTD = b'<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaa">]><x>&a;</x>'
         (packed({"xl/workbook.xml": DTD[21:].decode().encode("utf-16")}), "holds a document type definition"),
         (packed({"xl/a.xml": b" " * 100_000_001}), "too large when it is unpacked"),
         (packed({f"xl/{i}.xml": b"" for i in range(501)}), "too large when it is unpacked"),
-        (packed({"xl/worksheets/sheet1.xml": b'<row r="999999999">'}), "rows beyond 200,000"),
+        (packed({"xl/workbook.bin": DTD}), "holds a document type definition"),
+        (packed({"x": b" " * ((1 << 20) - 60) + DTD}), "holds a document type definition"),
     ],
 )  # fmt: skip
 def test_what_is_no_table_is_refused_in_one_line(data: bytes, said: str) -> None:
@@ -159,6 +161,47 @@ def test_what_is_no_table_is_refused_in_one_line(data: bytes, said: str) -> None
         read_table(data)
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def with_sheet(xml: bytes, part: str = "xl/worksheets/sheet1.xml") -> bytes:
+    """A good workbook with another first sheet, which may lie elsewhere."""
+    with zipfile.ZipFile(io.BytesIO(workbook(ROWS))) as package:
+        parts = {name: package.read(name) for name in package.namelist()}
+    del parts["xl/worksheets/sheet1.xml"]
+    relations = "xl/_rels/workbook.xml.rels"
+    parts[relations] = parts[relations].replace(b"worksheets/sheet1.xml", part.removeprefix("xl/").encode())
+    parts["[Content_Types].xml"] = parts["[Content_Types].xml"].replace(
+        b"/xl/worksheets/sheet1.xml", f"/{part}".encode()
+    )
+    return packed({**parts, part: xml})
+
+
+SHEET = (
+    '<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>'
+    '<row r="1"><c r="A1"><v>1</v></c><c r="B1"><v>2</v></c></row>{}</sheetData></worksheet>'
+)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        with_sheet(SHEET.format("<row r='99999999999'><c><v>1</v></c></row>").encode()),
+        with_sheet(SHEET.format('<row r="99999999999"/>').encode("utf-16")),
+        with_sheet(SHEET.format('<row r="200001"/>').encode(), "xl/worksheets/sheet1.bin"),
+        with_sheet(SHEET.format("<row/>" * 200_001).encode()),
+    ],
+    ids=["single quotes", "UTF-16", "another name", "no numbers"],
+)
+def test_a_sheet_without_an_end_is_refused_however_it_is_written(data: bytes) -> None:
+    with pytest.raises(InputError, match="rows beyond 200,000"):
+        read_table(data)
+
+
+def test_rows_that_never_close_take_no_longer_than_they_are_long() -> None:
+    began_s = time.process_time()
+    with pytest.raises(InputError):
+        read_table(packed({"xl/worksheets/sheet1.xml": b"<row " * 400_000}))
+    assert time.process_time() - began_s < 5.0, "its square would take minutes"
 
 
 @pytest.mark.parametrize("columns", [(0, 0, None), (0, 2, None), (-1, 1, None), (0, 1, 1), (0, 1, 5)])

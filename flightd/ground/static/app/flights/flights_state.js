@@ -7,6 +7,7 @@ const LIST_AGAIN_MS = 6000;
 const READING_AGAIN_MS = 700;
 const TROUBLE_AGAIN_MS = 3000;
 const KEPT_FLIGHTS = 6;
+const SAME_START_S = 5; // a log that does not say when it began is dated by when it was written
 
 const EMPTY = {
   list: { version: -1, rows: [], looked: false, unread: 0, cut: false, folder: true, trouble: "" },
@@ -53,16 +54,24 @@ async function askList() {
   }
 }
 
-// What is there of a flight; it is fetched where nothing is.
+// What is there of a flight; it is fetched where nothing is, or another flight is written in its place.
 export function opened(id) {
-  const known = flightsState().open.get(id);
-  if (known) return known;
-  const asked = {};
+  const { open, list } = flightsState();
+  const known = open.get(id);
+  const row = list.rows.find((one) => one.id === id);
+  if (known && !(row && isAnother(row, known))) return known;
+  const asked = { listed: row?.stamp };
   keep(id, asked);
   askJson(`/api/flights/${encodeURIComponent(id)}`)
-    .then((told) => keep(id, told))
-    .catch((error) => keep(id, { trouble: error.message }));
+    .then((told) => keep(id, { ...told, listed: row?.stamp }))
+    .catch((error) => keep(id, { trouble: error.message, listed: row?.stamp }));
   return asked;
+}
+
+// The log in the list is not the one that was fetched; one that grows stays the same flight while it is recorded.
+export function isAnother(row, { listed, stamp, row: fetched }) {
+  if (row.stamp === listed || row.stamp === stamp) return false;
+  return row.running && fetched ? Math.abs(row.started_s - fetched.started_s) > SAME_START_S : !row.running;
 }
 
 // Fetch a flight again that could not be had.

@@ -67,13 +67,14 @@ function remembered() {
   }
 }
 
-// Note a decision; throws an Error with words for a person.
+// Note a decision about the look that is shown; throws an Error with words for a person.
 export async function decide(place, what, note) {
-  const { source } = stock();
+  const { source, places } = stock();
+  const seen = places[place]?.seen_s ?? null;
   await asked(`/decisions?${sourceQuery(source)}`, {
     method: "POST",
     headers: { "Content-Type": "application/json" },
-    body: JSON.stringify({ id: newId(), place, what, who: who(), note }),
+    body: JSON.stringify({ id: newId(), place, what, who: who(), note, seen_s: seen }),
   });
   await loadDecisions();
 }

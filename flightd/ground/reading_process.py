@@ -1,4 +1,4 @@
-"""Reads logs in a process of its own: the station's loop never waits for one, and a log that is endless or
+"""Reads files in a process of its own: the station's loop never waits for one, and a file that is endless or
 hostile costs that process, not the station."""
 
 from __future__ import annotations
@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar, cast
 
 from flightd.core.errors import FlightdError, TransientError, UnavailableError
+from flightd.ground.bounded import Room
 from flightd.runtime.child_process import Child
 
 MOST_WAITING = 32
-"""More requests than this are refused."""
+"""More requests than this are refused, unless less is said."""
 _MOST_MEMORY_BYTES = 4 << 30
 _NICE = 10
 """Whoever flies on this machine goes first."""
@@ -38,12 +39,18 @@ class _Failed:
     error: FlightdError
 
 
+class NotStartedError(TransientError):
+    """There was no process to read anything."""
+
+
 class ReadingProcess:
     """One process, started when it is first needed and again after its death; one job at a time."""
 
-    def __init__(self) -> None:
+    def __init__(
+        self, most_waiting: int = MOST_WAITING, refusal: str = "too many flights are being read"
+    ) -> None:
         self._turn = asyncio.Lock()
-        self._waiting = 0
+        self._room = Room(most_waiting, refusal)
         self._child: Child | None = None
         self._ready = asyncio.Event()
 
@@ -52,14 +59,9 @@ class ReadingProcess:
 
         FlightdErrors come through; UnavailableError when too much waits already, TransientError when the
         process dies over it or it takes longer than `within_s` (it is killed then)."""
-        if self._waiting >= MOST_WAITING:
-            raise UnavailableError("too many flights are being read; try again in a moment")
-        self._waiting += 1
-        try:
+        with self._room.taken():
             async with self._turn:
                 answer = await self._answer(_Job(function, args, named), within_s)
-        finally:
-            self._waiting -= 1
         if isinstance(answer, _Failed):
             raise answer.error
         return cast("T", answer)
@@ -76,7 +78,10 @@ class ReadingProcess:
                 child = await self._started()
         except TimeoutError:
             self.close()
-            raise TransientError("the process that reads logs does not start") from None
+            raise NotStartedError("the reading process does not start") from None
+        except OSError as err:  # no more file descriptors, say
+            self._child = None
+            raise NotStartedError(f"the reading process does not start: {err.strerror or err}") from None
         try:
             async with asyncio.timeout(within_s):
                 return await child.ask(job)
@@ -88,7 +93,7 @@ class ReadingProcess:
             raise
         except TransientError as err:
             self._child = None
-            raise TransientError(f"the process that reads logs failed: {err.what}") from None
+            raise TransientError(f"the reading process failed: {err.what}") from None
 
     async def _started(self) -> Child:
         if self._child is None or not self._child.alive:
@@ -113,8 +118,8 @@ def _done(job: _Job) -> object:
     except FlightdError as err:
         return _Failed(err)
     except MemoryError:
-        return _Failed(UnavailableError("the log is too large to be read here"))
+        return _Failed(UnavailableError("it is too large to be read here"))
     except OSError as err:
         return _Failed(UnavailableError(f"cannot be read: {err.strerror or err}"))
-    except Exception as err:  # noqa: BLE001 - the last line before the process: a log may be anything
+    except Exception as err:  # noqa: BLE001 - the last line before the process: a file may be anything
         return _Failed(TransientError(f"cannot be read: {type(err).__name__}: {str(err)[:_SHOWN_CHARS]}"))
