@@ -346,6 +346,6 @@ def test_the_command_takes_the_inventory_beside_the_log_and_the_books(folder: Pa
     assert "Against the expected stock" in out.read_text()
     bare = write_flight(tmp_path / "bare")
     assert counted_beside(bare) is None
-    for wrong in ({"inventory": tmp_path / "none"}, {"expected": folder / "stock.csv"}):
+    for inventory, expected in ((tmp_path / "none", None), (None, folder / "stock.csv")):
         with pytest.raises(InputError, match=r"inventory\.db"):
-            counted_beside(bare, **wrong)
+            counted_beside(bare, inventory, expected)
