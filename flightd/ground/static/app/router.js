@@ -1,4 +1,5 @@
 // Moves between the pages: real paths in one document, so that the way to the drone stays open meanwhile.
+import { leavePage } from "./fetching.js";
 import { pageAt } from "./pages.js";
 import { state, update } from "./store.js";
 
@@ -12,7 +13,11 @@ function routeOf({ pathname, search, hash }) {
 // `replace` leaves no step to go back to: for what is chosen on a page rather than gone to.
 export function goTo(href, { replace = false } = {}) {
   const url = new URL(href, location.href);
-  if (url.href !== location.href) history[replace ? "replaceState" : "pushState"](null, "", url);
+  try {
+    if (url.href !== location.href) history[replace ? "replaceState" : "pushState"](null, "", url);
+  } catch (error) {
+    if (!replace) throw error; // a browser lets a page do so only so often: the next one is kept again
+  }
   arrive();
 }
 
@@ -42,6 +47,7 @@ function isForTheBrowser(event) {
 function arrive() {
   const from = state.route;
   const route = routeOf(location);
+  if (from && from.page !== route.page) leavePage();
   document.title = route.page ? `${route.page.title} · flightd` : "flightd";
   update((s) => {
     s.route = route;
