@@ -377,7 +377,7 @@ def test_the_address_says_which_inventory_and_who_goes_on_is_not_called_back(
         expect(chosen).to_have_value("store/tuesday")
         field = page.get_by_role("searchbox", name="Code or place")
         asked: list[Route] = []
-        page.route("**/api/stock/find*", lambda route: asked.append(route))
+        page.route("**/api/stock/find*", lambda route: asked.append(route))  # noqa: PLW0108 - it is marked
         field.fill("AL-01-1-1")
         field.press("Enter")
         page.wait_for_timeout(100)
