@@ -385,3 +385,25 @@ def test_the_address_says_which_inventory_and_who_goes_on_is_not_called_back(
         asked[-1].continue_()
         page.wait_for_timeout(700)
         expect(page).to_have_url(re.compile("/guide$"))
+
+
+def test_one_comparison_runs_at_a_time_and_the_newest_is_asked_for_when_it_ends(
+    browser: Browser, url: str, folder: Path
+) -> None:
+    with opened(browser, url) as page:
+        asked: list[Route] = []
+        page.route("**/api/stock/compare*", lambda route: asked.append(route))  # noqa: PLW0108 - it is marked
+        books = {"name": "books.csv", "mimeType": "text/csv", "buffer": b"place;code\nAL-01-1-1;PAL-1\n"}
+        page.locator("input[type=file]").set_input_files(books)  # type: ignore[arg-type]
+        page.wait_for_timeout(300)
+        asked[0].continue_()
+        expect(page.get_by_text("books.csv: csv, 1 rows")).to_be_visible()
+        for second in (1, 2, 3):
+            with SqliteStore(folder / "monday") as store:
+                store.commit(look("BL-01-1-2", LocationState.EMPTY, at_s=second))
+            page.wait_for_timeout(1300)
+        assert len(asked) == 2, "what changed since waits for its end"
+        asked[1].continue_()
+        page.wait_for_timeout(500)
+        assert len(asked) == 3
+        asked[2].continue_()
