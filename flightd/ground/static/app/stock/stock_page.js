@@ -76,7 +76,9 @@ function stay(route) {
     if (!asking || stock().troubles.sources || !stock().stores) return;
     arrived = true;
     const place = route.query.get("place");
+    const { chosen, looks } = stock();
     if (place) choose(place);
+    else if (chosen && !looks) loadLooks(chosen); // given up as the page was left
     loadDecisions();
   };
   const again = async () => {
