@@ -1,4 +1,4 @@
-"""The station's HTTP and WebSocket: the page's files, one WebSocket per page, acts by POST."""
+"""The station's HTTP and WebSocket: the page's files, one WebSocket per page, acts over it and by POST."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
+from flightd.core.errors import InputError
+from flightd.ground.acts import carried_out
 from flightd.ground.browser import Browser
 from flightd.ground.flights.flights import Flights
 from flightd.ground.flights.routes import flight_routes
 from flightd.ground.guards import Guard
 from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
-from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES, read_act, read_page_message
+from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES, SentAct, answer_message, read_page_message
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.stock_page import stock_page
@@ -58,16 +59,17 @@ async def _live(hub: Hub, socket: WebSocket) -> None:
     if hub.is_full:
         await socket.close(_FULL, "too many pages are open")
         return
-    with hub.opened() as browser:
-        try:
-            async with asyncio.TaskGroup() as tasks:
-                sending = tasks.create_task(_send(browser, socket), name="page out")
-                await _hear(hub, browser, socket)
-                sending.cancel()
-        except* WebSocketDisconnect:
-            pass  # it is gone: the usual end
-        except* InputError as group:
-            await _close(socket, str(group.exceptions[0]))
+    async with asyncio.TaskGroup() as acts:  # what was ordered is handed on though its page has gone
+        with hub.opened() as browser:
+            try:
+                async with asyncio.TaskGroup() as tasks:
+                    sending = tasks.create_task(_send(browser, socket), name="page out")
+                    await _hear(hub, browser, socket, acts)
+                    sending.cancel()
+            except* WebSocketDisconnect:
+                pass  # it is gone: the usual end
+            except* InputError as group:
+                await _close(socket, str(group.exceptions[0]))
 
 
 async def _send(browser: Browser, socket: WebSocket) -> None:
@@ -77,13 +79,23 @@ async def _send(browser: Browser, socket: WebSocket) -> None:
         await (socket.send_text(message) if isinstance(message, str) else socket.send_bytes(message))
 
 
-async def _hear(hub: Hub, browser: Browser, socket: WebSocket) -> None:
+async def _hear(hub: Hub, browser: Browser, socket: WebSocket, acts: asyncio.TaskGroup) -> None:
     """Everything that the page says.  WebSocketDisconnect when it closes, InputError for nonsense."""
     while True:
-        message = await socket.receive()
-        if message["type"] == "websocket.disconnect":
-            raise WebSocketDisconnect(message.get("code", 1000))
-        hub.hear(browser, read_page_message(message.get("text") or message.get("bytes") or ""))
+        received = await socket.receive()
+        if received["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(received.get("code", 1000))
+        message = read_page_message(received.get("text") or received.get("bytes") or "")
+        if isinstance(message, SentAct):
+            browser.begin_act()
+            acts.create_task(_sent_act(hub, browser, message), name=f"act for {message.drone}")
+        else:
+            hub.hear(browser, message)
+
+
+async def _sent_act(hub: Hub, browser: Browser, sent: SentAct) -> None:
+    status, answer = await carried_out(hub.drones, sent.drone, bytes(sent.act))
+    browser.answer_act(sent.number, answer_message(sent.number, status, answer))
 
 
 async def _close(socket: WebSocket, why: str) -> None:
@@ -92,23 +104,15 @@ async def _close(socket: WebSocket, why: str) -> None:
 
 
 async def _act(hub: Hub, request: Request) -> Response:
-    """Hand an act to a drone.  200: accepted; 4xx, 503: refused, with a reason for a person."""
-    drone = hub.drones.get(request.path_params["drone"])
-    if drone is None:
-        return _answer(404, refused="there is no such drone")
+    """Hand an act to a drone, as `carried_out` says."""
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
         return _answer(415, refused="an act is JSON")
     try:
-        act = read_act(await _body(request))
+        body = await _body(request)
     except InputError as err:
         return _answer(400, refused=str(err))
-    try:
-        accepted = await drone.act(act)
-    except (UnavailableError, TransientError) as err:
-        return _answer(503, refused=str(err))
-    except FlightdError as err:
-        return _answer(409, refused=str(err).removeprefix("refused: "))
-    return _answer(200, accepted=True, repeated=accepted.repeated)
+    status, answer = await carried_out(hub.drones, request.path_params["drone"], body)
+    return _answer(status, **answer)
 
 
 async def _body(request: Request) -> bytes:

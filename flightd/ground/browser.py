@@ -5,8 +5,13 @@ from __future__ import annotations
 import asyncio
 from typing import TypeAlias
 
+from flightd.core.errors import InputError
 from flightd.ground.latest_slots import LatestSlots
 from flightd.ground.messages import Drawn, Echo, PageMessage, PictureKey, Want, topic_message
+
+MOST_ACTS_OF_A_PAGE = 64
+"""So many acts of one page may wait for their answer at once: more than anybody orders."""
+_ANSWER = "answer "
 
 Topic: TypeAlias = tuple[str, str]
 """Drone and topic."""
@@ -21,6 +26,7 @@ class Browser:
         self._pictures: LatestSlots[PictureKey, bytes] = LatestSlots()
         self._wanted: frozenset[PictureKey] = frozenset()
         self._drawing = False
+        self._acting = 0
         self._changed = asyncio.Event()
 
     @property
@@ -35,8 +41,21 @@ class Browser:
 
     @property
     def waiting(self) -> int:
-        """Messages that wait to be taken: never more than there are topics."""
+        """Messages that wait to be taken: never more than there are topics, and answers to acts."""
         return len(self._topics) + len(self._pictures)
+
+    def begin_act(self) -> None:
+        """An act of this page waits for its answer from now on.  InputError where so many wait that no person
+        can have given them."""
+        untaken = sum(topic.startswith(_ANSWER) for _, topic in self._topics.topics())
+        if self._acting + untaken >= MOST_ACTS_OF_A_PAGE:
+            raise InputError(f"{MOST_ACTS_OF_A_PAGE} acts of this page wait for their answer already")
+        self._acting += 1
+
+    def answer_act(self, number: int, message: str) -> None:
+        """The answer to an act that began; no other one takes its place."""
+        self._acting -= 1
+        self.offer(("", f"{_ANSWER}{number}"), message)
 
     def offer(self, topic: Topic, message: str) -> None:
         """A topic's newest value."""

@@ -2,7 +2,8 @@
 
 To the page: JSON `{"drone", "topic", "value"}` (the station's own topics have an empty drone), and pictures
 as binary messages: four bytes with the length of a JSON head (big endian), the head, the JPEG.  From the
-page: `PageMessage` over the WebSocket, `Act` by POST.  What a drone says is passed on as its link says it.
+page: `PageMessage` over the WebSocket, an `Act` there too, or by POST.  What a drone says is passed on as
+its link says it.
 """
 
 from __future__ import annotations
@@ -49,7 +50,16 @@ class Echo(msgspec.Struct, frozen=True, tag="echo", tag_field="say", forbid_unkn
     number: float
 
 
-PageMessage: TypeAlias = Want | Drawn | Echo
+class SentAct(msgspec.Struct, frozen=True, tag="act", tag_field="say", forbid_unknown_fields=True):
+    """An act for a drone.  It is answered by the station's topic `answer` with the same number, HTTP's status
+    and what POST would answer; the act itself is read as POST reads it."""
+
+    number: Annotated[int, Meta(ge=0, le=2**31)]
+    drone: _Name
+    act: msgspec.Raw
+
+
+PageMessage: TypeAlias = Want | Drawn | Echo | SentAct
 
 
 class Act(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -100,6 +110,11 @@ def picture_message(key: PictureKey, answer: PictureAnswer, age_ms: float | None
         "areas": answer.areas,
     }
     return framed_picture(head, jpeg)
+
+
+def answer_message(number: int, status: int, answer: Mapping[str, Any]) -> str:
+    """The answer to a `SentAct` as it goes to the page that sent it."""
+    return topic_message("", "answer", {"number": number, "status": status, **answer})
 
 
 def framed_picture(head: Mapping[str, Any], jpeg: bytes) -> bytes:

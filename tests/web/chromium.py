@@ -55,6 +55,16 @@ def running() -> Iterator[Browser]:
 
 
 @contextlib.contextmanager
+def another(browser: Browser, *flags: str) -> Iterator[Browser]:
+    """Another Chromium beside one that runs, with further flags."""
+    other = browser.browser_type.launch(executable_path=chromium_path(), args=[*_QUIET, *flags])
+    try:
+        yield other
+    finally:
+        other.close()
+
+
+@contextlib.contextmanager
 def station(drones: Sequence[str], listen: str = "127.0.0.1:0", folder: Path | None = None) -> Iterator[str]:
     """`flightd ground` as a person starts it; its address."""
     words = [word for drone in drones for word in ("--drone", drone)]

@@ -231,8 +231,8 @@ def test_plots_show_a_stretch_around_the_time_in_more_detail(browser: Browser, u
         open_flight(page, url)
         asked: list[str] = []
         page.on("request", lambda request: asked.append(request.url))
-        page.keyboard.press("PageUp")
-        page.keyboard.press("PageUp")
+        page.keyboard.press("Shift+ArrowRight")
+        page.keyboard.press("Shift+ArrowRight")
         with page.expect_response(re.compile("/series")):
             page.get_by_label("Plots show").select_option("10 s")
         expect(page.get_by_role("img", name="Height, m, over time")).to_be_visible()
@@ -258,7 +258,7 @@ def test_two_flights_are_compared(size: tuple[int, int], scheme: str, browser: B
         expect(cross).to_contain_text("+7.0 cm")
         expect(cross).to_contain_text("worse")
         expect(page.get_by_role("img", name="Height, m, over time")).to_be_visible()
-        page.keyboard.press("PageUp")
+        page.keyboard.press("Shift+ArrowRight")
         expect(page.get_by_role("img", name="The first flight's drone")).to_have_count(1)
         expect(page.get_by_role("img", name="The second flight's drone")).to_have_count(1)
         assert page.evaluate("document.documentElement.scrollWidth") == size[0]
@@ -298,9 +298,20 @@ def test_a_report_opens_beside_and_reaches_nothing_of_the_station(browser: Brows
 def test_escape_stops_on_this_page_too(browser: Browser, url: str) -> None:
     with opened(browser, f"{url}/flights") as page:
         open_flight(page, url)
-        with page.expect_request("**/drones/demo/acts") as asked:
-            page.keyboard.press("Escape")
-        assert '"command":"stop"' in (asked.value.post_data or "")
+        page.keyboard.press("Escape")
+        expect(page.get_by_role("button", name="STOPPING")).to_be_visible()
+
+
+def test_page_keys_scroll_and_a_flight_takes_focus_and_title(browser: Browser, url: str) -> None:
+    with opened(browser, f"{url}/flights") as page:
+        open_flight(page, url)
+        expect(page.get_by_role("main")).to_be_focused()
+        expect(page).to_have_title(re.compile("2023.* · Flights · flightd$"))
+        for key in ("PageDown", "PageUp"):
+            page.keyboard.press(key)
+        assert now_s(page) == 0.0
+        page.keyboard.press("End")
+        expect(slider(page)).not_to_have_value("0")
 
 
 def test_without_a_folder_the_page_says_how_to_give_one(browser: Browser) -> None:

@@ -127,3 +127,22 @@ def test_a_narrow_page_is_chosen_from_a_list(browser: Browser, url: str) -> None
         page.get_by_role("combobox", name="Page", exact=True).select_option("Cameras")
         heading(page, "Cameras")
         expect(page).to_have_url(f"{url}/guide/cameras")
+
+
+def test_a_topic_takes_focus_and_title_and_is_chosen_by_key_only_when_it_is_meant(
+    browser: Browser, url: str
+) -> None:
+    with opened(browser, f"{url}/guide", NARROW) as page:
+        choice = page.get_by_role("combobox", name="Page")
+        expect(choice).to_have_value("index")
+        choice.focus()
+        page.keyboard.press("ArrowDown")
+        page.keyboard.press("ArrowDown")
+        page.wait_for_timeout(1200)
+        expect(page).to_have_url(f"{url}/guide")
+        picked = choice.input_value()
+        assert picked != "index"
+        page.keyboard.press("Enter")
+        expect(page).to_have_url(f"{url}/guide/{picked}")
+        expect(page.get_by_role("main")).to_be_focused()
+        expect(page).to_have_title(re.compile(". · Guide · flightd$"))

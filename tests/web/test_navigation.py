@@ -102,3 +102,26 @@ def test_a_page_that_cannot_be_had_says_so_and_is_tried_again(
         page.unroute(missing)
         page.get_by_role("button", name="Try again").click()
         expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
+
+
+def test_a_page_that_fails_leaves_the_head_and_stop(browser: Browser, url: str) -> None:
+    with opened(browser, url) as page:
+        expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
+        broken = "export default () => { throw new Error('nothing to draw'); };"
+        page.route(
+            "**/guide_page.js", lambda route: route.fulfill(content_type="text/javascript", body=broken)
+        )
+        page.get_by_role("link", name="Guide", exact=True).click()
+        expect(page.get_by_role("alert").filter(has_text="nothing to draw")).to_be_visible()
+        expect(page.get_by_role("button", name="STOP")).to_be_visible()
+        page.get_by_role("link", name="Live", exact=True).click()
+        expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
+
+
+def test_beside_the_flight_a_drone_that_does_not_fly_is_no_alarm(browser: Browser, url: str) -> None:
+    with opened(browser, url) as page:
+        expect(page.get_by_role("alert").filter(has_text="not heard yet")).to_be_visible()
+        assert re.search(r"[?!.]\.$", page.get_by_role("alert").first.inner_text().strip()) is None
+        page.get_by_role("link", name="Guide", exact=True).click()
+        expect(page.get_by_role("status").filter(has_text="not heard yet")).to_be_visible()
+        expect(page.get_by_role("alert").filter(has_text="not heard yet")).to_have_count(0)

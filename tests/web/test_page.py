@@ -13,7 +13,8 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.core.types import Phase
 from flightd.site.site_file import load_site
-from tests.web.chromium import NARROW, WIDE, hindrances, opened, running, station
+from tests.web.chromium import NARROW, WIDE, another, hindrances, opened, running, station
+from tests.web.holding_relay import holding
 from tests.web.live_flight import LiveFlight
 
 if TYPE_CHECKING:
@@ -29,6 +30,9 @@ CONFIG = load_config(CONFIGS / "sim.toml").with_values(
 )
 WITHIN_MS = 40_000.0
 HOLD_MS = 1300.0
+MOST_CONNECTIONS = 6
+DEAF = "WebSocket.prototype.send = () => {}"
+"""What the page says over its socket reaches nobody from now on."""
 
 expect.set_options(timeout=WITHIN_MS)
 
@@ -229,3 +233,38 @@ def test_a_station_that_ends_is_said_to_be_gone_and_found_again(browser: Browser
         expect(page.get_by_text("The ground station does not answer")).to_be_hidden()
         expect(page.get_by_text("Ready to fly")).to_be_visible()
         context.close()
+
+
+def test_stop_waits_behind_no_slow_request_of_any_page(
+    browser: Browser, url: str, flight: LiveFlight
+) -> None:
+    """A browser opens six connections to a host, for all its pages together."""
+    port = url.rpartition(":")[2]
+    with (
+        holding(int(port)) as relay,
+        another(browser, f"--host-resolver-rules=MAP localhost:{port} 127.0.0.1:{relay.port}") as mapped,
+        opened(mapped, f"http://localhost:{port}") as page,
+    ):
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+        page.evaluate("() => { for (let i = 0; i < 8; i += 1) fetch(`/api/flights?${i}`).catch(() => {}); }")
+        end_s = time.monotonic() + 20.0
+        while relay.held < MOST_CONNECTIONS:
+            assert time.monotonic() < end_s, relay.held
+            page.wait_for_timeout(50)
+        page.keyboard.press("Escape")
+        expect(page.get_by_text("STOP: accepted")).to_be_visible(timeout=3000)
+        assert relay.held == MOST_CONNECTIONS, "none of them was given up for it"
+
+
+def test_stop_goes_by_post_where_the_socket_says_nothing(
+    browser: Browser, url: str, flight: LiveFlight
+) -> None:
+    with opened(browser, url) as page:
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+        page.evaluate(DEAF)
+        with page.expect_request("**/drones/demo/acts") as posted:
+            page.keyboard.press("Escape")
+        expect(page.get_by_text("STOP: accepted")).to_be_visible()
+        answer = posted.value.response()
+        assert answer is not None
+        assert answer.status == 200

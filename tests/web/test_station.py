@@ -8,10 +8,11 @@ import json
 import socket
 import time
 from collections.abc import AsyncIterator, Sequence
+from typing import Any
 
 import pytest
 import zmq
-from websockets.asyncio.client import connect
+from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from flightd.adapters.ground_link.client import Address
@@ -58,6 +59,79 @@ async def test_a_page_is_told_all_that_the_link_says_and_its_acts_reach_the_flig
             await until(lambda: link.requests > 5)
             assert (await told(page, "events"))[-1]["text"] == "look out"
         assert [command.kind for command in link.take_commands()] == [CommandKind.PAUSE]
+
+
+async def answered(page: ClientConnection, number: int, act: object, drone: str = "demo") -> dict[str, Any]:
+    """What the station answers to an act that the page sends over its WebSocket."""
+    await page.send(json.dumps({"say": "act", "number": number, "drone": drone, "act": act}))
+    answer = await told(page, "answer", "")
+    assert answer.pop("number") == number
+    return answer  # type: ignore[no-any-return]
+
+
+@in_real_time
+async def test_an_act_over_the_socket_is_checked_and_answered_as_by_post_and_done_once_over_both() -> None:
+    async with (
+        serving(local()) as link,
+        served(("demo", address_of(link))) as station,
+        telling(link),
+        station.page() as page,
+    ):
+        await told(page, "status")
+        pause = {"id": "the-only-pause", "command": "pause"}
+        assert await answered(page, 1, pause) == {"status": 200, "accepted": True, "repeated": False}
+        code, text = await station.act("demo", None, **pause)
+        assert (code, json.loads(text)) == (200, {"accepted": True, "repeated": True})
+        assert (await answered(page, 2, pause))["repeated"]
+        for number, act in enumerate(
+            (
+                {"id": "to-nowhere", "command": "goto", "node": "Z9"},
+                {"id": "12345678", "command": "goto"},
+                {"id": "short", "command": "land"},
+                {"id": "12345678", "command": "fly"},
+                ["land"],
+            ),
+            start=3,
+        ):
+            code, text = await station.ask(
+                "POST", "/drones/demo/acts", {"Origin": station.origin, **JSON}, json.dumps(act).encode()
+            )
+            assert await answered(page, number, act) == {"status": code, **json.loads(text)}
+        assert (await answered(page, 9, pause, "nobody"))["status"] == 404
+        assert [command.kind for command in link.take_commands()] == [CommandKind.PAUSE]
+
+
+@in_real_time
+async def test_a_stop_is_handed_on_though_its_page_goes_at_once() -> None:
+    async with serving(local()) as link, served(("demo", address_of(link))) as station, telling(link):
+        await until(lambda: link.requests > 2)
+        async with station.page() as page:
+            act = {"id": "the-only-stop", "command": "stop"}
+            await page.send(json.dumps({"say": "act", "number": 1, "drone": "demo", "act": act}))
+        ordered: list[CommandKind] = []
+
+        def came() -> bool:
+            ordered.extend(command.kind for command in link.take_commands())
+            return bool(ordered)
+
+        await until(came)
+        assert ordered == [CommandKind.STOP]
+
+
+@in_real_time
+async def test_a_page_that_orders_more_than_a_person_can_is_closed() -> None:
+    async with served(("demo", NOBODY)) as station, station.page() as page:
+        act = {"id": "12345678", "command": "land"}
+        sent = json.dumps({"say": "act", "number": 1, "drone": "demo", "act": act})
+        with pytest.raises(ConnectionClosed, match="wait for their answer"):
+            await flood(page, sent)
+
+
+async def flood(page: ClientConnection, message: str) -> None:
+    """Send it again and again, and read nothing."""
+    async with asyncio.timeout(20):
+        while True:
+            await page.send(message)
 
 
 @in_real_time

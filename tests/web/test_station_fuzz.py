@@ -30,6 +30,7 @@ PAGE_WORDS = (
     '{"say":"want","pictures":[{"drone":"demo","camera":"down"}]}',
     '{"say":"drawn"}',
     '{"say":"echo","number":1.5}',
+    '{"say":"act","number":1,"drone":"nobody","act":{"id":"12345678","command":"stop"}}',
 )  # fmt: skip
 ACT_WORDS = ('{"id":"12345678","command":"goto","node":"A4"}', '{"id":"12345678","command":"stop"}')
 

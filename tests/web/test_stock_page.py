@@ -19,7 +19,7 @@ from tests.web.chromium import NARROW, WIDE, hindrances, opened, running, statio
 from tests.web.stock_rig import RACKS, RUN, SSCC, code, counted_store, flown_log, look
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Locator, Page
+    from playwright.sync_api import Browser, Locator, Page, Route
 
 pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
 from playwright.sync_api import expect
@@ -347,3 +347,63 @@ def test_a_front_on_the_right_runs_to_the_left_as_who_stands_before_it_sees_it(
             expect(page.get_by_role("heading", name=place, exact=True)).to_be_visible()
         words = "Aisle B, left · bay 2 · level 2 · position 2"
         expect(page.get_by_role("region", name="BL-02-2-2").get_by_text(words)).to_be_visible()
+
+
+def test_a_place_of_a_strange_name_and_a_first_answer_that_fails_stop_nothing(
+    browser: Browser, url: str
+) -> None:
+    with opened(browser, url) as page:
+        page.route(re.compile("/api/stock$"), lambda route: route.abort())
+        page.goto(f"{url}?store=monday&place=constructor")
+        expect(page.get_by_text("the ground station does not answer").first).to_be_visible()
+        page.unroute(re.compile("/api/stock$"))
+        expect(page.get_by_role("heading", name="Stock 6 of 11 places counted")).to_be_visible()
+
+
+def test_the_address_says_which_inventory_and_who_goes_on_is_not_called_back(
+    browser: Browser, url: str, folder: Path
+) -> None:
+    counted_store(folder / "tuesday")
+    with opened(browser, url) as page:
+        chosen = page.get_by_role("combobox", name=re.compile("^Inventory"))
+        expect(chosen).to_have_value("store/tuesday")
+        chosen.select_option("store/monday")
+        expect(page).to_have_url(f"{url}?store=monday")
+        page.get_by_role("link", name="Guide", exact=True).click()
+        expect(page).to_have_url(re.compile("/guide$"))
+        page.evaluate(
+            f"history.pushState(null, '', '{url}?store=tuesday'); dispatchEvent(new Event('popstate'))"
+        )
+        expect(chosen).to_have_value("store/tuesday")
+        field = page.get_by_role("searchbox", name="Code or place")
+        asked: list[Route] = []
+        page.route("**/api/stock/find*", lambda route: asked.append(route))  # noqa: PLW0108 - it is marked
+        field.fill("AL-01-1-1")
+        field.press("Enter")
+        page.wait_for_timeout(100)
+        page.get_by_role("link", name="Guide", exact=True).click()
+        asked[-1].continue_()
+        page.wait_for_timeout(700)
+        expect(page).to_have_url(re.compile("/guide$"))
+
+
+def test_one_comparison_runs_at_a_time_and_the_newest_is_asked_for_when_it_ends(
+    browser: Browser, url: str, folder: Path
+) -> None:
+    with opened(browser, url) as page:
+        asked: list[Route] = []
+        page.route("**/api/stock/compare*", lambda route: asked.append(route))  # noqa: PLW0108 - it is marked
+        books = {"name": "books.csv", "mimeType": "text/csv", "buffer": b"place;code\nAL-01-1-1;PAL-1\n"}
+        page.locator("input[type=file]").set_input_files(books)  # type: ignore[arg-type]
+        page.wait_for_timeout(300)
+        asked[0].continue_()
+        expect(page.get_by_text(re.compile("^books.csv: CSV"))).to_be_visible()
+        for second in (1, 2, 3):
+            with SqliteStore(folder / "monday") as store:
+                store.commit(look("BL-01-1-2", LocationState.EMPTY, at_s=second))
+            page.wait_for_timeout(1300)
+        assert len(asked) == 2, "what changed since waits for its end"
+        asked[1].continue_()
+        page.wait_for_timeout(500)
+        assert len(asked) == 3
+        asked[2].continue_()

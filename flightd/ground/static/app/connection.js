@@ -1,4 +1,4 @@
-// The WebSocket to the station: what it says goes into the store, pictures to whoever shows them.
+// The WebSocket to the station: what it says goes into the store, pictures to whoever shows them, acts on it.
 import { state, take, update } from "./store.js";
 
 const AGAIN_MS = 700;
@@ -6,6 +6,8 @@ const ECHO_MS = 1000;
 const LOST_MS = 3000;
 
 const showing = new Map(); // "drone camera" -> function that draws a picture
+const unanswered = new Map(); // number of an act that was sent -> function that takes its answer
+let acts = 0;
 let socket = null;
 
 export function connect() {
@@ -19,13 +21,37 @@ export function connect() {
     });
     sayWanted();
   };
-  socket.onmessage = ({ data }) => (typeof data === "string" ? take(JSON.parse(data)) : draw(data));
+  socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : draw(data));
   socket.onclose = () => {
+    for (const number of unanswered.keys()) answered({ number });
     update((s) => {
       s.socket = { ...s.socket, open: false, roundTripMs: null };
     });
     setTimeout(connect, AGAIN_MS);
   };
+}
+
+function hear(said) {
+  if (said.drone === "" && said.topic === "answer") answered(said.value);
+  take(said);
+}
+
+// Send an act, which waits behind no request of any page: {status, accepted or refused}; null where the socket
+// is not open, or closed before the answer came.
+export function sendAct(drone, act) {
+  if (socket?.readyState !== WebSocket.OPEN) return Promise.resolve(null);
+  acts += 1;
+  const number = acts;
+  return new Promise((resolve) => {
+    unanswered.set(number, resolve);
+    say({ say: "act", number, drone, act });
+  });
+}
+
+function answered({ number, ...answer }) {
+  const resolve = unanswered.get(number);
+  unanswered.delete(number);
+  resolve?.(answer.status ? answer : null);
 }
 
 // A picture of this camera is wanted while the function that is returned was not called.

@@ -1,6 +1,6 @@
 // How well the drone is heard from here: the page's own way to the station, and the station's to the drone.
 import { shown, state } from "./store.js";
-import { duration } from "./words.js";
+import { duration, isGrounded } from "./words.js";
 
 const SILENT_S = 1.5;
 
@@ -14,10 +14,11 @@ export function hears() {
   const silent = status ? silentFor(shown()) : null;
   if (silent === null || silent > SILENT_S) {
     const since = silent === null ? "" : ` for ${duration(silent)}`;
-    const why = link.trouble ? ` ${link.trouble}.` : "";
+    const why = link.trouble ? ` ${/[.?!]$/.test(link.trouble) ? link.trouble : `${link.trouble}.`}` : "";
     return {
       good: false,
       short: silent === null ? "Not heard yet" : `Silent${since}`,
+      flies: silent !== null && !isGrounded(status),
       text:
         silent === null
           ? `The drone was not heard yet.${why}`

@@ -1,2 +1,2 @@
 // The one door to the vendored library.
-export { html, render, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact.module.js";
+export { Component, html, render, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact.module.js";

@@ -1,4 +1,5 @@
 // The frame of every page: head with STOP, what is wrong with the connection, and the page that is gone to.
+import { Boundary } from "./boundary.js";
 import { Head } from "./head.js";
 import { html } from "./html.js";
 import { forget, loaded } from "./page_loader.js";
@@ -11,7 +12,7 @@ export function Page() {
     <${Head} />
     <main id="main" tabindex="-1">
       <${Silence} />
-      <${Shown} route=${state.route} />
+      <${Boundary} route=${state.route}><${Shown} route=${state.route} /><//>
     </main>
   `;
 }

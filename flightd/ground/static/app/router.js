@@ -1,4 +1,6 @@
 // Moves between the pages: real paths in one document, so that the way to the drone stays open meanwhile.
+import { leavePage } from "./fetching.js";
+import { useEffect } from "./html.js";
 import { pageAt } from "./pages.js";
 import { state, update } from "./store.js";
 
@@ -10,15 +12,20 @@ function routeOf({ pathname, search, hash }) {
 }
 
 // `replace` leaves no step to go back to: for what is chosen on a page rather than gone to.
-export function goTo(href, { replace = false } = {}) {
+// `keepFocus`: by what the person does on and on, such as typing.
+export function goTo(href, { replace = false, keepFocus = replace } = {}) {
   const url = new URL(href, location.href);
-  if (url.href !== location.href) history[replace ? "replaceState" : "pushState"](null, "", url);
-  arrive();
+  try {
+    if (url.href !== location.href) history[replace ? "replaceState" : "pushState"](null, "", url);
+  } catch (error) {
+    if (!replace) throw error; // a browser lets a page do so only so often: the next one is kept again
+  }
+  arrive({ keepFocus });
 }
 
 // Follow where the address bar points, and links to our own pages without leaving the document.
 export function followLinks() {
-  window.addEventListener("popstate", arrive);
+  window.addEventListener("popstate", () => arrive());
   document.addEventListener("click", (event) => {
     const link = event.target.closest?.("a[href]");
     if (!link || !isOurs(link) || isForTheBrowser(event)) return;
@@ -26,6 +33,14 @@ export function followLinks() {
     goTo(link.href);
   });
   arrive();
+}
+
+// What the page shows now, as soon as it is known, before the page's own name in the title.
+export function useTitle(what) {
+  const { page, path } = state.route;
+  useEffect(() => {
+    if (what && page && what !== page.title) document.title = `${what} · ${page.title} · flightd`;
+  }, [what, path]);
 }
 
 function isOurs(link) {
@@ -39,14 +54,16 @@ function isForTheBrowser(event) {
   return event.defaultPrevented || event.button !== 0 || event.ctrlKey || event.metaKey || event.shiftKey || event.altKey;
 }
 
-function arrive() {
+function arrive({ keepFocus = false } = {}) {
   const from = state.route;
   const route = routeOf(location);
-  document.title = route.page ? `${route.page.title} · flightd` : "flightd";
+  if (from && from.page !== route.page) leavePage();
+  const isElsewhere = from && from.path !== route.path;
+  if (!from || isElsewhere) document.title = route.page ? `${route.page.title} · flightd` : "flightd";
   update((s) => {
     s.route = route;
   });
-  if (!from || from.page === route.page) return;
+  if (!isElsewhere || keepFocus) return;
   window.scrollTo(0, 0);
   document.getElementById("main")?.focus({ preventScroll: true }); // the next Tab is the new page's first
 }

@@ -1,6 +1,7 @@
 // What the drone says, in words and numbers for people.
 
 const PHASES = {
+  __proto__: null,
   preflight: () => "On the ground",
   recover: () => "Taking over in the air",
   arming: () => "Arming",
@@ -27,10 +28,12 @@ export const isTroubled = (status) => TROUBLED.has(status.phase);
 export const isGrounded = (status) => GROUNDED.has(status.phase);
 
 export const COMMANDS = {
+  __proto__: null,
   start: "Start", pause: "Pause", resume: "Resume", goto: "Go to", home: "Fly home", land: "Land here", stop: "STOP",
 };
 
 export const ACTIONS = {
+  __proto__: null,
   hold: "holds", land: "lands", home: "flies home", report: "reports it", relocate: "looks for its place",
   hands_off: "hands off", stop: "comes down at once", continue: "goes on", configured: "as configured",
 };

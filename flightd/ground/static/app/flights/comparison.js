@@ -1,5 +1,6 @@
 // Two flights compared: both tracks on one map, plots over each other, figures side by side.
 import { html, useMemo, useState } from "../html.js";
+import { useTitle } from "../router.js";
 import { phaseWords } from "../words.js";
 import { isMark, momentAt, phaseSpans, takeOff } from "./at_time.js";
 import { date, differenceIn, FIGURES, isEstimate, outcomeWords, told, tone, verdictWords, withEstimates } from "./figures.js";
@@ -24,6 +25,7 @@ export function Comparison({ ids }) {
 }
 
 function Both({ ids, known }) {
+  useTitle("Two flights compared");
   const [byTakeOff, setByTakeOff] = useState(true);
   const flights = known.map(({ flight }, which) => ({
     id: ids[which], flight, row: known[which].row, kind: KINDS[which], shift: byTakeOff ? -takeOff(flight) : 0,

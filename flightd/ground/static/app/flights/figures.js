@@ -66,6 +66,7 @@ export const date = (row) => DATE.format(new Date(row.started_s * 1000));
 export const fullDate = (row) => FULL_DATE.format(new Date(row.started_s * 1000));
 
 const OUTCOMES = {
+  __proto__: null,
   completed: "Completed", aborted: "Aborted", "taken over": "Pilot took over", unfinished: "Unfinished",
   flying: "Flying", "": "No flight",
 };

@@ -1,6 +1,6 @@
 // What is known of the flights: the list, those that were opened, and where their playback is.
 // It lies in the store as `flights`; everything is fetched when it is first shown.
-import { askJson } from "../fetching.js";
+import { askJson, isGivenUp } from "../fetching.js";
 import { state, update } from "../store.js";
 
 const LIST_AGAIN_MS = 6000;
@@ -64,7 +64,10 @@ export function opened(id) {
   keep(id, asked);
   askJson(`/api/flights/${encodeURIComponent(id)}`)
     .then((told) => keep(id, { ...told, listed: row?.stamp }))
-    .catch((error) => keep(id, { trouble: error.message, listed: row?.stamp }));
+    .catch((error) => {
+      if (isGivenUp(error)) forgetFlight(id);
+      else keep(id, { trouble: error.message, listed: row?.stamp });
+    });
   return asked;
 }
 

@@ -60,9 +60,14 @@ export function usePlayback(span, pictures) {
 function isFor(event) {
   if (event.ctrlKey || event.metaKey || event.altKey) return false;
   const control = event.target.closest?.("input, textarea, select, button, a, summary");
+  if (isOfThePage(event)) return false;
   if (!control || control.matches("input[type=range]")) return true;
   return event.key !== " " && event.key !== "Enter" && !control.matches("input, textarea, select");
 }
+
+// Home and End of whoever reads a list or a table there are the browser's.
+const isOfThePage = ({ key, target }) =>
+  (key === "Home" || key === "End") && !target.matches?.("body, #main, input[type=range]");
 
 function act(event, span, pictures) {
   const { at } = flightsState().playing;
@@ -71,8 +76,6 @@ function act(event, span, pictures) {
     " ": () => turnRunning(span),
     ArrowRight: () => seek(at + step, span),
     ArrowLeft: () => seek(at - step, span),
-    PageUp: () => seek(at + LONG_STEP_S, span),
-    PageDown: () => seek(at - LONG_STEP_S, span),
     Home: () => seek(span.low, span),
     End: () => seek(span.high, span),
     ".": () => seek(pictures.find((time) => time > at + 0.001) ?? at, span),

@@ -1,5 +1,6 @@
 // One flight played back: map, picture, plots and events at one time.
 import { html, useEffect, useMemo, useRef } from "../html.js";
+import { useTitle } from "../router.js";
 import { capital, phaseWords } from "../words.js";
 import { isMark, lastBefore, momentAt, phaseSpans } from "./at_time.js";
 import { clock, date, faultWords, FIGURES, fullDate, isEstimate, outcomeWords, told, tone, verdictWords, withEstimates } from "./figures.js";
@@ -29,6 +30,7 @@ export function Missing({ id, trouble }) {
 }
 
 function Played({ id, flight, row }) {
+  useTitle(row ? `${title(row, flight)}, ${date(row)}` : title(row, flight));
   const span = useMemo(() => ({ low: 0, high: flight.duration_s }), [flight]);
   const pictures = useMemo(() => flight.pictures.map((picture) => picture.t_s), [flight]);
   const marks = useMemo(() => flight.events.filter(isMark), [flight]);
@@ -102,8 +104,13 @@ function Now({ flight, moment }) {
 }
 
 function EventList({ flight, t, span }) {
-  const list = useRef(null);
   const now = lastBefore(flight.events, t);
+  return useMemo(() => html`<${EventsUntil} flight=${flight} now=${now} span=${span} />`, [flight, now, span]);
+}
+
+// Drawn again only where another event is the newest one: there are thousands of them.
+function EventsUntil({ flight, now, span }) {
+  const list = useRef(null);
   useEffect(() => {
     const item = list.current?.children[Math.max(now, 0)];
     if (item) list.current.scrollTop = item.offsetTop - list.current.clientHeight / 2;

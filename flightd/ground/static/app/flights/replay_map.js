@@ -3,7 +3,7 @@ import { html, useMemo } from "../html.js";
 import { around, Drone, Legend, M, markScale, Nodes, Track, Way } from "../live/map_marks.js";
 import { bounds, Floor } from "../live/site_plan.js";
 import { state, update } from "../store.js";
-import { momentAt, pointsUntil, poseAt, seenAt, visitedAt, wayAt } from "./at_time.js";
+import { lastBefore, momentAt, pointsUntil, poseAt, seenAt, visitedAt, wayAt } from "./at_time.js";
 
 const ONE = [["leg", "next leg"], ["way", "way after it"], ["track", "track"], ["seen", "lines seen"], ["visited", "visited"]];
 const TRUTH = [["truth", "true track"]];
@@ -33,7 +33,7 @@ export function ReplayMap({ shown }) {
         ${alone && html`<${Seen} lines=${seenAt(flight, t)} />`}
         <${Way} from=${pose} way=${way} />
         ${shown.map((one) => html`<${Track} key=${one.kind} points=${pointsUntil(one.flight.track, one.t)} kind=${one.kind} />`)}
-        ${floor && html`<${Nodes} floor=${floor} visited=${visitedAt(flight, t)} goal=${momentAt(flight, t)?.goal} scale=${scale} />`}
+        ${floor && html`<${StillNodes} flight=${flight} t=${t} scale=${scale} />`}
         ${shown.map((one) => html`<${Flown} key=${one.kind} one=${one} scale=${scale} />`)}
       </svg>
       <div class="map-foot">
@@ -58,6 +58,18 @@ function WholeTracks({ shown }) {
       ${shown.length === 1 && shown[0].flight.truth && html`<${Track} points=${pointsUntil(shown[0].flight.truth)} kind="truth" />`}
     `,
     shown.map((one) => one.flight),
+  );
+}
+
+// Drawn again only where a node was visited, or another one is the goal.
+function StillNodes({ flight, t, scale }) {
+  const { floor, events } = flight;
+  const visits = useMemo(() => events.filter(({ name }) => name === "visited"), [events]);
+  const goal = momentAt(flight, t)?.goal;
+  const visited = lastBefore(visits, t);
+  return useMemo(
+    () => html`<${Nodes} floor=${floor} visited=${visitedAt(flight, t)} goal=${goal} scale=${scale} />`,
+    [flight, visited, goal, scale],
   );
 }
 

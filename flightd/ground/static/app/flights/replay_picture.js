@@ -1,4 +1,5 @@
 // The down camera's picture before the time of the playback, with the lines that were found in it.
+import { askStation } from "../fetching.js";
 import { html, useEffect, useRef, useState } from "../html.js";
 import { drawPicture, foundWords, WIDTH } from "../live/camera.js";
 import { lastBefore } from "./at_time.js";
@@ -78,7 +79,7 @@ function forget(kept, spared) {
 
 async function fetched(id, place) {
   try {
-    const answer = await fetch(`/api/flights/${id}/pictures/${place}`);
+    const answer = await askStation(`/api/flights/${id}/pictures/${place}`);
     if (!answer.ok) throw new Error((await answer.json()).refused);
     const data = await answer.arrayBuffer();
     const length = new DataView(data).getUint32(0);

@@ -1,5 +1,6 @@
 // Which colour stands for a phase, as in the flight's report.
 export const TONES = {
+  __proto__: null,
   preflight: "ground", arming: "ground", swap: "ground", done: "ground",
   take_off: "climb", climb: "climb", land: "climb",
   acquire: "seek", follow: "follow", hover: "hover", scan: "hover", turn: "turn",

@@ -1,6 +1,7 @@
 // One page of the guide.  Its HTML is the station's own: made of Markdown without any raw HTML.
 import { askJson } from "../fetching.js";
 import { html, useEffect, useRef, useState } from "../html.js";
+import { useTitle } from "../router.js";
 import { capital } from "../words.js";
 
 const HEADINGS_FROM = 3; // so many are worth a list of them
@@ -19,6 +20,7 @@ export function GuideArticle({ topic, hash }) {
     };
   }, [topic, again]);
   const page = told?.topic === topic ? told : null;
+  useTitle(page?.title);
   useEffect(() => {
     if (page?.html) arrive(article.current, hash);
   }, [page, hash]);

@@ -34,7 +34,7 @@ function SearchField({ words }) {
   }, []);
   const search = (text) => {
     const isSearching = location.pathname === "/guide/search"; // each letter is no step to go back to
-    goTo(text ? `/guide/search?q=${encodeURIComponent(text)}` : "/guide", { replace: isSearching });
+    goTo(text ? `/guide/search?q=${encodeURIComponent(text)}` : "/guide", { replace: isSearching, keepFocus: true });
   };
   return html`
     <div role="search">
@@ -54,7 +54,17 @@ function PageList({ topic }) {
   }, []);
   const shown = topic || "index";
   const current = pages.find((page) => page.topic === shown);
-  const choose = (event) => goTo(event.target.value === "index" ? "/guide" : `/guide/${event.target.value}`);
+  const byKeys = useRef(false); // an arrow key changes the choice at every press: Enter, or leaving it, goes there
+  const [picked, pick] = useState(null);
+  const choose = ({ target: { value } }) => {
+    pick(null);
+    if (value && value !== shown) goTo(value === "index" ? "/guide" : `/guide/${value}`);
+  };
+  const onChange = (event) => (byKeys.current ? pick(event.target.value) : choose(event));
+  const onKeyDown = (event) => {
+    byKeys.current = event.key !== "Enter";
+    if (event.key === "Enter") choose(event);
+  };
   return html`
     <nav class="guide-pages" aria-label="Guide">
       <ul>
@@ -65,7 +75,8 @@ function PageList({ topic }) {
         )}
       </ul>
       <label class="guide-choice">Page
-        <select value=${current ? shown : ""} onChange=${choose}>
+        <select value=${picked ?? (current ? shown : "")} onPointerDown=${() => (byKeys.current = false)} onKeyDown=${onKeyDown}
+          onChange=${onChange} onBlur=${choose}>
           ${!current && html`<option value="">choose a page</option>`}
           ${pages.map(({ topic: one, title }) => html`<option key=${one} value=${one}>${one === "index" ? "All pages" : title}</option>`)}
         </select>

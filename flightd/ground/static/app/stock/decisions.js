@@ -1,8 +1,10 @@
 // What people decided about places that need a look, and which of them are still open.
+import { isGivenUp } from "../fetching.js";
 import { asked } from "./stock_source.js";
-import { change, differs, inOrder, sourceQuery, stock } from "./stock_state.js";
+import { byKey, change, differs, inOrder, sourceQuery, stock, tellTrouble } from "./stock_state.js";
 
 export const DECISIONS = {
+  __proto__: null,
   looking: { order: "I look", name: "is looked at" },
   put_right: { order: "Put right", name: "put right" },
   count_again: { order: "Count again", name: "to be counted again" },
@@ -19,11 +21,12 @@ export async function loadDecisions() {
   try {
     const { decisions } = await (await asked(`/decisions?${sourceQuery(source)}`)).json();
     if (stock().source !== source) return;
-    const byPlace = {};
+    const byPlace = byKey({});
     for (const decision of decisions) (byPlace[decision.place] ??= []).push(decision);
     if (JSON.stringify(byPlace) !== JSON.stringify(stock().decisions)) change({ decisions: byPlace });
+    tellTrouble("decisions", "");
   } catch (error) {
-    change({ trouble: error.message });
+    if (!isGivenUp(error)) tellTrouble("decisions", error.message);
   }
 }
 

@@ -4,6 +4,7 @@ import { choose, compareAgain, download, forget, upload } from "./expected_stock
 import { stock } from "./stock_state.js";
 
 const OUTCOMES = {
+  __proto__: null,
   match: "as expected",
   missing: "missing",
   wrong: "another code there",
@@ -17,8 +18,9 @@ export const outcomeWords = (outcome) => OUTCOMES[outcome] ?? outcome;
 export function ExpectedCard({ onChoose }) {
   const { expected, source, tag } = stock();
   useEffect(() => {
-    if (expected?.chosen && !expected.busy && expected.tag !== tag) compareAgain();
-  }, [tag]);
+    const isRefused = expected?.trouble && !expected.chosen;
+    if (expected && !expected.busy && !isRefused && expected.tag !== tag) compareAgain();
+  }, [tag, expected?.tag, expected?.busy]);
   if (source?.kind !== "store") return null;
   return html`
     <section class="card expected" aria-labelledby="expected">

@@ -1,6 +1,7 @@
 // The books that a person uploads: sent to the station with the columns chosen, compared there, kept nowhere.
+import { isGivenUp } from "../fetching.js";
 import { asked } from "./stock_source.js";
-import { change, sourceQuery, stock } from "./stock_state.js";
+import { byKey, change, sourceQuery, stock } from "./stock_state.js";
 
 const COMPARE_MS = 60000;
 
@@ -17,8 +18,10 @@ export async function choose(columns) {
   await compare(columnsQuery(chosen));
 }
 
-// Again with what was counted since.
-export const compareAgain = () => compare(columnsQuery(stock().expected.chosen));
+// Again with what was counted since; not while one runs: it is asked for again when that one ends.
+export function compareAgain() {
+  if (!comparing) compare(columnsQuery(stock().expected.chosen));
+}
 
 export function forget() {
   const states = new Set(stock().states);
@@ -26,27 +29,48 @@ export function forget() {
   change({ expected: null, states });
 }
 
-let newest = 0;
+let comparing = null; // {file, source, ending} of the one comparison that runs
+let columnsWanted = null; // of the one that comes next
 
+// One at a time: of those that are asked for meanwhile the newest comes next.
 async function compare(columns) {
-  const number = ++newest;
+  const { expected, source } = stock();
+  columnsWanted = columns;
+  if (comparing) {
+    if (comparing.file !== expected.file || comparing.source !== source) comparing.ending.abort();
+    return;
+  }
+  while (columnsWanted !== null && stock().expected) {
+    const wanted = columnsWanted;
+    columnsWanted = null;
+    await compareOnce(wanted);
+  }
+  columnsWanted = null;
+}
+
+async function compareOnce(columns) {
   const { expected, source, tag } = stock();
-  const isOld = () => number !== newest || stock().source !== source || stock().expected?.file !== expected.file;
+  comparing = { file: expected.file, source, ending: new AbortController() };
+  const isOld = () => columnsWanted !== null || stock().source !== source || stock().expected?.file !== expected.file;
   try {
-    const answer = await (await posted(columns)).json();
-    if (!isOld()) change({ expected: { file: expected.file, name: expected.name, tag, ...answer } });
+    const answer = await (await posted(columns, { signal: comparing.ending.signal, goesOn: false })).json();
+    if (!isOld()) change({ expected: { file: expected.file, name: expected.name, tag, ...answer, outcomes: byKey(answer.outcomes) } });
   } catch (error) {
-    if (!isOld()) change({ expected: { ...stock().expected, busy: false, tag, trouble: error.message } });
+    const known = isGivenUp(error) ? {} : { tag, trouble: error.message }; // given up: again when the page is back
+    if (!isOld()) change({ expected: { ...stock().expected, busy: false, ...known } });
+  } finally {
+    comparing = null;
   }
 }
 
-function posted(query) {
+function posted(query, options = {}) {
   const { expected, source } = stock();
   return asked(`/compare?${sourceQuery(source)}${query}`, {
     method: "POST",
     headers: { "Content-Type": "application/octet-stream" },
     body: expected.file,
-    signal: AbortSignal.timeout(COMPARE_MS),
+    ms: COMPARE_MS,
+    ...options,
   });
 }
 

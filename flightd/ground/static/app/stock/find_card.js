@@ -1,7 +1,8 @@
 // Which inventory is shown, what is looked for in it, and how many places are in which state.
 import { html, useEffect, useRef } from "../html.js";
+import { goTo } from "../router.js";
 import { STATES } from "./states.js";
-import { change, differs, inOrder, isShown, stock } from "./stock_state.js";
+import { change, differs, inOrder, isShown, sourceQuery, stock } from "./stock_state.js";
 import { exportUrl, search, show } from "./stock_source.js";
 
 const TYPING_MS = 250;
@@ -29,8 +30,10 @@ function Source() {
     ...drones.map((name) => ({ kind: "drone", name, words: `${name}, as it tells now` })),
   ];
   const choose = (event) => {
+    const { kind, name } = all.find((one) => valueOf(one) === event.target.value);
     change({ picked: true });
-    show(all.find((one) => valueOf(one) === event.target.value));
+    show({ kind, name });
+    goTo(`/stock?${sourceQuery({ kind, name })}`, { replace: true });
   };
   return html`
     <label class="field">Inventory

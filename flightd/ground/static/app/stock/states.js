@@ -1,5 +1,6 @@
 // The states of a place, in the order of the legend: word, mark in the cell, what it means.
 export const STATES = {
+  __proto__: null,
   read: { name: "Read", mark: "", means: "one code, vouched for" },
   several: { name: "Several codes", mark: "2+", means: "more than one code in one place" },
   empty: { name: "Empty", mark: "", means: "seen to be empty" },

@@ -1,6 +1,7 @@
 // The page Stock: every place of an inventory as it stands, filling while a flight counts.
 import { html, useEffect } from "../html.js";
 import { goTo } from "../router.js";
+import { state } from "../store.js";
 import { loadDecisions } from "./decisions.js";
 import { Elevations, placeCell } from "./elevations.js";
 import { ExceptionsCard } from "./exceptions_card.js";
@@ -14,10 +15,13 @@ import { COUNTED } from "./states.js";
 const AGAIN_MS = { store: 1000, drone: 2000 };
 const SOURCES_MS = 10000;
 const DECISIONS_MS = 4000;
+const TROUBLE_MS = 2000;
 
 export default function StockPage({ route }) {
   useEffect(() => stay(route), []);
-  const { stores, drones, source, trouble, places, chosen } = stock();
+  useEffect(() => follow(route), [route]);
+  const { stores, source, troubles, tag, places, chosen } = stock();
+  const trouble = [...new Set(Object.values(troubles).filter(Boolean))].join("; ");
   if (!stores) return html`<p class="loading quiet" role="status">${trouble || "Loading …"}</p>`;
   if (!source) return html`<${Nothing} />`;
   const codes = Object.keys(places);
@@ -29,7 +33,7 @@ export default function StockPage({ route }) {
         ${trouble && html`<p class="stock-trouble" role="alert">${trouble}</p>`}
         <${FindCard} onChoose=${choose} />
         ${codes.length > 0 && html`<${Elevations} onChoose=${choose} />`}
-        ${codes.length === 0 && !trouble && html`<p class="quiet">Nothing was counted yet.</p>`}
+        ${codes.length === 0 && tag && html`<p class="quiet">Nothing was counted yet.</p>`}
         <${ExceptionsCard} onChoose=${choose} />
         <${ExpectedCard} onChoose=${choose} />
       </div>
@@ -47,24 +51,44 @@ function Nothing() {
   `;
 }
 
+// The inventory that an address names; null: none.
+function wantedOf({ query }) {
+  for (const kind of ["store", "drone"]) {
+    if (query.has(kind)) return { kind, name: query.get(kind) };
+  }
+  return null;
+}
+
+// To another inventory that the address names while the page is shown.
+function follow(route) {
+  const { stores, source } = stock();
+  const wanted = wantedOf(route);
+  if (stores && wanted && !(source?.kind === wanted.kind && source.name === wanted.name)) loadSources(wanted);
+}
+
 // Asks again and again while the page is shown and can be seen.
 function stay(route) {
-  const store = route.query.get("store");
-  const drone = route.query.get("drone");
-  const wanted = store !== null ? { kind: "store", name: store } : drone !== null ? { kind: "drone", name: drone } : null;
-  const first = loadSources(wanted).then(() => {
-    const place = route.query.get("place");
-    if (place) choose(place);
-  });
   let asking = true;
+  let arrived = false;
   let timer = 0;
-  const again = async () => {
-    if (!document.hidden) await loadPlaces();
-    if (asking) timer = setTimeout(again, AGAIN_MS[stock().source?.kind] ?? SOURCES_MS);
+  const arrive = async () => {
+    await loadSources(wantedOf(route));
+    if (!asking || stock().troubles.sources || !stock().stores) return;
+    arrived = true;
+    const place = route.query.get("place");
+    const { chosen, looks } = stock();
+    if (place) choose(place);
+    else if (chosen && !looks) loadLooks(chosen); // given up as the page was left
+    loadDecisions();
   };
-  first.then(again).then(loadDecisions);
+  const again = async () => {
+    if (!arrived && !document.hidden) await arrive();
+    if (asking && !document.hidden) await loadPlaces();
+    if (asking) timer = setTimeout(again, arrived ? (AGAIN_MS[stock().source?.kind] ?? SOURCES_MS) : TROUBLE_MS);
+  };
+  again();
   const decisions = setInterval(() => document.hidden || loadDecisions(), DECISIONS_MS);
-  const sources = setInterval(() => document.hidden || loadSources(null), SOURCES_MS);
+  const sources = setInterval(() => document.hidden || !arrived || loadSources(null), SOURCES_MS);
   return () => {
     asking = false;
     clearTimeout(timer);
@@ -75,6 +99,7 @@ function stay(route) {
 
 function choose(code) {
   const { source } = stock();
+  if (!source || state.route.page?.path !== "/stock") return; // the person has gone on meanwhile
   change({ chosen: code, looks: null });
   const query = new URLSearchParams({ [source.kind]: source.name, ...(code && { place: code }) });
   goTo(`/stock?${query}`, { replace: true });

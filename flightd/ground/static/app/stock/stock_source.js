@@ -1,17 +1,13 @@
 // Asks the station for inventories, places, looks, and what words mean.
-import { change, sourceQuery, stock } from "./stock_state.js";
+import { askStation, isGivenUp } from "../fetching.js";
+import { byKey, change, NOTHING, sourceQuery, stock, tellTrouble } from "./stock_state.js";
 
 const API = "/api/stock";
-const ANSWER_MS = 20000;
+const LOOK_MS = 150;
 
 // The answer's JSON; throws an Error with words for a person.
 export async function asked(path, options = {}) {
-  let answer;
-  try {
-    answer = await fetch(`${API}${path}`, { signal: AbortSignal.timeout(ANSWER_MS), ...options });
-  } catch {
-    throw new Error("the ground station does not answer");
-  }
+  const answer = await askStation(`${API}${path}`, { goesOn: options.method === "POST", ...options });
   if (!answer.ok) throw new Error(await refusal(answer));
   return answer;
 }
@@ -37,18 +33,19 @@ export async function loadSources(wanted) {
     const current = known.find(is(stock().source));
     // a store has pictures and history: one that appears takes the place of a drone that nobody picked
     const stays = current && (current.kind === "store" || stock().picked || stock().chosen);
-    const source = stays ? current : (named ?? known[0] ?? null);
-    change({ folder, stores, drones, trouble: "", picked: stock().picked || Boolean(named) });
-    if (!is(source)(stock().source)) show(source);
+    const source = named ?? (stays ? current : (known[0] ?? null));
+    change({ folder, stores, drones, picked: stock().picked || Boolean(named) });
+    tellTrouble("sources", "");
+    if (source ? !is(source)(stock().source) : stock().source) show(source);
   } catch (error) {
-    change({ trouble: error.message });
+    if (!isGivenUp(error)) tellTrouble("sources", error.message);
   }
 }
 
 export function show(source) {
   change({
-    source, tag: "", fronts: [], places: {}, fresh: new Set(), trouble: "", found: null, words: "", chosen: "", looks: null,
-    expected: null, decisions: {},
+    source, tag: "", fronts: [], places: NOTHING, fresh: new Set(), troubles: {}, found: null, words: "", chosen: "", looks: null,
+    expected: null, decisions: NOTHING,
   });
   return loadPlaces();
 }
@@ -64,16 +61,19 @@ export async function loadPlaces() {
     const tag = answer.headers.get("etag");
     if (stock().source !== source) return;
     if (tag === stock().tag) {
-      if (stock().trouble || stock().fresh.size) change({ trouble: "", fresh: new Set() });
+      tellTrouble("places", "");
+      if (stock().fresh.size) change({ fresh: new Set() });
       return;
     }
-    const { fronts, places } = await answer.json();
-    change({ tag, fronts, places, fresh: newlySeen(stock(), places), trouble: "" });
+    const { fronts, places: told } = await answer.json();
+    const places = byKey(told);
+    change({ tag, fronts, places, fresh: newlySeen(stock(), places) });
+    tellTrouble("places", "");
     const { chosen } = stock();
     if (chosen) loadLooks(chosen);
     if (stock().words) search(stock().words);
   } catch (error) {
-    if (stock().source === source) change({ trouble: error.message });
+    if (stock().source === source && !isGivenUp(error)) tellTrouble("places", error.message);
   } finally {
     loading = false;
     if (stock().source !== source) loadPlaces();
@@ -85,26 +85,41 @@ function newlySeen({ tag, places: before }, places) {
   return new Set(Object.keys(places).filter((code) => places[code].seen_s !== before[code]?.seen_s));
 }
 
+let looking = new AbortController();
+let lookedAt = -LOOK_MS;
+
+// A key that is held goes from place to place faster than the station answers: only where it rests is asked.
 export async function loadLooks(code) {
+  looking.abort();
+  looking = new AbortController();
+  const { signal } = looking;
   const { source } = stock();
   if (source.kind === "drone") return change({ looks: { code, looks: [] } });
+  const isQuick = performance.now() - lookedAt < LOOK_MS;
+  lookedAt = performance.now();
+  if (isQuick) await new Promise((resolve) => setTimeout(resolve, LOOK_MS));
+  if (signal.aborted) return undefined;
   try {
-    const { looks } = await (await asked(`/place?${sourceQuery(source)}&code=${encodeURIComponent(code)}`)).json();
+    const { looks } = await (await asked(`/place?${sourceQuery(source)}&code=${encodeURIComponent(code)}`, { signal })).json();
     if (stock().chosen === code) change({ looks: { code, looks } });
   } catch (error) {
-    if (stock().chosen === code) change({ looks: { code, looks: [], trouble: error.message } });
+    if (stock().chosen === code && !isGivenUp(error)) change({ looks: { code, looks: [], trouble: error.message } });
   }
 }
 
 export async function search(words) {
   change({ words });
   const { source } = stock();
-  if (!words.trim() || !source) return change({ found: null });
+  if (!words.trim() || !source) {
+    tellTrouble("search", "");
+    return change({ found: null });
+  }
   try {
     const { found } = await (await asked(`/find?${sourceQuery(source)}&text=${encodeURIComponent(words)}`)).json();
     if (stock().words === words) change({ found: new Set(found) });
+    tellTrouble("search", "");
   } catch (error) {
-    if (stock().words === words) change({ trouble: error.message });
+    if (stock().words === words && !isGivenUp(error)) tellTrouble("search", error.message);
   }
 }
 

@@ -1,6 +1,10 @@
 // What the page knows: which inventory is shown, its places as the station read them last, and what is chosen.
 import { state, update } from "../store.js";
 
+// By names from outside: a place may be called `constructor`.
+export const byKey = (told) => Object.assign(Object.create(null), told);
+export const NOTHING = Object.freeze(byKey({}));
+
 const EMPTY = {
   folder: "", // name of the folder in which inventories lie; empty: the station was told none
   stores: null, // [{name, written_s}], newest first; null: not asked yet
@@ -9,16 +13,16 @@ const EMPTY = {
   picked: false, // the person has said which
   tag: "", // of what is shown, as the station names it
   fronts: [],
-  places: {}, // code -> {state, texts, confidence, pending, seen_s}
+  places: NOTHING, // code -> {state, texts, confidence, pending, seen_s}
   fresh: new Set(), // places that changed with the newest answer
-  trouble: "",
+  troubles: {}, // of each thing that is asked for: sources, places, decisions, search
   states: new Set(), // that are picked out; empty: all
   words: "", // that are looked for
   found: null, // codes of places that the words mean; null: none are looked for
   chosen: "", // code of the place in the card
   looks: null, // {code, looks} or {code, trouble}
   expected: null, // see expected_stock.js
-  decisions: {}, // of each place, oldest first: see decisions.js
+  decisions: NOTHING, // of each place, oldest first: see decisions.js
   withClosed: false, // places that were decided are listed too
 };
 
@@ -28,6 +32,12 @@ export function change(changes) {
   update((s) => {
     s.stock = { ...(s.stock ?? EMPTY), ...changes };
   });
+}
+
+// What is the matter with one of the things that are asked for; empty: nothing.
+export function tellTrouble(what, text) {
+  if ((stock().troubles[what] ?? "") === text) return;
+  change({ troubles: { ...stock().troubles, [what]: text } });
 }
 
 export function sourceQuery(source) {
