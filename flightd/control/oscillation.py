@@ -24,7 +24,7 @@ LEAST_EASE = 0.35
 """The slowest at which a drone is still held against the air."""
 _SETTLES_NS = 1_000_000_000
 """So long a loop that was slowed down has to come to rest before it is slowed down again."""
-_RESTS_NS = 1_200_000_000
+_RESTS_NS = 800_000_000
 """What was slower than a half swing for so long swings no more."""
 _CALM_NS = 8_000_000_000
 """After so long without a swing the loop is tried faster again, once: what made it swing may have been
