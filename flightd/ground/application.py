@@ -8,9 +8,8 @@ from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 
-import msgspec
 from starlette.applications import Starlette
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
@@ -25,7 +24,8 @@ from flightd.ground.flights.routes import flight_routes
 from flightd.ground.guards import Guard
 from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
-from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES, SentAct, answer_message, read_page_message
+from flightd.ground.json_http import as_json, is_json, json_body, status_of
+from flightd.ground.messages import SentAct, answer_message, read_page_message
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.stock_page import stock_page
@@ -105,28 +105,11 @@ async def _close(socket: WebSocket, why: str) -> None:
 
 async def _act(hub: Hub, request: Request) -> Response:
     """Hand an act to a drone, as `carried_out` says."""
-    if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
-        return _answer(415, refused="an act is JSON")
+    if not is_json(request):
+        return as_json({"refused": "an act is JSON"}, 415)
     try:
-        body = await _body(request)
+        body = await json_body(request, "an act")
     except InputError as err:
-        return _answer(400, refused=str(err))
+        return as_json({"refused": str(err)}, status_of(err, 400))
     status, answer = await carried_out(hub.drones, request.path_params["drone"], body)
-    return _answer(status, **answer)
-
-
-async def _body(request: Request) -> bytes:
-    """The request's body.  InputError for one that is longer than any act, or breaks off."""
-    body = b""
-    try:
-        async for part in request.stream():
-            body += part
-            if len(body) > MAX_PAGE_MESSAGE_BYTES:
-                raise InputError("too long for an act")
-    except ClientDisconnect:
-        raise InputError("it breaks off") from None
-    return body
-
-
-def _answer(status: int, **fields: object) -> Response:
-    return Response(msgspec.json.encode(fields), status, media_type="application/json")
+    return as_json(answer, status)

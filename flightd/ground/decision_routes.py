@@ -9,15 +9,15 @@ from typing import Annotated
 
 import msgspec
 from msgspec import Meta
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from flightd.adapters.ground_link.protocol import DECODE_ERRORS
 from flightd.core.errors import InputError, RunError
 from flightd.ground.decision_book import Decided, Decision, DecisionBook
-from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
-from flightd.ground.stock_routes import StockAnswers, answered, as_json, told_seconds
+from flightd.ground.json_http import as_json, is_json, json_body
+from flightd.ground.stock_routes import StockAnswers, answered, told_seconds
 
 
 class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -46,9 +46,9 @@ def decision_routes(asked: StockAnswers, folder: Path | None) -> list[BaseRoute]
         return as_json({"decisions": [_document(decision) for decision in decisions]})
 
     async def note(request: Request) -> Response:
-        if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
+        if not is_json(request):
             return as_json({"refused": "a decision is JSON"}, 415)
-        said = _read(await _body(request))
+        said = _read(await json_body(request, "a decision"))
         view = await asked.store_view(request)
         place = next((place for place in view.places if place.code == said.place), None)
         if place is None:
@@ -77,18 +77,6 @@ def _read(body: bytes) -> Said:
     if not said.who.strip():
         raise InputError("not a decision: nobody made it")
     return said
-
-
-async def _body(request: Request) -> bytes:
-    body = b""
-    try:
-        async for part in request.stream():
-            body += part
-            if len(body) > MAX_PAGE_MESSAGE_BYTES:
-                raise InputError("too long for a decision")
-    except ClientDisconnect:
-        raise InputError("it breaks off") from None
-    return body
 
 
 def _document(decision: Decision) -> dict[str, object]:

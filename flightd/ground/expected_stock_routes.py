@@ -12,8 +12,9 @@ from starlette.routing import BaseRoute, Route
 
 from flightd.core.errors import InputError
 from flightd.ground.bounded import Room
+from flightd.ground.json_http import as_json
 from flightd.ground.reading_process import ReadingProcess
-from flightd.ground.stock_routes import StockAnswers, answered, as_json, download
+from flightd.ground.stock_routes import StockAnswers, answered, download
 from flightd.ground.uploaded_comparison import compare_upload
 from flightd.inventory.stock_table import MOST_BYTES
 

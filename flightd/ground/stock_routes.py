@@ -12,10 +12,11 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
+from flightd.core.errors import FlightdError, InputError
 from flightd.core.inventory import Observation, Standing
 from flightd.ground.bounded import Threads
 from flightd.ground.evidence_outlines import outlines
+from flightd.ground.json_http import JSON, as_json, status_of
 from flightd.ground.pages import page
 from flightd.ground.shown_text import shown
 from flightd.ground.stores import StockView, Stores
@@ -70,12 +71,9 @@ def answered(answer: _Answer) -> _Answer:
     async def guarded(request: Request) -> Response:
         try:
             return await answer(request)
-        except InputError as err:
-            return _refused(str(err), 404 if request.method == "GET" else 400)
-        except (UnavailableError, TransientError) as err:
-            return _refused(str(err), 503)
         except FlightdError as err:
-            return _refused(str(err).removeprefix("refused: "), 409)
+            mistaken = 404 if request.method == "GET" else 400
+            return _refused(str(err).removeprefix("refused: "), status_of(err, mistaken))
         except OSError as err:
             return _refused(f"cannot be read: {err.strerror or err}", 503)
         except (ArithmeticError, LookupError, TypeError, ValueError) as err:  # of a file that anybody wrote
@@ -87,10 +85,6 @@ def answered(answer: _Answer) -> _Answer:
 
 def _refused(why: str, status: int) -> Response:
     return as_json({"refused": shown(why)}, status)
-
-
-def as_json(value: object, status: int = 200, headers: dict[str, str] | None = None) -> Response:
-    return Response(msgspec.json.encode(value), status, headers, "application/json")
 
 
 class StockAnswers:
@@ -144,7 +138,7 @@ class StockAnswers:
         if request.headers.get("if-none-match") == tag:
             return Response(status_code=304, headers={"ETag": tag})
         document = await self.off_loop(_document, view)
-        return Response(document, headers={"ETag": tag}, media_type="application/json")
+        return Response(document, headers={"ETag": tag}, media_type=JSON)
 
     async def place(self, request: Request) -> Response:
         """One place with all its looks, newest first."""

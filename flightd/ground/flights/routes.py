@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from typing import TypeAlias
 
-import msgspec
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route
 
-from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
+from flightd.core.errors import FlightdError, InputError
 from flightd.ground.flights.flights import Flights
+from flightd.ground.json_http import JSON, as_json, status_of
 from flightd.ground.pages import page
 from flightd.ground.shown_text import shown
 
-_JSON = "application/json"
 _BINARY = "application/octet-stream"
 _SERIES_STRETCHES = 900
 _MOST_DIGITS = 16
@@ -41,9 +40,7 @@ def flight_routes(flights: Flights) -> list[BaseRoute]:
             try:
                 return await answer(flights, request)
             except FlightdError as err:
-                return Response(
-                    msgspec.json.encode({"refused": shown(err.what)}), _status(err), media_type=_JSON
-                )
+                return as_json({"refused": shown(err.what)}, status_of(err))
 
         return Route(path, guarded, methods=["GET"])
 
@@ -59,13 +56,13 @@ def flight_routes(flights: Flights) -> list[BaseRoute]:
 
 async def _list(flights: Flights, request: Request) -> Response:
     if flights.index is None:
-        return Response(b'{"folder":false}', media_type=_JSON)
+        return Response(b'{"folder":false}', media_type=JSON)
     known = _whole(request.query_params.get("known", ""))
-    return Response(flights.index.listing(-1 if known is None else known), media_type=_JSON)
+    return Response(flights.index.listing(-1 if known is None else known), media_type=JSON)
 
 
 async def _head(flights: Flights, request: Request) -> Response:
-    return Response(await flights.head(request.path_params["flight"]), media_type=_JSON)
+    return Response(await flights.head(request.path_params["flight"]), media_type=JSON)
 
 
 async def _series(flights: Flights, request: Request) -> Response:
@@ -80,7 +77,7 @@ async def _series(flights: Flights, request: Request) -> Response:
         raise InputError("stretches is no whole number")
     span = number("from", 0.0), number("to", float("inf"))
     return Response(
-        await flights.series(request.path_params["flight"], *span, int(stretches)), media_type=_JSON
+        await flights.series(request.path_params["flight"], *span, int(stretches)), media_type=JSON
     )
 
 
@@ -101,16 +98,10 @@ async def _report(flights: Flights, request: Request) -> Response:
     try:
         page = await flights.report(request.path_params["flight"])
     except FlightdError as err:  # a person looks at it, not our page
-        return PlainTextResponse(f"The report cannot be shown: {shown(err.what)}.\n", _status(err))
+        return PlainTextResponse(f"The report cannot be shown: {shown(err.what)}.\n", status_of(err))
     return HTMLResponse(page, headers=_REPORT_HEADERS)
 
 
 def _whole(text: str) -> int | None:
     """A whole number that is none too long, else None."""
     return int(text) if len(text) < _MOST_DIGITS and text.isascii() and text.isdigit() else None
-
-
-def _status(err: FlightdError) -> int:
-    if isinstance(err, InputError):
-        return 404
-    return 503 if isinstance(err, UnavailableError | TransientError) else 409

@@ -7,7 +7,6 @@ from collections.abc import Awaitable, Callable
 from dataclasses import asdict
 from functools import cache
 
-import msgspec
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Mount, Route
@@ -17,6 +16,7 @@ from flightd.core.errors import UnavailableError
 from flightd.ground.bounded import Room
 from flightd.ground.guide_pages.rendering import picture_folder, rendered, topics
 from flightd.ground.guide_pages.search import GuideSearch
+from flightd.ground.json_http import as_json
 from flightd.ground.pages import page
 
 MOST_QUERY_CHARS = 200
@@ -33,7 +33,7 @@ def guide_routes() -> list[BaseRoute]:
                 with room.taken():
                     return await answer(request)
             except UnavailableError as err:
-                return _json({"refused": str(err)}, 503)
+                return as_json({"refused": str(err)}, 503)
 
         return Route(path, bounded, methods=["GET"])
 
@@ -48,17 +48,17 @@ def guide_routes() -> list[BaseRoute]:
 
 async def _list(_request: Request) -> Response:
     pages = await asyncio.to_thread(lambda: [rendered(topic) for topic in topics()])
-    return _json({"pages": [{"topic": one.topic, "title": one.title} for one in pages]})
+    return as_json({"pages": [{"topic": one.topic, "title": one.title} for one in pages]})
 
 
 async def _page(request: Request) -> Response:
     topic = request.path_params["topic"]
     if topic not in topics():
-        return _json({"refused": "the guide has no such page"}, 404)
+        return as_json({"refused": "the guide has no such page"}, 404)
     one = await asyncio.to_thread(rendered, topic)
     before, after = _neighbours(topic)
     headings = [asdict(heading) for heading in one.headings]
-    return _json(
+    return as_json(
         {
             "topic": topic, "title": one.title, "html": one.html, "headings": headings,
             "before": before, "after": after,
@@ -69,7 +69,7 @@ async def _page(request: Request) -> Response:
 async def _search(request: Request) -> Response:
     query = request.query_params.get("q", "")[:MOST_QUERY_CHARS]
     hits = await asyncio.to_thread(lambda: _index().find(query))
-    return _json({"query": query, "hits": [asdict(hit) for hit in hits]})
+    return as_json({"query": query, "hits": [asdict(hit) for hit in hits]})
 
 
 @cache
@@ -88,7 +88,3 @@ def _neighbours(topic: str) -> tuple[dict[str, str] | None, dict[str, str] | Non
 
 def _named(topic: str | None) -> dict[str, str] | None:
     return None if topic is None else {"topic": topic, "title": rendered(topic).title}
-
-
-def _json(document: object, status: int = 200) -> Response:
-    return Response(msgspec.json.encode(document), status, media_type="application/json")

@@ -1,0 +1,44 @@
+"""JSON over HTTP: what a page sends, what it is answered, and the status that an error is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import msgspec
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import Response
+
+from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
+from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+
+JSON = "application/json"
+
+
+def as_json(value: object, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
+    return Response(msgspec.json.encode(value), status, headers, JSON)
+
+
+def status_of(err: FlightdError, mistaken: int = 404) -> int:
+    """What went wrong, as HTTP has it; `mistaken`: what was asked for or sent is wrong itself."""
+    if isinstance(err, InputError):
+        return mistaken
+    return 503 if isinstance(err, UnavailableError | TransientError) else 409
+
+
+def is_json(request: Request) -> bool:
+    """Whether its body says that it is JSON: another site's form cannot."""
+    return request.headers.get("content-type", "").partition(";")[0].strip() == JSON
+
+
+async def json_body(request: Request, what: str) -> bytes:
+    """The request's body.  InputError for one that is longer than any message of a page, which `what` names,
+    or breaks off."""
+    body = b""
+    try:
+        async for part in request.stream():
+            body += part
+            if len(body) > MAX_PAGE_MESSAGE_BYTES:
+                raise InputError(f"too long for {what}")
+    except ClientDisconnect:
+        raise InputError("it breaks off") from None
+    return body
