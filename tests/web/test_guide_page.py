@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.web.chromium import NARROW, WIDE, hindrances, opened, running, station
+from tests.web.chromium import NARROW, WIDE, hindrances, opened, station
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -18,12 +18,6 @@ from playwright.sync_api import expect
 
 TABLE = re.compile("Hazards.*The table")
 SIZES = [(WIDE, "light"), (WIDE, "dark"), (NARROW, "light"), (NARROW, "dark")]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with running() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.web.chromium import NARROW, WIDE, hindrances, opened, running, station
+from tests.web.chromium import NARROW, WIDE, hindrances, opened, station
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -17,12 +17,6 @@ pytest.importorskip("playwright", reason="the tests of the page need playwright:
 from playwright.sync_api import expect
 
 NOWHERE = "There is no such page"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with running() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

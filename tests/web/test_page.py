@@ -13,7 +13,7 @@ import pytest
 from flightd.config.schema import load_config
 from flightd.core.types import Phase
 from flightd.site.site_file import load_site
-from tests.web.chromium import NARROW, WIDE, another, hindrances, opened, running, station
+from tests.web.chromium import NARROW, WIDE, another, hindrances, opened, station
 from tests.web.holding_relay import holding
 from tests.web.live_flight import LiveFlight
 
@@ -35,12 +35,6 @@ DEAF = "WebSocket.prototype.send = () => {}"
 """What the page says over its socket reaches nobody from now on."""
 
 expect.set_options(timeout=WITHIN_MS)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with running() as browser:
-        yield browser
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,7 @@ from flightd.core.inventory import LocationState
 from flightd.studies.counted_stock import counted_beside
 from tests.replay.synthetic_count import site_with_racks, write_count, write_stock
 from tests.replay.synthetic_flight import SITE_TOML, write_flight
-from tests.web.chromium import NARROW, WIDE, hindrances, opened, running
+from tests.web.chromium import NARROW, WIDE, hindrances, opened
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -25,12 +24,6 @@ if TYPE_CHECKING:
 pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
 from playwright.sync_api import expect
 from typer.testing import CliRunner
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with running() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ import pytest
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.inventory import LocationState, PlannedLocation
-from tests.web.chromium import NARROW, WIDE, hindrances, opened, running, station
+from tests.web.chromium import NARROW, WIDE, hindrances, opened, station
 from tests.web.stock_rig import RACKS, RUN, SSCC, code, counted_store, flown_log, look
 
 if TYPE_CHECKING:
@@ -23,12 +23,6 @@ if TYPE_CHECKING:
 
 pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
 from playwright.sync_api import expect
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with running() as browser:
-        yield browser
 
 
 @pytest.fixture
