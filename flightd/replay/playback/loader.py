@@ -33,8 +33,8 @@ from flightd.replay.playback.samples import (
     vehicle_table,
 )
 from flightd.replay.playback.seen_floor import seen_floor
+from flightd.replay.recorded_map import recorded_map
 from flightd.site.site import Site
-from flightd.site.site_file import parse_site
 
 _TOPICS = frozenset(
     {
@@ -105,7 +105,9 @@ def load_playback(path: Path) -> Playback:
         gathered.take(entry)
     start_ns = gathered.first_ns or 0
     duration_s = max((gathered.last_ns - start_ns) * 1e-9, _FINEST_S)
-    site, map_error = _site(gathered.maps)
+    site, map_error = recorded_map(gathered.maps)
+    if not gathered.maps:
+        map_error = "no map was recorded"
     moments = _moments(gathered.moments, start_ns)
     poses = gathered.poses.column_set(start_ns)
     truth = _truth(path.with_name("truth.mcap"), start_ns)
@@ -159,16 +161,6 @@ def _moments(told: Sequence[tuple[int, Status]], start_ns: int) -> tuple[Moment,
         )
         for stamp_ns, status in sorted(told, key=lambda one: one[0])
     )
-
-
-def _site(maps: Sequence[Document]) -> tuple[Site | None, str]:
-    """The recorded map, or None and why it cannot be drawn."""
-    if not maps:
-        return None, "no map was recorded"
-    try:
-        return parse_site(maps[-1].text, "the recorded map"), ""
-    except InputError as err:
-        return None, str(err)
 
 
 def _truth(path: Path, start_ns: int) -> Columns | None:

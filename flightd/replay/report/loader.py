@@ -30,6 +30,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.replay.log import FlightLog, read_log
+from flightd.replay.recorded_map import recorded_map
 from flightd.replay.report.flight import (
     NS_PER_S,
     Array,
@@ -44,7 +45,6 @@ from flightd.replay.report.flight import (
 )
 from flightd.replay.smoothed_flight import smooth
 from flightd.site.site import Site
-from flightd.site.site_file import parse_site
 
 _SHORTEST_STOP_S = 0.2
 """A hover that the mission leaves at once is no stop."""
@@ -64,7 +64,7 @@ def load_flight(path: Path) -> RecordedFlight:
     poses = log.messages(GridPose)
     estimate = _estimate(poses, seconds)
     truth = _truth(truths, seconds) if truths else None
-    site, map_error = _site(log)
+    site, map_error = recorded_map(log.messages(Document, Topic.MAP))
     phases = tuple(_phase_spans(statuses, start_ns))
     return RecordedFlight(
         log=log,
@@ -98,17 +98,6 @@ def _summary(path: Path) -> Summary:
     except (OSError, msgspec.DecodeError) as err:
         raise InputError(f"{path}: not a readable summary ({err}); repair or remove it") from None
     return summary
-
-
-def _site(log: FlightLog) -> tuple[Site | None, str]:
-    """The recorded map, or None and why it cannot be drawn: a report without it is worth having."""
-    maps = log.messages(Document, Topic.MAP)
-    if not maps:
-        return None, ""
-    try:
-        return parse_site(maps[-1].text, "the recorded map"), ""
-    except InputError as err:
-        return None, str(err)
 
 
 def _ordered_nodes(log: FlightLog) -> frozenset[str]:
