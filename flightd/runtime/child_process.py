@@ -21,7 +21,6 @@ from flightd.runtime.message_channel import Channel, ChildEnd
 from flightd.runtime.undisturbed_start import undisturbed
 
 _PRELOAD = [
-    "flightd.app.frame_pool",
     "flightd.app.detection.detector_pool",
     "flightd.vision.line_detector",
     "flightd.vision.shelf.shelf_look",

@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import AsyncExitStack, ExitStack, nullcontext
-from datetime import UTC, datetime
 from pathlib import Path
 
 from flightd.adapters.store.sqlite import SqliteStore
@@ -27,9 +26,9 @@ def counts_shelves(config: Config, site: Site) -> bool:
 
 
 class FlightCount:
-    """The inventory of one flight, kept in `folder` if one is given, its looks named by `run` (empty:
-    as configured, or by the time).  Raises what the store raises; where
-    the vehicle may be `in_air` already, that is its `error` instead, and nothing is kept."""
+    """The inventory of one flight, kept in `folder` if one is given, its looks named by `run`.  Raises what
+    the store raises; where the vehicle may be `in_air` already, that is its `error` instead, and nothing is
+    kept."""
 
     def __init__(
         self,
@@ -38,13 +37,13 @@ class FlightCount:
         folder: Path | None,
         stack: ExitStack | AsyncExitStack,
         *,
-        run: str = "",
+        run: str,
         in_air: bool = False,
     ) -> None:
         self._scan = config.scan
         self._stack = stack
         self._store: SqliteStore | None = None
-        self._run = run or config.inventory.run or f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
+        self._run = run
         self._counted: frozenset[str] = frozenset()
         self.error: FlightdError | None = None
         self.scans = counts_shelves(config, site)

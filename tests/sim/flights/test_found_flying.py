@@ -162,8 +162,8 @@ def unopened(folder: Path) -> FlightdError:
     with ExitStack() as stack:
         counting = config.model_copy(update={"front_camera": front})
         with pytest.raises((InputError, UnavailableError)):
-            FlightCount(counting, site, folder, stack)
-        error = FlightCount(counting, site, folder, stack, in_air=True).error
+            FlightCount(counting, site, folder, stack, run="1")
+        error = FlightCount(counting, site, folder, stack, run="1", in_air=True).error
     assert error is not None
     return error
 
