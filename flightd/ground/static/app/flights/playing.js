@@ -35,7 +35,8 @@ export function usePlayback(span, pictures) {
     if (!running) return undefined;
     let last = performance.now();
     let frame = requestAnimationFrame(function run(now) {
-      const { at, speed } = flightsState().playing;
+      const { at, speed, running: goesOn } = flightsState().playing;
+      if (!goesOn) return; // a pause counts at once, not from the next effects on
       const next = at + ((now - last) / 1000) * speed;
       last = now;
       if (next >= high) setPlaying({ at: high, running: false });
