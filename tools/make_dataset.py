@@ -13,7 +13,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from flightd.sim.dataset.generate import COLOURS, write_dataset
+from flightd.sim.dataset.generate import write_dataset
+from flightd.sim.dataset.paint import PAINT_HSV
 from flightd.sim.dataset.scenes import LAYOUTS
 from flightd.sim.dataset.severity import LEVELS
 
@@ -34,7 +35,9 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0, help="seed of the first frame; the others follow")
     parser.add_argument("--size", type=size, default=(1920, 1080), help="WIDTHxHEIGHT (1920x1080)")
-    parser.add_argument("--colour", choices=COLOURS, help="colour of the lines (default: drawn by seed)")
+    parser.add_argument(
+        "--colour", choices=tuple(PAINT_HSV), help="colour of the lines (default: drawn by seed)"
+    )
     parser.add_argument("--layout", choices=LAYOUTS, help="arrangement (default: drawn by seed)")
     parser.add_argument("--masks", action="store_true", help="write each frame's paint mask (for training)")
     wanted = parser.parse_args()

@@ -61,6 +61,7 @@ from flightd.runtime.clock import Hold
 from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 from flightd.site.site import ASSUMED_CEILING_M, Site
 from flightd.vision.line_detector import Detector
+from flightd.vision.lines.colour_profile import SHIPPED
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,8 +305,17 @@ def _demand_ceiling(config: Config, site: Site) -> None:
 
 
 def profile_of(config: Config, site: Site) -> str:
-    """The colour profile that is configured, or else that of the site's lines."""
-    return config.vision.profile or site.line_colour.value
+    """The colour profile that is configured, or else the shipped one of the site's paint.  InputError where
+    none is shipped for it."""
+    if config.vision.profile:
+        return config.vision.profile
+    if site.line_colour not in SHIPPED:
+        raise InputError(
+            f"no profile is shipped for paint {site.line_colour}",
+            key="vision.profile",
+            remedy="train one (page Studio of the ground station, or flightd train-colour) and name its file",
+        )
+    return site.line_colour
 
 
 def detector_pool(config: Config, site: Site, clock: Clock, hold: Hold = nullcontext) -> DetectorPool:

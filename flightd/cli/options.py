@@ -21,7 +21,7 @@ ConfigFile: TypeAlias = Annotated[Path, typer.Option("--config", help="Configura
 
 METHODS: Final = ("naive", "centroid", "skeleton", "combined")
 PROFILE_HELP: Final = (
-    "Colour profile: yellow, white, red, blue, green, black, or a file of `flightd train-colour`."
+    "Colour profile: yellow, white, red, blue, green, black, orange, or a file of `flightd train-colour`."
 )
 
 

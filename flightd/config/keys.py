@@ -46,8 +46,9 @@ def unit_of(key: str, field: FieldInfo) -> str:
 
 
 def range_of(field: FieldInfo) -> str:
-    """The values that a field takes: its bounds, or its choices; "" where there is nothing to say."""
-    choices = choices_of(field.annotation)
+    """The values that a field takes: its bounds, or its choices (a text's as it names them itself,
+    `json_schema_extra={"values": ...}`); "" where there is nothing to say."""
+    choices = choices_of(field.annotation) or _named_values(field)
     if choices:
         return ", ".join(choices)
     low = next((f"above {short(c.gt)}" for c in field.metadata if getattr(c, "gt", None) is not None), "")
@@ -62,6 +63,12 @@ def range_of(field: FieldInfo) -> str:
         return high if high.startswith("below") else f"up to {high}"
     longest = next((c.max_length for c in field.metadata if getattr(c, "max_length", None) is not None), None)
     return "" if longest is None else f"at most {longest} long"
+
+
+def _named_values(field: FieldInfo) -> tuple[str, ...]:
+    extra = field.json_schema_extra
+    named = extra.get("values", ()) if isinstance(extra, Mapping) else ()
+    return tuple(map(str, named)) if isinstance(named, list) else ()
 
 
 def section_of(field: FieldInfo) -> type[BaseModel] | None:

@@ -15,11 +15,14 @@ _MARGIN_M = 1.1
 _HEADER_M = 0.9
 _SHELF_DEPTH_M = 0.8
 _MIN_WIDTH_M = 6.0
-_PAINT = {
+_PAINT: dict[str, str] = {
     LineColour.YELLOW: "#f2bd1d",
     LineColour.WHITE: "#ffffff",
     LineColour.RED: "#c0322f",
     LineColour.BLUE: "#2f63ad",
+    LineColour.GREEN: "#2f8f52",
+    LineColour.BLACK: "#26282b",
+    LineColour.ORANGE: "#e2701f",
 }
 _EXAGGERATED = 10.0
 """How many times as far as it is a line is drawn beside its place."""
@@ -130,7 +133,7 @@ class _Plan:
 
     def _lines(self) -> list[str]:
         """All outlines below all paint, so that crossings stay open."""
-        colour = _PAINT[self._site.line_colour]
+        colour = _PAINT.get(self._site.line_colour, self._site.line_colour)
         rectangles = [self._stroke(line) for line in self._site.lines]
         outlines = [f'<path d="{d}" fill="none" stroke="#6b6047" stroke-width="2"/>' for d in rectangles]
         return [*outlines, *(f'<path d="{d}" fill="{colour}"/>' for d in rectangles)]

@@ -51,7 +51,7 @@ def lay_out(
     pads: Iterable[Pad],
     *,
     line_width_m: float = 0.075,
-    line_colour: LineColour = LineColour.YELLOW,
+    line_colour: str = LineColour.YELLOW,
     ceiling_m: float | None = None,
     interlock: bool = False,
     racks: Sequence[Rack] = (),

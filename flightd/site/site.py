@@ -24,12 +24,15 @@ PAD_REACH_M = 0.5
 
 
 class LineColour(enum.StrEnum):
-    """Colour of the guide paint."""
+    """Colours of guide paint that have a name (`core.paint`); a site may have any other tone, #rrggbb."""
 
     YELLOW = "yellow"
     WHITE = "white"
     RED = "red"
     BLUE = "blue"
+    GREEN = "green"
+    BLACK = "black"
+    ORANGE = "orange"
 
 
 class Side(enum.StrEnum):
@@ -191,7 +194,7 @@ class Site:
     pads: tuple[Pad, ...]
     shelves: tuple[Shelf, ...]
     line_width_m: float
-    line_colour: LineColour
+    line_colour: str
     ceiling_m: float
     racks: tuple[Rack, ...] = ()
     locations: Mapping[str, Location] = field(default_factory=dict)

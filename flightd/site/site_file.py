@@ -3,7 +3,7 @@
     [site]
     name = "demo"                # any text
     line_width_m = 0.075         # 0.05..0.10
-    line_colour = "yellow"       # yellow, white, red, blue
+    line_colour = "yellow"       # yellow, white, red, blue, green, black, orange, or a tone: "#e0521a"
     ceiling_m = 6.0
 
     [[aisle]]                    # one straight line along x
@@ -70,13 +70,14 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, cast
 
-from pydantic import Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from flightd.config.section import Section
 from flightd.core.errors import InputError
 from flightd.core.markers import MarkerDictionary
+from flightd.core.paint import NAMED_PAINTS, checked_paint
 from flightd.site.layout import LayoutError, lay_out
-from flightd.site.site import Aisle, LineColour, Marker, Pad, PadSign, Rack, Side, Site
+from flightd.site.site import Aisle, Marker, Pad, PadSign, Rack, Side, Site
 from flightd.site.ways import KeepOut, OneWay
 
 _Metres = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
@@ -89,7 +90,9 @@ _PadOffset = Annotated[float, Field(ge=-0.5, le=0.5, allow_inf_nan=False)]
 class _SiteTable(Section):
     name: str = Field(min_length=1, max_length=80)
     line_width_m: float = Field(0.075, ge=0.05, le=0.10)
-    line_colour: LineColour = LineColour.YELLOW
+    line_colour: Annotated[str, AfterValidator(checked_paint)] = Field(
+        "yellow", json_schema_extra={"values": [*NAMED_PAINTS, "#rrggbb"]}
+    )
     ceiling_m: float | None = Field(None, gt=0, le=1000, allow_inf_nan=False)
     interlock: bool = False
 
@@ -304,7 +307,7 @@ def _first_mistake(err: ValidationError, tables: dict[str, Any]) -> str:
         case _:
             given = first["input"]
             shown = f" (it is {given!r})" if isinstance(given, str | int | float | bool) else ""
-            return f"{key}: {first['msg']}{shown}"
+            return f"{key}: {first['msg'].removeprefix('Value error, ')}{shown}"
 
 
 def _key(location: tuple[int | str, ...], tables: dict[str, Any]) -> str:

@@ -23,7 +23,7 @@ def floor_status(site: Site) -> FloorStatus:
         nodes=tuple(FloorNode(node.id, node.x_m, node.y_m) for node in site.nodes.values()),
         lines=tuple(FloorLine(line.x0_m, line.y0_m, line.x1_m, line.y1_m) for line in site.lines),
         line_width_m=site.line_width_m,
-        line_colour=site.line_colour.value,
+        line_colour=site.line_colour,
         racks=tuple(
             FloorRack(shelf.aisle, shelf.side.value, shelf.x0_m, shelf.x1_m, shelf.y_m, shelf.height_m)
             for shelf in site.shelves

@@ -315,7 +315,9 @@ class FloorStatus(msgspec.Struct, frozen=True):
     nodes: Annotated[tuple[FloorNode, ...], Meta(description="every node")]
     lines: Annotated[tuple[FloorLine, ...], Meta(description="every painted line")]
     line_width_m: Annotated[float, Meta(description="width of the paint; 0: not told")] = 0.0
-    line_colour: Annotated[str, Meta(description="colour of the paint; empty: not told")] = ""
+    line_colour: Annotated[
+        str, Meta(description="colour of the paint, or its tone as #rrggbb; empty: not told")
+    ] = ""
     racks: Annotated[tuple[FloorRack, ...], Meta(description="every shelf front")] = ()
     keep_outs: Annotated[tuple[FloorArea, ...], Meta(description="every keep-out")] = ()
     pads: Annotated[tuple[FloorPad, ...], Meta(description="every pad")] = ()

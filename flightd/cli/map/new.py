@@ -31,7 +31,10 @@ def new(
     ] = "1.5",
     pitch_m: Annotated[float, typer.Option(help="Metres from aisle to aisle.", min=0.5, max=100)] = 3.0,
     line_width_m: Annotated[float, typer.Option(help="Width of the painted lines.")] = 0.075,
-    line_colour: Annotated[str, typer.Option(help="yellow, white, red or blue.")] = "yellow",
+    line_colour: Annotated[
+        str,
+        typer.Option(help="yellow, white, red, blue, green, black, orange, or any tone as #rrggbb."),
+    ] = "yellow",
     cross_half_m: Annotated[float, typer.Option(help="Half the length of a node's own cross line.")] = 0.5,
     overrun_m: Annotated[float, typer.Option(help="How far the lines run past their end nodes.")] = 0.4,
     shelves: Annotated[

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from flightd.core.paint import is_tone
 from flightd.replay.report.flight import Array, RecordedFlight, Track
 from flightd.replay.report.markup import element, number, path_data, scrolled, text
 from flightd.site.site import Shelf, Side, Site
@@ -109,7 +110,8 @@ def _site(site: Site, place: _Projection) -> str:
         )
         for pad in site.pads
     )
-    return element("g", shelves, lines, pads, class_=f"site {site.line_colour}")
+    tone = f"--paint: {site.line_colour}" if is_tone(site.line_colour) else None
+    return element("g", shelves, lines, pads, class_=f"site {site.line_colour}", style=tone)
 
 
 def _shelf(shelf: Shelf, place: _Projection) -> str:

@@ -28,10 +28,19 @@ PAINT_HSV: dict[str, tuple[float, float, float]] = {
     "blue": (212.0, 0.78, 168.0),
     "green": (138.0, 0.68, 142.0),
     "black": (40.0, 0.10, 26.0),
+    "orange": (22.0, 0.88, 216.0),
 }
 """Hue (degrees), saturation (0..1) and value (0..255) of fresh paint under neutral light."""
 
-_HUE_SPREAD = {"yellow": 4.0, "white": 30.0, "red": 4.0, "blue": 9.0, "green": 12.0, "black": 180.0}
+_HUE_SPREAD = {
+    "yellow": 4.0,
+    "white": 30.0,
+    "red": 4.0,
+    "blue": 9.0,
+    "green": 12.0,
+    "black": 180.0,
+    "orange": 4.0,
+}
 
 FLOORS_HSV = ((45.0, 0.06), (30.0, 0.14), (210.0, 0.07), (90.0, 0.06), (0.0, 0.02), (36.0, 0.20))
 """Hue and saturation of concrete, screed, grey and greenish epoxy, asphalt and dusty beige."""

@@ -12,23 +12,18 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from flightd.core.paint import paint_srgb
 from flightd.core.types import Image
 from flightd.sim.appearance import Appearance
 from flightd.sim.floor.lighting import Lighting
 from flightd.sim.floor.printed_markers import FloorSigns
 from flightd.sim.floor.texture import NoiseField, Patch
 from flightd.sim.floor.wear_marks import FloorMarks
-from flightd.site.site import LineColour, PadSign, PaintedLine, Side, Site
+from flightd.site.site import PadSign, PaintedLine, Side, Site
 
 Floats: TypeAlias = NDArray[np.float32]
 Box: TypeAlias = tuple[float, float, float, float]
 
-_PAINT_SRGB = {  # red, green, blue as a camera sees clean floor paint in good light
-    LineColour.YELLOW: (236, 190, 38),
-    LineColour.WHITE: (232, 232, 226),
-    LineColour.RED: (176, 40, 38),
-    LineColour.BLUE: (34, 84, 168),
-}
 _CONCRETE_SRGB = (152, 150, 144)
 _MAT_SRGB = (58, 58, 61)
 _UPRIGHT_SRGB = (40, 62, 110)
@@ -73,7 +68,7 @@ class Floor:
             for (x_m, y_m), half in ((site.pad_centre(pad), pad.size_m / 2),)
         ]
         self._uprights, self._pallets = _shelf_feet(site) if look.concrete > 0.0 else ([], [])
-        self._paint = _linear(_PAINT_SRGB[site.line_colour])
+        self._paint = _linear(paint_srgb(site.line_colour))
         self._gamma = _gamma_table()
 
     def paint(self, patch: Patch) -> Image:

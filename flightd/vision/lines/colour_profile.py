@@ -35,7 +35,7 @@ Levels: TypeAlias = NDArray[np.uint8]
 """(H, W) uint8: NONE, WEAK or STRONG for each pixel."""
 
 NONE, WEAK, STRONG = 0, 1, 2
-SHIPPED = ("yellow", "white", "red", "blue", "green", "black")
+SHIPPED = ("yellow", "white", "red", "blue", "green", "black", "orange")
 TABLE_SIZE = 65536
 FORMAT_VERSION = 1
 

@@ -177,8 +177,8 @@ def test_the_smear_leaves_mid_exposure_in_place() -> None:
     assert np.abs(edge_offsets_px(blue, at, inward, 9.0)).max() < 0.3
 
 
-@pytest.mark.parametrize("colour", list(LineColour))
-def test_paint_has_its_colour(colour: LineColour) -> None:
+@pytest.mark.parametrize("colour", [*LineColour, "#7a3fa0"])
+def test_paint_has_its_colour(colour: str) -> None:
     site = one_line(colour)
     picture = Renderer(site, SimCamera(), CLEAN).render(hover(1.0, 0.0), 0)
     blue, green, red = (int(v) for v in picture[100, 320])
@@ -191,9 +191,17 @@ def test_paint_has_its_colour(colour: LineColour) -> None:
             assert red > 2 * max(green, blue)
         case LineColour.BLUE:
             assert blue > 1.5 * max(green, red)
+        case LineColour.GREEN:
+            assert green > 1.5 * max(blue, red)
+        case LineColour.BLACK:
+            assert max(red, green, blue) < 60
+        case LineColour.ORANGE:
+            assert red > 1.8 * green > 2.5 * blue
+        case _:
+            assert blue > red > 1.5 * green
 
 
-def one_line(colour: LineColour) -> Site:
+def one_line(colour: str) -> Site:
     return lay_out("one", [Aisle("A", 0.0, 0.0, (2.0,))], [], [Pad("home", "A1", 0.5)], line_colour=colour)
 
 

@@ -90,6 +90,20 @@ def test_files_are_found_from_the_configurations_own_folder(tmp_path: Path) -> N
     assert config.inventory.folder == tmp_path / "stock"
 
 
+def test_a_colour_profile_is_found_beside_the_configuration_and_a_shipped_name_stays_one(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "flightd.toml"
+    (tmp_path / "orange.npz").write_bytes(b"")
+    for told, meant in (
+        ("orange.npz", str(tmp_path / "orange.npz")),
+        ("yellow", "yellow"),
+        ("x" * 999, "x" * 999),
+    ):
+        path.write_text(MINIMAL + f'[vision]\nprofile = "{told}"\n')
+        assert load_config(path).vision.profile == meant
+
+
 def test_other_values_are_checked_as_those_of_a_file() -> None:
     config = load_config(CONFIGS / "sim.toml")
     other = config.with_values(mission={"dwell_s": 0.5, "expert": {"doubt_s": 1.0}})

@@ -126,7 +126,7 @@ def test_a_random_site_is_the_same_for_the_same_seed() -> None:
 def test_random_sites_have_unequal_spacings_and_all_colours() -> None:
     many = [random_site(seed) for seed in range(60)]
     assert all(any(len(set(aisle.spacing_m)) > 1 for aisle in site.aisles) for site in many)
-    assert {site.line_colour.value for site in many} == {"yellow", "white", "red", "blue"}
+    assert {site.line_colour for site in many} == {"yellow", "white", "red", "blue"}
     assert sum(site.line_colour == "yellow" for site in many) > len(many) / 2
 
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from flightd.core.errors import InputError
 from flightd.sim.random_sites import random_site
+from flightd.site.floor_plan_svg import draw_site
 from flightd.site.site import LineColour, Side, Site
 from flightd.site.site_file import load_site, parse_site, site_toml
 
@@ -79,6 +80,14 @@ def test_a_site_goes_to_another_process() -> None:
     assert again.path("A3", "B2") == ("A3", "A2", "A1", "B1", "B2")
 
 
+@pytest.mark.parametrize("paint", ["orange", "green", "black", "#7A3FA0"])
+def test_lines_may_be_of_any_paint(paint: str) -> None:
+    site = parse_site(GOOD.replace('"small"', f'"small"\nline_colour = "{paint}"'), "x.toml")
+    assert site.line_colour == paint.lower()
+    assert parse_site(site_toml(site), "x.toml") == site
+    assert 'fill="#' in draw_site(site)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -86,7 +95,11 @@ def test_a_site_goes_to_another_process() -> None:
         ("[site]", "[sight]", "unknown key; known here: site, aisle, cross, blocked, keep_out, rack, pad, "),
         ('name = "small"', "", "site.name: missing; add it"),
         ("line_width_m = 0.06", "line_width_m = 0.2", "site.line_width_m: Input should be less than"),
-        ("line_width_m = 0.06", 'line_colour = "mauve"', "site.line_colour: Input should be 'yellow'"),
+        (
+            "line_width_m = 0.06",
+            'line_colour = "mauve"',
+            "site.line_colour: no paint; give one of yellow, white, ",
+        ),
         ("line_width_m = 0.06", "line_with_m = 0.06", "site.line_with_m: unknown key; known here: name, "),
         ('id = "B"', 'id = "b2"', "aisle[1] (b2).id: 'b2': an aisle's id is one to three capital letters"),
         ("spacing_m = [1.5, 1.8]", "spacing_m = [1.5, -1.8]", "aisle[0] (A).spacing_m[1]: Input should be g"),

@@ -37,12 +37,15 @@ function depth(rack, racks) {
   return { top: Math.min(rack.y_m, back), bottom: Math.max(rack.y_m, back) };
 }
 
+// A paint without a name of its own is told by its tone.
+const isTone = (paint) => /^#[0-9a-f]{6}$/i.test(paint);
+
 export function Floor({ floor }) {
   return html`
     <g aria-hidden="true">
       ${floor.racks.map((rack) => html`<${Rack} rack=${rack} racks=${floor.racks} />`)}
       ${floor.pads.map((pad) => html`<${Pad} pad=${pad} />`)}
-      <g class=${`paint ${floor.line_colour}`}>
+      <g class=${`paint ${floor.line_colour}`} style=${isTone(floor.line_colour) ? { "--tone": floor.line_colour } : null}>
         ${floor.lines.map(
           (line) => html`
             <line
