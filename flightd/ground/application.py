@@ -29,6 +29,8 @@ from flightd.ground.messages import SentAct, answer_message, read_page_message
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.stock_page import stock_page
+from flightd.ground.studio.routes import studio_routes
+from flightd.ground.studio.studio import Studio
 
 _NOT_OURS = 1008
 """WebSocket: a message that is against the rules."""
@@ -37,7 +39,12 @@ _FULL = 1013
 
 
 def application(
-    hub: Hub, hosts: Iterable[str], folder: Path | None, flights: Flights, uploads: ReadingProcess
+    hub: Hub,
+    hosts: Iterable[str],
+    folder: Path | None,
+    flights: Flights,
+    uploads: ReadingProcess,
+    studio: Studio | None = None,
 ) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked, inventories and `flights`
     lie under `folder`, `uploads` reads what people send."""
@@ -47,6 +54,7 @@ def application(
         Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
         *stock_page(folder, hub.drones, uploads),
         *flight_routes(flights),
+        *studio_routes(studio),
         *guide_routes(),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]

@@ -23,6 +23,7 @@ from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.studio.studio import Studio
 from flightd.runtime.ending_signals import end_on_signals
 
 PORT = 8080
@@ -122,9 +123,10 @@ async def serve(
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  Inventories and flights lie under `folder`."""
     hub, flights, uploads = Hub(drones), Flights(folder), ReadingProcess()
+    studio = None if folder is None else Studio(folder, flights)
     server = _Server(
         uvicorn.Config(
-            application(hub, own_hosts(where.host, where.port), folder, flights, uploads),
+            application(hub, own_hosts(where.host, where.port), folder, flights, uploads, studio),
             http="h11",
             ws="websockets-sansio",
             lifespan="off",
@@ -143,6 +145,8 @@ async def serve(
     async with asyncio.TaskGroup() as tasks:
         station = tasks.create_task(hub.run(), name="hub")
         tasks.create_task(flights.run(), name="flights")
+        if studio is not None:
+            tasks.create_task(studio.run(), name="studio")
         serving = tasks.create_task(server.serve([listener]), name="pages")
         try:
             while not server.started:  # noqa: ASYNC110 - it tells nobody

@@ -67,15 +67,19 @@ class PerceptionDrift:
         return "; ".join(found)
 
 
-def replay_pictures(path: Path, detect: Detect) -> PerceptionDrift:
-    """Run `detect` on every recorded picture whose lines were recorded too.  InputError as `read_log`."""
+def replay_pictures(path: Path, detect: Detect, every: int = 1) -> PerceptionDrift:
+    """Run `detect` on every recorded picture whose lines were recorded too, or each `every`-th of them.
+    InputError as `read_log`."""
     recorded = {lines.frame_seq: lines for lines in read_log(path, {Topic.LINES}).messages(LineSet)}
-    pictures = gone = new = 0
+    seen = pictures = gone = new = 0
     differences: list[tuple[float, float]] = []
     for entry in LogReader(path).entries({Topic.FRAME}):
         picture = entry.message
         before = recorded.get(picture.seq) if isinstance(picture, RecordedFrame) else None
         if before is None or not isinstance(picture, RecordedFrame):
+            continue
+        seen += 1
+        if seen % every:
             continue
         image = (
             cv2.imdecode(np.frombuffer(picture.jpeg, np.uint8), cv2.IMREAD_COLOR) if picture.jpeg else None

@@ -58,19 +58,24 @@ def _shows(label: LabelledImage, colour: str) -> bool:
 
 def _lessons(labelled: Sequence[tuple[Path, LabelledImage]], colour: str) -> Iterator[tuple[Image, Teaching]]:
     for path, label in track(labelled, "reading"):
-        bgr = read_image(path)
-        if label.mask:
-            mask = cv2.cvtColor(read_image(path.parent / label.mask), cv2.COLOR_BGR2GRAY)
-            if mask.shape != bgr.shape[:2]:
-                raise InputError(f"not of the size of {path.name}", file=path.parent / label.mask)
-            teaching = teaching_from_mask(mask.astype("uint8"))
-        else:
-            teaching = teaching_from_label(label, bgr.shape[:2])
-        if label.negative and not label.mask and not label.regions:
-            teaching[:] = FLOOR
-        if not _shows(label, colour):
-            teaching[teaching == PAINT] = FLOOR if label.line_colour != "none" else UNKNOWN
-        yield bgr, teaching
+        yield lesson(path, label, colour)
+
+
+def lesson(path: Path, label: LabelledImage, colour: str) -> tuple[Image, Teaching]:
+    """A labelled picture, and what it teaches of `colour`.  InputError for a picture that cannot be read."""
+    bgr = read_image(path)
+    if label.mask:
+        mask = cv2.cvtColor(read_image(path.parent / label.mask), cv2.COLOR_BGR2GRAY)
+        if mask.shape != bgr.shape[:2]:
+            raise InputError(f"not of the size of {path.name}", file=path.parent / label.mask)
+        teaching = teaching_from_mask(mask.astype("uint8"))
+    else:
+        teaching = teaching_from_label(label, bgr.shape[:2])
+    if label.negative and not label.mask and not label.regions:
+        teaching[:] = FLOOR
+    if not _shows(label, colour):
+        teaching[teaching == PAINT] = FLOOR if label.line_colour != "none" else UNKNOWN
+    return bgr, teaching
 
 
 def as_json(trained: Trained, out: Path) -> str:

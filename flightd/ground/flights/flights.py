@@ -17,6 +17,7 @@ from flightd.ground.flights.flight_view import FlightView, read_framed_picture, 
 from flightd.ground.flights.log_folder import FoundLog
 from flightd.ground.flights.sized_cache import SizedCache
 from flightd.ground.reading_process import ReadingProcess
+from flightd.replay.playback.pictures import PicturePlace
 
 _WITHIN_S = 180.0
 _PLOTS_AT_ONCE, _MOST_PLOTS = 2, 32
@@ -107,6 +108,18 @@ class Flights:
         root, wanted, lens = self._root(), seen.view.pictures[place], seen.view.lens
         content = await self._playing.run(read_framed_picture, _WITHIN_S, root, log.relative, wanted, lens)
         return FlightPicture(tag, stays=stamp == seen.stamp, content=content)
+
+    async def where(self, log_id: str) -> tuple[Path, str]:
+        """The folder of flights, and a flight's log below it."""
+        return self._root(), (await self._log(log_id)).relative
+
+    async def whereabouts(self, log_id: str, place: int) -> tuple[Path, str, PicturePlace]:
+        """Where a picture of a flight lies: folder, log, place in the log."""
+        log = await self._log(log_id)
+        seen = self._recorded(log) or await self._view(log)
+        if not 0 <= place < len(seen.view.pictures):
+            raise InputError("the flight has no such picture")
+        return self._root(), log.relative, seen.view.pictures[place]
 
     async def report(self, log_id: str) -> bytes:
         """Its HTML report."""

@@ -49,7 +49,7 @@ _BRIGHTEST_FLOOR = 215.0
 """Each picture teaches under its own light, and under others: exposed and tinted at random, but never so
 that the floor is lost in the sensor's saturation."""
 
-_FOLDS = 5
+_FOLDS = FEWEST_PICTURES = 5
 _SVM_C = 4.0
 _UNSEEN = 0.06
 """Colours drawn at random and called floor, as a part of the pixels: what was never seen is not paint."""
@@ -149,8 +149,11 @@ def _relit(bgr: Image, rng: np.random.Generator) -> Image:
     return np.asarray(cv2.convertScaleAbs(bgr * cast), np.uint8)
 
 
-def collect(pictures: Iterable[tuple[Image, Teaching]], colour: str, seed: int) -> Pixels:
-    """The training pixels of all pictures.  Raises InputError without paint or without floor."""
+def collect(
+    pictures: Iterable[tuple[Image, Teaching]], colour: str, seed: int, fewest: int = FEWEST_PICTURES
+) -> Pixels:
+    """The training pixels of all pictures.  Raises InputError where fewer than `fewest` show paint, and
+    without floor."""
     rng = np.random.default_rng(seed)
     colours, paint, numbers = [], [], []
     for number, (bgr, teaching) in enumerate(pictures):
@@ -159,11 +162,13 @@ def collect(pictures: Iterable[tuple[Image, Teaching]], colour: str, seed: int) 
             colours.append(taken)
             paint.append(is_paint)
             numbers.append(np.full(len(taken), number, np.intp))
+    if not colours:
+        raise InputError("there is no picture to learn from")
     together = Pixels(np.concatenate(colours), np.concatenate(paint), np.concatenate(numbers))
     shown = len(set(together.picture[together.paint].tolist()))
-    if shown < _FOLDS or together.paint.all():
+    if shown < fewest or together.paint.all():
         raise InputError(
-            f"only {shown} pictures show paint of this colour; at least {_FOLDS} are needed, and floor"
+            f"only {shown} pictures show paint of this colour; at least {fewest} are needed, and floor"
         )
     return together
 
@@ -187,17 +192,39 @@ def train(name: str, colour: str, pixels: Pixels, seed: int) -> Trained:
     on_paint, on_floor = held_out[pixels.paint], held_out[~pixels.paint]
     strong = _threshold(on_paint, on_floor, _STRONG)
     weak = min(_threshold(on_paint, on_floor, _WEAK), strong)
-    decision = _fit(features, paint).decision_function(_features(_table_colours()))
+    lut = _baked(_fit(features, paint), weak, strong)
+    score = (kept + refused) / 2
+    profile = ColourProfile(name, lut, colour, _digest(colour, pixels, seed), round(score, 4))
+    shown = int(pixels.picture.max()) + 1
+    return Trained(profile, score, kept, refused, len(pixels.paint), shown)
+
+
+def sketch(name: str, colour: str, pixels: Pixels, seed: int) -> ColourProfile:
+    """A profile fitted once, to see at once what a few strokes teach: nothing is held out, so that its score
+    is 0, not known, and its levels are chosen by what it learnt from.  Raises as `train`."""
+    features, paint = _with_unseen(pixels, seed)
+    machine = _fit(features, paint)
+    values = machine.decision_function(features[: len(pixels.paint)])
+    on_paint, on_floor = values[pixels.paint], values[~pixels.paint]
+    strong = _threshold(on_paint, on_floor, _STRONG)
+    weak = min(_threshold(on_paint, on_floor, _WEAK), strong)
+    return ColourProfile(name, _baked(machine, weak, strong), colour, _digest(colour, pixels, seed))
+
+
+def _baked(machine: Any, weak: float, strong: float) -> NDArray[np.uint8]:
+    """(65536,) the machine's decision on every colour of the table."""
+    decision = machine.decision_function(_features(_table_colours()))
     lut = np.zeros(TABLE_SIZE, np.uint8)
     lut[decision > weak] = WEAK
     lut[decision > strong] = STRONG
+    return lut
 
+
+def _digest(colour: str, pixels: Pixels, seed: int) -> str:
+    """Names what was learnt from."""
     digest = hashlib.sha256(repr((colour, seed, _SVM_C, _UNSEEN)).encode())
     digest.update(pixels.bgr.tobytes() + pixels.paint.tobytes() + pixels.picture.tobytes())
-    score = (kept + refused) / 2
-    profile = ColourProfile(name, lut, colour, digest.hexdigest()[:16], round(score, 4))
-    shown = int(pixels.picture.max()) + 1
-    return Trained(profile, score, kept, refused, len(pixels.paint), shown)
+    return digest.hexdigest()[:16]
 
 
 def _threshold(

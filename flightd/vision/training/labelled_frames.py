@@ -122,11 +122,15 @@ def read_labels(dataset: Path) -> tuple[Path, Labels]:
 
 
 def write_labels(folder: Path, labels: Labels) -> None:
-    """Write `labels.json`, one line to an image, lengths to a ten-thousandth of a pixel."""
+    """Write `labels.json` into a folder."""
+    (folder / LABELS_NAME).write_text(labels_text(labels))
+
+
+def labels_text(labels: Labels) -> str:
+    """The content of `labels.json`, one line to an image, lengths to a ten-thousandth of a pixel."""
     rows = [msgspec.json.encode(_rounded(msgspec.to_builtins(image))).decode() for image in labels.images]
     about = msgspec.json.encode(labels.about).decode()
-    text = f'{{"about": {about},\n"images": [\n' + ",\n".join(rows) + "\n]}\n"
-    (folder / LABELS_NAME).write_text(text)
+    return f'{{"about": {about},\n"images": [\n' + ",\n".join(rows) + "\n]}\n"
 
 
 def _rounded(value: object) -> object:

@@ -22,6 +22,12 @@ export const PAGES = [
     load: () => import("./flights/flights_page.js"),
   },
   {
+    path: "/studio",
+    title: "Studio",
+    styles: ["studio.css"],
+    load: () => import("./studio/studio_page.js"),
+  },
+  {
     path: "/guide",
     title: "Guide",
     styles: ["guide.css"],

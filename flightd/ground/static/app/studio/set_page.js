@@ -1,0 +1,56 @@
+// One set: the picture in hand with what is marked in it, all its pictures, and what is learnt from them.
+import { html } from "../html.js";
+import { useTitle } from "../router.js";
+import { count } from "../words.js";
+import { AddPictures } from "./add_pictures.js";
+import { PictureCard } from "./picture_card.js";
+import { Profile } from "./profile_card.js";
+import { ScoreCard } from "./score_card.js";
+import { choosePicture, pictureHref, studio } from "./studio_state.js";
+
+export function SetPage({ name }) {
+  useTitle(name);
+  const { set, trouble } = studio();
+  if (!set) {
+    return trouble ? html`<p><a href="/studio">All sets</a></p>` : html`<p class="loading quiet" role="status">Opening the set …</p>`;
+  }
+  const shows = set.pictures.filter(showsPaint).length;
+  return html`
+    <header class="studio-head">
+      <p class="quiet"><a href="/studio">Studio</a></p>
+      <h2>${name} <small><i class=${`swatch ${set.paint}`} style=${{ background: tone(set.paint) }} aria-hidden="true" />${set.paint} paint</small></h2>
+    </header>
+    <div class="studio-grid">
+      <div class="studio-main">
+        <${PictureCard} key=${studio().chosen} />
+        <section class="card strip" aria-labelledby="strip"><h3 id="strip">Pictures <small>${count(set.pictures.length, "picture")}, paint marked in ${shows}</small></h3>
+          <ul>${set.pictures.map((picture, i) => html`<${Thumb} key=${picture.file} picture=${picture} number=${i + 1} />`)}</ul>
+          ${set.pictures.length === 0 && html`<p class="quiet">Start here: take pictures of your floor from a flight, from the drone as it stands, or from files, under every light that the floor has.</p>`}
+          <${AddPictures} />
+        </section>
+      </div>
+      <div class="studio-side">
+        <${ScoreCard} shows=${shows} />
+        <${Profile} profile=${set.profile} />
+      </div>
+    </div>
+  `;
+}
+
+export const showsPaint = (picture) => picture.regions.some((one) => one.paint) || picture.lines.length > 0;
+
+const TONES = { yellow: "#ecbe26", white: "#e8e8e2", red: "#b02826", blue: "#2254a8", green: "#2c8a48", black: "#1e1d1c", orange: "#de621a" };
+const tone = (paint) => TONES[paint] ?? (/^#[0-9a-f]{6}$/i.test(paint) ? paint : "none");
+
+function Thumb({ picture, number }) {
+  const { regions, lines, negative } = picture;
+  const marked = negative ? "no line" : [regions.length && count(regions.length, "mark"), lines.length && count(lines.length, "line")].filter(Boolean).join(", ");
+  return html`
+    <li>
+      <button class="thumb" aria-pressed=${picture.file === studio().chosen} onClick=${() => choosePicture(picture.file)}>
+        <img src=${pictureHref(picture.file)} alt="" loading="lazy" width="128" height="72" />
+        <span>${number}. ${marked || "nothing marked"}</span>
+      </button>
+    </li>
+  `;
+}

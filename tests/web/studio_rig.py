@@ -1,0 +1,107 @@
+"""A folder with a recorded flight, and what marks its pictures as a person does: by what shows in them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+from tests.replay.synthetic_flight import write_flight
+from tests.web.served import JSON, Station
+
+WIDTH, HEIGHT = 640, 360
+
+
+def flown_folder(root: Path) -> Path:
+    """A folder with one flight, whose pictures show yellow lines on grey concrete."""
+    (root / "flown").mkdir()
+    write_flight(root / "flown", truth=False, summary=False)
+    return root
+
+
+def marks_of(lines: list[dict[str, Any]], shift_px: float = 90.0) -> dict[str, Any]:
+    """Strokes along the first of the lines that a picture's head tells, and beside it; the lines by their
+    ends, as labels."""
+    (x0, y0), (x1, y1) = ([x * WIDTH, y * HEIGHT] for x, y in (lines[0]["points"][0], lines[0]["points"][-1]))
+    third = [x0 + (x1 - x0) * 0.3, y0 + (y1 - y0) * 0.3]  # the cross line is farther in
+    beside = [[x0 + shift_px, y0], [third[0] + shift_px, third[1]]]
+    labels = [
+        {
+            "x1": line["points"][0][0] * WIDTH - 0.5,
+            "y1": line["points"][0][1] * HEIGHT - 0.5,
+            "x2": line["points"][-1][0] * WIDTH - 0.5,
+            "y2": line["points"][-1][1] * HEIGHT - 0.5,
+            "thickness": 30.0,
+        }
+        for line in lines
+    ]
+    regions = [
+        {"paint": True, "stroke": [[x0, y0], [x1, y1]], "width": 12},
+        {"paint": False, "stroke": beside, "width": 12},
+    ]
+    return {"regions": regions, "lines": labels, "complete": True}
+
+
+async def post(station: Station, path: str, said: object, method: str = "POST") -> tuple[int, Any]:
+    """What the station answers to the JSON of its own page."""
+    headers = {"Origin": station.origin, **JSON}
+    code, text = await station.ask(method, path, headers, json.dumps(said).encode())
+    return code, json.loads(text)
+
+
+async def got(station: Station, path: str) -> Any:
+    code, text = await station.ask("GET", path)
+    assert code == 200, text
+    return json.loads(text)
+
+
+async def flight_of(station: Station, within_s: float = 60.0) -> tuple[str, int]:
+    """The id of the folder's flight, and how many pictures it has."""
+    async with asyncio.timeout(within_s):
+        while not (rows := (await got(station, "/api/flights"))["rows"]):  # noqa: ASYNC110 - it tells nobody
+            await asyncio.sleep(0.1)
+    flight = str(rows[0]["id"])
+    return flight, len((await got(station, f"/api/flights/{flight}"))["flight"]["pictures"])
+
+
+async def head_of(station: Station, path: str) -> tuple[dict[str, Any], bytes]:
+    """The head of a framed picture, and the picture."""
+    host = f"{station.where.host}:{station.where.port}"
+    asked = f"GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"
+    said = await station.say(asked.encode(), within_s=60.0)
+    head, _, body = said.partition(b"\r\n\r\n")
+    assert b" 200 " in head.splitlines()[0], said[:400]
+    length = int.from_bytes(body[:4], "big")
+    return json.loads(body[4 : 4 + length]), body[4 + length :]
+
+
+async def marked_set(station: Station, name: str, paint: str, count: int, marks: bool = True) -> list[str]:
+    """A set of so many marked pictures of the flight; their files."""
+    flight, pictures = await flight_of(station)
+    assert (await post(station, "/api/studio/sets", {"name": name, "paint": paint}))[0] == 200
+    files = []
+    for place in list(range(0, pictures, max(pictures // count, 1)))[:count]:
+        code, taken = await post(
+            station, f"/api/studio/sets/{name}/pictures", {"flight": flight, "place": place}
+        )
+        assert code == 200, taken
+        files.append(taken["file"])
+        head, _ = await head_of(station, f"/api/flights/{flight}/pictures/{place}")
+        path = f"/api/studio/sets/{name}/pictures/{taken['file']}"
+        if marks:
+            code, said = await post(station, path, marks_of(head["lines"]), "PUT")
+            assert code == 200, said
+    return files
+
+
+async def trained(station: Station, name: str, flights: list[str], within_s: float = 120.0) -> Any:
+    """The set once it was trained."""
+    code, said = await post(station, f"/api/studio/sets/{name}/train", {"flights": flights})
+    assert code == 202, said
+    async with asyncio.timeout(within_s):
+        while True:
+            known = await got(station, f"/api/studio/sets/{name}")
+            if not (known["training"] or {}).get("running"):
+                return known
+            await asyncio.sleep(0.2)

@@ -1,0 +1,195 @@
+"""What the station answers to the page Studio: pictures, marks, masks, training, scores, profiles."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from flightd.ground.studio import studio as studio_module
+from flightd.studies.train import train_colour
+from flightd.vision.lines.colour_profile import classify, grow, load_profile
+from flightd.vision.lines.sampling import grid_for, sample
+from flightd.vision.training.labelled_frames import read_labels
+from tests.rigs.event_loops import in_real_time
+from tests.web.served import JSON, served
+from tests.web.studio_rig import flight_of, flown_folder, got, head_of, marked_set, marks_of, post, trained
+
+pytest.importorskip("sklearn", reason="training needs scikit-learn: pip install -e '.[train]'")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return flown_folder(tmp_path_factory.mktemp("studio"))
+
+
+@in_real_time
+async def test_a_colour_is_learnt_from_a_log_scored_installed_and_taken_back(folder: Path) -> None:
+    async with served(folder=folder) as station:
+        files = await marked_set(station, "hall", "yellow", 9)
+        flight, _ = await flight_of(station)
+        at = "/api/studio/sets/hall"
+
+        head, png = await head_of(station, f"{at}/pictures/{files[0]}/mask?by=strokes")
+        mask = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
+        assert mask.shape[2] == 4
+        assert 0.02 < head["share"] < 0.4
+        assert len(head["lines"]) >= 1
+
+        known = await trained(station, "hall", [flight])
+        outcome = known["outcome"]
+        assert outcome["trained_on"] == 6
+        assert len(outcome["held_back"]) == 3
+        assert [one["name"] for one in outcome["scores"]] == ["new", "shipped yellow"]
+        new = outcome["scores"][0]
+        assert new["pictures"]["paint_kept"] > 0.95 * new["pictures"]["paint"] > 100
+        assert new["pictures"]["lines_found"] == new["pictures"]["lines"] > 0
+        assert new["logs"]["lines"] > 20
+        assert outcome["verdict"]["judged"] in {"same", "better"}
+
+        seen = outcome["training_hash"]
+        code, said = await post(station, f"{at}/install", {"training_hash": "another", "who": "Ann"})
+        assert (code, "trained anew" in said["refused"]) == (409, True)
+        code, shelved = await post(station, f"{at}/install", {"training_hash": seen, "who": "Ann"})
+        assert (code, shelved["current"]) == (200, 1)
+        profile = load_profile(folder / "profiles" / "hall.npz")
+        assert (profile.name, profile.colour, profile.training_hash) == ("hall", "yellow", seen)
+        assert shelved["file"] == str(folder / "profiles" / "hall.npz")
+
+        # the mask is the detector's own, not another one
+        bgr = cv2.imread(str(folder / "studio" / "hall" / files[1]))
+        head, _ = await head_of(station, f"{at}/pictures/{files[1]}/mask?by=installed")
+        own = grow(classify(sample(bgr, grid_for(640, 360)), profile)) > 0
+        assert head["share"] == pytest.approx(own.mean(), abs=1e-3)
+
+        again = (await trained(station, "hall", []))["outcome"]
+        assert [one["name"] for one in again["scores"]] == ["new", "shipped yellow", "installed 1"]
+        assert (await post(station, f"{at}/install", {"training_hash": seen, "who": "Bo"}))[1]["current"] == 2
+        code, back = await post(station, "/api/studio/profiles/hall/back", {"version": 1})
+        assert (code, back["current"], len(back["versions"])) == (200, 2, 2)  # the same bytes: the newest one
+
+
+@in_real_time
+async def test_the_set_is_a_dataset_that_the_commands_read(folder: Path, tmp_path: Path) -> None:
+    async with served(folder=folder) as station:
+        await marked_set(station, "same", "yellow", 7)
+    _, labels = read_labels(folder / "studio" / "same")
+    assert {label.line_colour for label in labels.images} == {"yellow"}
+    assert all(label.lines and label.complete for label in labels.images)
+    learnt = train_colour([folder / "studio" / "same"], "yellow", tmp_path / "by-hand.npz", "by-hand", 0)
+    assert learnt.pictures == 7
+
+
+@in_real_time
+async def test_a_worse_profile_says_so_and_needs_a_second_yes(folder: Path) -> None:
+    """Who marks the floor as paint and the paint as floor gets what he marked, and it finds no line again."""
+    async with served(folder=folder) as station:
+        flight, _ = await flight_of(station)
+        files = await marked_set(station, "wrong", "yellow", 8)
+        known = await got(station, "/api/studio/sets/wrong")
+        for picture in known["pictures"]:
+            regions = [one | {"paint": not one["paint"]} for one in picture["regions"]]
+            path = f"/api/studio/sets/wrong/pictures/{picture['file']}"
+            assert (await post(station, path, {"regions": regions}, "PUT"))[0] == 200
+        outcome = (await trained(station, "wrong", [flight]))["outcome"]
+        assert outcome["verdict"]["judged"] == "worse"
+        assert any("logs" in reason for reason in outcome["verdict"]["reasons"])
+        order = {"training_hash": outcome["training_hash"], "who": "Ann"}
+        code, said = await post(station, "/api/studio/sets/wrong/install", order)
+        assert code == 409
+        assert "it is worse than what flies" in said["refused"]
+        assert "second time" in said["refused"]
+        assert not (folder / "profiles" / "wrong.npz").exists()
+        code, _ = await post(station, "/api/studio/sets/wrong/install", order | {"again": True})
+        assert code == 200
+        assert (folder / "profiles" / "wrong.npz").exists()
+        assert files
+
+
+@in_real_time
+async def test_too_little_to_learn_from_says_what_is_missing(folder: Path) -> None:
+    async with served(folder=folder) as station:
+        await marked_set(station, "few", "#7a3fa0", 3)
+        known = await trained(station, "few", [])
+        assert "paint is marked in 3 pictures; 7 are needed" in known["training"]["refused"]
+        assert known["outcome"] is None
+
+
+@in_real_time
+async def test_without_scikit_learn_it_says_what_to_install(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(studio_module, "missing_training", lambda: "training needs scikit-learn")
+    async with served(folder=folder) as station:
+        await marked_set(station, "bare", "yellow", 1)
+        for path, said in (("train", {}),):
+            code, answer = await post(station, f"/api/studio/sets/bare/{path}", said)
+            assert code == 503
+            assert "extra train" in answer["refused"]
+            assert "pip install" in answer["refused"]
+
+
+@in_real_time
+async def test_bad_input_gets_one_clear_line(folder: Path) -> None:
+    async with served(folder=folder) as station:
+        files = await marked_set(station, "bad", "yellow", 1, marks=False)
+        at, flight = "/api/studio/sets", (await flight_of(station))[0]
+        one = f"{at}/bad/pictures/{files[0]}"
+        stroke = {"paint": True, "stroke": [[0, 0]] * 5001}
+        for method, path, said, status, words in (
+            ("POST", at, {"name": "../x", "paint": "yellow"}, 400, "no name of a set"),
+            ("POST", at, {"name": "bad", "paint": "yellow"}, 400, "already"),
+            ("POST", at, {"name": "x", "paint": "mauve"}, 400, "#rrggbb"),
+            ("POST", at, {"name": "x"}, 400, "not a new set"),
+            ("POST", f"{at}/none/pictures", {"flight": flight, "place": 0}, 400, "no set"),
+            ("POST", f"{at}/bad/pictures", {"flight": "nothing", "place": 0}, 400, "no such flight"),
+            ("POST", f"{at}/bad/pictures", {"flight": flight, "place": 10**6}, 400, "no such picture"),
+            ("PUT", f"{at}/bad/pictures/labels.json", {}, 400, "no such picture"),
+            ("PUT", one, {"regions": [{"paint": True, "box": [0, 0, 1e9, 1]}]}, 400, "outside"),
+            ("PUT", one, {"regions": [{"paint": True, "width": float("nan")}]}, 400, "not marks"),
+            ("PUT", one, {"lines": [{"x1": 0, "y1": 0, "x2": 0, "y2": 0}]}, 400, "without length"),
+            ("PUT", one, {"regions": [stroke]}, 400, "5000 points"),
+            ("POST", f"{at}/bad/install", {"training_hash": "x", "who": "Ann"}, 400, "nothing was trained"),
+            ("POST", "/api/studio/profiles/bad/back", {"version": 3}, 400, "no version 3"),
+        ):
+            code, answer = await post(station, path, said, method)
+            assert (code, words in answer["refused"]) == (status, True), (path, said, answer)
+        code, text = await station.ask("GET", f"{one}/mask?by=mauve")
+        assert (code, json.loads(text)["refused"]) == (404, "there is no profile 'mauve'")
+        code, text = await station.ask("GET", f"{one}/mask?by=strokes")
+        assert code == 404
+        code, text = await station.ask("PUT", one, JSON, b"{}")
+        assert code == 403  # without the page's own origin
+        code, text = await station.ask("GET", f"{at}/bad/pictures/..%2Flabels.json")
+        assert code == 404
+
+
+@in_real_time
+async def test_photographs_are_taken_in_and_what_is_none_is_refused(folder: Path) -> None:
+    headers = {"Content-Type": "application/octet-stream"}
+    async with served(folder=folder) as station:
+        await post(station, "/api/studio/sets", {"name": "photos", "paint": "orange"})
+        at = "/api/studio/sets/photos/uploads"
+        own = {"Origin": station.origin, **headers}
+        picture = cv2.imencode(".png", np.full((90, 160, 3), 120, np.uint8))[1].tobytes()
+        code, text = await station.ask("POST", at, own, picture)
+        assert code == 200
+        path = f"/api/studio/sets/photos/pictures/{json.loads(text)['file']}"
+        known = await got(station, "/api/studio/sets/photos")
+        assert [(one["width"], one["height"]) for one in known["pictures"]] == [(160, 90)]
+        for data in (b"", b"no picture", picture[:40]):
+            code, text = await station.ask("POST", at, own, data)
+            assert code == 400, text
+            assert "picture" in json.loads(text)["refused"]
+        assert (await post(station, path, None, "DELETE"))[0] == 200
+        assert (await got(station, "/api/studio/sets/photos"))["pictures"] == []
+
+
+def test_marks_of_a_line_lie_on_it_and_beside_it() -> None:
+    """The rig's own promise."""
+    told = marks_of([{"points": [[0.5, 0.0], [0.5, 1.0]]}])
+    assert told["regions"][0]["stroke"] == [[320.0, 0.0], [320.0, 360.0]]
+    assert told["regions"][1]["stroke"] == [[410.0, 0.0], [410.0, 108.0]]
