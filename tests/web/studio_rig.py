@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,10 @@ def marks_of(lines: list[dict[str, Any]], shift_px: float = 90.0) -> dict[str, A
     """Strokes along the first of the lines that a picture's head tells, and beside it; the lines by their
     ends, as labels."""
     (x0, y0), (x1, y1) = ([x * WIDTH, y * HEIGHT] for x, y in (lines[0]["points"][0], lines[0]["points"][-1]))
-    third = [x0 + (x1 - x0) * 0.3, y0 + (y1 - y0) * 0.3]  # the cross line is farther in
-    beside = [[x0 + shift_px, y0], [third[0] + shift_px, third[1]]]
+    length = math.hypot(x1 - x0, y1 - y0)
+    aside = (-(y1 - y0) / length * shift_px, (x1 - x0) / length * shift_px)
+    third = (x0 + (x1 - x0) * 0.3, y0 + (y1 - y0) * 0.3)  # another line crosses farther in
+    beside = [[x + aside[0], y + aside[1]] for x, y in ((x0, y0), third)]
     labels = [
         {
             "x1": line["points"][0][0] * WIDTH - 0.5,

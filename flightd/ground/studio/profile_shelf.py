@@ -70,9 +70,14 @@ class ProfileShelf:
         return Shelved(name, str(self._file(name).resolve()), current, versions)
 
     def install(self, name: str, profile: bytes, who: str, paint: str, learnt: tuple[str, str]) -> Shelved:
-        """A profile's file as the next version; `learnt` are its training hash and the verdict on it."""
+        """A profile's file as the next version; `learnt` are its training hash and the verdict on it.
+
+        What is installed already stays as it is."""
         with self._lock:
-            versions = self._versions(name)
+            before = self.of(name)
+            versions = before.versions
+            if any(one.number == before.current and one.file_hash == _hash(profile) for one in versions):
+                return before
             if len(versions) >= MOST_VERSIONS:
                 raise InputError(f"there are {MOST_VERSIONS} versions of {name}", remedy="take another name")
             number = versions[-1].number + 1 if versions else 1

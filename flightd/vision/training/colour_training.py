@@ -166,7 +166,9 @@ def collect(
         raise InputError("there is no picture to learn from")
     together = Pixels(np.concatenate(colours), np.concatenate(paint), np.concatenate(numbers))
     shown = len(set(together.picture[together.paint].tolist()))
-    if shown < fewest or together.paint.all():
+    if together.paint.all():
+        raise InputError("no floor is marked", remedy="show what is no paint, too")
+    if shown < fewest:
         raise InputError(
             f"only {shown} pictures show paint of this colour; at least {fewest} are needed, and floor"
         )

@@ -1,6 +1,7 @@
 // Pictures into the set: from a recorded flight, live from the drone, from files.
 import { showPictures } from "../connection.js";
 import { askJson, askStation } from "../fetching.js";
+import { flightsState, watchList } from "../flights/flights_state.js";
 import { html, useEffect, useRef, useState } from "../html.js";
 import { drawPicture, WIDTH } from "../live/camera.js";
 import { state } from "../store.js";
@@ -8,6 +9,7 @@ import { asked, change, choosePicture, reloadSet, setPath, told } from "./studio
 
 const SOURCES = [["flight", "From a flight"], ["live", "Live"], ["files", "Files"]];
 const AT_ONCE = 8;
+const READING_MS = 120000; // of a long log, when it is read first
 const JPEG = 0.95;
 
 export function AddPictures() {
@@ -30,7 +32,7 @@ const taken = (work) =>
   });
 
 function FromFlight() {
-  const [rows, setRows] = useState(null);
+  const { rows, looked } = flightsState().list;
   const [flight, setFlight] = useState("");
   const [pictures, setPictures] = useState(null); // how many there are
   const [place, setPlace] = useState(0);
@@ -39,30 +41,28 @@ function FromFlight() {
     setFlight(id);
     setPictures(null);
     told(async () => {
-      const told_ = await askJson(`/api/flights/${id}`);
-      setPictures(told_.flight.pictures.length);
+      const known = await askJson(`/api/flights/${id}`, { ms: READING_MS });
+      setPictures(known.flight.pictures.length);
       setPlace(0);
     });
   };
+  useEffect(watchList, []);
+  const first = rows[0]?.id;
   useEffect(() => {
-    told(async () => {
-      const known = (await askJson("/api/flights")).rows ?? [];
-      setRows(known);
-      if (known.length) choose(known[0].id);
-    });
-  }, []);
+    if (first && !flight) choose(first);
+  }, [first]);
   const take = async (at) => asked(setPath("/pictures"), "POST", { flight, place: at });
   const several = async () => {
     setBusy(true);
     const step = Math.max(Math.floor(pictures / AT_ONCE), 1);
     await taken(async () => {
-      let last;
-      for (let at = 0; at < pictures && at / step < AT_ONCE; at += step) last = await take(at);
-      return last;
+      const all = [];
+      for (let at = 0; at < pictures && at / step < AT_ONCE; at += step) all.push(await take(at));
+      return all[0];
     });
     setBusy(false);
   };
-  if (rows === null) return html`<p class="quiet" role="status">Looking for flights …</p>`;
+  if (!rows.length && !looked) return html`<p class="quiet" role="status">Looking for flights …</p>`;
   if (!rows.length) return html`<p class="quiet">No flight log lies below the station's folder yet.</p>`;
   return html`
     <div class="from-flight">
@@ -71,6 +71,7 @@ function FromFlight() {
           ${rows.map((row) => html`<option key=${row.id} value=${row.id}>${row.site || row.path} · ${row.path}</option>`)}
         </select>
       </label>
+      ${pictures === null && html`<p class="quiet" role="status">Reading the flight …</p>`}
       ${pictures === 0 && html`<p class="quiet">This log holds no pictures.</p>`}
       ${pictures > 0 &&
       html`

@@ -133,7 +133,7 @@ function Canvas({ label, kind, onMark, onUndo, setTool }) {
 }
 
 function MaskRow() {
-  const { mask, by, overview, set, saved } = studio();
+  const { mask, by, overview, set } = studio();
   const ways = [
     ["strokes", "what your marks teach"],
     ...(set.outcome ? [["trained", "the trained profile"]] : []),
@@ -148,14 +148,15 @@ function MaskRow() {
           ${ways.map(([key, words]) => html`<option key=${key} value=${key}>${words}</option>`)}
         </select>
       </label>
-      <p role="status" class=${mask?.trouble ? "refusal" : "quiet"}>${maskWords(mask, by, saved)}</p>
+      <p role="status" class=${mask?.trouble ? "refusal" : "quiet"}>${maskWords(studio())}</p>
     </div>
   `;
 }
 
-function maskWords(mask, by, saved) {
-  if (!saved) return "Saving …";
+function maskWords({ mask, by, saved, looking, trouble }) {
+  if (!saved) return trouble ? "Not saved yet." : "Saving …";
   if (by === "none") return "";
+  if (looking && !mask) return "Looking …";
   if (!mask) return "Mark some paint and some floor to see what they teach.";
   if (mask.trouble) return mask.trouble;
   const lines = mask.head.lines.length;

@@ -13,6 +13,7 @@ const EMPTY = {
   chosen: "", // file of the picture in hand
   by: "strokes", // what the mask is made by
   mask: null, // {file, by, picture, head} | {file, by, trouble}
+  looking: false, // whether a mask is on its way
   trouble: "",
   saved: true, // whether the station has all marks
 };
@@ -88,7 +89,7 @@ export function chooseMask(by) {
 
 export const pictureInHand = () => studio().set?.pictures.find((one) => one.file === studio().chosen);
 
-let unsent = 0; // how often marks were changed since the station had them all
+const unsent = new Set(); // files whose marks the station has not all
 let sending = false;
 
 // Marks of the picture in hand, kept by the station; the mask follows.
@@ -96,19 +97,20 @@ export async function mark(changes) {
   const file = studio().chosen;
   const pictures = studio().set.pictures.map((one) => (one.file === file ? { ...one, ...changes } : one));
   change({ set: { ...studio().set, pictures }, saved: false });
-  unsent += 1;
+  unsent.add(file);
   if (sending) return;
   sending = true;
-  await told(async () => {
-    while (unsent) {
-      unsent = 0;
-      const { regions, lines, complete, negative } = studio().set.pictures.find((one) => one.file === file) ?? {};
-      if (regions) await asked(setPath(`/pictures/${file}`), "PUT", { regions, lines, complete, negative });
+  const went = await told(async () => {
+    while (unsent.size) {
+      const [next] = unsent;
+      unsent.delete(next);
+      const { regions, lines, complete, negative } = studio().set.pictures.find((one) => one.file === next) ?? {};
+      if (regions) await asked(setPath(`/pictures/${next}`), "PUT", { regions, lines, complete, negative });
     }
-    change({ saved: true });
   });
   sending = false;
-  unsent = 0;
+  if (!went) unsent.add(file); // sent again with the next mark
+  else change({ saved: true });
   askMask();
 }
 
@@ -126,16 +128,23 @@ async function askMask() {
     maskAgain = false;
     const { chosen: file, by, set } = studio();
     if (!file || !set || by === "none" || (by === "strokes" && !teaches(set))) {
-      change({ mask: null });
+      change({ mask: null, looking: false });
       continue;
     }
+    change({ looking: true });
     const mask = await fetchedMask(file, by);
-    if (mask && studio().chosen === file && studio().by === by) change({ mask });
+    if (mask && studio().chosen === file && studio().by === by) change({ mask, looking: false });
   } while (maskAgain);
   masking = false;
+  change({ looking: false });
 }
 
-const teaches = (set) => set.pictures.some((one) => one.regions.length || one.lines.length);
+// Paint and floor: beside lines is floor where all of them are labelled.
+function teaches(set) {
+  const has = (paint) => set.pictures.some((one) => one.regions.some((region) => region.paint === paint));
+  const lines = set.pictures.filter((one) => one.lines.length && !one.regions.length);
+  return (has(true) || lines.length) && (has(false) || lines.some((one) => one.complete) || set.pictures.some((one) => one.negative));
+}
 
 async function fetchedMask(file, by) {
   try {
