@@ -46,20 +46,30 @@ class Station:
         )
 
     async def ask(
-        self, method: str, path: str, headers: Mapping[str, str] | None = None, body: bytes = b""
+        self,
+        method: str,
+        path: str,
+        headers: Mapping[str, str] | None = None,
+        body: bytes = b"",
+        within_s: float = 10.0,
     ) -> tuple[int, str]:
         """The status and the body of the answer to any request."""
-        head, text = await self.answer(method, path, headers, body)
+        head, text = await self.answer(method, path, headers, body, within_s)
         return int(head.split(" ")[1]), text
 
     async def answer(
-        self, method: str, path: str, headers: Mapping[str, str] | None = None, body: bytes = b""
+        self,
+        method: str,
+        path: str,
+        headers: Mapping[str, str] | None = None,
+        body: bytes = b"",
+        within_s: float = 10.0,
     ) -> tuple[str, str]:
         """The head and the body of the answer."""
         given = {"Host": f"{self.where.host}:{self.where.port}", **(headers or {})}
         lines = [f"{method} {path} HTTP/1.1", *(f"{name}: {value}" for name, value in given.items())]
         lines += [f"Content-Length: {len(body)}", "Connection: close", "", ""]
-        said = await self.say("\r\n".join(lines).encode() + body)
+        said = await self.say("\r\n".join(lines).encode() + body, within_s)
         head, _, text = said.partition(b"\r\n\r\n")
         return head.decode(), text.decode()
 

@@ -12,6 +12,7 @@ from tests.replay.synthetic_flight import write_flight
 from tests.web.served import JSON, Station
 
 WIDTH, HEIGHT = 640, 360
+_WITHIN_S = 90.0
 
 
 def flown_folder(root: Path) -> Path:
@@ -49,12 +50,12 @@ def marks_of(lines: list[dict[str, Any]], shift_px: float = 90.0) -> dict[str, A
 async def post(station: Station, path: str, said: object, method: str = "POST") -> tuple[int, Any]:
     """What the station answers to the JSON of its own page."""
     headers = {"Origin": station.origin, **JSON}
-    code, text = await station.ask(method, path, headers, json.dumps(said).encode())
+    code, text = await station.ask(method, path, headers, json.dumps(said).encode(), _WITHIN_S)
     return code, json.loads(text)
 
 
 async def got(station: Station, path: str) -> Any:
-    code, text = await station.ask("GET", path)
+    code, text = await station.ask("GET", path, within_s=_WITHIN_S)
     assert code == 200, text
     return json.loads(text)
 
@@ -72,7 +73,7 @@ async def head_of(station: Station, path: str) -> tuple[dict[str, Any], bytes]:
     """The head of a framed picture, and the picture."""
     host = f"{station.where.host}:{station.where.port}"
     asked = f"GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"
-    said = await station.say(asked.encode(), within_s=60.0)
+    said = await station.say(asked.encode(), within_s=_WITHIN_S)
     head, _, body = said.partition(b"\r\n\r\n")
     assert b" 200 " in head.splitlines()[0], said[:400]
     length = int.from_bytes(body[:4], "big")

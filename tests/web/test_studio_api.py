@@ -166,7 +166,7 @@ async def test_bad_input_gets_one_clear_line(folder: Path) -> None:
             assert (code, words in answer["refused"]) == (status, True), (path, said, answer)
         code, text = await station.ask("GET", f"{one}/mask?by=mauve")
         assert (code, json.loads(text)["refused"]) == (404, "there is no profile 'mauve'")
-        code, text = await station.ask("GET", f"{one}/mask?by=strokes")
+        code, text = await station.ask("GET", f"{one}/mask?by=strokes", within_s=90.0)
         assert code == 404
         code, text = await station.ask("PUT", one, JSON, b"{}")
         assert code == 403  # without the page's own origin
@@ -182,13 +182,13 @@ async def test_photographs_are_taken_in_and_what_is_none_is_refused(folder: Path
         at = "/api/studio/sets/photos/uploads"
         own = {"Origin": station.origin, **headers}
         picture = cv2.imencode(".png", np.full((90, 160, 3), 120, np.uint8))[1].tobytes()
-        code, text = await station.ask("POST", at, own, picture)
+        code, text = await station.ask("POST", at, own, picture, 90.0)
         assert code == 200
         path = f"/api/studio/sets/photos/pictures/{json.loads(text)['file']}"
         known = await got(station, "/api/studio/sets/photos")
         assert [(one["width"], one["height"]) for one in known["pictures"]] == [(160, 90)]
         for data in (b"", b"no picture", picture[:40]):
-            code, text = await station.ask("POST", at, own, data)
+            code, text = await station.ask("POST", at, own, data, 90.0)
             assert code == 400, text
             assert "picture" in json.loads(text)["refused"]
         assert (await post(station, path, None, "DELETE"))[0] == 200

@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from flightd.config.schema import load_config
+from flightd.site.site_file import load_site
 from flightd.vision.lines.colour_profile import load_profile
 from tests.web.chromium import NARROW, WIDE, hindrances, opened, station
+from tests.web.live_flight import LiveFlight
 from tests.web.studio_rig import HEIGHT, WIDTH, flown_folder, marks_of
 
 if TYPE_CHECKING:
@@ -168,6 +171,23 @@ def test_what_is_refused_says_why_and_stop_is_in_reach(browser: Browser, url: st
         expect(page.get_by_role("alert").filter(has_text="this is no picture")).to_be_visible()
         page.keyboard.press("Escape")
         expect(page.get_by_role("button", name="STOPPING")).to_be_visible()
+
+
+def test_a_live_picture_of_a_drone_is_taken(browser: Browser, tmp_path: Path) -> None:
+    configs = Path(__file__).parents[2] / "configs"
+    waits = load_config(configs / "sim.toml").with_values(mission={"autostart": False})
+    with LiveFlight(load_site(configs / "site-demo.toml"), waits) as flight:
+        status, command = flight.ports
+        with (
+            station([f"demo=127.0.0.1:{status}/{command}"], folder=tmp_path) as url,
+            opened(browser, f"{url}/studio") as page,
+        ):
+            page.get_by_label("Name of a new set").fill("live")
+            page.keyboard.press("Enter")
+            page.get_by_role("button", name="Live").click()
+            page.get_by_role("button", name="Take this picture").click(timeout=60_000)
+            expect(page.get_by_role("button", name="1. nothing marked")).to_be_visible(timeout=60_000)
+            expect(page.get_by_label("Picture to mark in")).to_be_visible()
 
 
 def test_without_a_folder_the_page_says_how_to_give_one(browser: Browser) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from flightd.core.errors import InputError
 from flightd.core.types import Image, LineSet
 from flightd.replay.perception_compare import replay_pictures
 from flightd.replay.playback.pictures import find_pictures
@@ -39,8 +40,8 @@ class ProfileScore(msgspec.Struct, frozen=True):
 
 
 class LogScore(msgspec.Struct, frozen=True):
-    """In so many `pictures` of `logs`: of the `lines` found in flight so many are found `again`, and `new`
-    ones that were not."""
+    """In so many `pictures` of the `logs` that could be read: of the `lines` found in flight so many are
+    found `again`, and `new` ones that were not."""
 
     logs: int
     pictures: int
@@ -86,12 +87,16 @@ def score_on_log(detector: Detector, logs: Sequence[Path], most_pictures: int) -
     def detect(bgr: Image, seq: int, stamp_ns: int) -> LineSet:
         return detector.detect(bgr, seq, stamp_ns)
 
-    pictures = lines = again = new = 0
+    read = pictures = lines = again = new = 0
     for log in logs:
-        every = max(-(-len(find_pictures(log)) // most_pictures), 1)
-        drift = replay_pictures(log, detect, every)
+        try:
+            every = max(-(-len(find_pictures(log)) // most_pictures), 1)
+            drift = replay_pictures(log, detect, every)
+        except InputError:  # cut off, or of another version: there are others
+            continue
+        read += 1
         pictures += drift.pictures
         lines += drift.pairs + drift.gone
         again += drift.pairs
         new += drift.new
-    return LogScore(len(logs), pictures, lines, again, new)
+    return LogScore(read, pictures, lines, again, new)

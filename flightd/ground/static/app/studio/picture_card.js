@@ -148,7 +148,10 @@ function MaskRow() {
           ${ways.map(([key, words]) => html`<option key=${key} value=${key}>${words}</option>`)}
         </select>
       </label>
-      <p role="status" class=${mask?.trouble ? "refusal" : "quiet"}>${maskWords(studio())}</p>
+      <div>
+        <p role="status" class=${mask?.trouble ? "refusal" : "quiet"}>${maskWords(studio())}</p>
+        ${mask?.picture && html`<p class="quiet legend"><i class="paint" />taken for paint <i class="dropped" />doubtful, left out <i class="found" />line found</p>`}
+      </div>
     </div>
   `;
 }

@@ -1,8 +1,8 @@
 // Learn from the set, see the new profile beside those that fly, install it; one that is worse asks twice.
-import { askJson } from "../fetching.js";
-import { html, useState } from "../html.js";
+import { flightsState, watchList } from "../flights/flights_state.js";
+import { html, useEffect, useState } from "../html.js";
 import { setWho, who } from "../stock/decisions.js";
-import { capital } from "../words.js";
+import { capital, count } from "../words.js";
 import { asked, change, reloadSet, setPath, studio, told, watchTraining } from "./studio_state.js";
 
 const LEAST_SHOWING = 7;
@@ -11,10 +11,11 @@ const MOST_LOGS = 8;
 export function ScoreCard({ shows }) {
   const { set, overview } = studio();
   const running = set.training?.running;
+  const { rows, looked, unread } = flightsState().list;
+  useEffect(watchList, []);
+  const flights = rows.filter((row) => !row.running && !row.trouble).slice(0, MOST_LOGS).map((row) => row.id);
   const train = () =>
     told(async () => {
-      const rows = (await askJson("/api/flights")).rows ?? [];
-      const flights = rows.slice(0, MOST_LOGS).map((row) => row.id);
       await asked(setPath("/train"), "POST", { flights });
       change({ set: { ...studio().set, training: { running: true, refused: "" } } });
       watchTraining();
@@ -23,14 +24,17 @@ export function ScoreCard({ shows }) {
     <section class="card score" aria-labelledby="score"><h3 id="score">Learn and compare</h3>
       ${overview.missing
         ? html`<p class="obstacles"><strong>Nothing can be learnt yet.</strong> ${capital(overview.missing)}</p>`
-        : html`<p class="quiet">${shows < LEAST_SHOWING ? `Mark paint and floor in ${LEAST_SHOWING - shows} more pictures.` : "Every fourth picture is held back from learning, and scored on."} Also scored on the logs of your newest flights.</p>`}
-      <button class="order main-order" disabled=${running || shows < LEAST_SHOWING || overview.missing} onClick=${train}>${running ? "Learning …" : "Learn from the marks"}</button>
+        : html`<p class="quiet">${shows < LEAST_SHOWING ? `Mark paint and floor in ${count(LEAST_SHOWING - shows, "more picture")}.` : "Every fourth picture is held back from learning, and scored on."} ${logWords(looked && !unread, flights.length)}</p>`}
+      <button class="order main-order" disabled=${running || !looked || shows < LEAST_SHOWING || overview.missing} onClick=${train}>${running ? "Learning …" : "Learn from the marks"}</button>
       ${running && html`<p class="quiet" role="status">Learning and scoring: up to some minutes. You may leave the page.</p>`}
       ${set.training?.refused && html`<p class="refusal" role="alert">${capital(set.training.refused)}</p>`}
       ${set.outcome && !running && html`<${Outcome} key=${set.outcome.training_hash} outcome=${set.outcome} />`}
     </section>
   `;
 }
+
+const logWords = (known, many) =>
+  many || known ? `Also scored on ${many ? count(many, "newest flight log") : "no flight log: none lies in the folder"}.` : "Looking for flight logs …";
 
 const WORDS = {
   better: ["good", "Better than what flies now"],
