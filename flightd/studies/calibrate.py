@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flightd.core.errors import InputError
+from flightd.core.geometry import Lens
 from flightd.studies.frame_files import all_pictures
 from flightd.vision import lens_calibration
 from flightd.vision.lens_calibration import Board
@@ -52,14 +53,18 @@ def calibrate_lens(paths: Sequence[Path], board: Board) -> CalibratedLens:
     width, height = sizes.pop() if sizes else (0, 0)
     step = max(len(views) // _MOST_VIEWS, 1)
     result = lens_calibration.calibrate(views[::step], board, width, height)
-    lens = result.lens
-    keys: dict[str, object] = {
-        "width_px": width,
-        "height_px": height,
+    keys = lens_keys(result.lens)
+    return CalibratedLens(looked, len(views), result.error_px, result.sigma_focal_px, keys)
+
+
+def lens_keys(lens: Lens) -> dict[str, object]:
+    """A lens as the keys of a camera's section."""
+    return {
+        "width_px": lens.width_px,
+        "height_px": lens.height_px,
         "fx_px": round(lens.fx_px, 2),
         "fy_px": round(lens.fy_px, 2),
         "cx_px": round(lens.cx_px, 2),
         "cy_px": round(lens.cy_px, 2),
         "distortion": [round(value, 6) for value in lens.distortion],
     }
-    return CalibratedLens(looked, len(views), result.error_px, result.sigma_focal_px, keys)

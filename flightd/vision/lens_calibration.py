@@ -27,12 +27,13 @@ class Board:
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """The lens, the root mean square of its reprojection error in pixels, and the standard deviation of
-    the focal length."""
+    """The lens, the root mean square of its reprojection error in pixels (of all views, and of each), and the
+    standard deviation of the focal length."""
 
     lens: Lens
     error_px: float
     sigma_focal_px: float
+    view_errors_px: tuple[float, ...] = ()
 
 
 def find_board(bgr: Image, board: Board) -> NDArray[np.float32] | None:
@@ -56,7 +57,7 @@ def calibrate(
         )
     flat = np.zeros((board.columns * board.rows, 3), np.float32)
     flat[:, :2] = np.mgrid[0 : board.columns, 0 : board.rows].T.reshape(-1, 2)
-    error_px, matrix, distortion, *_, sigmas, _, _ = cv2.calibrateCameraExtended(
+    error_px, matrix, distortion, *_, sigmas, _, view_errors = cv2.calibrateCameraExtended(
         [flat] * len(views), list(views), (width_px, height_px), np.eye(3), np.zeros(5)
     )
     if not error_px < _MOST_ERROR_PX:
@@ -74,4 +75,5 @@ def calibrate(
         float(matrix[1, 2]),
         (k1, k2, p1, p2, k3),
     )
-    return Calibration(lens, float(error_px), float(np.asarray(sigmas).reshape(-1)[0]))
+    each = tuple(float(error) for error in np.asarray(view_errors).reshape(-1))
+    return Calibration(lens, float(error_px), float(np.asarray(sigmas).reshape(-1)[0]), each)

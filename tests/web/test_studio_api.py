@@ -191,6 +191,12 @@ async def test_photographs_are_taken_in_and_what_is_none_is_refused(folder: Path
             code, text = await station.ask("POST", at, own, data, 90.0)
             assert code == 400, text
             assert "picture" in json.loads(text)["refused"]
+        study = await got(station, "/api/studio/sets/photos/boards?columns=9&rows=6")
+        assert (study["pictures"], study["boards"]) == (1, [])
+        assert "8 are needed" in study["refused"]
+        for sides in ("columns=2&rows=6", "columns=9", "columns=0040000&rows=6", "columns=x&rows=6"):
+            code, text = await station.ask("GET", f"/api/studio/sets/photos/boards?{sides}")
+            assert (code, "3 to 40 inner corners" in text) == (404, True)
         assert (await post(station, path, None, "DELETE"))[0] == 200
         assert (await got(station, "/api/studio/sets/photos"))["pictures"] == []
 

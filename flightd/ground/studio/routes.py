@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Awaitable, Callable
 from typing import Annotated, TypeVar
 
@@ -22,6 +23,7 @@ from flightd.ground.shown_text import shown
 from flightd.ground.studio.picture_sets import MOST_PICTURE_BYTES
 from flightd.ground.studio.profile_shelf import Shelved
 from flightd.ground.studio.studio import Studio, missing_training
+from flightd.vision.lens_calibration import Board
 from flightd.vision.lines.colour_profile import SHIPPED
 from flightd.vision.training.labelled_frames import LabelledImage, LabelledLine, LabelledRegion
 
@@ -111,6 +113,7 @@ def studio_routes(studio: Studio | None) -> list[BaseRoute]:
         at(picture, asked.mark, "PUT"),
         at(picture, asked.take_out, "DELETE"),
         at(f"{picture}/mask", asked.mask, "GET"),
+        at("/sets/{set}/boards", asked.boards, "GET"),
         at("/sets/{set}/train", asked.train, "POST"),
         at("/sets/{set}/install", asked.install, "POST"),
         at("/profiles/{set}/back", asked.take_back, "POST"),
@@ -212,6 +215,12 @@ class _Asked:
         await self._studio.disk.run(self._studio.sets.read, name)
         self._studio.order_training(name, said.flights)
         return as_json({"training": _training(self._studio, name)}, 202)
+
+    async def boards(self, request: Request) -> Response:
+        sides = [request.query_params.get(name, "") for name in ("columns", "rows")]
+        if not all(re.fullmatch(r"[0-9]{1,2}", side) and 3 <= int(side) <= 40 for side in sides):
+            raise InputError("a board has 3 to 40 inner corners a side")
+        return as_json(await self._studio.boards(request.path_params["set"], Board(*map(int, sides))))
 
     async def install(self, request: Request) -> Response:
         said = await _said(request, Install, "what to install")

@@ -17,6 +17,7 @@ from flightd.ground.flights.flights import Flights
 from flightd.ground.flights.log_folder import path_of
 from flightd.ground.plain_files import is_plain_file, plain_file
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.studio.board_study import BoardStudy, study_boards
 from flightd.ground.studio.lessons import (
     STROKES,
     Outcome,
@@ -31,12 +32,13 @@ from flightd.ground.studio.picture_sets import PictureSet, PictureSets
 from flightd.ground.studio.profile_shelf import ProfileShelf, Shelved
 from flightd.ground.studio.verdict import Judged
 from flightd.runtime.durable_files import replace_file
+from flightd.vision.lens_calibration import Board
 from flightd.vision.lines.colour_profile import SHIPPED
 
 TRAINED, OUTCOME = "trained.npz", "trained.json"
 INSTALLED = "installed"
 MOST_LOGS = 8
-_WITHIN_S, _TRAIN_S = 60.0, 1800.0
+_WITHIN_S, _TRAIN_S, _BOARDS_S = 60.0, 1800.0, 240.0
 _MOST_BYTES = 4 << 20
 
 
@@ -125,6 +127,12 @@ class Studio:
         profile = by if by in {*SHIPPED, STROKES} else str(await self.disk.run(self._file_of, known, by))
         folder = self.sets.folder_of(name)
         return await self._looking.run(mask_of, _WITHIN_S, folder, known.paint, known.labels, file, profile)
+
+    async def boards(self, name: str, board: Board) -> BoardStudy:
+        """What a set's pictures of a chessboard say of the lens."""
+        known = await self.disk.run(self.sets.read, name)
+        files = [label.file for label in known.labels]
+        return await self._looking.run(study_boards, _BOARDS_S, self.sets.folder_of(name), files, board)
 
     async def install(self, name: str, training_hash: str, who: str, again: bool) -> Shelved:
         """Install what was trained last.  RunError where it is another than the one of `training_hash`, and

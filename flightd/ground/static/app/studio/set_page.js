@@ -3,6 +3,7 @@ import { html } from "../html.js";
 import { useTitle } from "../router.js";
 import { count } from "../words.js";
 import { AddPictures } from "./add_pictures.js";
+import { LensCard } from "./lens_card.js";
 import { PictureCard } from "./picture_card.js";
 import { Profile } from "./profile_card.js";
 import { ScoreCard } from "./score_card.js";
@@ -32,6 +33,7 @@ export function SetPage({ name }) {
       <div class="studio-side">
         <${ScoreCard} shows=${shows} />
         <${Profile} profile=${set.profile} />
+        <${LensCard} />
       </div>
     </div>
   `;

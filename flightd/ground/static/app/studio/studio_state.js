@@ -27,12 +27,12 @@ export function change(changes) {
 }
 
 // The station's answer; its refusal is an Error with words for a person.
-export const asked = (path, method = "GET", said = undefined) =>
+export const asked = (path, method = "GET", said = undefined, ms = method === "GET" ? undefined : MASK_MS) =>
   askJson(`${API}${path}`, {
     method,
     goesOn: method !== "GET",
     ...(said !== undefined && { headers: { "Content-Type": "application/json" }, body: JSON.stringify(said) }),
-    ...(method !== "GET" && { ms: MASK_MS }),
+    ...(ms && { ms }),
   });
 
 export const setPath = (rest = "", name = studio().set?.name) => `/sets/${encodeURIComponent(name)}${rest}`;
