@@ -99,7 +99,7 @@ async def marked_set(station: Station, name: str, paint: str, count: int, marks:
     return files
 
 
-async def trained(station: Station, name: str, flights: list[str], within_s: float = 120.0) -> Any:
+async def trained(station: Station, name: str, flights: list[str], within_s: float = 300.0) -> Any:
     """The set once it was trained."""
     code, said = await post(station, f"/api/studio/sets/{name}/train", {"flights": flights})
     assert code == 202, said

@@ -79,7 +79,7 @@ def mark(page: Page) -> None:
 
 def learn(page: Page, verdict: str | re.Pattern[str]) -> None:
     page.get_by_role("button", name="Learn from the marks").click()
-    expect(page.get_by_text(verdict)).to_be_visible(timeout=120_000)
+    expect(page.get_by_text(verdict)).to_be_visible(timeout=300_000)
 
 
 def turn_marks_round(page: Page) -> None:

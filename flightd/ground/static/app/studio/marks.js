@@ -26,7 +26,7 @@ function thinned(points) {
 
 export const round = (value) => Math.round(value * 10) / 10;
 
-// A picture as it was before its last mark; `order` are the kinds of marks in which they were made.
+// A picture as it was before its last mark of that kind.
 export function withoutLast(picture, kind) {
   if (kind === "line") return { lines: picture.lines.slice(0, -1) };
   return { regions: picture.regions.slice(0, -1) };

@@ -16,17 +16,19 @@ export function PictureCard() {
   const [tool, setTool] = useState("paint");
   const [shape, setShape] = useState("stroke");
   const [width, setWidth] = useState(12);
-  const [order, setOrder] = useState([]); // kinds of the marks made here, newest last
+  const [made, setMade] = useState({ file: "", kinds: [] }); // of marks in the picture in hand, newest last
   if (!label) return null;
+  const kinds = made.file === label.file ? made.kinds : [];
+  const setKinds = (now) => setMade({ file: label.file, kinds: now });
   const add = (kind, points) => {
-    setOrder([...order, kind]);
+    setKinds([...kinds, kind]);
     if (kind === "line") return mark({ lines: [...label.lines, line(points[0], points[1], width)], negative: false });
     const region = kind === "box" ? box(tool === "paint", points[0], points[1]) : stroke(tool === "paint", points, width);
     return mark({ regions: [...label.regions, region] });
   };
   const undo = () => {
-    const kind = order[order.length - 1] ?? (label.lines.length ? "line" : "region");
-    setOrder(order.slice(0, -1));
+    const kind = kinds[kinds.length - 1] ?? (label.lines.length ? "line" : "region");
+    setKinds(kinds.slice(0, -1));
     mark(withoutLast(label, kind));
   };
   return html`
@@ -39,7 +41,7 @@ export function PictureCard() {
         </label>
         <button class="order" disabled=${!label.regions.length && !label.lines.length} onClick=${undo}>Undo</button>
       </div>
-      <${Canvas} label=${label} kind=${tool === "line" ? "line" : shape} onMark=${add} onUndo=${undo} setTool=${setTool} />
+      <${Canvas} key=${label.file} label=${label} kind=${tool === "line" ? "line" : shape} onMark=${add} onUndo=${undo} setTool=${setTool} />
       <${MaskRow} />
       <${PictureRow} label=${label} />
     </section>

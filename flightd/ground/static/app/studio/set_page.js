@@ -23,7 +23,7 @@ export function SetPage({ name }) {
     </header>
     <div class="studio-grid">
       <div class="studio-main">
-        <${PictureCard} key=${studio().chosen} />
+        <${PictureCard} />
         <section class="card strip" aria-labelledby="strip"><h3 id="strip">Pictures <small>${count(set.pictures.length, "picture")}, paint marked in ${shows}</small></h3>
           <ul>${set.pictures.map((picture, i) => html`<${Thumb} key=${picture.file} picture=${picture} number=${i + 1} />`)}</ul>
           ${set.pictures.length === 0 && html`<p class="quiet">Start here: take pictures of your floor from a flight, from the drone as it stands, or from files, under every light that the floor has.</p>`}
