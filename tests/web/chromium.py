@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import pytest
@@ -65,21 +66,32 @@ def another(browser: Browser, *flags: str) -> Iterator[Browser]:
 
 
 @contextlib.contextmanager
-def station(drones: Sequence[str], listen: str = "127.0.0.1:0", folder: Path | None = None) -> Iterator[str]:
+def station(
+    drones: Sequence[str],
+    listen: str = "127.0.0.1:0",
+    folder: Path | None = None,
+    state: Path | None = None,
+    options: Sequence[str] = (),
+) -> Iterator[str]:
     """`flightd ground` as a person starts it; its address."""
     words = [word for drone in drones for word in ("--drone", drone)]
     words += [] if folder is None else ["--folder", str(folder)]
+    words += ["--listen", listen, *options]
+    with TemporaryDirectory() as elsewhere, started([*words, "--state", str(state or elsewhere)]) as url:
+        yield url
+
+
+@contextlib.contextmanager
+def started(words: Sequence[str]) -> Iterator[str]:
+    """`flightd ground` with these words; its address."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "flightd", "ground", *words, "--listen", listen],
-        cwd=ROOT,
-        stderr=subprocess.PIPE,
-        text=True,
+        [sys.executable, "-m", "flightd", "ground", *words], cwd=ROOT, stderr=subprocess.PIPE, text=True
     )
     assert process.stderr is not None
     with process.stderr:
         try:
             said = process.stderr.readline()
-            found = re.search(r"http://127\.0\.0\.1:\d+", said)
+            found = re.search(r"https?://[0-9.]+:\d+", said)
             assert found is not None, said
             yield found.group()
         finally:
