@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
 from flightd.adapters.ground_link.client import Address
@@ -129,3 +130,13 @@ async def until_told(socket: ClientConnection, topic: str, field: str, value: An
     """Wait until the station's own topic says this."""
     while (await told(socket, topic, ""))[field] != value:
         pass
+
+
+async def ending(page: ClientConnection) -> int | None:
+    """The code with which the station closes a page."""
+    try:
+        async with asyncio.timeout(10):
+            while True:
+                await page.recv()
+    except ConnectionClosed as ended:
+        return None if ended.rcvd is None else ended.rcvd.code
