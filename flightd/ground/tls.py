@@ -58,21 +58,21 @@ def _read(cert: Path, key: Path) -> ssl.SSLContext:
     try:
         context.load_cert_chain(cert, key, ask)
     except ssl.SSLError as err:
-        option, why = _WHY.get(err.reason or "", ("", f"cannot be used: {err.reason or err}"))
+        reason = err.reason or ("PEM_LIB" if "PEM lib" in str(err) else "")
+        option, why = _WHY.get(reason, ("", f"cannot be used: {err.reason or err}"))
         files = {CERT: cert, KEY: key}
+        option = option or _culprit(cert, key)
         where = f"{option} {files[option]}" if option else f"{CERT} {cert}, {KEY} {key}"
-        if not option:
-            where = _culprit(cert, key) or where
         raise InputError(why, key=where) from None
     return context
 
 
 def _culprit(cert: Path, key: Path) -> str:
-    """Which of the two has not what it should have in it; empty where both look right."""
+    """The option of the file that has not what it should have in it; empty where both look right."""
     if b"-----BEGIN CERTIFICATE-----" not in cert.read_bytes():
-        return f"{CERT} {cert}"
+        return CERT
     if b"PRIVATE KEY-----" not in key.read_bytes():
-        return f"{KEY} {key}"
+        return KEY
     return ""
 
 

@@ -173,8 +173,8 @@ async def test_a_viewer_may_stop_and_pause_and_nothing_else_that_moves(tmp_path:
         assert [one.kind for one in link.take_commands()] == [CommandKind.LAND]
         cookie = await sign_in(station, "vera")
         async with station.page(additional_headers={"Cookie": cookie}) as page:
-            for command, status in (("home", 403), ("stop", 200)):
-                act = {"id": f"{command}-by-vera", "command": command}
+            for ordered, status in (("home", 403), ("stop", 200)):
+                act = {"id": f"{ordered}-by-vera", "command": ordered}
                 await page.send(json.dumps({"say": "act", "number": 1, "drone": "demo", "act": act}))
                 assert (await told(page, "answer", ""))["status"] == status
         assert [one.kind for one in link.take_commands()] == [CommandKind.STOP]

@@ -41,7 +41,7 @@ export default function SignIn() {
   return html`
     <form class="card sign-in" aria-labelledby="sign-in" onSubmit=${send}>
       <h2 id="sign-in">Sign in</h2>
-      <p class="quiet">This ground station asks who you are. Nothing of the drones is shown before.</p>
+      <p class="quiet">This ground station asks who you are. It shows nothing before.</p>
       <label class="field">Name
         <input ref=${name} name="username" maxlength="60" autocomplete="username" autocapitalize="none" spellcheck="false" />
       </label>
@@ -50,8 +50,7 @@ export default function SignIn() {
       </label>
       <button class="order" aria-disabled=${waits}>${waits ? "Signing in …" : "Sign in"}</button>
       <p class=${trouble ? "refusal" : "refusal none"} role="alert">${trouble}</p>
-      <p class="quiet">Who runs the station gives you a name, or a new password:
-        <code>flightd ground people</code></p>
+      <p class="quiet">No name yet, or a forgotten password? Whoever runs the station can help.</p>
     </form>
   `;
 }
