@@ -51,7 +51,7 @@ async def _handed_on(drone: DroneLink, act: Act, who: Identity | None) -> tuple[
     if who is None:
         return 401, {"refused": "sign in first"}
     if not may_order(who.role, act.command):
-        return 403, {"refused": f"{who.name} is a {who.role}; {act.command} needs the role operator"}
+        return 403, {"refused": f"{who.name} has the role {who.role}; {act.command} needs the role operator"}
     try:
         accepted = await drone.act(act)
     except (UnavailableError, TransientError) as err:

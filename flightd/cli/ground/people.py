@@ -114,7 +114,7 @@ def role(
 
     of = read_role(to, "ROLE")
     _book(state).set_role(name, of)
-    _tell({"name": name, "role": of.value}, f"{name} is a {of} now", as_json)
+    _tell({"name": name, "role": of.value}, f"the role of {name} is {of} now", as_json)
 
 
 def password(name: Name, state: State = None, as_json: AsJson = False) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -102,4 +103,10 @@ def ground(
 
 
 def _say_where(where: Listening) -> None:
+    from flightd.adapters.systemd import Notifier
+
+    if address := os.environ.get("NOTIFY_SOCKET"):
+        manager = Notifier(address)
+        manager.send(READY=1, STATUS=f"at {where.url}")
+        manager.close()
     print(f"flightd: the ground station is at {where.url} (Ctrl-C ends it)", file=sys.stderr, flush=True)

@@ -92,7 +92,7 @@ class _Gate:
                 await (_turn_away(receive, send) if is_socket else _ask_who(scope, receive, send))
                 return
             if not who.role.covers(rule.role):
-                why = f"this needs the role {rule.role}; {who.name} is a {who.role}"
+                why = f"this needs the role {rule.role}; {who.name} has the role {who.role}"
                 if rule.line is not Line.NONE:
                     self._write_down(scope, who, "refused", why)
                 await _refuse(scope, receive, send, 403, why)
