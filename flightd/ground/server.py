@@ -23,6 +23,7 @@ from flightd.ground.flights.flights import Flights
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+from flightd.ground.quiet_log import quiet_log
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.tls import Certificate
 from flightd.runtime.ending_signals import end_on_signals
@@ -155,6 +156,7 @@ async def serve(
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
     end; inventories and flights lie under `folder`."""
     hub, flights, uploads = Hub(drones), Flights(folder), ReadingProcess()
+    quiet_log()
     names = () if certificate is None else certificate.names
     hosts = own_hosts(where.host, where.port, certificate is not None, names, where.is_beyond)
     server = _Server(

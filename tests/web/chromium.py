@@ -96,7 +96,8 @@ def started(words: Sequence[str]) -> Iterator[str]:
             yield found.group()
         finally:
             process.terminate()
-            assert process.wait(20) == 0, process.stderr.read()
+            code, rest = process.wait(20), process.stderr.read()
+            assert (code, "Traceback" in rest) == (0, False), rest
 
 
 @contextlib.contextmanager
