@@ -81,7 +81,8 @@ async def _live(hub: Hub, orders: Orders, socket: WebSocket) -> None:
     if hub.is_full:
         await socket.close(_FULL, "too many pages are open")
         return
-    await socket.send_text(session_message(orders.access.login, who.name, who.role))
+    with contextlib.suppress(WebSocketDisconnect):  # it is heard of below
+        await _say(socket, session_message(orders.access.login, who.name, who.role))
     async with asyncio.TaskGroup() as acts:  # what was ordered is handed on though its page has gone
         with hub.opened(attends=who.role.covers(Role.OPERATOR)) as browser:
             try:
@@ -101,8 +102,8 @@ async def _live(hub: Hub, orders: Orders, socket: WebSocket) -> None:
                 gone = group.exceptions[0]
                 assert isinstance(gone, _GoneError)
                 if gone.code == SIGN_IN_FIRST:
-                    with contextlib.suppress(RuntimeError, WebSocketDisconnect):
-                        await socket.send_text(session_message(login=True, name="", role=""))
+                    with contextlib.suppress(WebSocketDisconnect):
+                        await _say(socket, session_message(login=True, name="", role=""))
                 await _close(socket, gone.code, str(gone))
 
 
@@ -121,7 +122,16 @@ async def _send(browser: Browser, socket: WebSocket) -> None:
     """Everything that the page is to see; waits where it does not take it."""
     while True:
         message = await browser.next()
+        await _say(socket, message)
+
+
+async def _say(socket: WebSocket, message: str | bytes) -> None:
+    """WebSocketDisconnect where the socket has closed meanwhile: the server does so by itself at a broken
+    frame, and tells it here first."""
+    try:
         await (socket.send_text(message) if isinstance(message, str) else socket.send_bytes(message))
+    except RuntimeError:
+        raise WebSocketDisconnect(_NOT_OURS) from None
 
 
 async def _hear(

@@ -4,6 +4,7 @@ What is not allowed is refused here, whatever the page has shown."""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Mapping
 
 from starlette.requests import HTTPConnection
@@ -139,5 +140,6 @@ async def _turn_away(receive: Receive, send: Send) -> None:
     """A page's script is told nothing of a handshake that fails: so the socket opens, says why, closes."""
     await receive()
     await send({"type": "websocket.accept"})
-    await send({"type": "websocket.send", "text": session_message(login=True, name="", role="")})
-    await send({"type": "websocket.close", "code": SIGN_IN_FIRST, "reason": "sign in first"})
+    with contextlib.suppress(RuntimeError):  # it has closed by itself meanwhile
+        await send({"type": "websocket.send", "text": session_message(login=True, name="", role="")})
+        await send({"type": "websocket.close", "code": SIGN_IN_FIRST, "reason": "sign in first"})
