@@ -23,7 +23,7 @@ from tests.web.malformed import Malformed, Station, b64, malformed, opening
 from tests.web.people_rig import PASSWORD, audited, with_people
 from tests.web.stock_rig import counted_store
 
-MESSAGES = int(os.environ.get("FLIGHTD_GROUND_FUZZ", "800"))
+MESSAGES = int(os.environ.get("FLIGHTD_GROUND_FUZZ", "600"))
 FIRST = int(os.environ.get("FLIGHTD_GROUND_FUZZ_FROM", "0"))
 _AT_ONCE = 16
 _PATIENCE_S = 20.0
