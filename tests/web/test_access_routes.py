@@ -30,6 +30,7 @@ from tests.rigs.ground_link import address_of, local, serving, telling
 from tests.rigs.waiting import until
 from tests.web.people_rig import PASSWORD, audited, sign_in, signing_in, with_people
 from tests.web.served import JSON, Station, ending, served, told
+from tests.web.stock_rig import counted_store
 
 NOBODY = ("demo", Address("127.0.0.1", 1, 1))
 ANYBODYS = {
@@ -244,6 +245,36 @@ async def test_only_an_admin_reads_the_audit_and_each_change_is_a_line(tmp_path:
             ("program-operator", "POST", "/api/stock/decisions", "refused"),
         ]
         assert (await station.ask("GET", "/api/stock", {"Authorization": "Bearer none"}))[0] == 401
+
+
+@in_real_time
+async def test_a_decision_bears_the_name_of_whoever_is_signed_in_whatever_was_typed(tmp_path: Path) -> None:
+    keys = with_people(tmp_path)
+    counted_store(tmp_path / "monday")
+    async with served(NOBODY, folder=tmp_path, state=tmp_path, login=True) as station:
+        said = {"place": "AL-02-2-1", "what": "looking", "who": "ada", "seen_s": 2e9}
+        senders: tuple[tuple[dict[str, str], int], ...] = (
+            ({"Cookie": await sign_in(station, "otto"), "Origin": station.origin}, 200),
+            ({"Cookie": await sign_in(station, "vera"), "Origin": station.origin}, 403),
+            ({"Authorization": f"Bearer {keys[Role.OPERATOR]}"}, 200),
+        )
+        for number, (headers, status) in enumerate(senders):
+            body = json.dumps({"id": f"decision-{number}", **said}).encode()
+            way = "/api/stock/decisions?store=monday"
+            code, text = await station.ask("POST", way, {**headers, **JSON}, body)
+            assert code == status, text
+            if code == 200:
+                assert json.loads(text)["who"] in {"otto", "program-operator"}
+        bears = {"Authorization": f"Bearer {keys[Role.VIEWER]}"}
+        _, text = await station.ask("GET", "/api/stock/decisions?store=monday", bears)
+        assert {one["who"] for one in json.loads(text)["decisions"]} == {"otto", "program-operator"}
+    lines = [line for line in audited(tmp_path) if line["target"] == "/api/stock/decisions"]
+    assert [(line["person"], line["outcome"]) for line in lines] == [
+        ("otto", "accepted"),
+        ("vera", "refused"),
+        ("program-operator", "accepted"),
+    ]
+    assert lines[0]["text"] == "looking at AL-02-2-1; HTTP 200"
 
 
 @in_real_time
