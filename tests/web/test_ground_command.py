@@ -54,6 +54,13 @@ def test_wrong_input_is_one_clear_line(words: list[str], said: str) -> None:
     assert error.count("\n") == 1
 
 
+def test_a_state_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    code, error = ground("--state", str(tmp_path / "file" / "state"), "--listen", "127.0.0.1:0")
+    assert (code, error.count("\n")) == (2, 1)
+    assert "audit.jsonl: cannot be written: Not a directory; be the user" in error
+
+
 def test_it_serves_until_ctrl_c_and_ends_in_order() -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "flightd", "ground", "--listen", "127.0.0.1:0"],

@@ -26,7 +26,7 @@ from tests.web.stock_rig import counted_store
 MESSAGES = int(os.environ.get("FLIGHTD_GROUND_FUZZ", "600"))
 FIRST = int(os.environ.get("FLIGHTD_GROUND_FUZZ_FROM", "0"))
 _AT_ONCE = 16
-_PATIENCE_S = 20.0
+_PATIENCE_S = 60.0
 CLOSED_AS_REFUSED = {1002, 1003, 1007, 1008, 1009}
 
 

@@ -15,7 +15,7 @@ from starlette.requests import cookie_parser
 from starlette.types import Scope
 
 from flightd.adapters.ground_link.audit import AuditLog
-from flightd.core.errors import FlightdError, InputError
+from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.ground.access.attempts import Attempts
 from flightd.ground.access.audit import StationEntry, audit_file
 from flightd.ground.access.passwords import PasswordCheck, hashed_secret
@@ -62,8 +62,14 @@ class Access:
         self._check = PasswordCheck() if login else None
         self._changing = asyncio.Lock()
         self._trying = Threads(_AT_ONCE, _MOST_WAITING, "too many people sign in at once")
-        with contextlib.suppress(OSError):  # the log says what is wrong
+        try:
             make_private_file(audit_file(state))
+        except OSError as err:
+            raise UnavailableError(
+                f"cannot be written: {err.strerror}",
+                file=audit_file(state),
+                remedy="be the user that the station runs as, or name another --state DIR",
+            ) from None
         self._audit = AuditLog(audit_file(state))
         self._read()
 
