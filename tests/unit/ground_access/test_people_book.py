@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -75,12 +76,13 @@ def test_what_is_no_name_is_refused(tmp_path: Path, name: str) -> None:
 
 def test_nobody_is_changed_who_is_not_there(tmp_path: Path) -> None:
     book = PeopleBook(tmp_path)
-    for change in (
+    changes: tuple[Callable[[], None], ...] = (
         lambda: book.set_role("ann", Role.ADMIN),
         lambda: book.set_password("ann", "x"),
         lambda: book.set_key("ann", b"x"),
         lambda: book.remove("ann"),
-    ):
+    )
+    for change in changes:
         with pytest.raises(InputError, match="there is no 'ann' here; see flightd ground people list"):
             change()
 
