@@ -29,6 +29,13 @@ export const PAGES = [
   },
 ];
 
+// Shown in the place of every page while somebody has to sign in.
+export const SIGN_IN = {
+  title: "Sign in",
+  styles: ["access.css"],
+  load: () => import("./access/sign_in.js"),
+};
+
 // The page at a path, or undefined: the longest one that it lies under.
 export function pageAt(path) {
   const under = PAGES.filter((page) => path === page.path || (page.path !== "/" && path.startsWith(`${page.path}/`)));
