@@ -28,6 +28,7 @@ from flightd.ground.json_http import as_json, is_json, json_body, status_of
 from flightd.ground.messages import SentAct, answer_message, read_page_message
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.site_page.routes import site_page
 from flightd.ground.stock_page import stock_page
 
 _NOT_OURS = 1008
@@ -37,15 +38,21 @@ _FULL = 1013
 
 
 def application(
-    hub: Hub, hosts: Iterable[str], folder: Path | None, flights: Flights, uploads: ReadingProcess
+    hub: Hub,
+    hosts: Iterable[str],
+    folder: Path | None,
+    flights: Flights,
+    uploads: ReadingProcess,
+    maps: ReadingProcess,
 ) -> ASGIApp:
-    """The whole station as ASGI; `hosts` are the names under which it may be asked, inventories and `flights`
-    lie under `folder`, `uploads` reads what people send."""
+    """The whole station as ASGI; `hosts` are the names under which it may be asked, inventories, site
+    files and `flights` lie under `folder`, `uploads` reads what people send, `maps` lays out maps."""
     routes = [
         first_page(),
         WebSocketRoute("/live", partial(_live, hub)),
         Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
         *stock_page(folder, hub.drones, uploads),
+        *site_page(folder, maps),
         *flight_routes(flights),
         *guide_routes(),
         Mount("/static", StaticFiles(directory=STATIC)),

@@ -122,9 +122,10 @@ async def serve(
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  Inventories and flights lie under `folder`."""
     hub, flights, uploads = Hub(drones), Flights(folder), ReadingProcess()
+    maps = ReadingProcess(refusal="too many maps are being checked")
     server = _Server(
         uvicorn.Config(
-            application(hub, own_hosts(where.host, where.port), folder, flights, uploads),
+            application(hub, own_hosts(where.host, where.port), folder, flights, uploads, maps),
             http="h11",
             ws="websockets-sansio",
             lifespan="off",
@@ -154,3 +155,4 @@ async def serve(
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.shield(asyncio.wait([serving], timeout=_LEAVE_S + 2.0))
             uploads.close()
+            maps.close()

@@ -59,9 +59,10 @@ class Gap:
     seen_m: float
 
     def __str__(self) -> str:
+        where = f"aisle {self.aisle}, {self.side} side: x {self.from_m:.2f} to {self.to_m:.2f} m"
         return (
-            f"aisle {self.aisle}, {self.side} side: x {self.from_m:.2f} to {self.to_m:.2f} m is in no picture; "
-            f"nodes may be {self.seen_m:.2f} m apart and {self.seen_m / 2:.2f} m from the shelf's ends"
+            f"{where} is in no picture; nodes may be {self.seen_m:.2f} m apart and {self.seen_m / 2:.2f} m "
+            "from the shelf's ends"
         )
 
 
@@ -69,9 +70,9 @@ class Gap:
 class Coverage:
     """What the camera will see and read from the nodes, flown at `speed_mps` while it looks.
 
-    `problems` are lines for a person, `gaps` those of them that have a place; `unseen` the codes out of every picture, `unreadable` those seen too
-    small; `read_part` is the share of all locations that is neither (1 for a site without any), and 0
-    where the flight is too fast.
+    `problems` are lines for a person, `gaps` those of them that have a place; `unseen` the codes out of every
+    picture, `unreadable` those seen too small; `read_part` is the share of all locations that is neither (1
+    for a site without any), and 0 where the flight is too fast.
     """
 
     locations: int

@@ -113,7 +113,8 @@ def test_a_header_within_a_text_is_none() -> None:
 
 
 def test_a_form_that_has_no_blocks_is_written_anew_and_says_so() -> None:
-    text = '# mine\nsite.name = "x"\npad = [{id = "home", node = "A1"}]\n[[aisle]]\nid="A"\nx_m=0\ny_m=0\nspacing_m=[2]\n'
+    aisle = '[[aisle]]\nid="A"\nx_m=0\ny_m=0\nspacing_m=[2]\n'
+    text = f'# mine\nsite.name = "x"\npad = [{{id = "home", node = "A1"}}]\n{aisle}'
     draft = read_draft(text, "x")
     assert not keeps_comments(draft)
     new = draft_text(edited(draft, "aisle", 0, y_m=1.0))
