@@ -134,7 +134,7 @@ function changed(row, key, value) {
 // How an element is called in lists and headings.
 export function titleOf(draft, { table, index }) {
   const values = valuesOf(draft, { table, index }) ?? {};
-  const pair = (values.nodes ?? []).join(" – ");
+  const pair = (values.nodes ?? []).join(" to ");
   switch (table) {
     case "site": return `Site ${values.name ?? ""}`;
     case "aisle": return `Aisle ${values.id ?? "?"}`;

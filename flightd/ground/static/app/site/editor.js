@@ -5,6 +5,7 @@ import { ElementCard, remove } from "./element_card.js";
 import { ElementList } from "./element_list.js";
 import { FindingsCard } from "./findings_card.js";
 import { Plan } from "./plan.js";
+import { zoomBy } from "./zoom.js";
 import { checkSoon, download, openFile, save, showVersion } from "./site_source.js";
 import { change, isChanged, redo, site, undo } from "./site_state.js";
 
@@ -80,10 +81,15 @@ function Menu({ words, options, onChoice }) {
 }
 
 function Foot() {
-  const { snap_m: snap, tool, sound } = site();
+  const { snap_m: snap, tool, sound, zoom } = site();
   return html`
     <div class="site-foot">
       <label class="field snap">Snap to <select value=${snap} onChange=${(event) => change({ snap_m: Number(event.target.value) })}>${SNAPS.map(([value, words]) => html`<option key=${value} value=${value}>${words}</option>`)}</select></label>
+      <div class="zoom" role="group" aria-label="Zoom">
+        <button class="order" aria-label="Larger" onClick=${() => zoomBy(1.5)}>+</button>
+        <button class="order" aria-label="Smaller" disabled=${zoom <= 1} onClick=${() => zoomBy(1 / 1.5)}>−</button>
+        <button class="order" disabled=${zoom <= 1} onClick=${() => zoomBy(0)}>Whole</button>
+      </div>
       ${tool && html`<button class="order" onClick=${() => change({ tool: "", picked: "", sketch: null, said: "" })}>Stop drawing</button>`}
       <p class="quiet">Drag aisles, nodes, pads, markers and keep-outs. x runs along the aisles, y to its right; the grid is ${sound && Math.max(sound.facts.length_m, sound.facts.width_m) > 57 ? "10 m" : "1 m"}.</p>
     </div>

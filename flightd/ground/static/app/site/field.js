@@ -15,13 +15,14 @@ function Typed({ field, shown, onText, at = null }) {
   const [text, setText] = useState(null);
   const [wrong, setWrong] = useState("");
   const id = fieldId(field.key, at);
-  const leave = (event) => {
-    setText(null);
-    const problem = event.target.value === shown ? "" : onText(event.target.value.trim());
-    setWrong(problem ?? "");
+  const leave = ({ target }) => {
+    const problem = (target.value !== shown && onText(target.value.trim())) || "";
+    target.setCustomValidity(problem); // a form around it is not sent then
+    setText(problem ? target.value : null);
+    setWrong(problem);
   };
   return html`
-    <label class="field" for=${id}>${field.words}${field.unit && html` <small>${field.unit}</small>`}
+    <label class="field" for=${id}><span>${field.words}${field.unit && html` <small>${field.unit}</small>`}</span>
       <input
         id=${id} value=${text ?? shown} placeholder=${field.placeholder ?? ""} inputmode=${field.kind === "text" ? "text" : "decimal"} autocomplete="off"
         aria-invalid=${wrong ? "true" : null} aria-describedby=${wrong ? `${id}-wrong` : null}

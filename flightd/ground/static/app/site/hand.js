@@ -2,6 +2,7 @@
 import { nodesOf, rounded, rowsOf, valuesOf, withNew, withNodeAt, withValues } from "./draft.js";
 import { freshValues } from "./new_elements.js";
 import { change, choose, drag, dropped, edit, site } from "./site_state.js";
+import { beginPan } from "./zoom.js";
 
 const M = 100;
 const STEP_M = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -32,7 +33,10 @@ export function begin(event) {
     held = { before: draft, from, tool, id: mark?.dataset.id };
     return;
   }
-  if (!mark) return;
+  if (!mark) {
+    held = { before: draft, pan: beginPan(event) };
+    return;
+  }
   const { table, index, node, id } = mark.dataset;
   held = { before: draft, from, table, index: Number(index), node: node === undefined ? null : Number(node), id, corner: event.target.dataset.corner };
   choose(table, held.index, held.node);
@@ -40,6 +44,10 @@ export function begin(event) {
 
 export function move(event) {
   if (!held) return;
+  if (held.pan) {
+    held.pan(event);
+    return;
+  }
   const to = pointOf(event);
   if (held.tool) {
     if (!NODES_TOOLS.has(held.tool)) change({ sketch: [held.from, to] });

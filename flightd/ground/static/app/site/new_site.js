@@ -1,5 +1,5 @@
 // A site from nothing: the few measures that are needed; the station draws equal aisles of them.
-import { html, useState } from "../html.js";
+import { html, useRef, useState } from "../html.js";
 import { goTo } from "../router.js";
 import { makeNew } from "./site_source.js";
 import { Field } from "./field.js";
@@ -27,27 +27,32 @@ const RACKS = [
 ];
 
 export function NewSite() {
-  const [floor, setFloor] = useState({
+  const [, redraw] = useState(0);
+  const measures = useRef({ floor: {
     name: "my hall", aisles: 2, nodes: 6, spacing_m: [1.5], pitch_m: 3, line_colour: "yellow", shelves: "both", shelf_distance_m: 1.2, shelf_height_m: 3,
-  });
-  const [racks, setRacks] = useState({ levels_m: [0.3, 1.5], bay_width_m: 1.35, positions: 1 });
-  const [withRacks, setWithRacks] = useState(true);
+  }, racks: { levels_m: [0.3, 1.5], bay_width_m: 1.35, positions: 1 }, withRacks: true });
+  const { withRacks } = measures.current;
+  const set = (changes) => {
+    Object.assign(measures.current, changes); // Enter sends the form before the next drawing
+    redraw((times) => times + 1);
+  };
   const draw = async (event) => {
     event.preventDefault();
+    const { floor, racks, withRacks } = measures.current;
     const isPlaced = withRacks && floor.shelves !== "none";
     if (await makeNew({ ...floor, ...(isPlaced && { racks }) })) goTo("/site/edit");
   };
-  const fields = (known, values, set) =>
-    known.map((field) => html`<${Field} key=${field.key} field=${field} values=${values} onValue=${(changes) => set({ ...values, ...changes })} />`);
+  const fields = (known, part) =>
+    known.map((field) => html`<${Field} key=${field.key} field=${field} values=${measures.current[part]} onValue=${(changes) => set({ [part]: { ...measures.current[part], ...changes } })} />`);
   return html`
     <form class="site-home" onSubmit=${draw}>
       <h2>New site</h2>
       <p class="quiet">Equal aisles, joined at both ends, with the pad at A1. Everything can be changed on the drawing afterwards.</p>
       ${site().trouble && html`<p class="site-trouble" role="alert">${site().trouble}</p>`}
-      <section class="card" aria-labelledby="new-floor"><h3 id="new-floor">Floor</h3><div class="element-fields wide">${fields(FLOOR, floor, setFloor)}</div></section>
+      <section class="card" aria-labelledby="new-floor"><h3 id="new-floor">Floor</h3><div class="element-fields wide">${fields(FLOOR, "floor")}</div></section>
       <section class="card" aria-labelledby="new-racks"><h3 id="new-racks">Racks</h3>
-        <label class="check"><input type="checkbox" checked=${withRacks} onChange=${(event) => setWithRacks(event.target.checked)} /> Racks along every aisle with shelves</label>
-        ${withRacks && html`<div class="element-fields wide">${fields(RACKS, racks, setRacks)}</div>`}
+        <label class="check"><input type="checkbox" checked=${withRacks} onChange=${(event) => set({ withRacks: event.target.checked })} /> Racks along every aisle with shelves</label>
+        ${withRacks && html`<div class="element-fields wide">${fields(RACKS, "racks")}</div>`}
       </section>
       <div class="site-orders"><button class="order main-order" type="submit">Draw it</button><a class="order as-link" href="/site">Cancel</a></div>
     </form>

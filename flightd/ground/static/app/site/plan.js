@@ -3,6 +3,7 @@ import { html, useMemo, useRef } from "../html.js";
 import { Floor } from "../live/site_plan.js";
 import { nodesOf, placesOf, rowsOf } from "./draft.js";
 import { begin, isDragging, move, nudge, release } from "./hand.js";
+import { zoomed } from "./zoom.js";
 import { site } from "./site_state.js";
 
 const M = 100;
@@ -16,7 +17,7 @@ export function Plan() {
   const nodes = useMemo(() => nodesOf(draft), [draft]);
   if (!box.current || !isDragging()) box.current = boxOf(draft, nodes, drawn); // it stays while something is dragged
   const isOld = !checked?.sound || checkedDraft !== draft;
-  const view = box.current;
+  const view = zoomed(box.current);
   const scale = Math.min(2.4, Math.max(0.7, view[2] / 12));
   return html`
     <svg

@@ -25,6 +25,8 @@ const EMPTY = {
   camera: null, // against which coverage is checked
   withCamera: true,
   snap_m: 0.1,
+  zoom: 1, // how many times larger than the whole is shown
+  centre: null, // [x, y] of what is shown, m; null: of the whole
   tool: "", // what the mouse draws: a table, or nothing: it chooses and moves
   busy: false,
 };
