@@ -152,7 +152,8 @@ def test_what_is_no_map_and_what_is_no_name_is_refused_in_a_line(folder: Path) -
                 ("/check", {"draft": {**good, "lists": {"other": []}}}), ("/new", {"name": ""}),
                 ("/new", {"name": "x", "aisles": 2, "nodes": 2, "spacing_m": [], "pitch_m": 3}),
                 ("/export?kind=dwg", good), ("/export?kind=toml", bad), ("/export?kind=lif", bad),
-                ("/import?kind=lif", b"[[" * 100_000), ("/import?kind=lif", b"\xff"), ("/import?kind=csv", b"\0"),
+                ("/import?kind=lif", b"[[" * 100_000), ("/import?kind=lif", b"\xff"),
+                ("/import?kind=csv", b"\0"),
                 ("/import?kind=dwg", b""), ("/import?kind=toml", b"[" * 5_000),
             ):  # fmt: skip
                 status, told = await sent(station, path, message)

@@ -25,7 +25,7 @@ export function Editor() {
       ${notes.length > 0 && html`<${Notes} notes=${notes} />`}
       <section class="card site-drawing" aria-labelledby="drawing"><h3 id="drawing" class="unseen">Drawing</h3><${Plan} /><${Foot} /></section>
       <${ElementList} />
-      <div class="site-beside"><${ElementCard} /><${FindingsCard} /><${CoverageCard} /></div>
+      <div class="site-beside"><${FindingsCard} /><${ElementCard} /><${CoverageCard} /></div>
     </div>
   `;
 }
@@ -91,10 +91,13 @@ function Foot() {
         <button class="order" disabled=${zoom <= 1} onClick=${() => zoomBy(0)}>Whole</button>
       </div>
       ${tool && html`<button class="order" onClick=${() => change({ tool: "", picked: "", sketch: null, said: "" })}>Stop drawing</button>`}
+      ${isLost(sound) && html`<p class="quiet lost-words"><i /> is not read</p>`}
       <p class="quiet">Drag aisles, nodes, pads, markers and keep-outs. x runs along the aisles, y to its right; the grid is ${sound && Math.max(sound.facts.length_m, sound.facts.width_m) > 57 ? "10 m" : "1 m"}.</p>
     </div>
   `;
 }
+
+const isLost = (sound) => sound?.coverage?.lost.length > 0 || sound?.findings.some(({ from_m: from }) => from !== undefined);
 
 function listen() {
   const onKey = (event) => {

@@ -3,6 +3,7 @@ import { html } from "../html.js";
 import { placesOf, rounded, rowsOf, titleOf, valuesOf, withAisleNamed, withNodeAfter, withNodeAt, without, withoutNode, withValues } from "./draft.js";
 import { Field } from "./field.js";
 import { FIELDS, ONE_OF } from "./fields.js";
+import { focusOn } from "./hand.js";
 import { choose, edit, site } from "./site_state.js";
 
 const WHOLE = { table: "site", index: 0, node: null };
@@ -36,7 +37,10 @@ export function remove() {
   const { draft, chosen } = site();
   if (chosen.table === "site") return;
   if (chosen.node !== null && chosen.node !== undefined) edit(withoutNode(draft, chosen.index, chosen.node), { chosen: { ...chosen, node: null } });
-  else edit(without(draft, chosen), { chosen: WHOLE });
+  else {
+    edit(without(draft, chosen), { chosen: WHOLE });
+    focusOn("element");
+  }
 }
 
 function Nodes({ values, index, chosen }) {

@@ -3,6 +3,7 @@ import { html } from "../html.js";
 import { fieldId } from "./field.js";
 import { FIELDS } from "./fields.js";
 import { nodesOf, rowsOf } from "./draft.js";
+import { focusOn } from "./hand.js";
 import { choose, site } from "./site_state.js";
 
 const KINDS = { error: "Mistake", problem: "Not read", note: "Note" };
@@ -15,12 +16,12 @@ export function FindingsCard() {
     <section class="card findings" aria-labelledby="findings">
       <h3 id="findings">Check</h3>
       <p class=${!checked || isOld ? "quiet" : checked.sound ? "ready" : "refusal"} role="status">${words}</p>
-      ${checked?.sound && html`<${Facts} facts=${checked.facts} />`}
       ${checked?.findings.length > 0 && html`
         <ul class="finding-list" aria-label="Findings">
           ${checked.findings.map((finding, i) => html`<li key=${i}><${Finding} finding=${finding} /></li>`)}
         </ul>
       `}
+      ${checked?.sound && html`<details><summary>In figures</summary><${Facts} facts=${checked.facts} /></details>`}
     </section>
   `;
 }
@@ -52,6 +53,5 @@ function placeOf({ table, index, nodes, aisle }) {
 function lead({ table, index, node }, { field }) {
   choose(table, index, node);
   const known = FIELDS[table].find(({ key }) => key === field);
-  const id = known ? fieldId(field, known.at ?? null) : "element";
-  requestAnimationFrame(() => requestAnimationFrame(() => (document.getElementById(id) ?? document.getElementById("element"))?.focus()));
+  focusOn(known ? fieldId(field, known.at ?? null) : "element");
 }

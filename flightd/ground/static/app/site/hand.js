@@ -142,4 +142,10 @@ export function add(table, given = {}) {
   const index = rowsOf(draft, table).length;
   edit(withNew(draft, table, freshValues(draft, table, given)), { chosen: { table, index, node: null } });
   change({ tool: "", picked: "", sketch: null });
+  focusOn("element");
+}
+
+// To the part of the page with this id, once it is drawn.
+export function focusOn(id) {
+  requestAnimationFrame(() => requestAnimationFrame(() => document.getElementById(id)?.focus()));
 }

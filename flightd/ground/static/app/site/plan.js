@@ -2,6 +2,7 @@
 import { html, useMemo, useRef } from "../html.js";
 import { Floor } from "../live/site_plan.js";
 import { nodesOf, placesOf, rowsOf } from "./draft.js";
+import { Fronts } from "./fronts.js";
 import { begin, isDragging, move, nudge, release } from "./hand.js";
 import { zoomed } from "./zoom.js";
 import { site } from "./site_state.js";
@@ -28,7 +29,7 @@ export function Plan() {
       <${Grid} view=${view} />
       <g class=${isOld ? "laid-out old" : "laid-out"}>
         ${floor}
-        ${sound && html`<${Bays} sound=${sound} />`}
+        ${sound && html`<${Fronts} sound=${sound} />`}
       </g>
       <g aria-hidden="true">
         ${rowsOf(draft, "keep_out").map(({ values }, i) => html`<${KeepOut} key=${`k${i}`} values=${values} ...${taken("keep_out", i, chosen)} />`)}
@@ -73,15 +74,6 @@ function Grid({ view }) {
   for (let at = from(x); at < x + width; at += step) lines.push([at, y, at, y + height]);
   for (let at = from(y); at < y + height; at += step) lines.push([x, at, x + width, at]);
   return html`<g class="site-grid" aria-hidden="true">${lines.map(([a, b, c, d]) => html`<line x1=${a * M} y1=${b * M} x2=${c * M} y2=${d * M} />`)}</g>`;
-}
-
-function Bays({ sound }) {
-  return html`
-    <g class="bays" aria-hidden="true">
-      ${sound.bays.map(([from, to, y]) => html`<path d=${`M${from * M} ${y * M - 9}v18M${to * M} ${y * M - 9}v18`} />`)}
-      ${(sound.coverage?.lost ?? []).map(([code, x, y]) => html`<circle class="lost" cx=${x * M} cy=${y * M} r="7"><title>${code}: not read</title></circle>`)}
-    </g>
-  `;
 }
 
 function Aisle({ values, table, index, isChosen }) {
