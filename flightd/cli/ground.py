@@ -45,7 +45,7 @@ def ground(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Where flights, inventories and site files lie; only site files are changed, by the page Site.",
+            help="Where flights, inventories and site files lie; only site files are changed.",
         ),
     ] = None,
     key: Annotated[

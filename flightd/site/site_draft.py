@@ -209,7 +209,8 @@ def as_measures(tables: Mapping[str, Any]) -> dict[str, Any]:
 def _measure(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_measure(one) for one in value]
-    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    is_whole = isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**53
+    return float(value) if is_whole else value
 
 
 def draft_of(tables: Mapping[str, Any]) -> SiteDraft:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import Response
@@ -18,27 +17,13 @@ from flightd.ground.pages import page
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.request_body import whole_body
 from flightd.ground.site_page import exchange
-from flightd.ground.site_page.checking import checked
-from flightd.ground.site_page.drafts import (
-    MOST_BYTES,
-    SentCheck,
-    SentDraft,
-    SentSave,
-    opened_document,
-    reader,
-)
-from flightd.ground.site_page.new_site import NewSite, new_draft
-from flightd.ground.site_page.saving import saved_text
+from flightd.ground.site_page.drafts import MOST_BYTES
 from flightd.ground.site_page.site_files import SiteFiles
+from flightd.ground.site_page.work import check_sent, export_sent, new_sent, opened_text, text_sent
 from flightd.ground.stock_routes import answered, download
-from flightd.site.site_draft import read_draft
 
 _WORK_S = 20.0
 _MOST_TOGETHER = 8
-_check = reader(SentCheck, "a map to be checked")
-_save = reader(SentSave, "a map to be saved")
-_draft = reader(SentDraft, "a map")
-_new = reader(NewSite, "a new site")
 
 
 def site_page(folder: Path | None, working: ReadingProcess) -> list[BaseRoute]:
@@ -85,37 +70,35 @@ class SiteAnswers:
         name = _name(request)
         opened = await self._threads.run(self._files.open, name)
         versions = await self._threads.run(self._files.versions, name)
-        draft = await self._working.run(_read, _WORK_S, opened.text, name)
+        draft = await self._working.run(opened_text, _WORK_S, opened.text, name)
         return as_json({**draft, "stamp": opened.stamp, "versions": versions})
 
     async def version(self, request: Request) -> Response:
         """An old version of it: `?name=&version=`."""
         name, version = _name(request), request.query_params.get("version", "")
         text = await self._threads.run(self._files.version, name, version)
-        return as_json(await self._working.run(_read, _WORK_S, text, f"{name}, {version}"))
+        return as_json(await self._working.run(opened_text, _WORK_S, text, f"{name}, {version}"))
 
     async def check(self, request: Request) -> Response:
         """A map laid out and checked as it stands in the editor."""
-        sent = _check(await self._json(request))
-        return Response(
-            await self._working.run(checked, _WORK_S, sent.draft.draft(), sent.camera), media_type=JSON
-        )
+        told = await self._working.run(check_sent, _WORK_S, await self._json(request))
+        return Response(told, media_type=JSON)
 
     async def save(self, request: Request) -> Response:
         """Save under `?name=`, over the version that was opened or as a new file."""
-        name, sent = _name(request), _save(await self._json(request))
-        text = await self._working.run(saved_text, _WORK_S, sent.draft.draft())
-        if sent.stamp:
-            saved = await self._threads.run(self._files.save, name, sent.stamp, text)
+        name = _name(request)
+        text, stamp = await self._working.run(text_sent, _WORK_S, await self._json(request))
+        if stamp:
+            saved = await self._threads.run(self._files.save, name, stamp, text)
         else:
             saved = await self._threads.run(self._files.create, name, text)
         versions = await self._threads.run(self._files.versions, name)
-        draft = await self._working.run(_read, _WORK_S, saved.text, name)
+        draft = await self._working.run(opened_text, _WORK_S, saved.text, name)
         return as_json({**draft, "stamp": saved.stamp, "versions": versions})
 
     async def new(self, request: Request) -> Response:
         """A map of equal aisles; nothing is saved."""
-        return as_json(await self._working.run(new_draft, _WORK_S, _new(await self._json(request))))
+        return as_json(await self._working.run(new_sent, _WORK_S, await self._json(request)))
 
     async def take_in(self, request: Request) -> Response:
         """The map that another program's file describes: `?kind=csv`, `lif` or `toml`."""
@@ -127,8 +110,7 @@ class SiteAnswers:
     async def give_out(self, request: Request) -> Response:
         """The map as a file for another program: `?kind=`."""
         kind = request.query_params.get("kind", "")
-        sent = _draft(await self._json(request))
-        data = await self._working.run(exchange.exported, _WORK_S, kind, sent.draft())
+        data = await self._working.run(export_sent, _WORK_S, kind, await self._json(request))
         file = exchange.FORMATS[kind]
         return download(data, f"site{file.suffix}", file.media_type)
 
@@ -141,10 +123,6 @@ class SiteAnswers:
 
 def _name(request: Request) -> str:
     return request.query_params.get("name", "")
-
-
-def _read(text: str, name: str) -> dict[str, Any]:
-    return opened_document(read_draft(text, name))
 
 
 def _shipped_camera() -> dict[str, float]:

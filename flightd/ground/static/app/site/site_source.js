@@ -97,7 +97,7 @@ async function check() {
   if (!draft || asking) return;
   asking = true;
   try {
-    const checked = await askJson("/api/site/check", sent({ draft, camera: withCamera ? camera : null }));
+    const checked = await askJson("/api/site/check", sent({ draft: { ...draft, text: "" }, camera: withCamera ? camera : null }));
     const sound = checked.sound ? { sound: checked } : {};
     change({ checked, checkedDraft: draft, ...sound, ...(site().trouble === site().checkTrouble && { trouble: "" }) });
   } catch (error) {
