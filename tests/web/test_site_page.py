@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.request import Request, urlopen
 
 import pytest
 
@@ -33,7 +34,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def url(folder: Path) -> Iterator[str]:
     with station(["demo=127.0.0.1:1/1"], folder=folder) as url:
+        _begin_working(url)
         yield f"{url}/site"
+
+
+def _begin_working(url: str) -> None:
+    """The first question starts the process that works on maps, which takes a while on a busy machine."""
+    new = {"name": "n", "aisles": 1, "nodes": 2, "spacing_m": [1.5], "pitch_m": 3}
+    asked = Request(
+        f"{url}/api/site/new", json.dumps(new).encode(), {"Origin": url, "Content-Type": "application/json"}
+    )
+    with urlopen(asked, timeout=60) as answer:
+        assert answer.status == 200
 
 
 @pytest.fixture
@@ -216,6 +228,58 @@ def test_all_of_it_goes_by_keys_alone_and_nodes_keep_what_lies_on_them(
         page.get_by_role("link", name="All sites").click()
         expect(page.get_by_text("has changes that are not saved")).to_be_visible()
         assert hindrances(page) == []
+
+
+ASKED = """async ({draft, calls}) => {
+  const module = await import("/static/app/site/draft.js");
+  for (const [name, ...given] of calls) draft = module[name](draft, ...given);
+  return draft;
+}"""
+
+
+def test_what_names_nodes_and_aisles_follows_them(browser: Browser, url: str) -> None:
+    def rows(*values: dict[str, object]) -> list[dict[str, object]]:
+        return [{"values": one, "at": i} for i, one in enumerate(values)]
+
+    aisles = [{"id": one, "x_m": 0, "y_m": y, "spacing_m": [1, 2, 3]} for one, y in (("A", 0), ("AB", 3))]
+    draft = {
+        "site": {"name": "x"},
+        "text": "as it was",
+        "lists": {
+            "aisle": rows(*aisles),
+            "cross": rows({"nodes": ["A1", "AB1"]}, {"nodes": ["A3", "AB3"]}),
+            "blocked": rows({"nodes": ["A2", "A3"]}),
+            "rack": rows({"aisles": ["A", "AB"]}, {"sides": ["left"]}),
+            "pad": rows({"id": "home", "node": "A1"}, {"id": "far", "node": "AB3"}),
+        },
+    }
+    with opened(browser, url) as page:
+
+        def after(*calls: list[object]) -> dict[str, list[dict[str, object]]]:
+            told = page.evaluate(ASKED, {"draft": draft, "calls": calls})
+            assert told["text"] == "as it was"
+            return {name: [row["values"] for row in rows] for name, rows in told["lists"].items()}
+
+        more = after(["withNodeAfter", 0, 1])
+        assert more["aisle"][0]["spacing_m"] == [1, 1, 1, 3]
+        assert [one["nodes"] for one in more["cross"]] == [["A1", "AB1"], ["A4", "AB3"]]
+        assert more["blocked"] == [{"nodes": ["A2", "A4"]}]
+        assert after(["withNodeAfter", 0, 1], ["withoutNode", 0, 2]) == after()
+        less = after(["withoutNode", 1, 2])
+        assert less["aisle"][1]["spacing_m"] == [1, 5]
+        assert len(less["cross"]) == len(less["pad"]) == 1
+        first = after(["withoutNode", 0, 0])
+        assert (first["aisle"][0]["x_m"], first["aisle"][0]["spacing_m"]) == (1, [2, 3])
+        assert [pad["node"] for pad in first["pad"]] == ["AB3"]
+        assert first["blocked"] == [{"nodes": ["A1", "A2"]}]
+        named = after(["withAisleNamed", 0, "Q"])
+        assert named["rack"] == [{"aisles": ["Q", "AB"]}, {"sides": ["left"]}]
+        assert [one["nodes"] for one in named["cross"]] == [["Q1", "AB1"], ["Q3", "AB3"]]
+        gone = after(["without", {"table": "aisle", "index": 0}])
+        assert gone["cross"] == gone["blocked"] == []
+        assert gone["rack"][0] == {"aisles": ["AB"]}
+        kept = after(["withNodeAt", 0, 1, 9.0])
+        assert kept["aisle"][0]["spacing_m"] == [2.95, 0.05, 3], "a node never passes its neighbour"
 
 
 def test_coverage_is_checked_beside_the_drawing_and_leads_to_its_aisle(

@@ -56,7 +56,7 @@ function Head() {
         <button type="button" class="order" disabled=${!past.length} title="Ctrl Z" onClick=${undo}>Undo</button>
         <button type="button" class="order" disabled=${!future.length} title="Ctrl Shift Z" onClick=${redo}>Redo</button>
         ${asked !== null && html`<label class="field">File <input value=${asked} maxlength="85" onInput=${(event) => setNewName(event.target.value)} /></label>`}
-        <button class="order main-order" disabled=${busy || (asked === null && !isChanged())} title="Ctrl S">${busy ? "Saving …" : "Save"}</button>
+        <button class="order main-order" disabled=${busy || (asked === null && !isChanged())} title="Ctrl S">${busy ? "Wait …" : "Save"}</button>
         ${stamp && html`<button type="button" class="order" aria-expanded=${asked !== null} onClick=${() => setNewName(asked === null ? suggested : null)}>${asked === null ? "Save as" : "Not as another"}</button>`}
         <${Menu} words="Export" options=${EXPORTS} onChoice=${download} />
         ${site().versions.length > 0 && html`<${Menu} words="Old versions" options=${site().versions.map((at) => [at, whenOf(at)])} onChoice=${showVersion} />`}

@@ -4,6 +4,7 @@ import { placesOf, rounded, rowsOf, titleOf, valuesOf, withAisleNamed, withNodeA
 import { Field } from "./field.js";
 import { FIELDS, ONE_OF } from "./fields.js";
 import { focusOn } from "./hand.js";
+import { RackSketch } from "./rack_sketch.js";
 import { choose, edit, site } from "./site_state.js";
 
 const WHOLE = { table: "site", index: 0, node: null };
@@ -27,7 +28,7 @@ export function ElementCard() {
         ${FIELDS[table].map((field) => html`<${Field} key=${`${table}${index}${field.key}${field.at ?? ""}`} field=${field} values=${values} index=${index} onValue=${onValue} />`)}
       </div>
       ${table === "aisle" && html`<${Nodes} values=${values} index=${index} chosen=${chosen} />`}
-      ${table === "rack" && html`<${Codes} index=${index} />`}
+      ${table === "rack" && html`<${Codes} index=${index} /><${RackSketch} values=${values} />`}
     </section>
   `;
 }

@@ -54,7 +54,7 @@ export function NewSite() {
         <label class="check"><input type="checkbox" checked=${withRacks} onChange=${(event) => set({ withRacks: event.target.checked })} /> Racks along every aisle with shelves</label>
         ${withRacks && html`<div class="element-fields wide">${fields(RACKS, "racks")}</div>`}
       </section>
-      <div class="site-orders"><button class="order main-order" type="submit">Draw it</button><a class="order as-link" href="/site">Cancel</a></div>
+      <div class="site-orders"><button class="order main-order" type="submit" disabled=${site().busy}>${site().busy ? "Drawing …" : "Draw it"}</button><a class="order as-link" href="/site">Cancel</a></div>
     </form>
   `;
 }

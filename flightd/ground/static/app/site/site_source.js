@@ -10,12 +10,14 @@ const named = (name) => encodeURIComponent(name);
 
 // Do something that may be refused: what is said then is shown.
 async function tried(work) {
-  change({ trouble: "", said: "" });
+  change({ trouble: "", said: "", busy: true });
   try {
     return await work();
   } catch (error) {
     if (!isGivenUp(error)) change({ trouble: error.message });
     return undefined;
+  } finally {
+    change({ busy: false });
   }
 }
 
@@ -57,17 +59,15 @@ export const showVersion = (version) =>
 // Save under the file's own name, or as a new file.
 export async function save(newName = "") {
   const { draft, stamp, name } = site();
-  change({ busy: true });
   await tried(async () => {
     const isNew = Boolean(newName) || !stamp;
     const to = newName || name;
     const told = await askJson(`/api/site/file?name=${named(to)}`, sent({ draft, stamp: isNew ? "" : stamp }, "PUT"));
     const common = { name: to, stamp: told.stamp, versions: told.versions, losesComments: told.loses_comments, kept: told.draft };
     const isStill = site().draft === draft; // else it was edited on meanwhile, over the text of before
-    change({ ...common, ...(isStill && { draft: told.draft, checkedDraft: told.draft }), said: `Saved as ${to}.` });
+    change({ ...common, ...(isStill && { draft: told.draft, checkedDraft: told.draft }), said: `Saved as ${to}. Fly it in simulation, in the station's folder: flightd sim --warehouse "${to}"` });
     loadListQuietly();
   });
-  change({ busy: false });
 }
 
 const loadListQuietly = () => askJson("/api/site").then((list) => change({ list })).catch(() => {});
