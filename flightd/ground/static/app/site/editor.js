@@ -81,7 +81,7 @@ function Menu({ words, options, onChoice }) {
 }
 
 function Foot() {
-  const { snap_m: snap, tool, sound, zoom } = site();
+  const { snap_m: snap, tool, sound, checked, zoom } = site();
   return html`
     <div class="site-foot">
       <label class="field snap">Snap to <select value=${snap} onChange=${(event) => change({ snap_m: Number(event.target.value) })}>${SNAPS.map(([value, words]) => html`<option key=${value} value=${value}>${words}</option>`)}</select></label>
@@ -92,6 +92,7 @@ function Foot() {
       </div>
       ${tool && html`<button class="order" onClick=${() => change({ tool: "", picked: "", sketch: null, said: "" })}>Stop drawing</button>`}
       ${isLost(sound) && html`<p class="quiet lost-words"><i /> is not read</p>`}
+      ${sound && checked?.sound === false && html`<p class="quiet">In pale colours: the map as it was sound last.</p>`}
       <p class="quiet">Drag aisles, nodes, pads, markers and keep-outs. x runs along the aisles, y to its right; the grid is ${sound && Math.max(sound.facts.length_m, sound.facts.width_m) > 57 ? "10 m" : "1 m"}.</p>
     </div>
   `;
