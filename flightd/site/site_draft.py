@@ -201,9 +201,11 @@ def _own_form(draft: SiteDraft) -> str:
     return (f"{head}\n\n" if head else "") + "\n".join(parts)
 
 
-def as_measures(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a table with whole numbers of metres and degrees as the file writes them: 3.0."""
-    return {key: _measure(value) if key.endswith(("_m", "_deg")) else value for key, value in tables.items()}
+def as_measures(values: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with whole numbers of metres and degrees as the file writes them, 3.0, and without the keys that
+    have no value."""
+    given = {key: value for key, value in values.items() if value is not None}
+    return {key: _measure(value) if key.endswith(("_m", "_deg")) else value for key, value in given.items()}
 
 
 def _measure(value: Any) -> Any:
