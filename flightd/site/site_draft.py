@@ -202,8 +202,8 @@ def _own_form(draft: SiteDraft) -> str:
 
 
 def as_measures(values: Mapping[str, Any]) -> dict[str, Any]:
-    """A table with whole numbers of metres and degrees as the file writes them, 3.0, and without the keys that
-    have no value."""
+    """A table with whole numbers of metres and degrees as the file writes them, 3.0, and without the keys
+    that have no value."""
     given = {key: value for key, value in values.items() if value is not None}
     return {key: _measure(value) if key.endswith(("_m", "_deg")) else value for key, value in given.items()}
 

@@ -18,7 +18,7 @@ from flightd.site.site_tables import LISTS, known_keys
 
 TEXT = (Path(__file__).parents[3] / "configs" / "site-racks-small.toml").read_text()
 CAMERA = {"fov_deg": 65.0, "width_px": 1280, "exposure_ms": 2.0, "module_mm": 3.0, "speed_mps": 0.3}
-EXTRAS = {
+EXTRAS: dict[str, dict[str, Any]] = {
     "blocked": {"nodes": ["A2", "A3"]},
     "keep_out": {"x0_m": 5.0, "y0_m": 1.0, "x1_m": 6.0, "y1_m": 2.0},
     "marker": {"id": 3, "dictionary": "4x4_50", "x_m": 0.6, "y_m": 0.6},
