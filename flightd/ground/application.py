@@ -31,6 +31,7 @@ from flightd.ground.json_http import as_json, is_json, json_body, status_of
 from flightd.ground.messages import SentAct, answer_message, read_page_message, session_message
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.site_page.routes import site_page
 from flightd.ground.stock_page import stock_page
 
 _NOT_OURS = 1008
@@ -49,15 +50,18 @@ def application(
     folder: Path | None,
     flights: Flights,
     uploads: ReadingProcess,
+    maps: ReadingProcess,
 ) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks,
-    inventories and `flights` lie under `folder`, `uploads` reads what people send."""
+    inventories, site files and `flights` lie under `folder`, `uploads` reads what people send, `maps` lays out
+    maps."""
     orders = Orders(hub.drones, access)
     routes = [
         first_page(),
         WebSocketRoute("/live", partial(_live, hub, orders)),
         Route("/drones/{drone}/acts", partial(_act, orders), methods=["POST"]),
         *stock_page(folder, hub.drones, uploads),
+        *site_page(folder, maps),
         *flight_routes(flights),
         *guide_routes(),
         *session_routes(access),

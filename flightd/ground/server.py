@@ -157,11 +157,12 @@ async def serve(
     end; inventories and flights lie under `folder`."""
     hub, flights, uploads = Hub(drones), Flights(folder), ReadingProcess()
     quiet_log()
+    maps = ReadingProcess(refusal="too many maps are being checked")
     names = () if certificate is None else certificate.names
     hosts = own_hosts(where.host, where.port, certificate is not None, names, where.is_beyond)
     server = _Server(
         uvicorn.Config(
-            application(hub, hosts, access, folder, flights, uploads),
+            application(hub, hosts, access, folder, flights, uploads, maps),
             http="h11",
             ws="websockets-sansio",
             lifespan="off",
@@ -195,4 +196,5 @@ async def serve(
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.shield(asyncio.wait([serving], timeout=_LEAVE_S + 2.0))
             uploads.close()
+            maps.close()
             await asyncio.to_thread(access.close)

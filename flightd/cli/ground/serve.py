@@ -47,7 +47,10 @@ def ground(
     ] = "127.0.0.1:8080",
     folder: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Where flights and inventories lie; they are read, never changed."),
+        typer.Option(
+            metavar="DIR",
+            help="Where flights, inventories and site files lie; only site files are changed.",
+        ),
     ] = None,
     key: Annotated[
         Path | None, typer.Option(envvar="FLIGHTCTL_KEY", help="Your secret key: NAME.key_secret.")

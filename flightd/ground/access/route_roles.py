@@ -35,6 +35,7 @@ _ANYBODY = Rule(None, Line.NONE)
 _LOOKS = Rule(Role.VIEWER, Line.NONE)
 _ACTS = Rule(Role.OPERATOR, Line.ACT)
 _RULES_OVER_ALL = Rule(Role.ADMIN, Line.NONE)
+_CHANGES = Rule(Role.ADMIN, Line.ACT)
 
 RULES: Mapping[str, Rule] = {
     # the pages' document and files, which are the same for all, and the way in
@@ -43,6 +44,8 @@ RULES: Mapping[str, Rule] = {
     "GET /stock/{rest:path}": _ANYBODY,
     "GET /flights": _ANYBODY,
     "GET /flights/{rest:path}": _ANYBODY,
+    "GET /site": _ANYBODY,
+    "GET /site/{rest:path}": _ANYBODY,
     "GET /guide": _ANYBODY,
     "GET /guide/{rest:path}": _ANYBODY,
     "MOUNT /static": _ANYBODY,
@@ -67,6 +70,14 @@ RULES: Mapping[str, Rule] = {
     "GET /api/flights/{flight}/series": _LOOKS,
     "GET /api/flights/{flight}/pictures/{place}": _LOOKS,
     "GET /api/flights/{flight}/report": _LOOKS,
+    "GET /api/site": _LOOKS,
+    "GET /api/site/file": _LOOKS,
+    "GET /api/site/version": _LOOKS,
+    "POST /api/site/check": _LOOKS,  # questions with a draft, which is kept nowhere
+    "POST /api/site/new": _LOOKS,
+    "POST /api/site/import": _LOOKS,
+    "POST /api/site/export": _LOOKS,
+    "PUT /api/site/file": _CHANGES,
     "GET /api/guide": _LOOKS,
     "GET /api/guide/search": _LOOKS,
     "GET /api/guide/pages/{topic}": _LOOKS,

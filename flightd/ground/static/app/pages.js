@@ -22,6 +22,12 @@ export const PAGES = [
     load: () => import("./flights/flights_page.js"),
   },
   {
+    path: "/site",
+    title: "Site",
+    styles: ["map.css", "site.css"],
+    load: () => import("./site/site_page.js"),
+  },
+  {
     path: "/guide",
     title: "Guide",
     styles: ["guide.css"],
