@@ -53,8 +53,8 @@ def application(
     maps: ReadingProcess,
 ) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks,
-    inventories, site files and `flights` lie under `folder`, `uploads` reads what people send, `maps` lays out
-    maps."""
+    inventories, site files and `flights` lie under `folder`, `uploads` reads what people send, `maps` lays
+    out maps."""
     orders = Orders(hub.drones, access)
     routes = [
         first_page(),

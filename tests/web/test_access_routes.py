@@ -35,6 +35,7 @@ from tests.web.stock_rig import counted_store
 NOBODY = ("demo", Address("127.0.0.1", 1, 1))
 ANYBODYS = {
     "GET /", "GET /stock", "GET /stock/{rest:path}", "GET /flights", "GET /flights/{rest:path}", "GET /guide",
+    "GET /site", "GET /site/{rest:path}",
     "GET /guide/{rest:path}", "MOUNT /static", "GET /api/session", "POST /api/session", "DELETE /api/session",
 }  # fmt: skip
 """What nobody has to sign in for: documents and scripts that are the same for all, and the way in."""
@@ -44,7 +45,13 @@ def routes_of(tmp_path: Path) -> list[str]:
     """Every route of a station, as the rules name them."""
     access = Access(tmp_path, login=False, secure=False)
     guard = application(
-        Hub([]), own_hosts("127.0.0.1", 1), access, tmp_path, Flights(tmp_path), ReadingProcess()
+        Hub([]),
+        own_hosts("127.0.0.1", 1),
+        access,
+        tmp_path,
+        Flights(tmp_path),
+        ReadingProcess(),
+        ReadingProcess(),
     )
     access.close()
     found: list[str] = []
