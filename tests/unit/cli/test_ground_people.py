@@ -95,7 +95,7 @@ def test_at_a_terminal_the_password_is_typed_twice_and_not_shown(tmp_path: Path)
             person.write(f"{WORDS}\n".encode())
         while b"ann may come in" not in shown:
             shown += person.read(1)
-    assert process.wait(20) == 0
+        assert process.wait(60) == 0, "before the terminal goes away"
     os.close(terminal)
     assert WORDS.encode() not in shown
 
