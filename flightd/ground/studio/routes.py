@@ -8,17 +8,19 @@ from typing import Annotated, TypeVar
 
 import msgspec
 from msgspec import Meta
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from flightd.adapters.ground_link.protocol import DECODE_ERRORS
 from flightd.core.errors import FlightdError, InputError
 from flightd.core.paint import NAMED_PAINTS
+from flightd.ground.access.gate import identity_of, note_act
 from flightd.ground.bounded import Room
 from flightd.ground.json_http import as_json, is_json, status_of
 from flightd.ground.pages import page
 from flightd.ground.plain_files import plain_file
+from flightd.ground.request_body import whole_body
 from flightd.ground.shown_text import shown
 from flightd.ground.studio.picture_sets import MOST_PICTURE_BYTES
 from flightd.ground.studio.profile_shelf import Shelved
@@ -28,7 +30,7 @@ from flightd.vision.lines.colour_profile import SHIPPED
 from flightd.vision.training.labelled_frames import LabelledImage, LabelledLine, LabelledRegion
 
 _BINARY = "application/octet-stream"
-_MOST_LABEL_BYTES = 512 << 10
+_MOST_LABEL_BYTES = 1 << 20
 _MOST_UPLOADS = 2
 _MOST_MARKS, _MOST_POINTS = 500, 5000
 _FAR_PX = 1e5
@@ -145,6 +147,7 @@ class _Asked:
     async def make(self, request: Request) -> Response:
         new = await _said(request, NewSet, "a new set")
         made = await self._studio.disk.run(self._studio.sets.make, new.name, new.paint)
+        note_act(request, f"made the set {made.name}")
         return as_json({"name": made.name})
 
     async def one(self, request: Request) -> Response:
@@ -165,13 +168,14 @@ class _Asked:
     async def take(self, request: Request) -> Response:
         wanted = await _said(request, Wanted, "a picture of a flight")
         name = request.path_params["set"]
+        note_act(request, f"picture {wanted.place} of {wanted.flight}")
         return as_json({"file": await self._studio.take_from_log(name, wanted.flight, wanted.place)})
 
     async def upload(self, request: Request) -> Response:
         if request.headers.get("content-type", "") != _BINARY:
             return as_json({"refused": "a picture is the file itself"}, 415)
         with self._uploads.taken():
-            data = await _body(request, MOST_PICTURE_BYTES, "a picture")
+            data = await whole_body(request, MOST_PICTURE_BYTES, "picture")
             return as_json({"file": await self._studio.take_upload(request.path_params["set"], data)})
 
     async def picture(self, request: Request) -> Response:
@@ -224,13 +228,20 @@ class _Asked:
 
     async def install(self, request: Request) -> Response:
         said = await _said(request, Install, "what to install")
-        name, who = request.path_params["set"], said.who.strip()
-        return as_json(await self._studio.install(name, said.training_hash, who, said.again))
+        name, person = request.path_params["set"], identity_of(request)
+        who = said.who.strip() if person.by == "local" else person.name  # a name that is typed proves nothing
+        if not who:
+            raise InputError("nobody installs it", remedy="say who you are")
+        shelved = await self._studio.install(name, said.training_hash, who, said.again)
+        verdict = next((one.verdict for one in shelved.versions if one.number == shelved.current), "")
+        note_act(request, f"version {shelved.current} installed, {verdict}")
+        return as_json(shelved)
 
     async def take_back(self, request: Request) -> Response:
         said, name = await _said(request, TakeBack, "a version"), request.path_params["set"]
         self._studio.sets.folder_of(name)  # its name is one
         back: Shelved = await self._studio.disk.run(self._studio.shelf.take_back, name, said.version)
+        note_act(request, f"version {said.version} taken back")
         return as_json(back)
 
     async def profile(self, request: Request) -> Response:
@@ -270,22 +281,8 @@ async def _said(request: Request, kind: type[T], what: str) -> T:
     """The request's JSON.  InputError for anything else."""
     if not is_json(request):
         raise InputError(f"{what} is JSON")
-    body = await _body(request, _MOST_LABEL_BYTES, what)
+    body = await whole_body(request, _MOST_LABEL_BYTES, what)
     try:
         return msgspec.json.decode(body, type=kind)
     except DECODE_ERRORS as err:
         raise InputError(f"not {what}: {err}") from None
-
-
-async def _body(request: Request, most: int, what: str) -> bytes:
-    parts: list[bytes] = []
-    size = 0
-    try:
-        async for part in request.stream():
-            parts.append(part)
-            size += len(part)
-            if size > most:
-                raise InputError(f"too long for {what}: {most} bytes at most")
-    except ClientDisconnect:
-        raise InputError("it breaks off") from None
-    return b"".join(parts)

@@ -1,5 +1,6 @@
 // The site as it is painted and built: lines, racks, pads, keep-outs.  Drawn once per map.
 import { html } from "../html.js";
+import { isTone } from "../paints.js";
 
 const M = 100;
 const RACK_DEPTH_M = 0.8;
@@ -36,9 +37,6 @@ function depth(rack, racks) {
   const back = rack.y_m + outward * Math.min(RACK_DEPTH_M, ...gaps);
   return { top: Math.min(rack.y_m, back), bottom: Math.max(rack.y_m, back) };
 }
-
-// A paint without a name of its own is told by its tone.
-const isTone = (paint) => /^#[0-9a-f]{6}$/i.test(paint);
 
 export function Floor({ floor }) {
   return html`

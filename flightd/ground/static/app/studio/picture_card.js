@@ -1,4 +1,5 @@
 // The picture in hand: paint and floor are shown with strokes or boxes, lines by two clicks; by mouse, finger or keys.
+import { mayOperate } from "../access/session.js";
 import { html, useEffect, useRef, useState } from "../html.js";
 import { percent } from "../words.js";
 import { drawAll } from "./drawing.js";
@@ -33,17 +34,18 @@ export function PictureCard() {
   };
   return html`
     <section class="card picture-card" aria-label="Picture">
-      <div class="tools">
+      ${mayOperate() &&
+      html`<div class="tools">
         <${Choice} name="Mark" options=${TOOLS} chosen=${tool} choose=${setTool} />
         ${tool !== "line" && html`<${Choice} name="With" options=${SHAPES} chosen=${shape} choose=${setShape} />`}
         <label class="field">${tool === "line" ? "Width of the paint" : "Width"} ${width} px
           <input type="range" min="2" max="80" value=${width} onInput=${(event) => setWidth(Number(event.target.value))} />
         </label>
         <button class="order" disabled=${!label.regions.length && !label.lines.length} onClick=${undo}>Undo</button>
-      </div>
+      </div>`}
       <${Canvas} key=${label.file} label=${label} kind=${tool === "line" ? "line" : shape} onMark=${add} onUndo=${undo} setTool=${setTool} />
       <${MaskRow} />
-      <${PictureRow} label=${label} />
+      ${mayOperate() && html`<${PictureRow} label=${label} />`}
     </section>
   `;
 }
@@ -121,6 +123,7 @@ function Canvas({ label, kind, onMark, onUndo, setTool }) {
     }
     event.preventDefault();
   };
+  if (!mayOperate()) return html`<canvas ref=${canvas} class="seen-only" width=${label.width} height=${label.height} role="img" aria-label="Picture" />`;
   return html`
     <canvas
       ref=${canvas} class="hand" width=${label.width} height=${label.height} tabindex="0" role="application"

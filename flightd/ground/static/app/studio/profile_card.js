@@ -1,4 +1,5 @@
 // An installed profile: its versions, the way back to an earlier one, and how it comes to the drone.
+import { mayChange } from "../access/session.js";
 import { html } from "../html.js";
 import { time } from "../words.js";
 import { asked, change, loadOverview, studio, told } from "./studio_state.js";
@@ -23,7 +24,7 @@ export function Profile({ profile }) {
             <li key=${one.number} aria-current=${one.number === current ? "true" : null}>
               <span><b>Version ${one.number}</b> ${one.paint}, ${one.who}${one.verdict === "worse" && html` <span class="refusal">worse</span>`}
                 <small>${DAY.format(one.utc_s * 1000)} ${time(one.utc_s * 1000)}</small></span>
-              ${one.number === current ? html`<span class="ready">installed</span>` : html`<button class="order" onClick=${() => back(one.number)}>Take back to ${one.number}</button>`}
+              ${one.number === current ? html`<span class="ready">installed</span>` : mayChange() && html`<button class="order" onClick=${() => back(one.number)}>Take back to ${one.number}</button>`}
             </li>
           `,
         )}

@@ -1,4 +1,5 @@
 // Learn from the set, see the new profile beside those that fly, install it; one that is worse asks twice.
+import { mayChange, mayOperate, signedInName } from "../access/session.js";
 import { flightsState, watchList } from "../flights/flights_state.js";
 import { html, useEffect, useState } from "../html.js";
 import { setWho, who } from "../stock/decisions.js";
@@ -25,7 +26,7 @@ export function ScoreCard({ shows }) {
       ${overview.missing
         ? html`<p class="obstacles"><strong>Nothing can be learnt yet.</strong> ${capital(overview.missing)}</p>`
         : html`<p class="quiet">${shows < LEAST_SHOWING ? `Mark paint and floor in ${count(LEAST_SHOWING - shows, "more picture")}.` : "Every fourth picture is held back from learning, and scored on."} ${logWords(looked && !unread, flights.length)}</p>`}
-      <button class="order main-order" disabled=${running || !looked || shows < LEAST_SHOWING || overview.missing} onClick=${train}>${running ? "Learning …" : "Learn from the marks"}</button>
+      ${mayOperate() && html`<button class="order main-order" disabled=${running || !looked || shows < LEAST_SHOWING || overview.missing} onClick=${train}>${running ? "Learning …" : "Learn from the marks"}</button>`}
       ${running && html`<p class="quiet" role="status">Learning and scoring: up to some minutes. You may leave the page.</p>`}
       ${set.training?.refused && html`<p class="refusal" role="alert">${capital(set.training.refused)}</p>`}
       ${set.outcome && !running && html`<${Outcome} key=${set.outcome.training_hash} outcome=${set.outcome} />`}
@@ -50,7 +51,7 @@ function Outcome({ outcome }) {
     ${outcome.verdict.reasons.length > 0 && html`<ul class="reasons">${outcome.verdict.reasons.map((reason) => html`<li key=${reason}>${capital(reason)}</li>`)}</ul>`}
     <${Scores} scores=${outcome.scores} />
     <p class="quiet">Learnt from ${outcome.trained_on} pictures, scored on ${outcome.held_back.length} others.</p>
-    <${Install} outcome=${outcome} />
+    ${mayChange() ? html`<${Install} outcome=${outcome} />` : html`<p class="quiet">An admin installs it.</p>`}
   `;
 }
 
@@ -82,10 +83,11 @@ function Install({ outcome }) {
   const [said, setSaid] = useState("");
   const isWorse = outcome.verdict.judged === "worse";
   const install = async (again) => {
-    if (!name.trim()) return setSaid("Say who you are first.");
-    setWho(name.trim());
+    const by = signedInName() || name.trim();
+    if (!by) return setSaid("Say who you are first.");
+    if (!signedInName()) setWho(by);
     if (isWorse && !again) return setAsks(true);
-    const order = { training_hash: outcome.training_hash, who: name.trim(), again };
+    const order = { training_hash: outcome.training_hash, who: by, again };
     const went = await told(async () => {
       const profile = await asked(setPath("/install"), "POST", order);
       setSaid(`Installed as version ${profile.current}.`);
@@ -96,7 +98,7 @@ function Install({ outcome }) {
   };
   return html`
     <div class="install">
-      <label class="field">Who <input value=${name} maxlength="60" autocomplete="name" onInput=${(event) => setName(event.target.value)} /></label>
+      ${!signedInName() && html`<label class="field">Who <input value=${name} maxlength="60" autocomplete="name" onInput=${(event) => setName(event.target.value)} /></label>`}
       ${!asks && html`<button class="order" onClick=${() => install(false)}>Install</button>`}
     </div>
     ${asks &&

@@ -1,4 +1,5 @@
 // Which picture sets there are, a new one, and the profiles that were installed.
+import { mayOperate } from "../access/session.js";
 import { html, useState } from "../html.js";
 import { goTo } from "../router.js";
 import { capital } from "../words.js";
@@ -15,7 +16,7 @@ export function SetList({ overview }) {
       <section class="card sets" aria-labelledby="sets"><h3 id="sets">Picture sets</h3>
         ${overview.sets.length === 0 && html`<p class="quiet">None yet. A set holds pictures of one floor and its paint; the profile has the set's name.</p>`}
         <ul>${overview.sets.map((name) => html`<li key=${name}><a class="order link" href=${`/studio/${encodeURIComponent(name)}`}>${name}</a></li>`)}</ul>
-        <${NewSet} paints=${overview.paints} />
+        ${mayOperate() ? html`<${NewSet} paints=${overview.paints} />` : html`<p class="quiet">Only looking on: an operator makes sets.</p>`}
       </section>
       ${overview.profiles.map((profile) => html`<${Profile} key=${profile.name} profile=${profile} />`)}
     </div>

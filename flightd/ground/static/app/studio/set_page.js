@@ -1,5 +1,7 @@
 // One set: the picture in hand with what is marked in it, all its pictures, and what is learnt from them.
+import { mayOperate } from "../access/session.js";
 import { html } from "../html.js";
+import { toneOf } from "../paints.js";
 import { useTitle } from "../router.js";
 import { count } from "../words.js";
 import { AddPictures } from "./add_pictures.js";
@@ -19,7 +21,7 @@ export function SetPage({ name }) {
   return html`
     <header class="studio-head">
       <p class="quiet"><a href="/studio">Studio</a></p>
-      <h2>${name} <small><i class=${`swatch ${set.paint}`} style=${{ background: tone(set.paint) }} aria-hidden="true" />${set.paint} paint</small></h2>
+      <h2>${name} <small><i class="paint-swatch" style=${{ background: toneOf(set.paint) }} aria-hidden="true" />${set.paint} paint</small></h2>
     </header>
     <div class="studio-grid">
       <div class="studio-main">
@@ -27,7 +29,7 @@ export function SetPage({ name }) {
         <section class="card strip" aria-labelledby="strip"><h3 id="strip">Pictures <small>${count(set.pictures.length, "picture")}, paint marked in ${shows}</small></h3>
           <ul>${set.pictures.map((picture, i) => html`<${Thumb} key=${picture.file} picture=${picture} number=${i + 1} />`)}</ul>
           ${set.pictures.length === 0 && html`<p class="quiet">Start here: take pictures of your floor from a flight, from the drone as it stands, or from files, under every light that the floor has.</p>`}
-          <${AddPictures} />
+          ${mayOperate() ? html`<${AddPictures} />` : html`<p class="quiet">Only looking on: an operator adds and marks pictures.</p>`}
         </section>
       </div>
       <div class="studio-side">
@@ -40,9 +42,6 @@ export function SetPage({ name }) {
 }
 
 export const showsPaint = (picture) => picture.regions.some((one) => one.paint) || picture.lines.length > 0;
-
-const TONES = { yellow: "#ecbe26", white: "#e8e8e2", red: "#b02826", blue: "#2254a8", green: "#2c8a48", black: "#1e1d1c", orange: "#de621a" };
-const tone = (paint) => TONES[paint] ?? (/^#[0-9a-f]{6}$/i.test(paint) ? paint : "none");
 
 function Thumb({ picture, number }) {
   const { regions, lines, negative } = picture;
