@@ -22,6 +22,7 @@ _PAGE = (
     b'{"say":"act","number":1,"drone":"demo","act":{"id":"12345678","command":"stop"}}',
 )
 _DECISION = b'{"id":"12345678","place":"AL-01-1-1","what":"fine","who":"ann","seen_s":null,"note":""}'
+_SET = b'{"name":"hall","paint":"yellow"}'
 _SIGN_IN = b'{"name":"otto","password":"correct horse battery"}'
 _ODD_VALUES: tuple[Any, ...] = (
     None, True, -1, 1e308, 2**70, "", "\x00", "x" * 3000, [], [[]], {}, {"": {}}, "\ufffd", "../../etc",
@@ -32,6 +33,7 @@ _PATHS = (
     "/api/stock/place?store=monday&code=", "/api/stock/find?store=monday&text=", "/api/flights/",
     "/api/guide/pages/", "/api/stock/picture?store=monday&name=", "/static/", "/api/guide/pictures/",
     "/api/stock/export?store=monday&format=", "/api/guide/search?q=", "/api/flights?known=",
+    "/api/studio/sets/", "/api/studio/sets/hall/pictures/", "/api/studio/profiles/",
 )  # fmt: skip
 
 
@@ -141,7 +143,7 @@ def wrong_types(draw: random.Random, station: Station) -> bytes:
     path, good = draw.choice(
         (
             ("/drones/demo/acts", _ACTS[0]), ("/api/session", _SIGN_IN),
-            ("/api/stock/decisions?store=monday", _DECISION),
+            ("/api/stock/decisions?store=monday", _DECISION), ("/api/studio/sets", _SET),
         )
     )  # fmt: skip
     document = json.loads(good)

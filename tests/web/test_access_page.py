@@ -126,6 +126,24 @@ def test_a_viewer_is_offered_what_he_may_and_stops_the_drone(
     assert ("start", "refused") in [(line["act"], line["outcome"]) for line in audited(state)]
 
 
+def test_an_operator_takes_a_live_picture_and_a_viewer_looks_at_it(browser: Browser, url: str) -> None:
+    with opened(browser, f"{url}/studio") as page:
+        sign_in(page, "otto")
+        page.get_by_label("Name of a new set").fill("live")
+        page.keyboard.press("Enter")
+        page.get_by_role("button", name="Live", exact=True).click()
+        page.get_by_role("button", name="Take this picture").click()
+        expect(page.get_by_label("Picture to mark in")).to_be_visible()
+        page.locator("summary").first.click()
+        page.get_by_role("button", name="Sign out").click()
+        sign_in(page, "vera")
+        expect(page.get_by_text("Only looking on: an operator adds and marks pictures.")).to_be_visible()
+        expect(page.get_by_role("img", name="Picture", exact=True)).to_be_visible()
+        for name in ("Paint", "Undo", "Take the picture out", "From a flight", "Learn from the marks"):
+            expect(page.get_by_role("button", name=name)).to_have_count(0)
+        assert hindrances(page) == []
+
+
 ATTACK = """async (target) => {
   const acts = `${target}/drones/demo/acts`, along = {credentials: "include"}, found = {};
   const tried = async (name, make) => {

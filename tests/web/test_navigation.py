@@ -72,6 +72,8 @@ def test_one_moves_by_keyboard_and_goes_on_with_the_new_pages_first_thing(browse
         page.keyboard.press("Enter")
         expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
         expect(page.get_by_role("main")).to_be_focused()
+        page.get_by_role("link", name="Studio", exact=True).click()  # this station has no folder
+        expect(page.get_by_role("heading", name="No folder to work in")).to_be_visible()
 
 
 def test_a_link_that_the_browser_is_asked_to_open_elsewhere_is_left_to_it(browser: Browser, url: str) -> None:

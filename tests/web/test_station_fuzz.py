@@ -30,6 +30,7 @@ PAGE_WORDS = (
     '{"say":"echo","number":1.5}',
     '{"say":"act","number":1,"drone":"nobody","act":{"id":"12345678","command":"stop"}}',
 )  # fmt: skip
+MARKS = '{"regions":[{"paint":true,"box":[1,2,30,40]},{"paint":false,"stroke":[[1,2],[3,4]],"width":9}]}'
 ACT_WORDS = ('{"id":"12345678","command":"goto","node":"A4"}', '{"id":"12345678","command":"stop"}')
 
 
@@ -48,6 +49,8 @@ def requests(station: Station, draw: random.Random) -> list[bytes]:
         f"POST /api/stock/compare?store=monday&place=0&code=1&quantity=&heading=yes HTTP/1.1\r\n"
         f"Host: {host}\r\nOrigin: {station.origin}\r\nContent-Type: application/octet-stream\r\n"
         f"Content-Length: {len(BOOKS)}\r\nConnection: close\r\n\r\n{BOOKS}",
+        f"PUT /api/studio/sets/hall/pictures/a.jpg HTTP/1.1\r\nHost: {host}\r\nOrigin: {station.origin}\r\n"
+        f"Content-Type: application/json\r\nContent-Length: {len(MARKS)}\r\n\r\n{MARKS}",
     ]
     corpus = [request.encode() for request in whole]
     made = [spoil_bytes(draw, corpus) for _ in range(REQUESTS)]

@@ -6,16 +6,22 @@ import json
 from pathlib import Path
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 
+from flightd.ground.access.roles import Role
 from flightd.ground.studio import studio as studio_module
+from flightd.ground.studio.lessons import Outcome
+from flightd.ground.studio.picture_sets import PictureSets
+from flightd.ground.studio.verdict import Judged, Verdict
 from flightd.studies.train import train_colour
-from flightd.vision.lines.colour_profile import classify, grow, load_profile
+from flightd.vision.lines.colour_profile import classify, grow, load_profile, save_profile
 from flightd.vision.lines.sampling import grid_for, sample
 from flightd.vision.training.labelled_frames import read_labels
 from tests.rigs.event_loops import in_real_time
-from tests.web.served import JSON, served
+from tests.web.people_rig import audited, with_people
+from tests.web.served import JSON, Station, served
 from tests.web.studio_rig import flight_of, flown_folder, got, head_of, marked_set, marks_of, post, trained
 
 pytest.importorskip("sklearn", reason="training needs scikit-learn: pip install -e '.[train]'")
@@ -27,7 +33,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @in_real_time
-async def test_a_colour_is_learnt_from_a_log_scored_installed_and_taken_back(folder: Path) -> None:
+async def test_a_colour_is_learnt_scored_installed_and_taken_back(folder: Path, tmp_path: Path) -> None:
+    """First as it should be, then with paint and floor mistaken for each other, then with too little."""
     async with served(folder=folder) as station:
         files = await marked_set(station, "hall", "yellow", 9)
         flight, _ = await flight_of(station)
@@ -39,6 +46,13 @@ async def test_a_colour_is_learnt_from_a_log_scored_installed_and_taken_back(fol
         assert mask.shape[2] == 4
         assert 0.02 < head["share"] < 0.4
         assert len(head["lines"]) >= 1
+
+        # the set is a dataset that the commands read
+        _, labels = read_labels(folder / "studio" / "hall")
+        assert {label.line_colour for label in labels.images} == {"yellow"}
+        assert all(label.lines and label.complete for label in labels.images)
+        learnt = train_colour([folder / "studio" / "hall"], "yellow", tmp_path / "hand.npz", "hand", 0)
+        assert learnt.pictures == 9
 
         known = await trained(station, "hall", [flight])
         outcome = known["outcome"]
@@ -56,9 +70,11 @@ async def test_a_colour_is_learnt_from_a_log_scored_installed_and_taken_back(fol
         assert (code, "trained anew" in said["refused"]) == (409, True)
         code, shelved = await post(station, f"{at}/install", {"training_hash": seen, "who": "Ann"})
         assert (code, shelved["current"]) == (200, 1)
-        profile = load_profile(folder / "profiles" / "hall.npz")
+        flies = folder / "profiles" / "hall.npz"
+        profile = load_profile(flies)
         assert (profile.name, profile.colour, profile.training_hash) == ("hall", "yellow", seen)
-        assert shelved["file"] == str(folder / "profiles" / "hall.npz")
+        assert shelved["file"] == str(flies)
+        assert (await post(station, f"{at}/install", {"training_hash": seen, "who": "Bo"}))[1] == shelved
 
         # the mask is the detector's own, not another one
         bgr = cv2.imread(str(folder / "studio" / "hall" / files[1]))
@@ -67,80 +83,100 @@ async def test_a_colour_is_learnt_from_a_log_scored_installed_and_taken_back(fol
         own = grow(classify(sample(np.asarray(bgr, np.uint8), grid_for(640, 360)), profile)) > 0
         assert head["share"] == pytest.approx(own.mean(), abs=1e-3)
 
-        assert (await post(station, f"{at}/install", {"training_hash": seen, "who": "Bo"}))[1] == shelved
-        assert (await post(station, f"{at}/pictures/{files[1]}", {}, "PUT"))[0] == 200
-        again = (await trained(station, "hall", []))["outcome"]
-        assert [one["name"] for one in again["scores"]] == ["new", "shipped yellow", "installed 1"]
-        order = {"training_hash": again["training_hash"], "who": "Bo", "again": True}
-        assert (await post(station, f"{at}/install", order))[1]["current"] == 2
-        assert load_profile(folder / "profiles" / "hall.npz").training_hash == again["training_hash"]
-        code, back = await post(station, "/api/studio/profiles/hall/back", {"version": 1})
-        assert (code, back["current"], [one["who"] for one in back["versions"]]) == (200, 1, ["Ann", "Bo"])
-        assert load_profile(folder / "profiles" / "hall.npz").training_hash == seen
-
-
-@in_real_time
-async def test_the_set_is_a_dataset_that_the_commands_read(folder: Path, tmp_path: Path) -> None:
-    async with served(folder=folder) as station:
-        await marked_set(station, "same", "yellow", 7)
-    _, labels = read_labels(folder / "studio" / "same")
-    assert {label.line_colour for label in labels.images} == {"yellow"}
-    assert all(label.lines and label.complete for label in labels.images)
-    learnt = train_colour([folder / "studio" / "same"], "yellow", tmp_path / "by-hand.npz", "by-hand", 0)
-    assert learnt.pictures == 7
-
-
-@in_real_time
-async def test_a_worse_profile_says_so_and_needs_a_second_yes(folder: Path) -> None:
-    """Who marks the floor as paint and the paint as floor gets what he marked, and it finds no line again."""
-    async with served(folder=folder) as station:
-        flight, _ = await flight_of(station)
-        files = await marked_set(station, "wrong", "yellow", 8)
-        known = await got(station, "/api/studio/sets/wrong")
         for picture in known["pictures"]:
             regions = [one | {"paint": not one["paint"]} for one in picture["regions"]]
-            path = f"/api/studio/sets/wrong/pictures/{picture['file']}"
+            path = f"{at}/pictures/{picture['file']}"
             assert (await post(station, path, {"regions": regions}, "PUT"))[0] == 200
-        outcome = (await trained(station, "wrong", [flight]))["outcome"]
-        assert outcome["verdict"]["judged"] == "worse"
-        assert any("logs" in reason for reason in outcome["verdict"]["reasons"])
-        order = {"training_hash": outcome["training_hash"], "who": "Ann"}
-        code, said = await post(station, "/api/studio/sets/wrong/install", order)
+        worse = (await trained(station, "hall", [flight]))["outcome"]
+        assert [one["name"] for one in worse["scores"]] == ["new", "shipped yellow", "installed 1"]
+        assert worse["verdict"]["judged"] == "worse"
+        assert any("logs" in reason for reason in worse["verdict"]["reasons"])
+        order = {"training_hash": worse["training_hash"], "who": "Bo"}
+        code, said = await post(station, f"{at}/install", order)
         assert code == 409
         assert "it is worse than what flies" in said["refused"]
         assert "second time" in said["refused"]
-        assert not (folder / "profiles" / "wrong.npz").exists()
-        code, _ = await post(station, "/api/studio/sets/wrong/install", order | {"again": True})
-        assert code == 200
-        assert (folder / "profiles" / "wrong.npz").exists()
-        assert files
+        assert load_profile(flies).training_hash == seen
+        code, shelved = await post(station, f"{at}/install", order | {"again": True})
+        assert (code, shelved["current"]) == (200, 2)
+        assert load_profile(flies).training_hash == worse["training_hash"]
+        code, back = await post(station, "/api/studio/profiles/hall/back", {"version": 1})
+        assert (code, back["current"], [one["who"] for one in back["versions"]]) == (200, 1, ["Ann", "Bo"])
+        assert load_profile(flies).training_hash == seen
+
+        for file in files[3:]:
+            assert (await post(station, f"{at}/pictures/{file}", {}, "PUT"))[0] == 200
+        refused = (await trained(station, "hall", []))["training"]["refused"]
+        assert "paint is marked in 3 pictures; 7 are needed" in refused
+
+
+def with_outcome(folder: Path, name: str) -> None:
+    """A set whose training has come to the shipped profile."""
+    PictureSets(folder).make(name, "yellow")
+    profile = load_profile("yellow")
+    save_profile(profile, folder / "studio" / name / "trained.npz")
+    outcome = Outcome(profile.training_hash, 6, (), 1.0, 1.0, (), Verdict(Judged.ALONE))
+    (folder / "studio" / name / "trained.json").write_bytes(msgspec.json.encode(outcome))
 
 
 @in_real_time
-async def test_too_little_to_learn_from_says_what_is_missing(folder: Path) -> None:
-    async with served(folder=folder) as station:
-        await marked_set(station, "few", "#7a3fa0", 3)
-        known = await trained(station, "few", [])
-        assert "paint is marked in 3 pictures; 7 are needed" in known["training"]["refused"]
-        assert known["outcome"] is None
+async def test_an_operator_learns_and_an_admin_installs_under_his_own_name(tmp_path: Path) -> None:
+    keys = with_people(tmp_path)
+    with_outcome(tmp_path, "hall")
+    at = "/api/studio/sets"
+    install = {"training_hash": load_profile("yellow").training_hash, "who": "somebody else"}
+    async with served(folder=tmp_path, state=tmp_path, login=True) as station:
+
+        async def status(role: Role, path: str, said: object) -> tuple[int, str]:
+            headers = {"Authorization": f"Bearer {keys[role]}", **JSON}
+            return await station.ask("POST", path, headers, json.dumps(said).encode())
+
+        new = {"name": "new", "paint": "#7A3FA0"}
+        assert (await status(Role.VIEWER, at, new))[0] == 403
+        assert (await status(Role.OPERATOR, at, new))[0] == 200
+        assert PictureSets(tmp_path).read("new").paint == "#7a3fa0"
+        for path, said in (
+            (f"{at}/hall/install", install),
+            ("/api/studio/profiles/hall/back", {"version": 1}),
+        ):
+            assert (await status(Role.OPERATOR, path, said))[0] == 403
+            code, text = await status(Role.ADMIN, path, said)
+            assert code == 200, text
+            assert [one["who"] for one in json.loads(text)["versions"]] == ["program-admin"]
+    lines = [(line["person"], line["outcome"], line["text"]) for line in audited(tmp_path)]
+    assert ("program-operator", "accepted", "made the set new; HTTP 200") in lines
+    assert ("program-admin", "accepted", "version 1 installed, alone; HTTP 200") in lines
+    assert ("program-admin", "accepted", "version 1 taken back; HTTP 200") in lines
+
+
+async def photographs_are_taken_in(station: Station) -> None:
+    """What is none is refused; a set of them is looked through for a board."""
+    headers = {"Content-Type": "application/octet-stream"}
+    await post(station, "/api/studio/sets", {"name": "photos", "paint": "orange"})
+    at = "/api/studio/sets/photos/uploads"
+    own = {"Origin": station.origin, **headers}
+    picture = cv2.imencode(".png", np.full((90, 160, 3), 120, np.uint8))[1].tobytes()
+    code, text = await station.ask("POST", at, own, picture, 90.0)
+    assert code == 200
+    path = f"/api/studio/sets/photos/pictures/{json.loads(text)['file']}"
+    known = await got(station, "/api/studio/sets/photos")
+    assert [(one["width"], one["height"]) for one in known["pictures"]] == [(160, 90)]
+    for data in (b"", b"no picture", picture[:40]):
+        code, text = await station.ask("POST", at, own, data, 90.0)
+        assert code == 400, text
+        assert "picture" in json.loads(text)["refused"]
+    study = await got(station, "/api/studio/sets/photos/boards?columns=9&rows=6")
+    assert (study["pictures"], study["boards"]) == (1, [])
+    assert "8 are needed" in study["refused"]
+    for sides in ("columns=2&rows=6", "columns=9", "columns=0040000&rows=6", "columns=x&rows=6"):
+        code, text = await station.ask("GET", f"/api/studio/sets/photos/boards?{sides}")
+        assert (code, "3 to 40 inner corners" in text) == (404, True)
+    assert (await post(station, path, None, "DELETE"))[0] == 200
+    assert (await got(station, "/api/studio/sets/photos"))["pictures"] == []
 
 
 @in_real_time
-async def test_without_scikit_learn_it_says_what_to_install(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(studio_module, "missing_training", lambda: "training needs scikit-learn")
-    async with served(folder=folder) as station:
-        await marked_set(station, "bare", "yellow", 1)
-        assert (await got(station, "/api/studio"))["sets"]
-        code, answer = await post(station, "/api/studio/sets/bare/train", {})
-        assert code == 503
-        assert "extra train" in answer["refused"]
-        assert "pip install" in answer["refused"]
-
-
-@in_real_time
-async def test_bad_input_gets_one_clear_line(folder: Path) -> None:
+async def test_bad_input_gets_one_clear_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async with served(folder=folder) as station:
         files = await marked_set(station, "bad", "yellow", 1, marks=False)
         at, flight = "/api/studio/sets", (await flight_of(station))[0]
@@ -160,6 +196,7 @@ async def test_bad_input_gets_one_clear_line(folder: Path) -> None:
             ("PUT", one, {"lines": [{"x1": 0, "y1": 0, "x2": 0, "y2": 0}]}, 400, "without length"),
             ("PUT", one, {"regions": [stroke]}, 400, "5000 points"),
             ("POST", f"{at}/bad/install", {"training_hash": "x", "who": "Ann"}, 400, "nothing was trained"),
+            ("POST", f"{at}/bad/install", {"training_hash": "x", "who": " "}, 400, "say who you are"),
             ("POST", "/api/studio/profiles/bad/back", {"version": 3}, 400, "no version 3"),
         ):
             code, answer = await post(station, path, said, method)
@@ -172,33 +209,12 @@ async def test_bad_input_gets_one_clear_line(folder: Path) -> None:
         assert code == 403  # without the page's own origin
         code, text = await station.ask("GET", f"{at}/bad/pictures/..%2Flabels.json")
         assert code == 404
-
-
-@in_real_time
-async def test_photographs_are_taken_in_and_what_is_none_is_refused(folder: Path) -> None:
-    headers = {"Content-Type": "application/octet-stream"}
-    async with served(folder=folder) as station:
-        await post(station, "/api/studio/sets", {"name": "photos", "paint": "orange"})
-        at = "/api/studio/sets/photos/uploads"
-        own = {"Origin": station.origin, **headers}
-        picture = cv2.imencode(".png", np.full((90, 160, 3), 120, np.uint8))[1].tobytes()
-        code, text = await station.ask("POST", at, own, picture, 90.0)
-        assert code == 200
-        path = f"/api/studio/sets/photos/pictures/{json.loads(text)['file']}"
-        known = await got(station, "/api/studio/sets/photos")
-        assert [(one["width"], one["height"]) for one in known["pictures"]] == [(160, 90)]
-        for data in (b"", b"no picture", picture[:40]):
-            code, text = await station.ask("POST", at, own, data, 90.0)
-            assert code == 400, text
-            assert "picture" in json.loads(text)["refused"]
-        study = await got(station, "/api/studio/sets/photos/boards?columns=9&rows=6")
-        assert (study["pictures"], study["boards"]) == (1, [])
-        assert "8 are needed" in study["refused"]
-        for sides in ("columns=2&rows=6", "columns=9", "columns=0040000&rows=6", "columns=x&rows=6"):
-            code, text = await station.ask("GET", f"/api/studio/sets/photos/boards?{sides}")
-            assert (code, "3 to 40 inner corners" in text) == (404, True)
-        assert (await post(station, path, None, "DELETE"))[0] == 200
-        assert (await got(station, "/api/studio/sets/photos"))["pictures"] == []
+        monkeypatch.setattr(studio_module, "missing_training", lambda: "training needs scikit-learn")
+        code, answer = await post(station, f"{at}/bad/train", {})
+        assert code == 503
+        assert "extra train" in answer["refused"]
+        assert "pip install" in answer["refused"]
+        await photographs_are_taken_in(station)
 
 
 def test_marks_of_a_line_lie_on_it_and_beside_it() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import flightd.ground
 from flightd.core.errors import InputError
+from flightd.core.paint import NAMED_PAINTS
 from flightd.ground.site_page.work import check_sent, export_sent, new_sent, opened_text, text_sent
 from flightd.site.site_draft import read_draft
 from flightd.site.site_file import parse_site
@@ -101,3 +104,15 @@ def test_a_new_site_that_is_no_floor_says_why() -> None:
     told = new_sent(json.dumps({**new, "name": 'q"\n[[x]]', "racks": {**racks, "levels_m": [0.3]}}).encode())
     assert told["draft"]["site"]["name"] == 'q"\n[[x]]'
     assert "ceiling_m = 4.5 is assumed" in told["notes"][0]
+
+
+def test_the_page_offers_every_paint_by_the_tone_that_it_has_and_takes_any_other() -> None:
+    script = (Path(flightd.ground.__file__).parent / "static/app/paints.js").read_text()
+    assert dict(re.findall(r'(\w+): "(#[0-9a-f]{6})"', script)) == {
+        paint: f"#{bytes(tone).hex()}" for paint, tone in NAMED_PAINTS.items()
+    }
+    draft = draft_of_all()
+    for paint in (*NAMED_PAINTS, "#7a3fa0"):
+        draft["site"]["line_colour"] = paint
+        told = checked(draft)
+        assert (told["sound"], told["floor"]["line_colour"]) == (True, paint)
