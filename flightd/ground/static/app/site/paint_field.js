@@ -13,11 +13,11 @@ export function PaintInput({ id, words, paint, set }) {
         <select id=${id} value=${isTone(paint) ? OTHER : paint} onChange=${({ target }) => set(target.value === OTHER ? FIRST_TONE : target.value)}>
           ${!known && html`<option value=${paint}>${paint || "choose"}</option>`}
           ${Object.keys(PAINTS).map((one) => html`<option key=${one} value=${one}>${one}</option>`)}
-          <option value=${OTHER}>another tone …</option>
+          <option value=${OTHER}>${isTone(paint) ? `${paint} …` : "another tone …"}</option>
         </select>
       </label>
       ${isTone(paint) &&
-      html`<label class="field" for=${`${id}-tone`}>Tone <small>${paint}</small>
+      html`<label class="field" for=${`${id}-tone`}>Tone
         <input id=${`${id}-tone`} type="color" value=${paint} onChange=${(event) => set(event.target.value)} />
       </label>`}
     </div>

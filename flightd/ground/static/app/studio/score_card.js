@@ -35,7 +35,7 @@ export function ScoreCard({ shows }) {
 }
 
 const logWords = (known, many) =>
-  many || known ? `Also scored on ${many ? `the ${count(many, "newest flight log")}` : "no flight log: none lies in the folder"}.` : "Looking for flight logs …";
+  many || known ? `Also scored on ${many ? `the ${many === 1 ? "newest flight log" : `${many} newest flight logs`}` : "no flight log: none lies in the folder"}.` : "Looking for flight logs …";
 
 const WORDS = {
   better: ["good", "Better than what flies now"],
