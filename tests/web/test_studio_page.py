@@ -54,7 +54,7 @@ def drag(page: Page, first: list[float], last: list[float]) -> None:
     ]
     page.mouse.move(*places[0])
     page.mouse.down()
-    page.mouse.move(*places[1], steps=5)
+    page.mouse.move(*places[1], steps=3)
     page.mouse.up()
 
 
@@ -144,14 +144,14 @@ def test_a_colour_is_learnt_compared_installed_and_taken_back(
         page.get_by_role("button", name=re.compile(r"^1\. ")).click()
         mark(page, seen.pop(next(iter(seen))))
         expect(page.get_by_role("button", name="1. 2 marks")).to_be_visible()
-        taught = re.compile(r"\d+ % of the picture is taken for paint, \d line")
-        expect(page.get_by_text(taught)).to_be_visible()
         page.get_by_label("Picture to mark in").focus()  # a line by its ends, by keys alone
         for key in ("3", "Space", "Shift+ArrowUp", "Shift+ArrowUp", "Space"):
             page.keyboard.press(key)
         expect(page.get_by_role("button", name="1. 2 marks, 1 line")).to_be_visible()
         page.keyboard.press("Backspace")
         expect(page.get_by_role("button", name="1. 2 marks", exact=True)).to_be_visible()
+        taught = re.compile(r"\d+ % of the picture is taken for paint, \d line")
+        expect(page.get_by_text(taught)).to_be_visible()
         expect(page.get_by_text("Saving …")).to_have_count(0)
 
         mistake_the_buttons(page, seen)
