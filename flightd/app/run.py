@@ -12,9 +12,11 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.recorder.archive import FlightArchive
 from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.adapters.store.learnt_sensors import load_learnt
+from flightd.adapters.store.settings_file import SettingsFile
 from flightd.app import service
 from flightd.app.absent_parts import NO_GROUND, NO_RECORDER
 from flightd.app.build import build, detector_pool, ground_link
@@ -22,6 +24,9 @@ from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.flight_identity import FlightIdentity
 from flightd.app.flight_orders import configured_order, going_on, resumed
+from flightd.app.maintenance.checks import DroneChecks
+from flightd.app.maintenance.maintainer import DroneMaintainer
+from flightd.app.maintenance.settings import DroneSettings
 from flightd.app.recording import FlightSetting, record_setting
 from flightd.config.schema import Config
 from flightd.core.errors import InputError, TransientError
@@ -44,9 +49,12 @@ _LOG = logging.getLogger(__name__)
 @dataclass(frozen=True, slots=True)
 class Run:
     """What is to be flown.  `started_anew`: the service manager started the daemon again by itself, so that
-    its vehicle may be in the air; `journal`: stderr goes to the journal."""
+    its vehicle may be in the air; `journal`: stderr goes to the journal; `file` is the configuration's, with
+    the text that it was started by."""
 
     setting: FlightSetting
+    file: SettingsFile
+    text: str
     started_anew: bool = False
     journal: bool = False
 
@@ -67,7 +75,9 @@ def prepare(config: Config, path: Path, *, resume: bool) -> Run:
         order = replace(order, autostart=False)
     journal = service.set_up_log(os.environ)
     service.note_start(os.environ)
-    return Run(FlightSetting(config, site, order, _learnt(config, in_air=anew)), anew, journal)
+    file = SettingsFile(path)
+    setting = FlightSetting(config, site, order, _learnt(config, in_air=anew))
+    return Run(setting, file, file.read(), anew, journal)
 
 
 def _learnt(config: Config, *, in_air: bool) -> LearntSensors | None:
@@ -85,8 +95,15 @@ def _learnt(config: Config, *, in_air: bool) -> LearntSensors | None:
         return None
 
 
-async def run_until_signal(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult | signal.Signals:
-    """The flight's result, or the signal that ended it."""
+@dataclass(frozen=True, slots=True)
+class RestartAsked:
+    """The ground asked for the daemon to be started anew."""
+
+
+async def run_until_signal(
+    run: Run, observer: Callable[[Snapshot], None]
+) -> FlightResult | RestartAsked | signal.Signals:
+    """The flight's result, what ended it before it began, or the signal that ended it."""
     flight = asyncio.ensure_future(_fly(run, observer))
     came: list[signal.Signals] = []
     end_on_signals(flight, came)
@@ -94,9 +111,15 @@ async def run_until_signal(run: Run, observer: Callable[[Snapshot], None]) -> Fl
     return came[0] if flight.cancelled() and came else flight.result()
 
 
-async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
+async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult | RestartAsked:
     config, site, clock = run.setting.config, run.setting.site, LoopClock()
-    watchers = service.monitors(config.metrics, os.environ, journal=run.journal)
+    recent, restarts = RecentLog(), service.is_restarted(os.environ)
+    watchers = service.monitors(config.metrics, os.environ, journal=run.journal, recent=recent)
+    maintainer = DroneMaintainer(
+        DroneChecks(config, site, f"{run.file.path}, site {site.name}", recent),
+        DroneSettings(run.file, run.text, restarts=restarts),
+        restarts=restarts,
+    )
     identity = FlightIdentity.of(run.setting, platform.node(), clock.now_ns())
     async with watchers as monitors, AsyncExitStack() as stack:
         folder, anew = config.inventory.folder, run.started_anew
@@ -107,7 +130,7 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
         if archive is not None:
             recorder = stack.enter_context(_recorder(run.setting, archive, identity))
         counting = await count.begun(clock)
-        link = ground_link(config.ground, site, clock, counting)
+        link = ground_link(config.ground, site, clock, counting, maintainer)
         ground = NO_GROUND if link is None else stack.enter_context(link)
         await pool.ready()
         flight = build(
@@ -127,9 +150,22 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
             startup_fault=count.error,
             unfit=unfit_here(config, site),
         )
-        daemon = Daemon(flight)
+        daemon, maintainer.flight = Daemon(flight), flight
         async with room_kept(archive, daemon.failed):
-            return await daemon.fly()
+            return await _flown(daemon, maintainer)
+
+
+async def _flown(daemon: Daemon, maintainer: DroneMaintainer) -> FlightResult | RestartAsked:
+    """The flight, unless the ground has the daemon started anew before it begins."""
+    flying = asyncio.ensure_future(daemon.fly())
+    leaving = asyncio.ensure_future(maintainer.restart_asked())
+    try:
+        await asyncio.wait([flying, leaving], return_when=asyncio.FIRST_COMPLETED)
+        return flying.result() if flying.done() else RestartAsked()
+    finally:
+        for task in (leaving, flying):
+            task.cancel()
+        await asyncio.wait([flying, leaving])
 
 
 def unfit_here(config: Config, site: Site) -> FailedChecks | None:

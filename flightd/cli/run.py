@@ -37,7 +37,7 @@ def run(
     SIGINT and SIGTERM hand the vehicle back at once (exit 130 and 143).  Started while its vehicle flies,
     it keeps it level, reports, and lands.  Started anew by systemd it never starts a flight by itself.
     """
-    from flightd.app.run import prepare, run_until_signal
+    from flightd.app.run import RestartAsked, prepare, run_until_signal
     from flightd.cli.flight_progress import FlightProgress
     from flightd.config.schema import load_config
     from flightd.core.types import Phase
@@ -48,6 +48,9 @@ def run(
     if isinstance(result, signal.Signals):
         print(f"flightd: stopped by {result.name}; the vehicle was handed back", file=sys.stderr)
         raise typer.Exit(128 + result)
+    if isinstance(result, RestartAsked):
+        print("flightd: ends, to be started anew as the ground asked", file=sys.stderr)
+        return
     print(f"{result.reason}; {result.nodes_done} of {result.nodes_planned} nodes visited", file=sys.stderr)
     if result.phase is not Phase.DONE:
         raise RunError(f"mission {result.phase}: {result.reason}")

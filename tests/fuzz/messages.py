@@ -8,6 +8,7 @@ import itertools
 from pathlib import Path
 
 from flightd.adapters.ground_link.audit import AuditEntry
+from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.protocol import (
     DECODE_ERRORS,
     VERSION,
@@ -20,7 +21,7 @@ from flightd.adapters.ground_link.protocol import (
     decode_status,
     encode,
 )
-from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
+from flightd.adapters.ground_link.request_handler import RequestHandler
 from flightd.core.types import CommandKind
 from flightd.site.site_file import load_site
 from tests.fuzz.drive import Target, main

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import uuid
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -21,20 +21,28 @@ from flightd.adapters.ground_link.protocol import (
     VERSION,
     Accepted,
     Answer,
+    AskDoctor,
     AskInventory,
     AskPicture,
+    AskSettings,
     AskStatus,
     Attend,
     Code,
+    DoctorAnswer,
     EventReport,
+    FixParameter,
     Hello,
     InventoryAnswer,
     Order,
     PictureAnswer,
+    ProposeSettings,
     Refused,
     Request,
+    Restart,
+    SettingsAnswer,
     StatusAnswer,
     StatusReport,
+    TakeSettingsBack,
     Welcome,
     decode_answer,
     decode_event,
@@ -48,7 +56,10 @@ from flightd.core.types import CommandKind
 RETRY_S = 1.0
 """An answer that does not come for so long is asked for again, with the same id."""
 
-_KINDS_OF_INPUT = {Code.MALFORMED, Code.VERSION, Code.NODE, Code.UNAVAILABLE}
+MAINTENANCE_S, PROPOSAL_S = 15.0, 75.0
+"""What looks after the drone takes a while: a look, and a proposal that is checked as a whole."""
+
+_KINDS_OF_INPUT = {Code.MALFORMED, Code.VERSION, Code.NODE, Code.UNAVAILABLE, Code.INVALID}
 _SHUT_OUT = {zmq.Event.HANDSHAKE_FAILED_AUTH, zmq.Event.HANDSHAKE_FAILED_PROTOCOL}
 """Events after which asking again is of no use."""
 
@@ -175,6 +186,38 @@ class GroundClient:
             raise TransientError("the daemon's picture came without its JPEG")
         return picture, frames[1]
 
+    async def doctor(self) -> DoctorAnswer:
+        """What the drone finds of itself; RunError where it does not stand on the ground."""
+        return await self._ask(AskDoctor(version=VERSION, id=_new_id()), DoctorAnswer, MAINTENANCE_S)
+
+    async def fix(self, name: str, person: str = "") -> DoctorAnswer:
+        """Have a parameter of the autopilot set right and read back; what the drone finds then."""
+        request = FixParameter(version=VERSION, id=_new_id(), name=name, person=person)
+        return await self._ask(request, DoctorAnswer, MAINTENANCE_S)
+
+    async def settings(self) -> SettingsAnswer:
+        """The configuration's file as it stands."""
+        return await self._ask(AskSettings(version=VERSION, id=_new_id()), SettingsAnswer, MAINTENANCE_S)
+
+    async def propose(self, base: str, changes: Mapping[str, Any], person: str = "") -> SettingsAnswer:
+        """Have keys changed of the settings that `base` names; InputError where that is no sound
+        configuration."""
+        request = ProposeSettings(
+            version=VERSION, id=_new_id(), base=base, changes=dict(changes), person=person
+        )
+        return await self._ask(request, SettingsAnswer, PROPOSAL_S)
+
+    async def take_back(self, base: str, version: int, person: str = "") -> SettingsAnswer:
+        """Have a kept version of the settings brought back."""
+        request = TakeSettingsBack(
+            version=VERSION, id=_new_id(), base=base, version_kept=version, person=person
+        )
+        return await self._ask(request, SettingsAnswer, PROPOSAL_S)
+
+    async def restart(self, person: str = "") -> Accepted:
+        """Have the daemon started anew."""
+        return await self._ask(Restart(version=VERSION, id=_new_id(), person=person), Accepted)
+
     async def published(self) -> AsyncIterator[StatusReport | EventReport]:
         """Every status and event from now on, for ever.  InputError for a message of another version."""
         while True:
@@ -189,8 +232,8 @@ class GroundClient:
             self._seen_ns = max(self._seen_ns, status.stamp_ns)
         return status
 
-    async def _ask(self, request: Request, kind: type[_A]) -> _A:
-        return _expected((await self._answer(request, self._timeout_s))[0], kind)
+    async def _ask(self, request: Request, kind: type[_A], least_s: float = 0.0) -> _A:
+        return _expected((await self._answer(request, max(self._timeout_s, least_s)))[0], kind)
 
     async def _answer(self, request: Request, timeout_s: float) -> tuple[Answer, list[bytes]]:
         """The answer to this request, asked for again while it does not come."""

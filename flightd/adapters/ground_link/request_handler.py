@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from flightd import __version__
 from flightd.adapters.ground_link.audit import AuditEntry
 from flightd.adapters.ground_link.floor_status import floor_status
+from flightd.adapters.ground_link.maintenance_rules import objection
+from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.protocol import (
     DECODE_ERRORS,
     VERSION,
@@ -26,6 +27,7 @@ from flightd.adapters.ground_link.protocol import (
     EventReport,
     Hello,
     InventoryAnswer,
+    Maintenance,
     Order,
     Refused,
     Request,
@@ -56,16 +58,6 @@ _LATE_NS = 5_000_000_000
 """By an older status nothing else is ordered: the order lay in a queue, or its giver saw nothing."""
 
 
-@dataclass(frozen=True, slots=True)
-class Peer:
-    """Where a request came from: `name` and `role` by its key, `route` its connection."""
-
-    name: str
-    role: Role
-    route: bytes = b""
-    address: str = ""
-
-
 class RequestHandler:
     """Answers requests; what they ask of the flight waits in `take_commands` and `attending`."""
 
@@ -93,6 +85,8 @@ class RequestHandler:
         self.status: StatusReport | None = None
         self.possible = possible_commands(BEGIN)
         """The commands that the mission takes now."""
+        self.looked_after: Callable[[], bool] = lambda: False
+        """Whether somebody changes or checks something of the drone now: then nothing is started."""
         self.requests = 0
         self.refused = 0
 
@@ -110,8 +104,9 @@ class RequestHandler:
         """How many attend and were heard lately."""
         return sum(now_ns - heard_ns < _TAKEN_OVER_NS for heard_ns in self._heard_ns.values())
 
-    def answer(self, body: bytes, peer: Peer, now_ns: int) -> Answer | AskPicture:
-        """What to answer to `body`, or the request for a picture, which takes a while."""
+    def answer(self, body: bytes, peer: Peer, now_ns: int) -> Answer | AskPicture | Maintenance:
+        """What to answer to `body`, or a request that takes a while: for a picture, or to look after the
+        drone."""
         self.requests += 1
         request = self._read(body)
         match request:
@@ -121,9 +116,13 @@ class RequestHandler:
                 return self._order(request, peer, now_ns)
             case Attend():
                 return self._attend(request, peer, now_ns)
-            case Refused():
-                return request
-        return self._show(request)
+            case AskStatus() | AskInventory() | AskPicture():
+                return self._show(request)
+        return request
+
+    def maintenance_objection(self, request: Maintenance, peer: Peer, now_ns: int) -> tuple[Code, str] | None:
+        """Why the drone is not looked after now; None where it may be."""
+        return objection(request, peer.role, self.status, self.possible, now_ns)
 
     def _read(self, body: bytes) -> Request | Refused:
         """The request in `body`; the version is looked at before anything else."""
@@ -152,8 +151,8 @@ class RequestHandler:
             return self._refuse(request.id, Code.UNAVAILABLE, "this flightd keeps no inventory store")
         return InventoryAnswer(request=request.id, places=tuple(self._inventory()))
 
-    def refuse_picture(self, request: AskPicture, code: Code, text: str) -> Refused:
-        """The answer to a request for a picture that cannot be served."""
+    def refuse_later(self, request: AskPicture | Maintenance, code: Code, text: str) -> Refused:
+        """The answer to a request that took a while, and cannot be served."""
         return self._refuse(request.id, code, text)
 
     def _welcome(self, request: Hello, peer: Peer) -> Welcome:
@@ -234,6 +233,11 @@ class RequestHandler:
                 f"no node {node!r} on site {self._floor.name}",
             ),
             (kind not in self.possible, Code.PHASE, self._impossible(kind, phase)),
+            (
+                kind is CommandKind.START and self.looked_after(),
+                Code.BUSY,
+                "the drone is looked after just now: start it in a moment",
+            ),
         )
         return next(((code, text) for applies, code, text in checks if applies), (None, ""))
 

@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 
 from flightd.adapters.ground_link.audit import AuditEntry
+from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.protocol import (
     VERSION,
     Answer,
@@ -17,7 +18,7 @@ from flightd.adapters.ground_link.protocol import (
     Role,
     StatusReport,
 )
-from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
+from flightd.adapters.ground_link.request_handler import RequestHandler
 from flightd.core.types import Phase
 from flightd.site.site_file import load_site
 from tests.rigs.possible_commands import possible_in

@@ -8,6 +8,7 @@ import random
 import msgspec
 import pytest
 
+from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.protocol import (
     Accepted,
     AskPicture,
@@ -20,7 +21,6 @@ from flightd.adapters.ground_link.protocol import (
     decode_answer,
     encode,
 )
-from flightd.adapters.ground_link.request_handler import Peer
 from flightd.core.types import CommandKind, Phase
 from tests.rigs.possible_commands import possible_in
 from tests.unit.ground.request_handler_rig import OPERATOR, SESSION, SITE, VIEWER, RequestHandlerRig, S, body

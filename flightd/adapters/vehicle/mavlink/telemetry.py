@@ -213,3 +213,8 @@ class MavlinkTelemetry(NewestReadings):
         """By the clocks as they were compared, a stamp long past or yet to come."""
         ours_ns = self._sync.to_ours(boot_ns)
         return ours_ns is not None and not -_STAMP_AGE_MAX_NS <= ours_ns - now_ns <= _AHEAD_NS
+
+
+def version_words(number: int) -> str:
+    """A firmware's version, as AUTOPILOT_VERSION packs it."""
+    return f"{number >> 24 & 0xFF}.{number >> 16 & 0xFF}.{number >> 8 & 0xFF}"

@@ -1,0 +1,88 @@
+"""A drone that stands and is looked after from the ground: `flightd run` as its service runs it, beside a
+simulated vehicle."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+
+import pytest
+
+from flightd.adapters.ground_link.client import GroundClient
+from flightd.core.errors import InputError, RunError
+from tests.rigs.event_loops import in_real_time
+from tests.rigs.service import ServiceRig
+
+
+@pytest.mark.slow
+@in_real_time
+async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) -> None:
+    rig = ServiceRig(tmp_path, ("A2",))
+    text = rig.config.read_text().replace("autostart = true", "autostart = false  # a person starts it")
+    text = text.replace("[ground]", f'[ground]\naudit = "{tmp_path / "audit.jsonl"}"')
+    rig.config.write_text(text)
+    async with rig.world():
+        daemon = await rig.start()
+        await rig.until(lambda status: status.vehicle is not None)
+        rig.set_parameters(GUID_TIMEOUT=3.0)
+        async with GroundClient(rig.address, timeout_s=60.0) as client, asyncio.timeout(120):
+            await client.hello()
+            report = await client.doctor()
+            while all(check.fix != "GUID_TIMEOUT" for check in report.checks):
+                report = await client.doctor()
+            assert not report.fit
+            assert {check.name for check in report.checks if check.level == "unseen"} >= {"camera", "delay"}
+            assert report.versions.keys() >= {"flightd", "firmware (ardupilot)", "Python", "numpy"}
+
+            report = await client.fix("GUID_TIMEOUT", "ann")
+            assert report.outcome.startswith("GUID_TIMEOUT was 3, now reads ")
+            assert all(check.fix != "GUID_TIMEOUT" for check in report.checks)
+            with pytest.raises(InputError, match="nothing to set right"):
+                await client.fix("GUID_TIMEOUT")
+            assert any("maintenance: GUID_TIMEOUT was 3" in line for line in report.log)
+
+            stands = await client.settings()
+            assert (stands.locked, stands.pending, stands.restarts, stands.versions) == ("", False, True, ())
+            for changes, complaint in (
+                ({"mission.height_m": 50.0}, "mission.height_m: 50 is outside 0.5 to 20 m"),
+                ({"mission.nodes": ["Z9"]}, "Z9"),
+                ({"ground.listen": "0.0.0.0"}, "on the drone itself"),
+                ({"mission.site": "../other.toml"}, "own folder"),
+                ({"mission.hieght_m": 1.0}, "unknown key"),
+            ):
+                with pytest.raises(InputError, match=complaint):
+                    await client.propose(stands.tag, changes)
+            assert rig.config.read_text() == text
+
+            changed = await client.propose(stands.tag, {"mission.height_m": 1.5, "scan.pictures": 4}, "ann")
+            assert changed.pending
+            assert "# a person starts it" in rig.config.read_text()
+            assert changed.table["mission"]["height_m"] == 1.5
+            assert [change.key for change in changed.versions[0].changes] == [
+                "mission.height_m",
+                "scan.pictures",
+            ]
+            with pytest.raises(RunError, match="changed meanwhile"):
+                await client.propose(stands.tag, {"mission.height_m": 1.4})
+
+            await client.restart("ann")
+            assert await daemon.wait() == 0
+        again = await rig.start()
+        await rig.until(lambda status: status.vehicle is not None)
+        async with GroundClient(rig.address, timeout_s=60.0) as client, asyncio.timeout(60):
+            await client.hello()
+            stands = await client.settings()
+            assert not stands.pending
+            back = await client.take_back(stands.tag, 1, "bob")
+            assert rig.config.read_text() == text
+            assert [version.person for version in back.versions] == ["bob", "ann"]
+        again.terminate()
+        assert await again.wait() == 143
+    assert not list(tmp_path.glob(".flightd.toml*"))
+    audit = [json.loads(line) for line in (tmp_path / "audit.jsonl").read_text().splitlines()]
+    done = [(entry["command"], entry["outcome"]) for entry in audit]
+    assert done[0] == ("fix", "accepted")
+    assert done.count(("propose", "invalid")) == 5
+    assert done[-1] == ("take_back", "accepted")
+    assert "by ann" in audit[0]["text"]
