@@ -19,6 +19,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from flightd.core.errors import InputError
 from flightd.ground.acts import carried_out
 from flightd.ground.browser import Browser
+from flightd.ground.doctor.routes import doctor_routes
 from flightd.ground.flights.flights import Flights
 from flightd.ground.flights.routes import flight_routes
 from flightd.ground.guards import Guard
@@ -47,6 +48,7 @@ def application(
         Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
         *stock_page(folder, hub.drones, uploads),
         *flight_routes(flights),
+        *doctor_routes(hub.drones),
         *guide_routes(),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]

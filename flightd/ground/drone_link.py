@@ -6,18 +6,19 @@ import asyncio
 import logging
 import math
 from collections import Counter, deque
-from collections.abc import Iterable
-from typing import Any, Protocol
+from collections.abc import Awaitable, Callable, Iterable
+from typing import Any, Protocol, TypeVar
 
 from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.protocol import Accepted, EventReport, Role, StatusReport, Welcome
 from flightd.core.errors import FlightdError, RunError, TransientError, UnavailableError
 from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind
-from flightd.ground.bounded import Shared
+from flightd.ground.bounded import Room, Shared
 from flightd.ground.messages import Act, LinkState, PictureKey, picture_message
 
 _LOG = logging.getLogger(__name__)
+_T = TypeVar("_T")
 ATTEND_S = 0.5
 _STATE_S = 0.5
 _ANSWER_S = 2.0
@@ -28,6 +29,7 @@ _TRACK_STEP_M = 0.05
 _TRACK_KEPT = 4000
 MOST_ACTS = 16
 """So many acts may wait for their answer at once; what lands the drone is never turned away."""
+_MOST_QUESTIONS = 4
 _VISITED = "visited"
 """The event of a node that was visited: its name is the text."""
 _URGENT = frozenset({CommandKind.STOP, CommandKind.LAND})
@@ -80,6 +82,7 @@ class DroneLink:
         self._attends = False
         self._trouble = "connecting"
         self._acting = 0
+        self._questions = Room(_MOST_QUESTIONS, f"{name} is looked after already")
         self._inventory = Shared(self._asked_inventory)
 
     async def run(self) -> None:
@@ -113,6 +116,14 @@ class DroneLink:
             return await client.order(act.command, act.node, act.id, session=session, seen_ns=seen_ns)
         finally:
             self._acting -= 1
+
+    async def ask(self, question: Callable[[GroundClient], Awaitable[_T]]) -> _T:
+        """What the drone answers to a question of who looks after it.  As `GroundClient` raises;
+        UnavailableError where it cannot be reached, or too many ask at once."""
+        if self._client is None:
+            raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
+        with self._questions.taken():
+            return await question(self._client)
 
     async def inventory(self) -> tuple[dict[str, str], ...]:
         """What it has counted on this flight, place by place: asked once for all that want to know now.

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import importlib.metadata
-import platform
 
-from flightd import __version__
 from flightd.adapters.ground_link.protocol import CheckReport, DoctorAnswer
 from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.app.flight import Flight
 from flightd.config.schema import Config
 from flightd.core.errors import InputError, RunError
+from flightd.core.versions import versions_of
 from flightd.doctor.beside_daemon import Running, check_here, judge_running
 from flightd.doctor.check import Check, CheckLevel
 from flightd.site.site import Site
@@ -81,17 +79,9 @@ class DroneChecks:
 
     def _versions(self, firmware: str) -> dict[str, str]:
         """Those that a person is asked for when something does not work."""
-        versions = {"flightd": __version__}
-        if firmware:
-            versions[f"firmware ({self._config.vehicle.kind})"] = firmware
-        versions["Python"] = platform.python_version()
-        versions["system"] = f"{platform.system()} {platform.release()}"
-        for library in _LIBRARIES:
-            try:
-                versions[library] = importlib.metadata.version(library)
-            except importlib.metadata.PackageNotFoundError:
-                continue
-        return versions
+        program, *rest = versions_of(_LIBRARIES).items()
+        kind = f"firmware ({self._config.vehicle.kind})"
+        return dict([program, *([(kind, firmware)] if firmware else []), *rest])
 
 
 def _reported(check: Check) -> CheckReport:

@@ -79,7 +79,7 @@ async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) 
             assert [version.person for version in back.versions] == ["bob", "ann"]
         again.terminate()
         assert await again.wait() == 143
-    assert not list(tmp_path.glob(".flightd.toml*"))
+    assert not (tmp_path / ".flightd.toml.proposed").exists()
     audit = [json.loads(line) for line in (tmp_path / "audit.jsonl").read_text().splitlines()]
     done = [(entry["command"], entry["outcome"]) for entry in audit]
     assert done[0] == ("fix", "accepted")

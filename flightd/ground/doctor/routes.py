@@ -1,0 +1,149 @@
+"""What the page Doctor asks for: a drone's report, its settings, and what a person changes.
+
+Whatever reaches a drone goes over its ground link, which decides: this station only asks."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Annotated, TypeAlias, TypeVar
+
+import msgspec
+from msgspec import Meta
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from flightd.adapters.ground_link.protocol import DECODE_ERRORS, SettingsAnswer, Value
+from flightd.core.errors import FlightdError, InputError
+from flightd.ground.doctor.known_settings import KnownSettings
+from flightd.ground.doctor.versions import station_versions
+from flightd.ground.drone_link import DroneLink
+from flightd.ground.json_http import as_json, is_json, json_body, status_of
+from flightd.ground.pages import page
+
+_Person = Annotated[str, Meta(max_length=64)]
+_Tag = Annotated[str, Meta(max_length=64)]
+_Changes = Annotated[dict[Annotated[str, Meta(max_length=80)], Value], Meta(max_length=64)]
+_Answer: TypeAlias = Callable[[DroneLink, Request], Awaitable[object]]
+_B = TypeVar("_B", bound=msgspec.Struct)
+
+
+class Fix(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Set a parameter right."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=32)]
+    person: _Person = ""
+
+
+class Typed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a person types, to be judged before it is sent."""
+
+    base: _Tag
+    changes: _Changes
+
+
+class Proposal(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Change settings."""
+
+    base: _Tag
+    changes: _Changes
+    person: _Person = ""
+
+
+class TakeBack(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Bring a kept version of the settings back."""
+
+    base: _Tag
+    version: Annotated[int, Meta(ge=1, le=10**9)]
+    person: _Person = ""
+
+
+class StartAnew(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Start the daemon anew."""
+
+    person: _Person = ""
+
+
+class DoctorAnswers:
+    """What the page is answered, drone by drone."""
+
+    def __init__(self) -> None:
+        self._known = KnownSettings()
+
+    async def report(self, drone: DroneLink, _request: Request) -> object:
+        return await drone.ask(lambda client: client.doctor())
+
+    async def fix(self, drone: DroneLink, request: Request) -> object:
+        said = await _read(request, Fix)
+        return await drone.ask(lambda client: client.fix(said.name, said.person))
+
+    async def settings(self, drone: DroneLink, _request: Request) -> object:
+        return self._noted(drone, await drone.ask(lambda client: client.settings()))
+
+    async def check(self, drone: DroneLink, request: Request) -> object:
+        said = await _read(request, Typed)
+        complaint = await asyncio.to_thread(self._known.complaint, drone.name, said.base, said.changes)
+        return {"complaint": complaint}
+
+    async def propose(self, drone: DroneLink, request: Request) -> object:
+        said = await _read(request, Proposal)
+        told = await drone.ask(lambda client: client.propose(said.base, said.changes, said.person))
+        return self._noted(drone, told)
+
+    async def take_back(self, drone: DroneLink, request: Request) -> object:
+        said = await _read(request, TakeBack)
+        told = await drone.ask(lambda client: client.take_back(said.base, said.version, said.person))
+        return self._noted(drone, told)
+
+    async def restart(self, drone: DroneLink, request: Request) -> object:
+        said = await _read(request, StartAnew)
+        return await drone.ask(lambda client: client.restart(said.person))
+
+    def _noted(self, drone: DroneLink, told: SettingsAnswer) -> SettingsAnswer:
+        self._known.note(drone.name, told)
+        return told
+
+
+def doctor_routes(drones: Mapping[str, DroneLink]) -> list[BaseRoute]:
+    """The page at /doctor and all that it asks for."""
+    answers = DoctorAnswers()
+
+    def at(path: str, answer: _Answer, method: str) -> Route:
+        async def guarded(request: Request) -> Response:
+            drone = drones.get(request.path_params["drone"])
+            if drone is None:
+                return as_json({"refused": "there is no such drone"}, 404)
+            try:
+                return as_json(await answer(drone, request))
+            except FlightdError as err:
+                return as_json({"refused": str(err).removeprefix("refused: ")}, status_of(err, 400))
+
+        return Route(f"/api/doctor/{{drone}}/{path}", guarded, methods=[method])
+
+    return [
+        Route("/api/doctor", _station, methods=["GET"]),
+        at("report", answers.report, "GET"),
+        at("fix", answers.fix, "POST"),
+        at("settings", answers.settings, "GET"),
+        at("check", answers.check, "POST"),
+        at("settings", answers.propose, "POST"),
+        at("take-back", answers.take_back, "POST"),
+        at("restart", answers.restart, "POST"),
+        *page("/doctor"),
+    ]
+
+
+async def _station(_request: Request) -> Response:
+    return as_json({"versions": await asyncio.to_thread(station_versions)})
+
+
+async def _read(request: Request, kind: type[_B]) -> _B:
+    """The body.  InputError for anything else."""
+    if not is_json(request):
+        raise InputError("what is asked for is JSON")
+    body = await json_body(request, "the settings")
+    try:
+        return msgspec.json.decode(body, type=kind)
+    except DECODE_ERRORS as err:
+        raise InputError(f"not understood: {err}") from None
