@@ -22,6 +22,12 @@ export const PAGES = [
     load: () => import("./flights/flights_page.js"),
   },
   {
+    path: "/doctor",
+    title: "Doctor",
+    styles: ["doctor.css"],
+    load: () => import("./doctor/doctor_page.js"),
+  },
+  {
     path: "/guide",
     title: "Guide",
     styles: ["guide.css"],

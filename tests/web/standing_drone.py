@@ -1,0 +1,58 @@
+"""A drone that stands on its pad and waits: `flightd run`, kept running as its service manager does, beside a
+simulated vehicle, in a thread of its own beside the browser."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tests.rigs.event_loops import real
+from tests.rigs.service import ServiceRig
+
+_READY_S = 90.0
+
+
+class StandingDrone:
+    """Its configuration's file, its ports, and the parameters of its autopilot."""
+
+    def __init__(self, folder: Path) -> None:
+        self.rig = ServiceRig(folder, ("A2",))
+        self.config = self.rig.config
+        text = self.config.read_text().replace("autostart = true", "autostart = false  # by a person")
+        self.config.write_text(text.replace("[ground]", f'[ground]\naudit = "{folder / "audit.jsonl"}"'))
+        self._ready, self._ending = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=lambda: real(self._stand()), name="drone", daemon=True)
+
+    @property
+    def at(self) -> str:
+        """As `flightd ground --drone` takes it."""
+        address = self.rig.address
+        return f"demo=127.0.0.1:{address.status_port}/{address.command_port}"
+
+    @contextmanager
+    def standing(self) -> Iterator[StandingDrone]:
+        """It stands there meanwhile."""
+        self._thread.start()
+        try:
+            assert self._ready.wait(_READY_S), (self.rig.folder / "stderr").read_text()
+            yield self
+        finally:
+            self._ending.set()
+            self._thread.join(60)
+            assert not self._thread.is_alive()
+
+    async def _stand(self) -> None:
+        async with self.rig.world():
+            process = await self.rig.start()
+            await self.rig.until(lambda status: status.vehicle is not None)
+            self.rig.set_parameters(GUID_TIMEOUT=3.0)
+            self._ready.set()
+            while not self._ending.is_set():
+                await asyncio.sleep(0.1)
+                if process.returncode is not None:
+                    process = await self.rig.start()
+            process.terminate()
+            await process.wait()
