@@ -65,8 +65,8 @@ def _vehicle(config: Config, found: Running) -> Check:
     if found.heartbeat_age_s > _OLD_S:
         text = f"{config.vehicle.kind} at {url} has been silent for {found.heartbeat_age_s:.0f} s"
         return error("vehicle", text, "check its power and cable")
-    if state.unfit is not None:
-        return error("vehicle", str(state.unfit), "see the parameters below, and the autopilot's own checks")
+    if state.unfit is not None and not found.findings:  # those are told one by one
+        return error("vehicle", str(state.unfit), "see the autopilot's own checks")
     text = f"{config.vehicle.kind} {found.firmware}".strip() + f" answers at {url}, mode {state.mode}"
     return ok("vehicle", text)
 

@@ -48,7 +48,7 @@ export function ChecksCard({ drone, known, look, take }) {
 function CheckRow({ check, busy, isFixed, onFix }) {
   const { name, level, text, remedy, fix } = check;
   return html`
-    <li class=${`check-row ${level}`}>
+    <li class=${`check-row is-${level}`}>
       <span class="level">${LEVELS[level]?.name ?? level}</span>
       <div>
         <p><strong>${name}</strong> ${text}</p>

@@ -1,5 +1,6 @@
 // One key of the configuration: its value, unit, range, default and meaning, as its own documentation has them.
 import { html } from "../html.js";
+import { capital } from "../words.js";
 import { isSame, nameOf, readAs, typed, valueIn } from "./settings_keys.js";
 
 export function SettingField({ about, table, change, complaint, locked, onChange }) {
@@ -20,10 +21,9 @@ export function SettingField({ about, table, change, complaint, locked, onChange
       <label for=${id}>${about.key}${about.unit && html` <span class="quiet">${about.unit}</span>`}</label>
       ${about.fixed ? html`<output id=${id}>${text || bare(about.default) || "not given"}</output>` : html`<${Field} about=${about} given=${given} />`}
       <p id=${`${id}-text`} class="quiet">
-        ${about.text}${about.range && !isChoice(about) ? html` <span class="nowrap">${about.range}.</span>` : ""}${" "}
-        ${about.fixed
-          ? html`<em>${about.fixed}.</em>`
-          : html`<span>${stands === undefined ? `Default: ${defaultOf(about)}.` : `In the file: ${typed(stands)}. Default: ${defaultOf(about)}.`}</span>`}
+        ${capital(about.text)}. ${about.range && !isChoice(about) ? `${capital(about.range)}. ` : ""}${about.fixed
+          ? html`<em>${capital(about.fixed)}.</em>`
+          : `${isChanged && stands !== undefined ? `In the file: ${typed(stands)}. ` : ""}Default: ${defaultOf(about)}.`}
       </p>
       ${complaint && html`<p class="complaint" role="alert">${complaint}</p>`}
     </div>
