@@ -9,7 +9,9 @@ the drone run or send something, by a message.
 from __future__ import annotations
 
 import copy
+import difflib
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeAlias
 
@@ -55,7 +57,8 @@ _NAMES = frozenset({"vision.profile"})
 """Names that may stand for files: without any folder."""
 
 
-def known_keys() -> dict[str, Row]:
+@cache
+def known_keys() -> Mapping[str, Row]:
     """Every key by its name."""
     return {row.name: row for row in rows()}
 
@@ -81,7 +84,7 @@ def proposed(table: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[str
     keys = known_keys()
     for name, value in changes.items():
         if name not in keys:
-            raise InputError("unknown key", key=name[:MOST_CHARACTERS])
+            raise _unknown(name, keys)
         if why := fixed_because(keys[name]):
             raise InputError(why, key=name)
         _check_value(name, value)
@@ -106,6 +109,13 @@ def differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str
 def value_in(table: Mapping[str, Any], name: str) -> Any:
     """A key's value in a table; None where it is left out."""
     return _flat(table).get(name)
+
+
+def _unknown(name: str, keys: Mapping[str, Row]) -> InputError:
+    short = name[:MOST_CHARACTERS]
+    near = difflib.get_close_matches(short, keys, n=1)
+    remedy = f"did you mean {near[0]}?" if near else ""
+    return InputError("unknown key", key=short if short.isprintable() else repr(short), remedy=remedy)
 
 
 def _check_value(name: str, value: Value) -> None:

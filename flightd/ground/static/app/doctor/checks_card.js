@@ -54,8 +54,8 @@ function CheckRow({ check, busy, isFixed, onFix }) {
         <p><strong>${name}</strong> ${text}</p>
         ${remedy && html`<p class="remedy">${remedy}</p>`}
       </div>
-      ${fix && html`<button class="order" disabled=${busy} onClick=${() => onFix(fix)}>
-        ${isFixed ? "Writing …" : html`Set right<span class="unseen">: ${fix}</span>`}</button>`}
+      ${fix && html`<button class="order" aria-label=${`Set right: ${fix}`} disabled=${busy} onClick=${() => onFix(fix)}>
+        ${isFixed ? "Writing …" : "Set right"}</button>`}
     </li>
   `;
 }
