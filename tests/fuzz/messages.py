@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import tomllib
 from pathlib import Path
 
 from flightd.adapters.ground_link.audit import AuditEntry
@@ -14,6 +15,8 @@ from flightd.adapters.ground_link.protocol import (
     VERSION,
     Accepted,
     AskPicture,
+    Maintenance,
+    ProposeSettings,
     Refused,
     Role,
     decode_answer,
@@ -22,6 +25,9 @@ from flightd.adapters.ground_link.protocol import (
     encode,
 )
 from flightd.adapters.ground_link.request_handler import RequestHandler
+from flightd.config.edited_text import edited
+from flightd.config.remote_change import checked
+from flightd.core.errors import InputError
 from flightd.core.types import CommandKind
 from flightd.site.site_file import load_site
 from tests.fuzz.drive import Target, main
@@ -35,6 +41,7 @@ def target(folder: Path) -> Target:
     del folder  # no files here
     audit: list[AuditEntry] = []
     handler = RequestHandler(load_site(_CONFIGS / "site-demo.toml"), "session", audit.append)
+    config = (_CONFIGS / "sim.toml").read_text()
     clock = itertools.count(10**12, 200_000_000)
 
     def attempt(data: bytes) -> bool:
@@ -44,7 +51,13 @@ def target(folder: Path) -> Target:
         assert not isinstance(viewed, Accepted), "a viewer's order was accepted"
         assert not handler.take_commands(), "a viewer's order reached the flight"
         audit.clear()
-        if not isinstance(answer, AskPicture):
+        if isinstance(answer, Maintenance):
+            assert handler.maintenance_objection(answer, _VIEWER, next(clock)) is not None
+            if isinstance(answer, ProposeSettings):
+                with contextlib.suppress(InputError):
+                    edited(config, answer.changes)
+                    checked(tomllib.loads(config), answer.changes, _CONFIGS / "sim.toml")
+        elif not isinstance(answer, AskPicture):
             assert decode_answer(encode(answer)) == answer
         for decode in (decode_answer, decode_status, decode_event):
             with contextlib.suppress(*DECODE_ERRORS):
@@ -58,6 +71,11 @@ def target(folder: Path) -> Target:
         head + b'"command", "command": "goto", "node": "A2", "session": "session"}',
         *(head + b'"%s"}' % op for op in (b"hello", b"status", b"picture", b"inventory", b"attend")),
         head + b'"attend", "leave": true}',
+        *(head + b'"%s"}' % op for op in (b"doctor", b"settings", b"restart")),
+        head + b'"fix", "name": "GUID_TIMEOUT", "person": "ann"}',
+        head + b'"take_back", "base": "0123456789abcdef", "version_kept": 3}',
+        head + b'"propose", "base": "0123456789abcdef", "changes": {"mission.height_m": 1.5, '
+        b'"mission.nodes": ["A1"], "scan.pictures": null, "control.yaw.kp": 2, "vehicle.name": "seven"}}',
         encode(Accepted(request="request-1")),
         b'{"version": 1, "session": "s", "seq": 1, "stamp_ns": 1, "level": "info", "name": "a", "text": "b"}',
     )

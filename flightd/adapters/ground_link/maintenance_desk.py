@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Protocol
@@ -14,6 +15,8 @@ from flightd.adapters.ground_link.maintenance_rules import changes_something
 from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.protocol import Answer, Code, Maintenance, ProposeSettings, Refused
 from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
+
+_LOG = logging.getLogger(__name__)
 
 MOST_WAITING = 4
 _REMEMBERED = 64
@@ -95,6 +98,9 @@ class MaintenanceDesk:
                 answer = await self._maintainer.serve(request, peer)
             except FlightdError as err:
                 refusal = _code_of(err), str(err)
+            except (OSError, ArithmeticError, LookupError, TypeError, ValueError) as err:
+                _LOG.exception("%s cannot be done", type(request).__name__)  # an error of ours ends no link
+                refusal = Code.UNAVAILABLE, f"that failed: {type(err).__name__}; the drone's log says more"
             else:
                 self._note(request, peer, "accepted", "")
                 return answer

@@ -8,6 +8,7 @@ starts.  That one runs in a process of its own: however long it takes, the contr
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import sys
 import tomllib
@@ -105,7 +106,8 @@ class DroneSettings:
                 stderr=asyncio.subprocess.PIPE,
             )
             try:
-                os.setpriority(os.PRIO_PROCESS, process.pid, _GENTLY)
+                with contextlib.suppress(OSError):  # the service's own limits may forbid that
+                    os.setpriority(os.PRIO_PROCESS, process.pid, _GENTLY)
                 async with asyncio.timeout(_CHECK_S):
                     _, said = await process.communicate()
             except TimeoutError:

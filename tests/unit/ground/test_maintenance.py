@@ -146,6 +146,8 @@ class Slow:
         await self.go.wait()
         if request.id.startswith("bad"):
             raise InputError("no such thing")
+        if request.id.startswith("odd"):
+            raise KeyError(request.id)
         self.done.append(f"{request.id} {peer.name}")
         return Accepted(request=request.id)
 
@@ -210,6 +212,17 @@ def test_only_so_many_wait_and_errors_are_answers() -> None:
         rig.ask("fix-00009", peer=VIEWER)
         await rig.work()
         assert rig.maintainer.done == ["fix-00009 bob"]
+
+    real(asked())
+
+
+def test_an_error_of_ours_is_an_answer_too() -> None:
+    async def asked() -> None:
+        rig = Desk()
+        rig.ask("odd-00001")
+        rig.ask("fix-00002")
+        await rig.work()
+        assert [getattr(answer, "code", None) for answer in rig.sent] == [Code.UNAVAILABLE, None]
 
     real(asked())
 

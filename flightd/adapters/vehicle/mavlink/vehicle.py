@@ -221,7 +221,8 @@ class MavlinkVehicle(abc.ABC):
 
     async def set_right(self, finding: ParameterFinding) -> bool:
         """Write its better value; True when it read back as written.  An armed vehicle is left as it is."""
-        if finding.better is None or self._telemetry.armed or not self._heard.is_set():
+        is_known = self.parameters.get((finding.name,)) is not None
+        if finding.better is None or self._telemetry.armed or not is_known:
             return False
         return await self.parameters.write(finding.name, finding.better)
 
