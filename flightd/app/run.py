@@ -10,6 +10,7 @@ import signal
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from flightd.adapters.recent_log import RecentLog
@@ -44,6 +45,8 @@ from flightd.site.site import Site
 from flightd.site.site_file import load_site
 
 _LOG = logging.getLogger(__name__)
+_COME_UP_S = 15.0
+"""A daemon that has run for so long has come up: nothing of its settings ends it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,10 +60,13 @@ class Run:
     text: str
     started_anew: bool = False
     journal: bool = False
+    taken_back: str = ""
+    """Which newer settings were given up before this start; empty: none."""
 
 
-def prepare(config: Config, path: Path, *, resume: bool) -> Run:
-    """What to fly by the configuration of the file `path`; `resume`: what the last flight left over.
+def prepare(config: Config, path: Path, *, resume: bool, taken_back: str = "") -> Run:
+    """What to fly by the configuration of the file `path`; `resume`: what the last flight left over;
+    `taken_back` says that newer settings were given up.
     InputError where nobody could start the flight, or where there is nothing left to fly."""
     if not config.mission.autostart and not config.ground.listen:
         raise InputError(
@@ -77,7 +83,7 @@ def prepare(config: Config, path: Path, *, resume: bool) -> Run:
     service.note_start(os.environ)
     file = SettingsFile(path)
     setting = FlightSetting(config, site, order, _learnt(config, in_air=anew))
-    return Run(setting, file, file.read(), anew, journal)
+    return Run(setting, file, file.read(), anew, journal, taken_back)
 
 
 def _learnt(config: Config, *, in_air: bool) -> LearntSensors | None:
@@ -117,7 +123,7 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult |
     watchers = service.monitors(config.metrics, os.environ, journal=run.journal, recent=recent)
     maintainer = DroneMaintainer(
         DroneChecks(config, site, f"{run.file.path}, site {site.name}", recent),
-        DroneSettings(run.file, run.text, restarts=restarts),
+        DroneSettings(run.file, run.text, restarts=restarts, unfit=partial(_failing, config)),
         restarts=restarts,
     )
     identity = FlightIdentity.of(run.setting, platform.node(), clock.now_ns())
@@ -151,21 +157,37 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult |
             unfit=unfit_here(config, site),
         )
         daemon, maintainer.flight = Daemon(flight), flight
+        if run.taken_back:
+            daemon.failed(TransientError(run.taken_back))
         async with room_kept(archive, daemon.failed):
-            return await _flown(daemon, maintainer)
+            return await _flown(daemon, maintainer, run.file)
 
 
-async def _flown(daemon: Daemon, maintainer: DroneMaintainer) -> FlightResult | RestartAsked:
+async def _flown(
+    daemon: Daemon, maintainer: DroneMaintainer, file: SettingsFile
+) -> FlightResult | RestartAsked:
     """The flight, unless the ground has the daemon started anew before it begins."""
+    settled = asyncio.ensure_future(_settled(file))
     flying = asyncio.ensure_future(daemon.fly())
     leaving = asyncio.ensure_future(maintainer.restart_asked())
     try:
         await asyncio.wait([flying, leaving], return_when=asyncio.FIRST_COMPLETED)
-        return flying.result() if flying.done() else RestartAsked()
+        result = flying.result() if flying.done() else RestartAsked()
+        file.confirm()  # it ended as it should
+        return result
+    except asyncio.CancelledError:  # a signal
+        file.confirm()
+        raise
     finally:
-        for task in (leaving, flying):
+        for task in (settled, leaving, flying):
             task.cancel()
-        await asyncio.wait([flying, leaving])
+        await asyncio.wait([flying, leaving, settled])
+
+
+async def _settled(file: SettingsFile) -> None:
+    """Once the daemon has run for a while its settings are no trial any more."""
+    await asyncio.sleep(_COME_UP_S)
+    await asyncio.to_thread(file.confirm)
 
 
 def unfit_here(config: Config, site: Site) -> FailedChecks | None:
@@ -179,6 +201,12 @@ def unfit_here(config: Config, site: Site) -> FailedChecks | None:
             _LOG.warning("%s: %s; %s", check.name, check.text, check.remedy)
     failed = tuple(check for check in checks if check.level is CheckLevel.ERROR)
     return FailedChecks(failed) if failed else None
+
+
+def _failing(config: Config) -> set[str]:
+    """The names of the checks of this computer that fail now.  Blocks for the disk."""
+    checks = [check_clock(), check_disk(config.recorder), *check_processor(config.vision.workers)]
+    return {check.name for check in checks if check.level is CheckLevel.ERROR}
 
 
 @asynccontextmanager

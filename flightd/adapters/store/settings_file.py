@@ -6,6 +6,7 @@ a power cut leaves the one or the other.  Every call blocks for the disk.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 from collections.abc import Sequence
@@ -39,12 +40,24 @@ class Version(msgspec.Struct, frozen=True):
     changes: tuple[Change, ...]
 
 
+class Trial(msgspec.Struct, frozen=True):
+    """Settings that no daemon has come up by yet: `version` is what stood before, `starts` how often one was
+    started by them."""
+
+    version: int
+    starts: int = 0
+
+
 class SettingsFile:
     """The file `path`; its versions lie in a folder `NAME.versions` beside it."""
 
     def __init__(self, path: Path) -> None:
         self.path = path.resolve()
         self._folder = self.path.with_name(f"{self.path.name}.versions")
+
+    @property
+    def _trial(self) -> Path:
+        return self._folder / "trial"
 
     @property
     def candidate(self) -> Path:
@@ -109,10 +122,42 @@ class SettingsFile:
             beside = self.path.with_name(f".{self.path.name}.new")
             beside.touch(mode=mode)
             beside.chmod(mode)
+            self._keep(self._trial, msgspec.json.encode(Trial(said.number)))
             replace_file(self.path, beside, text.encode())
             self._forget(sorted([*numbers, said.number])[:-KEPT])
         except OSError as err:
             raise UnavailableError(f"{self.path}: {err.strerror or err}", remedy=self.locked()) from err
+
+    def begin(self) -> str:
+        """To be called before each start of a daemon: settings by which an earlier one was started and did
+        not come up are taken back.  Says so, or is empty.  UnavailableError where the disk refuses."""
+        trial = self._on_trial()
+        if trial is None:
+            return ""
+        try:
+            if not trial.starts:
+                self._keep(self._trial, msgspec.json.encode(Trial(trial.version, 1)))
+                return ""
+            before = self.text_of(trial.version)
+            replace_file(self.path, self.path.with_name(f".{self.path.name}.new"), before.encode())
+            self._trial.unlink()
+        except OSError as err:
+            raise UnavailableError(f"{self.path}: {err.strerror or err}") from err
+        return f"flightd did not come up by its newest settings: those before change {trial.version} are back"
+
+    def confirm(self) -> None:
+        """A daemon that was started by the settings has come up; those that were changed since stay on trial.
+        Blocks for the disk, which may refuse."""
+        trial = self._on_trial()
+        if trial is not None and trial.starts:
+            with contextlib.suppress(OSError):
+                self._trial.unlink(missing_ok=True)
+
+    def _on_trial(self) -> Trial | None:
+        try:
+            return msgspec.json.decode(self._trial.read_bytes(), type=Trial)
+        except (OSError, msgspec.DecodeError):
+            return None
 
     def _keep(self, path: Path, data: bytes) -> None:
         replace_file(path, path.with_suffix(".new"), data)

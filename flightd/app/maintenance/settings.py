@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import os
 import sys
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -39,9 +40,13 @@ _INPUT_ERROR = 2
 
 class DroneSettings:
     """`running` is the text that the daemon was started with, `restarts`: the service manager starts it anew
-    when it ends."""
+    when it ends; `unfit` names the checks of this computer that fail now, whatever is proposed (it blocks for
+    the disk)."""
 
-    def __init__(self, file: SettingsFile, running: str, *, restarts: bool) -> None:
+    def __init__(
+        self, file: SettingsFile, running: str, *, restarts: bool, unfit: Callable[[], Collection[str]]
+    ) -> None:
+        self._unfit = unfit
         self._file = file
         self._running_tag = tag_of(running)
         self._restarts = restarts
@@ -102,14 +107,14 @@ class DroneSettings:
                 sys.executable,
                 *("-m", "flightd", "doctor", "--quick", "--json", "--config", str(candidate)),
                 stdin=asyncio.subprocess.DEVNULL,
-                stdout=asyncio.subprocess.DEVNULL,
+                stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.PIPE,
             )
             try:
                 with contextlib.suppress(OSError):  # the service's own limits may forbid that
                     os.setpriority(os.PRIO_PROCESS, process.pid, _GENTLY)
                 async with asyncio.timeout(_CHECK_S):
-                    _, said = await process.communicate()
+                    found, said = await process.communicate()
             except TimeoutError:
                 raise UnavailableError(f"the check did not end within {_CHECK_S:.0f} s") from None
             finally:
@@ -123,6 +128,8 @@ class DroneSettings:
             raise _without_file(InputError(line), candidate)
         if process.returncode not in {0, 1}:
             raise UnavailableError(f"the check of the settings failed (exit {process.returncode})")
+        if errors := new_errors(found, await asyncio.to_thread(self._unfit)):
+            raise InputError("; ".join(errors), remedy="the service would not start by them")
 
     def _answer(self, request_id: str) -> SettingsAnswer:
         text = self._file.read()
@@ -142,6 +149,20 @@ class DroneSettings:
             locked=self._file.locked(),
             restarts=self._restarts,
         )
+
+
+def new_errors(found: bytes, known: Collection[str]) -> list[str]:
+    """The errors in the check's document that would keep a service from starting, beyond those `known` by
+    name: not the link's own ports, which this daemon has."""
+    try:
+        checks = json.loads(found)["checks"]
+        return [
+            f"{check['name']}: {check['text']}"
+            for check in checks
+            if check["level"] == "error" and check["name"] != "ground" and check["name"] not in known
+        ]
+    except (ValueError, KeyError, TypeError) as err:
+        raise UnavailableError("the check of the settings told nothing") from err
 
 
 def key_reports() -> tuple[KeyReport, ...]:

@@ -50,6 +50,7 @@ async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) 
                 ({"ground.listen": "0.0.0.0"}, "on the drone itself"),
                 ({"mission.site": "../other.toml"}, "own folder"),
                 ({"mission.hieght_m": 1.0}, "unknown key"),
+                ({"recorder.reserve_gb": 90000.0}, "the service would not start by them"),
             ):
                 with pytest.raises(InputError, match=complaint):
                     await client.propose(stands.tag, changes)
@@ -83,6 +84,6 @@ async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) 
     audit = [json.loads(line) for line in (tmp_path / "audit.jsonl").read_text().splitlines()]
     done = [(entry["command"], entry["outcome"]) for entry in audit]
     assert done[0] == ("fix", "accepted")
-    assert done.count(("propose", "invalid")) == 5
+    assert done.count(("propose", "invalid")) == 6
     assert done[-1] == ("take_back", "accepted")
     assert "by ann" in audit[0]["text"]

@@ -47,11 +47,31 @@ def test_only_so_many_versions_are_kept_and_numbers_are_not_used_again(file: Set
         file.text_of(3)
 
 
+def test_settings_by_which_no_daemon_comes_up_are_taken_back_at_the_next_start(file: SettingsFile) -> None:
+    file.replace("a = 1\n", "a = 2\n", SAID)
+    file.confirm()  # of the daemon that ran when they were changed
+    assert file.begin() == ""
+    assert file.read() == "a = 2\n"
+    assert "before change 1 are back" in file.begin()
+    assert file.read() == "a = 1\n"
+    assert file.begin() == ""
+
+
+def test_settings_by_which_a_daemon_came_up_stay(file: SettingsFile) -> None:
+    file.replace("a = 1\n", "a = 2\n", SAID)
+    file.begin()
+    file.confirm()
+    assert [file.begin(), file.begin()] == ["", ""]
+    assert file.read() == "a = 2\n"
+
+
 def test_what_is_no_version_of_ours_is_left_out(file: SettingsFile) -> None:
     file.replace("a = 1\n", "a = 2\n", SAID)
     folder = file.path.with_name("flightd.toml.versions")
     (folder / "000007.json").write_text("{}")
     (folder / "000008.json").write_bytes(b"\xff")
+    (folder / "trial").write_bytes(b"\xff")
+    assert file.begin() == ""
     (folder / "000001.toml").rename(folder / "gone")
     assert file.versions() == []
 
