@@ -172,12 +172,13 @@ async def _flown(
     leaving = asyncio.ensure_future(maintainer.restart_asked())
     try:
         await asyncio.wait([flying, leaving], return_when=asyncio.FIRST_COMPLETED)
-        result = flying.result() if flying.done() else RestartAsked()
-        file.confirm()  # it ended as it should
-        return result
-    except asyncio.CancelledError:  # a signal
+    except asyncio.CancelledError:  # a signal: it ends as it should
         file.confirm()
         raise
+    else:
+        result = flying.result() if flying.done() else RestartAsked()
+        file.confirm()
+        return result
     finally:
         for task in (settled, leaving, flying):
             task.cancel()
