@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tests.rigs.event_loops import real
-from tests.rigs.service import ServiceRig
+from tests.rigs.service import SITE_FILE, ServiceRig
 
 _READY_S = 90.0
 
@@ -21,7 +21,9 @@ class StandingDrone:
     def __init__(self, folder: Path) -> None:
         self.rig = ServiceRig(folder, ("A2",))
         self.config = self.rig.config
+        (folder / SITE_FILE.name).write_text(SITE_FILE.read_text())
         text = self.config.read_text().replace("autostart = true", "autostart = false  # by a person")
+        text = text.replace(str(SITE_FILE), SITE_FILE.name)
         self.config.write_text(text.replace("[ground]", f'[ground]\naudit = "{folder / "audit.jsonl"}"'))
         self._ready, self._ending = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=lambda: real(self._stand()), name="drone", daemon=True)

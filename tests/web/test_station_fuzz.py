@@ -32,6 +32,7 @@ PAGE_WORDS = (
     '{"say":"echo","number":1.5}',
     '{"say":"act","number":1,"drone":"nobody","act":{"id":"12345678","command":"stop"}}',
 )  # fmt: skip
+PROPOSAL = '{"base":"0123456789abcdef","changes":{"mission.height_m":1.5,"scan.pictures":null}}'
 ACT_WORDS = ('{"id":"12345678","command":"goto","node":"A4"}', '{"id":"12345678","command":"stop"}')
 
 
@@ -50,6 +51,12 @@ def requests(station: Station, draw: random.Random) -> list[bytes]:
         f"POST /api/stock/compare?store=monday&place=0&code=1&quantity=&heading=yes HTTP/1.1\r\n"
         f"Host: {host}\r\nOrigin: {station.origin}\r\nContent-Type: application/octet-stream\r\n"
         f"Content-Length: {len(BOOKS)}\r\nConnection: close\r\n\r\n{BOOKS}",
+        f"GET /api/doctor/demo/report HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n",
+        *(
+            f"POST /api/doctor/demo/{path} HTTP/1.1\r\nHost: {host}\r\nOrigin: {station.origin}\r\n"
+            f"Content-Type: application/json\r\nContent-Length: {len(PROPOSAL)}\r\n\r\n{PROPOSAL}"
+            for path in ("settings", "check")
+        ),
     ]
     corpus = [request.encode() for request in whole]
     made = [spoil_bytes(draw, corpus) for _ in range(REQUESTS)]
