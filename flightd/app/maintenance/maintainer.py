@@ -19,6 +19,7 @@ from flightd.adapters.ground_link.protocol import (
 from flightd.app.flight import Flight
 from flightd.app.maintenance.checks import DroneChecks
 from flightd.app.maintenance.settings import DroneSettings
+from flightd.app.maintenance.shown_settings import ShownSettings
 from flightd.core.errors import RunError, UnavailableError
 from flightd.core.types import EventLevel, Phase
 
@@ -27,10 +28,11 @@ _ANSWER_LEAVES_S = 0.3
 
 class DroneMaintainer:
     """`adapters.ground_link.maintenance_desk.Maintainer` of a flight; `flight` is given once it is built.
-    `settings` is None where no file can be changed (a simulation), `restarts`: the service manager starts the
-    daemon anew when it ends."""
+    `restarts`: the service manager starts the daemon anew when it ends."""
 
-    def __init__(self, checks: DroneChecks, settings: DroneSettings | None, *, restarts: bool) -> None:
+    def __init__(
+        self, checks: DroneChecks, settings: DroneSettings | ShownSettings, *, restarts: bool
+    ) -> None:
         self._checks = checks
         self._settings = settings
         self._restarts = restarts
@@ -50,15 +52,15 @@ class DroneMaintainer:
                 self._tell(flight, f"{outcome} {_by(request.person, peer)}")
                 return await self._checks.report(request.id, flight, outcome)
             case AskSettings():
-                return await self._of_file.answer(request.id)
+                return await self._settings.answer(request.id)
             case ProposeSettings():
-                done = await self._of_file.propose(request, peer.name)
+                done = await self._settings.propose(request, peer.name)
                 self._tell(flight, f"{done} {_by(request.person, peer)}")
-                return await self._of_file.answer(request.id)
+                return await self._settings.answer(request.id)
             case TakeSettingsBack():
-                done = await self._of_file.take_back(request, peer.name)
+                done = await self._settings.take_back(request, peer.name)
                 self._tell(flight, f"{done} {_by(request.person, peer)}")
-                return await self._of_file.answer(request.id)
+                return await self._settings.answer(request.id)
             case Restart():
                 return self._asked_to_restart(request, peer, flight)
 
@@ -70,15 +72,6 @@ class DroneMaintainer:
             self._restart.clear()
             if self.flight is not None and stands_idle(self.flight):
                 return
-
-    @property
-    def _of_file(self) -> DroneSettings:
-        if self._settings is None:
-            raise UnavailableError(
-                "this flight is a simulation: its settings are those of its command line",
-                remedy="change its file, and start it anew",
-            )
-        return self._settings
 
     def _asked_to_restart(self, request: Restart, peer: Peer, flight: Flight) -> Accepted:
         if not self._restarts:

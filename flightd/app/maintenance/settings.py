@@ -143,7 +143,7 @@ class DroneSettings:
             tag=tag_of(text),
             table=_as_json(table),
             keys=key_reports(),
-            sections={table.name: table.description for table in tables()},
+            sections=section_texts(),
             versions=tuple(_kept(version) for version in self._file.versions()),
             pending=tag_of(text) != self._running_tag,
             locked=self._file.locked(),
@@ -180,6 +180,11 @@ def key_reports() -> tuple[KeyReport, ...]:
         )
         for row in rows()
     )
+
+
+def section_texts() -> dict[str, str]:
+    """What each section is, as its model says it."""
+    return {table.name: table.description for table in tables()}
 
 
 def _kept(version: Version) -> KeptVersion:

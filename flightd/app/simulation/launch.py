@@ -25,6 +25,7 @@ from flightd.app.flight import Flight
 from flightd.app.flight_identity import FlightIdentity
 from flightd.app.maintenance.checks import DroneChecks
 from flightd.app.maintenance.maintainer import DroneMaintainer
+from flightd.app.maintenance.shown_settings import ShownSettings
 from flightd.app.recording import record_setting
 from flightd.app.service import monitors
 from flightd.app.simulation.lockstep import LockstepDetectors, LockstepReaders
@@ -144,7 +145,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
         peers = replace(peers, vehicle=config.vehicle.url)
     recent = RecentLog()
     checks = DroneChecks(config, site, f"a simulation on site {site.name}", recent)
-    maintainer = DroneMaintainer(checks, None, restarts=False)
+    maintainer = DroneMaintainer(checks, ShownSettings(config), restarts=False)
     watching = monitors(config.metrics, {}, journal=False, recent=recent)
     async with watching as watchers, AsyncExitStack() as stack:
         recorder = stack.enter_context(_flight_recorder(simulation, identity, drop_newest))
