@@ -1,10 +1,12 @@
 """What the page Doctor asks for: a drone's report, its settings, and what a person changes.
 
-Whatever reaches a drone goes over its ground link, which decides: this station only asks."""
+Whatever reaches a drone goes over its ground link, which decides: this station only asks.  Passwords in the
+addresses of cameras are shown to nobody but who may change them."""
 
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Annotated, TypeAlias, TypeVar
 
@@ -16,6 +18,8 @@ from starlette.routing import BaseRoute, Route
 
 from flightd.adapters.ground_link.protocol import DECODE_ERRORS, SettingsAnswer, Value
 from flightd.core.errors import FlightdError, InputError
+from flightd.ground.access.gate import identity_of, note_act
+from flightd.ground.access.roles import Role
 from flightd.ground.doctor.known_settings import KnownSettings
 from flightd.ground.doctor.versions import station_versions
 from flightd.ground.drone_link import DroneLink
@@ -27,6 +31,7 @@ _Tag = Annotated[str, Meta(max_length=64)]
 _Changes = Annotated[dict[Annotated[str, Meta(max_length=80)], Value], Meta(max_length=64)]
 _Answer: TypeAlias = Callable[[DroneLink, Request], Awaitable[object]]
 _B = TypeVar("_B", bound=msgspec.Struct)
+_PASSWORD = re.compile(rb'(//[^/\s":@]*:)[^/\s"@]+@')
 
 
 class Fix(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -76,7 +81,8 @@ class DoctorAnswers:
 
     async def fix(self, drone: DroneLink, request: Request) -> object:
         said = await _read(request, Fix)
-        return await drone.ask(lambda client: client.fix(said.name, said.person))
+        note_act(request, said.name)
+        return await drone.ask(lambda client: client.fix(said.name, _person(request, said.person)))
 
     async def settings(self, drone: DroneLink, _request: Request) -> object:
         return self._noted(drone, await drone.ask(lambda client: client.settings()))
@@ -88,17 +94,21 @@ class DoctorAnswers:
 
     async def propose(self, drone: DroneLink, request: Request) -> object:
         said = await _read(request, Proposal)
-        told = await drone.ask(lambda client: client.propose(said.base, said.changes, said.person))
+        note_act(request, ", ".join(said.changes))
+        person = _person(request, said.person)
+        told = await drone.ask(lambda client: client.propose(said.base, said.changes, person))
         return self._noted(drone, told)
 
     async def take_back(self, drone: DroneLink, request: Request) -> object:
         said = await _read(request, TakeBack)
-        told = await drone.ask(lambda client: client.take_back(said.base, said.version, said.person))
+        note_act(request, f"version {said.version}")
+        person = _person(request, said.person)
+        told = await drone.ask(lambda client: client.take_back(said.base, said.version, person))
         return self._noted(drone, told)
 
     async def restart(self, drone: DroneLink, request: Request) -> object:
         said = await _read(request, StartAnew)
-        return await drone.ask(lambda client: client.restart(said.person))
+        return await drone.ask(lambda client: client.restart(_person(request, said.person)))
 
     def _noted(self, drone: DroneLink, told: SettingsAnswer) -> SettingsAnswer:
         self._known.note(drone.name, told)
@@ -115,7 +125,7 @@ def doctor_routes(drones: Mapping[str, DroneLink]) -> list[BaseRoute]:
             if drone is None:
                 return as_json({"refused": "there is no such drone"}, 404)
             try:
-                return as_json(await answer(drone, request))
+                return _shown(as_json(await answer(drone, request)), request)
             except FlightdError as err:
                 return as_json({"refused": str(err).removeprefix("refused: ")}, status_of(err, 400))
 
@@ -136,6 +146,19 @@ def doctor_routes(drones: Mapping[str, DroneLink]) -> list[BaseRoute]:
 
 async def _station(_request: Request) -> Response:
     return as_json({"versions": await asyncio.to_thread(station_versions)})
+
+
+def _person(request: Request, typed: str) -> str:
+    """Who acts, as the drone writes it down: a name that is typed proves nothing."""
+    who = identity_of(request)
+    return typed.strip() if who.by == "local" else who.name
+
+
+def _shown(answer: Response, request: Request) -> Response:
+    """The answer as this person may see it."""
+    if identity_of(request).role.covers(Role.ADMIN):
+        return answer
+    return Response(_PASSWORD.sub(rb"\1***@", answer.body), answer.status_code, media_type=answer.media_type)
 
 
 async def _read(request: Request, kind: type[_B]) -> _B:

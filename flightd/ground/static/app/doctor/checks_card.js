@@ -1,4 +1,5 @@
 // What the drone finds of itself: what is wrong first, with what to do about it, and what it sets right itself.
+import { mayChange, signedInName } from "../access/session.js";
 import { html, useState } from "../html.js";
 import { who } from "../stock/decisions.js";
 import { count } from "../words.js";
@@ -20,7 +21,7 @@ export function ChecksCard({ drone, known, look, take }) {
     setFixing(name);
     setOutcome({ text: `Setting ${name} right …`, good: true });
     try {
-      const told = await sendDrone(drone, "fix", { name, person: who() });
+      const told = await sendDrone(drone, "fix", { name, person: signedInName() || who() });
       take(told);
       setOutcome({ text: `${told.outcome}.`, good: true });
     } catch (error) {
@@ -54,7 +55,7 @@ function CheckRow({ check, busy, isFixed, onFix }) {
         <p><strong>${name}</strong> ${text}</p>
         ${remedy && html`<p class="remedy">${remedy}</p>`}
       </div>
-      ${fix && html`<button class="order" aria-label=${`Set right: ${fix}`} disabled=${busy} onClick=${() => onFix(fix)}>
+      ${fix && mayChange() && html`<button class="order" aria-label=${`Set right: ${fix}`} disabled=${busy} onClick=${() => onFix(fix)}>
         ${isFixed ? "Writing …" : "Set right"}</button>`}
     </li>
   `;

@@ -1,4 +1,5 @@
 // The versions of the settings that the drone keeps: who changed what, when, and the way back.
+import { mayChange, signedInName } from "../access/session.js";
 import { html, useState } from "../html.js";
 import { who } from "../stock/decisions.js";
 import { sendDrone } from "./asking.js";
@@ -14,7 +15,7 @@ export function HistoryCard({ drone, told, onTake }) {
     setSure(0);
     setOutcome({ text: "The drone checks that version as a whole …", good: true });
     try {
-      onTake(await sendDrone(drone, "take-back", { base: told.tag, version, person: who() }));
+      onTake(await sendDrone(drone, "take-back", { base: told.tag, version, person: signedInName() || who() }));
       setOutcome({ text: "The settings are as they were before that change.", good: true });
     } catch (error) {
       setOutcome({ text: error.message, good: false });
@@ -30,8 +31,8 @@ export function HistoryCard({ drone, told, onTake }) {
           <li key=${number}>
             <p><b>${person || client}</b> <span class="quiet">${WHEN.format(new Date(utc))}</span></p>
             <ul>${changes.map(({ key, before, after }) => html`<li key=${key}><code>${key}</code> ${shownValue(before)} → ${shownValue(after)}</li>`)}</ul>
-            <button class="order" disabled=${Boolean(told.locked)} onClick=${() => takeBack(number)}>
-              ${sure === number ? "Really go back" : "Back to before this"}</button>
+            ${mayChange() && html`<button class="order" disabled=${Boolean(told.locked)} onClick=${() => takeBack(number)}>
+              ${sure === number ? "Really go back" : "Back to before this"}</button>`}
           </li>`)}
       </ol>
     </section>

@@ -1,4 +1,5 @@
 // The settings of a drone: a section's keys as a form, what was changed and sent, and the versions that are kept.
+import { mayChange } from "../access/session.js";
 import { html, useEffect, useRef, useState } from "../html.js";
 import { goTo } from "../router.js";
 import { shown } from "../store.js";
@@ -11,7 +12,8 @@ import { nameOf, topSections } from "./settings_keys.js";
 const TYPED_MS = 250;
 
 export function SettingsView({ drone, section }) {
-  const [told, setTold] = useState(null);
+  const [known, setTold] = useState(null);
+  const told = known && !mayChange() && !known.locked ? { ...known, locked: "an admin changes settings" } : known;
   const [trouble, setTrouble] = useState("");
   const [changes, setChanges] = useState({});
   const complaint = useComplaint(drone, told, changes);
