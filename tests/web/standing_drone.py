@@ -47,10 +47,9 @@ class StandingDrone:
             assert not self._thread.is_alive()
 
     async def _stand(self) -> None:
-        async with self.rig.world():
+        async with self.rig.world(GUID_TIMEOUT=3.0):
             process = await self.rig.start()
             await self.rig.until(lambda status: status.vehicle is not None)
-            self.rig.set_parameters(GUID_TIMEOUT=3.0)
             self._ready.set()
             while not self._ending.is_set():
                 await asyncio.sleep(0.1)
