@@ -48,4 +48,4 @@ const isChoice = ({ type }) => type === "choice";
 
 const defaultOf = (about) => (about.default === "required" ? "none, it has to be given" : bare(about.default) || "not given");
 
-const bare = (text) => (text === "required" ? "" : text.replace(/^"(.*)"$/, "$1"));
+const bare = (text) => (text === "required" ? "" : text === "[]" ? "none" : text.replace(/^"(.*)"$/, "$1"));
