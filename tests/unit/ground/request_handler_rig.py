@@ -15,6 +15,7 @@ from flightd.adapters.ground_link.protocol import (
     Answer,
     AskPicture,
     LinkReport,
+    Maintenance,
     Role,
     StatusReport,
 )
@@ -72,8 +73,8 @@ class RequestHandlerRig:
         self.handler.possible = possible_in(phase)
         self.now_ns = 100 * S
 
-    def hand(self, request: bytes, peer: Peer = OPERATOR) -> Answer | AskPicture:
+    def hand(self, request: bytes, peer: Peer = OPERATOR) -> Answer | AskPicture | Maintenance:
         return self.handler.answer(request, peer, self.now_ns)
 
-    def order(self, command: str, peer: Peer = OPERATOR, **fields: Any) -> Answer | AskPicture:
+    def order(self, command: str, peer: Peer = OPERATOR, **fields: Any) -> Answer | AskPicture | Maintenance:
         return self.hand(body("command", command=command, **fields), peer)
