@@ -13,6 +13,8 @@ from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
 from flightd.core.refusal import words
 from flightd.core.types import Demand
 from flightd.sim.autopilot.autopilot import PeerConfig
+from flightd.sim.autopilot.copter import CopterMode
+from flightd.sim.autopilot.radio import RadioParams
 from tests.rigs.event_loops import virtual
 from tests.rigs.vehicles import ardupilot_rig, px4_rig
 
@@ -25,6 +27,29 @@ def test_it_lands_and_disarms_by_itself(make: Callable[[], Any]) -> None:
             rig.cut(True)
             await rig.until(lambda: not rig.peer.armed, 15.0)
             assert rig.peer.truth().height_m < 0.15
+
+    virtual(test())
+
+
+def test_an_autopilot_as_it_is_shipped_lands_a_second_after_its_companion_has_died() -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await rig.take_off()
+            rig.cut(True)
+            assert 0.8 < await rig.until(lambda: rig.peer.mode == CopterMode.LAND, 3.0) < 1.3
+
+    virtual(test())
+
+
+def test_an_uplink_that_loses_two_of_five_is_no_dead_companion() -> None:
+    """Of the heartbeats that a second holds nine in a row may be lost."""
+
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await rig.take_off()
+            rig.peer.link.up.params = RadioParams(loss=0.4)
+            await rig.stream(40.0, hz=10.0)
+            assert rig.peer.mode == CopterMode.GUIDED_NOGPS
 
     virtual(test())
 
@@ -54,7 +79,8 @@ def test_what_else_beats_on_the_vehicle_does_not_keep_it_in_the_air() -> None:
     ("make", "name", "value"),
     [
         (ardupilot_rig, "FS_GCS_ENABLE", 0.0),
-        (ardupilot_rig, "FS_GCS_TIMEOUT", 5.0),
+        (ardupilot_rig, "FS_GCS_TIMEOUT", 2.5),
+        (ardupilot_rig, "FS_GCS_TIMEOUT", 0.5),
         (ardupilot_rig, "GUID_TIMEOUT", 3.0),
         (ardupilot_rig, "BATT_FS_LOW_ACT", 0.0),
         (ardupilot_rig, "EK3_SRC1_POSZ", 2.0),

@@ -1,4 +1,4 @@
-"""A landing because no climb rate is told: by our own setpoints where something keeps their climb, else by the
+"""A landing because no climb rate is told: by our own setpoints where something keeps their climb, else the
 autopilot's own."""
 
 from __future__ import annotations
