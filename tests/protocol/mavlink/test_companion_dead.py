@@ -15,6 +15,7 @@ from flightd.core.types import Demand
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import CopterMode
 from flightd.sim.autopilot.radio import RadioParams
+from tests.protocol.mavlink.scripted_autopilot import ARM, ScriptedAutopilot, known, scripted
 from tests.rigs.event_loops import virtual
 from tests.rigs.vehicles import ardupilot_rig, px4_rig
 
@@ -102,6 +103,20 @@ def test_nothing_is_armed_that_would_stay_in_the_air_or_is_wrong_for_the_job(
             assert not rig.known().armed
             assert name in words(rig.known().refusal)
             assert "flightd doctor --fix" in words(rig.known().refusal)
+
+    virtual(test())
+
+
+@pytest.mark.parametrize("name", ["GUID_TIMEOUT", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "SYSID_MYGCS"])
+def test_nothing_is_armed_whose_way_down_is_not_known(name: str) -> None:
+    async def test() -> None:
+        autopilot = ScriptedAutopilot()
+        del autopilot.parameters[name]
+        async with scripted(autopilot) as (_, vehicle):
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(20.0)  # the examination gives up meanwhile
+            assert not autopilot.commands(ARM)
+            assert words(known(vehicle).refusal) == f"{name} not read yet"
 
     virtual(test())
 
