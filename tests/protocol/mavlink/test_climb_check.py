@@ -186,6 +186,22 @@ def test_a_rate_that_is_told_again_is_believed_again(make: Callable[[], Any]) ->
 
 
 @by_thrust
+def test_in_the_autopilots_own_landing_no_rate_is_kept(make: Callable[[], Any]) -> None:
+    """What was believed last would be told all the way down, and on the floor."""
+
+    async def test() -> None:
+        async with make() as rig:
+            await _silenced(rig)
+            rig.vehicle.demand(Demand.LAND)
+            await rig.stream(1.0)
+            assert rig.peer.armed
+            assert rig.peer.truth().climb_mps < -0.3
+            assert math.isnan(rig.known().climb_mps)
+
+    virtual(test())
+
+
+@by_thrust
 def test_on_the_floor_no_rate_is_made_up(make: Callable[[], Any]) -> None:
     """Nothing is armed without one."""
 

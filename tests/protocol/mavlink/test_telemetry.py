@@ -272,6 +272,7 @@ def refused(*off_ms: int) -> list[int]:
 def test_each_time_that_makes_no_sense_counts_once() -> None:
     assert refused(0, -400, 0) == [0, 0, 0], "late, and within reason"
     assert refused(0, -700, 0, 0) == [0, 1, 1, 1], "a stray datagram"
+    assert refused(0, 9_000, 0, 0) == [0, 1, 1, 1], "one from the future makes no reboot of the next"
     assert refused(0, 100_000, 100_000) == [0, 1, 2], "a clock that jumped"
 
 
