@@ -81,8 +81,8 @@ class Mission:
         self._scanner = scanner
         self._plan_id = ""
         self._levels: tuple[int, ...] = ()
-        self._armed = True
-        """The vehicle may be armed, as far as the newest tick knew."""
+        self._armed = False
+        """The vehicle was armed at the newest tick."""
         self._events = EventLog()
         self._orders = StandingOrders()
         by_itself = config.mission.autostart if autostart is None else autostart
@@ -248,7 +248,7 @@ class Mission:
 
     def step(self, inputs: MissionInputs) -> Guidance:
         """Advance by one tick."""
-        self._armed = inputs.vehicle is None or inputs.vehicle.armed
+        self._armed = inputs.vehicle is not None and inputs.vehicle.armed
         doubts = self._relocator.step(inputs, self.phase, self._progress.phase_s(inputs.now_ns))
         if self._relocator.jumped:
             self._correct(inputs)
