@@ -26,6 +26,7 @@ from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
 from flightd.ground.json_http import as_json, is_json, json_body, status_of
 from flightd.ground.messages import SentAct, answer_message, read_page_message
+from flightd.ground.missions.routes import mission_routes
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.stock_page import stock_page
@@ -47,6 +48,7 @@ def application(
         Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
         *stock_page(folder, hub.drones, uploads),
         *flight_routes(flights),
+        *mission_routes(folder, hub.drones),
         *guide_routes(),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]

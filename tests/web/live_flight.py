@@ -105,6 +105,7 @@ class LiveFlight:
         self._mailbox = _Mailbox()
         self._flight = _PacedFlight(site, config, self._mailbox, speed)
         self._link = ZmqGround(local(picture_fps=5.0, **ground), site, self._flight)
+        self._link.plan_by(self._flight.pilot.mission)
         camera = SimCamera(lens=config.camera.lens(), mount=config.camera.mount())
         self._renderer = Renderer(site, camera)
         self._lens = config.camera.lens()

@@ -133,6 +133,6 @@ def test_a_plan_comes_with_its_nodes_and_only_a_start_names_one() -> None:
 
 def test_the_largest_plan_of_usual_names_fits_into_a_request() -> None:
     request = PlanFlight(
-        version=VERSION, id="x" * 32, nodes=tuple(f"AISLE-12.{i:03}" for i in range(MOST_NODES))
+        version=VERSION, id="x" * 32, nodes=tuple(f"AISLE-12.{i}" for i in range(MOST_NODES))
     )
     assert len(msgspec.json.encode(request)) < MAX_REQUEST_BYTES
