@@ -13,12 +13,14 @@ MOST_NODES = 500
 @dataclass(frozen=True, slots=True)
 class PlannedFlight:
     """The `nodes` to visit, in the order in which they are flown, and the shelf `levels` that are counted at
-    them (none: all).  `places` is how many locations that is, `way_m` how far it flies over the floor.
+    them (none: all).  `places` is how many locations that is; `way` are all nodes where it stops or
+    turns, from pad to pad, `way_m` how long that is.
     `seconds` in the air need `batteries`, full ones but for the first, of which `charge` is left; a battery
     is taken to last `battery_s` in the air down to its reserve."""
 
     nodes: tuple[str, ...]
     levels: tuple[int, ...]
+    way: tuple[str, ...]
     places: int
     way_m: float
     seconds: float

@@ -73,6 +73,7 @@ class ChosenPlans:
         return PlannedFlight(
             nodes=nodes,
             levels=tuple(levels),
+            way=tuple(way),
             places=sum(len(self._scanner.places_at(node, levels)) for node in dict.fromkeys(nodes)),
             way_m=metres,
             seconds=flown.seconds,

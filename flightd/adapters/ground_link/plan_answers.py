@@ -41,6 +41,7 @@ class PlanAnswers:
             request=request.id,
             nodes=plan.nodes,
             levels=plan.levels,
+            way=plan.way,
             places=plan.places,
             way_m=round(plan.way_m, 2),
             seconds=round(plan.seconds, 1),

@@ -395,6 +395,7 @@ class Planned(_Answer, frozen=True, tag="planned"):
 
     nodes: Annotated[tuple[str, ...], Meta(description="in the order in which they are flown")]
     levels: Annotated[tuple[int, ...], Meta(description="shelf levels that are counted; none: all")]
+    way: Annotated[tuple[str, ...], Meta(description="all nodes where it stops or turns, from pad to pad")]
     places: Annotated[int, Meta(description="locations that are counted")]
     way_m: Annotated[float, Meta(description="length of the way, m")]
     seconds: Annotated[float, Meta(description="estimated time in the air, s")]

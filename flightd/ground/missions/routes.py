@@ -23,6 +23,7 @@ from flightd.ground.json_http import as_json, is_json, json_body, status_of
 from flightd.ground.missions.mission_book import Mission, MissionBook
 from flightd.ground.pages import page
 from flightd.ground.shown_text import shown
+from flightd.ground.stores import Stores
 
 _LOG = logging.getLogger(__name__)
 _AT_ONCE, _MOST_WAITING = 1, 32
@@ -62,12 +63,13 @@ _T = TypeVar("_T", Kept, Flown)
 
 def mission_routes(folder: Path | None, drones: Mapping[str, DroneLink]) -> list[BaseRoute]:
     """The page and its answers; without a `folder` missions are planned and flown, but not kept."""
-    missions = _Missions(None if folder is None else MissionBook(folder), drones)
+    missions = _Missions(None if folder is None else MissionBook(folder), Stores(folder), drones)
     for drone in drones.values():
         drone.on_plan = missions.heard
     ways: list[tuple[str, str, _Asked]] = [
         ("", "GET", missions.listed),
         ("/estimate", "GET", missions.estimate),
+        ("/recount", "GET", missions.recount),
         ("/fly", "POST", missions.fly),
         ("/{mission}", "PUT", missions.keep),
         ("/{mission}", "DELETE", missions.delete),
@@ -93,8 +95,9 @@ def _answered(answer: _Asked) -> _Asked:
 class _Missions:
     """Keeps missions in a `book`, if there is one; asks the drones all that only they know."""
 
-    def __init__(self, book: MissionBook | None, drones: Mapping[str, DroneLink]) -> None:
+    def __init__(self, book: MissionBook | None, stores: Stores, drones: Mapping[str, DroneLink]) -> None:
         self._book = book
+        self._stores = stores
         self._drones = drones
         self._threads = Threads(_AT_ONCE, _MOST_WAITING, "too many changes to missions wait already")
 
@@ -121,6 +124,24 @@ class _Missions:
         return as_json(_told(await self._drone(asked.drone).plan_flight(
             asked.nodes, asked.levels, best_order=asked.best_order, dry=True
         )))  # fmt: skip
+
+    async def recount(self, request: Request) -> Response:
+        """The nodes and levels that see each `&place=…` of `?store=NAME`, and the places of which none knows
+        from where they are seen."""
+        query = request.query_params
+        view = await self._threads.run(self._stores.view, query.get("store", ""))
+        node_of = {record.code: record.node for record in view.records}
+        levels = {spot.code: spot.level for front in view.fronts for spot in front.spots}
+        places = list(dict.fromkeys(query.getlist("place")))
+        seen = [code for code in places if node_of.get(code)]
+        known = all(levels.get(code) for code in seen)
+        return as_json(
+            {
+                "nodes": list(dict.fromkeys(node_of[code] for code in seen)),
+                "levels": sorted({levels[code] for code in seen}) if known else [],
+                "without": [code for code in places if code not in seen],
+            }
+        )
 
     async def fly(self, request: Request) -> Response:
         """Hand nodes to a drone for its next flight; it starts by a command of its own."""
@@ -198,6 +219,7 @@ def _told(planned: Planned) -> dict[str, object]:
     return {
         "nodes": planned.nodes,
         "levels": planned.levels,
+        "way": planned.way,
         "places": planned.places,
         "way_m": planned.way_m,
         "seconds": planned.seconds,

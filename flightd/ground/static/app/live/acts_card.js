@@ -40,7 +40,7 @@ function Order({ command, may, key_ }) {
   `;
 }
 
-function Obstacles({ obstacles }) {
+export function Obstacles({ obstacles }) {
   if (!obstacles.length) return html`<p class="ready"><span class="dot" />Ready to fly</p>`;
   return html`
     <div class="obstacles">
