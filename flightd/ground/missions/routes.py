@@ -144,10 +144,9 @@ class _Missions:
         )
 
     async def fly(self, request: Request) -> Response:
-        """Hand nodes to a drone for its next flight; it starts by a command of its own."""
+        """Hand nodes to a drone for its next flight (none: what its configuration says); it starts by a command
+        of its own."""
         asked = await _sent(request, Flown)
-        if not asked.nodes:
-            raise InputError("no node is chosen")
         planned = await self._drone(asked.drone).plan_flight(
             asked.nodes,
             asked.levels,

@@ -2,7 +2,7 @@
 import { act } from "../acts.js";
 import { html } from "../html.js";
 import { state, update } from "../store.js";
-import { capital, COMMANDS, isGrounded } from "../words.js";
+import { capital, COMMANDS, count, isGrounded } from "../words.js";
 import { HoldButton } from "./hold_button.js";
 
 const SHOWN_MS = 20000;
@@ -18,6 +18,7 @@ export function Acts({ status, welcome }) {
     <section class="card acts" aria-labelledby="acts">
       <h2 id="acts" class="unseen">Orders</h2>
       ${waits && html`<${Obstacles} obstacles=${status.obstacles} />`}
+      ${waits && status.plan && html`<p class="quiet">A start flies the ${count(status.nodes_planned, "node")} handed over on <a href="/missions">Missions</a>.</p>`}
       <div class="buttons">
         ${waits &&
         html`<${HoldButton} disabled=${!may("start")} onHeld=${() => act("start")}>Start<//>`}

@@ -11,7 +11,6 @@ const MARKS = [
   ["way", "the way"],
   ["keep", "keep out"],
 ];
-const SMALLEST_PX = 24;
 
 export function ChooseMap({ floor, planned }) {
   const box = useMemo(() => bounds(floor), [floor]);
@@ -28,16 +27,29 @@ export function ChooseMap({ floor, planned }) {
         viewBox=${box.map((value) => value * M).join(" ")}
         role="group"
         aria-label=${`Map of ${floor.name} to choose on`}
-        style=${{ "--scale": scale, "--least": `${SMALLEST_PX}px` }}
+        style=${{ "--scale": scale }}
       >
         ${plan}
         ${way.length > 1 &&
         html`<polyline class="planned-way" points=${way.map(({ x_m: x, y_m: y }) => `${x * M},${y * M}`).join(" ")} aria-hidden="true" />`}
         <${Nodes} floor=${floor} order=${planned?.nodes} scale=${scale} />
+        <${Numbers} nodes=${nodes} order=${planned?.nodes ?? []} scale=${scale} />
         ${status?.position && html`<${Drone} position=${status.position} scale=${scale} />`}
       </svg>
       <div class="map-foot"><${Legend} marks=${MARKS} /></div>
     </section>
+  `;
+}
+
+// Drawn over the nodes: each button's own text stays its name.
+function Numbers({ nodes, order, scale }) {
+  return html`
+    <g class="numbers" aria-hidden="true">
+      ${order.map((id, i) => {
+        const { x_m: x, y_m: y } = nodes.get(id);
+        return html`<text key=${id} transform=${`translate(${x * M} ${y * M}) scale(${scale})`} y="7">${i + 1}</text>`;
+      })}
+    </g>
   `;
 }
 
@@ -70,7 +82,6 @@ function Nodes({ floor, order, scale }) {
         onKeyDown=${(event) => onKey(event, node)}
       >
         <circle class="touch" r="32" /><circle class="mark" r=${isChosen ? 17 : 9} />
-        ${isChosen && html`<text class="place" y="7" text-anchor="middle">${place || ""}</text>`}
         <text x="14" y="36">${node.id}</text>
       </g>
     `;

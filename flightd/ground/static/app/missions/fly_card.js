@@ -4,7 +4,7 @@ import { Obstacles } from "../live/acts_card.js";
 import { HoldButton } from "../live/hold_button.js";
 import { shown, state } from "../store.js";
 import { capital, count, duration, isGrounded, percent } from "../words.js";
-import { fly } from "./missions_source.js";
+import { fly, flyConfigured } from "./missions_source.js";
 import { missions } from "./missions_state.js";
 
 const OUTCOME_MS = 20000;
@@ -18,12 +18,21 @@ export function FlyCard({ estimate, waits }) {
       <h3 id="fly">${flies ? "In flight" : "This flight"}</h3>
       ${note && html`<p class="note">${note}</p>`}
       ${flies && plan && html`<${Under} plan=${plan} />`}
+      ${waits && status.plan && html`<${Handed} status=${status} />`}
       ${!nodes.length && !flies && html`<p class="quiet">Choose aisles or nodes: what it takes is shown here at once.</p>`}
       ${nodes.length > 0 && !waits && html`<p class="quiet">What a flight takes is told by the drone while it waits on the ground.</p>`}
       ${nodes.length > 0 && waits && html`<${Takes} estimate=${estimate} />`}
       ${nodes.length > 0 && waits && welcome.role === "operator" && html`<${Start} estimate=${estimate} status=${status} />`}
       ${welcome.role !== "operator" && html`<p class="quiet">Only looking on: a start needs an operator's key.</p>`}
     </section>
+  `;
+}
+
+// What the drone holds already: the next start flies it, wherever that is given.
+function Handed({ status }) {
+  return html`
+    <p class="note">The drone holds a flight over ${count(status.nodes_planned, "node")} that was handed to it: the next start flies it.
+      <button class="order" onClick=${flyConfigured}>Fly as configured instead</button></p>
   `;
 }
 
@@ -49,7 +58,7 @@ function Takes({ estimate }) {
     ["Places", planned.places || "none counted"],
   ];
   return html`
-    <dl class="takes" role="status">
+    <dl class="takes">
       ${figures.map(([name, value]) => html`<div key=${name}><dt>${name}</dt><dd>${value}</dd></div>`)}
     </dl>
     <p class="quiet">

@@ -99,6 +99,17 @@ export async function fly({ nodes, levels, best, id }) {
   loadMissions();
 }
 
+// The drone forgets the flight that was handed to it.
+export async function flyConfigured() {
+  const body = JSON.stringify({ id: newId(), drone: state.selected, nodes: [] });
+  try {
+    await askJson("/api/missions/fly", { method: "POST", headers: JSON_BODY, goesOn: true, body });
+    change({ flying: "" });
+  } catch (error) {
+    change({ flying: error.message, refused: true });
+  }
+}
+
 async function taken(plan) {
   const until = performance.now() + TAKEN_MS;
   while (shown().status?.plan !== plan) {
