@@ -163,14 +163,14 @@ async def test_a_mission_goes_from_the_station_to_a_drone_that_flies_it_and_the_
             assert kept["remaining"] == ["A3"]
     with LiveFlight(SITE, CONFIG, speed=6.0) as flight:
         status, command = flight.ports
-        async with served(("demo", Address("127.0.0.1", status, command)), folder=tmp_path) as station:
-            async with station.page() as page:
-                await told(page, "welcome")
-                rest = {"drone": "demo", "nodes": kept["remaining"], "mission": "mission-1"}
-                assert (await ask(station, "POST", "/fly", id="plan-0003", **rest))[0] == 200
-                await station.act("demo", id="start-0002", command="start", plan="plan-0003")
-                while (await told(page, "plan", within_s=60))["visited"] != ["A3"]:
-                    pass
-                await asyncio.sleep(0.3)
-                (kept,) = (await ask(station, "GET", f"?site={site}"))[1]["missions"]
-                assert kept["remaining"] == []
+        address = Address("127.0.0.1", status, command)
+        async with served(("demo", address), folder=tmp_path) as station, station.page() as page:
+            await told(page, "welcome")
+            rest = {"drone": "demo", "nodes": kept["remaining"], "mission": "mission-1"}
+            assert (await ask(station, "POST", "/fly", id="plan-0003", **rest))[0] == 200
+            await station.act("demo", id="start-0002", command="start", plan="plan-0003")
+            while (await told(page, "plan", within_s=60))["visited"] != ["A3"]:
+                pass
+            await asyncio.sleep(0.3)
+            (kept,) = (await ask(station, "GET", f"?site={site}"))[1]["missions"]
+            assert kept["remaining"] == []
