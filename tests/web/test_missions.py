@@ -92,10 +92,11 @@ async def test_missions_are_kept_over_http_with_one_clear_line_for_bad_input(tmp
         assert (code, kept["name"], kept["nodes"]) == (200, "Aisle A", ["A1", "A2"])
         code, found = await ask(station, "GET", "?site=demo")
         assert [mission["id"] for mission in found["missions"]] == ["mission-1"]
-        for wrong in (
+        bad: tuple[dict[str, Any], ...] = (
             {"nodes": []}, {"name": ""}, {"name": "  "}, {"levels": [0]}, {"site": ""}, {"x": 1},
             {"nodes": ["n"] * 501}, {"nodes": [1]}, {"name": "n" * 81},
-        ):  # fmt: skip
+         )  # fmt: skip
+        for wrong in bad:
             code, said = await ask(station, "PUT", "/mission-2", **{**good, **wrong})
             assert code == 400, wrong
             assert "\n" not in said["refused"]
