@@ -59,9 +59,10 @@ export async function save({ id, name, nodes, levels }) {
 }
 
 export async function saveChosen() {
-  const { planned } = missions().estimate ?? {};
+  const { best, estimate } = missions();
+  const planned = estimate?.key === keyOf(missions()) ? estimate.planned : null; // not that of the choice before
   // kept in the order in which it is flown, so that it is the same tomorrow
-  const nodes = missions().best && planned?.nodes ? planned.nodes : missions().nodes;
+  const nodes = best && planned ? planned.nodes : missions().nodes;
   const kept = await save({ ...missions(), nodes });
   if (kept) open(kept);
 }
