@@ -39,7 +39,6 @@ def target(folder: Path) -> Target:
     site = load_site(_CONFIGS / "site-demo.toml")
     handler = RequestHandler(site, "session", audit.append)
     handler.plan_by(pilot_of(load_config(_CONFIGS / "sim.toml"), site).mission)
-    handler.possible = frozenset(CommandKind)
     clock = itertools.count(10**12, 200_000_000)
 
     def attempt(data: bytes) -> bool:
