@@ -9,7 +9,7 @@ from flightd.config.battery import BatteryConfig
 from flightd.config.schema import Config
 from flightd.core.errors import InputError
 from flightd.core.planned_flight import MOST_NODES, PlannedFlight
-from flightd.mission.battery.outings import flown_on
+from flightd.mission.battery.outings import Supply, WaysOfPlan, flown_on
 from flightd.mission.battery.sorties import Sorties
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
 from flightd.mission.plan.leg_times import Legs, Pace
@@ -64,12 +64,13 @@ class ChosenPlans:
         self, plan: FlightPlan, levels: Sequence[int], charge: float, rate_per_s: float
     ) -> PlannedFlight:
         """What flying a plan takes, from a battery of that `charge` (0..1) on, `rate_per_s` of a full one
-        being used in each second in the air."""
+        being used in each second in the air.  Each view of a shelf is looked from once, for its longest."""
         nodes = tuple(stop.node for stop in plan.stops if stop.visit)
         sorties = self._sorties(levels)
         way, site = [plan.start, *(stop.node for stop in plan.stops)], self._site
         metres = sum(site.length_m(site.path(a, b)) for a, b in itertools.pairwise(way))
-        flown = flown_on(sorties, plan, nodes, charge, rate_per_s, self._battery.reserve)
+        ways_s = WaysOfPlan.of(site, plan, self._pace)
+        flown = flown_on(sorties, plan, ways_s, Supply(charge, rate_per_s, self._battery.reserve))
         return PlannedFlight(
             nodes=nodes,
             levels=tuple(levels),

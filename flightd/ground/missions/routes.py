@@ -144,8 +144,8 @@ class _Missions:
         )
 
     async def fly(self, request: Request) -> Response:
-        """Hand nodes to a drone for its next flight (none: what its configuration says); it starts by a command
-        of its own."""
+        """Hand nodes to a drone for its next flight (none: what its configuration says), which starts by a
+        command of its own."""
         asked = await _sent(request, Flown)
         planned = await self._drone(asked.drone).plan_flight(
             asked.nodes,
