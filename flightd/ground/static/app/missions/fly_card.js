@@ -81,7 +81,11 @@ function Start({ estimate, status }) {
   const known = missions();
   const may = status.possible.includes("start") && status.possible.includes("plan") && Boolean(estimate?.planned);
   return html`
-    <${Obstacles} obstacles=${status.obstacles} />
+    ${
+      status.possible.includes("plan")
+        ? html`<${Obstacles} obstacles=${status.obstacles} />`
+        : html`<p class="note">It takes a mission only before its first start, while it stands disarmed and no start is given.</p>`
+    }
     <${HoldButton} disabled=${!may} onHeld=${() => fly({ ...known })}>Start this mission<//>
     <${Outcome} />
   `;
