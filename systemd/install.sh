@@ -53,6 +53,7 @@ done
 program=/opt/flightd
 unit=/etc/systemd/system/flightd.service
 rules=/etc/udev/rules.d/99-flightd.rules
+ground_unit=/etc/systemd/system/flightd-ground.service
 users=/etc/sysusers.d/flightd.conf
 
 # Whether the system that is installed into is the one that runs.
@@ -60,14 +61,15 @@ running() { [ -z "$root" ] && [ -d /run/systemd/system ]; }
 
 remove() {
     if running; then
-        systemctl disable --now flightd.service 2>/dev/null || true
+        systemctl disable --now flightd.service flightd-ground.service 2>/dev/null || true
     fi
     local folder=$root$program
     rm -rf "${folder:?}"
     rm -f "$root/usr/local/bin/flightd" "$root/usr/local/bin/flightctl"
-    rm -f "$root$unit" "$root$rules" "$root$users"
+    rm -f "$root$unit" "$root$ground_unit" "$root$rules" "$root$users"
     if [ "$purge" = yes ]; then
-        rm -rf "$root/etc/flightd" "$root/var/lib/flightd"
+        rm -rf "$root/etc/flightd" "$root/var/lib/flightd" "$root/var/lib/flightd-ground"
+        userdel ${root:+--prefix "$root"} flightd-ground 2>/dev/null || true
         userdel ${root:+--prefix "$root"} flightd 2>/dev/null || true
     fi
     if running; then
@@ -118,6 +120,7 @@ keep() {
 
 install_files() {
     install -D -m 644 "$source/systemd/flightd.service" "$root$unit"
+    install -D -m 644 "$source/systemd/flightd-ground.service" "$root$ground_unit"
     install -D -m 644 "$source/systemd/99-flightd.rules" "$root$rules"
     install -D -m 644 "$source/systemd/flightd.sysusers" "$root$users"
     systemd-sysusers ${root:+--root="$root"} "$root$users"
@@ -147,6 +150,9 @@ fi
 if running && systemctl is-active --quiet flightd.service; then
     fail "flightd runs: put the drone on its pad, then 'systemctl stop flightd', then this again"
 fi
+if running && systemctl is-active --quiet flightd-ground.service; then
+    fail "the ground station runs: land what it watches, then 'systemctl stop flightd-ground', then this again"
+fi
 install_program
 install_files
 if running; then
@@ -158,4 +164,5 @@ flightd is installed.  Next:
   edit /etc/flightd/flightd.toml and your site file beside it
   sudo -u flightd flightd doctor --config /etc/flightd/flightd.toml     (propellers off)
   sudo systemctl enable --now flightd
+A ground station (installed with --extras ground): see "As a ground station" in flightd guide service.
 TEXT

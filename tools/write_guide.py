@@ -23,7 +23,7 @@ from flightd.guide import pages
 from flightd.mission.safety import hazard_table
 from flightd.sim.judge.verdict import KINDS
 from flightd.sim.unknowns import SPREADS, UNEVEN, WorldKind
-from flightd.site.site_file import SiteFile
+from flightd.site.site_tables import SiteFile
 from tools import command_table, reference_tables, safety_case
 from tools.command_help import help_pages
 from tools.layer_picture import layers, picture

@@ -13,6 +13,12 @@ from flightd.core.types import AttitudeSetpoint
 _TRIM_MPS2 = 0.8
 """The most that is leaned against a push once not even the velocity is dead-reckoned: five degrees."""
 
+_STRONG = 0.5
+"""From this share of what may be leaned on a push decides how fast the drone may go with it."""
+_STOPS_BY = 0.05
+"""Share of what is left to lean that is counted on to stop it again: pushes grow."""
+_SLOW_MPS = 0.05
+
 
 @dataclass(frozen=True, slots=True)
 class Motion:
@@ -83,9 +89,24 @@ class FlightController:
         kd = ease * self._gains.kd
         wanted_x = reference.ax_mps2 + kd * reference.vx_mps - push_x
         wanted_y = reference.ay_mps2 + kd * reference.vy_mps - push_y
-        ax = self._x.step(reference.x_m - motion.x_m, motion.vx_mps, dt_s, wanted_x, ease)
-        ay = self._y.step(reference.y_m - motion.y_m, motion.vy_mps, dt_s, wanted_y, ease)
+        off_x, off_y = reference.x_m - motion.x_m, reference.y_m - motion.y_m
+        ax = self._x.step(off_x, motion.vx_mps, dt_s, wanted_x, ease)
+        ay = self._y.step(off_y, motion.vy_mps, dt_s, wanted_y, ease)
+        ax = self._stoppable(ax, off_x, motion.vx_mps, push_x, kd)
+        ay = self._stoppable(ay, off_y, motion.vy_mps, push_y, kd)
         return self._tilted(now_ns, ax, ay, motion, reference, dt_s)
+
+    def _stoppable(self, accel: float, off_m: float, rate_mps: float, push: float, kd: float) -> float:
+        """The acceleration of one axis (m/s^2), against a strong push as much as it takes to go no faster
+        with it than what is left to lean can stop within `off_m`: all that is leaned on at once, too late,
+        does not."""
+        if abs(push) < _STRONG * self._most_mps2:
+            return accel
+        way = math.copysign(1.0, push)
+        left = _STOPS_BY * max(self._most_mps2 - abs(push), 0.0)
+        most_mps = math.sqrt(2.0 * left * max(way * off_m, 0.0)) + _SLOW_MPS
+        with_it = min(way * accel, kd * (most_mps - way * rate_mps) - abs(push))
+        return way * max(with_it, -self._most_mps2)
 
     def level(self, now_ns: int, motion: Motion, reference: Reference, dt_s: float) -> AttitudeSetpoint:
         """Level and straight, height held: what is flown without a view of the floor.  The integrals

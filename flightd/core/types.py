@@ -233,7 +233,8 @@ class VehicleState:
     `battery_frac` is NaN while the vehicle does not know it, `battery_stamp_ns` the time at which it last
     told anything of its battery (0: it gives none), `battery_a` the current and `battery_cells` the cells in
     series (NaN and 0: not told).
-    `climb_contradicted`: what it told of its climb was none, `climb_mps` is the height's.
+    `climb_contradicted`: what it told of its climb was none, or ended, `climb_mps` is the height's.
+    `keeps_climb`: it keeps a setpoint's climb rate by its own measurements, whatever it tells of them.
     `refusal` is why it does not do what is demanded, `unfit` why the adapter would not arm it, as far as can
     be asked while it stands; None where nothing is against it.
     """
@@ -257,6 +258,7 @@ class VehicleState:
     battery_cells: int = 0
     unfit: Refusal | None = None
     climb_contradicted: bool = False
+    keeps_climb: bool = False
 
     @property
     def may_fly(self) -> bool:

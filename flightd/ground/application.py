@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 
@@ -17,71 +16,133 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from flightd.core.errors import InputError
-from flightd.ground.acts import carried_out
+from flightd.ground.access.access import Access
+from flightd.ground.access.gate import SIGN_IN_FIRST, address_of, gated, identity_of
+from flightd.ground.access.roles import Identity, Role
+from flightd.ground.access.session_routes import session_routes
+from flightd.ground.acts import Orders
 from flightd.ground.browser import Browser
 from flightd.ground.flights.flights import Flights
 from flightd.ground.flights.routes import flight_routes
-from flightd.ground.guards import Guard
+from flightd.ground.guards import Guard, Hosts
 from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
 from flightd.ground.json_http import as_json, is_json, json_body, status_of
-from flightd.ground.messages import SentAct, answer_message, read_page_message
+from flightd.ground.messages import SentAct, answer_message, read_page_message, session_message
 from flightd.ground.missions.routes import mission_routes
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.site_page.routes import site_page
 from flightd.ground.stock_page import stock_page
 
 _NOT_OURS = 1008
 """WebSocket: a message that is against the rules."""
 _FULL = 1013
 """WebSocket: try again later."""
+_OTHER_ROLE = 4403
+"""WebSocket: the person has another role by now; the page comes again."""
+_RENEWED_S = 1.0
 
 
 def application(
-    hub: Hub, hosts: Iterable[str], folder: Path | None, flights: Flights, uploads: ReadingProcess
+    hub: Hub,
+    hosts: Hosts,
+    access: Access,
+    folder: Path | None,
+    flights: Flights,
+    uploads: ReadingProcess,
+    maps: ReadingProcess,
 ) -> ASGIApp:
-    """The whole station as ASGI; `hosts` are the names under which it may be asked, inventories and `flights`
-    lie under `folder`, `uploads` reads what people send."""
+    """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks,
+    inventories, site files and `flights` lie under `folder`, `uploads` reads what people send, `maps` lays
+    out maps."""
+    orders = Orders(hub.drones, access)
     routes = [
         first_page(),
-        WebSocketRoute("/live", partial(_live, hub)),
-        Route("/drones/{drone}/acts", partial(_act, hub), methods=["POST"]),
+        WebSocketRoute("/live", partial(_live, hub, orders)),
+        Route("/drones/{drone}/acts", partial(_act, orders), methods=["POST"]),
         *stock_page(folder, hub.drones, uploads),
+        *site_page(folder, maps),
         *flight_routes(flights),
         *mission_routes(folder, hub.drones),
         *guide_routes(),
+        *session_routes(access),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    return Guard(Starlette(routes=routes), hosts)
+    return Guard(Starlette(routes=gated(routes, access)), hosts)
 
 
-async def _live(hub: Hub, socket: WebSocket) -> None:
-    """One page, until it closes or says what no page of ours says."""
+class _GoneError(Exception):
+    """The page's person is not who he was."""
+
+    def __init__(self, code: int, why: str) -> None:
+        super().__init__(why)
+        self.code = code
+
+
+async def _live(hub: Hub, orders: Orders, socket: WebSocket) -> None:
+    """One page, until it closes, says what no page of ours says, or its person's session ends."""
+    who = identity_of(socket)
     await socket.accept()
     if hub.is_full:
         await socket.close(_FULL, "too many pages are open")
         return
+    with contextlib.suppress(WebSocketDisconnect):  # it is heard of below
+        await _say(socket, session_message(orders.access.login, who.name, who.role))
     async with asyncio.TaskGroup() as acts:  # what was ordered is handed on though its page has gone
-        with hub.opened() as browser:
+        with hub.opened(attends=who.role.covers(Role.OPERATOR)) as browser:
             try:
                 async with asyncio.TaskGroup() as tasks:
                     sending = tasks.create_task(_send(browser, socket), name="page out")
-                    await _hear(hub, browser, socket, acts)
-                    sending.cancel()
+                    staying = tasks.create_task(_stay(orders.access, who), name="page's person")
+                    try:
+                        await _hear(hub, orders, browser, socket, acts)
+                    finally:
+                        sending.cancel()
+                        staying.cancel()
             except* WebSocketDisconnect:
                 pass  # it is gone: the usual end
             except* InputError as group:
-                await _close(socket, str(group.exceptions[0]))
+                await _close(socket, _NOT_OURS, str(group.exceptions[0]))
+            except* _GoneError as group:
+                gone = group.exceptions[0]
+                assert isinstance(gone, _GoneError)
+                if gone.code == SIGN_IN_FIRST:
+                    with contextlib.suppress(WebSocketDisconnect):
+                        await _say(socket, session_message(login=True, name="", role=""))
+                await _close(socket, gone.code, str(gone))
+
+
+async def _stay(access: Access, who: Identity) -> None:
+    """_GoneError once the session is over, or the role another one."""
+    while True:
+        await asyncio.sleep(_RENEWED_S)
+        now = access.renewed(who)
+        if now is None:
+            raise _GoneError(SIGN_IN_FIRST, "the session is over")
+        if now != who:
+            raise _GoneError(_OTHER_ROLE, "another role")
 
 
 async def _send(browser: Browser, socket: WebSocket) -> None:
     """Everything that the page is to see; waits where it does not take it."""
     while True:
         message = await browser.next()
+        await _say(socket, message)
+
+
+async def _say(socket: WebSocket, message: str | bytes) -> None:
+    """WebSocketDisconnect where the socket has closed meanwhile: the server does so by itself at a broken
+    frame, and tells it here first."""
+    try:
         await (socket.send_text(message) if isinstance(message, str) else socket.send_bytes(message))
+    except RuntimeError:
+        raise WebSocketDisconnect(_NOT_OURS) from None
 
 
-async def _hear(hub: Hub, browser: Browser, socket: WebSocket, acts: asyncio.TaskGroup) -> None:
+async def _hear(
+    hub: Hub, orders: Orders, browser: Browser, socket: WebSocket, acts: asyncio.TaskGroup
+) -> None:
     """Everything that the page says.  WebSocketDisconnect when it closes, InputError for nonsense."""
     while True:
         received = await socket.receive()
@@ -90,28 +151,31 @@ async def _hear(hub: Hub, browser: Browser, socket: WebSocket, acts: asyncio.Tas
         message = read_page_message(received.get("text") or received.get("bytes") or "")
         if isinstance(message, SentAct):
             browser.begin_act()
-            acts.create_task(_sent_act(hub, browser, message), name=f"act for {message.drone}")
+            acts.create_task(_sent_act(orders, browser, socket, message), name=f"act for {message.drone}")
         else:
             hub.hear(browser, message)
 
 
-async def _sent_act(hub: Hub, browser: Browser, sent: SentAct) -> None:
-    status, answer = await carried_out(hub.drones, sent.drone, bytes(sent.act))
+async def _sent_act(orders: Orders, browser: Browser, socket: WebSocket, sent: SentAct) -> None:
+    who, address = identity_of(socket), address_of(socket.scope)
+    status, answer = await orders.carried_out(who, address, sent.drone, bytes(sent.act))
     browser.answer_act(sent.number, answer_message(sent.number, status, answer))
 
 
-async def _close(socket: WebSocket, why: str) -> None:
+async def _close(socket: WebSocket, code: int, why: str) -> None:
     with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # it has closed by itself meanwhile
-        await socket.close(_NOT_OURS, why.encode()[:120].decode(errors="ignore"))
+        await socket.close(code, why.encode()[:120].decode(errors="ignore"))
 
 
-async def _act(hub: Hub, request: Request) -> Response:
-    """Hand an act to a drone, as `carried_out` says."""
+async def _act(orders: Orders, request: Request) -> Response:
+    """Hand an act to a drone, as `Orders.carried_out` says."""
     if not is_json(request):
         return as_json({"refused": "an act is JSON"}, 415)
     try:
         body = await json_body(request, "an act")
     except InputError as err:
         return as_json({"refused": str(err)}, status_of(err, 400))
-    status, answer = await carried_out(hub.drones, request.path_params["drone"], body)
+    status, answer = await orders.carried_out(
+        identity_of(request), address_of(request.scope), request.path_params["drone"], body
+    )
     return as_json(answer, status)

@@ -21,7 +21,8 @@ class Browser:
     """What one page is sent and wants.  Nobody who offers ever waits for it: what it does not take in time
     is replaced by what is newer, and counted."""
 
-    def __init__(self) -> None:
+    def __init__(self, attends: bool = True) -> None:
+        self.attends = attends
         self._topics: LatestSlots[Topic, str] = LatestSlots()
         self._pictures: LatestSlots[PictureKey, bytes] = LatestSlots()
         self._wanted: frozenset[PictureKey] = frozenset()

@@ -46,8 +46,8 @@ class Pages(Protocol):
     """Everybody who looks on."""
 
     @property
-    def browsers(self) -> int:
-        """Pages that are open now."""
+    def is_attended(self) -> bool:
+        """Some page is open whose person may fly."""
         ...
 
     def tell(self, drone: str, topic: str, value: Any) -> None:
@@ -273,13 +273,14 @@ class DroneLink:
                 await self.on_plan(plan)
 
     async def _attend(self, client: GroundClient) -> None:
-        """Attend while a page is open; without one only measure the way.  Viewers cannot attend."""
+        """Attend while the page of somebody is open who may fly; without one only measure the way.  With a
+        viewer's key it cannot attend."""
         loop = asyncio.get_running_loop()
         while True:
             began_s = loop.time()
             try:
                 may = self._welcome is not None and self._welcome.role is Role.OPERATOR
-                if may and self._pages.browsers:
+                if may and self._pages.is_attended:
                     await client.attend()
                     self._attends = True
                 else:

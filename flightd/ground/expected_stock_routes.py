@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import asyncio
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from flightd.core.errors import InputError
 from flightd.ground.bounded import Room
 from flightd.ground.json_http import as_json
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.request_body import whole_body
 from flightd.ground.stock_routes import StockAnswers, answered, download
 from flightd.ground.uploaded_comparison import compare_upload
 from flightd.inventory.stock_table import MOST_BYTES
 
 MOST_COMPARISONS = 4
 """So many may wait or be in work."""
-_UPLOAD_S = 60.0
 _COMPARE_S = 60.0
 _KIND = "application/octet-stream"
 
@@ -34,7 +32,7 @@ def expected_stock_routes(asked: StockAnswers, reading: ReadingProcess) -> list[
             return as_json({"refused": "an upload is the file itself"}, 415)
         with room.taken():  # before the file is taken in
             store = await asked.store_folder(request)
-            data = await _body(request)
+            data = await whole_body(request, MOST_BYTES)
             with NamedTemporaryFile(prefix="flightd-upload-") as upload:
                 await asked.off_loop(_write, upload.name, data)
                 answer = await reading.run(
@@ -49,26 +47,3 @@ def expected_stock_routes(asked: StockAnswers, reading: ReadingProcess) -> list[
 
 def _write(file: str, data: bytes) -> None:
     Path(file).write_bytes(data)
-
-
-async def _body(request: Request) -> bytes:
-    """The file.  InputError for one that is too long, or breaks off."""
-    length = request.headers.get("content-length", "0")
-    parts: list[bytes] = []
-    size = int(length) if length.isdecimal() and len(length) < 12 else MOST_BYTES + 1
-    try:
-        if size <= MOST_BYTES:
-            size = 0
-            async with asyncio.timeout(_UPLOAD_S):
-                async for part in request.stream():
-                    parts.append(part)
-                    size += len(part)
-                    if size > MOST_BYTES:
-                        break
-    except TimeoutError:
-        raise InputError(f"the upload takes longer than {_UPLOAD_S:.0f} s") from None
-    except ClientDisconnect:
-        raise InputError("the upload breaks off") from None
-    if size > MOST_BYTES:
-        raise InputError(f"the file has more than {MOST_BYTES // 10**6} MB")
-    return b"".join(parts)

@@ -21,7 +21,8 @@ class Hub:
     """Runs one task per drone and keeps what each topic says last, so that a page that is opened, or opened
     again, has everything at once.
 
-    A drone is attended while any page is open, and no longer: closing the last one is losing the ground."""
+    A drone is attended while the page of anybody is open who may fly, and no longer: closing the last one is
+    losing the ground."""
 
     def __init__(self, drones: Sequence[tuple[str, Address]]) -> None:
         self._latest: dict[Topic, Any] = {}
@@ -43,14 +44,19 @@ class Hub:
         return len(self._browsers)
 
     @property
+    def is_attended(self) -> bool:
+        """Some page is open of a person who may fly: who only looks on is no ground for the flight."""
+        return any(browser.attends for browser in self._browsers)
+
+    @property
     def is_full(self) -> bool:
         """No more pages are taken."""
         return len(self._browsers) >= MOST_BROWSERS
 
     @contextmanager
-    def opened(self) -> Iterator[Browser]:
-        """A page is open meanwhile, told at once what every topic says last."""
-        browser = Browser()
+    def opened(self, attends: bool) -> Iterator[Browser]:
+        """A page is open meanwhile, told at once what each topic says last; `attends`: its person may fly."""
+        browser = Browser(attends)
         for topic in sorted(self._latest, key=lambda topic: topic[1] == "link"):  # how old the rest is: last
             browser.offer(topic, topic_message(*topic, self._latest[topic]))
         self._browsers.add(browser)

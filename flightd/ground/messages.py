@@ -114,6 +114,11 @@ def picture_message(key: PictureKey, answer: PictureAnswer, age_ms: float | None
     return framed_picture(head, jpeg)
 
 
+def session_message(login: bool, name: str, role: str) -> str:
+    """Who the page's person is to the station; with `login` and no name: somebody who has to sign in."""
+    return topic_message("", "session", {"login": login, "name": name, "role": role})
+
+
 def answer_message(number: int, status: int, answer: Mapping[str, Any]) -> str:
     """The answer to a `SentAct` as it goes to the page that sent it."""
     return topic_message("", "answer", {"number": number, "status": status, **answer})

@@ -9,7 +9,7 @@ import re
 import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import uvicorn
@@ -17,12 +17,15 @@ import uvicorn
 from flightd.adapters.ground_link.client import Address
 from flightd.config.ground import is_loopback
 from flightd.core.errors import InputError, UnavailableError
+from flightd.ground.access.access import Access
 from flightd.ground.application import application
 from flightd.ground.flights.flights import Flights
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+from flightd.ground.quiet_log import quiet_log
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.tls import Certificate
 from flightd.runtime.ending_signals import end_on_signals
 
 PORT = 8080
@@ -38,15 +41,21 @@ class Listening:
 
     host: str
     port: int = PORT
+    secure: bool = False
 
     @property
     def url(self) -> str:
-        return f"http://[{self.host}]:{self.port}" if ":" in self.host else f"http://{self.host}:{self.port}"
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{'https' if self.secure else 'http'}://{host}:{self.port}"
+
+    @property
+    def is_beyond(self) -> bool:
+        """Other machines reach it."""
+        return not is_loopback(self.host)
 
     @classmethod
     def read(cls, text: str) -> Listening:
-        """HOST, HOST:PORT or [HOST]:PORT.  InputError for anything else, and for what other machines reach:
-        the station asks nobody who he is yet."""
+        """HOST, HOST:PORT or [HOST]:PORT.  InputError for anything else."""
         found = _LISTEN.fullmatch(text)
         host = text if found is None else found["host"]
         port = PORT if found is None or found["port"] is None else int(found["port"])
@@ -58,13 +67,31 @@ class Listening:
         host = host.removeprefix("[").removesuffix("]")
         if port > 65535:
             raise InputError("a port is at most 65535", key=f"--listen {text}")
-        if not is_loopback(host):
-            raise InputError(
-                "reaches beyond this machine, and the ground station has no login yet",
-                key=f"--listen {text}",
-                remedy=f"listen on 127.0.0.1, and come from elsewhere through ssh -L {PORT}:127.0.0.1:{PORT}",
-            )
         return cls("127.0.0.1" if host == "localhost" else host, port)
+
+
+def check_reach(where: Listening, access: Access, certificate: Certificate | None) -> None:
+    """InputError for a station that other machines would reach, and that lacks people or TLS: then a password
+    could be read on the way, or nobody would be asked for one."""
+    has_people = access.login and access.people > 0
+    if access.login and not has_people and not where.is_beyond:
+        raise InputError(
+            "nobody could sign in", key="--login", remedy="flightd ground people add NAME --role admin"
+        )
+    if not where.is_beyond or (has_people and certificate is not None):
+        return
+    steps = [] if has_people else ["flightd ground people add NAME --role admin"]
+    if certificate is None:
+        steps.append("give --tls-cert FILE --tls-key FILE")
+    raise InputError(
+        f"reaches beyond this machine, and the station has {' and '.join(_lacks(has_people, certificate))}",
+        key=f"--listen {where.host}",
+        remedy=", then ".join(steps),
+    )
+
+
+def _lacks(has_people: bool, certificate: Certificate | None) -> list[str]:
+    return ([] if has_people else ["nobody who could sign in"]) + ([] if certificate else ["no TLS"])
 
 
 class _Server(uvicorn.Server):
@@ -89,21 +116,25 @@ def opened(listening: Listening) -> tuple[socket.socket, Listening]:
             f"{listening.url}: {err.strerror or err}",
             remedy="give --listen an address of this machine and a free port",
         ) from None
-    return listener, Listening(listening.host, int(listener.getsockname()[1]))
+    return listener, replace(listening, port=int(listener.getsockname()[1]))
 
 
 def run(
     drones: Sequence[tuple[str, Address]],
     listening: Listening,
     on_ready: Callable[[Listening], None],
+    access: Access,
+    certificate: Certificate | None = None,
     folder: Path | None = None,
 ) -> signal.Signals | None:
-    """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had."""
+    """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had,
+    InputError where it must not be listened at (`check_reach`)."""
+    check_reach(listening, access, certificate)
     listener, where = opened(listening)
     came: list[signal.Signals] = []
 
     async def until_signal() -> None:
-        serving = asyncio.ensure_future(serve(drones, listener, where, on_ready, folder))
+        serving = asyncio.ensure_future(serve(drones, listener, where, access, on_ready, certificate, folder))
         end_on_signals(serving, came)
         with contextlib.suppress(asyncio.CancelledError):
             await serving
@@ -117,14 +148,21 @@ async def serve(
     drones: Sequence[tuple[str, Address]],
     listener: socket.socket,
     where: Listening,
+    access: Access,
     on_ready: Callable[[Listening], None] = lambda _: None,
+    certificate: Certificate | None = None,
     folder: Path | None = None,
 ) -> None:
-    """Serve until cancelled; the pages are told that it ends.  Inventories and flights lie under `folder`."""
+    """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
+    end; inventories and flights lie under `folder`."""
     hub, flights, uploads = Hub(drones), Flights(folder), ReadingProcess()
+    quiet_log()
+    maps = ReadingProcess(refusal="too many maps are being checked")
+    names = () if certificate is None else certificate.names
+    hosts = own_hosts(where.host, where.port, certificate is not None, names, where.is_beyond)
     server = _Server(
         uvicorn.Config(
-            application(hub, own_hosts(where.host, where.port), folder, flights, uploads),
+            application(hub, hosts, access, folder, flights, uploads, maps),
             http="h11",
             ws="websockets-sansio",
             lifespan="off",
@@ -138,11 +176,15 @@ async def serve(
             ws_ping_timeout=_PING_S,
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=_LEAVE_S,
+            ssl_certfile=None if certificate is None else certificate.cert,
+            ssl_keyfile=None if certificate is None else certificate.key,
         )
     )
     async with asyncio.TaskGroup() as tasks:
         station = tasks.create_task(hub.run(), name="hub")
         tasks.create_task(flights.run(), name="flights")
+        if access.login:
+            tasks.create_task(access.run(), name="people")
         serving = tasks.create_task(server.serve([listener]), name="pages")
         try:
             while not server.started:  # noqa: ASYNC110 - it tells nobody
@@ -154,3 +196,5 @@ async def serve(
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.shield(asyncio.wait([serving], timeout=_LEAVE_S + 2.0))
             uploads.close()
+            maps.close()
+            await asyncio.to_thread(access.close)

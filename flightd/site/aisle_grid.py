@@ -9,6 +9,13 @@ from dataclasses import dataclass
 from typing import Final
 
 _LETTERS: Final = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_OVER_SHELVES_M: Final = 1.5
+"""Of a ceiling that nobody gave: room for the drone above what it counts."""
+
+
+def assumed_ceiling_m(shelf_height_m: float, levels_m: Sequence[float]) -> float:
+    """A ceiling over racks for which none was given: to be measured before anything flies there."""
+    return round(max(shelf_height_m, *levels_m) + _OVER_SHELVES_M, 2)
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,12 +49,30 @@ class FrontView:
 
 
 @dataclass(frozen=True, slots=True)
+class Gap:
+    """A stretch of a shelf front, `from_m` to `to_m` along x, that is in no node's picture of `seen_m`."""
+
+    aisle: str
+    side: str
+    from_m: float
+    to_m: float
+    seen_m: float
+
+    def __str__(self) -> str:
+        where = f"aisle {self.aisle}, {self.side} side: x {self.from_m:.2f} to {self.to_m:.2f} m"
+        return (
+            f"{where} is in no picture; nodes may be {self.seen_m:.2f} m apart and {self.seen_m / 2:.2f} m "
+            "from the shelf's ends"
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Coverage:
     """What the camera will see and read from the nodes, flown at `speed_mps` while it looks.
 
-    `problems` are lines for a person; `unseen` the codes out of every picture, `unreadable` those seen too
-    small; `read_part` is the share of all locations that is neither (1 for a site without any), and 0
-    where the flight is too fast.
+    `problems` are lines for a person, `gaps` those of them that have a place; `unseen` the codes out of every
+    picture, `unreadable` those seen too small; `read_part` is the share of all locations that is neither (1
+    for a site without any), and 0 where the flight is too fast.
     """
 
     locations: int
@@ -64,6 +82,7 @@ class Coverage:
     blur_modules: float
     speed_limit_mps: float
     problems: tuple[str, ...]
+    gaps: tuple[Gap, ...] = ()
 
     @property
     def read_part(self) -> float:
@@ -75,7 +94,8 @@ class Coverage:
 
 def check_coverage(site: Site, view: FrontView, speed_mps: float) -> Coverage:
     """Hold every shelf front against the paper's rule, and every label against the reader's limits."""
-    problems = [problem for shelf in site.shelves for problem in _rule_problems(site, shelf, view)]
+    uncovered = [gap for shelf in site.shelves for gap in _gaps(site, shelf, view)]
+    problems = [str(gap) for gap in uncovered]
     unseen, unreadable = [], []
     smallest = math.inf
     for location in site.locations.values():
@@ -109,24 +129,21 @@ def check_coverage(site: Site, view: FrontView, speed_mps: float) -> Coverage:
         blur,
         view.speed_limit_mps(),
         tuple(problems),
+        tuple(uncovered),
     )
 
 
-def _rule_problems(site: Site, shelf: Shelf, view: FrontView) -> list[str]:
-    """One line for each stretch of the front that is in no node's picture."""
+def _gaps(site: Site, shelf: Shelf, view: FrontView) -> list[Gap]:
+    """Each stretch of the front that is in no node's picture."""
     seen_m = view.seen_m(_shelf_distance_m(site, shelf))
     gaps = []
     reached_m = shelf.x0_m
     for x_m in [*(node.x_m for node in site.aisle_nodes(shelf.aisle)), math.inf]:
         starts_m = min(x_m - seen_m / 2, shelf.x1_m)
         if starts_m > reached_m + _SLACK_M:
-            gaps.append((reached_m, starts_m))
+            gaps.append(Gap(shelf.aisle, shelf.side, reached_m, starts_m, seen_m))
         reached_m = max(reached_m, min(x_m + seen_m / 2, shelf.x1_m))
-    return [
-        f"aisle {shelf.aisle}, {shelf.side} side: x {start_m:.2f} to {end_m:.2f} m is in no picture; "
-        f"nodes may be {seen_m:.2f} m apart and {seen_m / 2:.2f} m from the shelf's ends"
-        for start_m, end_m in gaps
-    ]
+    return gaps
 
 
 def _shelf_distance_m(site: Site, shelf: Shelf) -> float:

@@ -16,6 +16,8 @@ _LEAP = 0.1
 _STEADY_FRAMES, _STEADY_SHARE = 30, 0.08
 """Widths that never agreed with the height are held against it, too, once they were so many frames the same
 share of it, within so much on average: a range finder that reads too little from the floor on."""
+_OTHER_FRAMES = 90
+"""The same for a line of another width than those before it, of which no range finder can be the cause."""
 
 
 class WidthHeights:
@@ -27,9 +29,7 @@ class WidthHeights:
         self._last_m: float | None = None
         self._judged = False
         self._followed = False  # by its widths, from frame to frame, since it last agreed with the one told
-        self._frames = 0
-        self._mean_share: float | None = None
-        self._strays = 0.0
+        self._watched = _Watched()
         self._told_m = 0.0
         self.by_width_m: float | None = None
         """What the newest frame's lines tell, where they could be held against a height; None where not."""
@@ -58,30 +58,52 @@ class WidthHeights:
             last_m = self._last_m
             nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
         share = told_m / nearest_m
-        if not self._judged:
-            steady_share = self._steady_share(share)
-            if not agrees and steady_share is None:  # then it is the line that is another
-                return told_m
-            self._judged, self._share = True, 1.0 if agrees else steady_share or 1.0
+        change = self._change(nearest_m, share)
+        if agrees or (self._judged and change < _LEAP):
+            if not self._judged:
+                self._judged, self._share = True, 1.0
+            self._watched = _Watched()
+        else:
+            frames = _OTHER_FRAMES if self._judged else _STEADY_FRAMES
+            steady_share = self._watched.steady_share(share, frames)
+            if steady_share is None:  # then it is the line that is another
+                return told_m / self._believed_share
+            self._judged, self._share, self._watched = True, steady_share, _Watched()
         self._share += _GAIN * (share - self._share)
-        self._told_m = told_m
         if self._last_m is not None:
-            change = min(abs(math.log(nearest_m / self._last_m)), 1.0)
             self._changes += _GAIN * (change - self._changes)
             self._followed = agrees or (self._followed and change < _LEAP)
         self._last_m = self.by_width_m = nearest_m
+        self._told_m = told_m
         leapt = self._followed and abs(share - 1.0) > _DOUBTED
         return nearest_m if leapt or self._believed_share != 1.0 else told_m
 
-    def _steady_share(self, share: float) -> float | None:
-        """The share of that by the width as which the height has long been told; None where it changes."""
-        mean = share if self._mean_share is None else self._mean_share
-        self._frames += 1
-        self._mean_share = mean + _GAIN * (share - mean)
-        self._strays += _GAIN * (abs(share / mean - 1.0) - self._strays)
-        steady = self._frames >= _STEADY_FRAMES and self._strays < _STEADY_SHARE
-        return self._mean_share if steady else None
+    def _change(self, nearest_m: float, share: float) -> float:
+        """By how much both what the widths tell and its share of what is told have changed, as a share: then
+        it is a line of another width.  Of a range finder that leaps only the share does, of a climb that
+        nobody saw only the height."""
+        if self._last_m is None or not self._told_m > 0.0:
+            return 0.0
+        by_width, by_share = nearest_m / self._last_m, share * self._last_m / self._told_m
+        return min(abs(math.log(by_width)), abs(math.log(by_share)), 1.0)
 
     @property
     def _believed_share(self) -> float:
         return self.share if abs(self.share - 1.0) > _DOUBTED else 1.0
+
+
+class _Watched:
+    """The share of the height by widths as which one is told, of lines that are not believed yet."""
+
+    def __init__(self) -> None:
+        self._frames = 0
+        self._mean: float | None = None
+        self._strays = 0.0
+
+    def steady_share(self, share: float, frames: int) -> float | None:
+        """Take one frame's; None until it was the same over so many `frames`."""
+        mean = share if self._mean is None else self._mean
+        self._frames += 1
+        self._mean = mean + _GAIN * (share - mean)
+        self._strays += _GAIN * (abs(share / mean - 1.0) - self._strays)
+        return self._mean if self._frames >= frames and self._strays < _STEADY_SHARE else None

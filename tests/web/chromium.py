@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import pytest
@@ -65,26 +66,38 @@ def another(browser: Browser, *flags: str) -> Iterator[Browser]:
 
 
 @contextlib.contextmanager
-def station(drones: Sequence[str], listen: str = "127.0.0.1:0", folder: Path | None = None) -> Iterator[str]:
+def station(
+    drones: Sequence[str],
+    listen: str = "127.0.0.1:0",
+    folder: Path | None = None,
+    state: Path | None = None,
+    options: Sequence[str] = (),
+) -> Iterator[str]:
     """`flightd ground` as a person starts it; its address."""
     words = [word for drone in drones for word in ("--drone", drone)]
     words += [] if folder is None else ["--folder", str(folder)]
+    words += ["--listen", listen, *options]
+    with TemporaryDirectory() as elsewhere, started([*words, "--state", str(state or elsewhere)]) as url:
+        yield url
+
+
+@contextlib.contextmanager
+def started(words: Sequence[str]) -> Iterator[str]:
+    """`flightd ground` with these words; its address."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "flightd", "ground", *words, "--listen", listen],
-        cwd=ROOT,
-        stderr=subprocess.PIPE,
-        text=True,
+        [sys.executable, "-m", "flightd", "ground", *words], cwd=ROOT, stderr=subprocess.PIPE, text=True
     )
     assert process.stderr is not None
     with process.stderr:
         try:
             said = process.stderr.readline()
-            found = re.search(r"http://127\.0\.0\.1:\d+", said)
+            found = re.search(r"https?://[0-9.]+:\d+", said)
             assert found is not None, said
             yield found.group()
         finally:
             process.terminate()
-            assert process.wait(20) == 0, process.stderr.read()
+            code, rest = process.wait(20), process.stderr.read()
+            assert (code, "Traceback" in rest) == (0, False), rest
 
 
 @contextlib.contextmanager
@@ -96,7 +109,7 @@ def opened(browser: Browser, url: str, size: tuple[int, int] = WIDE, scheme: str
     context.on("request", lambda request: asked.append(request.url))
     context.on("weberror", lambda error: wrong.append(str(error.error)))
     page = context.new_page()
-    page.on("websocket", lambda socket: asked.append(socket.url.replace("ws://", "http://")))
+    page.on("websocket", lambda socket: asked.append(socket.url.replace("ws", "http", 1)))
     page.on("console", lambda said: wrong.append(said.text) if "Content Security" in said.text else None)
     try:
         page.goto(url)
@@ -114,6 +127,7 @@ def new_context(browser: Browser, size: tuple[int, int], scheme: str) -> Browser
     context = browser.new_context(
         viewport={"width": size[0], "height": size[1]},
         color_scheme="dark" if scheme == "dark" else "light",
+        ignore_https_errors=True,  # of a certificate that the test has made for itself
     )
     context.set_default_timeout(30_000)
     context.add_init_script(path=AXE)

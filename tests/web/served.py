@@ -8,12 +8,15 @@ import json
 from collections.abc import AsyncIterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
 from flightd.adapters.ground_link.client import Address
+from flightd.ground.access.access import Access
 from flightd.ground.server import Listening, opened, serve
 
 JSON = {"Content-Type": "application/json"}
@@ -81,12 +84,17 @@ class Station:
 
 
 @contextlib.asynccontextmanager
-async def served(*drones: tuple[str, Address], folder: Path | None = None) -> AsyncIterator[Station]:
-    """A station that serves meanwhile; flights lie below `folder`."""
+async def served(
+    *drones: tuple[str, Address], folder: Path | None = None, state: Path | None = None, login: bool = False
+) -> AsyncIterator[Station]:
+    """A station that serves meanwhile; flights lie below `folder`, people and audit in `state`."""
     listener, where = opened(Listening("127.0.0.1", 0))
     ready = asyncio.Event()
-    with listener:
-        serving = asyncio.ensure_future(serve(drones, listener, where, lambda _: ready.set(), folder))
+    with listener, TemporaryDirectory() as elsewhere:
+        access = Access(state or Path(elsewhere), login, secure=False)
+        serving = asyncio.ensure_future(
+            serve(drones, listener, where, access, lambda _: ready.set(), folder=folder)
+        )
         try:
             await asyncio.wait_for(ready.wait(), 20)
             yield Station(where)
@@ -122,3 +130,13 @@ async def until_told(socket: ClientConnection, topic: str, field: str, value: An
     """Wait until the station's own topic says this."""
     while (await told(socket, topic, ""))[field] != value:
         pass
+
+
+async def ending(page: ClientConnection) -> int | None:
+    """The code with which the station closes a page."""
+    try:
+        async with asyncio.timeout(10):
+            while True:
+                await page.recv()
+    except ConnectionClosed as ended:
+        return None if ended.rcvd is None else ended.rcvd.code

@@ -10,8 +10,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
-from websockets.asyncio.client import ClientConnection
-from websockets.exceptions import ConnectionClosed
 
 from flightd.adapters.ground_link.client import Address
 from flightd.core.errors import InputError
@@ -19,7 +17,7 @@ from flightd.ground.messages import read_act, read_page_message
 from tests.fuzz.mutate import spoil_bytes, spoil_text
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.ground_link import address_of, local, serving, telling
-from tests.web.served import JSON, Station, served, told
+from tests.web.served import JSON, Station, ending, served, told
 from tests.web.stock_rig import counted_store
 
 NOBODY = ("demo", Address("127.0.0.1", 1, 1))
@@ -117,16 +115,6 @@ def broken(read: Callable[[bytes], object], words: Sequence[str], draw: random.R
             read(made)
         except InputError:
             return made
-
-
-async def ending(page: ClientConnection) -> int | None:
-    """The code with which the station closes a page."""
-    try:
-        async with asyncio.timeout(10):
-            while True:
-                await page.recv()
-    except ConnectionClosed as ended:
-        return None if ended.rcvd is None else ended.rcvd.code
 
 
 def _is_text(words: bytes) -> bool:

@@ -52,8 +52,8 @@ class AuditLog:
         self._thread = threading.Thread(target=self._write_all, name="audit", daemon=True)
         self._thread.start()
 
-    def write(self, entry: AuditEntry) -> None:
-        """Take an entry; the time is now, UTC."""
+    def write(self, entry: msgspec.Struct) -> None:
+        """Take an entry, of whatever fields; the time is now, UTC."""
         stamped = {"time": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%S.%fZ}", **msgspec.to_builtins(entry)}
         try:
             self._queue.put_nowait(msgspec.json.encode(stamped) + b"\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -45,6 +46,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
     armed = [ArmedChange(**row) for row in _rows(truth, Topic.ARMED, ArmedChange)]
     notes = [e.message for e in truth if e.topic == Topic.FAULT and isinstance(e.message, dict)]
     begun = [note for note in notes if note["began"]]
+    dead_ns = min((note["stamp_ns"] for note in begun if note["kind"] == "companion_dead"), default=math.inf)
     statuses = flown.messages(Status)
     evidence = FlightEvidence(
         site=simulation.scenario.floor.site(simulation.site, simulation.seed),
@@ -52,7 +54,8 @@ def judge_flight(simulation: Simulation) -> Judgement:
         statuses=statuses,
         events=flown.messages(Event),
         truth=[Kinematics(**row) for row in _rows(truth, Topic.TRUTH, Kinematics)],
-        setpoints=flown.messages(AttitudeSetpoint),
+        # what a computer that is dead would have sent reaches nobody
+        setpoints=[sent for sent in flown.messages(AttitudeSetpoint) if sent.stamp_ns < dead_ns],
         armed=armed or None,
         piloted=any(note["kind"] == "pilot" for note in begun) or bool(simulation.truth_url),
     )

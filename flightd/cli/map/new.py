@@ -13,9 +13,6 @@ from flightd.cli.map.site_files import Force, write_new
 from flightd.cli.options import AsJson
 from flightd.core.errors import InputError
 
-_OVER_SHELVES_M = 1.5
-"""Of a ceiling that nobody gave: room for the drone above what it counts."""
-
 
 def register(app: typer.Typer) -> None:
     """Hang the command under `app`."""
@@ -64,7 +61,7 @@ def new(
     Examples:
       flightd map new hall-3.toml --aisles 4 --nodes 8 --spacing-m 1.4,1.7 --pitch-m 3.2
     """
-    from flightd.site.aisle_grid import AisleGrid, RackRow
+    from flightd.site.aisle_grid import AisleGrid, RackRow, assumed_ceiling_m
     from flightd.site.facts import site_facts
     from flightd.site.site_file import parse_site, site_toml
 
@@ -76,7 +73,9 @@ def new(
             )
         levels = _metres("--levels-m", levels_m)
         racks = RackRow(bay_width_m, levels, positions, deck_below_label_m, pattern)
-        ceiling_m = ceiling_m or _assumed_ceiling_m(shelf_height_m, levels)
+        if not ceiling_m:
+            ceiling_m = assumed_ceiling_m(shelf_height_m, levels)
+            _say_assumed(ceiling_m)
     grid = AisleGrid(
         name=name or out.stem,
         aisles=aisles,
@@ -98,15 +97,12 @@ def new(
     print(json.dumps({"file": str(out), **site_facts(site)}) if as_json else out)
 
 
-def _assumed_ceiling_m(shelf_height_m: float, levels_m: tuple[float, ...]) -> float:
-    """A ceiling over racks for which none was given; says so."""
-    assumed_m = round(max(shelf_height_m, *levels_m) + _OVER_SHELVES_M, 2)
+def _say_assumed(ceiling_m: float) -> None:
     print(
-        f"flightd: --ceiling-m is not given: ceiling_m = {assumed_m:g} is assumed and written; measure the"
+        f"flightd: --ceiling-m is not given: ceiling_m = {ceiling_m:g} is assumed and written; measure the"
         " lowest thing under the roof before anything flies there",
         file=sys.stderr,
     )
-    return assumed_m
 
 
 def _sides(shelves: str) -> tuple[str, ...]:

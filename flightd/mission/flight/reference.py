@@ -185,7 +185,7 @@ class ReferenceGenerator:
         p, v = self._params, s.vehicle
         self._still_s = self._standstill.step(s, sinks=self._sinks)
         self._sinks = False
-        moving = self._steers and s.speed_mps > _REST_MPS
+        moving = self._steers and s.speed_mps > _REST_MPS and not self._standstill.touches
         if moving and not task.state.on_pad and task.phase_s < _SETTLE_S:
             self._height.reset(self._height.position)
             return 0.0, Demand.FLY
@@ -195,7 +195,7 @@ class ReferenceGenerator:
         self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
         self._sinks = rate > 0.0
         deaf = s.telemetry_age_s > p.telemetry_land_s
-        unsteered = v is not None and math.isnan(v.climb_mps)
+        unsteered = v is not None and math.isnan(v.climb_mps) and not v.keeps_climb
         self._by_itself |= unsteered  # nothing takes it back out of its own landing
         standing = v is not None and v.landed is LandedState.ON_GROUND and not deaf
         standing = standing or self._still_s > _DISARM_S

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from flightd.config.mission import MissionConfig
 from flightd.core.types import Attitude
@@ -33,6 +34,8 @@ _STILL_M = 0.04
 _STILL_RAD = math.radians(2.0)
 _TOUCHES_S, _FLIES_S = 0.3, 0.5
 """Down and still, or kept from sinking, for so long it touches; moving for so long it flies again."""
+_KEPT_S = 0.4
+"""So near the floor, and for so long no nearer though it sinks, it stands, whatever climb it tells."""
 _DEFIES_RAD, _DEFIES_STILL_RAD, _DEFIES_S = math.radians(3.0), math.radians(1.0), 0.4
 """An attitude that stays as it is for so long, though another one is commanded, is held by the floor, so be
 the range finder and the climb rate what they may."""
@@ -54,6 +57,7 @@ class Standstill:
         self._touched_m = math.nan
         self._climbed_m = 0.0
         self._held: Attitude | None = None
+        self._kept: tuple[int, float] | None = None
         self.touches = False
         """It stands on something: who stands does not follow a lean, and the position loop would ask for more
         and more of it."""
@@ -65,12 +69,14 @@ class Standstill:
 
     def begin(self) -> None:
         """A landing begins."""
-        self._since = self._held = None
+        self._since = self._held = self._kept = None
         self._blocked_s, self._sank_s, self.touches = 0.0, 0.0, False
 
     def step(self, s: MissionInputs, *, sinks: bool) -> float:
         """Seconds; 0 while it moves, is higher, or is not heard.  `sinks`: it is commanded to."""
         climb_mps = math.nan if s.vehicle is None else s.vehicle.climb_mps
+        if s.warnings.height_stuck:
+            s = replace(s, height_m=math.nan)  # what sticks may stick at what is read on the floor
         if not sinks:
             self._sank_s = 0.0  # it has stopped at some height, to aim
         elif climb_mps < -_STILL_MPS:
@@ -81,7 +87,9 @@ class Standstill:
         is_held = sinks and abs(climb_mps) <= _STILL_MPS and may_touch
         self._blocked_s = self._blocked_s + s.dt_s if is_held else 0.0
         still_s = self._stood_s(s, sinks=sinks)
-        if max(still_s, self._blocked_s) > _TOUCHES_S or self._defies(s, sinks=sinks):
+        stands = max(still_s, self._blocked_s) > _TOUCHES_S
+        is_kept = self._kept_s(s, climb_mps, sinks=sinks) > _KEPT_S
+        if self._defies(s, sinks=sinks) or is_kept or stands:
             if not self.touches:
                 self._touched_m, self._climbed_m = s.height_m, 0.0
             self.touches, self._moving_s = True, 0.0
@@ -98,6 +106,16 @@ class Standstill:
         by_height = abs(s.height_m - self._touched_m) > _MOVES_M
         by_climb = abs(climb_mps) > _MOVES_MPS or abs(self._climbed_m) > _MOVES_M
         return by_height or by_climb or (not sinks and s.height_m > _FLOOR_M)
+
+    def _kept_s(self, s: MissionInputs, climb_mps: float, *, sinks: bool) -> float:
+        """For how long the floor keeps it at its height; the climb that it tells may wander meanwhile."""
+        near = s.height_m <= self._floor_m + _NEAR_FLOOR_M
+        if not sinks or not near or abs(climb_mps) > _MOVES_MPS or s.telemetry_age_s > self._hold_s:
+            self._kept = None
+            return 0.0
+        if self._kept is None or abs(s.height_m - self._kept[1]) > _STILL_M:
+            self._kept = s.now_ns, s.height_m
+        return (s.now_ns - self._kept[0]) * 1e-9
 
     def _defies(self, s: MissionInputs, *, sinks: bool) -> bool:
         """It does not follow the lean that is commanded."""
@@ -117,7 +135,9 @@ class Standstill:
         if v is None or s.telemetry_age_s > self._hold_s or not _is_steady(s.height_m, v.climb_mps):
             self._since = None
             return 0.0
-        high = s.height_m > self._floor_m + _NEAR_FLOOR_M  # NaN: unknown
+        high = s.height_m > self._floor_m + _NEAR_FLOOR_M
+        if math.isnan(s.height_m):  # one that hovers is still, too
+            high = not self._sank_s > _TOUCHES_S
         if high and not sinks:
             self._since = None
             return 0.0

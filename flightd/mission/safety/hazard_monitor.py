@@ -25,7 +25,7 @@ _NEWS_S = 1.0
 """Something that was replaced is news for so long."""
 _CLOCK_S = 0.3
 """So soon clocks are compared anew after a reboot or a jump."""
-_JUMPED = 3
+_JUMPED = 2
 """So many attitudes with a senseless time are no stray datagram."""
 
 _HOLDING = triggers_of(Action.HOLD)

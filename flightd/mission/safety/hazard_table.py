@@ -102,9 +102,9 @@ HAZARDS: tuple[Hazard, ...] = (
         None,
         "the autopilot hears neither heartbeats nor setpoints of this computer",
         Action.LAND,
-        "level after 0.3 s (PX4: half a second), then the autopilot lands by itself (ArduPilot:"
-        " `FS_GCS_ENABLE`, `FS_GCS_TIMEOUT`, `SYSID_MYGCS`; PX4: `COM_OF_LOSS_T`, `COM_OBL_RC_ACT`); without"
-        " these nothing is armed",
+        "level after 0.3 s (PX4: half a second), then, a second after its death, the autopilot lands"
+        " by itself (ArduPilot: `FS_GCS_ENABLE`, `FS_GCS_TIMEOUT`, `SYSID_MYGCS`; PX4: `COM_OF_LOSS_T`,"
+        " `COM_OBL_RC_ACT`); without these nothing is armed",
         "tests/protocol/mavlink/test_companion_dead.py",
     ),
     Hazard(
@@ -129,8 +129,9 @@ HAZARDS: tuple[Hazard, ...] = (
         "no climb rate from the autopilot for a second, and then for `mission.telemetry_hold_s`; or, where"
         " thrust is sent, one that stands still though pushed by 0.3 m/s, while the height moves that way",
         Action.LAND,
-        "down by the height's rate where the told one is contradicted; else, and once that is lost, too, the"
-        " autopilot's own landing: it cannot be steered unmeasured; nothing is armed without a climb rate",
+        "down by setpoints, held by the lines: the autopilot keeps their climb rate; where thrust is sent,"
+        " the height's rate keeps it; once that is lost, too, the autopilot's own landing: thrust cannot be"
+        " steered unmeasured; nothing is armed without a climb rate",
         _FAST,
     ),
     Hazard(

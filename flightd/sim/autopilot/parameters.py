@@ -31,7 +31,7 @@ COPTER_PARAMETERS: dict[str, float] = {
     "DISARM_DELAY": 10,
     "FS_THR_ENABLE": 3,
     "FS_GCS_ENABLE": 5,
-    "FS_GCS_TIMEOUT": 2,
+    "FS_GCS_TIMEOUT": 1,
     "FS_EKF_ACTION": 1,
     "FS_EKF_THRESH": 0.8,
     "RC_OPTIONS": 32,

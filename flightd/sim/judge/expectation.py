@@ -18,7 +18,7 @@ class Expectation(Section):
 
     hazard: str = Field(min_length=1, max_length=40)
     found_s: float = Field(1.0, gt=0, le=600)
-    ends: Literal["completed", "home", "landed", "handed over"]
+    ends: Literal["completed", "home", "landed", "down", "handed over"]
     tolerates: tuple[str, ...] = ()
 
     @field_validator("hazard")

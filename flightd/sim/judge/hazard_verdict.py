@@ -18,6 +18,8 @@ from flightd.site.site import Site
 
 _ON_FLOOR_M = 0.2
 _AT_PAD_M = 0.5
+_ENDS = {"landed": {"landed", "home"}, "down": {"landed", "home", "completed"}}
+"""What is as good an end as the one that is expected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +65,7 @@ def judged_hazard(
     phase = PHASE_OF.get(row.action) if row.trigger is not None else None
     if phase is not None and phase not in after:
         own.append(JudgedFault("other_action", at_s, 0.0))
-    if outcome != expected.ends and (outcome, expected.ends) != ("home", "landed"):
+    if outcome not in _ENDS.get(expected.ends, {expected.ends}):
         own.append(JudgedFault("other_end", at_s, 0.0))
     if down_s is not None and down_s > DOWN_S and all(fault.kind != "down_late" for fault in own):
         own.append(JudgedFault("down_late", at_s, round(down_s, 2)))

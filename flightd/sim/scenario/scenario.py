@@ -61,7 +61,7 @@ duration_s = 3.0         # left out: to the end
 [expect]                 # what `--scenario all` holds the flight to
 hazard = "camera_frozen" # as in `mission.hazards`
 found_s = 0.5            # after the first fault began; without faults after take-off
-ends = "landed"          # completed, home, landed (on a pad too), handed over
+ends = "landed"          # completed, home, landed (on a pad too), down (any of these), handed over
 tolerates = ["left_leg"] # kinds of fault that are none here (`sim.judge.verdict`)
 """
 

@@ -30,6 +30,13 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightd calibrate": ("none.jpg",),
     "flightd run": ("--config", "none.toml"),
     "flightd ground": ("--listen", "0.0.0.0"),
+    "flightd ground people add": ("ann", "--role", "captain"),
+    "flightd ground people list": ("surplus",),
+    "flightd ground people role": ("nobody", "admin"),
+    "flightd ground people password": ("nobody",),
+    "flightd ground people key": ("nobody",),
+    "flightd ground people remove": ("nobody",),
+    "flightd ground audit": ("--last", "0"),
     "flightd doctor": ("--config", "none.toml"),
     "flightd report": ("empty.mcap",),
     "flightd replay": ("empty.mcap",),
@@ -40,7 +47,9 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightd log repair": ("empty.mcap",),
     "flightd map check": ("none.toml",),
     "flightd map draw": ("none.toml",),
+    "flightd map export": ("none.toml",),
     "flightd map fit": ("empty.mcap",),
+    "flightd map import": ("none.json", "new.toml"),
     "flightd map new": ("new.toml", "--spacing-m", "wide"),
     "flightd inventory plan": ("stock", "none.toml"),
     "flightd inventory show": ("none",),
@@ -58,8 +67,9 @@ WRONG: dict[str, tuple[str, ...]] = {
 def _walk(command: Any, path: str) -> Iterator[tuple[str, Any]]:
     """Every command below a group, with the words that call it."""
     children = getattr(command, "commands", None)
-    if children is None:
+    if children is None or command.invoke_without_command:
         yield path, command
+    if children is None:
         return
     for name, child in children.items():
         yield from _walk(child, f"{path} {name}")
@@ -71,7 +81,7 @@ COMMANDS = dict(
         *_walk(typer.main.get_command(flightctl_app), "flightctl"),
     ]
 )
-GROUPS = ("flightd", "flightctl", "flightd log", "flightd map", "flightd inventory")
+GROUPS = ("flightd", "flightctl", "flightd log", "flightd map", "flightd inventory", "flightd ground people")
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -80,6 +90,7 @@ Run = Callable[..., tuple[int, str, str]]
 def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
     """Exit code, stdout and stderr of a command line, run in an empty folder."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("FLIGHTD_GROUND_STATE", str(tmp_path / "state"))
     (tmp_path / "empty.mcap").touch()
 
     def run(path: str, *arguments: str) -> tuple[int, str, str]:

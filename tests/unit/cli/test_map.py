@@ -133,3 +133,54 @@ def test_restrictions_are_told_and_drawn(flightd: Command, tmp_path: Path) -> No
     svg = ET.parse(out.strip()).getroot()
     classes = [part.get("class") for part in svg.iter()]
     assert (classes.count("shut"), classes.count("keep"), classes.count("way")) == (3, 1, 3)
+
+
+def test_maps_go_out_to_other_programs_and_come_back_as_the_same_floor(
+    flightd: Command, tmp_path: Path
+) -> None:
+    site = tmp_path / "hall.toml"
+    site.write_text(site_toml(random_site(4)))
+    for kind, ending in (("lif", ".lif.json"), ("csv", "-nodes.csv")):
+        out = tmp_path / f"hall{ending}"
+        assert flightd("map", "export", site, "--as", kind)[:2] == (0, f"{out}\n")
+        back = tmp_path / f"{kind}.toml"
+        code, told, _ = flightd("map", "import", out, back, "--json")
+        assert (code, json.loads(told)["ok"]) == (0, True)
+        places = [
+            {node.id: (node.x_m, node.y_m) for node in load_site(one).nodes.values()} for one in (site, back)
+        ]
+        assert places[1].keys() == places[0].keys()
+        assert all(places[1][node] == pytest.approx(places[0][node]) for node in places[0])
+    code, _, err = flightd("map", "import", tmp_path / "hall-nodes.csv", tmp_path / "csv.toml")
+    assert code == 2
+    assert "there already" in err
+
+
+def test_a_map_that_is_not_sound_yet_is_imported_and_says_so(flightd: Command, tmp_path: Path) -> None:
+    table = tmp_path / "survey.csv"
+    table.write_text("node;x_m;y_m;joined_to\nA1;0;0;B1\nA2;1,5;0;\nB1;0,02;0,8;\nB2;1,5;0,8;\n")
+    code, out, _ = flightd("map", "import", table, tmp_path / "s.toml")
+    assert code == 1
+    assert "not sound yet: aisle (B).y_m: aisles A and B are 0.8 m apart" in out
+    assert flightd("map", "check", tmp_path / "s.toml")[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "words"),
+    [
+        ("a.json", b"{", "no JSON, and so no LIF"),
+        ("a.json", b"{}", "has no list 'layouts': this is no LIF"),
+        ("a.csv", b"node,x_m,y_m\nA1,0,zero\n", "row 2: y_m is 'zero'"),
+        ("a.csv", b'node,x_m,y_m\n"A1,0,0\n', "no CSV"),
+        ("a.csv", b"\xff\xfe", "no UTF-8 text"),
+    ],
+)
+def test_what_is_no_map_of_anybody_is_refused(
+    flightd: Command, tmp_path: Path, name: str, data: bytes, words: str
+) -> None:
+    (tmp_path / name).write_bytes(data)
+    code, out, err = flightd("map", "import", tmp_path / name, tmp_path / "s.toml")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"flightd: {tmp_path / name}: ")
+    assert words in err
+    assert not (tmp_path / "s.toml").exists()

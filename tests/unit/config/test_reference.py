@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from flightd.config.reference import Row, rows, tables
-from flightd.site.site_file import SiteFile
+from flightd.site.site_tables import SiteFile
 
 ROWS = rows()
 NUMBERS = {"number", "whole number"}

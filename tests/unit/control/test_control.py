@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.config.control import PidGains
+from flightd.config.control import ControlConfig, PidGains
+from flightd.control.flight_controller import Conditions, FlightController, Motion, Reference
 from flightd.control.motion_profile import Profile
 from flightd.control.pid import Pid
+from flightd.core.geometry import GRAVITY_MPS2
 
 GAINS = PidGains(kp=2.0, ki=1.0, kd=1.0)
 INTEGRAL_LIMIT, OUTPUT_LIMIT = 0.5, 1.0
@@ -75,3 +79,32 @@ def test_a_waiting_reference_comes_to_rest_and_feeds_nothing_forward(
         assert abs(profile.acceleration) <= 0.5 + 1e-9
     assert (profile.velocity, profile.acceleration) == (0.0, 0.0)
     assert abs(profile.position - began) <= left_m + 1e-6
+
+
+def _blown(push_mps2: float, told_mps2: float, start_m: float) -> float:
+    """How far beyond its place a point mass that starts at rest ends up: leans take 0.2 s and 60 ms, and
+    reach to 1.7 m/s^2."""
+    controller, sent = FlightController(ControlConfig()), [-push_mps2] * 4
+    y_m, v_mps, lean_mps2, furthest_m = start_m, 0.0, -push_mps2, start_m
+    for tick in range(500):
+        setpoint = controller.step(
+            tick * 20_000_000,
+            Motion(0.0, y_m, 0.0, v_mps, 0.0, 0.0, 1.6),
+            Reference(0.0, 0.0, 0.0, 1.6),
+            0.02,
+            Conditions((0.0, told_mps2)),
+        )
+        sent.append(math.tan(setpoint.roll_rad) * GRAVITY_MPS2)
+        lean_mps2 += (sent[-4] - lean_mps2) * 0.1
+        v_mps += (lean_mps2 + push_mps2) * 0.02
+        y_m += v_mps * 0.02
+        furthest_m = max(furthest_m, y_m)
+    assert abs(y_m) < 0.1, "it arrives"
+    return furthest_m
+
+
+@pytest.mark.parametrize("start_m", [-0.3, -0.6])
+def test_it_goes_no_faster_with_a_strong_push_than_it_can_stop(start_m: float) -> None:
+    """Of 1.7 m/s^2 that it may lean a push of 1.5, of which it knows 1.2, leaves 0.2 to stop it by."""
+    assert _blown(1.5, 1.2, start_m) < 0.15
+    assert _blown(1.2, 1.2, start_m) < 0.15

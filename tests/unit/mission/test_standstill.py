@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import replace
 
 import pytest
 
 from flightd.config.mission import MissionConfig
 from flightd.core.types import Attitude, AttitudeSetpoint, LandedState, VehicleState
 from flightd.mission.flight.touchdown import Standstill
-from flightd.mission.guidance import MissionInputs
+from flightd.mission.guidance import MissionInputs, Warnings
 
 TICK_NS = 20_000_000
 PARAMS = MissionConfig(site="site-demo.toml")
@@ -53,14 +54,41 @@ def test_a_climb_that_wanders_on_the_floor_takes_nothing_off_it(height_m: float)
     assert all(touched[touched.index(True) :])
 
 
+def test_one_that_the_floor_keeps_at_its_height_stands_though_it_tells_a_climb() -> None:
+    """0.2 m/s down, told on the floor for a second and more."""
+    stands = Standstill(PARAMS)
+    for tick in range(100):
+        height_m = max(0.4 - 0.2 * tick * 0.02, 0.1)
+        stands.step(told(tick, height_m, -0.2), sinks=True)
+        assert not (stands.touches and height_m > 0.15)
+    for tick in range(100, 130):
+        stands.step(told(tick, 0.1, -0.2), sinks=True)
+    assert stands.touches
+
+
+def test_a_range_finder_that_sticks_at_the_floor_makes_no_hover_a_standstill() -> None:
+    stands = Standstill(PARAMS)
+    stuck = Warnings(height_stuck=True)
+    for tick in range(100):
+        sinks = tick >= 80  # and has not begun to
+        stands.step(replace(told(tick, 0.1, 0.02), warnings=stuck), sinks=sinks)
+        assert not stands.touches
+    for tick in range(100, 130):
+        stands.step(replace(told(tick, 0.1, -0.2), warnings=stuck), sinks=True)
+        assert not stands.touches
+    for tick in range(130, 160):
+        stands.step(replace(told(tick, 0.1, 0.0), warnings=stuck), sinks=True)
+    assert stands.touches
+
+
 @pytest.mark.parametrize(("rises_mps", "height_m"), [(0.5, 0.1), (0.2, 0.1), (0.5, float("nan"))])
 def test_one_that_rises_flies(rises_mps: float, height_m: float) -> None:
     stands = Standstill(PARAMS)
-    for tick in range(100):
+    for tick in range(150):
         stands.step(told(tick, height_m, 0.0), sinks=True)
     assert stands.touches
-    for tick in range(100, 250):
-        stands.step(told(tick, height_m + rises_mps * (tick - 100) * 0.02, rises_mps), sinks=True)
+    for tick in range(150, 300):
+        stands.step(told(tick, height_m + rises_mps * (tick - 150) * 0.02, rises_mps), sinks=True)
     assert not stands.touches
 
 

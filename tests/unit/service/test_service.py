@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +17,8 @@ from flightd.app.service import note_start, was_started_before
 
 SYSTEMD = Path(__file__).parents[3] / "systemd"
 UNIT = SYSTEMD / "flightd.service"
+GROUND_UNIT = SYSTEMD / "flightd-ground.service"
+UNITS = pytest.mark.parametrize("unit", [UNIT, GROUND_UNIT], ids=lambda unit: unit.stem)
 
 
 def tool(name: str) -> str:
@@ -62,29 +66,71 @@ def test_the_quick_doctor_needs_neither_camera_nor_vehicle(tmp_path: Path) -> No
     assert "mission.site" in refused.stderr
 
 
-def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path: Path) -> None:
+@UNITS
+def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path: Path, unit: Path) -> None:
     analyze = tool("systemd-analyze")
     program = tmp_path / "flightd"
     program.write_text("#!/bin/sh\n")
     program.chmod(0o755)
-    copy = tmp_path / "flightd.service"  # verify wants the program to exist
-    copy.write_text(UNIT.read_text().replace("/opt/flightd/bin/flightd run", f"{program} run"))
+    copy = tmp_path / unit.name  # verify wants the program to exist
+    copy.write_text(unit.read_text().replace("ExecStart=/opt/flightd/bin/flightd", f"ExecStart={program}"))
     result = subprocess.run([analyze, "verify", str(copy)], capture_output=True, text=True, check=False)
     assert (result.returncode, result.stdout + result.stderr) == (0, "")
 
 
-def test_the_services_exposure_is_low() -> None:
+@UNITS
+def test_the_services_exposure_is_low(unit: Path) -> None:
     analyze = tool("systemd-analyze")
     result = subprocess.run(
-        [analyze, "security", "--offline=true", "--no-pager", str(UNIT)],
+        [analyze, "security", "--offline=true", "--no-pager", str(unit)],
         capture_output=True,
         text=True,
         check=False,
     )
-    found = re.search(r"exposure level for flightd\.service: ([\d.]+)", result.stdout)
+    found = re.search(r"exposure level for flightd(?:-ground)?\.service: ([\d.]+)", result.stdout)
     if found is None:
         pytest.skip(f"this systemd-analyze cannot rate a file: {result.stderr.strip()}")
     assert float(found[1]) <= 2.5
+
+
+def settings(unit: Path) -> set[str]:
+    """The lines of a unit that set something."""
+    return {line for line in unit.read_text().splitlines() if line[:1] not in {"", "#", "["}}
+
+
+def test_the_ground_station_is_shut_in_as_the_daemon_is() -> None:
+    shutting = re.compile(
+        r"(Protect|Private|Restrict|NoNew|Memory(Deny)|Lock|System|Capability|Ambient|Keyring|RemoveIPC|IPA|Device)"
+    )
+    needed_by_the_drone = {line for line in settings(UNIT) if line.startswith("DeviceAllow=")} | {
+        "RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_NETLINK"
+    }
+    daemons = {line for line in settings(UNIT) if shutting.match(line)} - needed_by_the_drone
+    assert len(daemons) > 25
+    assert daemons <= settings(GROUND_UNIT)
+    assert "User=flightd-ground" in settings(GROUND_UNIT)
+    assert "u flightd-ground -" in (SYSTEMD / "flightd.sysusers").read_text()
+
+
+def test_the_units_words_start_a_ground_station(tmp_path: Path) -> None:
+    line = next(line for line in settings(GROUND_UNIT) if line.startswith("ExecStart="))
+    words = line.replace("$OPTIONS", "--listen 127.0.0.1:0").split()[1:]
+    for folder in ("state", "flights"):
+        (tmp_path / folder).mkdir()
+    words = [word.replace("/var/lib/flightd-ground", str(tmp_path)) for word in words]
+    address = str(tmp_path / "notify")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(address)
+        manager.settimeout(30)
+        process = subprocess.Popen(
+            [sys.executable, "-m", "flightd", *words], cwd=SYSTEMD.parent, stderr=subprocess.DEVNULL,
+            env={**os.environ, "NOTIFY_SOCKET": address},
+        )  # fmt: skip
+        try:
+            assert manager.recv(1000).decode().startswith("READY=1\nSTATUS=at http://127.0.0.1:")
+        finally:
+            process.terminate()
+            assert process.wait(20) == 0
 
 
 def test_the_install_script_is_sound() -> None:

@@ -67,6 +67,25 @@ def test_a_line_of_another_width_does_not_contradict_the_height_at_once() -> Non
     assert heights.believed_m([0.8], 1.6) == 1.6
 
 
+def test_an_old_line_of_half_the_width_that_is_seen_alone_is_no_height() -> None:
+    """As long as it takes to fly over it: what the picture moves by would be doubled."""
+    heights = WidthHeights()
+    for _ in range(30):
+        heights.believed_m([1.6], 1.6)
+    for _ in range(45):
+        assert heights.believed_m([3.25], 1.6) == 1.6
+        assert heights.share == 1.0
+    assert heights.believed_m([1.6, 3.25], 1.6) == 1.6
+
+
+def test_a_width_after_a_climb_that_nobody_saw_is_held_against_the_height_at_once() -> None:
+    """Blind for a while: both have changed alike, the range finder reads too much as before."""
+    heights = WidthHeights()
+    for n in range(120):
+        heights.believed_m([1.0], 1.0 if n < 30 else 1.5)
+    assert heights.believed_m([1.6], 2.4) == pytest.approx(1.6, abs=0.02)
+
+
 def test_once_contradicted_a_width_is_not_taken_for_being_nearer_to_what_is_wrong() -> None:
     heights = WidthHeights()
     for _ in range(30):

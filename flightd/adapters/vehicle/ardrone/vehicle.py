@@ -104,6 +104,7 @@ class ArDroneVehicle:
             heartbeat_ns=telemetry.arrival_ns,
             refusal=self._flight.refusal(now_ns),
             unfit=self._unfit(),
+            keeps_climb=True,
         )
 
     def _unfit(self) -> Refusal | None:

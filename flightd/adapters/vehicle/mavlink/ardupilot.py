@@ -99,7 +99,7 @@ class ArduPilotVehicle(MavlinkVehicle):
         self._flies_raw = bool(int(found[1]) & _THRUST_IS_COLLECTIVE)
         return self._flies_raw
 
-    def sinks_unmeasured(self) -> bool:
+    def keeps_climb(self) -> bool:
         return self._thrust_is_raw() is False
 
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:

@@ -3,7 +3,7 @@
 A rate that stands still, whatever the vehicle does, is answered with ever more thrust.  It is found by three
 things together: it stays off the rate that is wanted, it does not move although thrust pushes it there, and
 the height does.  A range finder that sticks shows nothing of that: the told rate follows the thrust then.
-Pure.
+Of one that is told no more nothing but the height's is left, too.  Pure.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from flightd.adapters.vehicle.mavlink.height_loop import VELOCITY_PER_S
 _KEPT_NS, _SPAN_NS, _SAMPLES = 600_000_000, 250_000_000, 6
 """A slope is of the newest samples that span so long, but of no fewer; older ones are not kept."""
 _FRESH_NS = 250_000_000
+_UNTOLD_NS = 400_000_000
+"""A rate that was not told for so long will not come again soon."""
 _LEAP_M, _LEAP_MPS = 0.1, 3.0
 """A height that changes by more from one sample to the next is that of another floor: goods, a pallet."""
 _PUSHED_MPS, _PUSHED_NS, _PUSH_KEPT_NS = 0.3, 200_000_000, 600_000_000
@@ -41,8 +43,15 @@ class ClimbCheck:
         self._heights: deque[tuple[int, float]] = deque()
         self._rates: deque[_Told] = deque()
         self._ahead_ns: int | None = None
+        self._untold_ns: int | None = None
+        self._untold = False
         self.contradicted = False
         """The told rate is wrong, for good: one that stands still agrees with every hover."""
+
+    @property
+    def by_height(self) -> bool:
+        """Whether the rate that is believed is the height's."""
+        return self.contradicted or self._untold
 
     def height(self, stamp_ns: int, height_m: float) -> None:
         """Take a sample, in order of time; the same one again is passed over."""
@@ -60,16 +69,18 @@ class ClimbCheck:
             heights.popleft()
 
     def believed_mps(self, now_ns: int, told_mps: float, wanted_mps: float) -> float:
-        """The climb rate to close the loop by: as told, or the height's where that contradicts it (NaN where
-        there is none of either), m/s, + up; `wanted_mps` is what the loop pushes towards, NaN where it does
-        not carry the vehicle."""
+        """The climb rate to close the loop by: as told, or the height's where that contradicts it or none has
+        been told for a while (NaN where there is none of either), m/s, + up; `wanted_mps` is what the loop
+        pushes towards, NaN where it does not carry the vehicle."""
         slope_mps = self._slope_mps(now_ns)
         ahead = self._stands_still(now_ns, told_mps, wanted_mps) and (
             math.copysign(1.0, wanted_mps - told_mps) * (slope_mps - told_mps) > _AHEAD_MPS  # NaN: no
         )
         self._ahead_ns = (self._ahead_ns or now_ns) if ahead else None
         self.contradicted |= self._ahead_ns is not None and now_ns - self._ahead_ns >= _AHEAD_NS
-        return slope_mps if self.contradicted else told_mps
+        self._untold_ns = (self._untold_ns or now_ns) if math.isnan(told_mps) else None
+        self._untold = self._untold_ns is not None and now_ns - self._untold_ns >= _UNTOLD_NS
+        return slope_mps if self.by_height else told_mps
 
     def _stands_still(self, now_ns: int, told_mps: float, wanted_mps: float) -> bool:
         """The told rate has not moved for a while although it is pushed one way."""

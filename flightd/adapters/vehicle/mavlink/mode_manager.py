@@ -67,7 +67,7 @@ class FirmwareRules(Protocol):
         is wrong for the job; None where it may."""
         ...
 
-    def sinks_unmeasured(self) -> bool:
+    def keeps_climb(self) -> bool:
         """Whether the autopilot itself keeps a setpoint's climb rate: our own height loop cannot sink by
         measurements that no longer come."""
         ...
@@ -151,7 +151,7 @@ class ModeArmingManager:
         """Whether setpoints go out to a vehicle that lands unheard: one that a pilot has taken meanwhile
         passes over them."""
         flying = self._authority.held == self._firmware.flying_mode
-        return self.lands_unheard and flying and self._firmware.sinks_unmeasured()
+        return self.lands_unheard and flying and self._firmware.keeps_climb()
 
     @property
     def in_control(self) -> bool:

@@ -133,10 +133,10 @@ _ARDUPILOT: tuple[Rule, ...] = (
     ),
     Rule(
         ("FS_GCS_TIMEOUT",),
-        _within(1.5, 3.0),
-        "1.5 to 3 s",
-        "so long it hovers without anybody before it lands by itself",
-        2,
+        _within(0.8, 2.0),
+        "0.8 to 2 s",
+        "so long it drifts, level, without anybody before it lands by itself",
+        1,
     ),
     Rule(
         ("FS_THR_ENABLE",),

@@ -43,7 +43,8 @@ class SetpointShaper:
 
     def climb_of(self, state: VehicleState) -> VehicleState:
         """The state with the climb rate that is flown by, where the told one is not the vehicle's."""
-        if not (self._climb.contradicted and state.armed):
+        untold = self._climb.by_height and math.isnan(state.climb_mps)
+        if not (state.armed and (self._climb.contradicted or untold)):
             return state
         return replace(state, climb_mps=self._climb_mps, climb_contradicted=True)
 
@@ -72,7 +73,7 @@ class SetpointShaper:
             now_ns,
             setpoint.climb_mps,
             climb_mps=self._climb_mps,
-            lags=self._climb.contradicted,
+            lags=self._climb.by_height,
             height_m=height_m,
             tilt_cos=math.cos(setpoint.roll_rad) * math.cos(setpoint.pitch_rad),
             armed=self._measured.armed,

@@ -157,7 +157,8 @@ class MavlinkVehicle(abc.ABC):
             in_control=self._modes.in_control,
             refusal=self._modes.refusal,
         )
-        return state and self._steering.climb_of(replace(state, unfit=self._modes.unfit))
+        known = state and replace(state, unfit=self._modes.unfit, keeps_climb=self.keeps_climb())
+        return known and self._steering.climb_of(known)
 
     def attitudes(self) -> list[Attitude]:
         return self._telemetry.attitudes()
@@ -215,7 +216,7 @@ class MavlinkVehicle(abc.ABC):
             return SharedSystemId(self._own_system_id)
         return not_set_up(self._way_down, self._rules, self.parameters.get, examined=self._examined)
 
-    def sinks_unmeasured(self) -> bool:
+    def keeps_climb(self) -> bool:
         """Whether the autopilot itself keeps a setpoint's climb rate; not where our own height loop does."""
         return False
 

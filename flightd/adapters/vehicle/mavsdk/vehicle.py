@@ -213,7 +213,7 @@ class MavsdkVehicle:
     def _read(self, names: Names) -> tuple[str, float] | None:
         return next((self._parameters[name] for name in names if name in self._parameters), None)
 
-    def sinks_unmeasured(self) -> bool:
+    def keeps_climb(self) -> bool:
         """PX4 takes raw thrust, which our own height loop makes of measured climb rates."""
         return False
 

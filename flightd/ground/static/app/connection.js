@@ -4,13 +4,16 @@ import { state, take, update } from "./store.js";
 const AGAIN_MS = 700;
 const ECHO_MS = 1000;
 const LOST_MS = 3000;
+const SIGN_IN_FIRST = 4401;
 
 const showing = new Map(); // "drone camera" -> function that draws a picture
 const unanswered = new Map(); // number of an act that was sent -> function that takes its answer
 let acts = 0;
 let socket = null;
+let turnedAway = false; // until somebody signs in, here or in another tab
 
 export function connect() {
+  turnedAway = false;
   const url = new URL("/live", location.href);
   url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
   socket = new WebSocket(url);
@@ -22,12 +25,13 @@ export function connect() {
     sayWanted();
   };
   socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : draw(data));
-  socket.onclose = () => {
+  socket.onclose = ({ code }) => {
     for (const number of unanswered.keys()) answered({ number });
     update((s) => {
       s.socket = { ...s.socket, open: false, roundTripMs: null };
     });
-    setTimeout(connect, AGAIN_MS);
+    if (code === SIGN_IN_FIRST) turnedAway = true;
+    else setTimeout(connect, AGAIN_MS);
   };
 }
 
@@ -90,7 +94,10 @@ async function draw(data) {
   }
 }
 
-document.addEventListener("visibilitychange", sayWanted);
+document.addEventListener("visibilitychange", () => {
+  if (turnedAway && !document.hidden) connect();
+  sayWanted();
+});
 setInterval(() => {
   say({ say: "echo", number: performance.now() });
   if (state.socket.open && performance.now() - state.socket.heardAt > LOST_MS) socket.close();

@@ -1,4 +1,5 @@
 // The head: pages, which site and drone, how well it is heard, and STOP, always in reach.
+import { PersonMenu } from "./access/person.js";
 import { act } from "./acts.js";
 import { html } from "./html.js";
 import { hears } from "./hearing.js";
@@ -8,14 +9,19 @@ import { shown, state, update } from "./store.js";
 export function Head() {
   return html`
     <header class="head">
-      <h1 class="brand"><img src="/static/icon.svg" alt="" width="28" height="28" /><span>flightd</span></h1>
+      <${Brand} />
       <${Pages} />
       <${Drones} />
       <${Hearing} />
+      <${PersonMenu} />
       <${Stop} />
     </header>
   `;
 }
+
+export const Brand = () => html`
+  <h1 class="brand"><img src="/static/icon.svg" alt="" width="28" height="28" /><span>flightd</span></h1>
+`;
 
 function Pages() {
   return html`

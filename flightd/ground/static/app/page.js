@@ -1,12 +1,17 @@
 // The frame of every page: head with STOP, what is wrong with the connection, and the page that is gone to.
 import { Boundary } from "./boundary.js";
-import { Head } from "./head.js";
+import { Brand, Head } from "./head.js";
 import { html } from "./html.js";
 import { forget, loaded } from "./page_loader.js";
 import { Silence } from "./silence.js";
+import { mustSignIn } from "./access/session.js";
+import { SIGN_IN } from "./pages.js";
 import { state, update } from "./store.js";
 
 export function Page() {
+  if (mustSignIn()) {
+    return html`<header class="head"><${Brand} /></header><main id="main"><${Loaded} page=${SIGN_IN} /></main>`;
+  }
   return html`
     <a class="skip" href="#main">To the page</a>
     <${Head} />
@@ -23,6 +28,10 @@ function Shown({ route }) {
     return html`<section class="card empty"><h2>There is no such page</h2>
       <p>Nothing is at <code>${route.path}</code>. <a href="/">To the flight</a></p></section>`;
   }
+  return html`<${Loaded} page=${page} route=${route} />`;
+}
+
+function Loaded({ page, route }) {
   const { component: Component, failed } = loaded(page, redraw);
   if (Component) return html`<${Component} key=${page.path} route=${route} />`;
   if (!failed) return html`<p class="loading quiet" role="status">Loading …</p>`;

@@ -28,12 +28,25 @@ export const PAGES = [
     load: () => import("./flights/flights_page.js"),
   },
   {
+    path: "/site",
+    title: "Site",
+    styles: ["map.css", "site.css"],
+    load: () => import("./site/site_page.js"),
+  },
+  {
     path: "/guide",
     title: "Guide",
     styles: ["guide.css"],
     load: () => import("./guide/guide_page.js"),
   },
 ];
+
+// Shown in the place of every page while somebody has to sign in.
+export const SIGN_IN = {
+  title: "Sign in",
+  styles: ["access.css"],
+  load: () => import("./access/sign_in.js"),
+};
 
 // The page at a path, or undefined: the longest one that it lies under.
 export function pageAt(path) {

@@ -17,6 +17,7 @@ const TRACK_STEP_M = 0.05;
 const TRACK_KEPT = 4000;
 
 export const state = {
+  session: null, // who is signed in: {login, name, role}; see access/session.js
   route: null, // page, path below it and query: see router.js
   stock: null, // see stock/stock_state.js
   missions: null, // see missions/missions_state.js
@@ -56,6 +57,7 @@ export function take({ drone, topic, value }) {
   update((s) => {
     s.socket.heardAt = performance.now();
     if (drone === "") {
+      if (topic === "session") s.session = value;
       if (topic === "station") takeStation(s, value);
       if (topic === "echo") takeEcho(s, value);
       return;

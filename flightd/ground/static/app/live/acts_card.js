@@ -1,4 +1,5 @@
 // What a person may order now, what keeps the drone on the ground, and what became of the newest order.
+import { mayOperate } from "../access/session.js";
 import { act } from "../acts.js";
 import { html } from "../html.js";
 import { state, update } from "../store.js";
@@ -12,6 +13,12 @@ export function Acts({ status, welcome }) {
   if (welcome.role !== "operator") {
     return html`<section class="card acts"><h2>Only looking on</h2>
       <p class="quiet">The key of this station has the role ${welcome.role}; orders need an operator's.</p></section>`;
+  }
+  if (!mayOperate()) {
+    return html`<section class="card acts" aria-labelledby="acts"><h2 id="acts">Only looking on</h2>
+      <p class="quiet">${state.session.name} is a viewer: what flies needs an operator. STOP and Pause are everybody’s.</p>
+      <div class="buttons"><${Order} command="pause" may=${may("pause")} key_="P" /></div>
+      <${Outcome} /></section>`;
   }
   const waits = status.phase === "preflight" || status.phase === "swap";
   return html`

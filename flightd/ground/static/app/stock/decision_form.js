@@ -1,4 +1,5 @@
 // What a person decides about the place in the card, with a name and a note; and what was decided before.
+import { mayOperate, signedInName } from "../access/session.js";
 import { html, useState } from "../html.js";
 import { time } from "../words.js";
 import { DECISIONS, decide, needsALook, setWho, standing, who } from "./decisions.js";
@@ -16,8 +17,8 @@ export function DecisionForm() {
   if (source.kind !== "store" || (!needsALook(chosen, known) && !before.length)) return null;
   const now = standing(chosen, known)?.what ?? "open";
   const send = async (what) => {
-    if (!name.trim()) return setOutcome({ text: "Say who you are first.", good: false });
-    setWho(name.trim());
+    if (!signedInName() && !name.trim()) return setOutcome({ text: "Say who you are first.", good: false });
+    if (!signedInName()) setWho(name.trim());
     try {
       await decide(chosen, what, note);
       setNote("");
@@ -28,17 +29,20 @@ export function DecisionForm() {
   };
   return html`
     <div class="decision" role="group" aria-label="Decision">
-      <label class="field">Who
+      ${!mayOperate() && html`<p class="quiet">Only looking on: an operator decides.</p>`}
+      ${mayOperate() && !signedInName() &&
+      html`<label class="field">Who
         <input value=${name} maxlength="60" autocomplete="name" onInput=${(event) => setName(event.target.value)} />
-      </label>
-      <label class="field">Note
+      </label>`}
+      ${mayOperate() &&
+      html`<label class="field">Note
         <input value=${note} maxlength="500" onInput=${(event) => setNote(event.target.value)} />
       </label>
       <div class="decision-orders">
         ${Object.entries(DECISIONS)
           .filter(([what]) => what !== "open" || now !== "open")
           .map(([what, { order }]) => html`<button key=${what} class="order" aria-pressed=${now === what} onClick=${() => send(what)}>${order}</button>`)}
-      </div>
+      </div>`}
       <p class=${outcome.good ? "quiet" : "refusal"} role="status">${outcome.text}</p>
       ${before.length > 0 &&
       html`

@@ -1,4 +1,5 @@
 // What people decided about places that need a look, and which of them are still open.
+import { signedInName } from "../access/session.js";
 import { isGivenUp } from "../fetching.js";
 import { asked } from "./stock_source.js";
 import { byKey, change, differs, inOrder, sourceQuery, stock, tellTrouble } from "./stock_state.js";
@@ -77,7 +78,7 @@ export async function decide(place, what, note) {
   await asked(`/decisions?${sourceQuery(source)}`, {
     method: "POST",
     headers: { "Content-Type": "application/json" },
-    body: JSON.stringify({ id: newId(), place, what, who: who(), note, seen_s: seen }),
+    body: JSON.stringify({ id: newId(), place, what, who: signedInName() || who(), note, seen_s: seen }),
   });
   await loadDecisions();
 }

@@ -1,13 +1,16 @@
-"""`flightd ground`: the ground station in the browser."""
+"""`flightd ground` itself: serves the ground station."""
 
 from __future__ import annotations
 
+import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flightd.cli.ground.state import State, state_folder
 from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,15 +23,12 @@ EXAMPLES = """Examples:
   flightd ground --drone a=127.0.0.1 --drone b=127.0.0.1:6571/6572    two simulators, by their ports
   flightd ground --folder out                  with the flights and inventories under out
   flightd ground --listen 127.0.0.1:9000
+  flightd ground --listen 0.0.0.0:8443 --tls-cert station.pem --tls-key station.key    for others, who sign in
 """
 
 
-def register(app: typer.Typer) -> None:
-    """Hang the command under `app`."""
-    app.command("ground", epilog=EXAMPLES)(ground)
-
-
 def ground(
+    ctx: typer.Context,
     drone: Annotated[
         list[str] | None,
         typer.Option(
@@ -39,11 +39,18 @@ def ground(
         ),
     ] = None,
     listen: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="Where browsers find the page: of this machine only.")
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Where browsers find the page.  Beyond this machine it needs people and TLS.",
+        ),
     ] = "127.0.0.1:8080",
     folder: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Where flights and inventories lie; they are read, never changed."),
+        typer.Option(
+            metavar="DIR",
+            help="Where flights, inventories and site files lie; only site files are changed.",
+        ),
     ] = None,
     key: Annotated[
         Path | None, typer.Option(envvar="FLIGHTCTL_KEY", help="Your secret key: NAME.key_secret.")
@@ -56,27 +63,53 @@ def ground(
             help="A drone's public key: NAME.key; without NAME= that of all.",
         ),
     ] = None,
+    tls_cert: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The station's certificate, with its chain: PEM.")
+    ] = None,
+    tls_key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The secret key of the certificate: PEM.")
+    ] = None,
+    login: Annotated[
+        bool,
+        typer.Option("--login", help="Ask who they are on this machine, too; beyond it that is always so."),
+    ] = False,
+    state: State = None,
 ) -> None:
     """Watch and command drones in the browser: map, cameras, hazards, events; start, pause, go to, STOP.
 
     It is a client of the ground link, as flightctl is: the drone flies on without it.  While a page is open,
     it attends the flight; closing the last one is losing the ground (ground.lost_action).  Ctrl-C ends it.
+
+    On this machine it asks nobody who he is.  Beyond it everybody signs in, by TLS: see people.
     """
+    if ctx.invoked_subcommand is not None:
+        return
     try:
+        from flightd.ground.access.access import Access
         from flightd.ground.server import Listening, run
     except ModuleNotFoundError:
         from flightd.core.extras import missing_extra
 
         raise missing_extra("ground", "flightd ground") from None
     from flightd.ground.drone_names import drone_addresses
+    from flightd.ground.tls import read_certificate
 
     if folder is not None and not folder.is_dir():
         raise InputError("there is no such folder", key=f"--folder {folder}")
     drones = drone_addresses(drone or (), key, server_key or ())
-    ended_by = run(drones, Listening.read(listen), _say_where, folder)
+    certificate = read_certificate(tls_cert, tls_key)
+    where = replace(Listening.read(listen), secure=certificate is not None)
+    access = Access(state_folder(state), login or where.is_beyond, where.secure)
+    ended_by = run(drones, where, _say_where, access, certificate, folder)
     if ended_by is not None:
         print(f"flightd: the ground station was ended by {ended_by.name}", file=sys.stderr)
 
 
 def _say_where(where: Listening) -> None:
+    from flightd.adapters.systemd import Notifier
+
+    if address := os.environ.get("NOTIFY_SOCKET"):
+        manager = Notifier(address)
+        manager.send(READY=1, STATUS=f"at {where.url}")
+        manager.close()
     print(f"flightd: the ground station is at {where.url} (Ctrl-C ends it)", file=sys.stderr, flush=True)

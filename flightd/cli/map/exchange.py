@@ -1,0 +1,141 @@
+"""`flightd map import` and `flightd map export`: maps of other programs."""
+
+from __future__ import annotations
+
+import csv
+import enum
+import io
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from flightd.cli.map.site_files import Force, SiteFile, write_new
+from flightd.cli.options import AsJson
+from flightd.core.errors import InputError
+
+if TYPE_CHECKING:
+    from flightd.site.exchange.graph import Imported
+
+_MOST_BYTES = 8_000_000
+
+
+class Kind(enum.StrEnum):
+    """What a map is exported as."""
+
+    LIF = "lif"
+    CSV = "csv"
+    LOCATIONS = "locations"
+
+
+_ENDINGS = {Kind.LIF: ".lif.json", Kind.CSV: "-nodes.csv", Kind.LOCATIONS: "-locations.csv"}
+
+
+def register(app: typer.Typer) -> None:
+    """Hang the commands under `app`."""
+    app.command("import")(import_)
+    app.command("export")(export)
+
+
+def import_(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="VDMA LIF (.json), or nodes (.csv).")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Site file to write.")],
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Make a site file of another program's map: VDMA LIF, or a table node, x_m, y_m, joined_to, pad.
+
+    What it could not take is said.  Shelves and racks are in neither: add them, or draw them on the page
+    Site of flightd ground.
+
+    \b
+    Examples:
+      flightd map import fleet.lif.json hall-3.toml
+      flightd map import survey.csv hall-3.toml
+    """
+    from flightd.site.site_draft import draft_of, draft_text
+    from flightd.site.site_tables import SiteTablesError, site_of
+
+    found = _read(file)
+    try:
+        site_of(found.tables)
+        mistake = ""
+    except SiteTablesError as err:
+        mistake = str(err)
+    write_new(out, draft_text(draft_of(found.tables)), force)
+    if as_json:
+        print(json.dumps({"file": str(out), "ok": not mistake, "mistake": mistake, "notes": found.notes}))
+    else:
+        print(out)
+        for note in found.notes:
+            print(f"  {note}")
+        if mistake:
+            print(f"  not sound yet: {mistake}")
+    if mistake:
+        raise typer.Exit(1)
+
+
+def export(
+    site_file: SiteFile,
+    kind: Annotated[
+        Kind, typer.Option("--as", help="lif: VDMA LIF; csv: the nodes; locations: their codes.")
+    ] = Kind.LIF,
+    out: Annotated[
+        Path | None, typer.Option(metavar="F", help="Where to write; beside the site file.")
+    ] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write a site for another program: VDMA LIF for a fleet's manager, or tables of nodes or locations.
+
+    \b
+    Examples:
+      flightd map export hall-3.toml
+      flightd map export hall-3.toml --as locations --out codes.csv
+    """
+    from flightd.site.exchange.lif import lif_document
+    from flightd.site.exchange.node_table import locations_csv, nodes_csv
+    from flightd.site.site_file import load_site
+
+    site = load_site(site_file)
+    target = out if out is not None else site_file.with_name(f"{site_file.stem}{_ENDINGS[kind]}")
+    match kind:
+        case Kind.LIF:
+            now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+            text = json.dumps(lif_document(site, now), indent=2) + "\n"
+        case Kind.CSV:
+            text = nodes_csv(site)
+        case Kind.LOCATIONS:
+            text = locations_csv(site)
+    write_new(target, text, force)
+    print(json.dumps({"file": str(target)}) if as_json else target)
+
+
+def _read(file: Path) -> Imported:
+    from flightd.site.exchange.lif import tables_of_lif
+    from flightd.site.exchange.node_table import tables_of_rows
+
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(_MOST_BYTES + 1)
+        text = data.decode("utf-8-sig")
+    except OSError as err:
+        raise InputError(f"cannot read it: {err.strerror or err}", file=file) from None
+    except UnicodeDecodeError:
+        raise InputError("no UTF-8 text", file=file) from None
+    if len(data) > _MOST_BYTES:
+        raise InputError(f"more than {_MOST_BYTES // 10**6} MB", file=file)
+    try:
+        if file.suffix.lower() == ".json":
+            return tables_of_lif(json.loads(text))
+        separator = max(",;\t", key=text.partition("\n")[0].count)
+        rows = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
+        return tables_of_rows([row for row in rows if row])
+    except (json.JSONDecodeError, RecursionError):
+        raise InputError("no JSON, and so no LIF", file=file) from None
+    except csv.Error as err:
+        raise InputError(f"no CSV: {err}", file=file) from None
+    except InputError as err:
+        raise InputError(err.what, file=file, remedy=err.remedy) from None

@@ -1,0 +1,94 @@
+"""Who may ask for what: each route of the station with the role that it needs.
+
+A route that is not listed here does not exist: the station refuses to start with it.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from flightd.ground.access.roles import Role
+
+
+class Line(enum.Enum):
+    """Which line a request leaves in the audit."""
+
+    NONE = enum.auto()
+    """It changes nothing."""
+    ACT = enum.auto()
+    """Method, path and status, with what the route notes about it."""
+    OWN = enum.auto()
+    """The route writes it itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """`role` None: anybody, without signing in; nothing that is anybody's business may be behind it."""
+
+    role: Role | None
+    line: Line
+
+
+_ANYBODY = Rule(None, Line.NONE)
+_LOOKS = Rule(Role.VIEWER, Line.NONE)
+_ACTS = Rule(Role.OPERATOR, Line.ACT)
+_RULES_OVER_ALL = Rule(Role.ADMIN, Line.NONE)
+_CHANGES = Rule(Role.ADMIN, Line.ACT)
+
+RULES: Mapping[str, Rule] = {
+    # the pages' document and files, which are the same for all, and the way in
+    "GET /": _ANYBODY,
+    "GET /stock": _ANYBODY,
+    "GET /stock/{rest:path}": _ANYBODY,
+    "GET /missions": _ANYBODY,
+    "GET /missions/{rest:path}": _ANYBODY,
+    "GET /flights": _ANYBODY,
+    "GET /flights/{rest:path}": _ANYBODY,
+    "GET /site": _ANYBODY,
+    "GET /site/{rest:path}": _ANYBODY,
+    "GET /guide": _ANYBODY,
+    "GET /guide/{rest:path}": _ANYBODY,
+    "MOUNT /static": _ANYBODY,
+    "GET /api/session": _ANYBODY,
+    "POST /api/session": Rule(None, Line.OWN),
+    "DELETE /api/session": Rule(None, Line.OWN),
+    # what a viewer may order stands in roles.py
+    "WEBSOCKET /live": Rule(Role.VIEWER, Line.OWN),
+    "POST /drones/{drone}/acts": Rule(Role.VIEWER, Line.OWN),
+    "GET /api/stock": _LOOKS,
+    "GET /api/stock/places": _LOOKS,
+    "GET /api/stock/place": _LOOKS,
+    "GET /api/stock/find": _LOOKS,
+    "GET /api/stock/picture": _LOOKS,
+    "GET /api/stock/outlines": _LOOKS,
+    "GET /api/stock/export": _LOOKS,
+    "POST /api/stock/compare": _LOOKS,  # a question with a file, which is kept nowhere
+    "GET /api/stock/decisions": _LOOKS,
+    "POST /api/stock/decisions": _ACTS,
+    "GET /api/missions": _LOOKS,
+    "GET /api/missions/estimate": _LOOKS,  # what the drone would do, which changes nothing in it
+    "GET /api/missions/recount": _LOOKS,
+    "POST /api/missions/fly": _ACTS,
+    "PUT /api/missions/{mission}": _ACTS,
+    "DELETE /api/missions/{mission}": _ACTS,
+    "GET /api/flights": _LOOKS,
+    "GET /api/flights/{flight}": _LOOKS,
+    "GET /api/flights/{flight}/series": _LOOKS,
+    "GET /api/flights/{flight}/pictures/{place}": _LOOKS,
+    "GET /api/flights/{flight}/report": _LOOKS,
+    "GET /api/site": _LOOKS,
+    "GET /api/site/file": _LOOKS,
+    "GET /api/site/version": _LOOKS,
+    "POST /api/site/check": _LOOKS,  # questions with a draft, which is kept nowhere
+    "POST /api/site/new": _LOOKS,
+    "POST /api/site/import": _LOOKS,
+    "POST /api/site/export": _LOOKS,
+    "PUT /api/site/file": _CHANGES,
+    "GET /api/guide": _LOOKS,
+    "GET /api/guide/search": _LOOKS,
+    "GET /api/guide/pages/{topic}": _LOOKS,
+    "MOUNT /api/guide/pictures": _LOOKS,
+    "GET /api/audit": _RULES_OVER_ALL,
+}

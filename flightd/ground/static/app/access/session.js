@@ -1,0 +1,45 @@
+// Who is signed in, and what that person may: the server refuses the rest whatever is shown here.
+import { state, update } from "../store.js";
+
+const ANSWER_MS = 20000;
+
+// The station asks everybody who he is, and nobody is signed in here.
+export const mustSignIn = () => Boolean(state.session?.login && !state.session.name);
+
+// A viewer looks on and stops; until the station has said who somebody is, nothing is held back.
+export const mayOperate = () => state.session?.role !== "viewer";
+
+// The name of whoever is signed in; empty where the station asks nobody.
+export const signedInName = () => (state.session?.login ? state.session.name : "");
+
+export async function signIn(name, password) {
+  const session = await asked("POST", { name, password });
+  update((s) => {
+    s.session = session;
+  });
+}
+
+// Ends the session on every page that has it; the station closes their sockets, this page's too.
+export async function signOut() {
+  const session = await asked("DELETE");
+  update((s) => {
+    s.session = session;
+  });
+}
+
+async function asked(method, body) {
+  let answer;
+  try {
+    answer = await fetch("/api/session", {
+      method,
+      headers: { "Content-Type": "application/json" },
+      body: body && JSON.stringify(body),
+      signal: AbortSignal.timeout(ANSWER_MS),
+    });
+  } catch (error) {
+    throw new Error("the ground station does not answer", { cause: error });
+  }
+  const told = await answer.json().catch(() => ({}));
+  if (!answer.ok) throw new Error(told.refused ?? `the ground station answers ${answer.status}`);
+  return told;
+}

@@ -1,0 +1,225 @@
+"""Signing in with a real browser, by keyboard alone; what a viewer is offered; another origin's page."""
+
+from __future__ import annotations
+
+import http.server
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from flightd.config.schema import load_config
+from flightd.core.types import Phase
+from flightd.site.site_file import load_site
+from tests.rigs.certificates import make_certificate
+from tests.web.chromium import NARROW, WIDE, hindrances, new_context, opened, station
+from tests.web.live_flight import LiveFlight
+from tests.web.people_rig import PASSWORD, audited, with_people
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
+from playwright.sync_api import expect
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+SITE = load_site(CONFIGS / "site-demo.toml")
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission={"autostart": False, "start_countdown_s": 0.0})
+
+expect.set_options(timeout=40_000.0)
+
+
+@pytest.fixture(scope="module")
+def state(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    state = tmp_path_factory.mktemp("state")
+    with_people(state)
+    return state
+
+
+@pytest.fixture(scope="module")
+def flight() -> Iterator[LiveFlight]:
+    """One that waits for its start."""
+    with LiveFlight(SITE, CONFIG) as flight:
+        yield flight
+
+
+@pytest.fixture(scope="module")
+def url(flight: LiveFlight, state: Path) -> Iterator[str]:
+    """A station under TLS at which everybody signs in."""
+    cert, key = make_certificate(state)
+    words = ["--login", "--tls-cert", str(cert), "--tls-key", str(key)]
+    status, command = flight.ports
+    with station([f"demo=127.0.0.1:{status}/{command}"], folder=state, state=state, options=words) as url:
+        yield url
+
+
+def sign_in(page: Page, name: str, password: str = PASSWORD) -> None:
+    """By keyboard alone: the name has the focus."""
+    expect(page.get_by_role("textbox", name="Name")).to_be_focused()
+    page.keyboard.type(name)
+    page.keyboard.press("Tab")
+    page.keyboard.type(password)
+    page.keyboard.press("Enter")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [WIDE, NARROW])
+def test_a_person_signs_in_by_keyboard_sees_who_he_is_and_signs_out(
+    browser: Browser, url: str, size: tuple[int, int], scheme: str
+) -> None:
+    with opened(browser, f"{url}/guide", size, scheme) as page:
+        expect(page.get_by_role("heading", name="Sign in")).to_be_visible()
+        assert page.title() == "Sign in · flightd"
+        assert hindrances(page) == []
+        assert page.evaluate("document.documentElement.scrollWidth") == size[0]
+        sign_in(page, "otto")
+        expect(page.get_by_role("link", name="Guide", exact=True)).to_have_attribute("aria-current", "page")
+        expect(page.get_by_role("heading", name="flightd guide").or_(page.locator("article"))).to_be_visible()
+        head = page.locator("summary")
+        expect(head).to_contain_text("otto")
+        head.focus()
+        page.keyboard.press("Enter")
+        expect(page.get_by_text("Signed in as otto, operator")).to_be_visible()
+        expect(page.get_by_role("button", name="STOP")).to_be_in_viewport(ratio=1.0)
+        assert hindrances(page) == []
+        assert page.evaluate("document.documentElement.scrollWidth") == size[0]
+        (cookie,) = page.context.cookies()
+        assert (cookie["name"], cookie["httpOnly"], cookie["secure"]) == ("__Host-flightd", True, True)
+        assert cookie["sameSite"] == "Strict"
+        assert page.evaluate("document.cookie") == ""
+        page.keyboard.press("Tab")
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("heading", name="Sign in")).to_be_visible()
+
+
+def test_a_viewer_is_offered_what_he_may_and_stops_the_drone(
+    browser: Browser, url: str, flight: LiveFlight, state: Path
+) -> None:
+    with opened(browser, url) as page:
+        sign_in(page, "vera", "wrong password")
+        expect(page.get_by_role("alert")).to_have_text("Name or password is wrong.")
+        expect(page.get_by_label("Password")).to_be_focused()
+        page.keyboard.type(PASSWORD)
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("heading", name="Only looking on")).to_be_visible()
+        for name in ("Start", "Fly home", "Land here", "Resume"):
+            expect(page.get_by_role("button", name=name)).to_have_count(0)
+        expect(page.get_by_role("button", name="Pause")).to_be_visible()
+        assert hindrances(page) == []
+        refused = page.evaluate(
+            """async () => (await fetch("/drones/demo/acts", {method: "POST",
+               headers: {"Content-Type": "application/json"},
+               body: JSON.stringify({id: "12345678", command: "start"})})).status"""
+        )
+        assert refused == 403, "whatever the page shows"
+        assert flight.phase is Phase.PREFLIGHT
+        with page.expect_response(lambda answer: answer.url.endswith("/api/session")):
+            other = page.context.new_page()
+            other.goto(f"{url}/stock")
+            expect(other.locator("summary")).to_contain_text("vera")
+            other.locator("summary").click()
+            page.locator("summary").click()
+            page.get_by_role("button", name="Sign out").click()
+        expect(other.get_by_role("heading", name="Sign in")).to_be_visible()
+    assert ("start", "refused") in [(line["act"], line["outcome"]) for line in audited(state)]
+
+
+ATTACK = """async (target) => {
+  const acts = `${target}/drones/demo/acts`, along = {credentials: "include"}, found = {};
+  const tried = async (name, make) => {
+    try { found[name] = await make(); } catch (error) { found[name] = "refused"; }
+  };
+  const act = JSON.stringify({id: "evil-stop-1", command: "stop"});
+  await tried("read", async () => (await fetch(`${target}/api/stock`, along)).status);
+  await tried("session", async () => (await fetch(`${target}/api/session`, along)).text());
+  await tried("json", async () => (await fetch(acts, {method: "POST", ...along,
+    headers: {"Content-Type": "application/json"}, body: act})).status);
+  await tried("bearer", async () =>
+    (await fetch(`${target}/api/stock`, {headers: {Authorization: "Bearer x"}})).status);
+  const plain = {method: "POST", mode: "no-cors", ...along, body: act};
+  await tried("plain", async () => (await fetch(acts, plain)).type);
+  await tried("beacon", async () => (navigator.sendBeacon(acts, act), "sent"));
+  await tried("socket", () => new Promise((resolve, reject) => {
+    const socket = new WebSocket(target.replace("http", "ws") + "/live");
+    socket.onmessage = ({data}) => resolve(data);
+    const said = {say: "act", number: 1, drone: "demo", act: JSON.parse(act)};
+    socket.onopen = () => socket.send(JSON.stringify(said));
+    socket.onclose = reject;
+  }));
+  const element = (tag, attributes) => () => new Promise((resolve, reject) => {
+    const heard = {onload: () => resolve("loaded"), onerror: reject};
+    document.body.append(Object.assign(document.createElement(tag), attributes, heard));
+  });
+  await tried("picture", element("img", {src: `${target}/static/icon.svg`}));
+  await tried("script", element("script", {src: `${target}/api/session`}));
+  await tried("style", element("link", {rel: "stylesheet", href: `${target}/static/style/base.css`}));
+  await tried("frame", () => new Promise((resolve) => {
+    const frame = Object.assign(document.createElement("iframe"), {src: target, name: "frame"});
+    frame.onload = () => {
+      try { resolve(frame.contentDocument ? "read" : "refused"); } catch { resolve("refused"); }
+    };
+    document.body.append(frame);
+  }));
+  await tried("window", async () => {
+    const other = window.open(target);
+    await new Promise((resolve) => setTimeout(resolve, 1000));
+    try { return other.document.body.innerText; } catch { return "refused"; }
+  });
+  const form = Object.assign(document.createElement("form"),
+    {method: "post", action: acts, enctype: "text/plain", target: "frame"});
+  const field = {name: act.slice(0, -1) + ',"x":"', value: '"}'};
+  form.append(Object.assign(document.createElement("input"), field));
+  document.body.append(form);
+  form.submit();
+  await new Promise((resolve) => setTimeout(resolve, 500));
+  return found;
+}"""
+
+
+class _Blank(http.server.BaseHTTPRequestHandler):
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", "text/html")
+        self.end_headers()
+        self.wfile.write(b"<!doctype html><title>evil</title><body></body>")
+
+    def log_message(self, *_: object) -> None: ...
+
+
+@pytest.fixture
+def evil() -> Iterator[str]:
+    """Another origin of the same site: the strictest cookie goes along with its requests."""
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), _Blank) as server:
+        serving = threading.Thread(target=server.serve_forever)
+        serving.start()
+        yield f"http://127.0.0.1:{server.server_address[1]}"
+        server.shutdown()
+        serving.join()
+
+
+@pytest.mark.parametrize("asks", [True, False], ids=["signed-in", "on-this-machine"])
+def test_another_origins_page_can_neither_read_nor_command(
+    browser: Browser, evil: str, flight: LiveFlight, state: Path, tmp_path: Path, asks: bool
+) -> None:
+    status, command = flight.ports
+    with_people(tmp_path)
+    options = ["--login"] if asks else []
+    with station([f"demo=127.0.0.1:{status}/{command}"], state=tmp_path, options=options) as url:
+        context = new_context(browser, WIDE, "light")
+        page = context.new_page()
+        page.goto(url)
+        if asks:
+            sign_in(page, "ada")
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+        before = len(audited(tmp_path))
+        page.goto(evil)
+        found = page.evaluate(ATTACK, url)
+        assert found == {name: "sent" if name == "beacon" else "refused" for name in found}
+        assert len(found) == 12
+        assert len(audited(tmp_path)) == before, "no act has come so far that it is one"
+        page.goto(url)
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+        context.close()
+    assert flight.phase is Phase.PREFLIGHT
