@@ -17,6 +17,7 @@ from starlette.routing import BaseRoute, Route
 from flightd.adapters.ground_link.protocol import DECODE_ERRORS, PlanAnswer, Planned
 from flightd.core.errors import FlightdError, InputError
 from flightd.core.planned_flight import MOST_NODES
+from flightd.ground.access.gate import note_act
 from flightd.ground.bounded import Threads
 from flightd.ground.drone_link import DroneLink
 from flightd.ground.json_http import as_json, is_json, json_body, status_of
@@ -147,6 +148,8 @@ class _Missions:
         """Hand nodes to a drone for its next flight (none: what its configuration says), which starts by a
         command of its own."""
         asked = await _sent(request, Flown)
+        over = ", ".join(asked.nodes) or "what is configured"
+        note_act(request, f"plan {asked.id} for {asked.drone}: {over}")
         planned = await self._drone(asked.drone).plan_flight(
             asked.nodes,
             asked.levels,
@@ -169,6 +172,7 @@ class _Missions:
         name = " ".join(kept.name.split())
         if not name:
             raise InputError("a mission needs a name")
+        note_act(request, f"{name} of {kept.site}")
         mission = Mission(
             identity, kept.site, name, tuple(dict.fromkeys(kept.nodes)), kept.levels, time.time_ns()
         )

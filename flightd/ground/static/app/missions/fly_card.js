@@ -1,4 +1,5 @@
 // What the chosen flight takes by the drone's own plan, and its start.
+import { mayOperate } from "../access/session.js";
 import { html } from "../html.js";
 import { Obstacles } from "../live/acts_card.js";
 import { HoldButton } from "../live/hold_button.js";
@@ -13,26 +14,27 @@ export function FlyCard({ estimate, waits }) {
   const { nodes, note } = missions();
   const { status, plan, welcome } = shown();
   const flies = status && !waits && !isGrounded(status);
+  const may = welcome.role === "operator" && mayOperate();
   return html`
     <section class="card fly" aria-labelledby="fly">
       <h3 id="fly">${flies ? "In flight" : "This flight"}</h3>
       ${note && html`<p class="note">${note}</p>`}
       ${flies && plan && html`<${Under} plan=${plan} />`}
-      ${waits && status.plan && html`<${Handed} status=${status} />`}
+      ${waits && status.plan && html`<${Handed} status=${status} may=${may} />`}
       ${!nodes.length && !flies && html`<p class="quiet">Choose aisles or nodes: what it takes is shown here at once.</p>`}
       ${nodes.length > 0 && !waits && html`<p class="quiet">What a flight takes is told by the drone while it waits on the ground.</p>`}
       ${nodes.length > 0 && waits && html`<${Takes} estimate=${estimate} />`}
-      ${nodes.length > 0 && waits && welcome.role === "operator" && html`<${Start} estimate=${estimate} status=${status} />`}
-      ${welcome.role !== "operator" && html`<p class="quiet">Only looking on: a start needs an operator's key.</p>`}
+      ${nodes.length > 0 && waits && may && html`<${Start} estimate=${estimate} status=${status} />`}
+      ${!may && html`<p class="quiet">Only looking on: ${mayOperate() ? "a start needs an operator’s key." : `${state.session.name} is a viewer; what is kept and flown needs an operator.`}</p>`}
     </section>
   `;
 }
 
 // What the drone holds already: the next start flies it, wherever that is given.
-function Handed({ status }) {
+function Handed({ status, may }) {
   return html`
     <p class="note">The drone holds a flight over ${count(status.nodes_planned, "node")} that was handed to it: the next start flies it.
-      <button class="order" onClick=${flyConfigured}>Fly as configured instead</button></p>
+      ${may && html`<button class="order" onClick=${flyConfigured}>Fly as configured instead</button>`}</p>
   `;
 }
 

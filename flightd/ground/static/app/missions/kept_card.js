@@ -1,4 +1,5 @@
 // The missions that are kept under names: opened, renamed, duplicated, deleted; and what was cut, flown on.
+import { mayOperate } from "../access/session.js";
 import { html, useState } from "../html.js";
 import { shown } from "../store.js";
 import { count } from "../words.js";
@@ -15,10 +16,10 @@ export function KeptCard() {
         <h3 id="kept">Kept missions</h3>
         ${id && html`<button class="order" onClick=${startAnew}>New mission</button>`}
       </div>
-      ${kept ? html`<${Save} />` : html`<p class="quiet">This station keeps none: start it with <code>--folder</code>.</p>`}
+      ${kept ? mayOperate() && html`<${Save} />` : html`<p class="quiet">This station keeps none: start it with <code>--folder</code>.</p>`}
       ${trouble && html`<p class="refusal" role="alert">${trouble}</p>`}
       ${list === null && html`<p class="quiet" role="status">Loading …</p>`}
-      ${kept && list?.length === 0 && html`<p class="quiet">None yet: choose nodes, give them a name and keep them.</p>`}
+      ${kept && list?.length === 0 && html`<p class="quiet">None yet${mayOperate() ? ": choose nodes, give them a name and keep them" : ""}.</p>`}
       ${list?.length > 0 && html`<ul>${list.map((mission) => html`<${Row} key=${mission.id} mission=${mission} />`)}</ul>`}
     </section>
   `;
@@ -59,14 +60,15 @@ function Row({ mission }) {
       <button class="name" aria-pressed=${mission.id === id} onClick=${() => open(mission)}>
         <strong>${mission.name}</strong><span class="quiet">${about(mission, flies)}</span>
       </button>
-      ${cut && html`<button class="order" onClick=${flyRest}>Fly the rest</button>`}
-      <div class="row-acts">
+      ${cut && mayOperate() && html`<button class="order" onClick=${flyRest}>Fly the rest</button>`}
+      ${mayOperate() &&
+      html`<div class="row-acts">
         <button class="tab" onClick=${() => duplicate(mission)} aria-label=${`Duplicate ${mission.name}`}>Duplicate</button>
         ${asks
           ? html`<button class="tab sure-delete" onClick=${() => remove(mission)} aria-label=${`Delete ${mission.name} for good`}>Delete for good</button>
               <button class="tab" onClick=${() => setAsks(false)}>Keep it</button>`
           : html`<button class="tab" onClick=${() => setAsks(true)} aria-label=${`Delete ${mission.name}`}>Delete</button>`}
-      </div>
+      </div>`}
     </li>
   `;
 }

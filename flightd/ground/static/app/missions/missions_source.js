@@ -1,11 +1,13 @@
 // What the page Missions asks of the station, and has it do.
 import { act, newId } from "../acts.js";
-import { askJson, isGivenUp } from "../fetching.js";
+import { askJson, askStation, isGivenUp } from "../fetching.js";
 import { shown, state } from "../store.js";
 import { change, missions, open } from "./missions_state.js";
 
-const BUSY_MS = 400;
-const TAKEN_MS = 3000;
+const LOOK_MS = 100;
+const AGAIN_MS = 500;
+const PATIENCE_MS = 6000;
+const TAKEN_MS = 6000;
 const JSON_BODY = { "Content-Type": "application/json" };
 
 export async function loadMissions() {
@@ -88,8 +90,7 @@ export async function fly({ nodes, levels, best, id }) {
   const seen = { session: welcome?.session ?? "", seen_ns: status?.stamp_ns ?? 0 };
   change({ flying: "Handing the nodes to the drone …", refused: false });
   try {
-    const body = JSON.stringify({ ...given, ...seen });
-    await askJson("/api/missions/fly", { method: "POST", headers: JSON_BODY, goesOn: true, body });
+    await handOver({ ...given, ...seen });
     await taken(given.id);
   } catch (error) {
     change({ flying: error.message, refused: true });
@@ -102,20 +103,34 @@ export async function fly({ nodes, levels, best, id }) {
 
 // The drone forgets the flight that was handed to it.
 export async function flyConfigured() {
-  const body = JSON.stringify({ id: newId(), drone: state.selected, nodes: [] });
   try {
-    await askJson("/api/missions/fly", { method: "POST", headers: JSON_BODY, goesOn: true, body });
+    await handOver({ id: newId(), drone: state.selected, nodes: [] });
     change({ flying: "" });
   } catch (error) {
     change({ flying: error.message, refused: true });
   }
 }
 
+// Sent again while the drone does not answer: by its id it is taken once.
+async function handOver(given) {
+  const until = performance.now() + PATIENCE_MS;
+  const body = JSON.stringify(given);
+  for (;;) {
+    const answer = await askStation("/api/missions/fly", { method: "POST", headers: JSON_BODY, goesOn: true, body });
+    if (answer.ok) return;
+    const { refused } = await answer.json().catch(() => ({}));
+    if (answer.status !== 503 || performance.now() > until) throw new Error(refused ?? `the ground station answers ${answer.status}`);
+    await passed(AGAIN_MS);
+  }
+}
+
+const passed = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
 async function taken(plan) {
   const until = performance.now() + TAKEN_MS;
   while (shown().status?.plan !== plan) {
     if (performance.now() > until) throw new Error("the drone has not taken the nodes: look at its events on Live");
-    await new Promise((resolve) => setTimeout(resolve, BUSY_MS / 4));
+    await passed(LOOK_MS);
   }
 }
 

@@ -1,4 +1,5 @@
 // The places that need a look as a queue: what is the matter, who looks, what was decided.
+import { mayOperate } from "../access/session.js";
 import { isGivenUp } from "../fetching.js";
 import { html, useMemo, useState } from "../html.js";
 import { recount } from "../missions/missions_source.js";
@@ -28,7 +29,7 @@ export function ExceptionsCard({ onChoose }) {
           ${count(all.length - open.length, "closed place")}
         </button>`}
       </div>
-      <${Recount} places=${recounted(open)} source=${known.source} />
+      ${mayOperate() && html`<${Recount} places=${recounted(open)} source=${known.source} />`}
       ${listed.length > 0 &&
       html`
         <ol aria-labelledby="exceptions">
