@@ -64,8 +64,8 @@ function Takes({ estimate }) {
       ${figures.map(([name, value]) => html`<div key=${name}><dt>${name}</dt><dd>${value}</dd></div>`)}
     </dl>
     <p class="quiet">
-      Estimated by the drone: its speeds and turns along this way, each view of a shelf looked from once for its longest (mostly it is shorter), and its battery:
-      ${" "}${percent(planned.charge)} left, a full one lasts ${duration(planned.battery_s)} down to its reserve.
+      The drone’s own estimate: its speeds and turns along this way, and each view of a shelf at its longest; mostly it takes less.
+      ${" "}Its battery has ${percent(planned.charge)}; a full one lasts ${duration(planned.battery_s)} down to its reserve.
     </p>
     <details class="flown-order">
       <summary>Order of flight</summary>

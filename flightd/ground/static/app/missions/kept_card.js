@@ -58,7 +58,7 @@ function Row({ mission }) {
   return html`
     <li class=${mission.id === id ? "row shown" : "row"}>
       <button class="name" aria-pressed=${mission.id === id} onClick=${() => open(mission)}>
-        <strong>${mission.name}</strong><span class="quiet">${about(mission, flies)}</span>
+        <strong>${mission.name}</strong><span class="quiet">${about(mission, flies && plan)}</span>
       </button>
       ${cut && mayOperate() && html`<button class="order" onClick=${flyRest}>Fly the rest</button>`}
       ${mayOperate() &&
@@ -73,10 +73,11 @@ function Row({ mission }) {
   `;
 }
 
+// `flies`: the plan that is flown, if it is of this mission: newer than what is kept of it.
 function about({ nodes, levels, flown_ns: flown, remaining }, flies) {
   const parts = [count(nodes.length, "node")];
   if (levels.length) parts.push(`level ${levels.join(", ")}`);
-  if (flies) parts.push(`in flight, ${remaining.length} left`);
+  if (flies) parts.push(`in flight, ${flies.remaining.length} left`);
   else if (flown && remaining.length) parts.push(`${remaining.length} left of ${DAY.format(new Date(flown / 1e6))}`);
   else if (flown) parts.push(`flown ${DAY.format(new Date(flown / 1e6))}`);
   return parts.join(" · ");
