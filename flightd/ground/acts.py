@@ -38,7 +38,7 @@ class Orders:
         self.access.write_down(
             who,
             address,
-            f"{act.command} {act.node}".rstrip(),
+            f"{act.command} {act.node or act.plan}".rstrip(),
             name,
             outcome="accepted" if status == 200 else "refused",
             text=str(answer.get("refused", "repeated" if answer.get("repeated") else "")),

@@ -30,14 +30,14 @@ def is_json(request: Request) -> bool:
     return request.headers.get("content-type", "").partition(";")[0].strip() == JSON
 
 
-async def json_body(request: Request, what: str) -> bytes:
-    """The request's body.  InputError for one that is longer than any message of a page, which `what` names,
-    or breaks off."""
+async def json_body(request: Request, what: str, most: int = MAX_PAGE_MESSAGE_BYTES) -> bytes:
+    """The request's body.  InputError for one that is longer than `most` bytes, which `what` names, or breaks
+    off."""
     body = b""
     try:
         async for part in request.stream():
             body += part
-            if len(body) > MAX_PAGE_MESSAGE_BYTES:
+            if len(body) > most:
                 raise InputError(f"too long for {what}")
     except ClientDisconnect:
         raise InputError("it breaks off") from None

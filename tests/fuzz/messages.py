@@ -13,6 +13,7 @@ from flightd.adapters.ground_link.protocol import (
     VERSION,
     Accepted,
     AskPicture,
+    Planned,
     Refused,
     Role,
     decode_answer,
@@ -21,6 +22,8 @@ from flightd.adapters.ground_link.protocol import (
     encode,
 )
 from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
+from flightd.app.build import pilot_of
+from flightd.config.schema import load_config
 from flightd.core.types import CommandKind
 from flightd.site.site_file import load_site
 from tests.fuzz.drive import Target, main
@@ -33,14 +36,17 @@ _OPERATOR, _VIEWER = Peer("ann", Role.OPERATOR, b"1"), Peer("bob", Role.VIEWER, 
 def target(folder: Path) -> Target:
     del folder  # no files here
     audit: list[AuditEntry] = []
-    handler = RequestHandler(load_site(_CONFIGS / "site-demo.toml"), "session", audit.append)
+    site = load_site(_CONFIGS / "site-demo.toml")
+    handler = RequestHandler(site, "session", audit.append)
+    handler.plan_by(pilot_of(load_config(_CONFIGS / "sim.toml"), site).mission)
     clock = itertools.count(10**12, 200_000_000)
 
     def attempt(data: bytes) -> bool:
         answer = handler.answer(data, _OPERATOR, next(clock))
         handler.take_commands()
         viewed = handler.answer(data, _VIEWER, next(clock))
-        assert not isinstance(viewed, Accepted), "a viewer's order was accepted"
+        dry = isinstance(viewed, Planned) and viewed.dry
+        assert dry or not isinstance(viewed, Accepted | Planned), "a viewer's order was accepted"
         assert not handler.take_commands(), "a viewer's order reached the flight"
         audit.clear()
         if not isinstance(answer, AskPicture):
@@ -57,6 +63,10 @@ def target(folder: Path) -> Target:
         head + b'"command", "command": "goto", "node": "A2", "session": "session"}',
         *(head + b'"%s"}' % op for op in (b"hello", b"status", b"picture", b"inventory", b"attend")),
         head + b'"attend", "leave": true}',
+        head + b'"plan"}',
+        head + b'"plan_flight", "nodes": ["A2", "A1"], "levels": [1], "best_order": true}',
+        head + b'"plan_flight", "nodes": ["A2"], "dry": true}',
+        head + b'"command", "command": "start", "plan": "plan-0001"}',
         encode(Accepted(request="request-1")),
         b'{"version": 1, "session": "s", "seq": 1, "stamp_ns": 1, "level": "info", "name": "a", "text": "b"}',
     )

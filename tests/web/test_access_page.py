@@ -115,6 +115,10 @@ def test_a_viewer_is_offered_what_he_may_and_stops_the_drone(
         )
         assert refused == 403, "whatever the page shows"
         assert flight.phase is Phase.PREFLIGHT
+        page.get_by_role("link", name="Missions").click()
+        expect(page.get_by_text("vera is a viewer; what is kept and flown needs an operator")).to_be_visible()
+        expect(page.get_by_label("Name")).to_have_count(0)
+        page.get_by_role("link", name="Live").click()
         with page.expect_response(lambda answer: answer.url.endswith("/api/session")):
             other = page.context.new_page()
             other.goto(f"{url}/stock")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import uuid
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -23,6 +23,7 @@ from flightd.adapters.ground_link.protocol import (
     Answer,
     AskInventory,
     AskPicture,
+    AskPlan,
     AskStatus,
     Attend,
     Code,
@@ -31,6 +32,9 @@ from flightd.adapters.ground_link.protocol import (
     InventoryAnswer,
     Order,
     PictureAnswer,
+    PlanAnswer,
+    PlanFlight,
+    Planned,
     Refused,
     Request,
     StatusAnswer,
@@ -48,7 +52,7 @@ from flightd.core.types import CommandKind
 RETRY_S = 1.0
 """An answer that does not come for so long is asked for again, with the same id."""
 
-_KINDS_OF_INPUT = {Code.MALFORMED, Code.VERSION, Code.NODE, Code.UNAVAILABLE}
+_KINDS_OF_INPUT = {Code.MALFORMED, Code.VERSION, Code.NODE, Code.PLAN, Code.UNAVAILABLE}
 _SHUT_OUT = {zmq.Event.HANDSHAKE_FAILED_AUTH, zmq.Event.HANDSHAKE_FAILED_PROTOCOL}
 """Events after which asking again is of no use."""
 
@@ -140,18 +144,50 @@ class GroundClient:
         *,
         session: str | None = None,
         seen_ns: int | None = None,
+        plan: str = "",
     ) -> Accepted:
         """Give a command; sent again until it is answered, done once.  It is for the flight `session`, given
-        by who saw the status of `seen_ns`; left out: this client's, and the newest that it heard."""
+        by who saw the status of `seen_ns`; left out: this client's, and the newest that it heard.  A start
+        may name the `plan` that it is for."""
         order = Order(
             version=VERSION,
             id=order_id or _new_id(),
             command=kind,
             node=node,
+            plan=plan,
             session=self.session if session is None else session,
             seen_ns=self._seen_ns if seen_ns is None else seen_ns,
         )
         return await self._ask(order, Accepted)
+
+    async def plan_flight(
+        self,
+        nodes: Sequence[str],
+        levels: Sequence[int] = (),
+        order_id: str = "",
+        *,
+        best_order: bool = False,
+        dry: bool = False,
+        session: str | None = None,
+        seen_ns: int | None = None,
+    ) -> Planned:
+        """Hand a drone that stands disarmed the nodes of its next flight, or (`dry`) only ask what that would
+        be; the rest as `order`."""
+        request = PlanFlight(
+            version=VERSION,
+            id=order_id or _new_id(),
+            nodes=tuple(nodes),
+            levels=tuple(levels),
+            best_order=best_order,
+            dry=dry,
+            session=self.session if session is None else session,
+            seen_ns=self._seen_ns if seen_ns is None else seen_ns,
+        )
+        return await self._ask(request, Planned)
+
+    async def plan(self) -> PlanAnswer:
+        """The plan that is flown, or would be with the next start, and what is left of it."""
+        return await self._ask(AskPlan(version=VERSION, id=_new_id()), PlanAnswer)
 
     async def attend(self, leave: bool = False) -> Accepted:
         """Say that somebody watches this flight (at least once a second), or no longer does."""
