@@ -21,7 +21,8 @@ def flown(*nodes: str, levels: tuple[int, ...] = ()) -> tuple[Flown, PlannedFlig
     """The flight of a plan that comes once the drone is ready, and what was said of it before."""
     stock = Stock({code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in SITE.locations})
     flight = IdealFlight(SITE, CONFIG, front=IdealFront(SITE, SIGHT, stock))
-    mission, said = flight.pilot.mission, []
+    mission = flight.pilot.mission
+    said: list[PlannedFlight] = []
 
     def order(_phase: Phase, _now_ns: int) -> None:
         if not said and CommandKind.START in mission.possible_commands:
