@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import sqlite3
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from flightd.core.errors import InputError, RunError, UnavailableError
+from flightd.ground.own_database import OwnDatabase
 
 FILE = "missions.db"
 _APPLICATION, _VERSION = 0x666C746D, 1
@@ -60,21 +59,26 @@ class MissionBook:
     UnavailableError where the disk refuses, InputError for a file that is another program's."""
 
     def __init__(self, folder: Path) -> None:
-        self._file = folder / FILE
-        self._lock = threading.Lock()
+        self._database = OwnDatabase(
+            file=folder / FILE,
+            holds="the missions",
+            application=_APPLICATION,
+            version=_VERSION,
+            schema=SCHEMA,
+        )
 
     def missions(self, site: str) -> list[Mission]:
         """All of a site, by their names."""
-        if not self._file.exists():
+        if not self._database.file.exists():
             return []
-        with self._opened() as book:
+        with self._database.opened() as book:
             rows = book.execute(_ALL, (site,)).fetchall()
             return [_mission(row) for row in rows]
 
     def keep(self, mission: Mission) -> Mission:
         """Keep a mission, in place of the one with its id; where its nodes change, nothing is left of the
         flight before.  RunError for a name that the site's missions have already."""
-        with self._opened() as book, _transaction(book):
+        with self._database.changed() as book:
             known = _found(book, mission.id)
             if known is None and book.execute("SELECT count(*) FROM mission").fetchone()[0] >= MOST_MISSIONS:
                 raise UnavailableError(f"{MOST_MISSIONS} missions are kept already", remedy="delete some")
@@ -100,13 +104,13 @@ class MissionBook:
 
     def delete(self, mission_id: str) -> None:
         """Forget a mission.  InputError where there is none."""
-        with self._opened() as book:
+        with self._database.opened() as book:
             if not book.execute("DELETE FROM mission WHERE id = ?", (mission_id,)).rowcount:
                 raise InputError("there is no such mission any more")
 
     def handed_over(self, mission_id: str, plan: str, nodes: Sequence[str], utc_ns: int) -> None:
         """A drone has taken these nodes of a mission as the plan of its next flight."""
-        with self._opened() as book, _transaction(book):
+        with self._database.changed() as book:
             book.execute(
                 "UPDATE mission SET plan = ?, flown_ns = ?, remaining = ? WHERE id = ?",
                 (plan, utc_ns, json.dumps(list(nodes)), mission_id),
@@ -114,42 +118,12 @@ class MissionBook:
 
     def left(self, plan: str, remaining: Sequence[str]) -> None:
         """What a drone tells that is left of a plan; that of no mission changes nothing."""
-        if not self._file.exists():
+        if not self._database.file.exists():
             return
-        with self._opened() as book:
+        with self._database.opened() as book:
             book.execute(
                 "UPDATE mission SET remaining = ? WHERE plan = ?", (json.dumps(list(remaining)), plan)
             )
-
-    @contextmanager
-    def _opened(self) -> Iterator[sqlite3.Connection]:
-        with self._lock:
-            try:
-                with closing(sqlite3.connect(self._file, timeout=2.0, isolation_level=None)) as book:
-                    self._prepare(book)
-                    yield book
-            except sqlite3.OperationalError as err:
-                raise UnavailableError(
-                    f"{self._file}: {err}", remedy="may this station write there?"
-                ) from err
-            except (sqlite3.DatabaseError, ValueError) as err:
-                raise InputError(f"{self._file}: not the missions of a ground station: {err}") from err
-
-    def _prepare(self, book: sqlite3.Connection) -> None:
-        """Make the table, all or nothing; InputError for what is not ours."""
-        if self._is_empty(book):
-            with _transaction(book):
-                if self._is_empty(book):
-                    book.execute(SCHEMA)
-                    book.execute(f"PRAGMA application_id = {_APPLICATION}")
-                    book.execute(f"PRAGMA user_version = {_VERSION}")
-
-    def _is_empty(self, book: sqlite3.Connection) -> bool:
-        asked = ("PRAGMA application_id", "PRAGMA user_version", "SELECT count(*) FROM sqlite_schema")
-        application, version, tables = (book.execute(question).fetchone()[0] for question in asked)
-        if tables and (application, version) != (_APPLICATION, _VERSION):
-            raise InputError(f"{self._file}: not the missions of a ground station, or of another version")
-        return not tables
 
 
 def _found(book: sqlite3.Connection, mission_id: str) -> Mission | None:
@@ -171,15 +145,3 @@ def _mission(row: Sequence[str | int]) -> Mission:
         str(identity), str(site), str(name), tuple(json.loads(str(nodes))), tuple(json.loads(str(levels))),
         int(changed_ns), str(plan), int(flown_ns), tuple(json.loads(str(remaining))),
     )  # fmt: skip
-
-
-@contextmanager
-def _transaction(book: sqlite3.Connection) -> Iterator[None]:
-    book.execute("BEGIN IMMEDIATE")
-    try:
-        yield
-        book.execute("COMMIT")
-    except BaseException:
-        if book.in_transaction:
-            book.execute("ROLLBACK")
-        raise
