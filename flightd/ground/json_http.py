@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
+from typing import TypeAlias
 
 import msgspec
 from starlette.requests import ClientDisconnect, Request
@@ -10,8 +11,10 @@ from starlette.responses import Response
 
 from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+from flightd.ground.shown_text import shown
 
 JSON = "application/json"
+AnswerTo: TypeAlias = Callable[[Request], Awaitable[Response]]
 
 
 def as_json(value: object, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
@@ -23,6 +26,24 @@ def status_of(err: FlightdError, mistaken: int = 404) -> int:
     if isinstance(err, InputError):
         return mistaken
     return 503 if isinstance(err, UnavailableError | TransientError) else 409
+
+
+def refusal(why: str, status: int) -> Response:
+    """One line for a person."""
+    return as_json({"refused": shown(why)}, status)
+
+
+def or_refused(answer: AnswerTo) -> AnswerTo:
+    """What goes wrong as a status and one line for a person."""
+
+    async def guarded(request: Request) -> Response:
+        try:
+            return await answer(request)
+        except FlightdError as err:
+            mistaken = 404 if request.method in {"GET", "DELETE"} else 400
+            return refusal(str(err).removeprefix("refused: "), status_of(err, mistaken))
+
+    return guarded
 
 
 def is_json(request: Request) -> bool:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, TypeAlias, TypeVar
+from typing import Annotated, TypeVar
 
 import msgspec
 from msgspec import Meta
@@ -20,10 +20,9 @@ from flightd.core.planned_flight import MOST_NODES
 from flightd.ground.access.gate import note_act
 from flightd.ground.bounded import Threads
 from flightd.ground.drone_link import DroneLink
-from flightd.ground.json_http import as_json, is_json, json_body, status_of
+from flightd.ground.json_http import AnswerTo, as_json, is_json, json_body, or_refused
 from flightd.ground.missions.mission_book import Mission, MissionBook
 from flightd.ground.pages import page
-from flightd.ground.shown_text import shown
 from flightd.ground.stores import Stores
 
 _LOG = logging.getLogger(__name__)
@@ -58,7 +57,6 @@ class Flown(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seen_ns: Annotated[int, Meta(ge=0)] = 0
 
 
-_Asked: TypeAlias = Callable[[Request], Awaitable[Response]]
 _T = TypeVar("_T", Kept, Flown)
 
 
@@ -67,7 +65,7 @@ def mission_routes(folder: Path | None, drones: Mapping[str, DroneLink]) -> list
     missions = _Missions(None if folder is None else MissionBook(folder), Stores(folder), drones)
     for drone in drones.values():
         drone.on_plan = missions.heard
-    ways: list[tuple[str, str, _Asked]] = [
+    ways: list[tuple[str, str, AnswerTo]] = [
         ("", "GET", missions.listed),
         ("/estimate", "GET", missions.estimate),
         ("/recount", "GET", missions.recount),
@@ -75,22 +73,8 @@ def mission_routes(folder: Path | None, drones: Mapping[str, DroneLink]) -> list
         ("/{mission}", "PUT", missions.keep),
         ("/{mission}", "DELETE", missions.delete),
     ]
-    answers = [Route(f"/api/missions{way}", _answered(answer), methods=[verb]) for way, verb, answer in ways]
+    answers = [Route(f"/api/missions{way}", or_refused(answer), methods=[verb]) for way, verb, answer in ways]
     return [*page("/missions"), *answers]
-
-
-def _answered(answer: _Asked) -> _Asked:
-    """What goes wrong as a status and one line for a person."""
-
-    async def guarded(request: Request) -> Response:
-        try:
-            return await answer(request)
-        except FlightdError as err:
-            mistaken = 404 if request.method in {"GET", "DELETE"} else 400
-            text = shown(str(err).removeprefix("refused: "))
-            return as_json({"refused": text}, status_of(err, mistaken))
-
-    return guarded
 
 
 class _Missions:
