@@ -147,10 +147,10 @@ class MavlinkTelemetry(NewestReadings):
         senseless = self._is_senseless(boot_ns, now_ns)
         if not senseless:  # one that strayed ahead would make the next good one look like a reboot
             self._boot_ms = boot_ms
-        if boot_ms and not senseless:
-            self._sync.heard(boot_ns, now_ns)
+            if boot_ms:
+                self._sync.heard(boot_ns, now_ns)
         stamp_ns = self._stamp(boot_ns, now_ns)
-        self._stamps_refused += rebooted or self._is_senseless(boot_ns, now_ns)
+        self._stamps_refused += rebooted or senseless
         last_ns = stamp_ns - 1 if self._attitude is None or rebooted else self._attitude.stamp_ns
         if stamp_ns >= last_ns:
             self._attitude = sample = Attitude(stamp_ns, *angles)
