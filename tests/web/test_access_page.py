@@ -71,7 +71,7 @@ def test_a_person_signs_in_by_keyboard_sees_who_he_is_and_signs_out(
 ) -> None:
     with opened(browser, f"{url}/guide", size, scheme) as page:
         expect(page.get_by_role("heading", name="Sign in")).to_be_visible()
-        assert page.title() == "Sign in · flightd"
+        expect(page).to_have_title("Sign in · flightd")
         assert hindrances(page) == []
         assert page.evaluate("document.documentElement.scrollWidth") == size[0]
         sign_in(page, "otto")
