@@ -99,7 +99,8 @@ class GroundClient:
         self._requests: Any = self._socket(zmq.DEALER)
         self._status: Any = self._socket(zmq.SUB)
         self._monitor: Any = self._requests.get_monitor_socket()
-        self._asked: dict[str, asyncio.Future[tuple[Answer, list[bytes]]]] = {}
+        self._asked: dict[asyncio.Future[tuple[Answer, list[bytes]]], str] = {}
+        """What waits, for the answer to which request: an order may be sent again while the first waits."""
         self._reading: asyncio.Task[None] | None = None
         self._seen: set[int] = set()
         self.session = ""
@@ -230,22 +231,26 @@ class GroundClient:
 
     async def _answer(self, request: Request, timeout_s: float) -> tuple[Answer, list[bytes]]:
         """The answer to this request, asked for again while it does not come."""
-        self._asked[request.id] = asyncio.get_running_loop().create_future()
+        asked: asyncio.Future[tuple[Answer, list[bytes]]] = asyncio.get_running_loop().create_future()
+        self._asked[asked] = request.id
         try:
             async with asyncio.timeout(timeout_s):
-                return await self._repeated(request)
+                return await self._repeated(request, asked)
         except TimeoutError:
             raise UnavailableError(await self._why_silent()) from None
         finally:
-            self._asked.pop(request.id).cancel()
+            del self._asked[asked]
+            asked.cancel()
 
-    async def _repeated(self, request: Request) -> tuple[Answer, list[bytes]]:
+    async def _repeated(
+        self, request: Request, asked: asyncio.Future[tuple[Answer, list[bytes]]]
+    ) -> tuple[Answer, list[bytes]]:
         patience_s = 4.0 if isinstance(request, AskPicture) else RETRY_S
         while True:
             await self._requests.send(encode(request))
             try:
                 async with asyncio.timeout(patience_s):
-                    return await asyncio.shield(self._asked[request.id])
+                    return await asyncio.shield(asked)
             except TimeoutError:
                 await self._note_events()
                 if self._seen & _SHUT_OUT:
@@ -268,8 +273,7 @@ class GroundClient:
 
     def _waiting(self, request_id: str) -> list[asyncio.Future[tuple[Answer, list[bytes]]]]:
         """What waits for the answer to a request, or for any where the id is empty."""
-        found = [self._asked.get(request_id)] if request_id else list(self._asked.values())
-        return [asked for asked in found if asked is not None and not asked.done()]
+        return [asked for asked, of in self._asked.items() if request_id in ("", of) and not asked.done()]
 
     async def _why_silent(self) -> str:
         """What ZMQ saw happen to the connection, in words."""
