@@ -105,6 +105,7 @@ def build(
     where configuration, map and order contradict each other."""
     peers = peers or configured_peers(config)
     pilot = pilot_of(config, site, order, learnt)
+    ground.plan_by(pilot.mission)
     vehicle = connect_vehicle(
         config.vehicle,
         clock,

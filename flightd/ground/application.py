@@ -30,6 +30,7 @@ from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
 from flightd.ground.json_http import as_json, is_json, json_body, status_of
 from flightd.ground.messages import SentAct, answer_message, read_page_message, session_message
+from flightd.ground.missions.routes import mission_routes
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.site_page.routes import site_page
@@ -65,6 +66,7 @@ def application(
         *site_page(folder, maps),
         *flight_routes(flights),
         *doctor_routes(hub.drones),
+        *mission_routes(folder, hub.drones),
         *guide_routes(),
         *session_routes(access),
         Mount("/static", StaticFiles(directory=STATIC)),

@@ -16,6 +16,7 @@ from flightd.adapters.ground_link.protocol import (
     Accepted,
     AskPicture,
     Maintenance,
+    Planned,
     ProposeSettings,
     Refused,
     Role,
@@ -25,8 +26,10 @@ from flightd.adapters.ground_link.protocol import (
     encode,
 )
 from flightd.adapters.ground_link.request_handler import RequestHandler
+from flightd.app.build import pilot_of
 from flightd.config.edited_text import edited
 from flightd.config.remote_change import checked
+from flightd.config.schema import load_config
 from flightd.core.errors import InputError
 from flightd.core.types import CommandKind
 from flightd.site.site_file import load_site
@@ -40,7 +43,9 @@ _OPERATOR, _VIEWER = Peer("ann", Role.OPERATOR, b"1"), Peer("bob", Role.VIEWER, 
 def target(folder: Path) -> Target:
     del folder  # no files here
     audit: list[AuditEntry] = []
-    handler = RequestHandler(load_site(_CONFIGS / "site-demo.toml"), "session", audit.append)
+    site = load_site(_CONFIGS / "site-demo.toml")
+    handler = RequestHandler(site, "session", audit.append)
+    handler.plan_by(pilot_of(load_config(_CONFIGS / "sim.toml"), site).mission)
     config = (_CONFIGS / "sim.toml").read_text()
     clock = itertools.count(10**12, 200_000_000)
 
@@ -48,7 +53,8 @@ def target(folder: Path) -> Target:
         answer = handler.answer(data, _OPERATOR, next(clock))
         handler.take_commands()
         viewed = handler.answer(data, _VIEWER, next(clock))
-        assert not isinstance(viewed, Accepted), "a viewer's order was accepted"
+        dry = isinstance(viewed, Planned) and viewed.dry
+        assert dry or not isinstance(viewed, Accepted | Planned), "a viewer's order was accepted"
         assert not handler.take_commands(), "a viewer's order reached the flight"
         audit.clear()
         if isinstance(answer, Maintenance):
@@ -76,6 +82,10 @@ def target(folder: Path) -> Target:
         head + b'"take_back", "base": "0123456789abcdef", "version_kept": 3}',
         head + b'"propose", "base": "0123456789abcdef", "changes": {"mission.height_m": 1.5, '
         b'"mission.nodes": ["A1"], "scan.pictures": null, "control.yaw.kp": 2, "vehicle.name": "seven"}}',
+        head + b'"plan"}',
+        head + b'"plan_flight", "nodes": ["A2", "A1"], "levels": [1], "best_order": true}',
+        head + b'"plan_flight", "nodes": ["A2"], "dry": true}',
+        head + b'"command", "command": "start", "plan": "plan-0001"}',
         encode(Accepted(request="request-1")),
         b'{"version": 1, "session": "s", "seq": 1, "stamp_ns": 1, "level": "info", "name": "a", "text": "b"}',
     )

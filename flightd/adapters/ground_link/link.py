@@ -35,6 +35,7 @@ from flightd.adapters.ground_link.request_handler import RequestHandler
 from flightd.adapters.ground_link.status_report import status_report
 from flightd.config.ground import GroundConfig
 from flightd.core.errors import TransientError, UnavailableError
+from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName, Preview
 from flightd.core.snapshot import Snapshot
 from flightd.core.types import Command, Event
@@ -181,6 +182,10 @@ class ZmqGround:
         )
         self._handler.events.append(report)
         self._publish(EVENT_TOPIC, encode(report))
+
+    def plan_by(self, planner: Planner) -> None:
+        """Plans are asked of it from now on."""
+        self._handler.plan_by(planner)
 
     def take_commands(self) -> list[Command]:
         return self._handler.take_commands()

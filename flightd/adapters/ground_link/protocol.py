@@ -16,13 +16,14 @@ from typing import Annotated, Any, Literal, TypeAlias
 import msgspec
 from msgspec import Meta
 
+from flightd.core.planned_flight import MOST_NODES
 from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind, EventLevel, Phase
 
 VERSION = 1
 STATUS_TOPIC = b"status"
 EVENT_TOPIC = b"event"
-MAX_REQUEST_BYTES = 8192
+MAX_REQUEST_BYTES = 32768
 """A longer request ends its connection."""
 
 
@@ -165,6 +166,9 @@ class StatusReport(msgspec.Struct, frozen=True):
         float | None, Meta(description="time in the air until only the reserve is left, s")
     ] = None
     home_s: Annotated[float | None, Meta(description="time from the goal down onto a charge pad, s")] = None
+    plan: Annotated[
+        str, Meta(description="id of the order that the plan came with; empty: the configuration's plan")
+    ] = ""
 
 
 class EventReport(msgspec.Struct, frozen=True):
@@ -196,8 +200,18 @@ class Hello(_Request, frozen=True, tag="hello"):
 class Order(_Request, frozen=True, tag="command"):
     """A command to the mission; operators only.  Answer: `accepted`, or `refused`."""
 
-    command: Annotated[CommandKind, Meta(description=", ".join(CommandKind))]
+    command: Annotated[
+        CommandKind, Meta(description=", ".join(CommandKind) + " (plan: by `plan_flight`, not here)")
+    ]
     node: _Node = ""
+    plan: Annotated[
+        str,
+        Meta(
+            max_length=64,
+            description="only with start: id of the order of the plan that it is for; where another one "
+            "stands, it does not start",
+        ),
+    ] = ""
     session: Annotated[
         str, Meta(max_length=64, description="from `welcome`; given, a daemon started since then refuses")
     ] = ""
@@ -209,6 +223,35 @@ class Order(_Request, frozen=True, tag="command"):
             "stop, land and pause are taken: the order may have lain in a queue",
         ),
     ] = 0
+
+
+class PlanFlight(_Request, frozen=True, tag="plan_flight", omit_defaults=True):
+    """The nodes that the next start flies, for a drone that stands disarmed and was given no start; it does
+    not start by that.  Checked by the drone against its map and its battery.  Operators only, but with `dry`.
+    Answer: `planned`, or `refused`."""
+
+    nodes: Annotated[
+        tuple[Annotated[str, Meta(max_length=64)], ...],
+        Meta(max_length=MOST_NODES, description="nodes to visit; none: again what the configuration says"),
+    ] = ()
+    levels: Annotated[
+        tuple[Annotated[int, Meta(ge=1, le=99)], ...],
+        Meta(max_length=99, description="shelf levels that are counted there; none: all"),
+    ] = ()
+    best_order: Annotated[
+        bool, Meta(description="in the quickest order (many nodes: aisle by aisle), not as listed")
+    ] = False
+    dry: Annotated[bool, Meta(description="only say what it would be; by viewers, too")] = False
+    session: Annotated[
+        str, Meta(max_length=64, description="from `welcome`; given, a daemon started since then refuses")
+    ] = ""
+    seen_ns: Annotated[
+        int, Meta(ge=0, description="`stamp_ns` of the newest status; by one older than 5 s it is refused")
+    ] = 0
+
+
+class AskPlan(_Request, frozen=True, tag="plan"):
+    """The plan that is flown, or would be with the next start, and what is left of it.  Answer: `plan`."""
 
 
 class AskStatus(_Request, frozen=True, tag="status"):
@@ -291,7 +334,9 @@ class Restart(_Request, frozen=True, tag="restart"):
 
 Maintenance: TypeAlias = AskDoctor | FixParameter | AskSettings | ProposeSettings | TakeSettingsBack | Restart
 """What looks after a drone on the ground."""
-Request: TypeAlias = Hello | Order | AskStatus | AskPicture | AskInventory | Attend | Maintenance
+Request: TypeAlias = (
+    Hello | Order | PlanFlight | AskPlan | AskStatus | AskPicture | AskInventory | Attend | Maintenance
+)
 
 
 class Envelope(msgspec.Struct, frozen=True):
@@ -315,6 +360,8 @@ class FloorNode(msgspec.Struct, frozen=True):
     id: Annotated[str, Meta(description="name")]
     x_m: Annotated[float, Meta(description="m along the aisles")]
     y_m: Annotated[float, Meta(description="m to the right of x")]
+    aisle: Annotated[str, Meta(description="of which aisle")] = ""
+    levels: Annotated[tuple[int, ...], Meta(description="shelf levels with locations that it faces")] = ()
 
 
 class FloorLine(msgspec.Struct, frozen=True):
@@ -404,6 +451,35 @@ class Accepted(_Answer, frozen=True, tag="accepted"):
     repeated: Annotated[bool, Meta(description="this id was done before; it was not done again")] = False
 
 
+class Planned(_Answer, frozen=True, tag="planned"):
+    """What the flight over the nodes is; not `dry`, it waits for the start."""
+
+    nodes: Annotated[tuple[str, ...], Meta(description="in the order in which they are flown")]
+    levels: Annotated[tuple[int, ...], Meta(description="shelf levels that are counted; none: all")]
+    way: Annotated[tuple[str, ...], Meta(description="all nodes where it stops or turns, from pad to pad")]
+    places: Annotated[int, Meta(description="locations that are counted")]
+    way_m: Annotated[float, Meta(description="length of the way, m")]
+    seconds: Annotated[float, Meta(description="estimated time in the air, s")]
+    batteries: Annotated[int, Meta(description="estimated, with the one that is in it")]
+    charge: Annotated[
+        float, Meta(description="of the battery that is in it, by which that is estimated, 0..1")
+    ]
+    battery_s: Annotated[float, Meta(description="time in the air of a full battery down to its reserve, s")]
+    dry: Annotated[bool, Meta(description="only said, not taken")] = False
+    repeated: Annotated[bool, Meta(description="this id was done before; it was not done again")] = False
+
+
+class PlanAnswer(_Answer, frozen=True, tag="plan"):
+    """The plan that is flown, or would be with the next start, and what is left of it."""
+
+    session: _Session
+    id: Annotated[str, Meta(description="of the order that it came with; empty: the configuration's")]
+    nodes: Annotated[tuple[str, ...], Meta(description="nodes to visit, in order")]
+    levels: Annotated[tuple[int, ...], Meta(description="shelf levels that are counted; none: all")]
+    visited: Annotated[tuple[str, ...], Meta(description="visited so far, in order")]
+    remaining: Annotated[tuple[str, ...], Meta(description="still to be visited, in order")]
+
+
 class Code(enum.StrEnum):
     """Why a request was refused."""
 
@@ -414,6 +490,7 @@ class Code(enum.StrEnum):
     ID_REUSED = "id_reused"
     PHASE = "phase"
     NODE = "node"
+    PLAN = "plan"
     BUSY = "busy"
     LATE = "late"
     UNAVAILABLE = "unavailable"
@@ -538,6 +615,8 @@ class SettingsAnswer(_Answer, frozen=True, tag="settings"):
 Answer: TypeAlias = (
     Welcome
     | Accepted
+    | Planned
+    | PlanAnswer
     | Refused
     | StatusAnswer
     | PictureAnswer
@@ -561,11 +640,12 @@ DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 PUBLISHED = (StatusReport, EventReport)
 REQUESTS = (
-    Hello, Order, AskStatus, AskPicture, AskInventory, Attend, AskDoctor, FixParameter, AskSettings,
-    ProposeSettings, TakeSettingsBack, Restart,
+    Hello, Order, PlanFlight, AskPlan, AskStatus, AskPicture, AskInventory, Attend, AskDoctor, FixParameter,
+    AskSettings, ProposeSettings, TakeSettingsBack, Restart,
 )  # fmt: skip
 ANSWERS = (
-    Welcome, Accepted, Refused, StatusAnswer, PictureAnswer, InventoryAnswer, DoctorAnswer, SettingsAnswer,
+    Welcome, Accepted, Planned, PlanAnswer, Refused, StatusAnswer, PictureAnswer, InventoryAnswer,
+    DoctorAnswer, SettingsAnswer,
 )  # fmt: skip
 PARTS = (
     Position, SeenLine, VehicleReport, LinkReport, SensorReport, HazardReport, FloorStatus, FloorNode,

@@ -7,12 +7,16 @@ from __future__ import annotations
 
 from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import msgspec
 
 from flightd import __version__
 from flightd.adapters.ground_link.audit import AuditEntry
 from flightd.adapters.ground_link.floor_status import floor_status
 from flightd.adapters.ground_link.maintenance_rules import objection
 from flightd.adapters.ground_link.peer import Peer
+from flightd.adapters.ground_link.plan_answers import PlanAnswers, impossible
 from flightd.adapters.ground_link.protocol import (
     DECODE_ERRORS,
     VERSION,
@@ -20,6 +24,7 @@ from flightd.adapters.ground_link.protocol import (
     Answer,
     AskInventory,
     AskPicture,
+    AskPlan,
     AskStatus,
     Attend,
     Code,
@@ -29,6 +34,8 @@ from flightd.adapters.ground_link.protocol import (
     InventoryAnswer,
     Maintenance,
     Order,
+    PlanFlight,
+    Planned,
     Refused,
     Request,
     Role,
@@ -38,6 +45,7 @@ from flightd.adapters.ground_link.protocol import (
     decode_envelope,
     decode_request,
 )
+from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName
 from flightd.core.types import WAITING, Command, CommandKind, Phase
 from flightd.mission.machine import BEGIN, possible_commands
@@ -78,7 +86,8 @@ class RequestHandler:
         self._inventory = inventory
         self._cameras = tuple(cameras)
         self._commands: deque[Command] = deque()
-        self._done: OrderedDict[tuple[str, str], tuple[CommandKind, str]] = OrderedDict()
+        self._plans: PlanAnswers | None = None
+        self._done: OrderedDict[tuple[str, str], tuple[Command, Answer]] = OrderedDict()
         self._recent: deque[tuple[str, int]] = deque(maxlen=_ORDERS_PER_S * 8)
         self._heard_ns: dict[tuple[str, bytes], int] = {}
         self.events: deque[EventReport] = deque(maxlen=_RECENT_EVENTS)
@@ -89,6 +98,10 @@ class RequestHandler:
         """Whether somebody changes or checks something of the drone now: then nothing is started."""
         self.requests = 0
         self.refused = 0
+
+    def plan_by(self, planner: Planner) -> None:
+        """Plans are asked of it from now on."""
+        self._plans = PlanAnswers(planner, self._session)
 
     def take_commands(self) -> list[Command]:
         """The orders accepted since the last call, oldest first."""
@@ -114,9 +127,11 @@ class RequestHandler:
                 return self._welcome(request, peer)
             case Order():
                 return self._order(request, peer, now_ns)
+            case PlanFlight():
+                return self._plan_flight(request, peer, now_ns)
             case Attend():
                 return self._attend(request, peer, now_ns)
-            case AskStatus() | AskInventory() | AskPicture():
+            case AskPlan() | AskStatus() | AskInventory() | AskPicture():
                 return self._show(request)
         return request
 
@@ -136,20 +151,22 @@ class RequestHandler:
         except DECODE_ERRORS as err:
             return self._refuse(request_id, Code.MALFORMED, f"not a request of this protocol: {err}")
 
-    def _show(self, request: AskStatus | AskInventory | AskPicture) -> Answer | AskPicture:
+    def _show(self, request: AskPlan | AskStatus | AskInventory | AskPicture) -> Answer | AskPicture:
+        if isinstance(request, AskPlan):
+            return self._standing_plan(request)
         if isinstance(request, AskStatus):
             return StatusAnswer(request=request.id, status=self.status)
         if isinstance(request, AskPicture):
-            if self._picture_fps == 0:
-                text = "pictures are off: set ground.picture_fps"
-                return self._refuse(request.id, Code.UNAVAILABLE, text)
-            if request.camera not in self._cameras:
-                text = f"this flight uses no {request.camera} camera"
-                return self._refuse(request.id, Code.UNAVAILABLE, text)
-            return request
+            missing = self._no_picture(request)
+            return self._refuse(request.id, Code.UNAVAILABLE, missing) if missing else request
         if self._inventory is None:
             return self._refuse(request.id, Code.UNAVAILABLE, "this flightd keeps no inventory store")
         return InventoryAnswer(request=request.id, places=tuple(self._inventory()))
+
+    def _no_picture(self, request: AskPicture) -> str:
+        if self._picture_fps == 0:
+            return "pictures are off: set ground.picture_fps"
+        return "" if request.camera in self._cameras else f"this flight uses no {request.camera} camera"
 
     def refuse_later(self, request: AskPicture | Maintenance, code: Code, text: str) -> Refused:
         """The answer to a request that took a while, and cannot be served."""
@@ -170,34 +187,87 @@ class RequestHandler:
 
     def _order(self, order: Order, peer: Peer, now_ns: int) -> Answer:
         """Accept, refuse or repeat an order, and write down which."""
-        known = self._done.get((peer.name, order.id))
-        answer: Answer
-        if known == (order.command, order.node):
-            answer, outcome, text = Accepted(request=order.id, repeated=True), "repeated", ""
-        else:
-            code, text = self._objection(order, peer, now_ns, known is not None)
-            if code is None:
-                self._accept(order, peer)
-                answer, outcome = Accepted(request=order.id), "accepted"
-            else:
-                answer, outcome = self._refuse(order.id, code, text), code.value
-        if outcome != Code.BUSY:
-            self._audit(
-                AuditEntry(
-                    client=peer.name,
-                    role=peer.role.value,
-                    address=peer.address,
-                    id=order.id,
-                    command=order.command.value,
-                    node=order.node,
-                    outcome=outcome,
-                    text=text,
-                )
-            )
-        return answer
+        command = Command(order.id, order.command, order.node, plan=order.plan)
+        repeated = self._repeated(command, peer)
+        if repeated is not None:
+            return repeated
+        code, text = self._objection(order, peer, now_ns)
+        if code is not None:
+            return self._not_done(command, peer, code, text)
+        return self._accept(command, peer, Accepted(request=order.id))
 
-    def _objection(self, order: Order, peer: Peer, now_ns: int, id_known: bool) -> tuple[Code | None, str]:
-        """Why an order cannot be obeyed, if it cannot."""
+    def _repeated(self, command: Command, peer: Peer) -> Answer | None:
+        """The answer to a command that was done before, None to a new one."""
+        done = self._done.get((peer.name, command.id))
+        if done is None or done[0] != command or not isinstance(done[1], Accepted | Planned):
+            return None
+        self._write_down(command, peer, "repeated", "")
+        return msgspec.structs.replace(done[1], repeated=True)
+
+    def _not_done(self, command: Command, peer: Peer, code: Code, text: str) -> Refused:
+        if code is not Code.BUSY:
+            self._write_down(command, peer, code.value, text)
+        return self._refuse(command.id, code, text)
+
+    def _write_down(self, command: Command, peer: Peer, outcome: str, text: str) -> None:
+        self._audit(
+            AuditEntry(
+                client=peer.name,
+                role=peer.role.value,
+                address=peer.address,
+                id=command.id,
+                command=command.kind.value,
+                node=command.node or ",".join(command.nodes),
+                outcome=outcome,
+                text=text,
+            )
+        )
+
+    def _plan_flight(self, request: PlanFlight, peer: Peer, now_ns: int) -> Answer:
+        """What a flight over the nodes is, handed to the mission unless it is only asked for."""
+        command = Command(request.id, CommandKind.PLAN, nodes=request.nodes, levels=request.levels)
+        if not request.dry and (repeated := self._repeated(command, peer)) is not None:
+            return repeated
+        code, text = self._against_plan(request, peer, now_ns)
+        if code is None and self._plans is not None:
+            planned = self._plans.planned(request, now_ns)
+            if isinstance(planned, Planned):
+                if request.dry:
+                    return planned
+                taken = replace(command, nodes=planned.nodes if request.nodes else ())
+                return self._accept(taken, peer, planned, asked=command)
+            code, text = planned
+        code = code or Code.UNAVAILABLE
+        return (
+            self._refuse(request.id, code, text) if request.dry else self._not_done(command, peer, code, text)
+        )
+
+    def _against_plan(self, request: PlanFlight, peer: Peer, now_ns: int) -> tuple[Code | None, str]:
+        """Why a plan is not looked at, if it is not."""
+        order = Order(
+            version=request.version,
+            id=request.id,
+            command=CommandKind.PLAN,
+            session=request.session,
+            seen_ns=request.seen_ns,
+        )
+        if self._plans is None:
+            return Code.UNAVAILABLE, "no flight is planned here yet; ask again in a moment"
+        if request.dry:  # planned between two ticks: not while it flies
+            phase = self.status.phase if self.status is not None else Phase.PREFLIGHT
+            return (None, "") if phase in WAITING else (Code.PHASE, impossible(phase))
+        return self._objection(order, peer, now_ns, planned=True)
+
+    def _standing_plan(self, request: AskPlan) -> Answer:
+        if self._plans is None:
+            return self._refuse(request.id, Code.UNAVAILABLE, "no flight is planned here yet")
+        return self._plans.standing(request)
+
+    def _objection(
+        self, order: Order, peer: Peer, now_ns: int, *, planned: bool = False
+    ) -> tuple[Code | None, str]:
+        """Why an order cannot be obeyed, if it cannot; `planned`: it came with its plan."""
+        id_known = (peer.name, order.id) in self._done
         phase = self.status.phase if self.status is not None else Phase.PREFLIGHT
         kind, node = order.command, order.node
         checks = (
@@ -228,6 +298,16 @@ class RequestHandler:
                 "goto needs a node, the other commands have none",
             ),
             (
+                (kind is CommandKind.PLAN) != planned,
+                Code.MALFORMED,
+                "a plan comes with its nodes: op plan_flight",
+            ),
+            (
+                bool(order.plan) and kind is not CommandKind.START,
+                Code.MALFORMED,
+                "only start names the plan that it is for",
+            ),
+            (
                 bool(node) and node not in self._nodes,
                 Code.NODE,
                 f"no node {node!r} on site {self._floor.name}",
@@ -243,6 +323,8 @@ class RequestHandler:
 
     def _impossible(self, kind: CommandKind, phase: Phase) -> str:
         """Why the mission does not take an order now."""
+        if kind is CommandKind.PLAN:
+            return impossible(phase)
         if kind is CommandKind.START and phase in WAITING and self.status is not None:
             return f"cannot {kind}: {self.status.reason}"
         return f"cannot {kind} in phase {phase}"
@@ -257,13 +339,15 @@ class RequestHandler:
         self._recent.append((peer.name, now_ns))
         return True
 
-    def _accept(self, order: Order, peer: Peer) -> None:
-        self._done[peer.name, order.id] = (order.command, order.node)
+    def _accept(self, command: Command, peer: Peer, answer: Answer, asked: Command | None = None) -> Answer:
+        """Hand a command to the mission; `asked`: as the client put it, where that is otherwise."""
+        self._done[peer.name, command.id] = (asked or command, answer)
         if len(self._done) > _REMEMBERED_ORDERS:
             self._done.popitem(last=False)
-        command = Command(order.id, order.command, order.node)
+        self._write_down(command, peer, "accepted", "")
         if not any(waiting.kind is command.kind for waiting in self._commands if command.kind in _URGENT):
             self._commands.append(command)
+        return answer
 
     def _attend(self, request: Attend, peer: Peer, now_ns: int) -> Answer:
         if peer.role is not Role.OPERATOR:

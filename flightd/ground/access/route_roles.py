@@ -42,6 +42,8 @@ RULES: Mapping[str, Rule] = {
     "GET /": _ANYBODY,
     "GET /stock": _ANYBODY,
     "GET /stock/{rest:path}": _ANYBODY,
+    "GET /missions": _ANYBODY,
+    "GET /missions/{rest:path}": _ANYBODY,
     "GET /flights": _ANYBODY,
     "GET /flights/{rest:path}": _ANYBODY,
     "GET /site": _ANYBODY,
@@ -67,6 +69,12 @@ RULES: Mapping[str, Rule] = {
     "POST /api/stock/compare": _LOOKS,  # a question with a file, which is kept nowhere
     "GET /api/stock/decisions": _LOOKS,
     "POST /api/stock/decisions": _ACTS,
+    "GET /api/missions": _LOOKS,
+    "GET /api/missions/estimate": _LOOKS,  # what the drone would do, which changes nothing in it
+    "GET /api/missions/recount": _LOOKS,
+    "POST /api/missions/fly": _ACTS,
+    "PUT /api/missions/{mission}": _ACTS,
+    "DELETE /api/missions/{mission}": _ACTS,
     "GET /api/flights": _LOOKS,
     "GET /api/flights/{flight}": _LOOKS,
     "GET /api/flights/{flight}/series": _LOOKS,

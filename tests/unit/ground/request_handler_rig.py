@@ -20,10 +20,13 @@ from flightd.adapters.ground_link.protocol import (
     StatusReport,
 )
 from flightd.adapters.ground_link.request_handler import RequestHandler
+from flightd.app.build import pilot_of
+from flightd.config.schema import load_config
 from flightd.core.types import Phase
 from flightd.site.site_file import load_site
 from tests.rigs.possible_commands import possible_in
 
+CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml")
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
 OPERATOR = Peer("ann", Role.OPERATOR, b"1", "127.0.0.1")
 VIEWER = Peer("bob", Role.VIEWER, b"2", "127.0.0.1")
@@ -69,6 +72,8 @@ class RequestHandlerRig:
     def __init__(self, phase: Phase = Phase.FOLLOW, **more: Any) -> None:
         self.audit: list[AuditEntry] = []
         self.handler = RequestHandler(SITE, SESSION, self.audit.append, **more)
+        self.mission = pilot_of(CONFIG, SITE).mission
+        self.handler.plan_by(self.mission)
         self.handler.status = report(phase)
         self.handler.possible = possible_in(phase)
         self.now_ns = 100 * S
@@ -78,3 +83,6 @@ class RequestHandlerRig:
 
     def order(self, command: str, peer: Peer = OPERATOR, **fields: Any) -> Answer | AskPicture | Maintenance:
         return self.hand(body("command", command=command, **fields), peer)
+
+    def plan(self, *nodes: str, peer: Peer = OPERATOR, **fields: Any) -> Answer | AskPicture | Maintenance:
+        return self.hand(body("plan_flight", nodes=nodes, **fields), peer)

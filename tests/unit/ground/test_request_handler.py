@@ -14,6 +14,7 @@ from flightd.adapters.ground_link.protocol import (
     AskPicture,
     Code,
     InventoryAnswer,
+    Planned,
     Refused,
     Role,
     StatusAnswer,
@@ -98,9 +99,12 @@ def test_every_command_in_every_phase_is_accepted_or_refused_by_the_table(
     kind: CommandKind, phase: Phase
 ) -> None:
     rig = RequestHandlerRig(phase)
-    answer = rig.order(kind, node="A2" if kind is CommandKind.GOTO else "")
+    if kind is CommandKind.PLAN:
+        answer = rig.plan("A2")
+    else:
+        answer = rig.order(kind, node="A2" if kind is CommandKind.GOTO else "")
     if kind in possible_in(phase):
-        assert isinstance(answer, Accepted)
+        assert isinstance(answer, Accepted | Planned)
     else:
         assert refusal(answer) is Code.PHASE
         assert rig.handler.take_commands() == []

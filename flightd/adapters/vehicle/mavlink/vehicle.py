@@ -167,7 +167,7 @@ class MavlinkVehicle(abc.ABC):
             refusal=self._modes.refusal,
         )
         known = state and replace(state, unfit=self._modes.unfit, keeps_climb=self.keeps_climb())
-        return known and self._steering.climb_of(known)
+        return known and self._steering.climb_of(known, now_ns)
 
     def attitudes(self) -> list[Attitude]:
         return self._telemetry.attitudes()

@@ -16,6 +16,12 @@ export const PAGES = [
     load: () => import("./stock/stock_page.js"),
   },
   {
+    path: "/missions",
+    title: "Missions",
+    styles: ["live.css", "map.css", "missions.css"],
+    load: () => import("./missions/missions_page.js"),
+  },
+  {
     path: "/flights",
     title: "Flights",
     styles: ["live.css", "map.css", "../vendor/uplot.css", "flights.css", "replay.css"],
