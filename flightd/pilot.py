@@ -49,7 +49,6 @@ class Pilot:
         learnt: LearntSensors | None = None,
     ) -> None:
         self._config = config
-        self._plan = plan
         self._scanner = scanner
         self._mission = Mission(site, plan, policy, config, scanner, overhead_m, autostart=autostart)
         self._estimator = StateEstimator(site, config, scanner.least_integrity, self._mission.stand, learnt)
@@ -97,8 +96,8 @@ class Pilot:
 
     @property
     def plan(self) -> FlightPlan:
-        """The plan at the start of the flight."""
-        return self._plan
+        """The plan at the start of the flight: the order's, or what was ordered since, before it flew."""
+        return self._mission.plan
 
     @property
     def exposure(self) -> float:
@@ -160,7 +159,7 @@ class Pilot:
             reason=mission.reason,
             goal=mission.goal.node,
             visited=len(mission.visited),
-            planned=self._plan.visits,
+            planned=mission.plan.visits,
             pose=pose,
             tracks=tracks,
             events=mission.drain_events(),

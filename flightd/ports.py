@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
 
 from flightd.core.inventory import LocationRecord, Observation, PlannedLocation
+from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName, Preview
 from flightd.core.snapshot import Snapshot
 from flightd.core.types import (
@@ -134,9 +135,10 @@ class Ground(Protocol):
 
     `tell` comes ten times a second and at each change of phase, `event` with each event.  `take_commands`
     drains the orders since the last call, oldest first; `silent_s` is the time since any client that attends
-    the flight was heard, 0 when none attends.  `picture_due` says whether a camera's picture exposed at that
-    time is asked for (True at a capped rate only), `picture` then hands it over.  `run` serves until
-    cancelled; TransientError when another `run` may succeed.
+    the flight was heard, 0 when none attends.  `plan_by` gives what answers what a flight would be.
+    `picture_due` says whether a camera's picture exposed at that time is asked for (True at a capped rate
+    only), `picture` then hands it over.  `run` serves until cancelled; TransientError when another `run` may
+    succeed.
     """
 
     async def run(self) -> None: ...
@@ -148,6 +150,8 @@ class Ground(Protocol):
     def take_commands(self) -> list[Command]: ...
 
     def silent_s(self, now_ns: int) -> float: ...
+
+    def plan_by(self, planner: Planner) -> None: ...
 
     def picture_due(self, stamp_ns: int, camera: CameraName = CameraName.DOWN) -> bool: ...
 

@@ -6,6 +6,7 @@ from flightd.core.types import CommandKind, Phase
 from flightd.mission.machine import STATES, Intent, possible_commands
 
 _ONLY = {
+    (True, Intent.WAIT): "before a start is ordered",
     (True, Intent.VISIT): "once a start is ordered",
     (False, Intent.VISIT): "while the plan is flown",
 }

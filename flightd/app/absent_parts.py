@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable
 
 from flightd.app.flight import Tasks
+from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName, Preview
 from flightd.core.scanning import CodeSet
 from flightd.core.snapshot import Snapshot
@@ -49,6 +50,9 @@ class NoGround:
 
     def take_commands(self) -> list[Command]:
         return []
+
+    def plan_by(self, planner: Planner) -> None:
+        """Nobody asks."""
 
     def silent_s(self, now_ns: int) -> float:  # noqa: ARG002 - the port names it
         return 0.0

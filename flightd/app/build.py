@@ -13,6 +13,7 @@ from functools import partial
 
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.ground_link.link import ZmqGround
+from flightd.adapters.ground_link.maintenance_desk import Maintainer
 from flightd.adapters.interlock import FileInterlock
 from flightd.adapters.store.learnt_sensors import learnt_file
 from flightd.adapters.store.progress import progress_file
@@ -105,6 +106,7 @@ def build(
     where configuration, map and order contradict each other."""
     peers = peers or configured_peers(config)
     pilot = pilot_of(config, site, order, learnt)
+    ground.plan_by(pilot.mission)
     vehicle = connect_vehicle(
         config.vehicle,
         clock,
@@ -335,14 +337,18 @@ def detector_of(config: Config, site: Site) -> Callable[[], Detector]:
 
 
 def ground_link(
-    settings: GroundConfig, site: Site, clock: Clock, counting: Counting | None = None
+    settings: GroundConfig,
+    site: Site,
+    clock: Clock,
+    counting: Counting | None = None,
+    maintainer: Maintainer | None = None,
 ) -> ZmqGround | None:
     """The link to ground stations, not listening yet; None where none is wanted."""
     if not settings.listen:
         return None
     if counting is None:
-        return ZmqGround(settings, site, clock)
-    return ZmqGround(settings, site, clock, counting.places, tuple(CameraName))
+        return ZmqGround(settings, site, clock, maintainer=maintainer)
+    return ZmqGround(settings, site, clock, counting.places, tuple(CameraName), maintainer)
 
 
 def _plan_on(config: Config, flown: Site, order: FlightOrder) -> FlightPlan:

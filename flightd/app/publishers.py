@@ -43,7 +43,11 @@ class TelemetryPublishers:
 
     def trouble(self, text: str) -> None:
         """Something failed that people should know of, outside of any tick."""
-        event = Event(self._clock.now_ns(), EventLevel.ERROR, "failure", text)
+        self.note(EventLevel.ERROR, "failure", text)
+
+    def note(self, level: EventLevel, name: str, text: str) -> None:
+        """Something happened outside of any tick that people should know of, and the log keeps."""
+        event = Event(self._clock.now_ns(), level, name, text)
         self.barrier.call("recorder", lambda: self._recorder.record(Topic.EVENT, event.stamp_ns, event), None)
         self._event(event)
 

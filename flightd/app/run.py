@@ -10,11 +10,14 @@ import signal
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
+from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.recorder.archive import FlightArchive
 from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.adapters.store.learnt_sensors import load_learnt
+from flightd.adapters.store.settings_file import SettingsFile
 from flightd.app import service
 from flightd.app.absent_parts import NO_GROUND, NO_RECORDER
 from flightd.app.build import build, detector_pool, ground_link
@@ -22,6 +25,9 @@ from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.flight_identity import FlightIdentity
 from flightd.app.flight_orders import configured_order, going_on, resumed
+from flightd.app.maintenance.checks import DroneChecks
+from flightd.app.maintenance.maintainer import DroneMaintainer
+from flightd.app.maintenance.settings import DroneSettings
 from flightd.app.recording import FlightSetting, record_setting
 from flightd.config.schema import Config
 from flightd.core.errors import InputError, TransientError
@@ -39,20 +45,28 @@ from flightd.site.site import Site
 from flightd.site.site_file import load_site
 
 _LOG = logging.getLogger(__name__)
+_COME_UP_S = 15.0
+"""A daemon that has run for so long has come up: nothing of its settings ends it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
     """What is to be flown.  `started_anew`: the service manager started the daemon again by itself, so that
-    its vehicle may be in the air; `journal`: stderr goes to the journal."""
+    its vehicle may be in the air; `journal`: stderr goes to the journal; `file` is the configuration's, with
+    the text that it was started by."""
 
     setting: FlightSetting
+    file: SettingsFile
+    text: str
     started_anew: bool = False
     journal: bool = False
+    taken_back: str = ""
+    """Which newer settings were given up before this start; empty: none."""
 
 
-def prepare(config: Config, path: Path, *, resume: bool) -> Run:
-    """What to fly by the configuration of the file `path`; `resume`: what the last flight left over.
+def prepare(config: Config, path: Path, *, resume: bool, taken_back: str = "") -> Run:
+    """What to fly by the configuration of the file `path`; `resume`: what the last flight left over;
+    `taken_back` says that newer settings were given up.
     InputError where nobody could start the flight, or where there is nothing left to fly."""
     if not config.mission.autostart and not config.ground.listen:
         raise InputError(
@@ -67,7 +81,9 @@ def prepare(config: Config, path: Path, *, resume: bool) -> Run:
         order = replace(order, autostart=False)
     journal = service.set_up_log(os.environ)
     service.note_start(os.environ)
-    return Run(FlightSetting(config, site, order, _learnt(config, in_air=anew)), anew, journal)
+    file = SettingsFile(path)
+    setting = FlightSetting(config, site, order, _learnt(config, in_air=anew))
+    return Run(setting, file, file.read(), anew, journal, taken_back)
 
 
 def _learnt(config: Config, *, in_air: bool) -> LearntSensors | None:
@@ -85,8 +101,15 @@ def _learnt(config: Config, *, in_air: bool) -> LearntSensors | None:
         return None
 
 
-async def run_until_signal(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult | signal.Signals:
-    """The flight's result, or the signal that ended it."""
+@dataclass(frozen=True, slots=True)
+class RestartAsked:
+    """The ground asked for the daemon to be started anew."""
+
+
+async def run_until_signal(
+    run: Run, observer: Callable[[Snapshot], None]
+) -> FlightResult | RestartAsked | signal.Signals:
+    """The flight's result, what ended it before it began, or the signal that ended it."""
     flight = asyncio.ensure_future(_fly(run, observer))
     came: list[signal.Signals] = []
     end_on_signals(flight, came)
@@ -94,9 +117,15 @@ async def run_until_signal(run: Run, observer: Callable[[Snapshot], None]) -> Fl
     return came[0] if flight.cancelled() and came else flight.result()
 
 
-async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
+async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult | RestartAsked:
     config, site, clock = run.setting.config, run.setting.site, LoopClock()
-    watchers = service.monitors(config.metrics, os.environ, journal=run.journal)
+    recent, restarts = RecentLog(), service.is_restarted(os.environ)
+    watchers = service.monitors(config.metrics, os.environ, journal=run.journal, recent=recent)
+    maintainer = DroneMaintainer(
+        DroneChecks(config, site, f"{run.file.path}, site {site.name}", recent),
+        DroneSettings(run.file, run.text, restarts=restarts, unfit=partial(_failing, config)),
+        restarts=restarts,
+    )
     identity = FlightIdentity.of(run.setting, platform.node(), clock.now_ns())
     async with watchers as monitors, AsyncExitStack() as stack:
         folder, anew = config.inventory.folder, run.started_anew
@@ -107,7 +136,7 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
         if archive is not None:
             recorder = stack.enter_context(_recorder(run.setting, archive, identity))
         counting = await count.begun(clock)
-        link = ground_link(config.ground, site, clock, counting)
+        link = ground_link(config.ground, site, clock, counting, maintainer)
         ground = NO_GROUND if link is None else stack.enter_context(link)
         await pool.ready()
         flight = build(
@@ -127,9 +156,39 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
             startup_fault=count.error,
             unfit=unfit_here(config, site),
         )
-        daemon = Daemon(flight)
+        daemon, maintainer.flight = Daemon(flight), flight
+        if run.taken_back:
+            daemon.failed(TransientError(run.taken_back))
         async with room_kept(archive, daemon.failed):
-            return await daemon.fly()
+            return await _flown(daemon, maintainer, run.file)
+
+
+async def _flown(
+    daemon: Daemon, maintainer: DroneMaintainer, file: SettingsFile
+) -> FlightResult | RestartAsked:
+    """The flight, unless the ground has the daemon started anew before it begins."""
+    settled = asyncio.ensure_future(_settled(file))
+    flying = asyncio.ensure_future(daemon.fly())
+    leaving = asyncio.ensure_future(maintainer.restart_asked())
+    try:
+        await asyncio.wait([flying, leaving], return_when=asyncio.FIRST_COMPLETED)
+    except asyncio.CancelledError:  # a signal: it ends as it should
+        file.confirm()
+        raise
+    else:
+        result = flying.result() if flying.done() else RestartAsked()
+        file.confirm()
+        return result
+    finally:
+        for task in (settled, leaving, flying):
+            task.cancel()
+        await asyncio.wait([flying, leaving, settled])
+
+
+async def _settled(file: SettingsFile) -> None:
+    """Once the daemon has run for a while its settings are no trial any more."""
+    await asyncio.sleep(_COME_UP_S)
+    await asyncio.to_thread(file.confirm)
 
 
 def unfit_here(config: Config, site: Site) -> FailedChecks | None:
@@ -143,6 +202,12 @@ def unfit_here(config: Config, site: Site) -> FailedChecks | None:
             _LOG.warning("%s: %s; %s", check.name, check.text, check.remedy)
     failed = tuple(check for check in checks if check.level is CheckLevel.ERROR)
     return FailedChecks(failed) if failed else None
+
+
+def _failing(config: Config) -> set[str]:
+    """The names of the checks of this computer that fail now.  Blocks for the disk."""
+    checks = [check_clock(), check_disk(config.recorder), *check_processor(config.vision.workers)]
+    return {check.name for check in checks if check.level is CheckLevel.ERROR}
 
 
 @asynccontextmanager

@@ -12,6 +12,7 @@ from pathlib import Path
 from flightd.adapters.journal import JournalFormatter, JournalMonitor, goes_to_journal
 from flightd.adapters.metrics.metrics import MetricsBook
 from flightd.adapters.metrics.server import MetricsServer
+from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.systemd import SystemdMonitor
 from flightd.config.metrics import MetricsConfig
 from flightd.ports import Monitor
@@ -55,13 +56,27 @@ def note_start(environment: Mapping[str, str]) -> None:
             )
 
 
+def is_restarted(environment: Mapping[str, str]) -> bool:
+    """Whether a service manager waits for this daemon, to start it anew when it ends."""
+    return bool(environment.get("NOTIFY_SOCKET")) and _mark(environment) is not None
+
+
 @asynccontextmanager
 async def monitors(
-    settings: MetricsConfig, environment: Mapping[str, str], *, journal: bool
+    settings: MetricsConfig,
+    environment: Mapping[str, str],
+    *,
+    journal: bool,
+    recent: RecentLog | None = None,
 ) -> AsyncIterator[list[Monitor]]:
-    """Who watches the daemon from this machine.  UnavailableError when the metrics' port is taken."""
+    """Who watches the daemon from this machine; `recent` hears of everything that is logged, too.
+    UnavailableError when the metrics' port is taken."""
     found: list[Monitor] = []
     async with AsyncExitStack() as stack:
+        if recent is not None:
+            logging.getLogger().addHandler(recent)
+            stack.callback(logging.getLogger().removeHandler, recent)
+            found.append(recent)
         if journal:
             lines = LineWriter(sys.stderr)
             stack.callback(lines.close)

@@ -19,7 +19,12 @@ if TYPE_CHECKING:
     from flightd.doctor.diagnosis import Diagnosis
 
 LEAST_ROCK_S, MOST_ROCK_S = 5.0, 120.0
-_COLOURS = {"ok": typer.colors.GREEN, "warning": typer.colors.YELLOW, "error": typer.colors.RED}
+_COLOURS = {
+    "ok": typer.colors.GREEN,
+    "warning": typer.colors.YELLOW,
+    "error": typer.colors.RED,
+    "unseen": typer.colors.BLUE,
+}
 
 
 def register(app: typer.Typer) -> None:
@@ -83,13 +88,16 @@ def doctor(
 
 async def _examined(config: Config, path: Path, rock_s: float, *, quick: bool) -> Diagnosis:
     """Composed as for a flight: InputError where configuration and site are not sound."""
-    from flightd.app.build import detector_of, ground_link, pilot_of, plan_of
+    from flightd.adapters.vehicle.connect import connect_vehicle
+    from flightd.app.build import detector_of, ground_link, interlock_of, pilot_of, plan_of
     from flightd.doctor.diagnosis import Subject, examine, examine_quickly, measure_delay
     from flightd.runtime.clock import LoopClock
     from flightd.site.site_file import load_site
 
     site, clock = load_site(config.mission.site), LoopClock()
     pilot_of(config, site)
+    interlock_of(config, site, clock)
+    connect_vehicle(config.vehicle, clock, config.control, cells=config.battery.cells)
     detector = detector_of(config, site)()
     subject = Subject(
         config,

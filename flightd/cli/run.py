@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import signal
 import sys
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from flightd.core.errors import RunError
+from flightd.core.errors import InputError, RunError, UnavailableError
 
 EXAMPLES = """Examples:
 
@@ -37,17 +38,26 @@ def run(
     SIGINT and SIGTERM hand the vehicle back at once (exit 130 and 143).  Started while its vehicle flies,
     it keeps it level, reports, and lands.  Started anew by systemd it never starts a flight by itself.
     """
-    from flightd.app.run import prepare, run_until_signal
+    from flightd.adapters.store.settings_file import SettingsFile
+    from flightd.app.run import RestartAsked, prepare, run_until_signal
     from flightd.cli.flight_progress import FlightProgress
     from flightd.config.schema import load_config
     from flightd.core.types import Phase
 
-    flight = prepare(load_config(config), config, resume=resume)
+    taken_back = ""
+    with contextlib.suppress(InputError, UnavailableError):  # whatever stands there is flown by, or refused
+        taken_back = SettingsFile(config).begin()
+    if taken_back:
+        print(f"flightd: {taken_back}", file=sys.stderr)
+    flight = prepare(load_config(config), config, resume=resume, taken_back=taken_back)
     with FlightProgress(shown=not flight.journal) as progress:
         result = asyncio.run(run_until_signal(flight, progress))
     if isinstance(result, signal.Signals):
         print(f"flightd: stopped by {result.name}; the vehicle was handed back", file=sys.stderr)
         raise typer.Exit(128 + result)
+    if isinstance(result, RestartAsked):
+        print("flightd: ends, to be started anew as the ground asked", file=sys.stderr)
+        return
     print(f"{result.reason}; {result.nodes_done} of {result.nodes_planned} nodes visited", file=sys.stderr)
     if result.phase is not Phase.DONE:
         raise RunError(f"mission {result.phase}: {result.reason}")

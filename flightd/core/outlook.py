@@ -20,13 +20,14 @@ class Outlook:
     """`obstacles` is all that keeps the drone on the ground while it waits there, worst first; `way` the
     nodes that it flies over next, in order (not those far ahead).  `battery_left_s` is how long the charge
     above the reserve lasts in the air and `home_s` how long the way to the nearest charge pad takes; NaN: not
-    known."""
+    known.  `plan` is the id of the order that the plan came with; empty: the configuration's."""
 
     hazards: tuple[HazardSeen, ...] = ()
     obstacles: tuple[str, ...] = ()
     way: tuple[str, ...] = ()
     battery_left_s: float = math.nan
     home_s: float = math.nan
+    plan: str = ""
 
 
 NO_OUTLOOK = Outlook()

@@ -358,15 +358,23 @@ class CommandKind(enum.StrEnum):
     HOME = "home"
     LAND = "land"
     STOP = "stop"
+    PLAN = "plan"
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """An operator's order; `node` only with GOTO."""
+    """An operator's order; `node` only with GOTO.
+
+    PLAN: to visit `nodes` in that order with the next start (none: what the configuration says) and to count
+    what hangs on the shelf `levels` there (none: on all).  START with `plan`: only if the plan that stands is
+    the one that was ordered with this id."""
 
     id: str
     kind: CommandKind
     node: str = ""
+    nodes: tuple[str, ...] = ()
+    levels: tuple[int, ...] = ()
+    plan: str = ""
 
 
 class Phase(enum.StrEnum):

@@ -9,11 +9,12 @@ from flightd.core.refusal import Refusal
 
 
 class CheckLevel(StrEnum):
-    """OK, WARNING (flies, but look at it) or ERROR (not fit to fly)."""
+    """OK, WARNING (flies, but look at it), ERROR (not fit to fly), or UNSEEN: not looked at here."""
 
     OK = "ok"
     WARNING = "warning"
     ERROR = "error"
+    UNSEEN = "unseen"
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,8 @@ class Check:
     level: CheckLevel
     text: str
     remedy: str = ""
+    fix: str = ""
+    """The parameter that the drone can set right itself; empty where it cannot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,3 +49,7 @@ def warning(name: str, text: str, remedy: str) -> Check:
 
 def error(name: str, text: str, remedy: str) -> Check:
     return Check(name, CheckLevel.ERROR, text, remedy)
+
+
+def unseen(name: str, text: str, remedy: str) -> Check:
+    return Check(name, CheckLevel.UNSEEN, text, remedy)

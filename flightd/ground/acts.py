@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
+from flightd.core.errors import FlightdError, InputError
 from flightd.ground.access.access import Access
 from flightd.ground.access.roles import Identity, may_order
 from flightd.ground.drone_link import DroneLink
+from flightd.ground.json_http import status_of
 from flightd.ground.messages import Act, read_act
 
 
@@ -38,7 +39,7 @@ class Orders:
         self.access.write_down(
             who,
             address,
-            f"{act.command} {act.node}".rstrip(),
+            f"{act.command} {act.node or act.plan}".rstrip(),
             name,
             outcome="accepted" if status == 200 else "refused",
             text=str(answer.get("refused", "repeated" if answer.get("repeated") else "")),
@@ -54,8 +55,6 @@ async def _handed_on(drone: DroneLink, act: Act, who: Identity | None) -> tuple[
         return 403, {"refused": f"{who.name} has the role {who.role}; {act.command} needs the role operator"}
     try:
         accepted = await drone.act(act)
-    except (UnavailableError, TransientError) as err:
-        return 503, {"refused": str(err)}
     except FlightdError as err:
-        return 409, {"refused": str(err).removeprefix("refused: ")}
+        return status_of(err, 409), {"refused": str(err).removeprefix("refused: ")}
     return 200, {"accepted": True, "repeated": accepted.repeated}

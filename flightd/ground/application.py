@@ -22,6 +22,7 @@ from flightd.ground.access.roles import Identity, Role
 from flightd.ground.access.session_routes import session_routes
 from flightd.ground.acts import Orders
 from flightd.ground.browser import Browser
+from flightd.ground.doctor.routes import doctor_routes
 from flightd.ground.flights.flights import Flights
 from flightd.ground.flights.routes import flight_routes
 from flightd.ground.guards import Guard, Hosts
@@ -29,6 +30,7 @@ from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
 from flightd.ground.json_http import as_json, is_json, json_body, status_of
 from flightd.ground.messages import SentAct, answer_message, read_page_message, session_message
+from flightd.ground.missions.routes import mission_routes
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.site_page.routes import site_page
@@ -67,6 +69,8 @@ def application(
         *site_page(folder, maps),
         *flight_routes(flights),
         *studio_routes(studio),
+        *doctor_routes(hub.drones),
+        *mission_routes(folder, hub.drones),
         *guide_routes(),
         *session_routes(access),
         Mount("/static", StaticFiles(directory=STATIC)),

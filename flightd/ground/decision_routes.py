@@ -15,7 +15,7 @@ from starlette.routing import BaseRoute, Route
 
 from flightd.adapters.ground_link.protocol import DECODE_ERRORS
 from flightd.core.errors import InputError, RunError
-from flightd.ground.access.gate import identity_of, note_act
+from flightd.ground.access.gate import note_act, person_of
 from flightd.ground.decision_book import Decided, Decision, DecisionBook
 from flightd.ground.json_http import as_json, is_json, json_body
 from flightd.ground.stock_routes import StockAnswers, answered, told_seconds
@@ -58,8 +58,7 @@ def decision_routes(asked: StockAnswers, folder: Path | None) -> list[BaseRoute]
             raise RunError(
                 "the place was looked at again meanwhile", remedy="decide about what is shown of it now"
             )
-        person = identity_of(request)
-        who = said.who.strip() if person.by == "local" else person.name  # a name that is typed proves nothing
+        who = person_of(request, said.who)
         note_act(request, f"{said.what} at {said.place}")
         decision = Decision(
             said.id, said.place, time.time_ns(), place.utc_ns, said.what, who, said.note.strip()

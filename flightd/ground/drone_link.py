@@ -6,28 +6,39 @@ import asyncio
 import logging
 import math
 from collections import Counter, deque
-from collections.abc import Iterable
-from typing import Any, Protocol
+from collections.abc import Awaitable, Callable, Iterable, Sequence
+from typing import Any, Protocol, TypeVar
 
 from flightd.adapters.ground_link.client import Address, GroundClient
-from flightd.adapters.ground_link.protocol import Accepted, EventReport, Role, StatusReport, Welcome
-from flightd.core.errors import FlightdError, RunError, TransientError, UnavailableError
+from flightd.adapters.ground_link.protocol import (
+    Accepted,
+    EventReport,
+    PlanAnswer,
+    Planned,
+    Role,
+    StatusReport,
+    Welcome,
+)
+from flightd.core.errors import FlightdError, InputError, RunError, TransientError, UnavailableError
 from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind
-from flightd.ground.bounded import Shared
+from flightd.ground.bounded import Room, Shared
 from flightd.ground.messages import Act, LinkState, PictureKey, picture_message
 
 _LOG = logging.getLogger(__name__)
+_T = TypeVar("_T")
 ATTEND_S = 0.5
 _STATE_S = 0.5
 _ANSWER_S = 2.0
 _AGAIN_S = 0.5
 _NO_PICTURE_S = 1.0
+_NO_PLAN_S = 5.0
 _EVENTS_KEPT = 100
 _TRACK_STEP_M = 0.05
 _TRACK_KEPT = 4000
 MOST_ACTS = 16
 """So many acts may wait for their answer at once; what lands the drone is never turned away."""
+_MOST_QUESTIONS = 4
 _VISITED = "visited"
 """The event of a node that was visited: its name is the text."""
 _URGENT = frozenset({CommandKind.STOP, CommandKind.LAND})
@@ -80,7 +91,12 @@ class DroneLink:
         self._attends = False
         self._trouble = "connecting"
         self._acting = 0
+        self._questions = Room(_MOST_QUESTIONS, f"{name} is looked after already")
         self._inventory = Shared(self._asked_inventory)
+        self.on_plan: Callable[[PlanAnswer], Awaitable[None]] | None = None
+        """Hears what is left of the drone's plan, whenever that changes."""
+        self._plan_changed = asyncio.Event()
+        self._plan_seen: tuple[object, ...] = ()
 
     async def run(self) -> None:
         """Connect, and again after whatever went wrong."""
@@ -110,9 +126,50 @@ class DroneLink:
             if act.command in _URGENT:  # whatever flies there now
                 return await client.order(act.command, act.node, act.id, session="", seen_ns=0)
             session, seen_ns = act.session or None, act.seen_ns or None
-            return await client.order(act.command, act.node, act.id, session=session, seen_ns=seen_ns)
+            return await client.order(
+                act.command, act.node, act.id, session=session, seen_ns=seen_ns, plan=act.plan
+            )
         finally:
             self._acting -= 1
+
+    async def plan_flight(
+        self,
+        nodes: Sequence[str],
+        levels: Sequence[int],
+        order_id: str = "",
+        *,
+        best_order: bool = False,
+        dry: bool = False,
+        session: str = "",
+        seen_ns: int = 0,
+    ) -> Planned:
+        """Hand the drone the nodes of its next flight, or ask what that would be.  As `act` raises."""
+        client = self._client
+        if client is None:
+            raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
+        if self._acting >= MOST_ACTS:
+            raise RunError(f"{MOST_ACTS} acts wait for an answer of {self.name} already")
+        self._acting += 1
+        try:
+            return await client.plan_flight(
+                nodes,
+                levels,
+                order_id,
+                best_order=best_order,
+                dry=dry,
+                session=session or None,
+                seen_ns=seen_ns or None,
+            )
+        finally:
+            self._acting -= 1
+
+    async def ask(self, question: Callable[[GroundClient], Awaitable[_T]]) -> _T:
+        """What the drone answers to a question of who looks after it.  As `GroundClient` raises;
+        UnavailableError where it cannot be reached, or too many ask at once."""
+        if self._client is None:
+            raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
+        with self._questions.taken():
+            return await question(self._client)
 
     async def inventory(self) -> tuple[dict[str, str], ...]:
         """What it has counted on this flight, place by place: asked once for all that want to know now.
@@ -133,6 +190,7 @@ class DroneLink:
                 tasks.create_task(self._listen(client), name=f"{self.name} listens")
                 tasks.create_task(self._attend(client), name=f"{self.name} attends")
                 tasks.create_task(self._tell_states(), name=f"{self.name} state")
+                tasks.create_task(self._follow_plan(client), name=f"{self.name} plan")
                 for camera in welcome.cameras if welcome.picture_fps > 0 else ():
                     name = f"{self.name} {camera} pictures"
                     tasks.create_task(self._look(client, camera), name=name)
@@ -199,8 +257,31 @@ class DroneLink:
             self._track.append((round(at.x_m, 3), round(at.y_m, 3)))
             self._pages.keep(self.name, "track", tuple(self._track))
         self._pages.tell(self.name, "status", report)
+        seen = (report.session, report.plan, report.nodes_done, report.nodes_planned, report.phase)
+        if seen != self._plan_seen:
+            self._plan_seen = seen
+            self._plan_changed.set()
         if silent:
             self._tell_state()
+
+    async def _follow_plan(self, client: GroundClient) -> None:
+        """Ask for the plan whenever it, or what is left of it, may be another."""
+        self._plan_changed.set()
+        while True:
+            await self._plan_changed.wait()
+            self._plan_changed.clear()
+            try:
+                plan = await client.plan()
+            except (RunError, InputError):  # an older drone knows no plans
+                await asyncio.sleep(_NO_PLAN_S)
+                continue
+            except UnavailableError:
+                await asyncio.sleep(_AGAIN_S)
+                self._plan_changed.set()
+                continue
+            self._pages.tell(self.name, "plan", plan)
+            if self.on_plan is not None:
+                await self.on_plan(plan)
 
     async def _attend(self, client: GroundClient) -> None:
         """Attend while the page of somebody is open who may fly; without one only measure the way.  With a

@@ -68,6 +68,8 @@ class Act(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     id: Annotated[str, Meta(min_length=8, max_length=64)]
     command: CommandKind
     node: _Name = ""
+    plan: _Name = ""
+    """Only with start: the plan that it is for; empty: whichever stands."""
     session: _Name = ""
     """The flight that the person saw, from `welcome`; empty: the one that the station sees."""
     seen_ns: Annotated[int, Meta(ge=0)] = 0

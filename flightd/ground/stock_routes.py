@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import msgspec
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from flightd.core.errors import FlightdError, InputError
+from flightd.core.errors import InputError
 from flightd.core.inventory import Observation, Standing
 from flightd.ground.bounded import Threads
 from flightd.ground.evidence_outlines import outlines
-from flightd.ground.json_http import JSON, as_json, status_of
+from flightd.ground.json_http import JSON, AnswerTo, as_json, or_refused, refusal
 from flightd.ground.pages import page
-from flightd.ground.shown_text import shown
 from flightd.ground.stores import StockView, Stores
 from flightd.inventory.code_search import found_places
 from flightd.inventory.elevation import fronts_of
@@ -47,12 +46,9 @@ class CountingDrone(Protocol):
         ...
 
 
-_Answer: TypeAlias = Callable[[Request], Awaitable[Response]]
-
-
 def stock_routes(asked: StockAnswers) -> list[BaseRoute]:
     """The page, and what it asks."""
-    ways: dict[str, _Answer] = {
+    ways: dict[str, AnswerTo] = {
         "": asked.stores,
         "/places": asked.places,
         "/place": asked.place,
@@ -65,26 +61,20 @@ def stock_routes(asked: StockAnswers) -> list[BaseRoute]:
     return [*page("/stock"), *reads]
 
 
-def answered(answer: _Answer) -> _Answer:
-    """What goes wrong as a status and one line for a person."""
+def answered(answer: AnswerTo) -> AnswerTo:
+    """Or refused, as is what a file that anybody wrote can lead to."""
+    asked = or_refused(answer)
 
     async def guarded(request: Request) -> Response:
         try:
-            return await answer(request)
-        except FlightdError as err:
-            mistaken = 404 if request.method == "GET" else 400
-            return _refused(str(err).removeprefix("refused: "), status_of(err, mistaken))
+            return await asked(request)
         except OSError as err:
-            return _refused(f"cannot be read: {err.strerror or err}", 503)
-        except (ArithmeticError, LookupError, TypeError, ValueError) as err:  # of a file that anybody wrote
+            return refusal(f"cannot be read: {err.strerror or err}", 503)
+        except (ArithmeticError, LookupError, TypeError, ValueError) as err:
             _LOG.exception("%s cannot be answered", request.url.path)
-            return _refused(f"this inventory cannot be shown: {type(err).__name__}", 409)
+            return refusal(f"this inventory cannot be shown: {type(err).__name__}", 409)
 
     return guarded
-
-
-def _refused(why: str, status: int) -> Response:
-    return as_json({"refused": shown(why)}, status)
 
 
 class StockAnswers:

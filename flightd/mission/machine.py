@@ -210,6 +210,7 @@ _OVER_PAD: Mapping[tuple[Trigger, Intent], tuple[Phase, Cause]] = {
 
 _ANY = {intent: intent for intent in Intent}
 _TURNS: Mapping[Trigger, tuple[Collection[Phase], Mapping[Intent, Intent]]] = {
+    Trigger.PLAN: ((Phase.PREFLIGHT,), {Intent.WAIT: Intent.WAIT}),
     Trigger.START: (WAITING, {Intent.WAIT: Intent.VISIT, Intent.VISIT: Intent.VISIT}),
     Trigger.PAUSE: (FLYING, _ANY),
     Trigger.RESUME: (FLYING, _ANY),
@@ -235,6 +236,7 @@ COMMANDS: Mapping[CommandKind, Trigger] = {
     CommandKind.HOME: Trigger.GO_HOME,
     CommandKind.LAND: Trigger.LAND_HERE,
     CommandKind.STOP: Trigger.STOP,
+    CommandKind.PLAN: Trigger.PLAN,
 }
 
 

@@ -11,9 +11,12 @@ from dataclasses import replace
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
+from flightd.core.errors import InputError
 from flightd.core.outlook import Outlook
+from flightd.core.planned_flight import PlannedFlight, StandingPlan
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, Phase
 from flightd.mission.battery.swap import BatterySwap
+from flightd.mission.chosen_plan import ChosenPlans
 from flightd.mission.event_log import EventLog
 from flightd.mission.flight.phase_progress import PhaseProgress
 from flightd.mission.flight.reference import ReferenceGenerator, ReferenceTask
@@ -73,6 +76,13 @@ class Mission:
         autostart: bool | None = None,
     ) -> None:
         start = site.nodes[plan.start]
+        self.plan = self._configured = plan
+        self._chosen = ChosenPlans(site, plan, policy, config, scanner)
+        self._scanner = scanner
+        self._plan_id = ""
+        self._levels: tuple[int, ...] = ()
+        self._armed = False
+        """The vehicle was armed at the newest tick."""
         self._events = EventLog()
         self._orders = StandingOrders()
         by_itself = config.mission.autostart if autostart is None else autostart
@@ -146,7 +156,23 @@ class Mission:
         """What an operator may order now; no start before the flight is ready."""
         possible = possible_commands(self.state)
         held = self.state.waiting and not self._clearance.is_ready
-        return possible - {CommandKind.START} if held else possible
+        withheld = {CommandKind.START} if held else set()
+        return possible - withheld - ({CommandKind.PLAN} if self._armed else set())
+
+    @property
+    def standing(self) -> StandingPlan:
+        """The plan that is flown, or would be with the next start."""
+        nodes = tuple(stop.node for stop in self.plan.stops if stop.visit)
+        return StandingPlan(self._plan_id, nodes, self._levels, tuple(self.visited), self.remaining)
+
+    def planned(self, nodes: Sequence[str], levels: Sequence[int], *, best_order: bool) -> PlannedFlight:
+        """What a flight over the nodes would be, from the pad that it stands on first and with the battery as
+        it is told now (none: what the configuration says); changes nothing.  InputError where it
+        cannot be flown."""
+        plan, levels = self._configured, tuple(levels) if nodes else ()
+        if nodes:
+            plan = self._chosen.plan(nodes, levels, best_order=best_order)
+        return self._chosen.estimate(plan, levels, *self._charging.charge)
 
     def outlook(self, now_ns: int) -> Outlook:
         """What it expects and what troubles it."""
@@ -157,6 +183,7 @@ class Mission:
             way=self._route.way,
             battery_left_s=left_s,
             home_s=home_s,
+            plan=self._plan_id,
         )
 
     def drain_events(self) -> tuple[Event, ...]:
@@ -169,7 +196,14 @@ class Mission:
         if trigger not in taken_in(self.state):
             self._events.report(now_ns, EventLevel.WARNING, "command", refusal(command, self.state))
             return
+        if kind is CommandKind.PLAN:
+            self._take_plan(command, now_ns)
+            return
         if self.state.waiting and kind in {CommandKind.START, CommandKind.PAUSE}:
+            if kind is CommandKind.START and command.plan and command.plan != self._plan_id:
+                text = "start refused: another plan stands than the one that it was given for"
+                self._events.report(now_ns, EventLevel.WARNING, "command", text)
+                return
             self._take_start(trigger, now_ns)
             return
         if self.phase is Phase.ARMING and kind is CommandKind.PAUSE:
@@ -180,6 +214,26 @@ class Mission:
             self._go_home(trigger, Happened(trigger), now_ns)
         elif kind is CommandKind.GOTO:
             self._route.go_to(now_ns, command.node)
+
+    def _take_plan(self, command: Command, now_ns: int) -> None:
+        """Fly other nodes with the next start, or again what the configuration says; one that cannot be flown
+        changes nothing."""
+        plan, why = self._configured, "the vehicle is armed" if self._armed else ""
+        try:
+            if command.nodes and not why:
+                plan = self._chosen.plan(command.nodes, command.levels)
+        except InputError as err:
+            why = str(err)
+        if why:
+            self._events.report(now_ns, EventLevel.WARNING, "command", f"plan refused: {why}")
+            return
+        self.plan, self._levels = plan, command.levels if command.nodes else ()
+        self._plan_id = command.id if command.nodes else ""
+        self._route.begin(plan)
+        self._scanner.choose(self._levels)
+        counted = f", counted on level {', '.join(map(str, self._levels))}" if self._levels else ""
+        text = f"{plan.nodes} nodes{counted}" if command.nodes else "as configured again"
+        self._events.report(now_ns, EventLevel.INFO, "plan", text)
 
     def _take_start(self, trigger: Trigger, now_ns: int) -> None:
         """Begin a start's count-down if nothing keeps the drone on the ground, or take it back."""
@@ -194,6 +248,7 @@ class Mission:
 
     def step(self, inputs: MissionInputs) -> Guidance:
         """Advance by one tick."""
+        self._armed = inputs.vehicle is not None and inputs.vehicle.armed
         doubts = self._relocator.step(inputs, self.phase, self._progress.phase_s(inputs.now_ns))
         if self._relocator.jumped:
             self._correct(inputs)

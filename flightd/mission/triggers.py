@@ -67,6 +67,7 @@ class Trigger(enum.Enum):
     BATTERY_LOW = "battery low"
     DETECTOR_LOST = "a detector process was replaced"
     RECORDER_DEAD = "the log's writer was started again"
+    PLAN = "a plan ordered"
     START = "start ordered"
     GOTO = "another node ordered"
     GO_HOME = "ordered home"

@@ -12,11 +12,13 @@ from typing import Any
 from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.keys import load_pair, load_public, make_keys
 from flightd.adapters.ground_link.link import ZmqGround
+from flightd.adapters.ground_link.maintenance_desk import Maintainer
 from flightd.config.ground import GroundConfig
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import (
     Attitude,
+    CommandKind,
     Demand,
     Event,
     EventLevel,
@@ -67,9 +69,9 @@ def address_of(link: ZmqGround) -> Address:
 
 
 @contextlib.asynccontextmanager
-async def serving(config: GroundConfig) -> AsyncIterator[ZmqGround]:
+async def serving(config: GroundConfig, maintainer: Maintainer | None = None) -> AsyncIterator[ZmqGround]:
     """The link, answering."""
-    with ZmqGround(config, SITE, LoopClock()) as link:
+    with ZmqGround(config, SITE, LoopClock(), maintainer=maintainer) as link:
         async with asyncio.TaskGroup() as tasks:
             running = tasks.create_task(link.run())
             try:
@@ -80,11 +82,11 @@ async def serving(config: GroundConfig) -> AsyncIterator[ZmqGround]:
 
 @contextlib.asynccontextmanager
 async def telling(link: ZmqGround, phase: Phase = Phase.FOLLOW) -> AsyncIterator[None]:
-    """Statuses in quick succession, as a flying daemon gives them."""
+    """Statuses in quick succession, as a daemon gives them: armed but in the preflight."""
 
     async def tell() -> None:
         while True:
-            tell_once(link, phase)
+            tell_once(link, phase, armed=phase is not Phase.PREFLIGHT)
             await asyncio.sleep(0.02)
 
     async with asyncio.TaskGroup() as tasks:
@@ -103,7 +105,12 @@ async def connected(client: GroundClient, link: ZmqGround) -> None:
 
 
 def tell_once(
-    link: ZmqGround, phase: Phase = Phase.FOLLOW, x_m: float = 1.0, battery_frac: float = 0.8
+    link: ZmqGround,
+    phase: Phase = Phase.FOLLOW,
+    x_m: float = 1.0,
+    battery_frac: float = 0.8,
+    *,
+    armed: bool = True,
 ) -> None:
     now_ns = LoopClock().now_ns()
     attitude = Attitude(now_ns - 10_000_000, 0.01, -0.02, 0.0)
@@ -114,8 +121,8 @@ def tell_once(
         0.0,
         "GUIDED_NOGPS",
         True,
-        True,
-        LandedState.IN_AIR,
+        armed,
+        LandedState.IN_AIR if armed else LandedState.ON_GROUND,
         battery_frac,
         12.1,
         now_ns - 500_000_000,
@@ -124,7 +131,8 @@ def tell_once(
     output = TickOutput(None, Demand.FLY, phase, "arrived", "A2", 1, 12, pose, None)
     latency_ms = {"detection": 5.0, "total": 71.0}
     told = Snapshot(TickInput(now_ns, vehicle=vehicle), output, 1, 12, 300, 2, 29.0, latency_ms)
-    link.tell(replace(told, possible=possible_in(phase)))
+    possible = possible_in(phase) - (frozenset() if armed else {CommandKind.PAUSE})  # no start is under way
+    link.tell(replace(told, possible=possible))
 
 
 def event(text: str) -> Event:

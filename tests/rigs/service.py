@@ -91,8 +91,9 @@ class ServiceRig:
         return "\n".join(lines)
 
     @asynccontextmanager
-    async def world(self) -> AsyncIterator[None]:
-        """The simulated vehicle, with the parameters that are shipped, and camera, alive meanwhile."""
+    async def world(self, **parameters: float) -> AsyncIterator[None]:
+        """The simulated vehicle, with the parameters that are shipped but for these, and camera, alive
+        meanwhile."""
         context = multiprocessing.get_context("spawn")
         channel = Channel()
         spec = WorldSpec(
@@ -100,6 +101,7 @@ class ServiceRig:
             seed=3,
             camera_address=("127.0.0.1", self.ports[0]),
             vehicle_ports=(self.ports[1],),
+            parameters=parameters,
             camera=CAMERA.__class__(**_fields(CAMERA) | {"mount": _turned(CAMERA.mount)}),
         )
         log = self.folder / "truth.mcap"

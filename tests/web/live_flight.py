@@ -77,6 +77,11 @@ class _PacedFlight(IdealFlight):
         self.phase = Phase.PREFLIGHT
         self.on_tick = self._keep_pace
 
+    def pace(self, speed: float) -> None:
+        """From now on so many times as fast as the clock."""
+        self._began = (time.monotonic(), self.now_ns())
+        self._speed = speed
+
     def end(self) -> None:
         """Leave the flight at its next tick."""
         self._over.set()
@@ -105,6 +110,7 @@ class LiveFlight:
         self._mailbox = _Mailbox()
         self._flight = _PacedFlight(site, config, self._mailbox, speed)
         self._link = ZmqGround(local(picture_fps=5.0, **ground), site, self._flight)
+        self._link.plan_by(self._flight.pilot.mission)
         camera = SimCamera(lens=config.camera.lens(), mount=config.camera.mount())
         self._renderer = Renderer(site, camera)
         self._lens = config.camera.lens()
@@ -147,6 +153,11 @@ class LiveFlight:
     def faults(self) -> Faults:
         """What is wrong with the drone; a test changes it in flight."""
         return self._flight.faults
+
+    def pace(self, speed: float) -> None:
+        """Fly so many times as fast as the clock from now on.  What is seen is old by the flight's own clock:
+        a fast flight refuses an order that a slow machine brings late."""
+        self._flight.pace(speed)
 
     def wait_s(self, seconds: float) -> None:
         """Let it fly on."""

@@ -23,17 +23,21 @@ _PAGE = (
 )
 _DECISION = b'{"id":"12345678","place":"AL-01-1-1","what":"fine","who":"ann","seen_s":null,"note":""}'
 _SET = b'{"name":"hall","paint":"yellow"}'
+_PLAN = b'{"id":"12345678","drone":"nobody","nodes":["A1","A2"],"levels":[1],"best_order":true}'
 _SIGN_IN = b'{"name":"otto","password":"correct horse battery"}'
 _ODD_VALUES: tuple[Any, ...] = (
     None, True, -1, 1e308, 2**70, "", "\x00", "x" * 3000, [], [[]], {}, {"": {}}, "\ufffd", "../../etc",
 )  # fmt: skip
 _ANY_WORDS = {"seen_s", "note", "who", "name", "password"}
 """Fields in which an odd value may be in order."""
+_MAY_LACK = {"note", "node", "levels", "best_order"}
 _PATHS = (
     "/api/stock/place?store=monday&code=", "/api/stock/find?store=monday&text=", "/api/flights/",
     "/api/guide/pages/", "/api/stock/picture?store=monday&name=", "/static/", "/api/guide/pictures/",
     "/api/stock/export?store=monday&format=", "/api/guide/search?q=", "/api/flights?known=",
     "/api/studio/sets/", "/api/studio/sets/hall/pictures/", "/api/studio/profiles/",
+    "/api/missions?site=", "/api/missions/estimate?drone=nobody&node=",
+    "/api/missions/recount?store=monday&place=",
 )  # fmt: skip
 
 
@@ -143,14 +147,15 @@ def wrong_types(draw: random.Random, station: Station) -> bytes:
     path, good = draw.choice(
         (
             ("/drones/demo/acts", _ACTS[0]), ("/api/session", _SIGN_IN),
-            ("/api/stock/decisions?store=monday", _DECISION), ("/api/studio/sets", _SET),
+            ("/api/stock/decisions?store=monday", _DECISION), ("/api/missions/fly", _PLAN),
+            ("/api/studio/sets", _SET),
         )
     )  # fmt: skip
     document = json.loads(good)
     if draw.random() < 0.2:
         document = draw.choice(_ODD_VALUES)
     elif draw.random() < 0.3:
-        del document[draw.choice([key for key in document if key not in {"note", "node"}])]
+        del document[draw.choice([key for key in document if key not in _MAY_LACK])]
     else:
         key = draw.choice([key for key in document if key not in _ANY_WORDS] or ["more"])
         document[key] = draw.choice([value for value in _ODD_VALUES if not (key == "node" and value == "")])
@@ -165,7 +170,9 @@ def deep_or_long(draw: random.Random, station: Station) -> bytes:
 
 def wrong_kind(draw: random.Random, station: Station) -> bytes:
     kind = draw.choice(("text/plain", "", "application/jsonp", "multipart/form-data; boundary=x", "\x7f"))
-    path = draw.choice(("/drones/demo/acts", "/api/session", "/api/stock/decisions?store=monday"))
+    path = draw.choice(
+        ("/drones/demo/acts", "/api/session", "/api/stock/decisions?store=monday", "/api/missions/fly")
+    )
     return _post(draw, station, path, draw.choice(_ACTS), **{"Content-Type": kind})
 
 
@@ -211,6 +218,7 @@ def spoilt(draw: random.Random, station: Station) -> bytes:
         opening(station),
         _post(draw, station, "/drones/nobody/acts", _ACTS[1]),
         _post(draw, station, "/api/stock/decisions?store=monday", _DECISION),
+        _post(draw, station, "/api/missions/fly", _PLAN),
         _request("GET", "/api/stock/find?store=monday&text=%2800%29340123450002439853", _own(station)),
     ]
     return spoil_bytes(draw, corpus)

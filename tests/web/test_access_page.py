@@ -71,7 +71,7 @@ def test_a_person_signs_in_by_keyboard_sees_who_he_is_and_signs_out(
 ) -> None:
     with opened(browser, f"{url}/guide", size, scheme) as page:
         expect(page.get_by_role("heading", name="Sign in")).to_be_visible()
-        assert page.title() == "Sign in · flightd"
+        expect(page).to_have_title("Sign in · flightd")
         assert hindrances(page) == []
         assert page.evaluate("document.documentElement.scrollWidth") == size[0]
         sign_in(page, "otto")
@@ -115,6 +115,10 @@ def test_a_viewer_is_offered_what_he_may_and_stops_the_drone(
         )
         assert refused == 403, "whatever the page shows"
         assert flight.phase is Phase.PREFLIGHT
+        page.get_by_role("link", name="Missions").click()
+        expect(page.get_by_text("vera is a viewer; what is kept and flown needs an operator")).to_be_visible()
+        expect(page.get_by_label("Name")).to_have_count(0)
+        page.get_by_role("link", name="Live").click()
         with page.expect_response(lambda answer: answer.url.endswith("/api/session")):
             other = page.context.new_page()
             other.goto(f"{url}/stock")

@@ -113,7 +113,8 @@ def test_what_is_found_nowhere_and_what_is_no_page_say_so(browser: Browser, url:
         page.goto(f"{url}/guide/nothing")
         heading(page, "The page cannot be shown")
         page.get_by_role("link", name="All pages").first.click()
-        heading(page, "flightd")
+        title = page.get_by_role("article").get_by_role("heading", name="flightd", exact=True)
+        expect(title).to_be_visible()
 
 
 def test_a_narrow_page_is_chosen_from_a_list(browser: Browser, url: str) -> None:

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import re
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from urllib.parse import urlsplit
 
 import pytest
+from markdown_it import MarkdownIt
 
+from flightd.ground.guide_pages import rendering
 from flightd.ground.guide_pages.rendering import (
     PICTURES,
     RenderedPage,
@@ -32,6 +36,23 @@ def test_every_page_that_is_shipped_can_be_read() -> None:
         page = rendered(topic)
         assert page.title
         assert page.html.startswith("<h2 ")
+
+
+def test_pages_that_are_asked_for_at_once_are_rendered_one_after_the_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The Markdown library's tables, filled at their first use, are no other thread's to read meanwhile."""
+    inside = threading.Semaphore(1)
+
+    def parser() -> MarkdownIt:
+        assert inside.acquire(blocking=False), "another page is being rendered"
+        threading.Event().wait(0.01)
+        inside.release()
+        return MarkdownIt("commonmark")
+
+    monkeypatch.setattr(rendering, "_parser", parser)
+    with ThreadPoolExecutor(4) as threads:
+        assert len(list(threads.map(rendered.__wrapped__, topics()[:4]))) == 4
 
 
 @pytest.mark.parametrize("topic", topics())

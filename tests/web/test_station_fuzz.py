@@ -31,6 +31,7 @@ PAGE_WORDS = (
     '{"say":"act","number":1,"drone":"nobody","act":{"id":"12345678","command":"stop"}}',
 )  # fmt: skip
 MARKS = '{"regions":[{"paint":true,"box":[1,2,30,40]},{"paint":false,"stroke":[[1,2],[3,4]],"width":9}]}'
+PROPOSAL = '{"base":"0123456789abcdef","changes":{"mission.height_m":1.5,"scan.pictures":null}}'
 ACT_WORDS = ('{"id":"12345678","command":"goto","node":"A4"}', '{"id":"12345678","command":"stop"}')
 
 
@@ -51,6 +52,12 @@ def requests(station: Station, draw: random.Random) -> list[bytes]:
         f"Content-Length: {len(BOOKS)}\r\nConnection: close\r\n\r\n{BOOKS}",
         f"PUT /api/studio/sets/hall/pictures/a.jpg HTTP/1.1\r\nHost: {host}\r\nOrigin: {station.origin}\r\n"
         f"Content-Type: application/json\r\nContent-Length: {len(MARKS)}\r\n\r\n{MARKS}",
+        f"GET /api/doctor/demo/report HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n",
+        *(
+            f"POST /api/doctor/demo/{path} HTTP/1.1\r\nHost: {host}\r\nOrigin: {station.origin}\r\n"
+            f"Content-Type: application/json\r\nContent-Length: {len(PROPOSAL)}\r\n\r\n{PROPOSAL}"
+            for path in ("settings", "check")
+        ),
     ]
     corpus = [request.encode() for request in whole]
     made = [spoil_bytes(draw, corpus) for _ in range(REQUESTS)]

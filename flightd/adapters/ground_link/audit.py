@@ -18,7 +18,8 @@ _CLOSE_S = 2.0
 
 
 class AuditEntry(msgspec.Struct, frozen=True):
-    """One command: who sent what from where, and what came of it (accepted, repeated or a refusal's code)."""
+    """One command: who sent what from where, and what came of it (accepted, repeated or a refusal's code).
+    `node` holds the nodes of a plan, with commas."""
 
     client: str
     role: str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import uuid
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -21,20 +21,32 @@ from flightd.adapters.ground_link.protocol import (
     VERSION,
     Accepted,
     Answer,
+    AskDoctor,
     AskInventory,
     AskPicture,
+    AskPlan,
+    AskSettings,
     AskStatus,
     Attend,
     Code,
+    DoctorAnswer,
     EventReport,
+    FixParameter,
     Hello,
     InventoryAnswer,
     Order,
     PictureAnswer,
+    PlanAnswer,
+    PlanFlight,
+    Planned,
+    ProposeSettings,
     Refused,
     Request,
+    Restart,
+    SettingsAnswer,
     StatusAnswer,
     StatusReport,
+    TakeSettingsBack,
     Welcome,
     decode_answer,
     decode_event,
@@ -48,7 +60,12 @@ from flightd.core.types import CommandKind
 RETRY_S = 1.0
 """An answer that does not come for so long is asked for again, with the same id."""
 
-_KINDS_OF_INPUT = {Code.MALFORMED, Code.VERSION, Code.NODE, Code.UNAVAILABLE}
+MAINTENANCE_S, PROPOSAL_S = 15.0, 75.0
+"""What looks after the drone takes a while: a look, and a proposal that is checked as a whole."""
+
+_KINDS_OF_INPUT = {
+    Code.MALFORMED, Code.VERSION, Code.NODE, Code.PLAN, Code.UNAVAILABLE, Code.INVALID,
+}  # fmt: skip
 _SHUT_OUT = {zmq.Event.HANDSHAKE_FAILED_AUTH, zmq.Event.HANDSHAKE_FAILED_PROTOCOL}
 """Events after which asking again is of no use."""
 
@@ -95,7 +112,8 @@ class GroundClient:
         self._requests: Any = self._socket(zmq.DEALER)
         self._status: Any = self._socket(zmq.SUB)
         self._monitor: Any = self._requests.get_monitor_socket()
-        self._asked: dict[str, asyncio.Future[tuple[Answer, list[bytes]]]] = {}
+        self._asked: dict[asyncio.Future[tuple[Answer, list[bytes]]], str] = {}
+        """What waits, for the answer to which request: an order may be sent again while the first waits."""
         self._reading: asyncio.Task[None] | None = None
         self._seen: set[int] = set()
         self.session = ""
@@ -140,18 +158,50 @@ class GroundClient:
         *,
         session: str | None = None,
         seen_ns: int | None = None,
+        plan: str = "",
     ) -> Accepted:
         """Give a command; sent again until it is answered, done once.  It is for the flight `session`, given
-        by who saw the status of `seen_ns`; left out: this client's, and the newest that it heard."""
+        by who saw the status of `seen_ns`; left out: this client's, and the newest that it heard.  A start
+        may name the `plan` that it is for."""
         order = Order(
             version=VERSION,
             id=order_id or _new_id(),
             command=kind,
             node=node,
+            plan=plan,
             session=self.session if session is None else session,
             seen_ns=self._seen_ns if seen_ns is None else seen_ns,
         )
         return await self._ask(order, Accepted)
+
+    async def plan_flight(
+        self,
+        nodes: Sequence[str],
+        levels: Sequence[int] = (),
+        order_id: str = "",
+        *,
+        best_order: bool = False,
+        dry: bool = False,
+        session: str | None = None,
+        seen_ns: int | None = None,
+    ) -> Planned:
+        """Hand a drone that stands disarmed the nodes of its next flight, or (`dry`) only ask what that would
+        be; the rest as `order`."""
+        request = PlanFlight(
+            version=VERSION,
+            id=order_id or _new_id(),
+            nodes=tuple(nodes),
+            levels=tuple(levels),
+            best_order=best_order,
+            dry=dry,
+            session=self.session if session is None else session,
+            seen_ns=self._seen_ns if seen_ns is None else seen_ns,
+        )
+        return await self._ask(request, Planned)
+
+    async def plan(self) -> PlanAnswer:
+        """The plan that is flown, or would be with the next start, and what is left of it."""
+        return await self._ask(AskPlan(version=VERSION, id=_new_id()), PlanAnswer)
 
     async def attend(self, leave: bool = False) -> Accepted:
         """Say that somebody watches this flight (at least once a second), or no longer does."""
@@ -175,6 +225,38 @@ class GroundClient:
             raise TransientError("the daemon's picture came without its JPEG")
         return picture, frames[1]
 
+    async def doctor(self) -> DoctorAnswer:
+        """What the drone finds of itself; RunError where it does not stand on the ground."""
+        return await self._ask(AskDoctor(version=VERSION, id=_new_id()), DoctorAnswer, MAINTENANCE_S)
+
+    async def fix(self, name: str, person: str = "") -> DoctorAnswer:
+        """Have a parameter of the autopilot set right and read back; what the drone finds then."""
+        request = FixParameter(version=VERSION, id=_new_id(), name=name, person=person)
+        return await self._ask(request, DoctorAnswer, MAINTENANCE_S)
+
+    async def settings(self) -> SettingsAnswer:
+        """The configuration's file as it stands."""
+        return await self._ask(AskSettings(version=VERSION, id=_new_id()), SettingsAnswer, MAINTENANCE_S)
+
+    async def propose(self, base: str, changes: Mapping[str, Any], person: str = "") -> SettingsAnswer:
+        """Have keys changed of the settings that `base` names; InputError where that is no sound
+        configuration."""
+        request = ProposeSettings(
+            version=VERSION, id=_new_id(), base=base, changes=dict(changes), person=person
+        )
+        return await self._ask(request, SettingsAnswer, PROPOSAL_S)
+
+    async def take_back(self, base: str, version: int, person: str = "") -> SettingsAnswer:
+        """Have a kept version of the settings brought back."""
+        request = TakeSettingsBack(
+            version=VERSION, id=_new_id(), base=base, version_kept=version, person=person
+        )
+        return await self._ask(request, SettingsAnswer, PROPOSAL_S)
+
+    async def restart(self, person: str = "") -> Accepted:
+        """Have the daemon started anew."""
+        return await self._ask(Restart(version=VERSION, id=_new_id(), person=person), Accepted)
+
     async def published(self) -> AsyncIterator[StatusReport | EventReport]:
         """Every status and event from now on, for ever.  InputError for a message of another version."""
         while True:
@@ -189,27 +271,31 @@ class GroundClient:
             self._seen_ns = max(self._seen_ns, status.stamp_ns)
         return status
 
-    async def _ask(self, request: Request, kind: type[_A]) -> _A:
-        return _expected((await self._answer(request, self._timeout_s))[0], kind)
+    async def _ask(self, request: Request, kind: type[_A], least_s: float = 0.0) -> _A:
+        return _expected((await self._answer(request, max(self._timeout_s, least_s)))[0], kind)
 
     async def _answer(self, request: Request, timeout_s: float) -> tuple[Answer, list[bytes]]:
         """The answer to this request, asked for again while it does not come."""
-        self._asked[request.id] = asyncio.get_running_loop().create_future()
+        asked: asyncio.Future[tuple[Answer, list[bytes]]] = asyncio.get_running_loop().create_future()
+        self._asked[asked] = request.id
         try:
             async with asyncio.timeout(timeout_s):
-                return await self._repeated(request)
+                return await self._repeated(request, asked)
         except TimeoutError:
             raise UnavailableError(await self._why_silent()) from None
         finally:
-            self._asked.pop(request.id).cancel()
+            del self._asked[asked]
+            asked.cancel()
 
-    async def _repeated(self, request: Request) -> tuple[Answer, list[bytes]]:
+    async def _repeated(
+        self, request: Request, asked: asyncio.Future[tuple[Answer, list[bytes]]]
+    ) -> tuple[Answer, list[bytes]]:
         patience_s = 4.0 if isinstance(request, AskPicture) else RETRY_S
         while True:
             await self._requests.send(encode(request))
             try:
                 async with asyncio.timeout(patience_s):
-                    return await asyncio.shield(self._asked[request.id])
+                    return await asyncio.shield(asked)
             except TimeoutError:
                 await self._note_events()
                 if self._seen & _SHUT_OUT:
@@ -232,8 +318,7 @@ class GroundClient:
 
     def _waiting(self, request_id: str) -> list[asyncio.Future[tuple[Answer, list[bytes]]]]:
         """What waits for the answer to a request, or for any where the id is empty."""
-        found = [self._asked.get(request_id)] if request_id else list(self._asked.values())
-        return [asked for asked in found if asked is not None and not asked.done()]
+        return [asked for asked, of in self._asked.items() if request_id in ("", of) and not asked.done()]
 
     async def _why_silent(self) -> str:
         """What ZMQ saw happen to the connection, in words."""

@@ -17,10 +17,16 @@ from flightd.site.site import Site
 
 def floor_status(site: Site) -> FloorStatus:
     """The map as it goes over the link."""
+    levels: dict[str, set[int]] = {}
+    for location in site.locations.values():
+        levels.setdefault(location.node, set()).add(location.level)
     return FloorStatus(
         name=site.name,
         home=site.home.node,
-        nodes=tuple(FloorNode(node.id, node.x_m, node.y_m) for node in site.nodes.values()),
+        nodes=tuple(
+            FloorNode(node.id, node.x_m, node.y_m, node.aisle, tuple(sorted(levels.get(node.id, ()))))
+            for node in site.nodes.values()
+        ),
         lines=tuple(FloorLine(line.x0_m, line.y0_m, line.x1_m, line.y1_m) for line in site.lines),
         line_width_m=site.line_width_m,
         line_colour=site.line_colour,

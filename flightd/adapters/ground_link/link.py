@@ -14,6 +14,8 @@ import zmq.asyncio
 from flightd.adapters.ground_link.audit import AuditEntry, AuditLog
 from flightd.adapters.ground_link.authenticator import DOMAIN, Authenticator
 from flightd.adapters.ground_link.keys import Client, KeyPair, load_clients, load_pair
+from flightd.adapters.ground_link.maintenance_desk import Maintainer, MaintenanceDesk
+from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.picture_answer import picture_answer
 from flightd.adapters.ground_link.protocol import (
     EVENT_TOPIC,
@@ -25,13 +27,15 @@ from flightd.adapters.ground_link.protocol import (
     Code,
     EventReport,
     LinkReport,
+    Maintenance,
     Role,
     encode,
 )
-from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
+from flightd.adapters.ground_link.request_handler import RequestHandler
 from flightd.adapters.ground_link.status_report import status_report
 from flightd.config.ground import GroundConfig
 from flightd.core.errors import TransientError, UnavailableError
+from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName, Preview
 from flightd.core.snapshot import Snapshot
 from flightd.core.types import Command, Event
@@ -71,9 +75,10 @@ class ZmqGround:
         clock: Clock,
         inventory: Callable[[], Sequence[dict[str, str]]] | None = None,
         cameras: Sequence[CameraName] = (CameraName.DOWN,),
+        maintainer: Maintainer | None = None,
     ) -> None:
         """Read keys and allow-list.  InputError names what is wrong with them.  `cameras` are those that this
-        flight has pictures of."""
+        flight has pictures of, `maintainer` does what the ground asks to look after the drone."""
         self._config = config
         self._clock = clock
         self._keys: KeyPair | None = load_pair(config.server_key) if config.server_key else None
@@ -83,6 +88,14 @@ class ZmqGround:
         self._handler = RequestHandler(
             site, self._session, self._write_down, config.picture_fps, inventory, cameras
         )
+        self._desk = MaintenanceDesk(
+            maintainer,
+            lambda request, peer: self._handler.maintenance_objection(request, peer, clock.now_ns()),
+            self._send,
+            self._write_down,
+            self._handler.refuse_later,
+        )
+        self._handler.looked_after = lambda: self._desk.is_busy
         self._seq: Counter[bytes] = Counter()
         self._waiting: dict[CameraName, _Waiting] = {camera: deque() for camera in CameraName}
         self._picture_ns = dict.fromkeys(CameraName, -(10**12))
@@ -131,6 +144,7 @@ class ZmqGround:
         try:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._answer_requests(), name="ground requests")
+                tasks.create_task(self._desk.run(), name="ground maintenance")
                 if self._authenticator is not None:
                     tasks.create_task(self._authenticator.run(), name="ground authenticator")
         except ExceptionGroup as group:
@@ -168,6 +182,10 @@ class ZmqGround:
         )
         self._handler.events.append(report)
         self._publish(EVENT_TOPIC, encode(report))
+
+    def plan_by(self, planner: Planner) -> None:
+        """Plans are asked of it from now on."""
+        self._handler.plan_by(planner)
 
     def take_commands(self) -> list[Command]:
         return self._handler.take_commands()
@@ -259,13 +277,15 @@ class ZmqGround:
         if peer is None:
             return
         answer = self._handler.answer(body, peer, now_ns)
-        if not isinstance(answer, AskPicture):
+        if isinstance(answer, Maintenance):
+            self._desk.hand_in(head, answer, peer)
+        elif not isinstance(answer, AskPicture):
             self._send(head, answer)
         elif len(self._waiting[answer.camera]) < _PICTURES_WAITING:
             self._waiting[answer.camera].append((head, answer, now_ns))
         else:
             text = "too many clients wait for a picture; ask again later"
-            self._send(head, self._handler.refuse_picture(answer, Code.BUSY, text))
+            self._send(head, self._handler.refuse_later(answer, Code.BUSY, text))
 
     def _peer(self, route: bytes, frame: zmq.Frame) -> Peer | None:
         """Who sent it, by the key of its connection; None for nobody that is known."""
@@ -291,7 +311,7 @@ class ZmqGround:
             while waiting and now_ns - waiting[0][2] > _PICTURE_NS:
                 head, request, _ = waiting.popleft()
                 text = f"the {camera} camera delivers no picture"
-                self._send(head, self._handler.refuse_picture(request, Code.UNAVAILABLE, text))
+                self._send(head, self._handler.refuse_later(request, Code.UNAVAILABLE, text))
 
     def _next(self, topic: bytes) -> int:
         self._seq[topic] += 1

@@ -11,18 +11,19 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 from msgspec import Meta
 
+from flightd.core.planned_flight import MOST_NODES
 from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind, EventLevel, Phase
 
 VERSION = 1
 STATUS_TOPIC = b"status"
 EVENT_TOPIC = b"event"
-MAX_REQUEST_BYTES = 8192
+MAX_REQUEST_BYTES = 32768
 """A longer request ends its connection."""
 
 
@@ -165,6 +166,9 @@ class StatusReport(msgspec.Struct, frozen=True):
         float | None, Meta(description="time in the air until only the reserve is left, s")
     ] = None
     home_s: Annotated[float | None, Meta(description="time from the goal down onto a charge pad, s")] = None
+    plan: Annotated[
+        str, Meta(description="id of the order that the plan came with; empty: the configuration's plan")
+    ] = ""
 
 
 class EventReport(msgspec.Struct, frozen=True):
@@ -196,8 +200,18 @@ class Hello(_Request, frozen=True, tag="hello"):
 class Order(_Request, frozen=True, tag="command"):
     """A command to the mission; operators only.  Answer: `accepted`, or `refused`."""
 
-    command: Annotated[CommandKind, Meta(description=", ".join(CommandKind))]
+    command: Annotated[
+        CommandKind, Meta(description=", ".join(CommandKind) + " (plan: by `plan_flight`, not here)")
+    ]
     node: _Node = ""
+    plan: Annotated[
+        str,
+        Meta(
+            max_length=64,
+            description="only with start: id of the order of the plan that it is for; where another one "
+            "stands, it does not start",
+        ),
+    ] = ""
     session: Annotated[
         str, Meta(max_length=64, description="from `welcome`; given, a daemon started since then refuses")
     ] = ""
@@ -209,6 +223,35 @@ class Order(_Request, frozen=True, tag="command"):
             "stop, land and pause are taken: the order may have lain in a queue",
         ),
     ] = 0
+
+
+class PlanFlight(_Request, frozen=True, tag="plan_flight", omit_defaults=True):
+    """The nodes that the next start flies, for a drone that stands disarmed and was given no start; it does
+    not start by that.  Checked by the drone against its map and its battery.  Operators only, but with `dry`.
+    Answer: `planned`, or `refused`."""
+
+    nodes: Annotated[
+        tuple[Annotated[str, Meta(max_length=64)], ...],
+        Meta(max_length=MOST_NODES, description="nodes to visit; none: again what the configuration says"),
+    ] = ()
+    levels: Annotated[
+        tuple[Annotated[int, Meta(ge=1, le=99)], ...],
+        Meta(max_length=99, description="shelf levels that are counted there; none: all"),
+    ] = ()
+    best_order: Annotated[
+        bool, Meta(description="in the quickest order (many nodes: aisle by aisle), not as listed")
+    ] = False
+    dry: Annotated[bool, Meta(description="only say what it would be; by viewers, too")] = False
+    session: Annotated[
+        str, Meta(max_length=64, description="from `welcome`; given, a daemon started since then refuses")
+    ] = ""
+    seen_ns: Annotated[
+        int, Meta(ge=0, description="`stamp_ns` of the newest status; by one older than 5 s it is refused")
+    ] = 0
+
+
+class AskPlan(_Request, frozen=True, tag="plan"):
+    """The plan that is flown, or would be with the next start, and what is left of it.  Answer: `plan`."""
 
 
 class AskStatus(_Request, frozen=True, tag="status"):
@@ -232,7 +275,68 @@ class Attend(_Request, frozen=True, tag="attend"):
     leave: Annotated[bool, Meta(description="true: I stop watching, my silence means nothing")] = False
 
 
-Request: TypeAlias = Hello | Order | AskStatus | AskPicture | AskInventory | Attend
+_Person = Annotated[str, Meta(max_length=64, description="who asks, for audit log and versions")]
+Value: TypeAlias = (
+    bool
+    | int
+    | float
+    | Annotated[str, Meta(max_length=200)]
+    | Annotated[tuple[bool | int | float | Annotated[str, Meta(max_length=200)], ...], Meta(max_length=200)]
+    | None
+)
+"""A configuration key's value; null: left out, its default holds."""
+
+
+class AskDoctor(_Request, frozen=True, tag="doctor"):
+    """What the drone finds of itself beside its running daemon; operators only, while it stands on the
+    ground.  Answer: `doctor`."""
+
+
+class FixParameter(_Request, frozen=True, tag="fix"):
+    """Write the better value of an autopilot's parameter that `doctor` told of, and read it back; operators
+    only, while it stands disarmed.  Answer: `doctor`, looked at anew."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=32, description="of the parameter")]
+    person: _Person = ""
+
+
+class AskSettings(_Request, frozen=True, tag="settings"):
+    """The configuration as it stands, with what each key means; operators only, while it stands on the
+    ground.  Answer: `settings`."""
+
+
+class ProposeSettings(_Request, frozen=True, tag="propose"):
+    """Change keys of the configuration's file; operators only, while it stands disarmed.  The drone checks it
+    as a whole, with its site, before it writes.  Answer: `settings`, as they stand then."""
+
+    base: Annotated[str, Meta(max_length=64, description="`tag` of the `settings` that the person saw")]
+    changes: Annotated[
+        dict[Annotated[str, Meta(max_length=80)], Value],
+        Meta(max_length=64, description='by key, as "mission.height_m"; null: leave it out'),
+    ]
+    person: _Person = ""
+
+
+class TakeSettingsBack(_Request, frozen=True, tag="take_back"):
+    """Bring a kept version of the configuration back: a proposal like any other.  Answer: `settings`."""
+
+    base: Annotated[str, Meta(max_length=64, description="`tag` of the `settings` that the person saw")]
+    version_kept: Annotated[int, Meta(ge=1, le=10**9, description="`number` of a kept version")]
+    person: _Person = ""
+
+
+class Restart(_Request, frozen=True, tag="restart"):
+    """End the daemon so that systemd starts it anew, by its changed settings; operators only, while it stands
+    disarmed.  Answer: `accepted`."""
+
+    person: _Person = ""
+
+
+Maintenance: TypeAlias = AskDoctor | FixParameter | AskSettings | ProposeSettings | TakeSettingsBack | Restart
+"""What looks after a drone on the ground."""
+Request: TypeAlias = (
+    Hello | Order | PlanFlight | AskPlan | AskStatus | AskPicture | AskInventory | Attend | Maintenance
+)
 
 
 class Envelope(msgspec.Struct, frozen=True):
@@ -256,6 +360,8 @@ class FloorNode(msgspec.Struct, frozen=True):
     id: Annotated[str, Meta(description="name")]
     x_m: Annotated[float, Meta(description="m along the aisles")]
     y_m: Annotated[float, Meta(description="m to the right of x")]
+    aisle: Annotated[str, Meta(description="of which aisle")] = ""
+    levels: Annotated[tuple[int, ...], Meta(description="shelf levels with locations that it faces")] = ()
 
 
 class FloorLine(msgspec.Struct, frozen=True):
@@ -347,6 +453,35 @@ class Accepted(_Answer, frozen=True, tag="accepted"):
     repeated: Annotated[bool, Meta(description="this id was done before; it was not done again")] = False
 
 
+class Planned(_Answer, frozen=True, tag="planned"):
+    """What the flight over the nodes is; not `dry`, it waits for the start."""
+
+    nodes: Annotated[tuple[str, ...], Meta(description="in the order in which they are flown")]
+    levels: Annotated[tuple[int, ...], Meta(description="shelf levels that are counted; none: all")]
+    way: Annotated[tuple[str, ...], Meta(description="all nodes where it stops or turns, from pad to pad")]
+    places: Annotated[int, Meta(description="locations that are counted")]
+    way_m: Annotated[float, Meta(description="length of the way, m")]
+    seconds: Annotated[float, Meta(description="estimated time in the air, s")]
+    batteries: Annotated[int, Meta(description="estimated, with the one that is in it")]
+    charge: Annotated[
+        float, Meta(description="of the battery that is in it, by which that is estimated, 0..1")
+    ]
+    battery_s: Annotated[float, Meta(description="time in the air of a full battery down to its reserve, s")]
+    dry: Annotated[bool, Meta(description="only said, not taken")] = False
+    repeated: Annotated[bool, Meta(description="this id was done before; it was not done again")] = False
+
+
+class PlanAnswer(_Answer, frozen=True, tag="plan"):
+    """The plan that is flown, or would be with the next start, and what is left of it."""
+
+    session: _Session
+    id: Annotated[str, Meta(description="of the order that it came with; empty: the configuration's")]
+    nodes: Annotated[tuple[str, ...], Meta(description="nodes to visit, in order")]
+    levels: Annotated[tuple[int, ...], Meta(description="shelf levels that are counted; none: all")]
+    visited: Annotated[tuple[str, ...], Meta(description="visited so far, in order")]
+    remaining: Annotated[tuple[str, ...], Meta(description="still to be visited, in order")]
+
+
 class Code(enum.StrEnum):
     """Why a request was refused."""
 
@@ -357,9 +492,11 @@ class Code(enum.StrEnum):
     ID_REUSED = "id_reused"
     PHASE = "phase"
     NODE = "node"
+    PLAN = "plan"
     BUSY = "busy"
     LATE = "late"
     UNAVAILABLE = "unavailable"
+    INVALID = "invalid"
 
 
 class Refused(_Answer, frozen=True, tag="refused"):
@@ -412,7 +549,83 @@ class InventoryAnswer(_Answer, frozen=True, tag="inventory"):
     places: Annotated[tuple[dict[str, str], ...], Meta(description="one object per place")]
 
 
-Answer: TypeAlias = Welcome | Accepted | Refused | StatusAnswer | PictureAnswer | InventoryAnswer
+class CheckReport(msgspec.Struct, frozen=True):
+    """One thing that was looked at."""
+
+    name: Annotated[str, Meta(description="what was looked at")]
+    level: Annotated[str, Meta(description="ok, warning, error, or unseen: only without the daemon")]
+    text: Annotated[str, Meta(description="what was found")]
+    remedy: Annotated[str, Meta(description="what a person can do about it, else empty")] = ""
+    fix: Annotated[str, Meta(description="name for `fix`, where the drone can mend it itself")] = ""
+
+
+class DoctorAnswer(_Answer, frozen=True, tag="doctor"):
+    """What the drone finds of itself."""
+
+    fit: Annotated[bool, Meta(description="no error among the checks")]
+    checks: Annotated[tuple[CheckReport, ...], Meta(description="one by one")]
+    versions: Annotated[dict[str, str], Meta(description="program, firmware, Python, libraries")]
+    log: Annotated[tuple[str, ...], Meta(description="the daemon's newest log lines, oldest first")]
+    outcome: Annotated[str, Meta(description="after `fix`: what was written and read back")] = ""
+
+
+class KeyReport(msgspec.Struct, frozen=True):
+    """A key of the configuration: what it takes, and what it means."""
+
+    section: Annotated[str, Meta(description="its table in the file")]
+    key: Annotated[str, Meta(description="its name there")]
+    type: Annotated[str, Meta(description="what it takes, in words of the file's format")]
+    unit: Annotated[str, Meta(description="of its numbers, else empty")]
+    range: Annotated[str, Meta(description="values that are taken, else empty")]
+    default: Annotated[str, Meta(description='as the file writes it; "required": there is none')]
+    text: Annotated[str, Meta(description="what it means")]
+    fixed: Annotated[str, Meta(description="why no ground station can change it, else empty")]
+
+
+class KeyChange(msgspec.Struct, frozen=True):
+    """A key before and after a change."""
+
+    key: Annotated[str, Meta(description="section and name")]
+    before: Annotated[Value, Meta(description="null: left out")]
+    after: Annotated[Value, Meta(description="null: left out")]
+
+
+class KeptVersion(msgspec.Struct, frozen=True):
+    """The configuration as it stood before a change, and the change."""
+
+    number: Annotated[int, Meta(description="for `take_back`; counts from 1")]
+    utc: Annotated[str, Meta(description="when it was changed, UTC")]
+    client: Annotated[str, Meta(description="whose key changed it")]
+    person: Annotated[str, Meta(description="who, as he said")]
+    changes: Annotated[tuple[KeyChange, ...], Meta(description="what was changed then")]
+
+
+class SettingsAnswer(_Answer, frozen=True, tag="settings"):
+    """The configuration's file as it stands."""
+
+    file: Annotated[str, Meta(description="its path on the drone")]
+    tag: Annotated[str, Meta(description="names these contents; give it with a proposal")]
+    table: Annotated[dict[str, Any], Meta(description="what the file gives; the rest has its default")]
+    keys: Annotated[tuple[KeyReport, ...], Meta(description="every key, in the order of the sections")]
+    sections: Annotated[dict[str, str], Meta(description="what each section is")]
+    versions: Annotated[tuple[KeptVersion, ...], Meta(description="kept versions, newest first")]
+    pending: Annotated[bool, Meta(description="the file is not what the daemon runs by: at its next start")]
+    locked: Annotated[str, Meta(description="why nothing can be changed from the ground, else empty")]
+    restarts: Annotated[bool, Meta(description="`restart` works: systemd starts the daemon anew")]
+
+
+Answer: TypeAlias = (
+    Welcome
+    | Accepted
+    | Planned
+    | PlanAnswer
+    | Refused
+    | StatusAnswer
+    | PictureAnswer
+    | InventoryAnswer
+    | DoctorAnswer
+    | SettingsAnswer
+)
 
 _encoder = msgspec.json.Encoder()
 encode = _encoder.encode
@@ -428,11 +641,18 @@ DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 """All that decoding bytes of a stranger can raise (msgspec.ValidationError is a DecodeError)."""
 
 PUBLISHED = (StatusReport, EventReport)
-REQUESTS = (Hello, Order, AskStatus, AskPicture, AskInventory, Attend)
-ANSWERS = (Welcome, Accepted, Refused, StatusAnswer, PictureAnswer, InventoryAnswer)
+REQUESTS = (
+    Hello, Order, PlanFlight, AskPlan, AskStatus, AskPicture, AskInventory, Attend, AskDoctor, FixParameter,
+    AskSettings, ProposeSettings, TakeSettingsBack, Restart,
+)  # fmt: skip
+ANSWERS = (
+    Welcome, Accepted, Planned, PlanAnswer, Refused, StatusAnswer, PictureAnswer, InventoryAnswer,
+    DoctorAnswer, SettingsAnswer,
+)  # fmt: skip
 PARTS = (
     Position, SeenLine, VehicleReport, LinkReport, SensorReport, HazardReport, FloorStatus, FloorNode,
-    FloorLine, FloorRack, FloorArea, FloorPad, FloorWay, PictureLine, PictureArea,
+    FloorLine, FloorRack, FloorArea, FloorPad, FloorWay, PictureLine, PictureArea, CheckReport, KeyReport,
+    KeptVersion, KeyChange,
 )  # fmt: skip
 
 

@@ -7,11 +7,16 @@ from __future__ import annotations
 
 from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
+
+import msgspec
 
 from flightd import __version__
 from flightd.adapters.ground_link.audit import AuditEntry
 from flightd.adapters.ground_link.floor_status import floor_status
+from flightd.adapters.ground_link.maintenance_rules import objection
+from flightd.adapters.ground_link.peer import Peer
+from flightd.adapters.ground_link.plan_answers import PlanAnswers, impossible
 from flightd.adapters.ground_link.protocol import (
     DECODE_ERRORS,
     VERSION,
@@ -19,6 +24,7 @@ from flightd.adapters.ground_link.protocol import (
     Answer,
     AskInventory,
     AskPicture,
+    AskPlan,
     AskStatus,
     Attend,
     Code,
@@ -26,7 +32,10 @@ from flightd.adapters.ground_link.protocol import (
     EventReport,
     Hello,
     InventoryAnswer,
+    Maintenance,
     Order,
+    PlanFlight,
+    Planned,
     Refused,
     Request,
     Role,
@@ -36,6 +45,7 @@ from flightd.adapters.ground_link.protocol import (
     decode_envelope,
     decode_request,
 )
+from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName
 from flightd.core.types import WAITING, Command, CommandKind, Phase
 from flightd.mission.machine import BEGIN, possible_commands
@@ -54,16 +64,6 @@ _URGENT = frozenset({CommandKind.LAND, CommandKind.STOP})
 _NEVER_LATE = _URGENT | {CommandKind.PAUSE}
 _LATE_NS = 5_000_000_000
 """By an older status nothing else is ordered: the order lay in a queue, or its giver saw nothing."""
-
-
-@dataclass(frozen=True, slots=True)
-class Peer:
-    """Where a request came from: `name` and `role` by its key, `route` its connection."""
-
-    name: str
-    role: Role
-    route: bytes = b""
-    address: str = ""
 
 
 class RequestHandler:
@@ -86,15 +86,22 @@ class RequestHandler:
         self._inventory = inventory
         self._cameras = tuple(cameras)
         self._commands: deque[Command] = deque()
-        self._done: OrderedDict[tuple[str, str], tuple[CommandKind, str]] = OrderedDict()
+        self._plans: PlanAnswers | None = None
+        self._done: OrderedDict[tuple[str, str], tuple[Command, Answer]] = OrderedDict()
         self._recent: deque[tuple[str, int]] = deque(maxlen=_ORDERS_PER_S * 8)
         self._heard_ns: dict[tuple[str, bytes], int] = {}
         self.events: deque[EventReport] = deque(maxlen=_RECENT_EVENTS)
         self.status: StatusReport | None = None
         self.possible = possible_commands(BEGIN)
         """The commands that the mission takes now."""
+        self.looked_after: Callable[[], bool] = lambda: False
+        """Whether somebody changes or checks something of the drone now: then nothing is started."""
         self.requests = 0
         self.refused = 0
+
+    def plan_by(self, planner: Planner) -> None:
+        """Plans are asked of it from now on."""
+        self._plans = PlanAnswers(planner, self._session)
 
     def take_commands(self) -> list[Command]:
         """The orders accepted since the last call, oldest first."""
@@ -110,8 +117,9 @@ class RequestHandler:
         """How many attend and were heard lately."""
         return sum(now_ns - heard_ns < _TAKEN_OVER_NS for heard_ns in self._heard_ns.values())
 
-    def answer(self, body: bytes, peer: Peer, now_ns: int) -> Answer | AskPicture:
-        """What to answer to `body`, or the request for a picture, which takes a while."""
+    def answer(self, body: bytes, peer: Peer, now_ns: int) -> Answer | AskPicture | Maintenance:
+        """What to answer to `body`, or a request that takes a while: for a picture, or to look after the
+        drone."""
         self.requests += 1
         request = self._read(body)
         match request:
@@ -119,11 +127,17 @@ class RequestHandler:
                 return self._welcome(request, peer)
             case Order():
                 return self._order(request, peer, now_ns)
+            case PlanFlight():
+                return self._plan_flight(request, peer, now_ns)
             case Attend():
                 return self._attend(request, peer, now_ns)
-            case Refused():
-                return request
-        return self._show(request)
+            case AskPlan() | AskStatus() | AskInventory() | AskPicture():
+                return self._show(request)
+        return request
+
+    def maintenance_objection(self, request: Maintenance, peer: Peer, now_ns: int) -> tuple[Code, str] | None:
+        """Why the drone is not looked after now; None where it may be."""
+        return objection(request, peer.role, self.status, self.possible, now_ns)
 
     def _read(self, body: bytes) -> Request | Refused:
         """The request in `body`; the version is looked at before anything else."""
@@ -137,23 +151,25 @@ class RequestHandler:
         except DECODE_ERRORS as err:
             return self._refuse(request_id, Code.MALFORMED, f"not a request of this protocol: {err}")
 
-    def _show(self, request: AskStatus | AskInventory | AskPicture) -> Answer | AskPicture:
+    def _show(self, request: AskPlan | AskStatus | AskInventory | AskPicture) -> Answer | AskPicture:
+        if isinstance(request, AskPlan):
+            return self._standing_plan(request)
         if isinstance(request, AskStatus):
             return StatusAnswer(request=request.id, status=self.status)
         if isinstance(request, AskPicture):
-            if self._picture_fps == 0:
-                text = "pictures are off: set ground.picture_fps"
-                return self._refuse(request.id, Code.UNAVAILABLE, text)
-            if request.camera not in self._cameras:
-                text = f"this flight uses no {request.camera} camera"
-                return self._refuse(request.id, Code.UNAVAILABLE, text)
-            return request
+            missing = self._no_picture(request)
+            return self._refuse(request.id, Code.UNAVAILABLE, missing) if missing else request
         if self._inventory is None:
             return self._refuse(request.id, Code.UNAVAILABLE, "this flightd keeps no inventory store")
         return InventoryAnswer(request=request.id, places=tuple(self._inventory()))
 
-    def refuse_picture(self, request: AskPicture, code: Code, text: str) -> Refused:
-        """The answer to a request for a picture that cannot be served."""
+    def _no_picture(self, request: AskPicture) -> str:
+        if self._picture_fps == 0:
+            return "pictures are off: set ground.picture_fps"
+        return "" if request.camera in self._cameras else f"this flight uses no {request.camera} camera"
+
+    def refuse_later(self, request: AskPicture | Maintenance, code: Code, text: str) -> Refused:
+        """The answer to a request that took a while, and cannot be served."""
         return self._refuse(request.id, code, text)
 
     def _welcome(self, request: Hello, peer: Peer) -> Welcome:
@@ -171,34 +187,87 @@ class RequestHandler:
 
     def _order(self, order: Order, peer: Peer, now_ns: int) -> Answer:
         """Accept, refuse or repeat an order, and write down which."""
-        known = self._done.get((peer.name, order.id))
-        answer: Answer
-        if known == (order.command, order.node):
-            answer, outcome, text = Accepted(request=order.id, repeated=True), "repeated", ""
-        else:
-            code, text = self._objection(order, peer, now_ns, known is not None)
-            if code is None:
-                self._accept(order, peer)
-                answer, outcome = Accepted(request=order.id), "accepted"
-            else:
-                answer, outcome = self._refuse(order.id, code, text), code.value
-        if outcome != Code.BUSY:
-            self._audit(
-                AuditEntry(
-                    client=peer.name,
-                    role=peer.role.value,
-                    address=peer.address,
-                    id=order.id,
-                    command=order.command.value,
-                    node=order.node,
-                    outcome=outcome,
-                    text=text,
-                )
-            )
-        return answer
+        command = Command(order.id, order.command, order.node, plan=order.plan)
+        repeated = self._repeated(command, peer)
+        if repeated is not None:
+            return repeated
+        code, text = self._objection(order, peer, now_ns)
+        if code is not None:
+            return self._not_done(command, peer, code, text)
+        return self._accept(command, peer, Accepted(request=order.id))
 
-    def _objection(self, order: Order, peer: Peer, now_ns: int, id_known: bool) -> tuple[Code | None, str]:
-        """Why an order cannot be obeyed, if it cannot."""
+    def _repeated(self, command: Command, peer: Peer) -> Answer | None:
+        """The answer to a command that was done before, None to a new one."""
+        done = self._done.get((peer.name, command.id))
+        if done is None or done[0] != command or not isinstance(done[1], Accepted | Planned):
+            return None
+        self._write_down(command, peer, "repeated", "")
+        return msgspec.structs.replace(done[1], repeated=True)
+
+    def _not_done(self, command: Command, peer: Peer, code: Code, text: str) -> Refused:
+        if code is not Code.BUSY:
+            self._write_down(command, peer, code.value, text)
+        return self._refuse(command.id, code, text)
+
+    def _write_down(self, command: Command, peer: Peer, outcome: str, text: str) -> None:
+        self._audit(
+            AuditEntry(
+                client=peer.name,
+                role=peer.role.value,
+                address=peer.address,
+                id=command.id,
+                command=command.kind.value,
+                node=command.node or ",".join(command.nodes),
+                outcome=outcome,
+                text=text,
+            )
+        )
+
+    def _plan_flight(self, request: PlanFlight, peer: Peer, now_ns: int) -> Answer:
+        """What a flight over the nodes is, handed to the mission unless it is only asked for."""
+        command = Command(request.id, CommandKind.PLAN, nodes=request.nodes, levels=request.levels)
+        if not request.dry and (repeated := self._repeated(command, peer)) is not None:
+            return repeated
+        code, text = self._against_plan(request, peer, now_ns)
+        if code is None and self._plans is not None:
+            planned = self._plans.planned(request, now_ns)
+            if isinstance(planned, Planned):
+                if request.dry:
+                    return planned
+                taken = replace(command, nodes=planned.nodes if request.nodes else ())
+                return self._accept(taken, peer, planned, asked=command)
+            code, text = planned
+        code = code or Code.UNAVAILABLE
+        return (
+            self._refuse(request.id, code, text) if request.dry else self._not_done(command, peer, code, text)
+        )
+
+    def _against_plan(self, request: PlanFlight, peer: Peer, now_ns: int) -> tuple[Code | None, str]:
+        """Why a plan is not looked at, if it is not."""
+        order = Order(
+            version=request.version,
+            id=request.id,
+            command=CommandKind.PLAN,
+            session=request.session,
+            seen_ns=request.seen_ns,
+        )
+        if self._plans is None:
+            return Code.UNAVAILABLE, "no flight is planned here yet; ask again in a moment"
+        if request.dry:  # planned between two ticks: not while it flies
+            phase = self.status.phase if self.status is not None else Phase.PREFLIGHT
+            return (None, "") if phase in WAITING else (Code.PHASE, impossible(phase))
+        return self._objection(order, peer, now_ns, planned=True)
+
+    def _standing_plan(self, request: AskPlan) -> Answer:
+        if self._plans is None:
+            return self._refuse(request.id, Code.UNAVAILABLE, "no flight is planned here yet")
+        return self._plans.standing(request)
+
+    def _objection(
+        self, order: Order, peer: Peer, now_ns: int, *, planned: bool = False
+    ) -> tuple[Code | None, str]:
+        """Why an order cannot be obeyed, if it cannot; `planned`: it came with its plan."""
+        id_known = (peer.name, order.id) in self._done
         phase = self.status.phase if self.status is not None else Phase.PREFLIGHT
         kind, node = order.command, order.node
         checks = (
@@ -229,16 +298,33 @@ class RequestHandler:
                 "goto needs a node, the other commands have none",
             ),
             (
+                (kind is CommandKind.PLAN) != planned,
+                Code.MALFORMED,
+                "a plan comes with its nodes: op plan_flight",
+            ),
+            (
+                bool(order.plan) and kind is not CommandKind.START,
+                Code.MALFORMED,
+                "only start names the plan that it is for",
+            ),
+            (
                 bool(node) and node not in self._nodes,
                 Code.NODE,
                 f"no node {node!r} on site {self._floor.name}",
             ),
             (kind not in self.possible, Code.PHASE, self._impossible(kind, phase)),
+            (
+                kind is CommandKind.START and self.looked_after(),
+                Code.BUSY,
+                "the drone is looked after just now: start it in a moment",
+            ),
         )
         return next(((code, text) for applies, code, text in checks if applies), (None, ""))
 
     def _impossible(self, kind: CommandKind, phase: Phase) -> str:
         """Why the mission does not take an order now."""
+        if kind is CommandKind.PLAN:
+            return impossible(phase)
         if kind is CommandKind.START and phase in WAITING and self.status is not None:
             return f"cannot {kind}: {self.status.reason}"
         return f"cannot {kind} in phase {phase}"
@@ -253,13 +339,15 @@ class RequestHandler:
         self._recent.append((peer.name, now_ns))
         return True
 
-    def _accept(self, order: Order, peer: Peer) -> None:
-        self._done[peer.name, order.id] = (order.command, order.node)
+    def _accept(self, command: Command, peer: Peer, answer: Answer, asked: Command | None = None) -> Answer:
+        """Hand a command to the mission; `asked`: as the client put it, where that is otherwise."""
+        self._done[peer.name, command.id] = (asked or command, answer)
         if len(self._done) > _REMEMBERED_ORDERS:
             self._done.popitem(last=False)
-        command = Command(order.id, order.command, order.node)
+        self._write_down(command, peer, "accepted", "")
         if not any(waiting.kind is command.kind for waiting in self._commands if command.kind in _URGENT):
             self._commands.append(command)
+        return answer
 
     def _attend(self, request: Attend, peer: Peer, now_ns: int) -> Answer:
         if peer.role is not Role.OPERATOR:

@@ -15,6 +15,7 @@ from contextlib import AsyncExitStack, ExitStack
 from dataclasses import replace
 from typing import Any
 
+from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.recorder.recorder import McapRecorder, WhenFull, drop_newest, wait_for_disk
 from flightd.app.absent_parts import NO_GROUND
 from flightd.app.build import build, detector_pool, ground_link
@@ -22,6 +23,9 @@ from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.flight import Flight
 from flightd.app.flight_identity import FlightIdentity
+from flightd.app.maintenance.checks import DroneChecks
+from flightd.app.maintenance.maintainer import DroneMaintainer
+from flightd.app.maintenance.shown_settings import ShownSettings
 from flightd.app.recording import record_setting
 from flightd.app.service import monitors
 from flightd.app.simulation.lockstep import LockstepDetectors, LockstepReaders
@@ -139,13 +143,17 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
     identity = FlightIdentity.of(simulation.setting, _DRONE, clock.now_ns())
     if simulation.truth_url:
         peers = replace(peers, vehicle=config.vehicle.url)
-    async with monitors(config.metrics, {}, journal=False) as watchers, AsyncExitStack() as stack:
+    recent = RecentLog()
+    checks = DroneChecks(config, site, f"a simulation on site {site.name}", recent)
+    maintainer = DroneMaintainer(checks, ShownSettings(config), restarts=False)
+    watching = monitors(config.metrics, {}, journal=False, recent=recent)
+    async with watching as watchers, AsyncExitStack() as stack:
         recorder = stack.enter_context(_flight_recorder(simulation, identity, drop_newest))
         process, channel = _started_world(simulation, ports, factor, stack)
         pool = stack.enter_context(detector_pool(config, site, clock))
         count = FlightCount(config, site, simulation.folder, stack, run=identity.run)
         counting = await count.begun(clock)
-        link = ground_link(_ground_settings(simulation), site, clock, counting)
+        link = ground_link(_ground_settings(simulation), site, clock, counting, maintainer)
         ground = NO_GROUND if link is None else stack.enter_context(link)
         faults = LauncherFaults(simulation.scenario.fault, pool, recorder, link)
         await pool.ready()
@@ -164,7 +172,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
             opener=open_paced_datagrams,
             interlock=faults.interlock,
         )
-        faults.mission = flight.pilot.mission
+        faults.mission, maintainer.flight = flight.pilot.mission, flight
         return await _beside(
             simulation, flight, ended_by, watch_world(process, channel, faults.tell), faults.run()
         )

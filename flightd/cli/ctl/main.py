@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 
 from flightd.cli.application import application, keep_blocks, version_option
-from flightd.cli.ctl import inventory, keygen, orders, picture, protocol, status, watch
+from flightd.cli.ctl import inventory, keygen, maintenance, orders, picture, plan, protocol, status, watch
 from flightd.cli.ctl.connection import DaemonConnection
 from flightd.cli.exits import run_app
 
 app = application("flightctl")
-for command in (status, orders, inventory, picture, keygen, protocol, watch):
+for command in (status, orders, plan, inventory, maintenance, picture, keygen, protocol, watch):
     command.register(app)
 
 

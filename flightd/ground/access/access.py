@@ -19,9 +19,10 @@ from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.ground.access.attempts import Attempts
 from flightd.ground.access.audit import StationEntry, audit_file
 from flightd.ground.access.passwords import PasswordCheck, hashed_secret
-from flightd.ground.access.people_book import PeopleBook, Person, Session, make_private_file
+from flightd.ground.access.people_book import PeopleBook, Person, Session
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.bounded import Threads
+from flightd.ground.own_database import make_private_file
 
 _LOG = logging.getLogger(__name__)
 IDLE_S, ABSOLUTE_S = 2 * 3600.0, 12 * 3600.0

@@ -34,6 +34,12 @@ def identity_of(connection: HTTPConnection) -> Identity:
     return who
 
 
+def person_of(connection: HTTPConnection, typed: str) -> str:
+    """Who is written down for an act: who signed in; only where nobody does, the name that was typed."""
+    who = identity_of(connection)
+    return typed.strip() if who.by == "local" else who.name
+
+
 def note_act(connection: HTTPConnection, words: str) -> None:
     """What the audit's line is to say of this act, besides method, path and status."""
     connection.scope[_NOTE].append(words)

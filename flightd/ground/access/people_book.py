@@ -5,31 +5,34 @@ It is changed by `flightd ground people` while the station runs, which reads it 
 
 from __future__ import annotations
 
-import os
 import re
 import sqlite3
-import threading
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from flightd.core.errors import InputError, UnavailableError
+from flightd.core.errors import InputError
 from flightd.ground.access.roles import Role
+from flightd.ground.own_database import OwnDatabase
 
 FILE = "people.db"
 MOST_PEOPLE, MOST_SESSIONS = 1000, 4000
 _APPLICATION, _VERSION = 0x666C7470, 1
 """`fltp`: SQLite's application id."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,59}")
-_SCHEMA = (
-    "CREATE TABLE person (name TEXT PRIMARY KEY COLLATE NOCASE, role TEXT NOT NULL, password TEXT NOT NULL,"
-    " key BLOB UNIQUE) STRICT",
-    "CREATE TABLE session (id BLOB PRIMARY KEY, person TEXT NOT NULL COLLATE NOCASE REFERENCES person"
-    " ON DELETE CASCADE, began_s REAL NOT NULL, seen_s REAL NOT NULL) STRICT",
-    f"PRAGMA application_id = {_APPLICATION}",
-    f"PRAGMA user_version = {_VERSION}",
-)
+_SCHEMA = """
+CREATE TABLE person (
+    name TEXT PRIMARY KEY COLLATE NOCASE,
+    role TEXT NOT NULL,
+    password TEXT NOT NULL,
+    key BLOB UNIQUE
+) STRICT;
+CREATE TABLE session (
+    id BLOB PRIMARY KEY,
+    person TEXT NOT NULL COLLATE NOCASE REFERENCES person ON DELETE CASCADE,
+    began_s REAL NOT NULL,
+    seen_s REAL NOT NULL
+) STRICT
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +61,17 @@ class PeopleBook:
     UnavailableError where the disk refuses, InputError for a file that is another program's."""
 
     def __init__(self, state: Path) -> None:
-        self.file = state / FILE
-        self._lock = threading.Lock()
+        self._database = OwnDatabase(
+            file=state / FILE,
+            holds="the people",
+            application=_APPLICATION,
+            version=_VERSION,
+            schema=_SCHEMA,
+            remedy="be the user that the station runs as, or name another --state DIR",
+            timeout_s=5.0,
+            private=True,
+        )
+        self.file = self._database.file
 
     def people(self) -> list[Person]:
         """Everybody, by name."""
@@ -69,7 +81,7 @@ class PeopleBook:
         """Everybody and every session, at one moment."""
         if not self.file.exists():
             return [], []
-        with self._opened() as book, _transaction(book):
+        with self._database.changed() as book:
             people = book.execute("SELECT name, role, password, key FROM person ORDER BY name").fetchall()
             sessions = book.execute("SELECT id, person, began_s, seen_s FROM session").fetchall()
         return [Person(row[0], Role(row[1]), row[2], row[3] or b"") for row in people], [
@@ -83,7 +95,7 @@ class PeopleBook:
                 f"{person.name!r} is no name here",
                 remedy="take up to 60 letters and digits, with . _ @ - between them",
             )
-        with self._opened() as book, _transaction(book):
+        with self._database.changed() as book:
             if book.execute("SELECT count(*) FROM person").fetchone()[0] >= MOST_PEOPLE:
                 raise InputError(f"there are {MOST_PEOPLE} people already")
             try:
@@ -110,7 +122,7 @@ class PeopleBook:
 
     def begin(self, session: Session, password: str) -> bool:
         """Keep a session; False where the person's password, by its hash, is not that one any more."""
-        with self._opened() as book, _transaction(book):
+        with self._database.changed() as book:
             book.execute(
                 "DELETE FROM session WHERE id IN"
                 " (SELECT id FROM session ORDER BY seen_s DESC LIMIT -1 OFFSET ?)",
@@ -124,73 +136,20 @@ class PeopleBook:
 
     def end(self, *sessions: bytes) -> None:
         """These sessions are over."""
-        with self._opened() as book, _transaction(book):
+        with self._database.changed() as book:
             book.executemany("DELETE FROM session WHERE id = ?", [(session,) for session in sessions])
 
     def note_seen(self, seen: dict[bytes, float]) -> None:
         """When each session was used last, UTC in s."""
-        with self._opened() as book, _transaction(book):
+        with self._database.changed() as book:
             book.executemany(
                 "UPDATE session SET seen_s = max(seen_s, ?) WHERE id = ?",
                 [(seen_s, session) for session, seen_s in seen.items()],
             )
 
     def _change(self, name: str, statement: str, *values: object, ends: bool = False) -> None:
-        with self._opened() as book, _transaction(book):
+        with self._database.changed() as book:
             if ends:
                 book.execute("DELETE FROM session WHERE person = ?", (name,))
             if book.execute(statement, (*values, name)).rowcount == 0:
                 raise InputError(f"there is no {name!r} here", remedy="see flightd ground people list")
-
-    @contextmanager
-    def _opened(self) -> Iterator[sqlite3.Connection]:
-        with self._lock:
-            try:
-                make_private_file(self.file)
-                with closing(sqlite3.connect(self.file, timeout=5.0, isolation_level=None)) as book:
-                    book.execute("PRAGMA foreign_keys = ON")
-                    book.execute("PRAGMA secure_delete = ON")
-                    self._prepare(book)
-                    yield book
-            except (OSError, sqlite3.OperationalError) as err:
-                raise UnavailableError(
-                    f"{self.file}: {err.strerror if isinstance(err, OSError) else err}",
-                    remedy="be the user that the station runs as, or name another --state DIR",
-                ) from err
-            except (sqlite3.DatabaseError, ValueError) as err:
-                raise InputError(f"{self.file}: not the people of a ground station: {err}") from err
-
-    def _prepare(self, book: sqlite3.Connection) -> None:
-        """Make the tables where the file is new, all or nothing."""
-        if self._is_empty(book):
-            with _transaction(book):
-                if self._is_empty(book):  # another process may have been quicker
-                    for statement in _SCHEMA:
-                        book.execute(statement)
-
-    def _is_empty(self, book: sqlite3.Connection) -> bool:
-        """InputError for what is not ours."""
-        tables = book.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
-        kind = [book.execute(f"PRAGMA {of}").fetchone()[0] for of in ("application_id", "user_version")]
-        if tables and kind != [_APPLICATION, _VERSION]:
-            raise InputError(f"{self.file}: not the people of a ground station, or of another version")
-        return not tables
-
-
-def make_private_file(file: Path) -> None:
-    """Make the file and its folder where they are not there, for the owner alone.  OSError."""
-    if not file.exists():
-        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        os.close(os.open(file, os.O_RDWR | os.O_CREAT, 0o600))
-
-
-@contextmanager
-def _transaction(book: sqlite3.Connection) -> Iterator[None]:
-    book.execute("BEGIN IMMEDIATE")
-    try:
-        yield
-        book.execute("COMMIT")
-    except BaseException:
-        if book.in_transaction:
-            book.execute("ROLLBACK")
-        raise

@@ -141,6 +141,9 @@ def _track(track: PoseTrack) -> dict[str, list[float]]:
         "sigma_y_m": track.sigma_y_m,
         "sigma_yaw_rad": track.sigma_yaw_rad,
     }
-    return {
-        name: np.round(column, 3).tolist() for name, column in columns.items() if np.isfinite(column).any()
-    }
+    with np.errstate(over="ignore"):  # a log may hold any number: one that overflows is told as unknown
+        return {
+            name: np.round(column, 3).tolist()
+            for name, column in columns.items()
+            if np.isfinite(column).any()
+        }

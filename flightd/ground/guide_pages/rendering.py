@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+import threading
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -23,6 +24,8 @@ _ALIGNED = re.compile(r"text-align:(left|right|center)")
 _CELL, _ROW = "·", "/"
 """Between the cells and the rows of a table."""
 _NO_WORD = re.compile(r"[^\w\- ]")
+_RENDERING = threading.Lock()
+"""The libraries fill tables at their first use that another thread must not see half full."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,15 +64,16 @@ def topics() -> tuple[str, ...]:
 
 @cache
 def rendered(topic: str) -> RenderedPage:
-    """The page on `topic`, one of `topics()`."""
+    """The page on `topic`, one of `topics()`.  From any thread."""
     found = page(topic)
-    parser = _parser()
-    tokens = parser.parse(found.text)
-    headings = tuple(_named(tokens))
-    sections = tuple(_sections(tokens, found.title))
-    for token in _all(tokens):
-        _adapt(token)
-    html = str(parser.renderer.render(tokens, parser.options, {}))
+    with _RENDERING:
+        parser = _parser()
+        tokens = parser.parse(found.text)
+        headings = tuple(_named(tokens))
+        sections = tuple(_sections(tokens, found.title))
+        for token in _all(tokens):
+            _adapt(token)
+        html = str(parser.renderer.render(tokens, parser.options, {}))
     return RenderedPage(topic, found.title, html, headings, sections)
 
 

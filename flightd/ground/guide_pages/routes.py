@@ -55,8 +55,7 @@ async def _page(request: Request) -> Response:
     topic = request.path_params["topic"]
     if topic not in topics():
         return as_json({"refused": "the guide has no such page"}, 404)
-    one = await asyncio.to_thread(rendered, topic)
-    before, after = _neighbours(topic)
+    one, before, after = await asyncio.to_thread(lambda: (rendered(topic), *_neighbours(topic)))
     headings = [asdict(heading) for heading in one.headings]
     return as_json(
         {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Awaitable, Callable
 from typing import Annotated, TypeVar
 
 import msgspec
@@ -12,12 +11,11 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from flightd.adapters.ground_link.protocol import DECODE_ERRORS
-from flightd.core.errors import FlightdError, InputError
+from flightd.core.errors import InputError
 from flightd.core.paint import NAMED_PAINTS
-from flightd.ground.access.gate import identity_of, note_act
+from flightd.ground.access.gate import note_act, person_of
 from flightd.ground.bounded import Room
-from flightd.ground.json_http import as_json, is_json, status_of
+from flightd.ground.json_http import AnswerTo, as_json, or_refused, refusal, said
 from flightd.ground.pages import page
 from flightd.ground.plain_files import plain_file
 from flightd.ground.request_body import whole_body
@@ -92,17 +90,14 @@ def studio_routes(studio: Studio | None) -> list[BaseRoute]:
         return [Route("/api/studio", none, methods=["GET"]), *page("/studio")]
     asked = _Asked(studio)
 
-    def at(path: str, answer: Callable[[Request], Awaitable[Response]], method: str) -> Route:
-        async def guarded(request: Request) -> Response:
+    def at(path: str, answer: AnswerTo, method: str) -> Route:
+        async def with_a_disk(request: Request) -> Response:
             try:
                 return await answer(request)
-            except FlightdError as err:
-                status = status_of(err, 404 if request.method == "GET" else 400)
-                return as_json({"refused": shown(str(err))}, status)
             except OSError as err:
-                return as_json({"refused": f"the disk refuses: {shown(err.strerror or 'unknown')}"}, 503)
+                return refusal(f"the disk refuses: {err.strerror or 'unknown'}", 503)
 
-        return Route(f"/api/studio{path}", guarded, methods=[method])
+        return Route(f"/api/studio{path}", or_refused(with_a_disk), methods=[method])
 
     picture = "/sets/{set}/pictures/{file}"
     return [
@@ -145,7 +140,7 @@ class _Asked:
         )
 
     async def make(self, request: Request) -> Response:
-        new = await _said(request, NewSet, "a new set")
+        new = await said(request, NewSet, "a new set")
         made = await self._studio.disk.run(self._studio.sets.make, new.name, new.paint)
         note_act(request, f"made the set {made.name}")
         return as_json({"name": made.name})
@@ -166,14 +161,14 @@ class _Asked:
         )
 
     async def take(self, request: Request) -> Response:
-        wanted = await _said(request, Wanted, "a picture of a flight")
+        wanted = await said(request, Wanted, "a picture of a flight")
         name = request.path_params["set"]
         note_act(request, f"picture {wanted.place} of {wanted.flight}")
         return as_json({"file": await self._studio.take_from_log(name, wanted.flight, wanted.place)})
 
     async def upload(self, request: Request) -> Response:
         if request.headers.get("content-type", "") != _BINARY:
-            return as_json({"refused": "a picture is the file itself"}, 415)
+            return refusal("a picture is the file itself", 415)
         with self._uploads.taken():
             data = await whole_body(request, MOST_PICTURE_BYTES, "picture")
             return as_json({"file": await self._studio.take_upload(request.path_params["set"], data)})
@@ -189,7 +184,7 @@ class _Asked:
 
     async def mark(self, request: Request) -> Response:
         studio, params = self._studio, request.path_params
-        marked = await _said(request, Marked, "marks of a picture")
+        marked = await said(request, Marked, "marks of a picture", _MOST_LABEL_BYTES)
         _check(marked)
         known = await studio.disk.run(studio.sets.read, params["set"])
         before = next((one for one in known.labels if one.file == params["file"]), None)
@@ -215,9 +210,9 @@ class _Asked:
         return Response(await self._studio.mask(params["set"], params["file"], by), media_type=_BINARY)
 
     async def train(self, request: Request) -> Response:
-        name, said = request.path_params["set"], await _said(request, Train, "flights to score on")
+        name, asked = request.path_params["set"], await said(request, Train, "flights to score on")
         await self._studio.disk.run(self._studio.sets.read, name)
-        self._studio.order_training(name, said.flights)
+        self._studio.order_training(name, asked.flights)
         return as_json({"training": _training(self._studio, name)}, 202)
 
     async def boards(self, request: Request) -> Response:
@@ -227,21 +222,20 @@ class _Asked:
         return as_json(await self._studio.boards(request.path_params["set"], Board(*map(int, sides))))
 
     async def install(self, request: Request) -> Response:
-        said = await _said(request, Install, "what to install")
-        name, person = request.path_params["set"], identity_of(request)
-        who = said.who.strip() if person.by == "local" else person.name  # a name that is typed proves nothing
+        asked = await said(request, Install, "what to install")
+        name, who = request.path_params["set"], person_of(request, asked.who)
         if not who:
             raise InputError("nobody installs it", remedy="say who you are")
-        shelved = await self._studio.install(name, said.training_hash, who, said.again)
+        shelved = await self._studio.install(name, asked.training_hash, who, asked.again)
         verdict = next((one.verdict for one in shelved.versions if one.number == shelved.current), "")
         note_act(request, f"version {shelved.current} installed, {verdict}")
         return as_json(shelved)
 
     async def take_back(self, request: Request) -> Response:
-        said, name = await _said(request, TakeBack, "a version"), request.path_params["set"]
+        asked, name = await said(request, TakeBack, "a version"), request.path_params["set"]
         self._studio.sets.folder_of(name)  # its name is one
-        back: Shelved = await self._studio.disk.run(self._studio.shelf.take_back, name, said.version)
-        note_act(request, f"version {said.version} taken back")
+        back: Shelved = await self._studio.disk.run(self._studio.shelf.take_back, name, asked.version)
+        note_act(request, f"version {asked.version} taken back")
         return as_json(back)
 
     async def profile(self, request: Request) -> Response:
@@ -275,14 +269,3 @@ def _check(marked: Marked) -> None:
             raise InputError("a line without length, or with a width below none")
     if not all(abs(number) < _FAR_PX for number in numbers):
         raise InputError("a mark that lies outside every picture")
-
-
-async def _said(request: Request, kind: type[T], what: str) -> T:
-    """The request's JSON.  InputError for anything else."""
-    if not is_json(request):
-        raise InputError(f"{what} is JSON")
-    body = await whole_body(request, _MOST_LABEL_BYTES, what)
-    try:
-        return msgspec.json.decode(body, type=kind)
-    except DECODE_ERRORS as err:
-        raise InputError(f"not {what}: {err}") from None

@@ -48,9 +48,18 @@ class WayBack:
 class Sorties:
     """The battery against the ways of one site.  `step` at each tick; the rest answers questions.
 
-    With a `scanner` a stop lasts as long as what it has left to count there."""
+    With a `scanner` a stop lasts as long as what it has left to count there; with `levels` as long as what
+    hangs on these, whether or not it is counted already."""
 
-    def __init__(self, site: Site, legs: Legs, battery: BatteryConfig, scanner: AnyScanner = NO_SCAN) -> None:
+    def __init__(
+        self,
+        site: Site,
+        legs: Legs,
+        battery: BatteryConfig,
+        scanner: AnyScanner = NO_SCAN,
+        levels: Sequence[int] | None = None,
+    ) -> None:
+        self._levels = levels
         self._site = site
         self._legs = legs
         self._scanner = scanner
@@ -64,9 +73,24 @@ class Sorties:
         self._gauge.step(now_ns, charge_frac, flying)
 
     @property
+    def take_off_s(self) -> float:
+        """Seconds from the pad up to the flying height."""
+        return self._legs.pace.take_off_s
+
+    @property
+    def land_s(self) -> float:
+        """Seconds from the flying height down onto a pad."""
+        return self._legs.pace.land_s
+
+    @property
     def rate_per_s(self) -> float:
         """Share of the full battery used per second in flight."""
         return self._gauge.rate_per_s
+
+    @property
+    def charge_frac(self) -> float:
+        """The newest charge, 0..1; 1 where none is known."""
+        return 1.0 if math.isnan(self._charge_frac) else self._charge_frac
 
     @property
     def left_s(self) -> float:
@@ -116,13 +140,18 @@ class Sorties:
             if min(self._fresh_frac(pad, node) for pad in pads) > 1.0 - self._battery.reserve
         )
 
-    def _out_s(self, on_s: float, there: str) -> float:
-        return on_s + self._stop_s(there) + self.way_back(there).seconds
+    def on_s(self, here: str, there: str) -> float:
+        """Seconds of the legal way between two nodes.  NoWayError."""
+        return self._legs.way_s(here, there)
 
-    def _stop_s(self, node: str) -> float:
+    def stop_s(self, node: str) -> float:
+        """Seconds of the stop at a node."""
         pace = self._legs.pace
-        counted_s = self._scanner.stop_s(node, pace)
+        counted_s = self._scanner.stop_s(node, pace, self._levels)
         return counted_s or pace.dwell_s
+
+    def _out_s(self, on_s: float, there: str) -> float:
+        return on_s + self.stop_s(there) + self.way_back(there).seconds
 
     def _fresh_frac(self, pad: str, node: str) -> float:
         on_s = self._legs.way_s(pad, node)

@@ -56,6 +56,12 @@ class BatterySwap:
         onto a charge pad; NaN where that is not known."""
         return self._sorties.left_s, self._sorties.home_s(self._route.goal.node)
 
+    @property
+    def charge(self) -> tuple[float, float]:
+        """The charge, 0..1 (full where it is not known), and the share of a full battery used per second in
+        the air."""
+        return self._sorties.charge_frac, self._sorties.rate_per_s
+
     def step(self, s: MissionInputs, state: State) -> Trigger | None:
         """Turn back in time: below the fixed share, or when what is left only just brings it back.  How it
         turned back with this tick, None if it did not."""

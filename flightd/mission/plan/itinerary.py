@@ -36,6 +36,10 @@ class Itinerary:
         """The node on which the drone stands before it flies, and its heading there."""
         self.visited: list[str] = []
 
+    def begin(self, plan: FlightPlan) -> None:
+        """Fly this plan instead, on the ground: from the same pad, before anything was visited."""
+        self._stops, self._next = list(plan.stops), 0
+
     @property
     def goal(self) -> Stop:
         """The stop flown to or hovered at."""

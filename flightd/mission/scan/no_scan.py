@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
@@ -27,8 +27,14 @@ class NoScan:
     def wants(self, _node: str) -> bool:
         return False
 
-    def stop_s(self, _node: str, _pace: Pace) -> float:
+    def stop_s(self, _node: str, _pace: Pace, _levels: Sequence[int] | None = None) -> float:
         return 0.0
+
+    def places_at(self, _node: str, _levels: Sequence[int] = ()) -> frozenset[str]:
+        return frozenset()
+
+    def choose(self, levels: Sequence[int]) -> None:
+        """Nothing is counted anyway."""
 
     def skip(self, locations: Iterable[str]) -> None:
         """Nothing is counted anyway."""

@@ -9,7 +9,7 @@ nothing is ever booked on a wrong location; its locations are left to count, and
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 
 from flightd.config.scan import ScanConfig
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
@@ -42,7 +42,8 @@ class Scanner:
         self._params = params
         self._assigner = Assigner(site, sight, params.expert.least_probability)
         self._planner = ViewPlanner(site, sight, self._assigner, params, highest_m, aside_per_height)
-        self._planned = frozenset(site.locations)
+        self._planned = self._wanted = frozenset(site.locations)
+        self._levels = {location.code: location.level for location in site.locations.values()}
         self._done: set[str] = set()
         self._task: ScanTask | None = None
         self._pending = PendingFindings(params.confirm_stops, params.expert.revisits)
@@ -92,13 +93,24 @@ class Scanner:
         """Whether locations of a node are left to count."""
         return not self.doubted and bool(self._left(node))
 
-    def stop_s(self, node: str, pace: Pace) -> float:
-        """How long the count of what is left at a node takes, each view looked from once; 0 where nothing
-        is to be counted."""
-        if not self.wants(node):
+    def stop_s(self, node: str, pace: Pace, levels: Sequence[int] | None = None) -> float:
+        """How long the count of what is left at a node takes, each view looked from once; with `levels` that
+        of what hangs on these (empty: on any), counted already or not.  0 where nothing is to be counted."""
+        if levels is None and not self.wants(node):
             return 0.0
-        views = self._planner.views(node, self._left(node), pace.height_m, 0.0)
-        return views_s(views, pace, self._params.view_s)
+        places = self._left(node) if levels is None else self.places_at(node, levels)
+        views = self._planner.views(node, places, pace.height_m, 0.0) if places else ()
+        return views_s(views, pace, self._params.view_s) if views else 0.0
+
+    def places_at(self, node: str, levels: Sequence[int] = ()) -> frozenset[str]:
+        """The locations that are counted from a node, on all levels or only on these."""
+        found = frozenset(self._planner.locations(node))
+        return frozenset(code for code in found if self._levels[code] in levels) if levels else found
+
+    def choose(self, levels: Sequence[int]) -> None:
+        """Count only what hangs on these levels; on all of them where there are none."""
+        among = self._planned
+        self._wanted = frozenset(code for code in among if self._levels[code] in levels) if levels else among
 
     def skip(self, locations: Iterable[str]) -> None:
         """These need no look any more: an earlier flight of the same count has booked them."""
@@ -226,7 +238,7 @@ class Scanner:
         return self._task.node if self._task else ""
 
     def _left(self, node: str) -> frozenset[str]:
-        return frozenset(self._planner.locations(node)) - self._done
+        return frozenset(self._planner.locations(node)) & self._wanted - self._done
 
     def _gather(self) -> None:
         if self._task is None:

@@ -29,6 +29,8 @@ class MavlinkChannel:
         self.due_ns: dict[int, int] = {}
         self.greeted = False
         """Whether it gets what the autopilot streams unasked."""
+        self.heard = 0
+        """The number of the newest message from there, of all that were heard; 0: none yet."""
 
     def sign(self, key: bytes) -> None:
         """Sign what goes out from now on."""
@@ -76,6 +78,7 @@ class UdpLink(asyncio.DatagramProtocol):
         self._parser.signing.secret_key = key
         self._key = key
         self._transport: asyncio.DatagramTransport | None = None
+        self._heard = 0
         self.channels: dict[Address, MavlinkChannel] = {}
         self.silent = False
         """Nothing goes out any more, what comes in is heard."""
@@ -105,13 +108,24 @@ class UdpLink(asyncio.DatagramProtocol):
             self._transport = None
 
     def channel(self, address: Address) -> MavlinkChannel | None:
-        """The channel of that address, made at its first use; None when too many have spoken."""
+        """The channel of that address, made at its first use.  Where there are too many, the one that was
+        silent for the longest gives way: a program that was started anew speaks from another port.  One that
+        was never heard stays; None where all are such."""
         channel = self.channels.get(address)
-        if channel is None and len(self.channels) < _CHANNELS_MAX:
+        if channel is None:
+            if len(self.channels) >= _CHANNELS_MAX and not self._give_way():
+                return None
             channel = self.channels[address] = MavlinkChannel(
                 address, self._system_id, self._component_id, self._key
             )
         return channel
+
+    def _give_way(self) -> bool:
+        """Drop the channel that was silent for the longest."""
+        spoke = [channel for channel in self.channels.values() if channel.heard]
+        if spoke:
+            del self.channels[min(spoke, key=lambda channel: channel.heard).address]
+        return bool(spoke)
 
     def send(self, channel: MavlinkChannel, message: Message) -> None:
         if self._transport is not None and not self.muted and message.get_msgId() not in self.withheld:
@@ -139,6 +153,8 @@ class UdpLink(asyncio.DatagramProtocol):
                 continue
             channel = self.channel((addr[0], addr[1]))
             if channel is not None:
+                self._heard += 1
+                channel.heard = self._heard
                 self._received(channel, message)
 
     def error_received(self, exc: Exception) -> None:

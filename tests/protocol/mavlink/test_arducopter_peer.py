@@ -409,3 +409,20 @@ def test_garbage_makes_no_channel_and_stops_nothing() -> None:
             transport.close()
 
     virtual(test())
+
+
+def test_whoever_starts_anew_is_heard_however_many_have_spoken_before() -> None:
+    async def test() -> None:
+        async with pair(PeerConfig(ready_s=0.0, remotes=(("127.0.0.1", 9),))) as (peer, client):
+            for _ in range(20):
+                gone = await RawClient.connect(await peer.open())
+                await asyncio.sleep(0.3)
+                gone.close()
+            again = await RawClient.connect(await peer.open())
+            await asyncio.sleep(1.5)
+            assert again.all("HEARTBEAT")
+            assert client.times("HEARTBEAT")[-1] > again.times("HEARTBEAT")[0] - 1.1, "who speaks stays"
+            assert ("127.0.0.1", 9) in peer.link.channels
+            again.close()
+
+    virtual(test())

@@ -13,6 +13,9 @@ from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
 from flightd.core.refusal import words
 from flightd.core.types import Demand
 from flightd.sim.autopilot.autopilot import PeerConfig
+from flightd.sim.autopilot.copter import CopterMode
+from flightd.sim.autopilot.radio import RadioParams
+from tests.protocol.mavlink.scripted_autopilot import ARM, ScriptedAutopilot, known, scripted
 from tests.rigs.event_loops import virtual
 from tests.rigs.vehicles import ardupilot_rig, px4_rig
 
@@ -25,6 +28,29 @@ def test_it_lands_and_disarms_by_itself(make: Callable[[], Any]) -> None:
             rig.cut(True)
             await rig.until(lambda: not rig.peer.armed, 15.0)
             assert rig.peer.truth().height_m < 0.15
+
+    virtual(test())
+
+
+def test_an_autopilot_as_it_is_shipped_lands_a_second_after_its_companion_has_died() -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await rig.take_off()
+            rig.cut(True)
+            assert 0.8 < await rig.until(lambda: rig.peer.mode == CopterMode.LAND, 3.0) < 1.3
+
+    virtual(test())
+
+
+def test_an_uplink_that_loses_two_of_five_is_no_dead_companion() -> None:
+    """Of the heartbeats that a second holds nine in a row may be lost."""
+
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await rig.take_off()
+            rig.peer.link.up.params = RadioParams(loss=0.4)
+            await rig.stream(40.0, hz=10.0)
+            assert rig.peer.mode == CopterMode.GUIDED_NOGPS
 
     virtual(test())
 
@@ -54,7 +80,8 @@ def test_what_else_beats_on_the_vehicle_does_not_keep_it_in_the_air() -> None:
     ("make", "name", "value"),
     [
         (ardupilot_rig, "FS_GCS_ENABLE", 0.0),
-        (ardupilot_rig, "FS_GCS_TIMEOUT", 5.0),
+        (ardupilot_rig, "FS_GCS_TIMEOUT", 2.5),
+        (ardupilot_rig, "FS_GCS_TIMEOUT", 0.5),
         (ardupilot_rig, "GUID_TIMEOUT", 3.0),
         (ardupilot_rig, "BATT_FS_LOW_ACT", 0.0),
         (ardupilot_rig, "EK3_SRC1_POSZ", 2.0),
@@ -76,6 +103,20 @@ def test_nothing_is_armed_that_would_stay_in_the_air_or_is_wrong_for_the_job(
             assert not rig.known().armed
             assert name in words(rig.known().refusal)
             assert "flightd doctor --fix" in words(rig.known().refusal)
+
+    virtual(test())
+
+
+@pytest.mark.parametrize("name", ["GUID_TIMEOUT", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "SYSID_MYGCS"])
+def test_nothing_is_armed_whose_way_down_is_not_known(name: str) -> None:
+    async def test() -> None:
+        autopilot = ScriptedAutopilot()
+        del autopilot.parameters[name]
+        async with scripted(autopilot) as (_, vehicle):
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(20.0)  # the examination gives up meanwhile
+            assert not autopilot.commands(ARM)
+            assert words(known(vehicle).refusal) == f"{name} not read yet"
 
     virtual(test())
 

@@ -22,6 +22,7 @@ from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.autopilot.link import MavlinkChannel
+from flightd.sim.autopilot.parameters import COPTER_PARAMETERS
 from flightd.sim.autopilot.px4 import Px4Peer
 from flightd.sim.autopilot.streams import MessageStreams
 from flightd.sim.plant.airframe import Airframe
@@ -59,6 +60,22 @@ def test_the_factory_settings_of_arducopter_are_named_and_mended() -> None:
             assert await examination.fix(report.findings) == []
             assert peer.parameters["GUID_TIMEOUT"] == pytest.approx(0.3)
             assert (await examination.report()).findings == ()
+
+    virtual(test())
+
+
+@pytest.mark.parametrize(
+    ("timeout_s", "fits"), [(0.5, False), (0.8, True), (1, True), (2, True), (2.5, False)]
+)
+def test_a_copter_waits_a_second_or_two_for_a_companion_that_is_silent(timeout_s: float, fits: bool) -> None:
+    """No longer: it drifts meanwhile; and no shorter: what is lost on the way is no death."""
+
+    async def test() -> None:
+        async with examined(ArduCopterPeer, FS_GCS_TIMEOUT=timeout_s) as (peer, examination):
+            report = await examination.report()
+            assert [finding.name for finding in report.findings] == ([] if fits else ["FS_GCS_TIMEOUT"])
+            assert await examination.fix(report.findings) == []
+            assert peer.parameters["FS_GCS_TIMEOUT"] == pytest.approx(timeout_s if fits else 1)
 
     virtual(test())
 
@@ -211,6 +228,14 @@ def test_the_shipped_parameter_files_are_fit_and_complete(
             assert rule.names[-1] in {"ARMING_CHECK", "ARMING_SKIPCHK"}
     assert judged >= 8
     assert all(len(name) <= 16 for name in values)
+
+
+def test_what_is_shipped_is_what_a_fix_would_write_and_a_simulated_copter_has() -> None:
+    (_, shipped), _ = shipped_parameters()
+    better = {rule.names[0]: rule.better for rule in RULES[Firmware.ARDUPILOT]}
+    for name in ("GUID_TIMEOUT", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT"):
+        assert shipped[name] == better[name] == COPTER_PARAMETERS[name]
+    assert shipped["FS_GCS_TIMEOUT"] == 1
 
 
 def test_range_finders_and_cells_are_looked_at() -> None:

@@ -252,6 +252,30 @@ def test_an_impossible_stamp_is_replaced_by_the_arrival() -> None:
     assert telemetry.attitudes()[0].stamp_ns == NOW_NS + 10 * MS
 
 
+def refused(*off_ms: int) -> list[int]:
+    """How many times made no sense, after each attitude; 20 ms apart, their times off by so much from those
+    of a clock that is well compared."""
+    sync = ClockSync()
+    telemetry = MavlinkTelemetry(sync)
+    sync.answered(sync.ask(NOW_NS), 60_000 * MS, NOW_NS)
+    telemetry.take(heartbeat(armed=True), NOW_NS)
+    counts = []
+    for number, off in enumerate(off_ms):
+        now_ns = NOW_NS + number * 20 * MS
+        telemetry.take(attitude(60_000 + 20 * number + off), now_ns)
+        state = telemetry.state(now_ns, "", in_control=True, refusal=None)
+        assert state is not None
+        counts.append(state.stamps_refused)
+    return counts
+
+
+def test_each_time_that_makes_no_sense_counts_once() -> None:
+    assert refused(0, -400, 0) == [0, 0, 0], "late, and within reason"
+    assert refused(0, -700, 0, 0) == [0, 1, 1, 1], "a stray datagram"
+    assert refused(0, 9_000, 0, 0) == [0, 1, 1, 1], "one from the future makes no reboot of the next"
+    assert refused(0, 100_000, 100_000) == [0, 1, 2], "a clock that jumped"
+
+
 def test_a_boot_clock_that_jumps_back_is_a_reboot() -> None:
     sync = ClockSync()
     telemetry = MavlinkTelemetry(sync)

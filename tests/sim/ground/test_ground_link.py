@@ -19,7 +19,7 @@ import zmq.asyncio
 
 from flightd.adapters.ground_link.client import GroundClient
 from flightd.adapters.ground_link.link import ZmqGround
-from flightd.adapters.ground_link.protocol import EventReport, Role, StatusReport
+from flightd.adapters.ground_link.protocol import Accepted, EventReport, Role, StatusReport
 from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.preview import CameraName, Preview
 from flightd.core.types import CommandKind, Phase
@@ -74,6 +74,25 @@ async def test_an_operator_is_told_what_happens_and_commands() -> None:
         with pytest.raises(InputError, match="keeps no inventory"):
             await client.inventory()
         assert (await client.hello()).events[-1].text == "look out"
+
+
+@in_real_time
+async def test_an_order_that_is_sent_again_while_the_first_waits_is_answered_twice_and_done_once() -> None:
+    """As of a page that tries another way; also where no answer comes."""
+
+    async def ordered(client: GroundClient) -> list[Any]:
+        orders = [client.order(CommandKind.GOTO, "A3", "order-0001") for _ in range(2)]
+        return await asyncio.gather(*orders, return_exceptions=True)
+
+    async with serving(local()) as link, GroundClient(address_of(link)) as client:
+        await connected(client, link)
+        tell_once(link)
+        assert [type(answer) for answer in await ordered(client)] == [Accepted] * 2
+        assert len(link.take_commands()) == 1
+        address = address_of(link)
+    async with GroundClient(address, timeout_s=0.2) as client:
+        silent = await ordered(client)
+        assert [type(error) for error in silent] == [UnavailableError] * 2
 
 
 async def _until_event(client: GroundClient) -> Any:

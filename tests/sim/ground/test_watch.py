@@ -9,8 +9,9 @@ import pytest
 from textual.widgets import RichLog, Static
 
 from flightd.adapters.ground_link.client import GroundClient
+from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.protocol import FloorStatus, Position, Role, Welcome
-from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
+from flightd.adapters.ground_link.request_handler import RequestHandler
 from flightd.cli.watch.floor_map import FloorMap, arrow
 from flightd.cli.watch.screen import WatchApp
 from flightd.core.types import CommandKind, Phase

@@ -60,6 +60,8 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightctl keygen": ("ann", "--role", "captain"),
     "flightctl protocol": ("--json", "surplus"),
     "flightctl goto": ("A2",),
+    "flightctl set": ("mission.height_m",),
+    "flightctl take-back": ("none",),
 }
 """Input that each command must refuse; the orders of flightctl are refused for their keys."""
 

@@ -45,6 +45,30 @@ def test_one_that_dies_away_is_none() -> None:
     assert swung(OscillationMonitor(), swing(1.0, -0.6, 6.0, 1.0)) is None
 
 
+@pytest.mark.parametrize(
+    ("found", "none"),
+    [
+        pytest.param((1.0, 1.0, 0.33), (1.0, 1.0, 0.31), id="how fast"),
+        pytest.param((1.0, 0.83, 1.5), (1.0, 0.77, 1.5), id="how little it dies away"),
+        pytest.param((4.8, 1.0, 0.45), (5.2, 1.0, 0.45), id="no slower"),
+    ],
+)
+def test_just_above_each_bound_it_is_found_and_just_below_it_is_none(
+    found: tuple[float, float, float], none: tuple[float, float, float]
+) -> None:
+    """Period, s, share of a half swing in the one before, and first speed, m/s, of which smoothing takes a
+    fifteenth at one a second."""
+    for (period_s, share, first_mps), expected in ((found, True), (none, False)):
+        off_mps = swing(period_s, math.log(share) / (0.5 * period_s), 12.0, first_mps)
+        assert (swung(OscillationMonitor(), off_mps) is not None) is expected
+
+
+def test_two_half_swings_tell_that_it_grows_by_half_and_three_that_it_grows_by_less() -> None:
+    by_half, by_less = (swing(1.0, math.log(share) / 0.5, 3.0, 0.4) for share in (1.6, 1.2))
+    assert (swung(OscillationMonitor(), by_half) or math.inf) < 1.0
+    assert 1.0 < (swung(OscillationMonitor(), by_less) or math.inf) < 1.5
+
+
 def test_gusts_are_none() -> None:
     """First-order noise of the strength and the correlation of what gusts make of the velocity."""
     draw, monitor, off, found = random.Random(4), OscillationMonitor(), 0.0, 0

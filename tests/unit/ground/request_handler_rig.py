@@ -9,19 +9,24 @@ from typing import Any
 import msgspec
 
 from flightd.adapters.ground_link.audit import AuditEntry
+from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.protocol import (
     VERSION,
     Answer,
     AskPicture,
     LinkReport,
+    Maintenance,
     Role,
     StatusReport,
 )
-from flightd.adapters.ground_link.request_handler import Peer, RequestHandler
+from flightd.adapters.ground_link.request_handler import RequestHandler
+from flightd.app.build import pilot_of
+from flightd.config.schema import load_config
 from flightd.core.types import Phase
 from flightd.site.site_file import load_site
 from tests.rigs.possible_commands import possible_in
 
+CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml")
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
 OPERATOR = Peer("ann", Role.OPERATOR, b"1", "127.0.0.1")
 VIEWER = Peer("bob", Role.VIEWER, b"2", "127.0.0.1")
@@ -67,12 +72,17 @@ class RequestHandlerRig:
     def __init__(self, phase: Phase = Phase.FOLLOW, **more: Any) -> None:
         self.audit: list[AuditEntry] = []
         self.handler = RequestHandler(SITE, SESSION, self.audit.append, **more)
+        self.mission = pilot_of(CONFIG, SITE).mission
+        self.handler.plan_by(self.mission)
         self.handler.status = report(phase)
         self.handler.possible = possible_in(phase)
         self.now_ns = 100 * S
 
-    def hand(self, request: bytes, peer: Peer = OPERATOR) -> Answer | AskPicture:
+    def hand(self, request: bytes, peer: Peer = OPERATOR) -> Answer | AskPicture | Maintenance:
         return self.handler.answer(request, peer, self.now_ns)
 
-    def order(self, command: str, peer: Peer = OPERATOR, **fields: Any) -> Answer | AskPicture:
+    def order(self, command: str, peer: Peer = OPERATOR, **fields: Any) -> Answer | AskPicture | Maintenance:
         return self.hand(body("command", command=command, **fields), peer)
+
+    def plan(self, *nodes: str, peer: Peer = OPERATOR, **fields: Any) -> Answer | AskPicture | Maintenance:
+        return self.hand(body("plan_flight", nodes=nodes, **fields), peer)

@@ -8,11 +8,13 @@ import random
 import msgspec
 import pytest
 
+from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.protocol import (
     Accepted,
     AskPicture,
     Code,
     InventoryAnswer,
+    Planned,
     Refused,
     Role,
     StatusAnswer,
@@ -20,7 +22,6 @@ from flightd.adapters.ground_link.protocol import (
     decode_answer,
     encode,
 )
-from flightd.adapters.ground_link.request_handler import Peer
 from flightd.core.types import CommandKind, Phase
 from tests.rigs.possible_commands import possible_in
 from tests.unit.ground.request_handler_rig import OPERATOR, SESSION, SITE, VIEWER, RequestHandlerRig, S, body
@@ -98,9 +99,12 @@ def test_every_command_in_every_phase_is_accepted_or_refused_by_the_table(
     kind: CommandKind, phase: Phase
 ) -> None:
     rig = RequestHandlerRig(phase)
-    answer = rig.order(kind, node="A2" if kind is CommandKind.GOTO else "")
+    if kind is CommandKind.PLAN:
+        answer = rig.plan("A2")
+    else:
+        answer = rig.order(kind, node="A2" if kind is CommandKind.GOTO else "")
     if kind in possible_in(phase):
-        assert isinstance(answer, Accepted)
+        assert isinstance(answer, Accepted | Planned)
     else:
         assert refusal(answer) is Code.PHASE
         assert rig.handler.take_commands() == []

@@ -333,6 +333,9 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.DETECTOR_LOST: sick(detectors_replaced=5),
     Trigger.RECORDER_DEAD: sick(recorder_restarts=5),
     Trigger.START: Stimulus(_start, 0.04, hold=False),
+    Trigger.PLAN: Stimulus(
+        lambda flight: flight.order(CommandKind.PLAN, nodes=("A3", "A2")), 0.04, hold=False
+    ),
     Trigger.GOTO: ordered(CommandKind.GOTO, "A3"),
     Trigger.GO_HOME: ordered(CommandKind.HOME),
     Trigger.PAUSE: ordered(CommandKind.PAUSE),

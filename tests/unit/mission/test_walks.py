@@ -87,7 +87,8 @@ class Walk:
         if "elsewhere" in sensed and flight.inputs.pose is not None:
             flight.set(pose=replace(flight.inputs.pose, x_m=flight.inputs.pose.x_m + 3.0))
         for order in sorted(orders):
-            flight.order(order, "A3" if order is CommandKind.GOTO else "")
+            nodes = ("A3", "A2") if order is CommandKind.PLAN else ()
+            flight.order(order, "A3" if order is CommandKind.GOTO else "", nodes)
             self.started |= order is CommandKind.START
         stopped = CommandKind.STOP in orders and not flight.mission.state.over
         for tick in range(round(seconds / 0.02)):

@@ -85,6 +85,7 @@ MESSAGES = [
     (Topic.STATUS, 5, STATUS),
     (Topic.EVENT, 6_500_000_000, Event(6_500_000_000, EventLevel.WARNING, "wind", "gusts of 3 m/s")),
     (Topic.COMMAND, 7, Command("c-1", CommandKind.GOTO, "B3")),
+    (Topic.COMMAND, 8, Command("c-2", CommandKind.PLAN, nodes=("B3", "A1"), levels=(1, 2))),
     (Topic.MAP, 8, Document("[site]\n")),
     (Topic.TRUTH, 9, {"stamp_ns": 9, "x_m": 1.5}),
 ]

@@ -1,15 +1,19 @@
-"""How long a hazard's landing took, as the judge counts."""
+"""How long a hazard's landing took, as the judge counts, and how a flight with one may end."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
-from flightd.core.types import Phase, Status
+from flightd.core.types import Event, EventLevel, Phase, Status
 from flightd.mission.safety.hazard_table import HAZARDS
 from flightd.sim.judge.expectation import Expectation
 from flightd.sim.judge.flight_score import score
 from flightd.sim.judge.hazard_verdict import HazardVerdict, judged_hazard
 from flightd.sim.judge.verdict import judged
+from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.scenario.scenario_files import load_scenario, shipped_scenarios
 from tests.rigs.flight_evidence import S, at, evidence, landed, status
 
 
@@ -33,3 +37,58 @@ def test_where_the_daemon_is_dead_it_is_counted_from_its_death() -> None:
     found = verdict("companion_dead", [status(0), status(24 * S)], begun_s=24)
     assert found.down_s == pytest.approx(66.0, abs=1.1)
     assert "down_late" in {fault.kind for fault in found.faults}
+
+
+FLOWN = [at(second * S) for second in range(1, 31)]
+ENDS: dict[str, tuple[Phase, list[Kinematics]]] = {
+    "completed": (Phase.DONE, landed(*FLOWN)),
+    "home": (Phase.ABORTED, landed(*FLOWN)),
+    "landed": (Phase.ABORTED, [*landed(*FLOWN)[:-1], at(31 * S, height_m=0.1)]),
+    "handed over": (Phase.PILOT, landed(*FLOWN)),
+    "in the air": (Phase.HOLD, landed(*FLOWN)[:-1]),
+}
+"""The last phase and the true motion of flights that end like that."""
+
+
+@pytest.mark.parametrize(
+    ("expected", "as_good"),
+    [
+        ("down", {"completed", "home", "landed"}),
+        ("landed", {"home", "landed"}),
+        ("home", {"home"}),
+        ("completed", {"completed"}),
+        ("handed over", {"handed over"}),
+    ],
+)
+def test_which_ends_are_as_good_as_the_expected_one(expected: Any, as_good: set[str]) -> None:
+    (row,) = (row for row in HAZARDS if row.name == "swings")
+    found = Event(10 * S, EventLevel.WARNING, "hazard", "it swings about its place: hold")
+    accepted = set()
+    for end, (phase, truth) in ENDS.items():
+        statuses = [status(0), status(10 * S, Phase.HOLD), status(31 * S, phase)]
+        flight = evidence(truth, statuses, [found])
+        figures = score(flight)
+        expects = Expectation(hazard="swings", ends=expected)
+        verdict = judged_hazard(row, expects, flight, figures, judged(flight, figures), [10 * S])
+        assert verdict.outcome == end
+        if "other_end" not in {fault.kind for fault in verdict.faults}:
+            accepted.add(end)
+    assert accepted == as_good
+
+
+def test_a_flight_that_stays_in_the_air_is_bad_whatever_way_down_is_expected() -> None:
+    """Also of a flight that the daemon says to have completed."""
+    (row,) = (row for row in HAZARDS if row.name == "swings")
+    for phase in (Phase.HOLD, Phase.DONE):
+        flight = evidence(landed(*FLOWN)[:-1], [status(0), status(30 * S, phase)])
+        figures = score(flight)
+        expects = Expectation(hazard="swings", ends="down")
+        faults = judged_hazard(row, expects, flight, figures, judged(flight, figures), [10 * S]).faults
+        assert {"other_end", "stayed_up"} <= {fault.kind for fault in faults}
+
+
+@pytest.mark.parametrize("name", ["swings", "clock_jump"])
+def test_what_may_fly_on_or_land_is_expected_down(name: str) -> None:
+    expects = load_scenario(shipped_scenarios()[name]).expect
+    assert expects is not None
+    assert expects.ends == "down"

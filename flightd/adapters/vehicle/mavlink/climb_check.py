@@ -44,14 +44,10 @@ class ClimbCheck:
         self._rates: deque[_Told] = deque()
         self._ahead_ns: int | None = None
         self._untold_ns: int | None = None
-        self._untold = False
         self.contradicted = False
         """The told rate is wrong, for good: one that stands still agrees with every hover."""
-
-    @property
-    def by_height(self) -> bool:
-        """Whether the rate that is believed is the height's."""
-        return self.contradicted or self._untold
+        self.by_height = False
+        """The rate that was believed last is the height's."""
 
     def height(self, stamp_ns: int, height_m: float) -> None:
         """Take a sample, in order of time; the same one again is passed over."""
@@ -79,7 +75,8 @@ class ClimbCheck:
         self._ahead_ns = (self._ahead_ns or now_ns) if ahead else None
         self.contradicted |= self._ahead_ns is not None and now_ns - self._ahead_ns >= _AHEAD_NS
         self._untold_ns = (self._untold_ns or now_ns) if math.isnan(told_mps) else None
-        self._untold = self._untold_ns is not None and now_ns - self._untold_ns >= _UNTOLD_NS
+        untold = self._untold_ns is not None and now_ns - self._untold_ns >= _UNTOLD_NS
+        self.by_height = self.contradicted or untold
         return slope_mps if self.by_height else told_mps
 
     def _stands_still(self, now_ns: int, told_mps: float, wanted_mps: float) -> bool:

@@ -19,7 +19,7 @@ from flightd.adapters.vehicle.mavlink.required_parameters import Job, ParameterF
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, BeatPoll, Beats
 from flightd.adapters.vehicle.mavlink.services.parameters import Parameters
-from flightd.adapters.vehicle.mavlink.telemetry import cells_told, range_sample
+from flightd.adapters.vehicle.mavlink.telemetry import cells_told, range_sample, version_words
 from flightd.adapters.vehicle.range_finders import RangeSample
 from flightd.core.errors import UnavailableError
 from flightd.ports import Clock
@@ -178,7 +178,6 @@ class Examination:
             case "BATTERY_STATUS" if message.id == 0:
                 self._cells = cells_told(message)
             case "AUTOPILOT_VERSION":
-                number = message.flight_sw_version
-                self._version = f"{number >> 24 & 0xFF}.{number >> 16 & 0xFF}.{number >> 8 & 0xFF}"
+                self._version = version_words(message.flight_sw_version)
             case _:
                 pass

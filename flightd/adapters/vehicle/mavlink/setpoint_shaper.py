@@ -13,6 +13,9 @@ from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.setpoint import HeadingIntegrator
 from flightd.core.types import AttitudeSetpoint, VehicleState
 
+_FLOWN_NS = 250_000_000
+"""The climb rate of an older setpoint is no longer the vehicle's."""
+
 
 class Measured(Protocol):
     """What has to be known of the vehicle's motion; NaN or None while it is unknown."""
@@ -40,13 +43,16 @@ class SetpointShaper:
         self.height = HeightLoop()
         self._climb = ClimbCheck()
         self._climb_mps = math.nan
+        self._climb_ns = 0
 
-    def climb_of(self, state: VehicleState) -> VehicleState:
-        """The state with the climb rate that is flown by, where the told one is not the vehicle's."""
+    def climb_of(self, state: VehicleState, now_ns: int) -> VehicleState:
+        """The state with the climb rate that is flown by, where the told one is not the vehicle's: none while
+        no setpoint of ours is flown, since then nothing looks at the height."""
         untold = self._climb.by_height and math.isnan(state.climb_mps)
         if not (state.armed and (self._climb.contradicted or untold)):
             return state
-        return replace(state, climb_mps=self._climb_mps, climb_contradicted=True)
+        flown_mps = self._climb_mps if now_ns - self._climb_ns <= _FLOWN_NS else math.nan
+        return replace(state, climb_mps=flown_mps, climb_contradicted=True)
 
     def heading_rad(self, setpoint: AttitudeSetpoint, now_ns: int) -> float | None:
         """The heading for a setpoint that goes out now; None when none may."""
@@ -69,6 +75,7 @@ class SetpointShaper:
             self._climb.height(self._measured.height_stamp_ns, height_m)
         pushed_mps = self.height.wanted_mps if self.height.in_air else math.nan
         self._climb_mps = self._climb.believed_mps(now_ns, told_mps, pushed_mps)
+        self._climb_ns = now_ns
         return self.height.step(
             now_ns,
             setpoint.climb_mps,

@@ -141,14 +141,16 @@ class MavlinkTelemetry(NewestReadings):
         boot_ms = int(message.time_boot_ms)
         wrapped = self._boot_ms > _WRAP_MS - _WRAP_NEAR_MS and boot_ms < _WRAP_NEAR_MS
         rebooted = boot_ms + _REBOOT_MS < self._boot_ms and not wrapped
-        self._boot_ms = boot_ms
         if rebooted:
             self._sync.reset()
         boot_ns = self._boot_ns(boot_ms, now_ns)
-        if boot_ms and not self._is_senseless(boot_ns, now_ns):
-            self._sync.heard(boot_ns, now_ns)
+        senseless = self._is_senseless(boot_ns, now_ns)
+        if not senseless:  # one that strayed ahead would make the next good one look like a reboot
+            self._boot_ms = boot_ms
+            if boot_ms:
+                self._sync.heard(boot_ns, now_ns)
         stamp_ns = self._stamp(boot_ns, now_ns)
-        self._stamps_refused += rebooted or self._is_senseless(boot_ns, now_ns)
+        self._stamps_refused += rebooted or senseless
         last_ns = stamp_ns - 1 if self._attitude is None or rebooted else self._attitude.stamp_ns
         if stamp_ns >= last_ns:
             self._attitude = sample = Attitude(stamp_ns, *angles)
@@ -213,3 +215,8 @@ class MavlinkTelemetry(NewestReadings):
         """By the clocks as they were compared, a stamp long past or yet to come."""
         ours_ns = self._sync.to_ours(boot_ns)
         return ours_ns is not None and not -_STAMP_AGE_MAX_NS <= ours_ns - now_ns <= _AHEAD_NS
+
+
+def version_words(number: int) -> str:
+    """A firmware's version, as AUTOPILOT_VERSION packs it."""
+    return f"{number >> 24 & 0xFF}.{number >> 16 & 0xFF}.{number >> 8 & 0xFF}"

@@ -20,7 +20,14 @@ from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
 from flightd.adapters.vehicle.mavlink.refusal import SharedSystemId, WrongFirmware, not_set_up
-from flightd.adapters.vehicle.mavlink.required_parameters import Job, Names, rules_for, way_down_rules
+from flightd.adapters.vehicle.mavlink.required_parameters import (
+    Job,
+    Names,
+    ParameterFinding,
+    judge,
+    rules_for,
+    way_down_rules,
+)
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, BeatPoll, Beats, too_slow
@@ -29,7 +36,7 @@ from flightd.adapters.vehicle.mavlink.services.statustext import SEVERITIES, Tex
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
-from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource, MavlinkTelemetry
+from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource, MavlinkTelemetry, version_words
 from flightd.core.refusal import Refusal
 from flightd.core.types import (
     Attitude,
@@ -57,6 +64,7 @@ RATES_HZ: dict[int, float] = {
 
 _BEATS_SETTLE_S, _BEATS_WINDOW_S, _BEATS_CHECK_S = 5.0, 3.0, 1.0
 _EXAMINE_S, _EXAMINE_AGAIN_S = 0.5, 10.0
+_VERSION_LOOKS, _VERSION_S = 3, 0.2
 _PAD_NEAR_M = 1.0
 """Further away the pad is not shown: a landing of last resort must not set out for it."""
 
@@ -125,6 +133,7 @@ class MavlinkVehicle(abc.ABC):
         self._examined = False
         """All that the autopilot answers of its parameters was read."""
         self._reboots = 0
+        self._version = ""
         self._heard = asyncio.Event()
         self._beats = Beats(_BEATS_WINDOW_S)
         self._poll = BeatPoll()
@@ -158,7 +167,7 @@ class MavlinkVehicle(abc.ABC):
             refusal=self._modes.refusal,
         )
         known = state and replace(state, unfit=self._modes.unfit, keeps_climb=self.keeps_climb())
-        return known and self._steering.climb_of(known)
+        return known and self._steering.climb_of(known, now_ns)
 
     def attitudes(self) -> list[Attitude]:
         return self._telemetry.attitudes()
@@ -198,6 +207,35 @@ class MavlinkVehicle(abc.ABC):
             self.link.send(message)
             if pad_m is not None and math.dist(pad_m, (pose.x_m, pose.y_m)) < _PAD_NEAR_M:
                 self.link.send(landing_target(self.firmware, pose, attitude, pad_m, height_m))
+
+    # For who looks after it on the ground
+
+    @property
+    def is_examined(self) -> bool:
+        """Whether all that it answers of its parameters was read."""
+        return self._examined
+
+    def findings(self) -> list[ParameterFinding]:
+        """The parameters that are wrong for the job, of those that were read."""
+        judged = (judge(rule, self.parameters.get(rule.names)) for rule in self._rules)
+        return [finding for finding in judged if finding is not None]
+
+    async def set_right(self, finding: ParameterFinding) -> bool:
+        """Write its better value; True when it read back as written.  An armed vehicle is left as it is."""
+        is_known = self.parameters.get((finding.name,)) is not None
+        if finding.better is None or self._telemetry.armed or not is_known:
+            return False
+        return await self.parameters.write(finding.name, finding.better)
+
+    async def version(self) -> str:
+        """What its firmware says of itself; "" where it does not tell."""
+        for _ in range(_VERSION_LOOKS):
+            if self._version or not self._heard.is_set():
+                break
+            message = dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+            self._commander.post(dialect.MAV_CMD_REQUEST_MESSAGE, message)
+            await asyncio.sleep(_VERSION_S)
+        return self._version
 
     # The firmware
 
@@ -259,6 +297,8 @@ class MavlinkVehicle(abc.ABC):
                 self._say(message, now_ns)
             case "PARAM_VALUE":
                 self.parameters.value(message)
+            case "AUTOPILOT_VERSION":
+                self._version = version_words(message.flight_sw_version)
             case _:
                 if self._telemetry.take(message, now_ns):
                     self._rebooted()
@@ -271,6 +311,7 @@ class MavlinkVehicle(abc.ABC):
         """The autopilot started anew: what was read of it and set in it may be so no longer."""
         self.parameters.forget()
         self._examined = False
+        self._version = ""
         self._reboots += 1
 
     def _say(self, message: Message, now_ns: int) -> None:

@@ -160,8 +160,9 @@ class MavsdkVehicle:
 
     def state(self) -> VehicleState | None:
         modes = self._modes
-        state = self._readings.state(self._clock.now_ns(), in_control=modes.in_control, refusal=modes.refusal)
-        return state and self._steering.climb_of(replace(state, unfit=modes.unfit))
+        now_ns = self._clock.now_ns()
+        state = self._readings.state(now_ns, in_control=modes.in_control, refusal=modes.refusal)
+        return state and self._steering.climb_of(replace(state, unfit=modes.unfit), now_ns)
 
     def attitudes(self) -> list[Attitude]:
         return self._readings.attitudes()

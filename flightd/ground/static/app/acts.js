@@ -8,13 +8,14 @@ const STOP_PATIENCE_MS = 60000;
 const ANSWER_MS = 3000;
 const SOCKET_MS = 1000; // an act that was not answered over the socket by then goes by POST too
 
-export async function act(command, node = "") {
+// `plan`: the one that a start is for; the drone does not start where another one stands.
+export async function act(command, node = "", plan = "") {
   const drone = state.selected;
   if (!drone) return undefined;
   // What was seen as it was pressed: the drone refuses what was ordered by an old picture, or for another flight.
   const { welcome, status } = shown();
   const seen = { session: welcome?.session ?? "", seen_ns: status?.stamp_ns ?? 0 };
-  const given = { id: newId(), command, ...(node && { node }), ...seen };
+  const given = { id: newId(), command, ...(node && { node }), ...(plan && { plan }), ...seen };
   const began = performance.now();
   const patience = command === "stop" ? STOP_PATIENCE_MS : PATIENCE_MS;
   note(drone, command, node, "sent", "");
@@ -63,7 +64,7 @@ function note(drone, command, node, stage, text) {
   });
 }
 
-function newId() {
+export function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
   return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
 }

@@ -16,6 +16,12 @@ export const PAGES = [
     load: () => import("./stock/stock_page.js"),
   },
   {
+    path: "/missions",
+    title: "Missions",
+    styles: ["live.css", "map.css", "missions.css"],
+    load: () => import("./missions/missions_page.js"),
+  },
+  {
     path: "/flights",
     title: "Flights",
     styles: ["live.css", "map.css", "../vendor/uplot.css", "flights.css", "replay.css"],
@@ -32,6 +38,12 @@ export const PAGES = [
     title: "Site",
     styles: ["map.css", "site.css"],
     load: () => import("./site/site_page.js"),
+  },
+  {
+    path: "/doctor",
+    title: "Doctor",
+    styles: ["doctor.css"],
+    load: () => import("./doctor/doctor_page.js"),
   },
   {
     path: "/guide",

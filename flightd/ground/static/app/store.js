@@ -10,6 +10,7 @@ const EMPTY_DRONE = {
   events: [],
   track: [], // [x_m, y_m], oldest first
   visited: new Set(),
+  plan: null, // what is flown, or would be with the next start: the link's PlanAnswer
   trouble: {}, // why a camera shows nothing, by its name
 };
 const TRACK_STEP_M = 0.05;
@@ -19,6 +20,7 @@ export const state = {
   session: null, // who is signed in: {login, name, role}; see access/session.js
   route: null, // page, path below it and query: see router.js
   stock: null, // see stock/stock_state.js
+  missions: null, // see missions/missions_state.js
   station: null, // version, drones, browsers
   drones: new Map(),
   selected: "", // drone that is shown and commanded

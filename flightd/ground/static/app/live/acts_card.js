@@ -3,7 +3,7 @@ import { mayOperate } from "../access/session.js";
 import { act } from "../acts.js";
 import { html } from "../html.js";
 import { state, update } from "../store.js";
-import { capital, COMMANDS, isGrounded } from "../words.js";
+import { capital, COMMANDS, count, isGrounded } from "../words.js";
 import { HoldButton } from "./hold_button.js";
 
 const SHOWN_MS = 20000;
@@ -25,6 +25,7 @@ export function Acts({ status, welcome }) {
     <section class="card acts" aria-labelledby="acts">
       <h2 id="acts" class="unseen">Orders</h2>
       ${waits && html`<${Obstacles} obstacles=${status.obstacles} />`}
+      ${waits && status.plan && html`<p class="quiet">A start flies the ${count(status.nodes_planned, "node")} handed over on <a href="/missions">Missions</a>.</p>`}
       <div class="buttons">
         ${waits &&
         html`<${HoldButton} disabled=${!may("start")} onHeld=${() => act("start")}>Start<//>`}
@@ -47,7 +48,7 @@ function Order({ command, may, key_ }) {
   `;
 }
 
-function Obstacles({ obstacles }) {
+export function Obstacles({ obstacles }) {
   if (!obstacles.length) return html`<p class="ready"><span class="dot" />Ready to fly</p>`;
   return html`
     <div class="obstacles">

@@ -1,5 +1,6 @@
 // What people decided about places that need a look, and which of them are still open.
 import { signedInName } from "../access/session.js";
+import { newId } from "../acts.js";
 import { isGivenUp } from "../fetching.js";
 import { asked } from "./stock_source.js";
 import { byKey, change, differs, inOrder, sourceQuery, stock, tellTrouble } from "./stock_state.js";
@@ -81,9 +82,4 @@ export async function decide(place, what, note) {
     body: JSON.stringify({ id: newId(), place, what, who: signedInName() || who(), note, seen_s: seen }),
   });
   await loadDecisions();
-}
-
-function newId() {
-  const bytes = crypto.getRandomValues(new Uint8Array(16));
-  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
 }

@@ -1,5 +1,9 @@
 // The places that need a look as a queue: what is the matter, who looks, what was decided.
-import { html, useMemo } from "../html.js";
+import { mayOperate } from "../access/session.js";
+import { isGivenUp } from "../fetching.js";
+import { html, useMemo, useState } from "../html.js";
+import { recount } from "../missions/missions_source.js";
+import { goTo } from "../router.js";
 import { count } from "../words.js";
 import { DECISIONS, exceptions } from "./decisions.js";
 import { outcomeWords } from "./expected_card.js";
@@ -7,6 +11,7 @@ import { STATES } from "./states.js";
 import { change, stock } from "./stock_state.js";
 
 const SHOWN = 200;
+const MOST_RECOUNTED = 300; // fit into one request
 
 export function ExceptionsCard({ onChoose }) {
   const known = stock();
@@ -24,6 +29,7 @@ export function ExceptionsCard({ onChoose }) {
           ${count(all.length - open.length, "closed place")}
         </button>`}
       </div>
+      ${mayOperate() && html`<${Recount} places=${recounted(open)} source=${known.source} />`}
       ${listed.length > 0 &&
       html`
         <ol aria-labelledby="exceptions">
@@ -32,6 +38,31 @@ export function ExceptionsCard({ onChoose }) {
       `}
       ${listed.length > SHOWN && html`<p class="quiet">and ${listed.length - SHOWN} more</p>`}
     </section>
+  `;
+}
+
+// What somebody ordered to be counted again, or else all that is open.
+function recounted(open) {
+  const ordered = open.filter(({ decision }) => decision?.what === "count_again");
+  return (ordered.length ? ordered : open).map(({ code }) => code).slice(0, MOST_RECOUNTED);
+}
+
+function Recount({ places, source }) {
+  const [trouble, setTrouble] = useState("");
+  if (!places.length) return null;
+  const plan = async () => {
+    try {
+      await recount(source.name, places);
+      goTo("/missions");
+    } catch (error) {
+      if (!isGivenUp(error)) setTrouble(error.message);
+    }
+  };
+  return html`
+    <div class="recount">
+      <button class="order" onClick=${plan}>Recount ${count(places.length, "place")} as a mission</button>
+      ${trouble && html`<p class="refusal" role="alert">${trouble}</p>`}
+    </div>
   `;
 }
 

@@ -1,0 +1,17 @@
+"""Who asks on the ground link."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flightd.adapters.ground_link.protocol import Role
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """Where a request came from: `name` and `role` by its key, `route` its connection."""
+
+    name: str
+    role: Role
+    route: bytes = b""
+    address: str = ""

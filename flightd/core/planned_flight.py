@@ -1,0 +1,55 @@
+"""What a flight over chosen nodes would be, and how the plan that stands is getting on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+MOST_NODES = 500
+"""A plan over more nodes is refused: it is read and checked between two ticks."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedFlight:
+    """The `nodes` to visit, in the order in which they are flown, and the shelf `levels` that are counted at
+    them (none: all).  `places` is how many locations that is; `way` are all nodes where it stops or
+    turns, from pad to pad, `way_m` how long that is.
+    `seconds` in the air need `batteries`, full ones but for the first, of which `charge` is left; a battery
+    is taken to last `battery_s` in the air down to its reserve."""
+
+    nodes: tuple[str, ...]
+    levels: tuple[int, ...]
+    way: tuple[str, ...]
+    places: int
+    way_m: float
+    seconds: float
+    batteries: int
+    charge: float
+    battery_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class StandingPlan:
+    """The plan of this flight: `id` of the order that it came with (empty: that of the configuration), its
+    nodes and levels, which of them were `visited` and which it still wants to visit."""
+
+    id: str
+    nodes: tuple[str, ...]
+    levels: tuple[int, ...]
+    visited: tuple[str, ...]
+    remaining: tuple[str, ...]
+
+
+class Planner(Protocol):
+    """What knows the map and the drone, and so what a flight would be."""
+
+    @property
+    def standing(self) -> StandingPlan:
+        """The plan that is flown, or would be with the next start."""
+        ...
+
+    def planned(self, nodes: Sequence[str], levels: Sequence[int], *, best_order: bool) -> PlannedFlight:
+        """What a flight over the nodes (none: those of the configuration) would be; changes nothing.
+        InputError where it cannot be flown."""
+        ...

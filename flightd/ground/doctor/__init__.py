@@ -1,0 +1,1 @@
+"""The page Doctor: drones looked after while they stand."""

@@ -1,0 +1,63 @@
+// What was changed and not sent yet, who sends it, and what came of it.
+import { mayChange, signedInName } from "../access/session.js";
+import { html, useState } from "../html.js";
+import { setWho, who } from "../stock/decisions.js";
+import { count } from "../words.js";
+import { sendDrone } from "./asking.js";
+import { shownValue, valueIn } from "./settings_keys.js";
+
+export function ChangesBar({ drone, told, changes, complaint, onTake, onDrop, onUndo }) {
+  const [person, setPerson] = useState(who());
+  const [outcome, setOutcome] = useState({ text: "", good: true });
+  const [busy, setBusy] = useState(false);
+  const names = Object.keys(changes);
+  const act = async (what, body, words) => {
+    const acts = signedInName() || person.trim();
+    if (!acts) return setOutcome({ text: "Say who you are first.", good: false });
+    if (!signedInName()) setWho(acts);
+    setBusy(true);
+    setOutcome({ text: words.meanwhile, good: true });
+    try {
+      const answer = await sendDrone(drone, what, { ...body, person: acts });
+      if (answer.table) onTake(answer);
+      setOutcome({ text: words.done, good: true });
+    } catch (error) {
+      setOutcome({ text: error.message, good: false });
+    } finally {
+      setBusy(false);
+    }
+  };
+  const send = () =>
+    act("settings", { base: told.tag, changes }, { meanwhile: "The drone checks them as a whole …", done: "The drone has written them." });
+  const restart = () => act("restart", {}, { meanwhile: "Asking …", done: "flightd starts anew: a few seconds." });
+  return html`
+    <section class="card changes" aria-labelledby="changes-title">
+      <h2 id="changes-title">${names.length ? `${count(names.length, "change")} not sent yet` : "Changes"}</h2>
+      ${!names.length && !told.locked && html`<p class="quiet">Type a value, look at what is said of it, and send it to the drone while it stands disarmed.
+        What is sent is taken at the next start of flightd.</p>`}
+      ${told.locked && html`<p class="quiet">Nothing can be changed now.</p>`}
+      <ul>
+        ${names.map((name) => html`
+          <li key=${name}><span><code>${name}</code> ${shownValue(valueIn(told.table, name))} → <b>${shownValue(changes[name])}</b></span>
+            <button class="link" aria-label=${`Undo ${name}`} onClick=${() => onUndo(name)}>Undo</button></li>`)}
+      </ul>
+      ${complaint && html`<p class="refusal" role="status">${complaint}</p>`}
+      ${(names.length > 0 || told.pending) && mayChange() && !signedInName() && html`
+        <label class="field">Who
+          <input value=${person} maxlength="60" autocomplete="name" onInput=${(event) => setPerson(event.target.value)} />
+        </label>`}
+      ${names.length > 0 && html`
+        <div class="changes-orders">
+          <button class="order" disabled=${busy || Boolean(complaint) || Boolean(told.locked)} onClick=${send}>Send to ${drone}</button>
+          <button class="order" disabled=${busy} onClick=${onDrop}>Drop</button>
+        </div>`}
+      <p class=${outcome.good ? "quiet" : "refusal"} role="status">${outcome.text}</p>
+      ${told.pending && html`
+        <div class="obstacles"><p>flightd still runs by older settings: it takes these at its next start.</p>
+          ${told.restarts && mayChange()
+            ? html`<button class="order" disabled=${busy || names.length > 0} onClick=${restart}>Start flightd anew</button>`
+            : html`<p>${mayChange() ? "Start it anew on the drone." : "An admin starts it anew."}</p>`}
+        </div>`}
+    </section>
+  `;
+}

@@ -1,0 +1,58 @@
+// Doctor: what the drone finds of itself at /doctor, its settings at /doctor/settings/SECTION.
+import { html, useEffect, useState } from "../html.js";
+import { shown, state } from "../store.js";
+import { useTitle } from "../router.js";
+import { askDrone } from "./asking.js";
+import { ChecksCard } from "./checks_card.js";
+import { LogCard } from "./log_card.js";
+import { SettingsView } from "./settings_view.js";
+import { VersionsCard } from "./versions_card.js";
+
+const VIEWS = { checks: { path: "/doctor", title: "Checks" }, settings: { path: "/doctor/settings", title: "Settings" } };
+
+export default function DoctorPage({ route }) {
+  const view = route.rest.split("/")[0] === "settings" ? "settings" : "checks";
+  const drone = state.selected;
+  useTitle(VIEWS[view].title);
+  return html`
+    <div class="doctor">
+      <nav class="doctor-views" aria-label="Doctor">
+        ${Object.entries(VIEWS).map(([name, { path, title }]) => html`
+          <a key=${name} href=${path} aria-current=${name === view ? "page" : null}>${title}</a>
+        `)}
+      </nav>
+      ${!drone
+        ? html`<section class="card empty"><h2>No drone</h2>
+            <p>This station was started without one: give <code>--drone NAME=HOST</code>.</p></section>`
+        : view === "settings"
+          ? html`<${SettingsView} key=${drone} drone=${drone} section=${route.rest.split("/")[1] ?? ""} />`
+          : html`<${ChecksView} key=${drone} drone=${drone} />`}
+    </div>
+  `;
+}
+
+function ChecksView({ drone }) {
+  const [known, setKnown] = useState({ report: null, trouble: "", looking: true });
+  const session = shown().welcome?.session ?? "";
+  const look = async () => {
+    setKnown((before) => ({ ...before, looking: true }));
+    try {
+      const report = await askDrone(drone, "report");
+      setKnown({ report, trouble: "", looking: false });
+    } catch (error) {
+      if (error.name !== "AbortError") setKnown((before) => ({ ...before, trouble: error.message, looking: false }));
+    }
+  };
+  useEffect(() => {
+    look();
+  }, [drone, session]);
+  return html`
+    <div class="doctor-checks">
+      <${ChecksCard} drone=${drone} known=${known} look=${look} take=${(report) => setKnown({ report, trouble: "", looking: false })} />
+      <div class="doctor-side">
+        <${VersionsCard} drone=${drone} versions=${known.report?.versions} />
+        <${LogCard} lines=${known.report?.log} />
+      </div>
+    </div>
+  `;
+}

@@ -1,0 +1,51 @@
+// One key of the configuration: its value, unit, range, default and meaning, as its own documentation has them.
+import { html } from "../html.js";
+import { capital } from "../words.js";
+import { isSame, nameOf, readAs, typed, valueIn } from "./settings_keys.js";
+
+export function SettingField({ about, table, change, complaint, locked, onChange }) {
+  const name = nameOf(about);
+  const id = `setting-${name}`;
+  const stands = valueIn(table, name);
+  const isChanged = change !== undefined;
+  const text = typed(isChanged ? change : stands);
+  const onInput = (event) => {
+    const value = readAs(about.type, event.target.value);
+    onChange(name, isSame(value, stands) ? undefined : value);
+  };
+  const given = {
+    id, value: text, onInput, "aria-describedby": `${id}-text`, "aria-invalid": complaint ? "true" : null, disabled: Boolean(locked),
+  };
+  return html`
+    <div class=${`setting ${isChanged ? "changed" : ""} ${complaint ? "wrong" : ""}`}>
+      <label for=${id}>${about.key}${about.unit && html` <span class="quiet">${about.unit}</span>`}</label>
+      ${about.fixed ? html`<output id=${id}>${text || bare(about.default) || "not given"}</output>` : html`<${Field} about=${about} given=${given} />`}
+      <p id=${`${id}-text`} class="quiet">
+        ${capital(about.text)}. ${about.range && !isChoice(about) ? `${capital(about.range)}. ` : ""}${about.fixed
+          ? html`<em>${capital(about.fixed)}.</em>`
+          : `${isChanged && stands !== undefined ? `In the file: ${typed(stands)}. ` : ""}Default: ${defaultOf(about)}.`}
+      </p>
+      ${complaint && html`<p class="complaint" role="alert">${complaint}</p>`}
+    </div>
+  `;
+}
+
+function Field({ about, given }) {
+  if (isChoice(about) || about.type === "true or false") {
+    const options = isChoice(about) ? about.range.split(", ") : ["true", "false"];
+    const { onInput, ...rest } = given;
+    return html`
+      <select ...${rest} onChange=${onInput}>
+        <option value="">default${about.default ? ` (${bare(about.default)})` : ""}</option>
+        ${options.map((option) => html`<option key=${option} value=${option}>${option}</option>`)}
+      </select>`;
+  }
+  const isNumber = about.type.includes("number") && !about.type.startsWith("list");
+  return html`<input ...${given} type="text" inputmode=${isNumber ? "decimal" : "text"} autocomplete="off" spellcheck="false" placeholder=${bare(about.default)} />`;
+}
+
+const isChoice = ({ type }) => type === "choice";
+
+const defaultOf = (about) => (about.default === "required" ? "none, it has to be given" : bare(about.default) || "not given");
+
+const bare = (text) => (text === "required" ? "" : text === "[]" ? "none" : text.replace(/^"(.*)"$/, "$1"));

@@ -1,0 +1,55 @@
+// Whole aisles and shelf levels at once, and in which order it is flown.
+import { html } from "../html.js";
+import { count } from "../words.js";
+import { choose, missions, toggleLevel, toggleNodes } from "./missions_state.js";
+
+export function ChooseCard({ floor }) {
+  const { nodes, levels, best } = missions();
+  const aisles = aislesOf(floor);
+  const all = floor.nodes.map(({ id }) => id);
+  const known = levelsOf(floor);
+  return html`
+    <section class="card choose" aria-label="Aisles, levels and order">
+      <div class="choose-row" role="group" aria-labelledby="choose-aisles">
+        <h3 id="choose-aisles">Aisles</h3>
+        ${aisles.map(
+          ([aisle, ids]) => html`<${Chip} key=${aisle} on=${ids.every((id) => nodes.includes(id))}
+            part=${ids.some((id) => nodes.includes(id))} onClick=${() => toggleNodes(ids)}>${aisle}<//>`,
+        )}
+        <${Chip} on=${all.every((id) => nodes.includes(id))} onClick=${() => toggleNodes(all)}>Every node<//>
+        <button class="order" disabled=${!nodes.length} onClick=${() => choose({ nodes: [] })}>Clear</button>
+      </div>
+      ${known.length > 0 &&
+      html`
+        <div class="choose-row" role="group" aria-labelledby="choose-levels">
+          <h3 id="choose-levels">Levels</h3>
+          <${Chip} on=${!levels.length} onClick=${() => choose({ levels: [] })}>All<//>
+          ${known.map((level) => html`<${Chip} key=${level} on=${levels.includes(level)} onClick=${() => toggleLevel(level)}>${level}<//>`)}
+          <span class="quiet">counted from the floor up</span>
+        </div>
+      `}
+      <div class="choose-row" role="group" aria-labelledby="choose-order">
+        <h3 id="choose-order">Order</h3>
+        <${Chip} on=${best} onClick=${() => choose({ best: true })}>Quickest<//>
+        <${Chip} on=${!best} onClick=${() => choose({ best: false })}>As chosen<//>
+        <span class="quiet">${nodes.length ? `${count(nodes.length, "node")} of ${all.length} chosen` : "nothing is chosen yet"}</span>
+      </div>
+    </section>
+  `;
+}
+
+function Chip({ on, part = false, onClick, children }) {
+  const kind = part && !on ? "pick part" : "pick";
+  return html`<button class=${kind} aria-pressed=${on} onClick=${onClick}>${children}</button>`;
+}
+
+function aislesOf({ nodes }) {
+  const found = new Map();
+  for (const { id, aisle } of nodes) found.set(aisle, [...(found.get(aisle) ?? []), id]);
+  found.delete("");
+  return [...found];
+}
+
+function levelsOf({ nodes }) {
+  return [...new Set(nodes.flatMap((node) => node.levels))].sort((a, b) => a - b);
+}

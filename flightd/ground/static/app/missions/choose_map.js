@@ -1,0 +1,89 @@
+// The map to choose on: each node a button, numbered in the order in which it is flown.
+import { html, useMemo } from "../html.js";
+import { nextInDirection } from "../live/map_keys.js";
+import { Drone, Legend, M, markScale } from "../live/map_marks.js";
+import { bounds, Floor } from "../live/site_plan.js";
+import { shown } from "../store.js";
+import { missions, toggleNode } from "./missions_state.js";
+
+const MARKS = [
+  ["chosen", "chosen, in the order of flight"],
+  ["way", "the way"],
+  ["keep", "keep out"],
+];
+
+export function ChooseMap({ floor, planned }) {
+  const box = useMemo(() => bounds(floor), [floor]);
+  const plan = useMemo(() => html`<${Floor} floor=${floor} box=${box} />`, [floor]);
+  const nodes = useMemo(() => new Map(floor.nodes.map((node) => [node.id, node])), [floor]);
+  const scale = markScale(box);
+  const way = (planned?.way ?? []).map((id) => nodes.get(id)).filter(Boolean);
+  const { status } = shown();
+  return html`
+    <section class="card map choosing" aria-labelledby="choose-map">
+      <h3 id="choose-map">Choose nodes on the map</h3>
+      <p class="quiet">Click a node, or go from node to node with the arrow keys and choose with the space bar.</p>
+      <svg
+        viewBox=${box.map((value) => value * M).join(" ")}
+        role="group"
+        aria-label=${`Map of ${floor.name} to choose on`}
+        style=${{ "--scale": scale }}
+      >
+        ${plan}
+        ${way.length > 1 &&
+        html`<polyline class="planned-way" points=${way.map(({ x_m: x, y_m: y }) => `${x * M},${y * M}`).join(" ")} aria-hidden="true" />`}
+        <${Nodes} floor=${floor} order=${planned?.nodes} scale=${scale} />
+        <${Numbers} nodes=${nodes} order=${planned?.nodes ?? []} scale=${scale} />
+        ${status?.position && html`<${Drone} position=${status.position} scale=${scale} />`}
+      </svg>
+      <div class="map-foot"><${Legend} marks=${MARKS} /></div>
+    </section>
+  `;
+}
+
+// Drawn over the nodes: each button's own text stays its name.
+function Numbers({ nodes, order, scale }) {
+  return html`
+    <g class="numbers" aria-hidden="true">
+      ${order.map((id, i) => {
+        const { x_m: x, y_m: y } = nodes.get(id);
+        return html`<text key=${id} transform=${`translate(${x * M} ${y * M}) scale(${scale})`} y="7">${i + 1}</text>`;
+      })}
+    </g>
+  `;
+}
+
+// The order is told by the drone's plan; before it is known, the nodes are only marked.
+function Nodes({ floor, order, scale }) {
+  const { nodes: chosen } = missions();
+  const entry = chosen[0] ?? floor.home;
+  const onKey = (event, node) => {
+    const next = nextInDirection(floor.nodes, node, event.key);
+    if (next) document.getElementById(`choose-${next.id}`)?.focus();
+    else if (event.key === "Enter" || event.key === " ") toggleNode(node.id);
+    else return;
+    event.preventDefault();
+  };
+  return floor.nodes.map((node) => {
+    const isChosen = chosen.includes(node.id);
+    const place = order ? order.indexOf(node.id) + 1 : 0;
+    const words = `Node ${node.id}${isChosen && place ? `, flown as number ${place}` : ""}`;
+    return html`
+      <g
+        key=${node.id}
+        id=${`choose-${node.id}`}
+        class=${isChosen ? "node picked" : "node"}
+        transform=${`translate(${node.x_m * M} ${node.y_m * M}) scale(${scale})`}
+        role="button"
+        aria-pressed=${isChosen}
+        aria-label=${words}
+        tabindex=${node.id === entry ? 0 : -1}
+        onClick=${() => toggleNode(node.id)}
+        onKeyDown=${(event) => onKey(event, node)}
+      >
+        <circle class="touch" r="32" /><circle class="mark" r=${isChosen ? 17 : 9} />
+        <text x="14" y="36">${node.id}</text>
+      </g>
+    `;
+  });
+}

@@ -1,0 +1,84 @@
+// The missions that are kept under names: opened, renamed, duplicated, deleted; and what was cut, flown on.
+import { mayOperate } from "../access/session.js";
+import { html, useState } from "../html.js";
+import { shown } from "../store.js";
+import { count } from "../words.js";
+import { duplicate, remove, saveChosen } from "./missions_source.js";
+import { change, choose, isKept, missions, open, startAnew } from "./missions_state.js";
+
+const DAY = new Intl.DateTimeFormat([], { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
+
+export function KeptCard() {
+  const { list, kept, trouble, id } = missions();
+  return html`
+    <section class="card kept" aria-labelledby="kept">
+      <div class="kept-head">
+        <h3 id="kept">Kept missions</h3>
+        ${id && html`<button class="order" onClick=${startAnew}>New mission</button>`}
+      </div>
+      ${kept ? mayOperate() && html`<${Save} />` : html`<p class="quiet">This station keeps none: start it with <code>--folder</code>.</p>`}
+      ${trouble && html`<p class="refusal" role="alert">${trouble}</p>`}
+      ${list === null && html`<p class="quiet" role="status">Loading …</p>`}
+      ${kept && list?.length === 0 && html`<p class="quiet">None yet${mayOperate() ? ": choose nodes, give them a name and keep them" : ""}.</p>`}
+      ${list?.length > 0 && html`<ul>${list.map((mission) => html`<${Row} key=${mission.id} mission=${mission} />`)}</ul>`}
+    </section>
+  `;
+}
+
+function Save() {
+  const { id, name, nodes } = missions();
+  const done = isKept();
+  const onSubmit = (event) => {
+    event.preventDefault();
+    saveChosen();
+  };
+  return html`
+    <form class="save" onSubmit=${onSubmit}>
+      <label class="field">Name
+        <input
+          value=${name} maxlength="80" autocomplete="off" spellcheck=${false}
+          onInput=${(event) => change({ name: event.target.value })}
+        />
+      </label>
+      <button class="order" disabled=${!nodes.length || !name.trim() || done}>${done ? "Kept" : id ? "Keep changes" : "Keep"}</button>
+    </form>
+  `;
+}
+
+function Row({ mission }) {
+  const [asks, setAsks] = useState(false);
+  const { id } = missions();
+  const { plan, status } = shown();
+  const flies = plan?.id === mission.plan && mission.plan && status && !["done", "aborted", "pilot", "preflight"].includes(status.phase);
+  const cut = mission.flown_ns > 0 && mission.remaining.length > 0 && !flies;
+  const flyRest = () => {
+    open(mission);
+    choose({ nodes: mission.remaining, note: `The rest of ${mission.name}: ${count(mission.remaining.length, "node")} of ${mission.nodes.length}.` });
+  };
+  return html`
+    <li class=${mission.id === id ? "row shown" : "row"}>
+      <button class="name" aria-pressed=${mission.id === id} onClick=${() => open(mission)}>
+        <strong>${mission.name}</strong><span class="quiet">${about(mission, flies && plan)}</span>
+      </button>
+      ${cut && mayOperate() && html`<button class="order" onClick=${flyRest}>Fly the rest</button>`}
+      ${mayOperate() &&
+      html`<div class="row-acts">
+        <button class="tab" onClick=${() => duplicate(mission)} aria-label=${`Duplicate ${mission.name}`}>Duplicate</button>
+        ${asks
+          ? html`<button class="tab sure-delete" onClick=${() => remove(mission)} aria-label=${`Delete ${mission.name} for good`}>Delete for good</button>
+              <button class="tab" onClick=${() => setAsks(false)}>Keep it</button>`
+          : html`<button class="tab" onClick=${() => setAsks(true)} aria-label=${`Delete ${mission.name}`}>Delete</button>`}
+      </div>`}
+    </li>
+  `;
+}
+
+// `flies`: the plan that is flown, if it is of this mission: newer than what is kept of it.
+function about({ nodes, levels, flown_ns: flown, remaining }, flies) {
+  const parts = [count(nodes.length, "node")];
+  if (levels.length) parts.push(`level ${levels.join(", ")}`);
+  if (flies) parts.push(`in flight, ${flies.remaining.length} left`);
+  else if (flown && remaining.length) parts.push(`${remaining.length} left of ${DAY.format(new Date(flown / 1e6))}`);
+  else if (flown) parts.push(`flown ${DAY.format(new Date(flown / 1e6))}`);
+  return parts.join(" · ");
+}

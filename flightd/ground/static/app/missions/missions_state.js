@@ -1,0 +1,65 @@
+// What the page Missions knows: what is chosen, what the drone makes of it, and the missions that are kept.
+import { state, update } from "../store.js";
+
+const EMPTY = {
+  site: "", // the site that the rest belongs to
+  nodes: [], // ids of the chosen nodes, in the order of their choice
+  levels: [], // shelf levels that are counted; none: all
+  best: true, // in the quickest order, not in that of the choice
+  id: "", // of the kept mission that is open; empty: none is
+  name: "",
+  note: "", // what a person should know of this choice
+  estimate: null, // {key, planned} or {key, trouble}
+  list: null, // missions that are kept; null: not known yet
+  kept: true, // this station has a folder to keep them in
+  trouble: "", // what the last act on a kept mission came to
+  refused: false, // `flying` is why it was not
+  flying: "", // what became of handing the mission over; empty: nothing is under way
+};
+
+export const missions = () => state.missions ?? EMPTY;
+
+export function change(changes) {
+  update((s) => {
+    s.missions = { ...(s.missions ?? EMPTY), ...changes };
+  });
+}
+
+// Another site: nothing that was chosen on the one before stands for it.
+export const enter = (site) => change({ ...EMPTY, site });
+
+// What is chosen becomes another choice; an estimate is asked for anew.
+export const choose = (changes) => change({ note: "", flying: "", ...changes });
+
+export function toggleNode(id) {
+  const { nodes } = missions();
+  choose({ nodes: nodes.includes(id) ? nodes.filter((other) => other !== id) : [...nodes, id] });
+}
+
+// All of these nodes, or none of them where all are chosen already.
+export function toggleNodes(ids) {
+  const { nodes } = missions();
+  const all = ids.every((id) => nodes.includes(id));
+  choose({
+    nodes: all ? nodes.filter((id) => !ids.includes(id)) : [...nodes, ...ids.filter((id) => !nodes.includes(id))],
+  });
+}
+
+export function toggleLevel(level) {
+  const { levels } = missions();
+  const next = levels.includes(level) ? levels.filter((other) => other !== level) : [...levels, level];
+  choose({ levels: next.sort((a, b) => a - b) });
+}
+
+export const open = ({ id, name, nodes, levels }) =>
+  change({ id, name, nodes, levels, best: false, note: "", flying: "", trouble: "" });
+
+export const startAnew = () => change({ id: "", name: "", nodes: [], levels: [], best: true, note: "", flying: "", trouble: "" });
+
+// Whether what is chosen is what the open mission holds.
+export function isKept() {
+  const { id, list, nodes, levels, name } = missions();
+  const kept = list?.find((mission) => mission.id === id);
+  const same = (a, b) => a.length === b.length && a.every((one, i) => one === b[i]);
+  return Boolean(kept && kept.name === name.trim() && same(kept.nodes, nodes) && same(kept.levels, levels));
+}

@@ -1,0 +1,107 @@
+"""A flight over nodes and levels that somebody chose: checked, ordered, planned and estimated.  Pure."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+from flightd.config.battery import BatteryConfig
+from flightd.config.schema import Config
+from flightd.core.errors import InputError
+from flightd.core.planned_flight import MOST_NODES, PlannedFlight
+from flightd.mission.battery.outings import Supply, WaysOfPlan, flown_on
+from flightd.mission.battery.sorties import Sorties
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
+from flightd.mission.plan.leg_times import Legs, Pace
+from flightd.mission.plan.route_optimiser import ordered_best
+from flightd.mission.scan.no_scan import AnyScanner
+from flightd.site.site import Site
+
+_BEST_OF = 60
+"""More nodes are flown aisle by aisle: to look for a better order would hold up the ticks."""
+_SHOWN = 3
+
+
+class ChosenPlans:
+    """Plans of one drone on one site, from the pad on which `first` begins.  Changes nothing."""
+
+    def __init__(
+        self, site: Site, first: FlightPlan, policy: HeadingPolicy, config: Config, scanner: AnyScanner
+    ) -> None:
+        self._site = site
+        self._first = first
+        self._policy = policy
+        self._pace = Pace.of(config.mission)
+        self._legs = Legs(site, policy, self._pace)
+        self._battery: BatteryConfig = config.battery
+        self._scanner = scanner
+
+    def plan(
+        self, nodes: Sequence[str], levels: Sequence[int] = (), *, best_order: bool = False
+    ) -> FlightPlan:
+        """The plan over these nodes, each once.  InputError, one line, for a node that the site lacks, that
+        no open line leads to or that a full battery does not reach and come back from, and for levels that
+        nothing is counted on."""
+        wanted = tuple(dict.fromkeys(nodes))
+        self._check(wanted, levels)
+        first = self._first
+        if best_order and len(wanted) <= _BEST_OF:
+            ends, yaw = (first.start, first.home), first.start_yaw_rad
+            wanted = ordered_best(self._site, wanted, ends, self._policy, self._pace, yaw)
+        elif best_order:
+            place = {node: i for i, node in enumerate(self._site.serpentine_route())}
+            wanted = tuple(sorted(wanted, key=lambda node: place.get(node, len(place))))
+        plan = make_plan(self._site, wanted, first.start, first.home, self._policy, first.start_yaw_rad)
+        far = self._sorties(levels).out_of_reach(wanted)
+        if far:
+            raise InputError(
+                f"a full battery does not reach {_listed(far)}, last for the stop there and come back with"
+                " its reserve; leave it out"
+            )
+        return plan
+
+    def estimate(
+        self, plan: FlightPlan, levels: Sequence[int], charge: float, rate_per_s: float
+    ) -> PlannedFlight:
+        """What flying a plan takes, from a battery of that `charge` (0..1) on, `rate_per_s` of a full one
+        being used in each second in the air.  Each view of a shelf is looked from once, for its longest."""
+        nodes = tuple(stop.node for stop in plan.stops if stop.visit)
+        sorties = self._sorties(levels)
+        way, site = [plan.start, *(stop.node for stop in plan.stops)], self._site
+        metres = sum(site.length_m(site.path(a, b)) for a, b in itertools.pairwise(way))
+        ways_s = WaysOfPlan.of(site, plan, self._pace)
+        flown = flown_on(sorties, plan, ways_s, Supply(charge, rate_per_s, self._battery.reserve))
+        return PlannedFlight(
+            nodes=nodes,
+            levels=tuple(levels),
+            way=tuple(way),
+            places=sum(len(self._scanner.places_at(node, levels)) for node in dict.fromkeys(nodes)),
+            way_m=metres,
+            seconds=flown.seconds,
+            batteries=flown.batteries,
+            charge=charge,
+            battery_s=(1.0 - self._battery.reserve) / rate_per_s,
+        )
+
+    def _sorties(self, levels: Sequence[int]) -> Sorties:
+        return Sorties(self._site, self._legs, self._battery, self._scanner, levels)
+
+    def _check(self, nodes: Sequence[str], levels: Sequence[int]) -> None:
+        if not nodes:
+            raise InputError("no node is chosen")
+        if len(nodes) > MOST_NODES:
+            raise InputError(
+                f"{len(nodes)} nodes are more than the {MOST_NODES} of one flight; fly it in parts"
+            )
+        if unknown := [node for node in nodes if node not in self._site.nodes]:
+            raise InputError(f"no node {_listed(unknown)} on site {self._site.name}")
+        if levels and not self._scanner.counts:
+            raise InputError("this flight counts no shelves: leave the levels out")
+        if levels and not any(self._scanner.places_at(node, levels) for node in nodes):
+            texts = ", ".join(map(str, levels))
+            raise InputError(f"nothing is counted on level {texts} at any of these nodes")
+
+
+def _listed(nodes: Sequence[str]) -> str:
+    more = f" and {len(nodes) - _SHOWN} more" if len(nodes) > _SHOWN else ""
+    return ", ".join(nodes[:_SHOWN]) + more

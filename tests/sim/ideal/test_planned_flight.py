@@ -1,0 +1,47 @@
+"""A plan that is handed over before the start, flown: its nodes and levels, and what it was said to take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flightd.config.schema import load_config
+from flightd.core.planned_flight import PlannedFlight
+from flightd.core.types import Command, CommandKind, Phase
+from tests.sim.ideal.ideal_flight import Flown, IdealFlight
+from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
+from tests.unit.mission.shelves import FITTED, SIGHT, SITE
+
+CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(
+    front_camera=FITTED, mission={"autostart": False, "start_countdown_s": 0.0}
+)
+ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE}
+
+
+def flown(*nodes: str, levels: tuple[int, ...] = ()) -> tuple[Flown, PlannedFlight]:
+    """The flight of a plan that comes once the drone is ready, and what was said of it before."""
+    stock = Stock({code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in SITE.locations})
+    flight = IdealFlight(SITE, CONFIG, front=IdealFront(SITE, SIGHT, stock))
+    mission = flight.pilot.mission
+    said: list[PlannedFlight] = []
+
+    def order(_phase: Phase, _now_ns: int) -> None:
+        if not said and CommandKind.START in mission.possible_commands:
+            said.append(mission.planned(nodes, levels, best_order=False))
+            plan = Command("plan-0001", CommandKind.PLAN, nodes=nodes, levels=levels)
+            flight.commands += [plan, Command("start-001", CommandKind.START, plan="plan-0001")]
+
+    flight.on_tick = order
+    return flight.fly(), said[0]
+
+
+def test_it_counts_the_chosen_level_of_the_chosen_nodes_in_about_the_time_that_was_said() -> None:
+    flight, said = flown("A3", "A2", levels=(1,))
+    assert (flight.phase, flight.visited) == (Phase.DONE, ["A3", "A2"])
+    found = {finding.location for output in flight.outputs for finding in output.findings}
+    wanted = {
+        place.code for place in SITE.locations.values() if place.node in {"A3", "A2"} and place.level == 1
+    }
+    assert found == wanted
+    assert said.places == len(wanted)
+    air_s = 0.02 * sum(output.phase not in ON_GROUND for output in flight.outputs)
+    assert 0.9 < said.seconds / air_s < 1.4, "a view is often over before its longest"

@@ -1,0 +1,75 @@
+"""The position loop swings over an airframe that answers too slowly, which is found and slowed down; over a
+sound one in gusts nothing is."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import pytest
+
+from flightd.config.control import ControlConfig
+from flightd.control.flight_controller import Conditions, FlightController, Motion, Reference
+from flightd.control.oscillation import OscillationMonitor
+from flightd.core.types import AttitudeSetpoint
+from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
+from flightd.sim.plant.wind import WindParams
+from flightd.sim.scenario.fault_schema import AttitudeSlow
+from flightd.sim.scenario.scenario_files import load_scenario, shipped_scenarios
+
+TICK_NS, TICK_S, STEPS = 20_000_000, 0.02, 4
+HEIGHT_M = 1.6
+SOUND = AirframeParams()
+(SLOW,) = load_scenario(shipped_scenarios()["swings"]).fault
+EXPECTED = load_scenario(shipped_scenarios()["swings"]).expect
+SEEDS = range(1, 5)
+
+
+@dataclass(frozen=True)
+class Hovered:
+    """When it was found to swing, s, infinite if never, and how fast it moved in the second half, m/s rms."""
+
+    found_s: float
+    late_mps: float
+
+
+def hover(share: float, gust_mps: float, seed: int, *, eases: bool = True, seconds: float = 40.0) -> Hovered:
+    """Over one place, by setpoints that act 40 ms late; `share` is the bandwidth's in a sound airframe's."""
+    params = AirframeParams(attitude_bandwidth_radps=share * SOUND.attitude_bandwidth_radps)
+    body = Airframe(params, WindParams(gust_rms_mps=gust_mps, vertical_gust_rms_mps=0.0), seed)
+    body.height_m, body.on_floor, body.collective = HEIGHT_M, False, SOUND.hover_collective
+    control, monitor = FlightController(ControlConfig()), OscillationMonitor()
+    sent = deque([AttitudeSetpoint(0)] * 3, maxlen=3)
+    found_s, squares = math.inf, []
+    for tick in range(round(seconds / TICK_S)):
+        now_ns = tick * TICK_NS
+        monitor.step(now_ns, body.vx_mps, body.vy_mps)
+        if monitor.swings:
+            found_s = min(found_s, tick * TICK_S)
+        if tick * TICK_S > 0.5 * seconds:
+            squares.append(body.vx_mps**2 + body.vy_mps**2)
+        motion = Motion(body.x_m, body.y_m, body.vx_mps, body.vy_mps, 0.0, 0.0, HEIGHT_M)
+        conditions = Conditions(ease=monitor.ease if eases else 1.0)
+        wanted = control.step(now_ns, motion, Reference(0.0, 0.0, 0.0, HEIGHT_M), TICK_S, conditions)
+        sent.append(wanted)
+        for _ in range(STEPS):
+            collective = SOUND.hover_collective / body.tilt_cos
+            command = AirframeCommand(True, sent[0].roll_rad, sent[0].pitch_rad, collective=collective)
+            body.step(TICK_S / STEPS, command)
+    return Hovered(found_s, math.sqrt(sum(squares) / len(squares)))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_airframe_of_the_scenario_swings_is_found_in_time_and_slowed_down(seed: int) -> None:
+    assert isinstance(SLOW, AttitudeSlow)
+    assert EXPECTED is not None
+    hovered = hover(SLOW.share, 0.3, seed)
+    assert hovered.found_s < EXPECTED.found_s
+    assert hovered.late_mps < 0.5 * hover(SLOW.share, 0.3, seed, eases=False).late_mps
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("gust_mps", [0.3, 0.8])
+def test_a_sound_airframe_in_gusts_never_swings(gust_mps: float, seed: int) -> None:
+    assert hover(1.0, gust_mps, seed, seconds=60.0).found_s == math.inf

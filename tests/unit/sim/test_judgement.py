@@ -1,0 +1,53 @@
+"""A simulated flight judged by its two logs."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
+from flightd.app.simulation.judgement import judge_flight
+from flightd.app.simulation.prepare import SimOptions, prepare
+from flightd.app.simulation.simulation import Simulation
+from flightd.core.topics import Topic
+from flightd.core.types import AttitudeSetpoint
+from flightd.sim.scenario.faults import FaultNote
+from flightd.sim.scenario.scenario import Scenario
+from tests.rigs.flight_evidence import S, at, status
+
+BEGUN_S, DOWN_S, END_S = 10, 26, 40
+
+
+@pytest.fixture
+def simulation(tmp_path: Path) -> Simulation:
+    return prepare(SimOptions(), Scenario(), tmp_path, lambda _: None)
+
+
+def faults(simulation: Simulation, kind: str) -> set[str]:
+    """Of a flight in which a fault began 16 s before it came down: level setpoints until then, and leaning
+    ones on the floor, ten a second to the end."""
+    with McapRecorder(simulation.truth_log, when_full=wait_for_disk) as log:
+        log.record(Topic.FAULT, BEGUN_S * S, FaultNote(BEGUN_S * S, 0, kind, True))
+        for stamp_ns in range(0, END_S * S, S // 10):
+            flies = S < stamp_ns < DOWN_S * S
+            log.record(Topic.TRUTH, stamp_ns, at(stamp_ns, 0.0, height_m=1.6 if flies else 0.1))
+    with McapRecorder(simulation.flight_log, when_full=wait_for_disk) as log:
+        log.record(Topic.STATUS, 0, status(0))
+        for stamp_ns in range(0, END_S * S, S // 10):
+            roll_rad = math.radians(10.0) if stamp_ns > DOWN_S * S else 0.0
+            log.record(Topic.SETPOINT, stamp_ns, AttitudeSetpoint(stamp_ns, roll_rad))
+    return {fault.kind for fault in judge_flight(simulation).faults}
+
+
+def test_what_a_dead_computer_would_have_sent_neither_steers_nor_leans(simulation: Simulation) -> None:
+    found = faults(simulation, "companion_dead")
+    assert "out_of_control" in found
+    assert "leaned_on_floor" not in found
+
+
+def test_what_a_computer_sends_that_is_alive_counts_whatever_else_fails(simulation: Simulation) -> None:
+    found = faults(simulation, "telemetry_silent")
+    assert "out_of_control" not in found
+    assert "leaned_on_floor" in found

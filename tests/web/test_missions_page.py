@@ -1,0 +1,121 @@
+"""The page Missions in a real browser: choose by mouse and keyboard, keep, fly, and fly the rest."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from flightd.config.schema import load_config
+from tests.unit.mission.shelves import FITTED
+from tests.web.chromium import NARROW, hindrances, opened, station
+from tests.web.live_flight import LiveFlight
+from tests.web.stock_rig import RACKS, counted_store
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Locator, Page
+
+pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
+from playwright.sync_api import expect
+
+CONFIG = load_config(Path(__file__).parents[2] / "configs" / "sim.toml").with_values(
+    mission={"autostart": False, "start_countdown_s": 0.0}, front_camera=FITTED
+)
+SECOND = list(RACKS.nodes)[1]
+
+expect.set_options(timeout=40_000.0)
+
+
+@pytest.fixture(scope="module")
+def flight() -> Iterator[LiveFlight]:
+    """A drone that waits on a site with racks."""
+    with LiveFlight(RACKS, CONFIG, speed=1.0) as flight:
+        yield flight
+
+
+@pytest.fixture(scope="module")
+def url(flight: LiveFlight, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Its station, with an inventory of that site."""
+    folder = tmp_path_factory.mktemp("hall")
+    counted_store(folder / "monday")
+    status, command = flight.ports
+    with station([f"demo=127.0.0.1:{status}/{command}"], folder=folder) as url:
+        yield url
+
+
+def button(page: Page, name: str) -> Locator:
+    return page.get_by_role("button", name=name, exact=True)
+
+
+def press(page: Page, name: str) -> None:
+    """By the key, once it may be pressed."""
+    expect(button(page, name)).to_be_enabled()
+    button(page, name).press("Enter")
+
+
+def places(page: Page) -> Locator:
+    return page.locator("dl.takes div").filter(has_text="Places").locator("dd")
+
+
+def test_a_flight_is_chosen_estimated_kept_flown_and_flown_on_and_places_become_one(
+    browser: Browser, url: str, flight: LiveFlight
+) -> None:
+    with opened(browser, f"{url}/missions") as page:
+        expect(page.get_by_text("Choose aisles or nodes")).to_be_visible()
+        button(page, f"Node {SECOND}").click()
+        expect(page.get_by_text("Time in the air")).to_be_visible()
+        every = places(page).inner_text()
+        button(page, "1").click()  # a shelf level
+        expect(places(page)).not_to_have_text(every)
+        assert 0 < int(places(page).inner_text()) < int(every)
+        page.get_by_role("button", name=f"Node {SECOND}").focus()  # and on by keyboard alone
+        page.keyboard.press("ArrowRight")
+        page.keyboard.press("Space")
+        chosen = page.get_by_role("group", name="Map of").get_by_role("button", pressed=True)
+        expect(chosen).to_have_count(2)
+        page.locator(".flown-order summary").click()
+        expect(page.locator(".flown-order li")).to_have_count(2)
+        assert hindrances(page) == []
+
+        page.get_by_label("Name").fill("Two nodes")
+        press(page, "Keep")
+        expect(button(page, "Kept")).to_be_visible()
+        page.get_by_label("Name").fill("Low level")
+        press(page, "Keep changes")
+        row = page.get_by_role("button", name="Low level 2 nodes")
+        expect(row).to_be_visible()
+        press(page, "Duplicate Low level")
+        copy = page.get_by_role("button", name="Low level copy 2 nodes")
+        expect(copy).to_be_visible()
+        press(page, "Delete Low level copy")
+        press(page, "Delete Low level copy for good")
+        expect(copy).to_have_count(0)
+        page.reload()
+        row.click()
+
+        start = page.get_by_role("button", name="Start this mission")
+        expect(start).to_have_attribute("aria-disabled", "false")
+        start.hover()
+        page.mouse.down()
+        expect(page.get_by_text(re.compile("0 of 2 nodes"))).to_be_visible()
+        page.mouse.up()
+        flight.pace(8.0)
+        page.get_by_role("link", name="Live").click()
+        button(page, "Land here").click()
+        expect(page.get_by_role("heading", name="Flight ended early")).to_be_visible()
+        page.get_by_role("link", name="Missions").click()
+        button(page, "Fly the rest").click()
+        expect(page.get_by_text("The rest of Low level: 2 nodes of 2.")).to_be_visible()
+
+        page.set_viewport_size({"width": NARROW[0], "height": NARROW[1]})
+        page.emulate_media(color_scheme="dark")
+        page.goto(f"{url}/stock?store=monday")
+        page.get_by_role("button", name=re.compile("^Recount . places as a mission")).click()
+        expect(page.get_by_text(re.compile("^Counts . places of the inventory again"))).to_be_visible()
+        expect(page.get_by_label("Name")).to_have_value(re.compile("^Recount . places"))
+        expect(button(page, "Node A1")).to_have_attribute("aria-pressed", "true")
+        assert hindrances(page) == []
+        assert page.evaluate("document.documentElement.scrollWidth") <= NARROW[0]
