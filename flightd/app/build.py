@@ -13,6 +13,7 @@ from functools import partial
 
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.ground_link.link import ZmqGround
+from flightd.adapters.ground_link.protocol import CameraOptics
 from flightd.adapters.interlock import FileInterlock
 from flightd.adapters.store.learnt_sensors import learnt_file
 from flightd.adapters.store.progress import progress_file
@@ -325,14 +326,18 @@ def detector_of(config: Config, site: Site) -> Callable[[], Detector]:
 
 
 def ground_link(
-    settings: GroundConfig, site: Site, clock: Clock, counting: Counting | None = None
+    settings: GroundConfig,
+    site: Site,
+    clock: Clock,
+    counting: Counting | None = None,
+    optics: Sequence[CameraOptics] = (),
 ) -> ZmqGround | None:
     """The link to ground stations, not listening yet; None where none is wanted."""
     if not settings.listen:
         return None
     if counting is None:
-        return ZmqGround(settings, site, clock)
-    return ZmqGround(settings, site, clock, counting.places, tuple(CameraName))
+        return ZmqGround(settings, site, clock, optics=optics)
+    return ZmqGround(settings, site, clock, counting.places, tuple(CameraName), optics)
 
 
 def _plan_on(config: Config, flown: Site, order: FlightOrder) -> FlightPlan:

@@ -12,6 +12,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from flightd.adapters.ground_link.camera_optics import camera_optics
 from flightd.adapters.recorder.archive import FlightArchive
 from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.adapters.store.learnt_sensors import load_learnt
@@ -107,7 +108,7 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult:
         if archive is not None:
             recorder = stack.enter_context(_recorder(run.setting, archive, identity))
         counting = await count.begun(clock)
-        link = ground_link(config.ground, site, clock, counting)
+        link = ground_link(config.ground, site, clock, counting, camera_optics(config))
         ground = NO_GROUND if link is None else stack.enter_context(link)
         await pool.ready()
         flight = build(

@@ -22,6 +22,7 @@ from flightd.adapters.ground_link.protocol import (
     VERSION,
     Answer,
     AskPicture,
+    CameraOptics,
     Code,
     EventReport,
     LinkReport,
@@ -71,9 +72,10 @@ class ZmqGround:
         clock: Clock,
         inventory: Callable[[], Sequence[dict[str, str]]] | None = None,
         cameras: Sequence[CameraName] = (CameraName.DOWN,),
+        optics: Sequence[CameraOptics] = (),
     ) -> None:
         """Read keys and allow-list.  InputError names what is wrong with them.  `cameras` are those that this
-        flight has pictures of."""
+        flight has pictures of, `optics` their lenses and mounts."""
         self._config = config
         self._clock = clock
         self._keys: KeyPair | None = load_pair(config.server_key) if config.server_key else None
@@ -81,7 +83,7 @@ class ZmqGround:
         self._session = secrets.token_hex(8)
         self._audit: AuditLog | None = None
         self._handler = RequestHandler(
-            site, self._session, self._write_down, config.picture_fps, inventory, cameras
+            site, self._session, self._write_down, config.picture_fps, inventory, cameras, optics
         )
         self._seq: Counter[bytes] = Counter()
         self._waiting: dict[CameraName, _Waiting] = {camera: deque() for camera in CameraName}

@@ -21,6 +21,7 @@ from flightd.adapters.ground_link.protocol import (
     AskPicture,
     AskStatus,
     Attend,
+    CameraOptics,
     Code,
     Envelope,
     EventReport,
@@ -77,6 +78,7 @@ class RequestHandler:
         picture_fps: float = 0.0,
         inventory: Callable[[], Sequence[dict[str, str]]] | None = None,
         cameras: Sequence[CameraName] = (CameraName.DOWN,),
+        optics: Sequence[CameraOptics] = (),
     ) -> None:
         self._nodes = frozenset(site.nodes)
         self._floor = floor_status(site)
@@ -85,6 +87,7 @@ class RequestHandler:
         self._picture_fps = picture_fps
         self._inventory = inventory
         self._cameras = tuple(cameras)
+        self._optics = tuple(optics)
         self._commands: deque[Command] = deque()
         self._done: OrderedDict[tuple[str, str], tuple[CommandKind, str]] = OrderedDict()
         self._recent: deque[tuple[str, int]] = deque(maxlen=_ORDERS_PER_S * 8)
@@ -167,6 +170,7 @@ class RequestHandler:
             floor=self._floor,
             events=tuple(self.events),
             cameras=self._cameras,
+            optics=self._optics,
         )
 
     def _order(self, order: Order, peer: Peer, now_ns: int) -> Answer:

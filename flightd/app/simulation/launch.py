@@ -15,6 +15,7 @@ from contextlib import AsyncExitStack, ExitStack
 from dataclasses import replace
 from typing import Any
 
+from flightd.adapters.ground_link.camera_optics import camera_optics
 from flightd.adapters.recorder.recorder import McapRecorder, WhenFull, drop_newest, wait_for_disk
 from flightd.app.absent_parts import NO_GROUND
 from flightd.app.build import build, detector_pool, ground_link
@@ -145,7 +146,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
         pool = stack.enter_context(detector_pool(config, site, clock))
         count = FlightCount(config, site, simulation.folder, stack, run=identity.run)
         counting = await count.begun(clock)
-        link = ground_link(_ground_settings(simulation), site, clock, counting)
+        link = ground_link(_ground_settings(simulation), site, clock, counting, camera_optics(config))
         ground = NO_GROUND if link is None else stack.enter_context(link)
         faults = LauncherFaults(simulation.scenario.fault, pool, recorder, link)
         await pool.ready()
