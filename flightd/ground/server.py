@@ -102,9 +102,9 @@ class _Server(uvicorn.Server):
         yield
 
 
-def opened(listening: Listening) -> tuple[socket.socket, Listening]:
+def opened(listening: Listening, option: str = "--listen") -> tuple[socket.socket, Listening]:
     """The listening socket, and where it really listens (port 0: any free one).  UnavailableError where the
-    address cannot be had."""
+    address, given by an `option`, cannot be had."""
     family = socket.AF_INET6 if ":" in listening.host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -114,7 +114,7 @@ def opened(listening: Listening) -> tuple[socket.socket, Listening]:
         listener.close()
         raise UnavailableError(
             f"{listening.url}: {err.strerror or err}",
-            remedy="give --listen an address of this machine and a free port",
+            remedy=f"give {option} an address of this machine and a free port",
         ) from None
     return listener, replace(listening, port=int(listener.getsockname()[1]))
 

@@ -26,6 +26,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.runtime.clock import LoopClock
+from flightd.site.site import Site
 from flightd.site.site_file import load_site
 from tests.rigs.possible_commands import possible_in
 
@@ -67,9 +68,9 @@ def address_of(link: ZmqGround) -> Address:
 
 
 @contextlib.asynccontextmanager
-async def serving(config: GroundConfig) -> AsyncIterator[ZmqGround]:
+async def serving(config: GroundConfig, site: Site = SITE, **more: Any) -> AsyncIterator[ZmqGround]:
     """The link, answering."""
-    with ZmqGround(config, SITE, LoopClock()) as link:
+    with ZmqGround(config, site, LoopClock(), **more) as link:
         async with asyncio.TaskGroup() as tasks:
             running = tasks.create_task(link.run())
             try:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 import time
 from collections.abc import Callable, Hashable, Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Self
@@ -22,10 +22,11 @@ from flightd.adapters.foxglove.schemas import JsonObject, json_schema
 from flightd.core.errors import UnavailableError
 from flightd.ground.foxglove_view.drone_view import DroneView, Message, Pictured, Told, image_topic
 from flightd.ground.foxglove_view.mailbox import Mailbox
+from flightd.ground.foxglove_view.origin_gate import OriginGate, hidden_address
 from flightd.ground.foxglove_view.reach import OPTION
 from flightd.ground.foxglove_view.slow_viewers import SlowViewers
 from flightd.ground.messages import LinkPicture, PictureKey
-from flightd.ground.server import Listening
+from flightd.ground.server import Listening, opened
 from flightd.runtime.supervisor import FaultBarrier
 
 _LOG = logging.getLogger(__name__)
@@ -71,6 +72,7 @@ class FoxgloveServer(ServerListener):
 
     def __init__(self, where: Listening, drones: Iterable[str]) -> None:
         """Listen at `where`.  UnavailableError where that cannot be had."""
+        listener, self.where = opened(where, OPTION)
         self._views = {name: DroneView(name) for name in drones}
         self._mailbox = Mailbox()
         self._slow = SlowViewers()
@@ -83,26 +85,31 @@ class FoxgloveServer(ServerListener):
         self._wake: Callable[[], object] | None = None
         self._station_ns = 0
         self._barrier = FaultBarrier(self._failed)
+        self._hidden = hidden_address()
+        with contextlib.ExitStack() as stack:
+            stack.callback(listener.close)
+            stack.callback(self._slow.close)
+            self._server = self._started()
+            stack.pop_all()
+        self._gate = OriginGate(listener, (self._hidden, self._server.port))
+        self._channel(_STATION, _STATION_SCHEMA)
+        self._thread = threading.Thread(target=self._run, name="foxglove", daemon=True)
+        self._thread.start()
+
+    def _started(self) -> foxglove.websocket.WebSocketServer:
+        """The SDK's server, where only the gate finds it."""
         try:
-            self._server = foxglove.start_server(
+            return foxglove.start_server(
                 name="flightd ground",
-                host=where.host,
-                port=where.port,
+                host=self._hidden,
+                port=0,
                 capabilities=[],
                 server_listener=self,
                 context=self._context,
                 message_backlog_size=BACKLOG,
             )
         except RuntimeError as err:
-            self._slow.close()
-            raise UnavailableError(
-                f"{OPTION} {where.host}:{where.port}: {err}",
-                remedy=f"give {OPTION} an address of this machine and a free port",
-            ) from None
-        self.where = Listening(where.host, self._server.port)
-        self._channel(_STATION, _STATION_SCHEMA)
-        self._thread = threading.Thread(target=self._run, name="foxglove", daemon=True)
-        self._thread.start()
+            raise UnavailableError(f"{OPTION}: {err}") from None
 
     @property
     def url(self) -> str:
@@ -118,6 +125,7 @@ class FoxgloveServer(ServerListener):
         """Close every viewer's connection and end; idempotent."""
         self._mailbox.close()
         self._server.stop()
+        self._gate.close()
         self._thread.join(_JOIN_S)
         self._slow.close()
 
@@ -166,7 +174,7 @@ class FoxgloveServer(ServerListener):
             self._subscriptions.discard((client.id, channel.topic))
 
     def _wake_hub(self) -> None:
-        with self._lock, suppress(RuntimeError):  # its loop has ended
+        with self._lock, contextlib.suppress(RuntimeError):  # its loop has ended
             if self._wake is not None:
                 self._wake()
 
