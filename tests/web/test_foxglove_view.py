@@ -26,15 +26,17 @@ import numpy as np
 from flightd.adapters.ground_link.camera_optics import camera_optics
 from flightd.adapters.ground_link.client import Address
 from flightd.adapters.ground_link.link import ZmqGround
+from flightd.adapters.ground_link.protocol import PictureAnswer
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.preview import CameraName, Preview
 from flightd.ground.foxglove_view import origin_gate
 from flightd.ground.foxglove_view.drone_view import StationTime
 from flightd.ground.foxglove_view.live_server import FoxgloveServer
+from flightd.ground.foxglove_view.mailbox import Mailbox
 from flightd.ground.foxglove_view.origin_gate import FOXGLOVES_PAGE, is_let_in
 from flightd.ground.foxglove_view.reach import foxglove_address
-from flightd.ground.messages import PictureKey
+from flightd.ground.messages import LinkPicture, PictureKey
 from flightd.ground.server import Listening
 from flightd.runtime.clock import LoopClock
 from flightd.site.site_file import load_site
@@ -220,8 +222,10 @@ def test_whose_page_asks_is_known_by_its_origin(head: bytes, let_in: bool) -> No
 
 
 @in_real_time
-async def test_a_viewer_that_takes_nothing_holds_up_neither_pages_nor_other_viewers() -> None:
-    async with flying() as link:
+async def test_a_viewer_that_takes_nothing_loses_pictures_and_holds_up_nobody() -> None:
+    large = PICTURE + bytes(300_000)
+    key = PictureKey("demo", CameraName.DOWN)
+    async with serving(local(picture_fps=10.0)) as link, telling(link):
         with FoxgloveServer(Listening("127.0.0.1", 0), ["demo"]) as server:
             async with (
                 served(("demo", address_of(link)), viewers=[server]) as station,
@@ -230,16 +234,33 @@ async def test_a_viewer_that_takes_nothing_holds_up_neither_pages_nor_other_view
             ):
                 reader, writer = await asyncio.open_connection("127.0.0.1", server.where.port, limit=1)
                 await stall(reader, writer, quick)
-                await quick.subscribe(DOWN)
-                for _ in range(10):
-                    await quick.next(DOWN)
-                    await told(page, "status")
+                await quick.subscribe(DOWN, "/station")
+                while (await quick.next("/station"))[1]["viewers"] < 2:
+                    pass
+                for seq in range(90):
+                    answer = PictureAnswer(request="", seq=seq, stamp_ns=LoopClock().now_ns())
+                    server.show(key, LinkPicture(answer, None, large))
+                    assert (await quick.next(DOWN))[1][2] == large
+                while (await quick.next("/station"))[1]["viewers_behind"] == 0:
+                    pass
+                await told(page, "status")
                 writer.transport.abort()
 
 
+def test_pictures_that_newer_ones_replace_are_counted() -> None:
+    box = Mailbox()
+    for number in range(5):
+        box.put("picture", number)
+    box.put("status", "new")
+    assert (box.dropped, box.holds("picture"), box.holds("other")) == (4, True, False)
+    assert [box.take(), box.take()] == [("picture", 4), ("status", "new")]
+    box.close()
+    assert box.take() is None
+
+
 async def stall(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, other: ForeignViewer) -> None:
-    """Subscribe to all pictures, and read nothing from then on."""
-    await other.advertised(DOWN, FRONT_IMAGE)
+    """Subscribe to pictures, and read nothing from then on."""
+    await other.advertised(DOWN)
     key = "dGhlIHNhbXBsZSBub25jZQ=="
     head = [
         "GET / HTTP/1.1", "Host: 127.0.0.1", "Upgrade: websocket", "Connection: Upgrade",
