@@ -244,7 +244,7 @@ async def test_a_viewer_that_takes_nothing_loses_pictures_and_holds_up_nobody() 
                 while (await quick.next("/station"))[1]["viewers_behind"] == 0:
                     pass
                 await told(page, "status")
-                writer.transport.abort()
+    writer.transport.abort()  # the server has ended without it
 
 
 def test_pictures_that_newer_ones_replace_are_counted() -> None:

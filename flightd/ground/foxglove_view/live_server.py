@@ -122,10 +122,14 @@ class FoxgloveServer(ServerListener):
         return self._mailbox.dropped
 
     def close(self) -> None:
-        """Close every viewer's connection and end; idempotent."""
+        """Close every viewer's connection and end; idempotent.
+
+        The SDK's server waits for ever for a viewer that takes nothing: the gate cuts that one off."""
         self._mailbox.close()
-        self._server.stop()
+        stopping = threading.Thread(target=self._server.stop, name="foxglove end", daemon=True)
+        stopping.start()
         self._gate.close()
+        stopping.join(_JOIN_S)
         self._thread.join(_JOIN_S)
         self._slow.close()
 
