@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from flightd.adapters.foxglove.cameras import calibration, cameras_on_drone
@@ -50,6 +51,17 @@ class Pictured:
 
 Message: TypeAlias = Told | Pictured
 
+SCHEMAS: Mapping[str, str] = MappingProxyType(
+    {
+        "scene": SCENE_UPDATE,
+        "camera_frames": FRAME_TRANSFORMS,
+        "drone_frame": FRAME_TRANSFORMS,
+        "pose": POSE_IN_FRAME,
+        **{f"{camera}_camera/calibration": CAMERA_CALIBRATION for camera in CameraName},
+    }
+)
+"""The topics of a drone besides its pictures, without its name, and what they are."""
+
 
 class StationTime:
     """Turns a drone's stamps into this station's, by the status that was quickest on its way."""
@@ -92,11 +104,9 @@ class DroneView:
         floor = value["floor"]
         self._frames = Frames(f"{floor.name}/map", self._frames.drone, self._frames.of_cameras)
         self._optics = {optics.camera: optics for optics in value["optics"]}
-        yield self._told(
-            "scene", SCENE_UPDATE, warehouse_scene(floor, received_ns, self._frames), received_ns
-        )
+        yield self._told("scene", warehouse_scene(floor, received_ns, self._frames), received_ns)
         mounted = cameras_on_drone(self._optics.values(), received_ns, self._frames)
-        yield self._told("camera_frames", FRAME_TRANSFORMS, mounted, received_ns)
+        yield self._told("camera_frames", mounted, received_ns)
         for camera in self._optics:
             yield self._calibrated(camera, received_ns)
 
@@ -110,14 +120,14 @@ class DroneView:
         leaning = (0.0, 0.0) if vehicle is None else (vehicle.roll_rad, vehicle.pitch_rad)
         place = at.x_m, at.y_m, report.height_m or 0.0
         frame = drone_on_map(stamp_ns, place, (*leaning, at.yaw_rad), self._frames)
-        yield self._told("drone_frame", FRAME_TRANSFORMS, frame, stamp_ns, standing=False)
+        yield self._told("drone_frame", frame, stamp_ns, standing=False)
         (moved,) = frame["transforms"]
         pose = {
             "timestamp": time_of(stamp_ns),
             "frame_id": self._frames.map,
             "pose": {"position": moved["translation"], "orientation": moved["rotation"]},
         }
-        yield self._told("pose", POSE_IN_FRAME, pose, stamp_ns, standing=False)
+        yield self._told("pose", pose, stamp_ns, standing=False)
 
     def picture(self, camera: CameraName, shown: LinkPicture, received_ns: int) -> Iterator[Message]:
         """A picture; before it the lens at its size, where that is another one than the last picture's."""
@@ -130,12 +140,10 @@ class DroneView:
 
     def _calibrated(self, camera: CameraName, stamp_ns: int) -> Told:
         fields = calibration(self._optics[camera], stamp_ns, self._frames, self._sizes.get(camera))
-        return self._told(f"{camera}_camera/calibration", CAMERA_CALIBRATION, fields, stamp_ns)
+        return self._told(f"{camera}_camera/calibration", fields, stamp_ns)
 
-    def _told(
-        self, topic: str, schema: str, fields: JsonObject, at_ns: int, *, standing: bool = True
-    ) -> Told:
-        return Told(f"/{self._name}/{topic}", schema, fields, at_ns, standing)
+    def _told(self, topic: str, fields: JsonObject, stamp_ns: int, *, standing: bool = True) -> Told:
+        return Told(f"/{self._name}/{topic}", SCHEMAS[topic], fields, stamp_ns, standing)
 
 
 def image_topic(drone: str, camera: CameraName) -> str:

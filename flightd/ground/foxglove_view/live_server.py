@@ -20,7 +20,8 @@ from foxglove.websocket import ChannelView, Client, ServerListener
 from flightd.adapters.foxglove.frames import NS_PER_S
 from flightd.adapters.foxglove.schemas import JsonObject, json_schema
 from flightd.core.errors import UnavailableError
-from flightd.ground.foxglove_view.drone_view import DroneView, Message, Pictured, Told, image_topic
+from flightd.core.preview import CameraName
+from flightd.ground.foxglove_view.drone_view import SCHEMAS, DroneView, Message, Pictured, Told, image_topic
 from flightd.ground.foxglove_view.mailbox import Mailbox
 from flightd.ground.foxglove_view.origin_gate import OriginGate, hidden_address
 from flightd.ground.foxglove_view.reach import OPTION
@@ -86,15 +87,24 @@ class FoxgloveServer(ServerListener):
         self._station_ns = 0
         self._barrier = FaultBarrier(self._failed)
         self._hidden = hidden_address()
+        self._open_channels()
         with contextlib.ExitStack() as stack:
             stack.callback(listener.close)
             stack.callback(self._slow.close)
             self._server = self._started()
             stack.pop_all()
         self._gate = OriginGate(listener, (self._hidden, self._server.port))
-        self._channel(_STATION, _STATION_SCHEMA)
         self._thread = threading.Thread(target=self._run, name="foxglove", daemon=True)
         self._thread.start()
+
+    def _open_channels(self) -> None:
+        """All before anybody comes: the SDK (0.30) can lose a subscription to a channel that is just made."""
+        self._channel(_STATION, _STATION_SCHEMA)
+        for name in self._views:
+            for topic, schema in SCHEMAS.items():
+                self._channel(f"/{name}/{topic}", json_schema(schema))
+            for camera in CameraName:
+                self._image_channel(image_topic(name, camera))
 
     def _started(self) -> foxglove.websocket.WebSocketServer:
         """The SDK's server, where only the gate finds it."""
@@ -202,8 +212,6 @@ class FoxgloveServer(ServerListener):
                 self._send_standing(topic)
             case DroneTopic(drone, "welcome"):
                 told, received_ns = value
-                for camera in told["cameras"]:
-                    self._image_channel(image_topic(drone, camera))
                 self._send(self._views[drone].welcome(told, received_ns))
             case DroneTopic(drone):
                 report, received_ns = value
