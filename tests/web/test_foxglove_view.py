@@ -232,7 +232,7 @@ async def test_a_viewer_that_takes_nothing_loses_pictures_and_holds_up_nobody() 
                 station.page() as page,
                 viewing(server.url) as quick,
             ):
-                reader, writer = await asyncio.open_connection("127.0.0.1", server.where.port, limit=1)
+                reader, writer = await asyncio.open_connection("127.0.0.1", server.where.port, limit=4096)
                 await stall(reader, writer, quick)
                 await quick.subscribe(DOWN, "/station")
                 while (await quick.next("/station"))[1]["viewers"] < 2:
@@ -267,6 +267,7 @@ async def stall(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, othe
         f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13", f"Sec-WebSocket-Protocol: {PROTOCOL}",
     ]  # fmt: skip
     writer.write("\r\n".join([*head, "", ""]).encode())
+    assert b" 101 " in await reader.readuntil(b"\r\n\r\n")
     wanted = [{"id": 1, "channelId": other.channels[DOWN]["id"]}]
     said = json.dumps({"op": "subscribe", "subscriptions": wanted}).encode()
     writer.write(bytes([0x81, 0x80 | len(said), 0, 0, 0, 0]) + said)  # a text frame, masked by nothing

@@ -7,6 +7,8 @@ import logging
 _SDK = "foxglove"
 _DROPS = "foxglove.websocket.connected_client.send_lossy"
 _SERVERS_OWN = "tungstenite"
+_OF_STRANGERS = "Dropping client"
+"""Who broke the protocol."""
 _STATION = logging.getLogger(__name__)
 
 
@@ -28,7 +30,7 @@ class SlowViewers(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         if record.name == _DROPS:
             self.found += 1
-        elif record.levelno >= logging.ERROR:
+        elif record.levelno >= logging.ERROR and not record.getMessage().startswith(_OF_STRANGERS):
             _STATION.error("%s: %s", record.name, record.getMessage())
 
     def close(self) -> None:
