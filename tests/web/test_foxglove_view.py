@@ -108,7 +108,7 @@ async def test_a_foreign_viewer_of_a_stations_own_process_sees_it_all_live() -> 
                 check_seen(viewer, seen)
                 process.send_signal(signal.SIGINT)
                 assert await ended(viewer.socket), "it says good-bye"
-            assert await asyncio.wait_for(process.wait(), 10) == 0
+            assert await asyncio.wait_for(process.wait(), 30) == 0
             said = (await process.stderr.read()).decode()
             assert said == "flightd: the ground station was ended by SIGINT\n"
         finally:
@@ -120,7 +120,7 @@ async def test_a_foreign_viewer_of_a_stations_own_process_sees_it_all_live() -> 
 async def ended(socket: ClientConnection) -> bool:
     """Whether the server closes it in order."""
     try:
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(30):
             while True:
                 await socket.recv()
     except ConnectionClosed as closed:
