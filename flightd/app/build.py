@@ -14,6 +14,7 @@ from functools import partial
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.adapters.ground_link.maintenance_desk import Maintainer
+from flightd.adapters.ground_link.protocol import CameraOptics
 from flightd.adapters.interlock import FileInterlock
 from flightd.adapters.store.learnt_sensors import learnt_file
 from flightd.adapters.store.progress import progress_file
@@ -342,13 +343,14 @@ def ground_link(
     clock: Clock,
     counting: Counting | None = None,
     maintainer: Maintainer | None = None,
+    optics: Sequence[CameraOptics] = (),
 ) -> ZmqGround | None:
     """The link to ground stations, not listening yet; None where none is wanted."""
     if not settings.listen:
         return None
     if counting is None:
-        return ZmqGround(settings, site, clock, maintainer=maintainer)
-    return ZmqGround(settings, site, clock, counting.places, tuple(CameraName), maintainer)
+        return ZmqGround(settings, site, clock, maintainer=maintainer, optics=optics)
+    return ZmqGround(settings, site, clock, counting.places, tuple(CameraName), maintainer, optics)
 
 
 def _plan_on(config: Config, flown: Site, order: FlightOrder) -> FlightPlan:

@@ -8,8 +8,8 @@ from functools import partial
 
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import StepFailure
-from flightd.core.topics import Topic
-from flightd.core.types import Event, EventLevel, Phase
+from flightd.core.topics import DronePlace, Topic
+from flightd.core.types import Event, EventLevel, GridPose, Phase, VehicleState
 from flightd.ports import Clock, Ground, Monitor, Recorder, Vehicle
 from flightd.runtime.supervisor import FaultBarrier
 
@@ -107,9 +107,16 @@ def _record(recorder: Recorder, snapshot: Snapshot) -> None:
         recorder.record(Topic.VEHICLE, now_ns, tick.vehicle)
     if output.pose is not None:
         recorder.record(Topic.POSE, now_ns, output.pose)
+        recorder.record(Topic.DRONE_FRAME, now_ns, _place(output.pose, tick.vehicle))
     for command in tick.commands:
         recorder.record(Topic.COMMAND, now_ns, command)
     for event in output.events:
         recorder.record(Topic.EVENT, event.stamp_ns, event)
     if snapshot.failure is not None:
         recorder.record(Topic.FAILURE, now_ns, snapshot.failure)
+
+
+def _place(pose: GridPose, vehicle: VehicleState | None) -> DronePlace:
+    attitude = None if vehicle is None else vehicle.attitude
+    roll_rad, pitch_rad = (0.0, 0.0) if attitude is None else (attitude.roll_rad, attitude.pitch_rad)
+    return DronePlace(pose.stamp_ns, pose.x_m, pose.y_m, pose.height_m, roll_rad, pitch_rad, pose.yaw_rad)

@@ -6,17 +6,30 @@ import json
 import tomllib
 from dataclasses import dataclass
 
+from flightd.adapters.foxglove.cameras import calibration, cameras_on_drone
+from flightd.adapters.foxglove.frames import IN_LOG
+from flightd.adapters.foxglove.schemas import (
+    CAMERA_CALIBRATION,
+    FRAME_TRANSFORMS,
+    SCENE_UPDATE,
+    WellKnown,
+)
+from flightd.adapters.foxglove.warehouse import warehouse_scene
+from flightd.adapters.ground_link.camera_optics import camera_optics
+from flightd.adapters.ground_link.floor_status import floor_status
 from flightd.app.flight_orders import configured_order
 from flightd.config.schema import Config, recorded_config
 from flightd.core.errors import InputError
 from flightd.core.flight_order import FlightOrder
 from flightd.core.learnt import LearntSensors
+from flightd.core.preview import CameraName
 from flightd.core.topics import Document, Topic
 from flightd.ports import Recorder
 from flightd.replay.log import FlightLog
 from flightd.site.site import Site
 from flightd.site.site_file import parse_site, site_toml
 
+_CALIBRATIONS = {CameraName.DOWN: Topic.DOWN_CALIBRATION, CameraName.FRONT: Topic.FRONT_CALIBRATION}
 SETTING_TOPICS = frozenset({Topic.CONFIG, Topic.MAP, Topic.ORDER, Topic.LEARNT})
 
 
@@ -37,6 +50,19 @@ def record_setting(recorder: Recorder, now_ns: int, setting: FlightSetting) -> N
     recorder.record(Topic.ORDER, now_ns, setting.order)
     if setting.learnt is not None:
         recorder.record(Topic.LEARNT, now_ns, setting.learnt)
+    _record_for_viewers(recorder, now_ns, setting)
+
+
+def _record_for_viewers(recorder: Recorder, now_ns: int, setting: FlightSetting) -> None:
+    """The warehouse and the cameras, as Foxglove draws them; nothing here reads them again."""
+    optics = camera_optics(setting.config)
+    scene = warehouse_scene(floor_status(setting.site), now_ns, IN_LOG)
+    recorder.record(Topic.SCENE, now_ns, WellKnown(SCENE_UPDATE, scene))
+    cameras = cameras_on_drone(optics, now_ns, IN_LOG)
+    recorder.record(Topic.CAMERA_FRAMES, now_ns, WellKnown(FRAME_TRANSFORMS, cameras))
+    for camera in optics:
+        message = WellKnown(CAMERA_CALIBRATION, calibration(camera, now_ns, IN_LOG))
+        recorder.record(_CALIBRATIONS[camera.camera], now_ns, message)
 
 
 def recorded_setting(log: FlightLog) -> FlightSetting:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from flightd.adapters.ground_link.camera_optics import camera_optics
 from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.recorder.archive import FlightArchive
 from flightd.adapters.recorder.recorder import McapRecorder
@@ -136,7 +137,7 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult |
         if archive is not None:
             recorder = stack.enter_context(_recorder(run.setting, archive, identity))
         counting = await count.begun(clock)
-        link = ground_link(config.ground, site, clock, counting, maintainer)
+        link = ground_link(config.ground, site, clock, counting, maintainer, camera_optics(config))
         ground = NO_GROUND if link is None else stack.enter_context(link)
         await pool.ready()
         flight = build(

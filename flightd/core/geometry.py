@@ -56,6 +56,22 @@ def heading_rotation(yaw_rad: float) -> Matrix:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def quaternion_of(rotation: Matrix) -> tuple[float, float, float, float]:
+    """The unit quaternion x y z w of a (3, 3) rotation, w not negative (Shepperd, 1978: from the largest
+    of the four, so that no division is by little)."""
+    (m00, m01, m02), (m10, m11, m12), (m20, m21, m22) = rotation.tolist()
+    rows = (
+        (1.0 + m00 - m11 - m22, m10 + m01, m20 + m02, m21 - m12),
+        (m10 + m01, 1.0 - m00 + m11 - m22, m21 + m12, m02 - m20),
+        (m20 + m02, m21 + m12, 1.0 - m00 - m11 + m22, m10 - m01),
+        (m21 - m12, m02 - m20, m10 - m01, 1.0 + m00 + m11 + m22),
+    )
+    largest = max(range(4), key=lambda i: rows[i][i])
+    length = math.copysign(math.hypot(*rows[largest]), rows[largest][3])
+    x, y, z, w = (value / length for value in rows[largest])
+    return x, y, z, w
+
+
 @dataclass(frozen=True, slots=True)
 class Lens:
     """Pinhole with Brown-Conrady distortion (OpenCV's order k1 k2 p1 p2 k3); pixels, centres at integers."""

@@ -28,7 +28,8 @@ class Topic(enum.StrEnum):
 
     TICK and DECISION are all that the pilot was given and all that it answered (`core.tick.TickInput`,
     `core.tick.TickOutput`), so that a flight can be replayed; FAILURE is what a tick raised;
-    the others are for people and their tools.
+    SCENE, DRONE_FRAME, CAMERA_FRAMES and the calibrations are for viewers (Foxglove), and nothing of flightd
+    reads them; the others are for people and their tools.
     """
 
     LINES = "/lines"
@@ -48,6 +49,11 @@ class Topic(enum.StrEnum):
     MAP = "/map"
     ORDER = "/order"
     LEARNT = "/learnt"
+    SCENE = "/scene"
+    DRONE_FRAME = "/drone_frame"
+    CAMERA_FRAMES = "/camera_frames"
+    DOWN_CALIBRATION = "/down_camera/calibration"
+    FRONT_CALIBRATION = "/front_camera/calibration"
     TRUTH = "/truth"
     SCENARIO = "/scenario"
     FAULT = "/fault"
@@ -71,10 +77,27 @@ class Document:
     text: str
 
 
-FOR_PEOPLE = frozenset(Topic) - {Topic.FRAME, Topic.TICK, Topic.DECISION}
-"""All but the pictures and what only a replay needs."""
+@dataclass(frozen=True, slots=True)
+class DronePlace:
+    """Where the drone's body is on the map and how it leans, for viewers; the log has it as their frame."""
 
-RETAINED = frozenset({Topic.CONFIG, Topic.MAP, Topic.ORDER, Topic.LEARNT, Topic.SCENARIO})
+    stamp_ns: int
+    x_m: float
+    y_m: float
+    height_m: float
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+
+
+_STANDING = frozenset({Topic.SCENE, Topic.CAMERA_FRAMES, Topic.DOWN_CALIBRATION, Topic.FRONT_CALIBRATION})
+FOR_VIEWERS = _STANDING | {Topic.DRONE_FRAME}
+"""What only viewers read: warehouse, frames, cameras."""
+
+FOR_PEOPLE = frozenset(Topic) - {Topic.FRAME, Topic.TICK, Topic.DECISION} - FOR_VIEWERS
+"""All but the pictures, what only a replay needs and what only viewers read."""
+
+RETAINED = frozenset({Topic.CONFIG, Topic.MAP, Topic.ORDER, Topic.LEARNT, Topic.SCENARIO}) | _STANDING
 """Topics whose newest message holds for the whole flight, so that every log file must carry it."""
 
 MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(

@@ -23,7 +23,7 @@ from flightd.core.errors import FlightdError, InputError, RunError, TransientErr
 from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind
 from flightd.ground.bounded import Room, Shared
-from flightd.ground.messages import Act, LinkState, PictureKey, picture_message
+from flightd.ground.messages import Act, LinkPicture, LinkState, PictureKey
 
 _LOG = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -60,7 +60,7 @@ class Pages(Protocol):
         """Tell it only to the pages that are opened from now on."""
         ...
 
-    def show(self, key: PictureKey, message: bytes) -> None:
+    def show(self, key: PictureKey, picture: LinkPicture) -> None:
         """Show a picture to every page that wants it."""
         ...
 
@@ -216,6 +216,7 @@ class DroneLink:
                 "client": welcome.client,
                 "cameras": welcome.cameras if welcome.picture_fps > 0 else (),
                 "floor": welcome.floor,
+                "optics": welcome.optics,
             },
         )
         self._pages.tell(self.name, "events", tuple(self._events))
@@ -342,4 +343,4 @@ class DroneLink:
                 self._pages.tell(self.name, trouble, "")
             behind_s = loop.time() - answer.stamp_ns * 1e-9
             age_ms = round(max(behind_s - self._clock_s, 0.0) * 1e3, 1) if self._seq else None
-            self._pages.show(key, picture_message(key, answer, age_ms, jpeg))
+            self._pages.show(key, LinkPicture(answer, age_ms, jpeg))

@@ -3,18 +3,40 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from functools import partial
+from typing import Any, Protocol
 
 from flightd import __version__
 from flightd.adapters.ground_link.client import Address
 from flightd.ground.browser import Browser, Topic
 from flightd.ground.drone_link import DroneLink
-from flightd.ground.messages import PageMessage, PictureKey, topic_message
+from flightd.ground.messages import LinkPicture, PageMessage, PictureKey, picture_message, topic_message
 
 MOST_BROWSERS = 64
 """More pages than this are refused: each costs memory and time."""
+
+
+class Viewer(Protocol):
+    """Looks on beside the pages, and attends nothing.  None of it may wait: it is called in the station's
+    loop."""
+
+    def attach(self, wake: Callable[[], object] | None) -> None:
+        """`wake` is to be called, by whatever thread, when other pictures are wanted; None: no more."""
+        ...
+
+    def tell(self, drone: str, topic: str, value: Any) -> None:
+        """A topic's newest value."""
+        ...
+
+    def show(self, key: PictureKey, picture: LinkPicture) -> None:
+        """A camera's newest picture, wanted or not."""
+        ...
+
+    def has_use_for(self, key: PictureKey) -> bool:
+        """A new picture of this camera is wanted now."""
+        ...
 
 
 class Hub:
@@ -24,7 +46,8 @@ class Hub:
     A drone is attended while the page of anybody is open who may fly, and no longer: closing the last one is
     losing the ground."""
 
-    def __init__(self, drones: Sequence[tuple[str, Address]]) -> None:
+    def __init__(self, drones: Sequence[tuple[str, Address]], viewers: Sequence[Viewer] = ()) -> None:
+        self._viewers = tuple(viewers)
         self._latest: dict[Topic, Any] = {}
         self._browsers: set[Browser] = set()
         self._looking = asyncio.Event()
@@ -33,10 +56,17 @@ class Hub:
 
     async def run(self) -> None:
         """Serve until cancelled."""
-        async with asyncio.TaskGroup() as tasks:
-            for name, drone in self.drones.items():
-                tasks.create_task(drone.run(), name=f"drone {name}")
-            await asyncio.Event().wait()  # a station may have no drone at all
+        loop = asyncio.get_running_loop()
+        for viewer in self._viewers:
+            viewer.attach(partial(loop.call_soon_threadsafe, self._looking.set))
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                for name, drone in self.drones.items():
+                    tasks.create_task(drone.run(), name=f"drone {name}")
+                await asyncio.Event().wait()  # a station may have no drone at all
+        finally:
+            for viewer in self._viewers:
+                viewer.attach(None)
 
     @property
     def browsers(self) -> int:
@@ -76,6 +106,8 @@ class Hub:
     def keep(self, drone: str, topic: str, value: Any) -> None:
         """Tell a topic's newest value to the pages that are opened from now on."""
         self._latest[drone, topic] = value
+        for viewer in self._viewers:
+            viewer.tell(drone, topic, value)
 
     def tell(self, drone: str, topic: str, value: Any) -> None:
         """Tell every page a topic's newest value, and those that are opened later."""
@@ -86,16 +118,26 @@ class Hub:
         for browser in self._browsers:
             browser.offer((drone, topic), message)
 
-    def show(self, key: PictureKey, message: bytes) -> None:
+    def show(self, key: PictureKey, picture: LinkPicture) -> None:
         """Show a picture to every page that wants it."""
+        for viewer in self._viewers:
+            viewer.show(key, picture)
+        if not self._browsers:
+            return
+        message = picture_message(key, picture)
         for browser in self._browsers:
             browser.offer_picture(key, message)
 
     async def wanted(self, key: PictureKey) -> None:
         """Wait until some page has use for a picture of that camera."""
-        while not any(browser.has_use_for(key) for browser in self._browsers):
+        while not self._has_use_for(key):
             self._looking.clear()
             await self._looking.wait()
+
+    def _has_use_for(self, key: PictureKey) -> bool:
+        return any(browser.has_use_for(key) for browser in self._browsers) or any(
+            viewer.has_use_for(key) for viewer in self._viewers
+        )
 
     def _tell_station(self) -> None:
         self.tell(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias, TypeVar
 
 import msgspec
@@ -91,6 +92,15 @@ class LinkState(msgspec.Struct, frozen=True):
     trouble: str
 
 
+@dataclass(frozen=True, slots=True)
+class LinkPicture:
+    """A camera's picture as the link gave it; `age_ms` since its exposure, as far as the station knows it."""
+
+    answer: PictureAnswer
+    age_ms: float | None
+    jpeg: bytes
+
+
 _decode_page: Callable[[str | bytes], PageMessage] = msgspec.json.Decoder(PageMessage).decode
 _decode_act: Callable[[str | bytes], Act] = msgspec.json.Decoder(Act).decode
 _encode = msgspec.json.encode
@@ -101,17 +111,18 @@ def topic_message(drone: str, topic: str, value: Any) -> str:
     return _encode({"drone": drone, "topic": topic, "value": value}).decode()
 
 
-def picture_message(key: PictureKey, answer: PictureAnswer, age_ms: float | None, jpeg: bytes) -> bytes:
-    """A picture as it goes to the page; `age_ms` since its exposure, as far as the station knows it."""
+def picture_message(key: PictureKey, picture: LinkPicture) -> bytes:
+    """A picture as it goes to the page."""
+    answer = picture.answer
     head = {
         "drone": key.drone,
         "camera": key.camera,
         "seq": answer.seq,
-        "age_ms": age_ms,
+        "age_ms": picture.age_ms,
         "lines": answer.lines,
         "areas": answer.areas,
     }
-    return framed_picture(head, jpeg)
+    return framed_picture(head, picture.jpeg)
 
 
 def session_message(login: bool, name: str, role: str) -> str:

@@ -21,7 +21,7 @@ from flightd.ground.access.access import Access
 from flightd.ground.application import application
 from flightd.ground.flights.flights import Flights
 from flightd.ground.guards import own_hosts
-from flightd.ground.hub import Hub
+from flightd.ground.hub import Hub, Viewer
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
 from flightd.ground.quiet_log import quiet_log
 from flightd.ground.reading_process import ReadingProcess
@@ -55,19 +55,19 @@ class Listening:
         return not is_loopback(self.host)
 
     @classmethod
-    def read(cls, text: str) -> Listening:
-        """HOST, HOST:PORT or [HOST]:PORT.  InputError for anything else."""
+    def read(cls, text: str, option: str = "--listen", default_port: int = PORT) -> Listening:
+        """HOST, HOST:PORT or [HOST]:PORT, given by an `option`.  InputError for anything else."""
         found = _LISTEN.fullmatch(text)
         host = text if found is None else found["host"]
-        port = PORT if found is None or found["port"] is None else int(found["port"])
+        port = default_port if found is None or found["port"] is None else int(found["port"])
         if found is None:
             try:
                 ipaddress.IPv6Address(text)
             except ValueError:
-                raise InputError("expected ADDRESS or ADDRESS:PORT", key=f"--listen {text}") from None
+                raise InputError("expected ADDRESS or ADDRESS:PORT", key=f"{option} {text}") from None
         host = host.removeprefix("[").removesuffix("]")
         if port > 65535:
-            raise InputError("a port is at most 65535", key=f"--listen {text}")
+            raise InputError("a port is at most 65535", key=f"{option} {text}")
         return cls("127.0.0.1" if host == "localhost" else host, port)
 
 
@@ -103,9 +103,9 @@ class _Server(uvicorn.Server):
         yield
 
 
-def opened(listening: Listening) -> tuple[socket.socket, Listening]:
+def opened(listening: Listening, option: str = "--listen") -> tuple[socket.socket, Listening]:
     """The listening socket, and where it really listens (port 0: any free one).  UnavailableError where the
-    address cannot be had."""
+    address, given by an `option`, cannot be had."""
     family = socket.AF_INET6 if ":" in listening.host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -115,7 +115,7 @@ def opened(listening: Listening) -> tuple[socket.socket, Listening]:
         listener.close()
         raise UnavailableError(
             f"{listening.url}: {err.strerror or err}",
-            remedy="give --listen an address of this machine and a free port",
+            remedy=f"give {option} an address of this machine and a free port",
         ) from None
     return listener, replace(listening, port=int(listener.getsockname()[1]))
 
@@ -127,6 +127,7 @@ def run(
     access: Access,
     certificate: Certificate | None = None,
     folder: Path | None = None,
+    viewers: Sequence[Viewer] = (),
 ) -> signal.Signals | None:
     """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had,
     InputError where it must not be listened at (`check_reach`)."""
@@ -135,7 +136,9 @@ def run(
     came: list[signal.Signals] = []
 
     async def until_signal() -> None:
-        serving = asyncio.ensure_future(serve(drones, listener, where, access, on_ready, certificate, folder))
+        serving = asyncio.ensure_future(
+            serve(drones, listener, where, access, on_ready, certificate, folder, viewers)
+        )
         end_on_signals(serving, came)
         with contextlib.suppress(asyncio.CancelledError):
             await serving
@@ -153,10 +156,11 @@ async def serve(
     on_ready: Callable[[Listening], None] = lambda _: None,
     certificate: Certificate | None = None,
     folder: Path | None = None,
+    viewers: Sequence[Viewer] = (),
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
-    end; inventories and flights lie under `folder`."""
-    hub, flights, uploads = Hub(drones), Flights(folder), ReadingProcess()
+    end; inventories and flights lie under `folder`; `viewers` are told what the pages are."""
+    hub, flights, uploads = Hub(drones, viewers), Flights(folder), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
     quiet_log()
     maps = ReadingProcess(refusal="too many maps are being checked")

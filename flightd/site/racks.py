@@ -75,6 +75,14 @@ def place_locations(
     return found
 
 
+def bay_edges(rack: Rack, front: Shelf) -> tuple[float, ...]:
+    """Where the bays on a front meet and end, by rising x; empty where none fits."""
+    bays = int((front.x1_m - front.x0_m) / rack.bay_width_m + _FITS_M)
+    # what is left over is split between both ends: the bays stand in the middle of the front
+    first_x_m = (front.x0_m + front.x1_m - bays * rack.bay_width_m) / 2
+    return tuple(first_x_m + number * rack.bay_width_m for number in range(bays + 1)) if bays else ()
+
+
 def code_form(racks: Iterable[Rack]) -> re.Pattern[str]:
     """What location codes of these racks look like, places that the map lacks included.
 
@@ -125,18 +133,15 @@ def _fill(
         if rack.levels_m[-1] >= shelf.height_m:
             problem = f"{rack.levels_m[-1]:g} m is above the shelf of aisle {shelf.aisle}"
             raise RackError(f"{key}.levels_m: {problem} ({shelf.height_m:g} m)")
-        bays = int((shelf.x1_m - shelf.x0_m) / rack.bay_width_m + _FITS_M)
-        # what is left over is split between both ends: the bays stand in the middle of the front
-        first_x_m = (shelf.x0_m + shelf.x1_m - bays * rack.bay_width_m) / 2
         place_m = rack.bay_width_m / rack.positions
-        for number in range(bays):
+        for left_x_m in bay_edges(rack, shelf)[:-1]:
             bay += 1
             for level, height_m in enumerate(rack.levels_m, start=1):
                 for position in range(1, rack.positions + 1):
                     code = _Place(shelf.aisle, shelf.side, bay, level, position).code(rack.pattern)
                     if code in found:
                         raise RackError(f"{key}.pattern: gives {code} twice; name what tells places apart")
-                    x_m = first_x_m + number * rack.bay_width_m + (position - 0.5) * place_m
+                    x_m = left_x_m + (position - 0.5) * place_m
                     node = min(nodes, key=lambda node: abs(node.x_m - x_m))
                     found[code] = Location(
                         code, shelf.aisle, shelf.side, bay, level, position, x_m, shelf.y_m, height_m, node.id

@@ -12,7 +12,6 @@ from typing import Any
 from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.keys import load_pair, load_public, make_keys
 from flightd.adapters.ground_link.link import ZmqGround
-from flightd.adapters.ground_link.maintenance_desk import Maintainer
 from flightd.config.ground import GroundConfig
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
@@ -28,6 +27,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.runtime.clock import LoopClock
+from flightd.site.site import Site
 from flightd.site.site_file import load_site
 from tests.rigs.possible_commands import possible_in
 
@@ -69,9 +69,9 @@ def address_of(link: ZmqGround) -> Address:
 
 
 @contextlib.asynccontextmanager
-async def serving(config: GroundConfig, maintainer: Maintainer | None = None) -> AsyncIterator[ZmqGround]:
+async def serving(config: GroundConfig, site: Site = SITE, **more: Any) -> AsyncIterator[ZmqGround]:
     """The link, answering."""
-    with ZmqGround(config, SITE, LoopClock(), maintainer=maintainer) as link:
+    with ZmqGround(config, site, LoopClock(), **more) as link:
         async with asyncio.TaskGroup() as tasks:
             running = tasks.create_task(link.run())
             try:

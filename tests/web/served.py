@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,6 +17,7 @@ from websockets.typing import Origin
 
 from flightd.adapters.ground_link.client import Address
 from flightd.ground.access.access import Access
+from flightd.ground.hub import Viewer
 from flightd.ground.server import Listening, opened, serve
 
 JSON = {"Content-Type": "application/json"}
@@ -95,7 +96,11 @@ class Station:
 
 @contextlib.asynccontextmanager
 async def served(
-    *drones: tuple[str, Address], folder: Path | None = None, state: Path | None = None, login: bool = False
+    *drones: tuple[str, Address],
+    folder: Path | None = None,
+    state: Path | None = None,
+    login: bool = False,
+    viewers: Sequence[Viewer] = (),
 ) -> AsyncIterator[Station]:
     """A station that serves meanwhile; flights lie below `folder`, people and audit in `state`."""
     listener, where = opened(Listening("127.0.0.1", 0))
@@ -103,7 +108,7 @@ async def served(
     with listener, TemporaryDirectory() as elsewhere:
         access = Access(state or Path(elsewhere), login, secure=False)
         serving = asyncio.ensure_future(
-            serve(drones, listener, where, access, lambda _: ready.set(), folder=folder)
+            serve(drones, listener, where, access, lambda _: ready.set(), folder=folder, viewers=viewers)
         )
         try:
             await asyncio.wait_for(ready.wait(), 20)

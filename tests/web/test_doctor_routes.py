@@ -65,7 +65,7 @@ class NotingDrone:
 async def test_everybody_looks_and_an_admin_changes_under_his_own_name(tmp_path: Path) -> None:
     keys, drone = with_people(tmp_path), NotingDrone()
     async with (
-        serving(local(), drone) as link,
+        serving(local(), maintainer=drone) as link,
         served(("demo", address_of(link)), state=tmp_path, login=True) as station,
         telling(link, Phase.PREFLIGHT),
     ):

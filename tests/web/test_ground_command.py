@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 import signal
 import subprocess
 import sys
@@ -47,6 +48,7 @@ def ground(*words: str) -> tuple[int, str]:
         (["--drone", "north"], "--drone north: expected NAME=HOST"),
         (["--drone", "a=h", "--drone", "a=k"], "--drone: the same name twice"),
         (["--key", "none.key_secret"], "--key, --server-key: belong together"),
+        (["--foxglove", "0.0.0.0"], "--foxglove 0.0.0.0: reaches beyond this machine, and Foxglove"),
     ],
 )  # fmt: skip
 def test_wrong_input_is_one_clear_line(words: list[str], said: str) -> None:
@@ -54,6 +56,21 @@ def test_wrong_input_is_one_clear_line(words: list[str], said: str) -> None:
     assert code == 2
     assert error.startswith(f"flightd: {said}")
     assert error.count("\n") == 1
+
+
+def test_without_foxgloves_package_one_line_says_how_to_get_it(tmp_path: Path) -> None:
+    (tmp_path / "foxglove.py").write_text("raise ModuleNotFoundError(\"No module named 'foxglove'\")\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "flightd", "ground", "--foxglove", "127.0.0.1:0"],
+        cwd=ROOT, capture_output=True, text=True, timeout=60, check=False,
+        env=os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
+    )  # fmt: skip
+    assert done.returncode != 0
+    assert done.stderr.startswith(
+        "flightd: flightd ground --foxglove needs what is not installed (extra foxglove)"
+    )
+    assert "-m pip install" in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 def test_a_state_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:

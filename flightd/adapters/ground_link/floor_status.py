@@ -12,7 +12,8 @@ from flightd.adapters.ground_link.protocol import (
     FloorWay,
     finite,
 )
-from flightd.site.site import Site
+from flightd.site.racks import bay_edges
+from flightd.site.site import Shelf, Site
 
 
 def floor_status(site: Site) -> FloorStatus:
@@ -31,7 +32,15 @@ def floor_status(site: Site) -> FloorStatus:
         line_width_m=site.line_width_m,
         line_colour=site.line_colour,
         racks=tuple(
-            FloorRack(shelf.aisle, shelf.side.value, shelf.x0_m, shelf.x1_m, shelf.y_m, shelf.height_m)
+            FloorRack(
+                shelf.aisle,
+                shelf.side.value,
+                shelf.x0_m,
+                shelf.x1_m,
+                shelf.y_m,
+                shelf.height_m,
+                _bays(site, shelf),
+            )
             for shelf in site.shelves
         ),
         keep_outs=tuple(
@@ -45,3 +54,10 @@ def floor_status(site: Site) -> FloorStatus:
             if edge.one_way or site.is_closed(edge)
         ),
     )
+
+
+def _bays(site: Site, front: Shelf) -> tuple[float, ...]:
+    for rack in site.racks:
+        if front.aisle in rack.aisles and front.side in rack.sides:
+            return bay_edges(rack, front)
+    return ()

@@ -24,6 +24,7 @@ from flightd.adapters.ground_link.protocol import (
     VERSION,
     Answer,
     AskPicture,
+    CameraOptics,
     Code,
     EventReport,
     LinkReport,
@@ -76,9 +77,11 @@ class ZmqGround:
         inventory: Callable[[], Sequence[dict[str, str]]] | None = None,
         cameras: Sequence[CameraName] = (CameraName.DOWN,),
         maintainer: Maintainer | None = None,
+        optics: Sequence[CameraOptics] = (),
     ) -> None:
         """Read keys and allow-list.  InputError names what is wrong with them.  `cameras` are those that this
-        flight has pictures of, `maintainer` does what the ground asks to look after the drone."""
+        flight has pictures of, `optics` their lenses and mounts; `maintainer` does what the ground asks to
+        look after the drone."""
         self._config = config
         self._clock = clock
         self._keys: KeyPair | None = load_pair(config.server_key) if config.server_key else None
@@ -86,7 +89,7 @@ class ZmqGround:
         self._session = secrets.token_hex(8)
         self._audit: AuditLog | None = None
         self._handler = RequestHandler(
-            site, self._session, self._write_down, config.picture_fps, inventory, cameras
+            site, self._session, self._write_down, config.picture_fps, inventory, cameras, optics
         )
         self._desk = MaintenanceDesk(
             maintainer,

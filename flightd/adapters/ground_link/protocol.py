@@ -382,6 +382,9 @@ class FloorRack(msgspec.Struct, frozen=True):
     x1_m: Annotated[float, Meta(description="other end")]
     y_m: Annotated[float, Meta(description="where the front stands")]
     height_m: Annotated[float, Meta(description="above the floor")]
+    bays_m: Annotated[
+        tuple[float, ...], Meta(description="x at which its bays meet and end, rising; empty: not divided")
+    ] = ()
 
 
 class FloorArea(msgspec.Struct, frozen=True):
@@ -430,6 +433,32 @@ class FloorStatus(msgspec.Struct, frozen=True):
     ways: Annotated[tuple[FloorWay, ...], Meta(description="closed and one-way lines")] = ()
 
 
+class CameraOptics(msgspec.Struct, frozen=True):
+    """A camera's lens, and how it sits in the drone: as its configuration has them."""
+
+    camera: Annotated[CameraName, Meta(description="which camera's")]
+    width_px: Annotated[int, Meta(description="width of its frames; pictures may be smaller")]
+    height_px: Annotated[int, Meta(description="height of its frames")]
+    fx_px: Annotated[float, Meta(description="focal length in x, at the frames' size")]
+    fy_px: Annotated[float, Meta(description="focal length in y")]
+    cx_px: Annotated[float, Meta(description="principal point x; pixels' centres are integers")]
+    cy_px: Annotated[float, Meta(description="principal point y")]
+    distortion: Annotated[
+        tuple[float, float, float, float, float], Meta(description="k1 k2 p1 p2 k3, OpenCV's order")
+    ]
+    offset_m: Annotated[
+        tuple[float, float, float],
+        Meta(description="forward, right, down of the point whose height is reported"),
+    ]
+    turn: Annotated[
+        tuple[float, float, float, float],
+        Meta(
+            description="quaternion x y z w that turns the picture's axes (right, down, ahead) into the "
+            "drone's (forward, right, down)"
+        ),
+    ]
+
+
 class Welcome(_Answer, frozen=True, tag="welcome"):
     """Who answers, what you may do, what flies where, and what happened last."""
 
@@ -445,6 +474,7 @@ class Welcome(_Answer, frozen=True, tag="welcome"):
     cameras: Annotated[tuple[CameraName, ...], Meta(description="those whose pictures may be asked for")] = (
         CameraName.DOWN,
     )
+    optics: Annotated[tuple[CameraOptics, ...], Meta(description="of the cameras, as far as known")] = ()
 
 
 class Accepted(_Answer, frozen=True, tag="accepted"):
@@ -651,8 +681,8 @@ ANSWERS = (
 )  # fmt: skip
 PARTS = (
     Position, SeenLine, VehicleReport, LinkReport, SensorReport, HazardReport, FloorStatus, FloorNode,
-    FloorLine, FloorRack, FloorArea, FloorPad, FloorWay, PictureLine, PictureArea, CheckReport, KeyReport,
-    KeptVersion, KeyChange,
+    FloorLine, FloorRack, FloorArea, FloorPad, FloorWay, CameraOptics, PictureLine, PictureArea, CheckReport,
+    KeyReport, KeptVersion, KeyChange,
 )  # fmt: skip
 
 

@@ -27,6 +27,7 @@ from flightd.adapters.ground_link.protocol import (
     AskPlan,
     AskStatus,
     Attend,
+    CameraOptics,
     Code,
     Envelope,
     EventReport,
@@ -77,6 +78,7 @@ class RequestHandler:
         picture_fps: float = 0.0,
         inventory: Callable[[], Sequence[dict[str, str]]] | None = None,
         cameras: Sequence[CameraName] = (CameraName.DOWN,),
+        optics: Sequence[CameraOptics] = (),
     ) -> None:
         self._nodes = frozenset(site.nodes)
         self._floor = floor_status(site)
@@ -85,6 +87,7 @@ class RequestHandler:
         self._picture_fps = picture_fps
         self._inventory = inventory
         self._cameras = tuple(cameras)
+        self._optics = tuple(optics)
         self._commands: deque[Command] = deque()
         self._plans: PlanAnswers | None = None
         self._done: OrderedDict[tuple[str, str], tuple[Command, Answer]] = OrderedDict()
@@ -183,6 +186,7 @@ class RequestHandler:
             floor=self._floor,
             events=tuple(self.events),
             cameras=self._cameras,
+            optics=self._optics,
         )
 
     def _order(self, order: Order, peer: Peer, now_ns: int) -> Answer:

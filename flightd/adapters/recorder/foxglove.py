@@ -1,9 +1,9 @@
-"""The well-known Foxglove schemas, and what makes our own messages conform to them.
+"""What makes our own messages conform to the Foxglove schemas.
 
 A recorded line set is also a `foxglove.ImageAnnotations` (drawn over the picture of the same time), a
-pose also a `foxglove.PoseInFrame`: our fields come first, theirs are appended by the writing process,
-so that the control task does not pay for them.  Foxglove's z is up and its y to the left: positions
-and angles are turned over from the map frame (y right, yaw clockwise).
+pose also a `foxglove.PoseInFrame`: our fields come first, theirs are appended by the writing process, so
+that the control task does not pay for them.  Where the drone's body is becomes a
+`foxglove.FrameTransforms` there, too, and nothing else.
 
 Own code: foxglove-sdk 0.30's types write protobuf alone, which leaves no room for our own fields in the same
 message, and it is 11 MB installed on aarch64 (54 MB on x86-64).
@@ -14,20 +14,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import Any, TypeAlias
 
 import msgspec
 
+from flightd.adapters.foxglove.frames import IN_LOG, body_attitude, drone_on_map, place, time_of
+from flightd.adapters.foxglove.schemas import (
+    FRAME_TRANSFORMS,
+    IMAGE_ANNOTATIONS,
+    POSE_IN_FRAME,
+    JsonObject,
+)
 from flightd.core.types import VERTICAL_LIMIT_RAD
-
-JsonObject: TypeAlias = dict[str, Any]
-
-NS_PER_S = 1_000_000_000
-
-IMAGE_ANNOTATIONS = "foxglove.ImageAnnotations"
-POSE_IN_FRAME = "foxglove.PoseInFrame"
-LOG = "foxglove.Log"
-COMPRESSED_IMAGE = "foxglove.CompressedImage"
 
 _VERTICAL = {"r": 0.0, "g": 0.9, "b": 1.0, "a": 1.0}
 _HORIZONTAL = {"r": 1.0, "g": 0.3, "b": 0.85, "a": 1.0}
@@ -36,82 +33,10 @@ _CLEAR = {"r": 0.0, "g": 0.0, "b": 0.0, "a": 0.0}
 _LINE_LOOP, _LINE_LIST = 2, 4
 
 
-def _object(**properties: JsonObject) -> JsonObject:
-    return {"type": "object", "properties": properties}
-
-
-_NUMBER: JsonObject = {"type": "number"}
-_TEXT: JsonObject = {"type": "string"}
-_INTEGER: JsonObject = {"type": "integer"}
-_TIME = _object(sec=_INTEGER, nsec=_INTEGER) | {"title": "time"}
-_COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
-_POINT = _object(x=_NUMBER, y=_NUMBER)
-
-
-def _list(items: JsonObject) -> JsonObject:
-    return {"type": "array", "items": items}
-
-
-PROPERTIES: Mapping[str, JsonObject] = MappingProxyType(
-    {
-        LOG: {
-            "timestamp": _TIME,
-            "level": _INTEGER | {"description": "2 info, 3 warning, 4 error"},
-            "message": _TEXT,
-            "name": _TEXT,
-            "file": _TEXT,
-            "line": _INTEGER,
-        },
-        COMPRESSED_IMAGE: {
-            "timestamp": _TIME,
-            "frame_id": _TEXT,
-            "data": _TEXT | {"contentEncoding": "base64"},
-            "format": _TEXT,
-            "seq": _INTEGER,
-        },
-        POSE_IN_FRAME: {
-            "timestamp": _TIME,
-            "frame_id": _TEXT,
-            "pose": _object(
-                position=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER),
-                orientation=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER),
-            ),
-        },
-        IMAGE_ANNOTATIONS: {
-            "circles": _list(
-                _object(
-                    timestamp=_TIME,
-                    position=_POINT,
-                    diameter=_NUMBER,
-                    thickness=_NUMBER,
-                    fill_color=_COLOUR,
-                    outline_color=_COLOUR,
-                )
-            ),
-            "points": _list(
-                _object(
-                    timestamp=_TIME,
-                    type=_INTEGER,
-                    points=_list(_POINT),
-                    outline_color=_COLOUR,
-                    outline_colors=_list(_COLOUR),
-                    fill_color=_COLOUR,
-                    thickness=_NUMBER,
-                )
-            ),
-            "texts": _list(_object(timestamp=_TIME, position=_POINT, text=_TEXT)),
-        },
-    }
-)
-"""The properties of each schema, as JSON schema."""
-
-
-def time_of(stamp_ns: int) -> JsonObject:
-    return {"sec": stamp_ns // NS_PER_S, "nsec": stamp_ns % NS_PER_S}
-
-
 def conforming(schema_name: str) -> Callable[[bytes, int], bytes] | None:
     """What appends a schema's fields to one of our messages (JSON, stamp), None if nothing need be."""
+    if schema_name == FRAME_TRANSFORMS:
+        return _transforms
     build = _BUILDERS.get(schema_name)
     if build is None:
         return None
@@ -214,26 +139,22 @@ def _stroke(
 
 def _pose(payload: bytes, stamp_ns: int) -> JsonObject:
     pose = _POSES.decode(payload)
-    position = {"x": pose.x_m, "y": -pose.y_m, "z": pose.height_m or 0.0}
-    orientation = _quaternion(pose.roll_rad, -pose.pitch_rad, -pose.yaw_rad)
+    orientation = body_attitude(pose.roll_rad, pose.pitch_rad, pose.yaw_rad)
     return {
         "timestamp": time_of(stamp_ns),
-        "frame_id": "map",
-        "pose": {"position": position, "orientation": orientation},
+        "frame_id": IN_LOG.map,
+        "pose": {"position": place(pose.x_m, pose.y_m, pose.height_m or 0.0), "orientation": orientation},
     }
 
 
-def _quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> JsonObject:
-    """Of yaw about z, then pitch about y, then roll about x."""
-    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
-    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
-    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
-    return {
-        "x": sr * cp * cy - cr * sp * sy,
-        "y": cr * sp * cy + sr * cp * sy,
-        "z": cr * cp * sy - sr * sp * cy,
-        "w": cr * cp * cy + sr * sp * sy,
-    }
+def _transforms(payload: bytes, stamp_ns: int) -> bytes:
+    """The drone on the map in place of our message; one that is of the schema already stays as it is."""
+    try:
+        pose = _POSES.decode(payload)
+    except (msgspec.MsgspecError, ValueError):
+        return payload
+    at = pose.x_m, pose.y_m, pose.height_m or 0.0
+    return msgspec.json.encode(drone_on_map(stamp_ns, at, (pose.roll_rad, pose.pitch_rad, pose.yaw_rad)))
 
 
 _BUILDERS: Mapping[str, Callable[[bytes, int], JsonObject]] = MappingProxyType(

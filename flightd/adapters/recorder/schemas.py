@@ -1,7 +1,8 @@
 """How messages look in the log: JSON, with JSON schemas that Foxglove and other MCAP tools read.
 
 Events are `foxglove.Log`, pictures `foxglove.CompressedImage`, line sets and poses are our fields and
-those of the Foxglove schema that fits; the rest are the fields of the dataclasses by name.  A float
+those of the Foxglove schema that fits; the warehouse, the cameras and where the drone's frame is are
+Foxglove's fields alone; the rest are the fields of the dataclasses by name.  A float
 that is not a number is written as null, a reason as its words.
 """
 
@@ -13,10 +14,12 @@ from functools import partial
 import msgspec
 import numpy as np
 
-from flightd.adapters.recorder import foxglove
-from flightd.adapters.recorder.foxglove import JsonObject
+from flightd.adapters.foxglove import schemas as foxglove
+from flightd.adapters.foxglove.frames import time_of
+from flightd.adapters.foxglove.schemas import JsonObject, WellKnown, json_schema
 from flightd.core.refusal import Refusal, words
 from flightd.core.tick import TickInput
+from flightd.core.topics import DronePlace
 from flightd.core.types import Event, EventLevel, LineSet, VehicleState
 
 _FOXGLOVE_LEVEL = {EventLevel.INFO: 2, EventLevel.WARNING: 3, EventLevel.ERROR: 4}
@@ -30,13 +33,14 @@ _IN_WORDS: JsonObject = {"type": "string"}
 
 def picture_schema() -> tuple[str, JsonObject]:
     """Name and JSON schema of a picture."""
-    return foxglove.COMPRESSED_IMAGE, _schema(foxglove.COMPRESSED_IMAGE, {})
+    return foxglove.COMPRESSED_IMAGE, json_schema(foxglove.COMPRESSED_IMAGE)
 
 
 def schema_of(message: object) -> tuple[str, JsonObject]:
     """Name and JSON schema of a message's type, without references (not every reader follows them)."""
-    if isinstance(message, Event):
-        return foxglove.LOG, _schema(foxglove.LOG, {})
+    name = _foxglove_alone(message)
+    if name:
+        return name, json_schema(name)
     if not dataclasses.is_dataclass(message):
         return "flightd.Object", {"type": "object"}
     kind = type(message)
@@ -44,14 +48,22 @@ def schema_of(message: object) -> tuple[str, JsonObject]:
     inlined = _inline(schema, schema.get("$defs", {}))
     assert isinstance(inlined, dict)
     if isinstance(message, LineSet):
-        return foxglove.IMAGE_ANNOTATIONS, _schema(foxglove.IMAGE_ANNOTATIONS, inlined["properties"])
+        return foxglove.IMAGE_ANNOTATIONS, json_schema(foxglove.IMAGE_ANNOTATIONS, inlined["properties"])
     if {field.name for field in dataclasses.fields(message)} >= _POSE_FIELDS:
-        return foxglove.POSE_IN_FRAME, _schema(foxglove.POSE_IN_FRAME, inlined["properties"])
+        return foxglove.POSE_IN_FRAME, json_schema(foxglove.POSE_IN_FRAME, inlined["properties"])
     return f"flightd.{kind.__name__}", inlined
 
 
-def _schema(name: str, ours: JsonObject) -> JsonObject:
-    return {"title": name, "type": "object", "properties": ours | foxglove.PROPERTIES[name]}
+def _foxglove_alone(message: object) -> str:
+    """The Foxglove schema of a message that has none of our fields in the log, else empty."""
+    match message:
+        case Event():
+            return foxglove.LOG
+        case DronePlace():
+            return foxglove.FRAME_TRANSFORMS
+        case WellKnown():
+            return message.schema
+    return ""
 
 
 def _schema_of_reason(kind: type) -> JsonObject:
@@ -86,7 +98,7 @@ def encode(message: object) -> bytes:
     if isinstance(message, Event):
         return _encode(
             {
-                "timestamp": foxglove.time_of(message.stamp_ns),
+                "timestamp": time_of(message.stamp_ns),
                 "level": _FOXGLOVE_LEVEL[message.level],
                 "message": message.text,
                 "name": message.name,
@@ -94,6 +106,8 @@ def encode(message: object) -> bytes:
                 "line": 0,
             }
         )
+    if isinstance(message, WellKnown):
+        return _encode(message.fields)
     if isinstance(message, TickInput | VehicleState):
         return _encode(_in_words(message))
     return _encode(message)

@@ -15,6 +15,7 @@ from contextlib import AsyncExitStack, ExitStack
 from dataclasses import replace
 from typing import Any
 
+from flightd.adapters.ground_link.camera_optics import camera_optics
 from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.recorder.recorder import McapRecorder, WhenFull, drop_newest, wait_for_disk
 from flightd.app.absent_parts import NO_GROUND
@@ -153,7 +154,9 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
         pool = stack.enter_context(detector_pool(config, site, clock))
         count = FlightCount(config, site, simulation.folder, stack, run=identity.run)
         counting = await count.begun(clock)
-        link = ground_link(_ground_settings(simulation), site, clock, counting, maintainer)
+        link = ground_link(
+            _ground_settings(simulation), site, clock, counting, maintainer, camera_optics(config)
+        )
         ground = NO_GROUND if link is None else stack.enter_context(link)
         faults = LauncherFaults(simulation.scenario.fault, pool, recorder, link)
         await pool.ready()

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +17,8 @@ from flightd.cli.ground.state import State, state_folder
 from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
+    from flightd.adapters.ground_link.client import Address
+    from flightd.ground.foxglove_view.live_server import FoxgloveServer
     from flightd.ground.server import Listening
 
 EXAMPLES = """Examples:
@@ -23,6 +28,7 @@ EXAMPLES = """Examples:
   flightd ground --drone a=127.0.0.1 --drone b=127.0.0.1:6571/6572    two simulators, by their ports
   flightd ground --folder out                  with the flights and inventories under out
   flightd ground --listen 127.0.0.1:9000
+  flightd ground --foxglove 127.0.0.1          for Foxglove, too: it connects to ws://127.0.0.1:8765
   flightd ground --listen 0.0.0.0:8443 --tls-cert station.pem --tls-key station.key    for others, who sign in
 """
 
@@ -74,6 +80,15 @@ def ground(
         bool,
         typer.Option("--login", help="Ask who they are on this machine, too; beyond it that is always so."),
     ] = False,
+    foxglove: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOST[:PORT]",
+            help="Serve Foxglove there too, live: warehouse, drones, cameras; this machine's addresses only."
+            " The port is 8765 unless given.",
+            show_default=False,
+        ),
+    ] = None,
     state: State = None,
 ) -> None:
     """Watch and command drones in the browser: map, cameras, hazards, events; start, pause, go to, STOP.
@@ -101,12 +116,29 @@ def ground(
     certificate = read_certificate(tls_cert, tls_key)
     where = replace(Listening.read(listen), secure=certificate is not None)
     access = Access(state_folder(state), login or where.is_beyond, where.secure)
-    ended_by = run(drones, where, _say_where, access, certificate, folder)
+    with contextlib.ExitStack() as stack:
+        viewer = None if foxglove is None else stack.enter_context(_foxglove_server(foxglove, login, drones))
+        at = "" if viewer is None else viewer.url
+        viewers = () if viewer is None else (viewer,)
+        ended_by = run(drones, where, partial(_say_where, at), access, certificate, folder, viewers)
     if ended_by is not None:
         print(f"flightd: the ground station was ended by {ended_by.name}", file=sys.stderr)
 
 
-def _say_where(where: Listening) -> None:
+def _foxglove_server(address: str, login: bool, drones: Sequence[tuple[str, Address]]) -> FoxgloveServer:
+    from flightd.ground.foxglove_view.reach import foxglove_address
+
+    where = foxglove_address(address, login)
+    try:
+        from flightd.ground.foxglove_view.live_server import FoxgloveServer
+    except ModuleNotFoundError:
+        from flightd.core.extras import missing_extra
+
+        raise missing_extra("foxglove", "flightd ground --foxglove") from None
+    return FoxgloveServer(where, [name for name, _ in drones])
+
+
+def _say_where(foxglove: str, where: Listening) -> None:
     from flightd.adapters.systemd import Notifier
 
     if address := os.environ.get("NOTIFY_SOCKET"):
@@ -114,3 +146,5 @@ def _say_where(where: Listening) -> None:
         manager.send(READY=1, STATUS=f"at {where.url}")
         manager.close()
     print(f"flightd: the ground station is at {where.url} (Ctrl-C ends it)", file=sys.stderr, flush=True)
+    if foxglove:
+        print(f"flightd: Foxglove finds it at {foxglove}", file=sys.stderr, flush=True)
