@@ -55,7 +55,7 @@ class Station:
         path: str,
         headers: Mapping[str, str] | None = None,
         body: bytes = b"",
-        within_s: float = 10.0,
+        within_s: float = 60.0,
     ) -> tuple[int, str]:
         """The status and the body of the answer to any request."""
         head, text = await self.answer(method, path, headers, body, within_s)
@@ -67,7 +67,7 @@ class Station:
         path: str,
         headers: Mapping[str, str] | None = None,
         body: bytes = b"",
-        within_s: float = 10.0,
+        within_s: float = 60.0,
     ) -> tuple[str, str]:
         """The head and the body of the answer."""
         given = {"Host": f"{self.where.host}:{self.where.port}", **(headers or {})}
