@@ -61,8 +61,8 @@ def stock_routes(asked: StockAnswers) -> list[BaseRoute]:
     return [*page("/stock"), *reads]
 
 
-def answered(answer: AnswerTo) -> AnswerTo:
-    """Or refused, as is what a file that anybody wrote can lead to."""
+def answered(answer: AnswerTo, unshown: str = "this inventory cannot be shown") -> AnswerTo:
+    """Or refused, as is what a file that anybody wrote can lead to, which `unshown` tells of."""
     asked = or_refused(answer)
 
     async def guarded(request: Request) -> Response:
@@ -72,7 +72,7 @@ def answered(answer: AnswerTo) -> AnswerTo:
             return refusal(f"cannot be read: {err.strerror or err}", 503)
         except (ArithmeticError, LookupError, TypeError, ValueError) as err:
             _LOG.exception("%s cannot be answered", request.url.path)
-            return refusal(f"this inventory cannot be shown: {type(err).__name__}", 409)
+            return refusal(f"{unshown}: {type(err).__name__}", 409)
 
     return guarded
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
+from flightd.app.simulation.meant_flight import meant_flight
 from flightd.app.simulation.sensor_summary import sensor_summary
 from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.stock_summary import stock_summary
@@ -41,7 +42,8 @@ class Judgement:
 
 def judge_flight(simulation: Simulation) -> Judgement:
     """Judge the flight whose logs stand in the simulation's folder."""
-    flown = read_log(simulation.flight_log, {Topic.STATUS, Topic.EVENT, Topic.SETPOINT})
+    flown = read_log(simulation.flight_log, {Topic.STATUS, Topic.EVENT, Topic.SETPOINT, Topic.COMMAND})
+    meant = meant_flight(simulation, flown)
     truth = read_log(simulation.truth_log, {Topic.TRUTH, Topic.FAULT, Topic.ARMED}).entries
     armed = [ArmedChange(**row) for row in _rows(truth, Topic.ARMED, ArmedChange)]
     notes = [e.message for e in truth if e.topic == Topic.FAULT and isinstance(e.message, dict)]
@@ -50,7 +52,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
     statuses = flown.messages(Status)
     evidence = FlightEvidence(
         site=simulation.scenario.floor.site(simulation.site, simulation.seed),
-        plan=simulation.plan(),
+        plan=meant.plan,
         statuses=statuses,
         events=flown.messages(Event),
         truth=[Kinematics(**row) for row in _rows(truth, Topic.TRUTH, Kinematics)],
@@ -60,7 +62,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
         piloted=any(note["kind"] == "pilot" for note in begun) or bool(simulation.truth_url),
     )
     figures = score(evidence)
-    stock = stock_summary(simulation, figures.flight_time_s)
+    stock = stock_summary(simulation, meant, figures.flight_time_s)
     faults = judged(
         evidence,
         figures,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flightd.adapters.store.sqlite import SqliteStore
+from flightd.app.simulation.meant_flight import MeantFlight
 from flightd.app.simulation.simulation import Simulation, truth_of
 from flightd.core.csv_text import inert
 from flightd.core.inventory import LocationRecord
@@ -35,13 +36,17 @@ def inventory_csv(folder: Path) -> bytes | None:
     return out.getvalue().encode()
 
 
-def stock_summary(simulation: Simulation, flight_time_s: float) -> dict[str, Any]:
-    """The summary's part on codes and places, over the locations of the wanted nodes."""
+def stock_summary(simulation: Simulation, meant: MeantFlight, flight_time_s: float) -> dict[str, Any]:
+    """The summary's part on codes and places, over the locations that were to be counted."""
     truth, records = truth_of(simulation), _records(simulation.folder)
     if not truth or records is None:
         return {"codes_expected": 0, "codes_read": 0, "codes_wrong": 0, "locations_per_hour": 0.0}
-    wanted = {stop.node for stop in simulation.plan().stops if stop.visit}
-    planned = {code for code, place in truth.items() if place.node in wanted}
+    locations = simulation.site.locations
+    planned = {
+        code
+        for code, place in truth.items()
+        if place.node in meant.nodes and (not meant.levels or locations[code].level in meant.levels)
+    }
     scored = score_stock(truth, records, planned).as_summary()
     hours = flight_time_s / 3600
     return scored | {"locations_per_hour": round(scored["locations_visited"] / hours, 1) if hours else 0.0}

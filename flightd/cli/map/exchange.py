@@ -19,8 +19,6 @@ from flightd.core.errors import InputError
 if TYPE_CHECKING:
     from flightd.site.exchange.graph import Imported
 
-_MOST_BYTES = 8_000_000
-
 
 class Kind(enum.StrEnum):
     """What a map is exported as."""
@@ -28,9 +26,6 @@ class Kind(enum.StrEnum):
     LIF = "lif"
     CSV = "csv"
     LOCATIONS = "locations"
-
-
-_ENDINGS = {Kind.LIF: ".lif.json", Kind.CSV: "-nodes.csv", Kind.LOCATIONS: "-locations.csv"}
 
 
 def register(app: typer.Typer) -> None:
@@ -95,46 +90,33 @@ def export(
       flightd map export hall-3.toml
       flightd map export hall-3.toml --as locations --out codes.csv
     """
-    from flightd.site.exchange.lif import lif_document
-    from flightd.site.exchange.node_table import locations_csv, nodes_csv
+    from flightd.site.exchange.map_files import EXPORTS
     from flightd.site.site_file import load_site
 
-    site = load_site(site_file)
-    target = out if out is not None else site_file.with_name(f"{site_file.stem}{_ENDINGS[kind]}")
-    match kind:
-        case Kind.LIF:
-            now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-            text = json.dumps(lif_document(site, now), indent=2) + "\n"
-        case Kind.CSV:
-            text = nodes_csv(site)
-        case Kind.LOCATIONS:
-            text = locations_csv(site)
-    write_new(target, text, force)
+    site, made = load_site(site_file), EXPORTS[kind]
+    target = out if out is not None else site_file.with_name(f"{site_file.stem}{made.suffix}")
+    write_new(target, made.write(site, datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")), force)
     print(json.dumps({"file": str(target)}) if as_json else target)
 
 
 def _read(file: Path) -> Imported:
-    from flightd.site.exchange.lif import tables_of_lif
+    from flightd.site.exchange.map_files import MOST_BYTES, tables_of_lif_file, text_of
     from flightd.site.exchange.node_table import tables_of_rows
 
     try:
         with file.open("rb") as stream:
-            data = stream.read(_MOST_BYTES + 1)
-        text = data.decode("utf-8-sig")
+            data = stream.read(MOST_BYTES + 1)
     except OSError as err:
         raise InputError(f"cannot read it: {err.strerror or err}", file=file) from None
-    except UnicodeDecodeError:
-        raise InputError("no UTF-8 text", file=file) from None
-    if len(data) > _MOST_BYTES:
-        raise InputError(f"more than {_MOST_BYTES // 10**6} MB", file=file)
+    if len(data) > MOST_BYTES:
+        raise InputError(f"more than {MOST_BYTES // 10**6} MB", file=file)
     try:
         if file.suffix.lower() == ".json":
-            return tables_of_lif(json.loads(text))
+            return tables_of_lif_file(data)
+        text = text_of(data)
         separator = max(",;\t", key=text.partition("\n")[0].count)
         rows = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
         return tables_of_rows([row for row in rows if row])
-    except (json.JSONDecodeError, RecursionError):
-        raise InputError("no JSON, and so no LIF", file=file) from None
     except csv.Error as err:
         raise InputError(f"no CSV: {err}", file=file) from None
     except InputError as err:

@@ -21,6 +21,7 @@ from flightd.ground.site_page.drafts import MOST_BYTES
 from flightd.ground.site_page.site_files import SiteFiles
 from flightd.ground.site_page.work import check_sent, export_sent, new_sent, opened_text, text_sent
 from flightd.ground.stock_routes import answered, download
+from flightd.site.exchange import map_files
 
 _WORK_S = 20.0
 _MOST_TOGETHER = 8
@@ -41,7 +42,10 @@ def site_page(folder: Path | None, working: ReadingProcess) -> list[BaseRoute]:
     ]
     return [
         *page("/site"),
-        *(Route(f"/api/site{way}", answered(answer), methods=[verb]) for verb, way, answer in ways),
+        *(
+            Route(f"/api/site{way}", answered(answer, "this map cannot be worked on"), methods=[verb])
+            for verb, way, answer in ways
+        ),
     ]
 
 
@@ -104,15 +108,15 @@ class SiteAnswers:
         """The map that another program's file describes: `?kind=csv`, `lif` or `toml`."""
         kind = request.query_params.get("kind", "")
         with self._uploads.taken():
-            data = await whole_body(request, exchange.MOST_BYTES)
+            data = await whole_body(request, map_files.MOST_BYTES)
             return as_json(await self._working.run(exchange.imported, _WORK_S, kind, data))
 
     async def give_out(self, request: Request) -> Response:
         """The map as a file for another program: `?kind=`."""
         kind = request.query_params.get("kind", "")
         data = await self._working.run(export_sent, _WORK_S, kind, await self._json(request))
-        file = exchange.FORMATS[kind]
-        return download(data, f"site{file.suffix}", file.media_type)
+        suffix, media_type = exchange.NAMED[kind]
+        return download(data, f"site{suffix}", media_type)
 
     async def _json(self, request: Request) -> bytes:
         if not is_json(request):
