@@ -48,7 +48,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
     armed = [ArmedChange(**row) for row in _rows(truth, Topic.ARMED, ArmedChange)]
     notes = [e.message for e in truth if e.topic == Topic.FAULT and isinstance(e.message, dict)]
     begun = [note for note in notes if note["began"]]
-    dead_ns = min((note["stamp_ns"] for note in begun if note["kind"] == "companion_dead"), default=math.inf)
+    dead = _lasted([note for note in notes if note["kind"] == "companion_dead"])
     statuses = flown.messages(Status)
     evidence = FlightEvidence(
         site=simulation.scenario.floor.site(simulation.site, simulation.seed),
@@ -57,7 +57,11 @@ def judge_flight(simulation: Simulation) -> Judgement:
         events=flown.messages(Event),
         truth=[Kinematics(**row) for row in _rows(truth, Topic.TRUTH, Kinematics)],
         # what a computer that is dead would have sent reaches nobody
-        setpoints=[sent for sent in flown.messages(AttitudeSetpoint) if sent.stamp_ns < dead_ns],
+        setpoints=[
+            sent
+            for sent in flown.messages(AttitudeSetpoint)
+            if not any(since_ns <= sent.stamp_ns < until_ns for since_ns, until_ns in dead)
+        ],
         armed=armed or None,
         piloted=any(note["kind"] == "pilot" for note in begun) or bool(simulation.truth_url),
     )
@@ -76,6 +80,27 @@ def judge_flight(simulation: Simulation) -> Judgement:
     row = next(row for row in HAZARDS if row.name == expected.hazard)
     verdict = judged_hazard(row, expected, evidence, figures, faults, [note["stamp_ns"] for note in begun])
     return Judgement(figures, stock, sensors, verdict, verdict.faults)
+
+
+def _lasted(notes: Sequence[dict[str, Any]]) -> list[tuple[float, float]]:
+    """From when to when, ns, each fault of these notes lasted; to infinity where it never ended."""
+    return [
+        (
+            begin["stamp_ns"],
+            next(
+                (
+                    end["stamp_ns"]
+                    for end in notes
+                    if not end["began"]
+                    and end["index"] == begin["index"]
+                    and end["stamp_ns"] >= begin["stamp_ns"]
+                ),
+                math.inf,
+            ),
+        )
+        for begin in notes
+        if begin["began"]
+    ]
 
 
 def _rows(entries: Sequence[Entry], topic: Topic, kind: type) -> list[dict[str, Any]]:

@@ -25,11 +25,13 @@ def simulation(tmp_path: Path) -> Simulation:
     return prepare(SimOptions(), Scenario(), tmp_path, lambda _: None)
 
 
-def faults(simulation: Simulation, kind: str) -> set[str]:
+def faults(simulation: Simulation, kind: str, ended_s: int | None = None) -> set[str]:
     """Of a flight in which a fault began 16 s before it came down: level setpoints until then, and leaning
     ones on the floor, ten a second to the end."""
     with McapRecorder(simulation.truth_log, when_full=wait_for_disk) as log:
         log.record(Topic.FAULT, BEGUN_S * S, FaultNote(BEGUN_S * S, 0, kind, True))
+        if ended_s is not None:
+            log.record(Topic.FAULT, ended_s * S, FaultNote(ended_s * S, 0, kind, False))
         for stamp_ns in range(0, END_S * S, S // 10):
             flies = S < stamp_ns < DOWN_S * S
             log.record(Topic.TRUTH, stamp_ns, at(stamp_ns, 0.0, height_m=1.6 if flies else 0.1))
@@ -45,6 +47,10 @@ def test_what_a_dead_computer_would_have_sent_neither_steers_nor_leans(simulatio
     found = faults(simulation, "companion_dead")
     assert "out_of_control" in found
     assert "leaned_on_floor" not in found
+
+
+def test_what_a_computer_sends_counts_again_once_it_has_come_back(simulation: Simulation) -> None:
+    assert "leaned_on_floor" in faults(simulation, "companion_dead", ended_s=BEGUN_S + 5)
 
 
 def test_what_a_computer_sends_that_is_alive_counts_whatever_else_fails(simulation: Simulation) -> None:
