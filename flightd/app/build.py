@@ -14,7 +14,7 @@ from functools import partial
 from flightd.adapters.camera.connect import connect_camera
 from flightd.adapters.ground_link.link import ZmqGround
 from flightd.adapters.ground_link.maintenance_desk import Maintainer
-from flightd.adapters.ground_link.protocol import CameraOptics
+from flightd.adapters.ground_link.messages.floor import CameraOptics
 from flightd.adapters.interlock import FileInterlock
 from flightd.adapters.store.learnt_sensors import learnt_file
 from flightd.adapters.store.progress import progress_file

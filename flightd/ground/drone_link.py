@@ -10,15 +10,9 @@ from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import Any, Protocol, TypeVar
 
 from flightd.adapters.ground_link.client import Address, GroundClient
-from flightd.adapters.ground_link.protocol import (
-    Accepted,
-    EventReport,
-    PlanAnswer,
-    Planned,
-    Role,
-    StatusReport,
-    Welcome,
-)
+from flightd.adapters.ground_link.messages.answers import Accepted, PlanAnswer, Planned, Welcome
+from flightd.adapters.ground_link.messages.base import Role
+from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.core.errors import FlightdError, InputError, RunError, TransientError, UnavailableError
 from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind

@@ -16,7 +16,8 @@ from typing import Annotated, Any, TypeAlias, TypeVar
 import msgspec
 from msgspec import Meta
 
-from flightd.adapters.ground_link.protocol import DECODE_ERRORS, PictureAnswer
+from flightd.adapters.ground_link.messages.answers import PictureAnswer
+from flightd.adapters.ground_link.protocol import DECODE_ERRORS
 from flightd.core.errors import InputError
 from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind

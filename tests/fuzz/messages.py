@@ -9,17 +9,13 @@ import tomllib
 from pathlib import Path
 
 from flightd.adapters.ground_link.audit import AuditEntry
+from flightd.adapters.ground_link.messages.answers import Accepted, Planned, Refused
+from flightd.adapters.ground_link.messages.base import VERSION, Role
+from flightd.adapters.ground_link.messages.maintenance import Maintenance, ProposeSettings
+from flightd.adapters.ground_link.messages.requests import AskPicture
 from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.protocol import (
     DECODE_ERRORS,
-    VERSION,
-    Accepted,
-    AskPicture,
-    Maintenance,
-    Planned,
-    ProposeSettings,
-    Refused,
-    Role,
     decode_answer,
     decode_event,
     decode_status,

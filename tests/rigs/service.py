@@ -21,7 +21,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.ground_link.client import Address, GroundClient
-from flightd.adapters.ground_link.protocol import StatusReport
+from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.adapters.vehicle.mavlink.link.codec import Codec
 from flightd.app.simulation.world_process import run_world
 from flightd.core.topics import Topic

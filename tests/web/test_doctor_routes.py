@@ -10,12 +10,9 @@ import pytest
 
 from flightd.adapters.ground_link.client import Address
 from flightd.adapters.ground_link.maintenance_rules import changes_something
+from flightd.adapters.ground_link.messages.maintenance import Maintenance, SettingsAnswer
 from flightd.adapters.ground_link.peer import Peer
-from flightd.adapters.ground_link.protocol import (
-    Answer,
-    Maintenance,
-    SettingsAnswer,
-)
+from flightd.adapters.ground_link.protocol import Answer
 from flightd.app.maintenance.settings import key_reports, new_errors
 from flightd.core.errors import RunError, UnavailableError
 from flightd.core.types import Phase

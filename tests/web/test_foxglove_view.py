@@ -26,7 +26,7 @@ import numpy as np
 from flightd.adapters.ground_link.camera_optics import camera_optics
 from flightd.adapters.ground_link.client import Address
 from flightd.adapters.ground_link.link import ZmqGround
-from flightd.adapters.ground_link.protocol import PictureAnswer
+from flightd.adapters.ground_link.messages.answers import PictureAnswer
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.preview import CameraName, Preview

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from flightd.adapters.foxglove.frames import Frames, time_of, transform, vector
 from flightd.adapters.foxglove.schemas import JsonObject
-from flightd.adapters.ground_link.protocol import CameraOptics
+from flightd.adapters.ground_link.messages.floor import CameraOptics
 from flightd.core.geometry import Lens
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 
 from flightd.adapters.foxglove.frames import Frames, place, quaternion, time_of, vector
 from flightd.adapters.foxglove.schemas import PRIMITIVES, JsonObject
-from flightd.adapters.ground_link.protocol import (
+from flightd.adapters.ground_link.messages.floor import (
     FloorArea,
     FloorLine,
     FloorNode,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from flightd.adapters.ground_link.protocol import CameraOptics
+from flightd.adapters.ground_link.messages.floor import CameraOptics
 from flightd.config.schema import Config
 from flightd.core.camera_view import AnyMount
 from flightd.core.geometry import Lens, quaternion_of

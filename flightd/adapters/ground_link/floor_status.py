@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from flightd.adapters.ground_link.protocol import (
+from flightd.adapters.ground_link.messages.base import finite
+from flightd.adapters.ground_link.messages.floor import (
     FloorArea,
     FloorLine,
     FloorNode,
@@ -10,7 +11,6 @@ from flightd.adapters.ground_link.protocol import (
     FloorRack,
     FloorStatus,
     FloorWay,
-    finite,
 )
 from flightd.site.racks import bay_edges
 from flightd.site.site import Shelf, Site

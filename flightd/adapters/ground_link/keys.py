@@ -19,7 +19,7 @@ import zmq
 import zmq.auth
 from zmq.utils import z85
 
-from flightd.adapters.ground_link.protocol import Role
+from flightd.adapters.ground_link.messages.base import Role
 from flightd.core.errors import InputError
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,48}")

@@ -15,23 +15,15 @@ from flightd.adapters.ground_link.audit import AuditEntry, AuditLog
 from flightd.adapters.ground_link.authenticator import DOMAIN, Authenticator
 from flightd.adapters.ground_link.keys import Client, KeyPair, load_clients, load_pair
 from flightd.adapters.ground_link.maintenance_desk import Maintainer, MaintenanceDesk
+from flightd.adapters.ground_link.messages.answers import Code
+from flightd.adapters.ground_link.messages.base import VERSION, Role
+from flightd.adapters.ground_link.messages.floor import CameraOptics
+from flightd.adapters.ground_link.messages.maintenance import Maintenance
+from flightd.adapters.ground_link.messages.published import EventReport, LinkReport
+from flightd.adapters.ground_link.messages.requests import AskPicture
 from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.picture_answer import picture_answer
-from flightd.adapters.ground_link.protocol import (
-    EVENT_TOPIC,
-    MAX_REQUEST_BYTES,
-    STATUS_TOPIC,
-    VERSION,
-    Answer,
-    AskPicture,
-    CameraOptics,
-    Code,
-    EventReport,
-    LinkReport,
-    Maintenance,
-    Role,
-    encode,
-)
+from flightd.adapters.ground_link.protocol import EVENT_TOPIC, MAX_REQUEST_BYTES, STATUS_TOPIC, Answer, encode
 from flightd.adapters.ground_link.request_handler import RequestHandler
 from flightd.adapters.ground_link.status_report import status_report
 from flightd.config.ground import GroundConfig

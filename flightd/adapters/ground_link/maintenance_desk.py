@@ -12,8 +12,10 @@ import msgspec
 
 from flightd.adapters.ground_link.audit import AuditEntry
 from flightd.adapters.ground_link.maintenance_rules import changes_something
+from flightd.adapters.ground_link.messages.answers import Code, Refused
+from flightd.adapters.ground_link.messages.maintenance import Maintenance, ProposeSettings
 from flightd.adapters.ground_link.peer import Peer
-from flightd.adapters.ground_link.protocol import Answer, Code, Maintenance, ProposeSettings, Refused
+from flightd.adapters.ground_link.protocol import Answer
 from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
 
 _LOG = logging.getLogger(__name__)

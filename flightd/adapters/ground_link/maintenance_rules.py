@@ -5,14 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 
-from flightd.adapters.ground_link.protocol import (
-    AskDoctor,
-    AskSettings,
-    Code,
-    Maintenance,
-    Role,
-    StatusReport,
-)
+from flightd.adapters.ground_link.messages.answers import Code
+from flightd.adapters.ground_link.messages.base import Role
+from flightd.adapters.ground_link.messages.maintenance import AskDoctor, AskSettings, Maintenance
+from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.types import CommandKind, LandedState, Phase
 
 HEARD_S = 3.0

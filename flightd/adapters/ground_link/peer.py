@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from flightd.adapters.ground_link.protocol import Role
+from flightd.adapters.ground_link.messages.base import Role
 
 
 @dataclass(frozen=True, slots=True)

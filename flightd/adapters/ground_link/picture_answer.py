@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flightd.adapters.ground_link.protocol import PictureAnswer, PictureArea, PictureLine
+from flightd.adapters.ground_link.messages.answers import PictureAnswer, PictureArea, PictureLine
 from flightd.core.preview import Preview
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
-from flightd.adapters.ground_link.protocol import AskPlan, Code, PlanAnswer, PlanFlight, Planned
+from flightd.adapters.ground_link.messages.answers import Code, PlanAnswer, Planned
+from flightd.adapters.ground_link.messages.requests import AskPlan, PlanFlight
 from flightd.core.errors import InputError
 from flightd.core.planned_flight import Planner
 from flightd.core.types import Phase

@@ -15,34 +15,36 @@ from flightd import __version__
 from flightd.adapters.ground_link.audit import AuditEntry
 from flightd.adapters.ground_link.floor_status import floor_status
 from flightd.adapters.ground_link.maintenance_rules import objection
-from flightd.adapters.ground_link.peer import Peer
-from flightd.adapters.ground_link.plan_answers import PlanAnswers, impossible
-from flightd.adapters.ground_link.protocol import (
-    DECODE_ERRORS,
-    VERSION,
+from flightd.adapters.ground_link.messages.answers import (
     Accepted,
-    Answer,
+    Code,
+    InventoryAnswer,
+    Planned,
+    Refused,
+    StatusAnswer,
+    Welcome,
+)
+from flightd.adapters.ground_link.messages.base import VERSION, Role
+from flightd.adapters.ground_link.messages.floor import CameraOptics
+from flightd.adapters.ground_link.messages.maintenance import Maintenance
+from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
+from flightd.adapters.ground_link.messages.requests import (
     AskInventory,
     AskPicture,
     AskPlan,
     AskStatus,
     Attend,
-    CameraOptics,
-    Code,
-    Envelope,
-    EventReport,
     Hello,
-    InventoryAnswer,
-    Maintenance,
     Order,
     PlanFlight,
-    Planned,
-    Refused,
+)
+from flightd.adapters.ground_link.peer import Peer
+from flightd.adapters.ground_link.plan_answers import PlanAnswers, impossible
+from flightd.adapters.ground_link.protocol import (
+    DECODE_ERRORS,
+    Answer,
+    Envelope,
     Request,
-    Role,
-    StatusAnswer,
-    StatusReport,
-    Welcome,
     decode_envelope,
     decode_request,
 )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from flightd.adapters.ground_link.protocol import (
-    VERSION,
+from flightd.adapters.ground_link.messages.base import VERSION, finite
+from flightd.adapters.ground_link.messages.published import (
     HazardReport,
     LinkReport,
     Position,
@@ -13,7 +13,6 @@ from flightd.adapters.ground_link.protocol import (
     SensorReport,
     StatusReport,
     VehicleReport,
-    finite,
 )
 from flightd.core.refusal import words
 from flightd.core.snapshot import Snapshot

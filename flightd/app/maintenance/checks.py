@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from flightd.adapters.ground_link.protocol import CheckReport, DoctorAnswer
+from flightd.adapters.ground_link.messages.maintenance import CheckReport, DoctorAnswer
 from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.app.flight import Flight

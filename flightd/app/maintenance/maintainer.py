@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
-from flightd.adapters.ground_link.peer import Peer
-from flightd.adapters.ground_link.protocol import (
-    Accepted,
-    Answer,
+from flightd.adapters.ground_link.messages.answers import Accepted
+from flightd.adapters.ground_link.messages.maintenance import (
     AskDoctor,
     AskSettings,
     FixParameter,
@@ -16,6 +14,8 @@ from flightd.adapters.ground_link.protocol import (
     Restart,
     TakeSettingsBack,
 )
+from flightd.adapters.ground_link.peer import Peer
+from flightd.adapters.ground_link.protocol import Answer
 from flightd.app.flight import Flight
 from flightd.app.maintenance.checks import DroneChecks
 from flightd.app.maintenance.settings import DroneSettings

@@ -18,7 +18,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from flightd.adapters.ground_link.protocol import (
+from flightd.adapters.ground_link.messages.maintenance import (
     KeptVersion,
     KeyChange,
     KeyReport,

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from flightd.adapters.ground_link.protocol import ProposeSettings, SettingsAnswer, TakeSettingsBack
+from flightd.adapters.ground_link.messages.maintenance import (
+    ProposeSettings,
+    SettingsAnswer,
+    TakeSettingsBack,
+)
 from flightd.app.maintenance.settings import key_reports, section_texts
 from flightd.config.schema import Config
 from flightd.core.errors import UnavailableError

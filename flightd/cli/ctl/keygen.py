@@ -31,7 +31,7 @@ def keygen(
       flightctl keygen ann --role viewer
     """
     from flightd.adapters.ground_link.keys import load_public, make_keys
-    from flightd.adapters.ground_link.protocol import Role
+    from flightd.adapters.ground_link.messages.base import Role
 
     if role not in set(Role):
         raise InputError(f"expected {' or '.join(Role)}", key=f"--role {role}")

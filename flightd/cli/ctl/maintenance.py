@@ -14,7 +14,7 @@ from flightd.core.errors import InputError, RunError
 
 if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import GroundClient
-    from flightd.adapters.ground_link.protocol import DoctorAnswer, SettingsAnswer
+    from flightd.adapters.ground_link.messages.maintenance import DoctorAnswer, SettingsAnswer
 
 Person = Annotated[str, typer.Option("--person", help="Who asks: for the audit log and the versions.")]
 

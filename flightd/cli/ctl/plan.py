@@ -14,7 +14,7 @@ from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import GroundClient
-    from flightd.adapters.ground_link.protocol import PlanAnswer, Planned
+    from flightd.adapters.ground_link.messages.answers import PlanAnswer, Planned
 
 
 def register(app: typer.Typer) -> None:

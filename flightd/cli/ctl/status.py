@@ -12,7 +12,7 @@ from flightd.cli.options import AsJson
 from flightd.core.errors import UnavailableError
 
 if TYPE_CHECKING:
-    from flightd.adapters.ground_link.protocol import StatusReport
+    from flightd.adapters.ground_link.messages.published import StatusReport
 
 
 def register(app: typer.Typer) -> None:

@@ -9,7 +9,8 @@ from typing import TypeAlias
 from rich.style import Style
 from rich.text import Text
 
-from flightd.adapters.ground_link.protocol import FloorStatus, Position
+from flightd.adapters.ground_link.messages.floor import FloorStatus
+from flightd.adapters.ground_link.messages.published import Position
 
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 _BRAILLE = 0x2800

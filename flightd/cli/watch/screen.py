@@ -15,7 +15,9 @@ from textual.containers import Horizontal, Vertical
 from textual.widgets import Footer, RichLog, Static
 
 from flightd.adapters.ground_link.client import GroundClient
-from flightd.adapters.ground_link.protocol import EventReport, Role, StatusReport, Welcome
+from flightd.adapters.ground_link.messages.answers import Welcome
+from flightd.adapters.ground_link.messages.base import Role
+from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.cli.watch.floor_map import FloorMap
 from flightd.core.errors import FlightdError
 from flightd.core.types import CommandKind, EventLevel, Phase

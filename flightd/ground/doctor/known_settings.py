@@ -6,7 +6,7 @@ from collections import OrderedDict
 from collections.abc import Mapping
 from pathlib import Path
 
-from flightd.adapters.ground_link.protocol import SettingsAnswer, Value
+from flightd.adapters.ground_link.messages.maintenance import SettingsAnswer, Value
 from flightd.config.remote_change import checked
 from flightd.core.errors import InputError, RunError
 

@@ -16,7 +16,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from flightd.adapters.ground_link.protocol import SettingsAnswer, Value
+from flightd.adapters.ground_link.messages.maintenance import SettingsAnswer, Value
 from flightd.core.errors import FlightdError
 from flightd.ground.access.gate import identity_of, note_act, person_of
 from flightd.ground.access.roles import Role

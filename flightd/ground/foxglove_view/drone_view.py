@@ -17,7 +17,8 @@ from flightd.adapters.foxglove.schemas import (
     JsonObject,
 )
 from flightd.adapters.foxglove.warehouse import warehouse_scene
-from flightd.adapters.ground_link.protocol import CameraOptics, StatusReport
+from flightd.adapters.ground_link.messages.floor import CameraOptics
+from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.preview import CameraName
 from flightd.ground.messages import LinkPicture
 from flightd.vision.shelf.evidence_jpeg import jpeg_size

@@ -14,7 +14,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from flightd.adapters.ground_link.protocol import PlanAnswer, Planned
+from flightd.adapters.ground_link.messages.answers import PlanAnswer, Planned
 from flightd.core.errors import FlightdError, InputError
 from flightd.core.planned_flight import MOST_NODES
 from flightd.ground.access.gate import note_act

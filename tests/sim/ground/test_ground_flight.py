@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from flightd.adapters.ground_link.client import Address, GroundClient
-from flightd.adapters.ground_link.protocol import StatusReport
+from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.types import CommandKind, Phase
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.free_ports import free_ports

@@ -19,7 +19,9 @@ import zmq.asyncio
 
 from flightd.adapters.ground_link.client import GroundClient
 from flightd.adapters.ground_link.link import ZmqGround
-from flightd.adapters.ground_link.protocol import Accepted, EventReport, Role, StatusReport
+from flightd.adapters.ground_link.messages.answers import Accepted
+from flightd.adapters.ground_link.messages.base import Role
+from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.preview import CameraName, Preview
 from flightd.core.types import CommandKind, Phase

@@ -9,8 +9,11 @@ import pytest
 from textual.widgets import RichLog, Static
 
 from flightd.adapters.ground_link.client import GroundClient
+from flightd.adapters.ground_link.messages.answers import Welcome
+from flightd.adapters.ground_link.messages.base import Role
+from flightd.adapters.ground_link.messages.floor import FloorStatus
+from flightd.adapters.ground_link.messages.published import Position
 from flightd.adapters.ground_link.peer import Peer
-from flightd.adapters.ground_link.protocol import FloorStatus, Position, Role, Welcome
 from flightd.adapters.ground_link.request_handler import RequestHandler
 from flightd.cli.watch.floor_map import FloorMap, arrow
 from flightd.cli.watch.screen import WatchApp

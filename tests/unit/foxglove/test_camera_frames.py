@@ -11,7 +11,7 @@ import pytest
 from flightd.adapters.foxglove.cameras import calibration, cameras_on_drone
 from flightd.adapters.foxglove.frames import Frames, drone_on_map
 from flightd.adapters.ground_link.camera_optics import camera_optics
-from flightd.adapters.ground_link.protocol import CameraOptics
+from flightd.adapters.ground_link.messages.floor import CameraOptics
 from flightd.config.schema import Config, load_config
 from flightd.core.camera_view import AnyMount, CameraView, ForwardMount, Viewpoint
 from flightd.core.geometry import Lens, Matrix, Mount, quaternion_of

@@ -9,16 +9,12 @@ from typing import Any
 import msgspec
 
 from flightd.adapters.ground_link.audit import AuditEntry
+from flightd.adapters.ground_link.messages.base import VERSION, Role
+from flightd.adapters.ground_link.messages.maintenance import Maintenance
+from flightd.adapters.ground_link.messages.published import LinkReport, StatusReport
+from flightd.adapters.ground_link.messages.requests import AskPicture
 from flightd.adapters.ground_link.peer import Peer
-from flightd.adapters.ground_link.protocol import (
-    VERSION,
-    Answer,
-    AskPicture,
-    LinkReport,
-    Maintenance,
-    Role,
-    StatusReport,
-)
+from flightd.adapters.ground_link.protocol import Answer
 from flightd.adapters.ground_link.request_handler import RequestHandler
 from flightd.app.build import pilot_of
 from flightd.config.schema import load_config

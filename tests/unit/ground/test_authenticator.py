@@ -11,7 +11,7 @@ from zmq.utils import z85
 
 from flightd.adapters.ground_link.authenticator import Authenticator
 from flightd.adapters.ground_link.keys import Client
-from flightd.adapters.ground_link.protocol import Role
+from flightd.adapters.ground_link.messages.base import Role
 
 PUBLIC = zmq.curve_keypair()[0]
 KEY = z85.decode(PUBLIC)

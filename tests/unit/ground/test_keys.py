@@ -11,7 +11,7 @@ import zmq
 import zmq.auth
 
 from flightd.adapters.ground_link.keys import Client, KeyPair, load_clients, load_pair, load_public, make_keys
-from flightd.adapters.ground_link.protocol import Role
+from flightd.adapters.ground_link.messages.base import Role
 from flightd.config.ground import GroundConfig, is_loopback
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError

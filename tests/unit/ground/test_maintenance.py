@@ -14,24 +14,20 @@ from hypothesis import strategies as st
 from flightd.adapters.ground_link.audit import AuditEntry
 from flightd.adapters.ground_link.maintenance_desk import MOST_WAITING, MaintenanceDesk
 from flightd.adapters.ground_link.maintenance_rules import HEARD_S, objection
-from flightd.adapters.ground_link.peer import Peer
-from flightd.adapters.ground_link.protocol import (
-    VERSION,
-    Accepted,
-    Answer,
+from flightd.adapters.ground_link.messages.answers import Accepted, Code, Refused
+from flightd.adapters.ground_link.messages.base import VERSION, Role
+from flightd.adapters.ground_link.messages.maintenance import (
     AskDoctor,
     AskSettings,
-    Code,
     FixParameter,
     Maintenance,
     ProposeSettings,
-    Refused,
     Restart,
-    Role,
-    StatusReport,
     TakeSettingsBack,
-    VehicleReport,
 )
+from flightd.adapters.ground_link.messages.published import StatusReport, VehicleReport
+from flightd.adapters.ground_link.peer import Peer
+from flightd.adapters.ground_link.protocol import Answer
 from flightd.core.errors import InputError
 from flightd.core.types import CommandKind, LandedState, Phase
 from tests.rigs.event_loops import real

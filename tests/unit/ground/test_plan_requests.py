@@ -5,18 +5,10 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from flightd.adapters.ground_link.protocol import (
-    MAX_REQUEST_BYTES,
-    VERSION,
-    Accepted,
-    Code,
-    PlanAnswer,
-    PlanFlight,
-    Planned,
-    Refused,
-    decode_answer,
-    encode,
-)
+from flightd.adapters.ground_link.messages.answers import Accepted, Code, PlanAnswer, Planned, Refused
+from flightd.adapters.ground_link.messages.base import VERSION
+from flightd.adapters.ground_link.messages.requests import PlanFlight
+from flightd.adapters.ground_link.protocol import MAX_REQUEST_BYTES, decode_answer, encode
 from flightd.core.planned_flight import MOST_NODES
 from flightd.core.types import CommandKind, Phase
 from tests.unit.ground.request_handler_rig import OPERATOR, VIEWER, RequestHandlerRig, S, body

@@ -7,7 +7,8 @@ import json
 import msgspec
 import pytest
 
-from flightd.adapters.ground_link.protocol import ANSWERS, PARTS, PUBLISHED, REQUESTS, encode, finite
+from flightd.adapters.ground_link.messages.base import finite
+from flightd.adapters.ground_link.protocol import ANSWERS, PARTS, PUBLISHED, REQUESTS, encode
 from flightd.adapters.ground_link.protocol_text import fields_of, markdown, schema
 
 TAGS = {"op", "answer"}

@@ -8,20 +8,19 @@ import random
 import msgspec
 import pytest
 
-from flightd.adapters.ground_link.peer import Peer
-from flightd.adapters.ground_link.protocol import (
+from flightd.adapters.ground_link.messages.answers import (
     Accepted,
-    AskPicture,
     Code,
     InventoryAnswer,
     Planned,
     Refused,
-    Role,
     StatusAnswer,
     Welcome,
-    decode_answer,
-    encode,
 )
+from flightd.adapters.ground_link.messages.base import Role
+from flightd.adapters.ground_link.messages.requests import AskPicture
+from flightd.adapters.ground_link.peer import Peer
+from flightd.adapters.ground_link.protocol import decode_answer, encode
 from flightd.core.types import CommandKind, Phase
 from tests.rigs.possible_commands import possible_in
 from tests.unit.ground.request_handler_rig import OPERATOR, SESSION, SITE, VIEWER, RequestHandlerRig, S, body

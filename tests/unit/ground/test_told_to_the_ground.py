@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from flightd.adapters.ground_link.floor_status import floor_status
+from flightd.adapters.ground_link.messages.published import LinkReport, StatusReport
+from flightd.adapters.ground_link.messages.requests import AskPicture
 from flightd.adapters.ground_link.picture_answer import picture_answer
-from flightd.adapters.ground_link.protocol import AskPicture, LinkReport, StatusReport, decode_answer, encode
+from flightd.adapters.ground_link.protocol import decode_answer, encode
 from flightd.adapters.ground_link.status_report import status_report
 from flightd.config.schema import load_config
 from flightd.core.geometry import Lens

@@ -1,0 +1,1 @@
+"""The messages of the ground link, by what they are about."""
