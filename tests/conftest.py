@@ -5,6 +5,7 @@ Those marked `realtime` do depend on it: see `tests.rigs.machine`."""
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Generator
 from typing import Any
 
@@ -26,8 +27,10 @@ _COSTLY = {
     "tests/sim/ideal/test_height_changes.py",
     "tests/sim/pictures/test_shelf_reading.py",
     "tests/unit/cli/test_vision_commands.py",
-    "tests/web/test_page.py",
+    "tests/web/test_navigation.py",
 }
+_IN_BROWSER = re.compile(r"tests/web/test_\w*page\.py")
+"""Each starts a Chromium, and a station for all its tests."""
 _IN_CI = os.environ.get("CI", "") == "true"
 _PATIENCE = pytest.StashKey[Patience]()
 
@@ -45,8 +48,15 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whole flights first: one that began last would keep one core busy while the other waits."""
-    items.sort(key=lambda item: (item.get_closest_marker("slow") is None, "/sim/" not in item.nodeid))
+    """Whole flights first, then what needs a browser: one that began last would keep one core busy while the
+    other waits."""
+    items.sort(
+        key=lambda item: (
+            item.get_closest_marker("slow") is None,
+            "/sim/" not in item.nodeid,
+            _IN_BROWSER.match(item.nodeid) is None,
+        )
+    )
 
 
 class _CostlyTogether(LoadScopeScheduling):  # type: ignore[misc]  # its library has no types
@@ -54,7 +64,7 @@ class _CostlyTogether(LoadScopeScheduling):  # type: ignore[misc]  # its library
 
     def _split_scope(self, nodeid: str) -> str:
         module = nodeid.partition("::")[0]
-        return module if module in _COSTLY else nodeid
+        return module if module in _COSTLY or _IN_BROWSER.fullmatch(module) else nodeid
 
 
 @pytest.hookimpl(optionalhook=True)
