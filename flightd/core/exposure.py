@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 MOST_EXPOSURE_S = 0.005
@@ -81,3 +82,10 @@ def _wrong(found: float | None, wanted: float, step: float) -> str:
 def motion_blur_px(exposure_s: float, speed_mps: float, height_m: float, focal_px: float) -> float:
     """How far the floor moves across the picture while it is exposed."""
     return exposure_s * speed_mps / height_m * focal_px
+
+
+def beat_passed(exposure_s: float, mains_hz: int) -> float:
+    """The share of a lamp's beat that is left in an exposure: it averages over its own length, and nothing is
+    left of whole half periods of the mains."""
+    turns = 2.0 * mains_hz * exposure_s
+    return abs(math.sin(math.pi * turns) / (math.pi * turns)) if turns else 1.0
