@@ -108,8 +108,9 @@ def _check_blur(config: Config, exposure_s: float) -> Check:
     if blur <= _MOST_BLUR_PX:
         return ok("blur", text)
     part = _MOST_BLUR_PX / blur
+    shorter_s = min(exposure_s * part, MOST_EXPOSURE_S)
     remedy = (
-        f"{_MOST_BLUR_PX:g} px at most: camera.exposure_s = {exposure_s * part:.4f}, or mission.speed_mps ="
+        f"{_MOST_BLUR_PX:g} px at most: camera.exposure_s = {shorter_s:.2g}, or mission.speed_mps ="
         f" {mission.speed_mps * part:.2g}"
     )
     return warning("blur", text, remedy)
@@ -139,13 +140,14 @@ def _check_flicker(camera: CameraConfig, seen: Seen) -> list[Check]:
     if found.is_seen:
         text = f"brightness beats by {found.amplitude:.0%} from picture to picture, everywhere alike: lamps"
         return [warning("flicker", text, _against_flicker(camera, seen.state))]
-    hidden = [f"{hz} Hz" for hz in _MAINS if seen.rate_hz and is_hidden(hz, seen.rate_hz)]
+    mains = (camera.anti_flicker_hz,) if camera.anti_flicker_hz else _MAINS
+    hidden = [hz for hz in mains if seen.rate_hz and is_hidden(hz, seen.rate_hz)]
+    lamps = f"lamps on {' or '.join(f'{hz} Hz' for hz in hidden)} mains"
+    still = f"{lamps} stand still at {seen.rate_hz:.0f} pictures a second"
+    if len(hidden) == len(mains):
+        return [unseen("flicker", f"{still}: nothing to see", "another camera.fps, to see them once")]
     text = f"none seen in {len(seen.series)} pictures"
-    if hidden:
-        text += (
-            f"; with mains of {' or '.join(hidden)} it stands still at {seen.rate_hz:.0f} a second, unseen"
-        )
-    return [ok("flicker", text)]
+    return [ok("flicker", f"{text}; {still}, unseen" if hidden else text)]
 
 
 def _against_flicker(camera: CameraConfig, state: ExposureState | None) -> str:

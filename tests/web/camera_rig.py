@@ -98,7 +98,7 @@ class CameraDrone:
     def _report(self, request: str) -> DoctorAnswer:
         config = parse_config(self.ran, FILE)
         state = read_back(config)
-        checks = check_exposure(config, Seen(state, [brightness_of(picture())] * 20, 20.0))
+        checks = check_exposure(config, Seen(state, [brightness_of(picture())] * 20, 30.0))
         return DoctorAnswer(
             request=request,
             fit=True,

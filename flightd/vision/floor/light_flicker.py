@@ -23,8 +23,9 @@ _USABLE = (8.0, 245.0)
 _SEEN = 0.05
 """Amplitude, as a share of the brightness, from which it disturbs: colours and labels are read worse."""
 _ALIKE = 0.4
-_STILL = 0.25
-"""What is left of the beat in the difference of neighbours, below which it is not seen."""
+_STILL = 0.7
+"""How much of a beat is left in the difference of neighbours (of 0 to 2) below which one of a tenth may pass
+unseen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,6 @@ def flicker_of(series: Sequence[Brightness]) -> Flicker | None:
 
 
 def is_hidden(mains_hz: int, rate_hz: float) -> bool:
-    """Whether pictures at this rate see the beat at the same moment again and again: it stands still."""
+    """Whether pictures at this rate see the beat at about the same moment each time: it stands still."""
     beats = 2.0 * mains_hz / rate_hz
     return 1.0 - math.cos(math.tau * (beats - round(beats))) < _STILL
