@@ -43,7 +43,7 @@ def said(settings: Config, found: Seen) -> dict[str, tuple[CheckLevel, str, str]
     ("keys", "state", "level", "words"),
     [
         ({"exposure_s": 0.004, "gain": 30}, HELD, OK, "manual, 4 ms, gain 30, as it was set"),
-        ({"exposure_s": 0.002, "gain": 30}, HELD, ERROR, "exposure_s was set to 0.002, the camera tells 0.004"),
+        ({"exposure_s": 0.002, "gain": 30}, HELD, ERROR, "exposure_s was set to 0.002, the camera tells"),
         ({"exposure_s": 0.004}, ExposureState(False, 0.03), ERROR, "goes on exposing by itself"),
         ({}, HELD, OK, "manual, 4 ms, gain 30"),
         ({}, ExposureState(False, 0.0157, 64), WARNING, "automatic, 15.7 ms, gain 64: it grows in the dark"),
