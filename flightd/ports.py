@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
 
+from flightd.core.exposure import ExposureState
 from flightd.core.inventory import LocationRecord, Observation, PlannedLocation
 from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName, Preview
@@ -100,6 +101,16 @@ class Camera(Protocol):
         ...
 
     async def run(self) -> None: ...
+
+
+@runtime_checkable
+class TellsExposure(Protocol):
+    """A camera that is read back: how it exposes."""
+
+    @property
+    def exposure_state(self) -> ExposureState | None:
+        """As it was read back last; None while nothing was."""
+        ...
 
 
 class Recorder(Protocol):

@@ -34,6 +34,7 @@ from flightd.app.detection.detector_pool import DetectorPool, Detectors
 from flightd.app.detection.pipeline import DetectionPipeline
 from flightd.app.flight import Count, Flight, SetpointSink, Vision
 from flightd.app.flight_orders import configured_order
+from flightd.app.frame_tap import NO_FRAMES, FrameTap
 from flightd.app.publishers import TelemetryPublishers
 from flightd.app.setpoint_pump import SetpointPump
 from flightd.config.ground import GroundConfig
@@ -123,7 +124,8 @@ def build(
         detectors, config.vision.workers, recorder, ground, kept_fps, config.camera.lens()
     )
     connect = partial(connect_camera, clock=clock, on_trouble=publishers.trouble, vehicle=vehicle, hold=hold)
-    camera = connect(config.camera, on_frame=vision.frames.put, url=peers.camera)
+    down_frames = FrameTap(vision.frames.put)
+    camera = connect(config.camera, on_frame=down_frames.put, url=peers.camera)
     front_camera: Camera = NO_CAMERA
     if counting is not None:
         counting.read_for(pilot.places)
@@ -146,6 +148,7 @@ def build(
         startup_fault=startup_fault,
         interlock=interlock,
         unfit=unfit,
+        down_frames=down_frames,
     )
 
 
@@ -167,11 +170,12 @@ def assemble(
     startup_fault: FlightdError | None = None,
     interlock: Interlock | None = None,
     unfit: Refusal | None = None,
+    down_frames: FrameTap = NO_FRAMES,
 ) -> Flight:
     """Put a flight together from what is connected already.  `cameras` are the down and the front one;
     `keep_files`: the stops left over are kept in `mission.progress`, what is learnt of the sensors in
     `tracking.learnt`, if those name files; `interlock` is the configured one unless given, `unfit` what
-    speaks against a flight on this computer."""
+    speaks against a flight on this computer, `down_frames` what the down camera's frames pass."""
     progress, learnt = (config.mission.progress, config.tracking.learnt) if keep_files else (None, None)
     camera, front_camera = cameras
     return Flight(
@@ -192,6 +196,7 @@ def assemble(
         startup_fault=startup_fault,
         interlock=interlock or interlock_of(config, site, clock),
         unfit=unfit,
+        down_frames=down_frames,
     )
 
 

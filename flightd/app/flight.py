@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias, TypeVar
 
 from flightd.adapters.store.progress import LeftOver
+from flightd.app.frame_tap import NO_FRAMES, FrameTap
 from flightd.app.publishers import TelemetryPublishers
 from flightd.core.errors import FlightdError
 from flightd.core.learnt import LearntSensors
@@ -127,7 +128,8 @@ class Flight:
 
     `share_pose` gives the vehicle's own estimator the pose, where it can use it.  `startup_fault` is what
     the daemon should not fly with: on the ground it ends with that; a vehicle that it finds flying is looked
-    after all the same.  `unfit` is what the check of this computer found against a flight."""
+    after all the same.  `unfit` is what the check of this computer found against a flight;
+    `down_frames` are the down camera's on their way to `vision`."""
 
     clock: Clock
     pilot: Pilot
@@ -146,3 +148,4 @@ class Flight:
     interlock: Interlock
     startup_fault: FlightdError | None = None
     unfit: Refusal | None = None
+    down_frames: FrameTap = NO_FRAMES

@@ -7,8 +7,10 @@ from typing import Annotated, TypeAlias
 
 from pydantic import Field
 
+from flightd.config.exposure_keys import ExposureTime, Gain, MainsHz
 from flightd.config.section import Section, unit
 from flightd.core.camera_view import FloorReach
+from flightd.core.exposure import ExposureOrder
 from flightd.core.geometry import Lens, Mount
 
 Width: TypeAlias = Annotated[int, Field(ge=16, le=7680, description="width of the frame")]
@@ -59,7 +61,8 @@ class CameraConfig(OpticsSection):
     url: str = Field(
         "udp://127.0.0.1:5600",
         description="udp://HOST:PORT (notices of pictures in shared memory), device:/dev/videoN, "
-        "stream:URL (rtsp, rtp, mpeg-ts…), file:PATH (a video), folder:PATH (pictures)",
+        "picamera:N (a Raspberry Pi's), stream:URL (rtsp, rtp, mpeg-ts…), file:PATH (a video), folder:PATH "
+        "(pictures)",
     )
     width_px: Width = 640
     height_px: Height = 360
@@ -72,6 +75,13 @@ class CameraConfig(OpticsSection):
     latency_s: float = Field(
         0.060, ge=0, le=1, description="from mid-exposure to arrival, least delay of the path"
     )
+    exposure_s: ExposureTime = 0.0
+    gain: Gain = None
+    anti_flicker_hz: MainsHz = 0
+
+    def exposure_order(self) -> ExposureOrder:
+        """What the camera is to be set to."""
+        return ExposureOrder(self.exposure_s or None, self.gain, self.anti_flicker_hz)
 
     def mount(self) -> Mount:
         turned = (math.radians(one) for one in (self.mount_roll_deg, self.mount_pitch_deg))

@@ -7,7 +7,9 @@ import math
 from pydantic import Field
 
 from flightd.config.camera import FocalX, FocalY, Height, OpticsSection, Width
+from flightd.config.exposure_keys import ByHand, Gain, MainsHz
 from flightd.core.camera_view import ForwardMount
+from flightd.core.exposure import ExposureOrder
 
 
 class FrontCameraConfig(OpticsSection):
@@ -17,8 +19,8 @@ class FrontCameraConfig(OpticsSection):
 
     url: str = Field(
         "",
-        description="as camera.url: udp://HOST:PORT, device:/dev/videoN, stream:URL, file:PATH or "
-        "folder:PATH; empty: there is none, nothing is scanned",
+        description="as camera.url: udp://HOST:PORT, device:/dev/videoN, picamera:N, stream:URL, "
+        "file:PATH or folder:PATH; empty: there is none, nothing is scanned",
     )
     width_px: Width = 1280
     height_px: Height = 800
@@ -41,11 +43,20 @@ class FrontCameraConfig(OpticsSection):
     latency_s: float = Field(
         0.080, ge=0, le=1, description="from mid-exposure to arrival, least delay of the path"
     )
+    manual_exposure: ByHand = False
+    gain: Gain = None
+    anti_flicker_hz: MainsHz = 0
 
     @property
     def is_fitted(self) -> bool:
         """Whether there is such a camera."""
         return bool(self.url)
+
+    def exposure_order(self) -> ExposureOrder:
+        """What the camera is to be set to."""
+        return ExposureOrder(
+            self.exposure_s if self.manual_exposure else None, self.gain, self.anti_flicker_hz
+        )
 
     def mount(self) -> ForwardMount:
         return ForwardMount(

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
 from flightd.config.schema import Config
+from flightd.core.exposure import ExposureState
 from flightd.core.types import VehicleState
 from flightd.doctor.calibration import check_calibration, check_learnt
 from flightd.doctor.check import Check, CheckLevel, error, ok, unseen, warning
+from flightd.doctor.exposure import Seen, check_exposure, check_front_exposure
 from flightd.doctor.machine import check_clock, check_disk, check_processor
 from flightd.site.site import Site
 
@@ -21,9 +23,9 @@ _ALONE = "stop the daemon and run flightd doctor on the drone"
 @dataclass(frozen=True, slots=True)
 class Running:
     """What the running daemon knows: its vehicle (None: not heard), the age of its newest heartbeat, the
-    down camera's pictures per second, the
-    autopilot's findings (None: not read yet, or no such autopilot) and firmware, and the configuration's
-    file."""
+    down camera's pictures per second and how they are exposed, how the front camera was read back (None: not
+    at all), the autopilot's findings (None: not read yet, or no such autopilot) and firmware, and the
+    configuration's file."""
 
     file: str
     vehicle: VehicleState | None
@@ -32,6 +34,8 @@ class Running:
     findings: Sequence[ParameterFinding] | None
     firmware: str
     is_mavlink: bool
+    exposure: Seen
+    front_exposure: ExposureState | None = None
 
 
 def check_here(config: Config, site: Site) -> list[Check]:
@@ -52,6 +56,8 @@ def judge_running(config: Config, found: Running) -> list[Check]:
         _vehicle(config, found),
         *_parameters(found),
         _camera(config, found),
+        *(check_exposure(config, found.exposure) if found.pictures_hz else []),
+        *check_front_exposure(config, found.front_exposure),
         ok("ground", "this station was answered"),
         *_left_out(found),
     ]
@@ -109,7 +115,7 @@ def _camera(config: Config, found: Running) -> Check:
 def _left_out(found: Running) -> list[Check]:
     """What nobody can look at while the daemon has it."""
     left = [
-        unseen("camera", "opening the camera, brightness, and the detector's speed on its pictures", _ALONE),
+        unseen("camera", "opening the camera, and the detector's speed on its pictures", _ALONE),
         unseen("delay", "the camera's delay, measured by rocking the drone", f"{_ALONE} with --rock"),
         unseen("ground", "whether its ports are free: this link has them", _ALONE),
     ]

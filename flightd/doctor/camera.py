@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 
 from flightd.adapters.camera.connect import connect_camera
 from flightd.config.schema import Config
 from flightd.core.errors import TransientError, UnavailableError
+from flightd.core.exposure import ExposureState
 from flightd.core.tick import CLOSEST_TICKS_S
 from flightd.core.types import Image
 from flightd.doctor.check import Check, error, ok, warning
 from flightd.doctor.picture_of import picture_of
-from flightd.ports import Clock, Vehicle
+from flightd.ports import Clock, TellsExposure, Vehicle
 from flightd.runtime.frame_ring import FrameTicket
+from flightd.runtime.latest_slot import Latest
+from flightd.vision.floor.brightness import Brightness, brightness_of
 from flightd.vision.line_detector import Detector
 
 _FIRST_S = 6.0
@@ -30,13 +34,15 @@ _NEAR = 0.8
 
 @dataclass(slots=True)
 class Pictures:
-    """What came: arrival times, the newest picture of a second ago or later, what was refused, and the delays
-    since mid-exposure."""
+    """What came: arrival times, the newest picture of a second ago or later, what was refused, the delays
+    since mid-exposure, how bright the pictures were, and how the camera was read back."""
 
     arrivals_ns: list[int] = field(default_factory=list)
     picture: Image | None = None
     trouble: str = ""
     delays_s: list[float] = field(default_factory=list)
+    series: list[Brightness] = field(default_factory=list)
+    exposure: ExposureState | None = None
 
     @property
     def rate_hz(self) -> float:
@@ -50,6 +56,7 @@ async def watch(config: Config, clock: Clock, vehicle: Vehicle | None) -> Pictur
     """Let the camera run for some seconds.  InputError for a wrong address."""
     pictures = Pictures()
     first = asyncio.Event()
+    newest: Latest[FrameTicket] = Latest()
 
     def take(ticket: FrameTicket) -> None:
         pictures.arrivals_ns.append(ticket.arrival_ns)
@@ -57,6 +64,12 @@ async def watch(config: Config, clock: Clock, vehicle: Vehicle | None) -> Pictur
         first.set()
         if pictures.picture is None and len(pictures.arrivals_ns) >= _LEAST_PICTURES:
             pictures.picture = picture_of(ticket)  # the first ones are exposed badly
+        if pictures.picture is not None:
+            newest.put(ticket)
+
+    async def measure() -> None:
+        async for brightness in brightness_series(newest):
+            pictures.series.append(brightness)
 
     def complain(text: str) -> None:
         pictures.trouble = text
@@ -64,18 +77,32 @@ async def watch(config: Config, clock: Clock, vehicle: Vehicle | None) -> Pictur
     camera = connect_camera(config.camera, clock, take, complain, vehicle)
     running = asyncio.ensure_future(camera.run())
     started = asyncio.ensure_future(first.wait())
+    measuring = asyncio.ensure_future(measure())
     try:
         await asyncio.wait({running, started}, timeout=_FIRST_S, return_when=asyncio.FIRST_COMPLETED)
         await asyncio.wait({running}, timeout=_WATCH_S if first.is_set() else 0.0)
+        if isinstance(camera, TellsExposure):
+            pictures.exposure = camera.exposure_state
     finally:
-        started.cancel()
-        running.cancel()
-        ended = await asyncio.gather(running, started, return_exceptions=True)
+        for task in (started, measuring, running):
+            task.cancel()
+        ended = await asyncio.gather(running, started, measuring, return_exceptions=True)
     if isinstance(ended[0], TransientError | UnavailableError):
         pictures.trouble = str(ended[0])
-    elif isinstance(ended[0], Exception):
-        raise ended[0]
+    else:
+        for error_of_part in ended:
+            if isinstance(error_of_part, Exception):
+                raise error_of_part
     return pictures
+
+
+async def brightness_series(tickets: Latest[FrameTicket]) -> AsyncIterator[Brightness]:
+    """How bright the pictures behind these tickets are, as long as they come; those that are gone are left
+    out."""
+    while True:
+        picture = picture_of(await tickets.get())
+        if picture is not None:
+            yield await asyncio.to_thread(brightness_of, picture)
 
 
 def judge_camera(config: Config, found: Pictures) -> list[Check]:

@@ -17,6 +17,7 @@ from flightd.doctor import camera, machine, vehicle
 from flightd.doctor.calibration import check_calibration, check_learnt
 from flightd.doctor.check import Check, CheckLevel, ok, warning
 from flightd.doctor.delay import check_delay
+from flightd.doctor.exposure import Seen, check_exposure
 from flightd.doctor.ground import GroundListener, check_ground
 from flightd.doctor.vehicle import Autopilot
 from flightd.ports import Clock
@@ -95,6 +96,8 @@ async def examine(subject: Subject) -> Diagnosis:
         autopilot = await vehicle.examine(config.vehicle, subject.clock, cells=config.battery.cells)
     checks += check_ground(config.ground, subject.ground)
     checks += camera.judge_camera(config, pictures)
+    if pictures.rate_hz:
+        checks += check_exposure(config, Seen(pictures.exposure, pictures.series, pictures.rate_hz))
     checks += camera.check_vision(config, subject.detector, pictures.picture)
     checks += camera.check_latency(config, subject.detector, pictures)
     return Diagnosis([*checks, *autopilot.checks], autopilot.report)

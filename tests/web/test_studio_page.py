@@ -11,6 +11,7 @@ import pytest
 
 from flightd.ground.studio.profile_shelf import ProfileShelf
 from flightd.vision.lines.colour_profile import load_profile, save_profile
+from tests.web.camera_rig import CameraDrone
 from tests.web.chromium import NARROW, WIDE, hindrances, opened, station
 from tests.web.studio_rig import HEIGHT, WIDTH, flown_folder, marks_of
 
@@ -39,7 +40,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def url(folder: Path) -> Iterator[str]:
-    with station(["demo=127.0.0.1:1/1"], folder=folder) as url:
+    """Of a station with a drone that cannot be reached, and one that stands."""
+    with CameraDrone().standing() as eye, station(["demo=127.0.0.1:1/1", eye.at], folder=folder) as url:
         yield url
 
 
@@ -183,4 +185,47 @@ def test_a_colour_is_learnt_compared_installed_and_taken_back(
         expect(page.get_by_role("link", name="hall")).to_be_visible()
         page.get_by_label("Paint").select_option("another …")
         expect(page.get_by_label("Tone")).to_be_visible()
+        serves_everybody(page)
+
+
+def test_a_cameras_exposure_is_seen_set_and_read_back(browser: Browser, url: str) -> None:
+    with opened(browser, f"{url}/studio") as page:
+        card = page.get_by_role("region", name="Camera exposure")
+        expect(card.get_by_role("alert").filter(has_text="demo cannot be reached")).to_be_visible()
+        page.get_by_role("button", name="eye").click()
+        expect(card.get_by_role("row", name="Exposure left to the camera 20 ms")).to_be_visible()
+        expect(card.get_by_role("row", name="Automatic left to the camera on")).to_be_visible()
+        expect(card.get_by_text(re.compile("the floor smears by 5.3 px"))).to_be_visible()
+        spread = re.compile(r"Brightness .*: Median 90 of 255, 6\.\d % burnt out, 0\.0 % black")
+        expect(card.get_by_role("img", name=spread)).to_be_visible()
+        says = card.get_by_role("list", name="What the doctor says")
+        for words in (
+            "it grows in the dark",
+            "set camera.exposure_s",
+            "too bright",
+            "then a shorter exposure",
+        ):
+            expect(says.get_by_text(words)).to_be_visible()
+
+        exposure = card.get_by_label("exposure_s s")
+        exposure.focus()  # all of it by keys
+        page.keyboard.type("0.5")
+        complaint = card.get_by_role("alert").filter(has_text="camera.exposure_s: 0.5 is outside 0 to 0.1 s")
+        expect(complaint).to_be_visible()
+        expect(card.get_by_role("button", name="Send to eye")).to_be_disabled()
+        page.keyboard.press("Control+a")
+        page.keyboard.type("0.004")
+        card.get_by_label("gain 1").focus()
+        page.keyboard.type("200")
+        expect(complaint).to_have_count(0)
+        serves_everybody(page)
+        card.get_by_label("Who").fill("Bo")
+        card.get_by_role("button", name="Send to eye").press("Enter")
+        card.get_by_role("button", name="Start flightd anew").press("Enter")
+        expect(card.get_by_text("flightd starts anew")).to_be_visible()
+        card.get_by_role("button", name="Look again").press("Enter")
+        expect(card.get_by_role("row", name="Exposure 4 ms 4 ms")).to_be_visible()
+        expect(card.get_by_role("row", name="Gain 200 100")).to_be_visible()
+        expect(says.get_by_text("gain was set to 200, the camera tells 100")).to_be_visible()
+        expect(card.get_by_text(re.compile("the floor smears by 1.1 px"))).to_be_visible()
         serves_everybody(page)

@@ -9,8 +9,9 @@ from typing import Any
 from flightd.adapters.camera.capture_process import SLOTS, Captured, CaptureOver, capture
 from flightd.adapters.camera.exposure_times import TimeSource
 from flightd.adapters.camera.frame_order import FrameOrder
-from flightd.adapters.camera.source import Source, SourceKind
+from flightd.adapters.camera.source import Source
 from flightd.core.errors import TransientError
+from flightd.core.exposure import ExposureMismatch, ExposureState
 from flightd.ports import Clock
 from flightd.runtime.child_process import LinkedProcess
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
@@ -21,7 +22,7 @@ _GIVING_BACK_S = 1.0
 
 class CaptureCamera:
     """Hands the ticket of each frame to `on_frame`, exposed when driver or stream say so; where they say
-    nothing, `on_trouble` hears what error remains.
+    nothing, `on_trouble` hears what error remains, and what a camera does not do as it was set.
 
     `clock` is the machine's monotonic one.  `run` raises TransientError when the source cannot be opened,
     ends or gives frames of another size; started again it tries anew.
@@ -45,6 +46,8 @@ class CaptureCamera:
         self._exposure = 1.0
         self._process: LinkedProcess | None = None
         self._asked = False
+        self._mismatches: tuple[ExposureMismatch, ...] = ()
+        self._state: ExposureState | None = None
         self.frames = 0
 
     @property
@@ -56,6 +59,11 @@ class CaptureCamera:
     def pid(self) -> int | None:
         """The capture process, None while there is none."""
         return None if self._process is None else self._process.pid
+
+    @property
+    def exposure_state(self) -> ExposureState | None:
+        """As it was read back last; None while nothing was."""
+        return self._state
 
     def expose(self, part: float) -> None:
         """Ask the device for frames of this part of its usual exposure; streams and recordings are as they
@@ -78,6 +86,8 @@ class CaptureCamera:
                 self._deliver(ring, message)
             elif isinstance(message, CaptureOver):
                 end(message.reason)
+            elif isinstance(message, ExposureState):
+                self._take_state(message)
             elif message is TimeSource.ARRIVAL:
                 self._on_trouble(
                     f"camera {self._name} does not tell when a frame was exposed: its time is that of its"
@@ -86,19 +96,26 @@ class CaptureCamera:
 
         arguments = (source, ring.name, self._latency_ns)
         process = LinkedProcess(capture, arguments, take, lambda _: end("the capture process died"))
-        self._process, self._asked = process, False
+        self._process, self._asked = process, not source.order.is_empty
         try:
             if self._exposure != 1.0:
                 self._ask()
             raise TransientError(f"camera {self._name}: {await over}")
         finally:
-            self._process = None
+            self._process = self._state = None
             self._without_time_before, self._without_time = self.refused - self._order.refused, 0
             await self._ended(process, ring)
 
     @property
     def _name(self) -> str:
-        return f"{self._source.kind}:{self._source.place}"
+        return self._source.name
+
+    def _take_state(self, state: ExposureState) -> None:
+        self._state = state
+        found = state.mismatches(self._source.order)
+        if found and found != self._mismatches:
+            self._on_trouble(f"camera {self._name}: {'; '.join(map(str, found))}")
+        self._mismatches = found
 
     async def _ended(self, process: LinkedProcess, ring: FrameRing) -> None:
         process.hang_up()
@@ -114,7 +131,7 @@ class CaptureCamera:
                 ring.close()
 
     def _ask(self) -> None:
-        if self._process is not None and self._source.kind is SourceKind.DEVICE:
+        if self._process is not None and self._source.kind.is_told:
             self._asked = True
             self._process.send(self._exposure)
 

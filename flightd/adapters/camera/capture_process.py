@@ -17,7 +17,11 @@ import numpy as np
 
 from flightd.adapters.camera.exposure import DeviceExposure
 from flightd.adapters.camera.exposure_times import ExposureTimes, TimeSource
+from flightd.adapters.camera.grabbed import Grabbed
+from flightd.adapters.camera.held_exposure import HeldExposure
+from flightd.adapters.camera.picamera import frames_of_picamera, open_picamera
 from flightd.adapters.camera.source import Source, SourceKind
+from flightd.adapters.camera.v4l2_controls import controls_of
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Image
 from flightd.runtime.frame_ring import FrameRing
@@ -35,17 +39,6 @@ _FFMPEG = {
     "|analyzeduration;500000",
     "OPENCV_FFMPEG_LOGLEVEL": "8",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Grabbed:
-    """One frame as it was read at `arrival_ns` of the machine's monotonic clock; `device_ns` is what driver
-    or stream say of its time, by any clock, None if nothing."""
-
-    bgr: Image
-    arrival_ns: int
-    device_ns: int | None = None
-    exposure: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,15 +62,20 @@ class CaptureOver:
 
 
 def capture(parent: ChildEnd, source: Source, ring_name: str, latency_ns: int) -> None:
-    """The process's life.  Sends `Captured`, a `TimeSource` when it is known what tells of exposures, and
-    `CaptureOver` at the end."""
+    """The process's life.  Sends `Captured`, a `TimeSource` when it is known what tells of exposures, an
+    `ExposureState` whenever a camera that can be told is read back to be in another, and `CaptureOver` at the
+    end."""
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)  # what cannot be opened is told
     try:
         ring = FrameRing.attach(ring_name, SLOTS, source.width_px, source.height_px)
     except UnavailableError as err:
         parent.send(CaptureOver(str(err)))
         return
-    parent.send(CaptureOver(_reason_of_end(parent, source, ring, latency_ns)))
+    try:
+        reason = _reason_of_end(parent, source, ring, latency_ns)
+    except UnavailableError as err:
+        reason = str(err)
+    parent.send(CaptureOver(reason))
 
 
 def _reason_of_end(parent: ChildEnd, source: Source, ring: FrameRing, latency_ns: int) -> str:
@@ -129,6 +127,8 @@ def frames_of(source: Source, parent: ChildEnd) -> Generator[Grabbed, None, None
         with _environment(_FFMPEG):
             stream = cv2.VideoCapture(source.place, cv2.CAP_FFMPEG, [*patience, cv2.CAP_PROP_N_THREADS, 1])
         yield from _grabbed(stream)
+    elif source.kind is SourceKind.PICAMERA:
+        yield from frames_of_picamera(source, open_picamera(int(source.place)), parent)
     else:
         yield from _of_device(source, parent)
 
@@ -154,15 +154,19 @@ def _of_device(source: Source, parent: ChildEnd) -> Iterator[Grabbed]:
     device.set(cv2.CAP_PROP_FRAME_HEIGHT, source.height_px)
     device.set(cv2.CAP_PROP_FPS, source.fps)
     device.set(cv2.CAP_PROP_BUFFERSIZE, 1)
-    exposure = DeviceExposure(device)
-    try:
-        for frame in _grabbed(device):
-            part = exposure.of_next_frame()
-            yield Grabbed(frame.bgr, frame.arrival_ns, frame.device_ns, part)
-            while parent.has_news():
-                exposure.ask(parent.receive())
-    finally:
-        exposure.give_back()
+    with controls_of(source.place) as controls:
+        held = HeldExposure(controls, source.order, parent.send)
+        exposure = DeviceExposure(device)
+        try:
+            for frame in _grabbed(device):
+                part = exposure.of_next_frame()
+                yield Grabbed(frame.bgr, frame.arrival_ns, frame.device_ns, part)
+                held.look(exposure.is_usual)
+                while parent.has_news():
+                    exposure.ask(parent.receive())
+        finally:
+            exposure.give_back()
+            held.give_back()
 
 
 def _grabbed(video: cv2.VideoCapture) -> Iterator[Grabbed]:

@@ -46,5 +46,5 @@ def connect_camera(
     if url.startswith("udp:"):
         size_px = config.width_px, config.height_px
         return SharedCamera(url, size_px, config.latency_s, clock, on_frame, on_trouble)
-    source = parse_source(url, config.width_px, config.height_px, config.fps)
+    source = parse_source(url, config.width_px, config.height_px, config.fps, config.exposure_order())
     return CaptureCamera(source, config.latency_s, clock, on_frame, on_trouble)

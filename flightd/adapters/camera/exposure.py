@@ -55,6 +55,11 @@ class DeviceExposure:
         if self._coming != 1.0:
             self.ask(1.0)
 
+    @property
+    def is_usual(self) -> bool:
+        """Whether the device is set to its usual exposure, and the frames that come have it."""
+        return self._coming == 1.0 and not self._late
+
     def of_next_frame(self) -> float:
         """The part of the usual exposure that the frame read next has."""
         if self._late:

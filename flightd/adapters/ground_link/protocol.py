@@ -41,6 +41,7 @@ from flightd.adapters.ground_link.messages.maintenance import (
     AskSettings,
     CheckReport,
     DoctorAnswer,
+    ExposureReport,
     FixParameter,
     KeptVersion,
     KeyChange,
@@ -128,5 +129,5 @@ ANSWERS = (
 PARTS = (
     Position, SeenLine, VehicleReport, LinkReport, SensorReport, HazardReport, FloorStatus, FloorNode,
     FloorLine, FloorRack, FloorArea, FloorPad, FloorWay, CameraOptics, PictureLine, PictureArea, CheckReport,
-    KeyReport, KeptVersion, KeyChange,
+    ExposureReport, KeyReport, KeptVersion, KeyChange,
 )  # fmt: skip

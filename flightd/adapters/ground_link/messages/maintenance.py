@@ -8,6 +8,7 @@ import msgspec
 from msgspec import Meta
 
 from flightd.adapters.ground_link.messages.base import ClientRequest, DaemonAnswer
+from flightd.core.preview import CameraName
 
 _Person = Annotated[str, Meta(max_length=64, description="who asks, for audit log and versions")]
 
@@ -82,6 +83,28 @@ class CheckReport(msgspec.Struct, frozen=True):
     fix: Annotated[str, Meta(description="name for `fix`, where the drone can mend it itself")] = ""
 
 
+class ExposureReport(msgspec.Struct, frozen=True):
+    """How a camera is set to expose, and how it was read back; the doctor's checks say what that means."""
+
+    camera: Annotated[CameraName, Meta(description="which camera's")]
+    section: Annotated[str, Meta(description="of the configuration, with its keys")]
+    refused: Annotated[str, Meta(description="why flightd cannot set this camera, else empty")]
+    set_exposure_s: Annotated[float | None, Meta(description="exposure it was set to, s; null: left to it")]
+    set_gain: Annotated[float | None, Meta(description="gain it was set to; null: left to it")]
+    set_anti_flicker_hz: Annotated[int, Meta(description="mains it was set to, Hz; 0: left to it")]
+    manual: Annotated[bool | None, Meta(description="read back: by hand, not automatic; null: not told")]
+    exposure_s: Annotated[float | None, Meta(description="read back, s; null: not told")]
+    gain: Annotated[float | None, Meta(description="read back, the camera's own number; null: not told")]
+    anti_flicker_hz: Annotated[int | None, Meta(description="read back, Hz, 0: off; null: not told")]
+    blur_px: Annotated[
+        float | None,
+        Meta(
+            description="of the floor at `mission.speed_mps` from `mission.height_m`, px; null: the exposure "
+            "is not known, or it looks elsewhere"
+        ),
+    ]
+
+
 class DoctorAnswer(DaemonAnswer, frozen=True, tag="doctor"):
     """What the drone finds of itself."""
 
@@ -90,6 +113,9 @@ class DoctorAnswer(DaemonAnswer, frozen=True, tag="doctor"):
     versions: Annotated[dict[str, str], Meta(description="program, firmware, Python, libraries")]
     log: Annotated[tuple[str, ...], Meta(description="the daemon's newest log lines, oldest first")]
     outcome: Annotated[str, Meta(description="after `fix`: what was written and read back")] = ""
+    exposures: Annotated[
+        tuple[ExposureReport, ...], Meta(description="of the cameras that are fitted, the down camera first")
+    ] = ()
 
 
 class KeyReport(msgspec.Struct, frozen=True):

@@ -30,7 +30,7 @@ export const PAGES = [
   {
     path: "/studio",
     title: "Studio",
-    styles: ["studio.css"],
+    styles: ["doctor.css", "studio.css", "exposure.css"],
     load: () => import("./studio/studio_page.js"),
   },
   {

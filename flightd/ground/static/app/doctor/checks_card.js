@@ -39,14 +39,14 @@ export function ChecksCard({ drone, known, look, take }) {
       ${trouble && html`<p class="obstacles" role="alert">${trouble}</p>`}
       <p class=${outcome.good ? "quiet" : "refusal"} role="status">${outcome.text}</p>
       ${!report && looking && html`<p class="quiet">The drone looks at itself: about two seconds.</p>`}
-      ${report && html`<ul class="check-list">${sorted(report.checks).map((check, at) => html`
+      ${report && html`<ul class="check-list">${worstFirst(report.checks).map((check, at) => html`
         <${CheckRow} key=${`${at} ${check.name}`} check=${check} busy=${fixing !== ""} isFixed=${fixing === check.fix && fixing !== ""} onFix=${fix} />`)}
       </ul>`}
     </section>
   `;
 }
 
-function CheckRow({ check, busy, isFixed, onFix }) {
+export function CheckRow({ check, busy, isFixed, onFix }) {
   const { name, level, text, remedy, fix } = check;
   return html`
     <li class=${`check-row is-${level}`}>
@@ -61,7 +61,7 @@ function CheckRow({ check, busy, isFixed, onFix }) {
   `;
 }
 
-const sorted = (checks) => checks.toSorted((a, b) => (LEVELS[a.level]?.order ?? 9) - (LEVELS[b.level]?.order ?? 9));
+export const worstFirst = (checks) => checks.toSorted((a, b) => (LEVELS[a.level]?.order ?? 9) - (LEVELS[b.level]?.order ?? 9));
 
 function verdict(report, trouble) {
   if (!report) return trouble ? "Not looked at" : "Checks";

@@ -1,5 +1,5 @@
 // One key of the configuration: its value, unit, range, default and meaning, as its own documentation has them.
-import { html } from "../html.js";
+import { html, useState } from "../html.js";
 import { capital } from "../words.js";
 import { isSame, nameOf, readAs, typed, valueIn } from "./settings_keys.js";
 
@@ -8,10 +8,13 @@ export function SettingField({ about, table, change, complaint, locked, onChange
   const id = `setting-${name}`;
   const stands = valueIn(table, name);
   const isChanged = change !== undefined;
-  const text = typed(isChanged ? change : stands);
+  const value = isChanged ? change : stands;
+  const [said, setSaid] = useState(null); // as it was typed: "0." on the way to "0.5" is a number already
+  const text = said !== null && isSame(readAs(about.type, said), value) ? said : typed(value);
   const onInput = (event) => {
-    const value = readAs(about.type, event.target.value);
-    onChange(name, isSame(value, stands) ? undefined : value);
+    setSaid(event.target.value);
+    const now = readAs(about.type, event.target.value);
+    onChange(name, isSame(now, stands) ? undefined : now);
   };
   const given = {
     id, value: text, onInput, "aria-describedby": `${id}-text`, "aria-invalid": complaint ? "true" : null, disabled: Boolean(locked),

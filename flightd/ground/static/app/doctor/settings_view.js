@@ -64,7 +64,7 @@ export function SettingsView({ drone, section }) {
 }
 
 // What speaks against what is typed, by the configuration's own models; "" where nothing does.
-function useComplaint(drone, told, changes) {
+export function useComplaint(drone, told, changes) {
   const [complaint, setComplaint] = useState("");
   const asked = useRef(new AbortController());
   const typed = JSON.stringify(changes);

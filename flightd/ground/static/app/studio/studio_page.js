@@ -1,5 +1,6 @@
-// The page Studio: all picture sets and installed profiles, or one set with its pictures in hand.
+// The page Studio: all picture sets, installed profiles and the camera's exposure, or one set with its pictures in hand.
 import { html, useEffect } from "../html.js";
+import { ExposureCard } from "./exposure_card.js";
 import { SetList } from "./set_list.js";
 import { SetPage } from "./set_page.js";
 import { loadOverview, openSet, studio } from "./studio_state.js";
@@ -11,12 +12,12 @@ export default function StudioPage({ route }) {
     else loadOverview();
   }, [name]);
   const { overview, trouble } = studio();
-  if (overview && !overview.folder) return html`<${NoFolder} />`;
+  if (overview && !overview.folder) return html`<div class="studio"><${NoFolder} /><${ExposureCard} /></div>`;
   if (!overview && !trouble) return html`<p class="loading quiet" role="status">Loading …</p>`;
   return html`
     <div class="studio">
       ${trouble && html`<p class="studio-trouble" role="alert">${trouble}</p>`}
-      ${name ? html`<${SetPage} name=${name} />` : overview && html`<${SetList} overview=${overview} />`}
+      ${name ? html`<${SetPage} name=${name} />` : overview && html`<${SetList} overview=${overview} /><${ExposureCard} />`}
     </div>
   `;
 }

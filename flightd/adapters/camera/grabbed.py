@@ -1,0 +1,18 @@
+"""A frame as it was read, before it lies in shared memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flightd.core.types import Image
+
+
+@dataclass(frozen=True, slots=True)
+class Grabbed:
+    """One frame as it was read at `arrival_ns` of the machine's monotonic clock; `device_ns` is what driver
+    or stream say of its time, by any clock, None if nothing; `exposure` is its part of the usual one."""
+
+    bgr: Image
+    arrival_ns: int
+    device_ns: int | None = None
+    exposure: float = 1.0
