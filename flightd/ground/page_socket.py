@@ -1,4 +1,4 @@
-"""A page's WebSocket as the server keeps it: one that answers no ping is cut off, whatever waits for it still."""
+"""A page's WebSocket as the server keeps it: one that answers no ping is cut off, whatever waits for it."""
 
 from __future__ import annotations
 
