@@ -11,7 +11,7 @@ line      the same at the end of a line of 4 Mbit/s, with what the page loads an
 killed    what the flight does after kill -9 of the station
 memory    of the station, with --minutes: pages come and go while a drone flies mission after mission
 
-python -m tools.bench_station [--windows N] [--seconds S] [--minutes M] [--mbit 4,1] [--pin] [--no-flight]
+python -m tools.bench_station [--windows N] [--seconds S] [--minutes M] [--mbit 4,1] [--pin] [--flight-nice N]
 """
 
 from __future__ import annotations
@@ -54,6 +54,7 @@ class Options:
     seconds: float
     mbits: tuple[float, ...]
     nice: int
+    flight_nice: int
     pin: bool
     folder: Path
 
@@ -65,19 +66,23 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=0.0, help="of the memory's measure")
     parser.add_argument("--mbit", default="4,1", help="lines to try, Mbit/s")
     parser.add_argument("--nice", type=int, default=10, help="of station and pages")
+    parser.add_argument("--flight-nice", type=int, default=0, help="of flight and world; below 0 needs root")
+    parser.add_argument("--keep", help="folder for logs; none: they are not kept")
     parser.add_argument("--pin", action="store_true", help="the daemon on one core, all else on another")
     parser.add_argument("--no-flight", action="store_true", help="only the memory")
     words = parser.parse_args()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     mbits = tuple(float(mbit) for mbit in words.mbit.split(",") if mbit)
     told: dict[str, Any] = {
+        "flight_nice": words.flight_nice,
         "cores": os.cpu_count(),
         "load": os.getloadavg(),
         "nice": words.nice,
         "pin": words.pin,
     }
     with tempfile.TemporaryDirectory() as folder:
-        options = Options(words.windows, words.seconds, mbits, words.nice, words.pin, Path(folder))
+        kept = Path(words.keep or folder)
+        options = Options(words.windows, words.seconds, mbits, words.nice, words.flight_nice, words.pin, kept)
         if not words.no_flight:
             told |= _or_why_not(lambda: measured_crowd(options), "flight")
             told |= _or_why_not(lambda: measured_line_and_kill(options), "line")
@@ -102,7 +107,9 @@ def measured_crowd(options: Options) -> dict[str, Any]:
     ages: dict[str, Any] = {}
     with ending() as started:
         flight = started(
-            SimulatedFlight(folder, ports, "mission.dwell_s=12", "mission.autostart_countdown_s=1")
+            SimulatedFlight(
+                folder, ports, options.flight_nice, "mission.dwell_s=12", "mission.autostart_countdown_s=1"
+            )
         )
         station = started(Station(options.folder, ports, options.nice))
         crowd = started(CrowdProcess(options.folder, options.nice))
@@ -134,6 +141,7 @@ def measured_crowd(options: Options) -> dict[str, Any]:
             "p99_difference_ms": round(pooled["crowd"]["p99"] - pooled["alone"]["p99"], 2),
             "on_the_wire_ms": summary.get("setpoint_interval_ms"),
             "flew_through": flew,
+            "reason": summary.get("reason", ""),
         },
         "ages": ages,
     }
@@ -145,7 +153,7 @@ def measured_line_and_kill(options: Options) -> dict[str, Any]:
     lines: dict[str, Any] = {}
     with ending() as started:
         settings = ("ground.lost_action=home", "mission.dwell_s=12", "mission.autostart_countdown_s=1")
-        flight = started(SimulatedFlight(folder, ports, *settings))
+        flight = started(SimulatedFlight(folder, ports, options.flight_nice, *settings))
         station = started(Station(options.folder, ports, options.nice))
         crowd = started(CrowdProcess(options.folder, options.nice))
         watching = started(CrowdProcess(options.folder, options.nice))
@@ -183,9 +191,9 @@ def measured_memory(options: Options, seconds: float) -> dict[str, Any]:
             while (at_s := time.monotonic() - began_s) < seconds:
                 rows.append((at_s, station.rss_mb))
                 if len(rows) % 60 == 0:
-                    _say(f"{at_s / 60:.0f} min: {rows[-1][1]:.1f} MB, {crowd.say('tell')['browsers']} pages")
+                    _say(f"{at_s / 60:.0f} min: {rows[-1][1]:.1f} MB")
                 time.sleep(SAMPLE_S)
-        seen = crowd.say("tell")
+        seen = _last_told(crowd)
     half = [row for row in rows if row[0] > rows[-1][0] / 2]
     memory = {
         "minutes": round(rows[-1][0] / 60, 1),
@@ -197,12 +205,25 @@ def measured_memory(options: Options, seconds: float) -> dict[str, Any]:
         },
         "slope_mb_per_h": round(_slope(half) * 3600, 2),
         "every_minute_mb": [round(mb, 1) for _, mb in rows[:: round(60 / SAMPLE_S)]],
-        "closed": seen["plain"]["closed"],
+        "pages": seen,
+    }
+    return {"memory": memory}
+
+
+def _last_told(crowd: CrowdProcess) -> dict[str, Any]:
+    """How the pages fared; what was measured before counts, though they do not say."""
+    try:
+        seen = crowd.say("tell")
+    except (OSError, RuntimeError) as err:
+        return {"error": str(err)}
+    closed = seen["plain"]["closed"]
+    return {
+        "open": seen["browsers"],
+        "closed": closed,
         "stalled": seen["stalled_again"],
         "reloads": seen["reloads"],
         "came_and_went_to_the_end": seen["churning"],
     }
-    return {"memory": memory}
 
 
 def _after(log: FlightLog, killed_ns: int) -> dict[str, Any]:

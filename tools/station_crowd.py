@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from playwright.async_api import Browser, Page
 
 CAMERAS = ("down", "front")
-ANSWER_S = 30.0
+ANSWER_S = 60.0
 """Nothing is waited for longer than this."""
 _ECHO_S = 1.0
 _AGAIN_S = 0.7
@@ -306,10 +306,18 @@ class Crowd:
                 self._pages[index] = asyncio.create_task(page.run(), name="page")
                 if self._chromium is not None and loop.time() - loaded_s > _RELOAD_S:
                     loaded_s = loop.time()
-                    async with self._loading, asyncio.timeout(ANSWER_S):
-                        await self._chromium.close()
-                        await self._chromium.open()
-                    self.reloads += 1
+                    await self._load_again(self._chromium)
+
+    async def _load_again(self, chromium: ChromiumPages) -> None:
+        from playwright.async_api import Error  # noqa: PLC0415 - only where it is wanted
+
+        try:
+            async with self._loading, asyncio.timeout(ANSWER_S):
+                await chromium.close()
+                await chromium.open()
+            self.reloads += 1
+        except (Error, TimeoutError) as err:
+            print(f"not loaded again: {err}", file=sys.stderr, flush=True)
 
     async def _browser(self, rule: str) -> Browser:
         if rule not in self._browsers:
