@@ -37,7 +37,8 @@ _HANGS_S = 9.0
 _MOST_AGES = 200_000
 _RELOAD_S = 60.0
 _SHARES = (("p50", 0.5), ("p99", 0.99), ("max", 1.0))
-_FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
+_FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run",
+          "--disable-renderer-backgrounding", "--disable-backgrounding-occluded-windows")  # fmt: skip
 _HOOK = """(() => {
   const seen = (window.seen = { statuses: [], pictures: [], ready: null, closed: 0 });
   let head = null;

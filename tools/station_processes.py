@@ -60,6 +60,13 @@ class Started:
                 for thread in Path(f"/proc/{pid}/task").iterdir():
                     os.sched_setaffinity(int(thread.name), {core})
 
+    def renice(self, nice: int) -> None:
+        """All of them: a browser gives its own processes what it likes."""
+        for pid in self.pids:
+            with contextlib.suppress(OSError):
+                for thread in Path(f"/proc/{pid}/task").iterdir():
+                    os.setpriority(os.PRIO_PROCESS, int(thread.name), nice)
+
     def end(self, number: signal.Signals = signal.SIGKILL) -> None:
         """At once, or so that it may end in order first; within a bound in any case."""
         pids = self.pids
@@ -82,6 +89,7 @@ class CrowdProcess(Started):
         words = [sys.executable, "-m", "tools.station_crowd"]
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
         super().__init__(words, folder / "crowd.log", nice, **pipes)
+        self._nice = nice
 
     def say(self, do: str, **order: Any) -> dict[str, Any]:
         sink, source = self.process.stdin, self.process.stdout
@@ -96,8 +104,13 @@ class CrowdProcess(Started):
             raise RuntimeError(f"{do}: {answer['error']}")
         return answer
 
+    def open(self, url: str, **more: Any) -> None:
+        """These pages, in place of those before."""
+        self.say("open", url=url, **more)
+        self.renice(self._nice)
+
     def open_all(self, url: str, **more: Any) -> None:
-        self.say("open", url=url, plain=_PLAIN, stalled=_STALLED, chromium=_CHROMIUM, **more)
+        self.open(url, plain=_PLAIN, stalled=_STALLED, chromium=_CHROMIUM, **more)
 
 
 class Station(Started):
