@@ -119,6 +119,7 @@ def picture_message(key: PictureKey, picture: LinkPicture) -> bytes:
         "drone": key.drone,
         "camera": key.camera,
         "seq": answer.seq,
+        "stamp_ns": answer.stamp_ns,
         "age_ms": picture.age_ms,
         "lines": answer.lines,
         "areas": answer.areas,

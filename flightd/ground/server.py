@@ -23,6 +23,7 @@ from flightd.ground.flights.flights import Flights
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub, Viewer
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+from flightd.ground.page_socket import PageSocket
 from flightd.ground.quiet_log import quiet_log
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.studio.studio import Studio
@@ -170,7 +171,7 @@ async def serve(
         uvicorn.Config(
             application(hub, hosts, access, folder, flights, uploads, maps, studio),
             http="h11",
-            ws="websockets-sansio",
+            ws=PageSocket,
             lifespan="off",
             log_config=None,
             log_level="error",

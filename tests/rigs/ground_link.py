@@ -60,7 +60,7 @@ class Keyring:
 
 
 def local(**more: Any) -> GroundConfig:
-    return GroundConfig(listen="127.0.0.1", status_port=0, command_port=0, **more)
+    return GroundConfig(**{"listen": "127.0.0.1", "status_port": 0, "command_port": 0, **more})
 
 
 def address_of(link: ZmqGround) -> Address:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import socket
 from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -101,9 +102,13 @@ async def served(
     state: Path | None = None,
     login: bool = False,
     viewers: Sequence[Viewer] = (),
+    send_buffer: int | None = None,
 ) -> AsyncIterator[Station]:
-    """A station that serves meanwhile; flights lie below `folder`, people and audit in `state`."""
+    """A station that serves meanwhile; flights lie below `folder`, people and audit in `state`; its system
+    takes so many bytes at once for a page (None: as many as it likes)."""
     listener, where = opened(Listening("127.0.0.1", 0))
+    if send_buffer is not None:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, send_buffer)
     ready = asyncio.Event()
     with listener, TemporaryDirectory() as elsewhere:
         access = Access(state or Path(elsewhere), login, secure=False)

@@ -192,15 +192,17 @@ async def test_stalled_pages_delay_no_other() -> None:
 
 @in_real_time
 async def test_a_page_that_hangs_does_not_count_as_one_that_attends() -> None:
-    """Whoever closes his laptop is lost like whoever closes the page."""
+    """Whoever closes his laptop is lost like whoever closes the page, though much waits for him still."""
     async with (
         serving(local()) as link,
-        served(("demo", address_of(link))) as station,
+        served(("demo", address_of(link)), send_buffer=16_384) as station,
         telling(link),
         stalled_page(station),
     ):
         await until(lambda: silent_s(link) > 0.0)
         await until(lambda: silent_s(link) > 2.0, 60.0)
+        async with station.page() as page:
+            await until_told(page, "station", "browsers", 1)
 
 
 @in_real_time

@@ -5,6 +5,7 @@ const EMPTY_DRONE = {
   welcome: null, // role, site, cameras
   status: null, // the link's StatusReport
   heardAt: 0, // when the status came, by performance.now()
+  clockMs: null, // the drone's clock behind performance.now(), with the quickest status so far
   link: null, // how the station hears the drone
   linkAt: 0, // when it told so
   events: [],
@@ -85,12 +86,14 @@ function takeEcho(s, value) {
 
 function changed(known, topic, value) {
   if (topic === "status") {
-    return { status: value, heardAt: performance.now(), track: longer(known.track, value.position) };
+    const heardAt = performance.now();
+    const clockMs = Math.min(known.clockMs ?? Infinity, heardAt - value.stamp_ns / 1e6);
+    return { status: value, heardAt, clockMs, track: longer(known.track, value.position) };
   }
   if (topic === "link") return { link: value, linkAt: performance.now() };
   if (topic === "visited") return { visited: new Set(value) };
   if (topic.endsWith(" trouble")) return { trouble: { ...known.trouble, [topic.split(" ")[0]]: value } };
-  if (topic === "welcome" && known.welcome?.session !== value.session) return { welcome: value, track: [] };
+  if (topic === "welcome" && known.welcome?.session !== value.session) return { welcome: value, track: [], clockMs: null };
   return { [topic]: value };
 }
 

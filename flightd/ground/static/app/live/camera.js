@@ -34,8 +34,14 @@ export function Camera({ camera }) {
 
 function caption(seen, found) {
   if (!seen) return "no picture yet";
-  const since = performance.now() - seen.at + (seen.head.age_ms ?? 0);
-  return `${found}, ${age(since / 1000)} old`;
+  return `${found}, ${age(pictureAgeMs(seen, shown().clockMs, performance.now()) / 1000)} old`;
+}
+
+// Since the exposure, the way to this page with it.  The quickest status tells the drone's clock, `clockMs`; before
+// there is one, the age is what the station knew, and the time since the picture came.
+export function pictureAgeMs({ head, at }, clockMs, now) {
+  const byStation = now - at + (head.age_ms ?? 0);
+  return clockMs === null ? byStation : Math.max(byStation, now - head.stamp_ns / 1e6 - clockMs);
 }
 
 export function foundWords({ lines, areas }) {
