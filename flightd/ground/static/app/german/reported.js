@@ -192,7 +192,7 @@ export default {
   "sign in first": "melden Sie sich zuerst an",
   "name or password is wrong": "Name oder Passwort ist falsch",
   "{name} has the role {role}; {command} needs the role operator": "{name} hat die Rolle {role}; {command} braucht die Rolle Bediener",
-  "another flight, perhaps another map": "ein anderer Flug, vielleicht eine andere Karte",
+  "flightd was started anew: another flight, perhaps another map": "flightd wurde neu gestartet: ein anderer Flug, vielleicht eine andere Karte",
   "cut off before its end: a kill, or a loss of power": "vor seinem Ende abgeschnitten: beendet, oder Strom verloren",
   "is being recorded": "wird aufgezeichnet",
   "holds no flight": "enthält keinen Flug",
