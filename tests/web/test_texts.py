@@ -1,4 +1,4 @@
-"""The texts of the pages: what is said in English has its German, with the same figures, and nothing else does."""
+"""The texts of the pages: all that is said in English has its German, with the same figures, and no more."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ export default {
   "estimated": "geschätzt",
   "Duration": "Dauer",
   "Nodes": "Knoten",
-  "Cross-track rms": "Querabweichung rms",
+  "Cross-track rms": "Quer rms",
   "Hover p95": "Schweben p95",
   "Landing error": "Landefehler",
   "Codes": "Codes",

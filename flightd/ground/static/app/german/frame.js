@@ -59,7 +59,7 @@ export default {
   "Silent for {since}": "Stumm seit {since}",
   "The drone was not heard yet.": "Die Drohne wurde noch nicht gehört.",
   "The drone is silent for {since}: what you see is old.": "Die Drohne ist seit {since} stumm: Was Sie sehen, ist alt.",
-  "Link {trip}": "Funk {trip}",
+  "Link {trip}": "Antwort {trip}",
   "Heard": "Gehört",
   "Missions": "Missionen",
   "Start": "Start",
