@@ -45,11 +45,11 @@ ENGLISH_LEFT = """async () => {
   const shown = [];
   const nodes = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (nodes.nextNode()) {
-    if (!nodes.currentNode.parentElement.closest("[lang=en], code, pre, noscript")) shown.push(nodes.currentNode.data);
+    if (!nodes.currentNode.parentElement.closest("body [lang=en], code, pre, noscript")) shown.push(nodes.currentNode.data);
   }
   for (const name of ["aria-label", "title", "placeholder", "alt"]) {
     for (const element of document.querySelectorAll(`[${name}]`)) {
-      if (!element.closest("[lang=en]")) shown.push(element.getAttribute(name));
+      if (!element.closest("body [lang=en]")) shown.push(element.getAttribute(name));
     }
   }
   return shown.map((text) => text.trim()).filter((text) => text && english.some((one) => one.test(text)));
