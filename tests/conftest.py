@@ -29,7 +29,7 @@ _COSTLY = {
     "tests/unit/cli/test_vision_commands.py",
     "tests/web/test_navigation.py",
 }
-_IN_BROWSER = re.compile(r"tests/web/test_\w*page\.py")
+_IN_BROWSER = re.compile(r"tests/web/test_(?:\w*page|language)\.py")
 """Each starts a Chromium, and a station for all its tests."""
 _IN_CI = os.environ.get("CI", "") == "true"
 _PATIENCE = pytest.StashKey[Patience]()

@@ -101,9 +101,11 @@ def started(words: Sequence[str]) -> Iterator[str]:
 
 
 @contextlib.contextmanager
-def opened(browser: Browser, url: str, size: tuple[int, int] = WIDE, scheme: str = "light") -> Iterator[Page]:
+def opened(
+    browser: Browser, url: str, size: tuple[int, int] = WIDE, scheme: str = "light", locale: str = "en-US"
+) -> Iterator[Page]:
     """A page of the station.  No foreign host may be asked, and nothing may go wrong in it, meanwhile."""
-    context = new_context(browser, size, scheme)
+    context = new_context(browser, size, scheme, locale)
     asked: list[str] = []
     wrong: list[str] = []
     context.on("request", lambda request: asked.append(request.url))
@@ -122,11 +124,14 @@ def opened(browser: Browser, url: str, size: tuple[int, int] = WIDE, scheme: str
     assert wrong == []
 
 
-def new_context(browser: Browser, size: tuple[int, int], scheme: str) -> BrowserContext:
+def new_context(
+    browser: Browser, size: tuple[int, int], scheme: str, locale: str = "en-US"
+) -> BrowserContext:
     """A person's browser: `scheme` light or dark, axe-core at hand in every page."""
     context = browser.new_context(
         viewport={"width": size[0], "height": size[1]},
         color_scheme="dark" if scheme == "dark" else "light",
+        locale=locale,
         ignore_https_errors=True,  # of a certificate that the test has made for itself
     )
     context.set_default_timeout(30_000)

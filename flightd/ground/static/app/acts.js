@@ -1,4 +1,5 @@
 // Acts of the person: sent to the drone, the same one again until it is answered, done once.
+import { english } from "./language.js";
 import { sendAct } from "./connection.js";
 import { shown, state, update } from "./store.js";
 
@@ -49,7 +50,7 @@ async function posted(drone, given, urgent) {
     });
     return { status: answer.status, ...(await answer.json()) };
   } catch {
-    return { refused: "the ground station does not answer" };
+    return { refused: english("the ground station does not answer") };
   }
 }
 

@@ -1,5 +1,7 @@
 // The one gate to the station's /api/: so few requests at a time that the browser's six connections are never
 // all held, and none for a page that was left.
+import { english } from "./language.js";
+
 const MOST = 3;
 const ANSWER_MS = 20000;
 
@@ -29,7 +31,7 @@ export async function askStation(url, { signal, ms = ANSWER_MS, goesOn = false, 
     return new Response(await answer.blob(), { status, headers }); // its connection is free from here on
   } catch (error) {
     if (given.aborted) throw new DOMException("given up", "AbortError");
-    throw new Error("the ground station does not answer", { cause: error });
+    throw new Error(english("the ground station does not answer"), { cause: error });
   } finally {
     const next = waiting.shift();
     if (next) next();
@@ -47,6 +49,6 @@ async function turn() {
 export async function askJson(url, options) {
   const answer = await askStation(url, options);
   const told = await answer.json().catch(() => ({}));
-  if (!answer.ok) throw new Error(told.refused ?? `the ground station answers ${answer.status}`);
+  if (!answer.ok) throw new Error(told.refused ?? english("the ground station answers {status}", { status: answer.status }));
   return told;
 }

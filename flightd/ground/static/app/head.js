@@ -2,6 +2,7 @@
 import { PersonMenu } from "./access/person.js";
 import { act } from "./acts.js";
 import { html } from "./html.js";
+import { LANGUAGES, keep, language, say, speak } from "./language.js";
 import { hears } from "./hearing.js";
 import { PAGES } from "./pages.js";
 import { shown, state, update } from "./store.js";
@@ -14,6 +15,7 @@ export function Head() {
       <${Drones} />
       <${Hearing} />
       <${PersonMenu} />
+      <${Language} />
       <${Stop} />
     </header>
   `;
@@ -23,12 +25,29 @@ export const Brand = () => html`
   <h1 class="brand"><img src="/static/icon.svg" alt="" width="28" height="28" /><span>flightd</span></h1>
 `;
 
+// To the other language.
+export function Language() {
+  const other = Object.keys(LANGUAGES).find((one) => one !== language());
+  const turn = () =>
+    speak(other).then(
+      () => {
+        keep(other);
+        retitle();
+        update(() => {});
+      },
+      () => {}, // the station does not answer, as the head says; the next press tries again
+    );
+  return html`
+    <button class="tab language" lang=${other} aria-label=${`${other.toUpperCase()}, ${LANGUAGES[other]}`} title=${LANGUAGES[other]} onClick=${turn}>${other.toUpperCase()}</button>
+  `;
+}
+
 function Pages() {
   return html`
-    <nav class="pages" aria-label="Pages">
+    <nav class="pages" aria-label=${say("Pages")}>
       ${PAGES.map(
         (page) => html`
-          <a key=${page.path} href=${page.path} aria-current=${page === state.route.page ? "page" : null}>${page.title}</a>
+          <a key=${page.path} href=${page.path} aria-current=${page === state.route.page ? "page" : null}>${say(page.title)}</a>
         `,
       )}
     </nav>
@@ -38,9 +57,9 @@ function Pages() {
 function Drones() {
   const names = state.station?.drones ?? [];
   const site = shown().welcome?.floor.name;
-  if (names.length < 2) return html`<p class="site">${site ? `Site ${site}` : ""}</p>`;
+  if (names.length < 2) return html`<p class="site">${site ? say("Site {site}", { site }) : ""}</p>`;
   return html`
-    <nav class="drones" aria-label="Drones">
+    <nav class="drones" aria-label=${say("Drones")}>
       ${names.map(
         (name) => html`
           <button
@@ -71,8 +90,8 @@ function Stop() {
   const stopping = newest?.command === "stop" && newest.stage === "sent";
   const several = (state.station?.drones.length ?? 0) > 1;
   return html`
-    <button class="stop" onClick=${() => act("stop")} title="Level at once and down at once, without steering">
-      <strong>${stopping ? "STOPPING" : "STOP"}${several ? ` ${state.selected}` : ""}</strong>
+    <button class="stop" onClick=${() => act("stop")} title=${say("Level at once and down at once, without steering")}>
+      <strong>${stopping ? say("STOPPING") : say("STOP")}${several ? ` ${state.selected}` : ""}</strong>
       <kbd>Esc</kbd>
     </button>
   `;

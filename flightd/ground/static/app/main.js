@@ -1,16 +1,21 @@
 // Draws the page anew whenever the store changes, and starts the connection.
 import { connect } from "./connection.js";
 import { html, render } from "./html.js";
+import { preferred, speak } from "./language.js";
 import { listenForKeys } from "./keys.js";
 import { Page } from "./page.js";
-import { followLinks } from "./router.js";
+import { followLinks, retitle } from "./router.js";
 import { watch } from "./store.js";
 
 const root = document.getElementById("page");
 const draw = () => render(html`<${Page} />`, root);
 
+const SPOKEN_MS = 3000; // a station that gives no texts by then is read in English
+
 listenForKeys();
 followLinks();
+connect();
+await Promise.race([speak(preferred()), new Promise((resolve) => setTimeout(resolve, SPOKEN_MS))]).catch(() => {});
+retitle();
 watch(draw);
 draw();
-connect();

@@ -1,7 +1,8 @@
 // The frame of every page: head with STOP, what is wrong with the connection, and the page that is gone to.
 import { Boundary } from "./boundary.js";
-import { Brand, Head } from "./head.js";
+import { Brand, Head, Language } from "./head.js";
 import { html } from "./html.js";
+import { say, sayWith } from "./language.js";
 import { forget, loaded } from "./page_loader.js";
 import { Silence } from "./silence.js";
 import { mustSignIn } from "./access/session.js";
@@ -10,10 +11,10 @@ import { state, update } from "./store.js";
 
 export function Page() {
   if (mustSignIn()) {
-    return html`<header class="head"><${Brand} /></header><main id="main"><${Loaded} page=${SIGN_IN} /></main>`;
+    return html`<header class="head"><${Brand} /><${Language} /></header><main id="main"><${Loaded} page=${SIGN_IN} /></main>`;
   }
   return html`
-    <a class="skip" href="#main">To the page</a>
+    <a class="skip" href="#main">${say("To the page")}</a>
     <${Head} />
     <main id="main" tabindex="-1">
       <${Silence} />
@@ -25,8 +26,8 @@ export function Page() {
 function Shown({ route }) {
   const { page } = route;
   if (!page) {
-    return html`<section class="card empty"><h2>There is no such page</h2>
-      <p>Nothing is at <code>${route.path}</code>. <a href="/">To the flight</a></p></section>`;
+    return html`<section class="card empty"><h2>${say("There is no such page")}</h2>
+      <p>${sayWith("Nothing is at {path}.", { path: html`<code>${route.path}</code>` })} <a href="/">${say("To the flight")}</a></p></section>`;
   }
   return html`<${Loaded} page=${page} route=${route} />`;
 }
@@ -34,14 +35,14 @@ function Shown({ route }) {
 function Loaded({ page, route }) {
   const { component: Component, failed } = loaded(page, redraw);
   if (Component) return html`<${Component} key=${page.path} route=${route} />`;
-  if (!failed) return html`<p class="loading quiet" role="status">Loading …</p>`;
+  if (!failed) return html`<p class="loading quiet" role="status">${say("Loading …")}</p>`;
   const again = () => {
     forget(page);
     redraw();
   };
   return html`
-    <section class="card empty"><h2>The page cannot be loaded</h2>
-      <p>The ground station does not send it. <button class="tab" onClick=${again}>Try again</button></p></section>
+    <section class="card empty"><h2>${say("The page cannot be loaded")}</h2>
+      <p>${say("The ground station does not send it.")} <button class="tab" onClick=${again}>${say("Try again")}</button></p></section>
   `;
 }
 

@@ -2,52 +2,54 @@
 //
 // `path` is where it is, with everything below it; `load` gives the module whose `default` is its component,
 // called with {route}; `styles` are its own, over and above base.css and frame.css.
+import { english } from "./language.js";
+
 export const PAGES = [
   {
     path: "/",
-    title: "Live",
+    title: english("Live"),
     styles: ["live.css", "map.css"],
     load: () => import("./live/live_page.js"),
   },
   {
     path: "/stock",
-    title: "Stock",
+    title: english("Stock"),
     styles: ["stock.css"],
     load: () => import("./stock/stock_page.js"),
   },
   {
     path: "/missions",
-    title: "Missions",
+    title: english("Missions"),
     styles: ["live.css", "map.css", "missions.css"],
     load: () => import("./missions/missions_page.js"),
   },
   {
     path: "/flights",
-    title: "Flights",
+    title: english("Flights"),
     styles: ["live.css", "map.css", "../vendor/uplot.css", "flights.css", "replay.css"],
     load: () => import("./flights/flights_page.js"),
   },
   {
     path: "/studio",
-    title: "Studio",
+    title: english("Studio"),
     styles: ["doctor.css", "studio.css", "exposure.css"],
     load: () => import("./studio/studio_page.js"),
   },
   {
     path: "/site",
-    title: "Site",
+    title: english("Site"),
     styles: ["map.css", "site.css"],
     load: () => import("./site/site_page.js"),
   },
   {
     path: "/doctor",
-    title: "Doctor",
+    title: english("Doctor"),
     styles: ["doctor.css"],
     load: () => import("./doctor/doctor_page.js"),
   },
   {
     path: "/guide",
-    title: "Guide",
+    title: english("Guide"),
     styles: ["guide.css"],
     load: () => import("./guide/guide_page.js"),
   },
@@ -55,7 +57,7 @@ export const PAGES = [
 
 // Shown in the place of every page while somebody has to sign in.
 export const SIGN_IN = {
-  title: "Sign in",
+  title: english("Sign in"),
   styles: ["access.css"],
   load: () => import("./access/sign_in.js"),
 };

@@ -1,6 +1,7 @@
 // Moves between the pages: real paths in one document, so that the way to the drone stays open meanwhile.
 import { leavePage } from "./fetching.js";
 import { useEffect } from "./html.js";
+import { language, say } from "./language.js";
 import { pageAt } from "./pages.js";
 import { state, update } from "./store.js";
 
@@ -35,12 +36,19 @@ export function followLinks() {
   arrive();
 }
 
+// The title anew, in another language; what the page shows is put before it as it is drawn.
+export function retitle() {
+  if (state.route) document.title = titleOf(state.route);
+}
+
+const titleOf = ({ page }) => (page ? `${say(page.title)} · flightd` : "flightd");
+
 // What the page shows now, as soon as it is known, before the page's own name in the title.
 export function useTitle(what) {
   const { page, path } = state.route;
   useEffect(() => {
-    if (what && page && what !== page.title) document.title = `${what} · ${page.title} · flightd`;
-  }, [what, path]);
+    if (what && page && what !== say(page.title)) document.title = `${what} · ${say(page.title)} · flightd`;
+  }, [what, path, language()]);
 }
 
 function isOurs(link) {
@@ -59,7 +67,7 @@ function arrive({ keepFocus = false } = {}) {
   const route = routeOf(location);
   if (from && from.page !== route.page) leavePage();
   const isElsewhere = from && from.path !== route.path;
-  if (!from || isElsewhere) document.title = route.page ? `${route.page.title} · flightd` : "flightd";
+  if (!from || isElsewhere) document.title = titleOf(route);
   update((s) => {
     s.route = route;
   });

@@ -1,49 +1,50 @@
 // What the drone says, in words and numbers for people.
+import { dateFormat, decimal, english, say } from "./language.js";
 
 const PHASES = {
   __proto__: null,
-  preflight: () => "On the ground",
-  recover: () => "Taking over in the air",
-  arming: () => "Arming",
-  take_off: () => "Taking off",
-  acquire: () => "Finding the lines",
-  follow: (goal) => `Flying to ${goal}`,
-  hover: (goal) => `Over ${goal}`,
-  turn: () => "Turning",
-  climb: () => "Changing height",
-  scan: (goal) => `Scanning the shelf at ${goal}`,
-  hold: () => "Holding its place",
-  relocate: () => "Finding its place again",
-  land: () => "Landing",
-  swap: () => "Waiting for a battery",
-  done: () => "Flight over",
-  aborted: () => "Flight ended early",
-  pilot: () => "The pilot flies",
+  preflight: english("On the ground"),
+  recover: english("Taking over in the air"),
+  arming: english("Arming"),
+  take_off: english("Taking off"),
+  acquire: english("Finding the lines"),
+  follow: english("Flying to {goal}"),
+  hover: english("Over {goal}"),
+  turn: english("Turning"),
+  climb: english("Changing height"),
+  scan: english("Scanning the shelf at {goal}"),
+  hold: english("Holding its place"),
+  relocate: english("Finding its place again"),
+  land: english("Landing"),
+  swap: english("Waiting for a battery"),
+  done: english("Flight over"),
+  aborted: english("Flight ended early"),
+  pilot: english("The pilot flies"),
 };
 const TROUBLED = new Set(["recover", "hold", "relocate", "aborted", "pilot"]);
 const GROUNDED = new Set(["preflight", "swap", "done", "aborted", "pilot"]);
 
-export const phaseWords = (status) => (PHASES[status.phase] ?? (() => status.phase))(status.goal || "its goal");
+export const phaseWords = (status) => say(PHASES[status.phase] ?? status.phase, { goal: status.goal || say("its goal") });
 export const isTroubled = (status) => TROUBLED.has(status.phase);
 export const isGrounded = (status) => GROUNDED.has(status.phase);
 
 export const COMMANDS = {
   __proto__: null,
-  start: "Start", pause: "Pause", resume: "Resume", goto: "Go to", home: "Fly home", land: "Land here", stop: "STOP",
+  start: english("Start"), pause: english("Pause"), resume: english("Resume"), goto: english("Go to"), home: english("Fly home"),
+  land: english("Land here"), stop: english("STOP"),
 };
 
 export const ACTIONS = {
   __proto__: null,
-  hold: "holds", land: "lands", home: "flies home", report: "reports it", relocate: "looks for its place",
-  hands_off: "hands off", stop: "comes down at once", continue: "goes on", configured: "as configured",
+  hold: english("holds"), land: english("lands"), home: english("flies home"), report: english("reports it"),
+  relocate: english("looks for its place"), hands_off: english("hands off"), stop: english("comes down at once"),
+  continue: english("goes on"), configured: english("as configured"),
 };
-
-export const count = (amount, one) => `${amount} ${one}${amount === 1 ? "" : "s"}`;
 
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 export const number = (value, digits = 0) =>
-  value === null || value === undefined ? "–" : value.toFixed(digits);
+  value === null || value === undefined ? "–" : decimal(value, digits);
 
 export const percent = (share) => (share === null || share === undefined ? "–" : `${Math.round(share * 100)} %`);
 
@@ -54,12 +55,12 @@ export function duration(seconds) {
 }
 
 export function age(seconds) {
-  if (seconds === null || seconds === undefined) return "never";
+  if (seconds === null || seconds === undefined) return say("never");
   if (seconds < 1) return `${Math.round(seconds * 1000)} ms`;
   return duration(seconds);
 }
 
-const CLOCK = new Intl.DateTimeFormat([], {
+const CLOCK = dateFormat({
   hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23",
 });
 export const time = (date) => CLOCK.format(date);

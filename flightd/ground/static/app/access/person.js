@@ -1,5 +1,6 @@
 // Who is signed in, in the head, and the way out.
 import { html, useState } from "../html.js";
+import { quoted, say, sayWith } from "../language.js";
 import { state } from "../store.js";
 import { signOut } from "./session.js";
 
@@ -10,13 +11,13 @@ export function PersonMenu() {
   const leave = () => signOut().catch((error) => setTrouble(error.message));
   return html`
     <details class="person">
-      <summary title=${`Signed in as ${session.name}`}>
-        <span class="person-name">${session.name}</span> <small>${session.role}</small>
+      <summary title=${say("Signed in as {name}", { name: session.name })}>
+        <span class="person-name">${session.name}</span> <small>${say(session.role)}</small>
       </summary>
       <div class="person-menu">
-        <p>Signed in as <strong>${session.name}</strong>, ${session.role}</p>
-        <button class="order" onClick=${leave}>Sign out</button>
-        ${trouble && html`<p class="refusal" role="alert">${trouble}</p>`}
+        <p>${sayWith("Signed in as {name}", { name: html`<strong>${session.name}</strong>` })}, ${say(session.role)}</p>
+        <button class="order" onClick=${leave}>${say("Sign out")}</button>
+        ${trouble && html`<p class="refusal" role="alert">${quoted(trouble)}</p>`}
       </div>
     </details>
   `;

@@ -1,4 +1,5 @@
 // Who is signed in, and what that person may: the server refuses the rest whatever is shown here.
+import { english } from "../language.js";
 import { state, update } from "../store.js";
 
 const ANSWER_MS = 20000;
@@ -40,9 +41,9 @@ async function asked(method, body) {
       signal: AbortSignal.timeout(ANSWER_MS),
     });
   } catch (error) {
-    throw new Error("the ground station does not answer", { cause: error });
+    throw new Error(english("the ground station does not answer"), { cause: error });
   }
   const told = await answer.json().catch(() => ({}));
-  if (!answer.ok) throw new Error(told.refused ?? `the ground station answers ${answer.status}`);
+  if (!answer.ok) throw new Error(told.refused ?? english("the ground station answers {status}", { status: answer.status }));
   return told;
 }

@@ -1,16 +1,16 @@
 // What the drone finds of itself: what is wrong first, with what to do about it, and what it sets right itself.
 import { mayChange, signedInName } from "../access/session.js";
 import { html, useState } from "../html.js";
+import { english, quoted, say } from "../language.js";
 import { who } from "../stock/decisions.js";
-import { count } from "../words.js";
 import { sendDrone } from "./asking.js";
 
 const LEVELS = {
   __proto__: null,
-  error: { name: "Error", order: 0 },
-  warning: { name: "Look at it", order: 1 },
-  ok: { name: "Good", order: 2 },
-  unseen: { name: "Not seen", order: 3 },
+  error: { name: english("Error"), order: 0 },
+  warning: { name: english("Look at it"), order: 1 },
+  ok: { name: english("Good"), order: 2 },
+  unseen: { name: english("Not seen"), order: 3 },
 };
 
 export function ChecksCard({ drone, known, look, take }) {
@@ -19,7 +19,7 @@ export function ChecksCard({ drone, known, look, take }) {
   const [outcome, setOutcome] = useState({ text: "", good: true });
   const fix = async (name) => {
     setFixing(name);
-    setOutcome({ text: `Setting ${name} right …`, good: true });
+    setOutcome({ text: english("Setting {name} right …", { name }), good: true });
     try {
       const told = await sendDrone(drone, "fix", { name, person: signedInName() || who() });
       take(told);
@@ -34,11 +34,11 @@ export function ChecksCard({ drone, known, look, take }) {
     <section class="card checks" aria-labelledby="checks-title" aria-busy=${looking}>
       <div class="checks-head">
         <h2 id="checks-title">${verdict(report, trouble)}</h2>
-        <button class="order" disabled=${looking} onClick=${look}>${looking ? "Looking …" : "Look again"}</button>
+        <button class="order" disabled=${looking} onClick=${look}>${looking ? say("Looking …") : say("Look again")}</button>
       </div>
-      ${trouble && html`<p class="obstacles" role="alert">${trouble}</p>`}
-      <p class=${outcome.good ? "quiet" : "refusal"} role="status">${outcome.text}</p>
-      ${!report && looking && html`<p class="quiet">The drone looks at itself: about two seconds.</p>`}
+      ${trouble && html`<p class="obstacles" role="alert">${quoted(trouble)}</p>`}
+      <p class=${outcome.good ? "quiet" : "refusal"} role="status">${quoted(outcome.text)}</p>
+      ${!report && looking && html`<p class="quiet">${say("The drone looks at itself: about two seconds.")}</p>`}
       ${report && html`<ul class="check-list">${worstFirst(report.checks).map((check, at) => html`
         <${CheckRow} key=${`${at} ${check.name}`} check=${check} busy=${fixing !== ""} isFixed=${fixing === check.fix && fixing !== ""} onFix=${fix} />`)}
       </ul>`}
@@ -50,13 +50,13 @@ export function CheckRow({ check, busy, isFixed, onFix }) {
   const { name, level, text, remedy, fix } = check;
   return html`
     <li class=${`check-row is-${level}`}>
-      <span class="level">${LEVELS[level]?.name ?? level}</span>
+      <span class="level">${say(LEVELS[level]?.name ?? level)}</span>
       <div>
-        <p><strong>${name}</strong> ${text}</p>
-        ${remedy && html`<p class="remedy">${remedy}</p>`}
+        <p><strong>${quoted(name)}</strong> ${quoted(text)}</p>
+        ${remedy && html`<p class="remedy">${quoted(remedy)}</p>`}
       </div>
-      ${fix && mayChange() && html`<button class="order" aria-label=${`Set right: ${fix}`} disabled=${busy} onClick=${() => onFix(fix)}>
-        ${isFixed ? "Writing …" : "Set right"}</button>`}
+      ${fix && mayChange() && html`<button class="order" aria-label=${say("Set right: {fix}", { fix })} disabled=${busy} onClick=${() => onFix(fix)}>
+        ${isFixed ? say("Writing …") : say("Set right")}</button>`}
     </li>
   `;
 }
@@ -64,8 +64,8 @@ export function CheckRow({ check, busy, isFixed, onFix }) {
 export const worstFirst = (checks) => checks.toSorted((a, b) => (LEVELS[a.level]?.order ?? 9) - (LEVELS[b.level]?.order ?? 9));
 
 function verdict(report, trouble) {
-  if (!report) return trouble ? "Not looked at" : "Checks";
+  if (!report) return trouble ? say("Not looked at") : say("Checks");
   const { error = [], warning = [] } = Object.groupBy(report.checks, (check) => check.level);
-  if (error.length) return `Not fit to fly: ${count(error.length, "error")}`;
-  return warning.length ? `No error; ${count(warning.length, "thing")} to look at` : "No error found";
+  if (error.length) return say("Not fit to fly: {n} error|Not fit to fly: {n} errors", { n: error.length });
+  return warning.length ? say("No error; {n} thing to look at|No error; {n} things to look at", { n: warning.length }) : say("No error found");
 }

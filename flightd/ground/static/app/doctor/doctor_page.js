@@ -1,5 +1,6 @@
 // Doctor: what the drone finds of itself at /doctor, its settings at /doctor/settings/SECTION.
 import { html, useEffect, useState } from "../html.js";
+import { english, say, sayWith } from "../language.js";
 import { shown, state } from "../store.js";
 import { useTitle } from "../router.js";
 import { askDrone } from "./asking.js";
@@ -8,22 +9,22 @@ import { LogCard } from "./log_card.js";
 import { SettingsView } from "./settings_view.js";
 import { VersionsCard } from "./versions_card.js";
 
-const VIEWS = { checks: { path: "/doctor", title: "Checks" }, settings: { path: "/doctor/settings", title: "Settings" } };
+const VIEWS = { checks: { path: "/doctor", title: english("Checks") }, settings: { path: "/doctor/settings", title: english("Settings") } };
 
 export default function DoctorPage({ route }) {
   const view = route.rest.split("/")[0] === "settings" ? "settings" : "checks";
   const drone = state.selected;
-  useTitle(VIEWS[view].title);
+  useTitle(say(VIEWS[view].title));
   return html`
     <div class="doctor">
-      <nav class="doctor-views" aria-label="Doctor">
+      <nav class="doctor-views" aria-label=${say("Doctor")}>
         ${Object.entries(VIEWS).map(([name, { path, title }]) => html`
-          <a key=${name} href=${path} aria-current=${name === view ? "page" : null}>${title}</a>
+          <a key=${name} href=${path} aria-current=${name === view ? "page" : null}>${say(title)}</a>
         `)}
       </nav>
       ${!drone
-        ? html`<section class="card empty"><h2>No drone</h2>
-            <p>This station was started without one: give <code>--drone NAME=HOST</code>.</p></section>`
+        ? html`<section class="card empty"><h2>${say("No drone")}</h2>
+            <p>${sayWith("This station was started without one: give {option}.", { option: html`<code>--drone NAME=HOST</code>` })}</p></section>`
         : view === "settings"
           ? html`<${SettingsView} key=${drone} drone=${drone} section=${route.rest.split("/")[1] ?? ""} />`
           : html`<${ChecksView} key=${drone} drone=${drone} />`}

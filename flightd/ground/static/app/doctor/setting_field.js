@@ -1,5 +1,6 @@
 // One key of the configuration: its value, unit, range, default and meaning, as its own documentation has them.
 import { html, useState } from "../html.js";
+import { quoted, say } from "../language.js";
 import { capital } from "../words.js";
 import { isSame, nameOf, readAs, typed, valueIn } from "./settings_keys.js";
 
@@ -22,13 +23,13 @@ export function SettingField({ about, table, change, complaint, locked, onChange
   return html`
     <div class=${`setting ${isChanged ? "changed" : ""} ${complaint ? "wrong" : ""}`}>
       <label for=${id}>${about.key}${about.unit && html` <span class="quiet">${about.unit}</span>`}</label>
-      ${about.fixed ? html`<output id=${id}>${text || bare(about.default) || "not given"}</output>` : html`<${Field} about=${about} given=${given} />`}
+      ${about.fixed ? html`<output id=${id}>${text || bare(about.default) || say("not given")}</output>` : html`<${Field} about=${about} given=${given} />`}
       <p id=${`${id}-text`} class="quiet">
-        ${capital(about.text)}. ${about.range && !isChoice(about) ? `${capital(about.range)}. ` : ""}${about.fixed
-          ? html`<em>${capital(about.fixed)}.</em>`
-          : `${isChanged && stands !== undefined ? `In the file: ${typed(stands)}. ` : ""}Default: ${defaultOf(about)}.`}
+        ${quoted(about.text, capital)}. ${about.range && !isChoice(about) && [quoted(about.range, capital), ". "]}${about.fixed
+          ? html`<em>${quoted(about.fixed, capital)}.</em>`
+          : `${isChanged && stands !== undefined ? `${say("In the file: {value}.", { value: typed(stands) })} ` : ""}${say("Default: {value}.", { value: defaultOf(about) })}`}
       </p>
-      ${complaint && html`<p class="complaint" role="alert">${complaint}</p>`}
+      ${complaint && html`<p class="complaint" role="alert">${quoted(complaint)}</p>`}
     </div>
   `;
 }
@@ -39,7 +40,7 @@ function Field({ about, given }) {
     const { onInput, ...rest } = given;
     return html`
       <select ...${rest} onChange=${onInput}>
-        <option value="">default${about.default ? ` (${bare(about.default)})` : ""}</option>
+        <option value="">${about.default ? say("default ({value})", { value: bare(about.default) }) : say("default")}</option>
         ${options.map((option) => html`<option key=${option} value=${option}>${option}</option>`)}
       </select>`;
   }
@@ -49,6 +50,6 @@ function Field({ about, given }) {
 
 const isChoice = ({ type }) => type === "choice";
 
-const defaultOf = (about) => (about.default === "required" ? "none, it has to be given" : bare(about.default) || "not given");
+const defaultOf = (about) => (about.default === "required" ? say("none, it has to be given") : bare(about.default) || say("not given"));
 
-const bare = (text) => (text === "required" ? "" : text === "[]" ? "none" : text.replace(/^"(.*)"$/, "$1"));
+const bare = (text) => (text === "required" ? "" : text === "[]" ? say("none") : text.replace(/^"(.*)"$/, "$1"));

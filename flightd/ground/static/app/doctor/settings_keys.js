@@ -1,4 +1,5 @@
 // A configuration's keys: where they are in the file's table, and values as a person types and reads them.
+import { say } from "../language.js";
 
 export const nameOf = ({ section, key }) => `${section}.${key}`;
 
@@ -13,7 +14,7 @@ export function typed(value) {
   return Array.isArray(value) ? value.join(", ") : String(value);
 }
 
-export const shownValue = (value) => (value === undefined || value === null ? "default" : typed(value) || "empty");
+export const shownValue = (value) => (value === undefined || value === null ? say("default") : typed(value) || say("empty"));
 
 // What was typed as a value of a key: what is no number stays text, which the drone's own words then complain about.
 export function readAs(type, text) {

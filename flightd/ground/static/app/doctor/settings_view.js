@@ -1,6 +1,7 @@
 // The settings of a drone: a section's keys as a form, what was changed and sent, and the versions that are kept.
 import { mayChange } from "../access/session.js";
 import { html, useEffect, useRef, useState } from "../html.js";
+import { english, quoted, say, sayWith } from "../language.js";
 import { goTo } from "../router.js";
 import { shown } from "../store.js";
 import { askDrone, sendDrone } from "./asking.js";
@@ -13,7 +14,7 @@ const TYPED_MS = 250;
 
 export function SettingsView({ drone, section }) {
   const [known, setTold] = useState(null);
-  const told = known && !mayChange() && !known.locked ? { ...known, locked: "an admin changes settings" } : known;
+  const told = known && !mayChange() && !known.locked ? { ...known, locked: english("an admin changes settings") } : known;
   const [trouble, setTrouble] = useState("");
   const [changes, setChanges] = useState({});
   const complaint = useComplaint(drone, told, changes);
@@ -39,10 +40,10 @@ export function SettingsView({ drone, section }) {
     setChanges({});
   };
   if (!told) {
-    return html`<section class="card settings-none"><h2>Settings</h2>
+    return html`<section class="card settings-none"><h2>${say("Settings")}</h2>
       ${trouble
-        ? html`<p class="obstacles" role="alert">${trouble}</p><button class="order" onClick=${load}>Ask again</button>`
-        : html`<p class="quiet" role="status">Asking the drone …</p>`}</section>`;
+        ? html`<p class="obstacles" role="alert">${quoted(trouble)}</p><button class="order" onClick=${load}>${say("Ask again")}</button>`
+        : html`<p class="quiet" role="status">${say("Asking the drone …")}</p>`}</section>`;
   }
   const sections = topSections(told.keys);
   const current = sections.includes(section) ? section : sections[0];
@@ -50,8 +51,8 @@ export function SettingsView({ drone, section }) {
     <div class="settings">
       <${Sections} names=${sections} current=${current} changes=${changes} />
       <div class="settings-main">
-        ${trouble && html`<p class="obstacles" role="alert">${trouble}</p>`}
-        ${told.locked && html`<p class="obstacles">Only to look at: ${told.locked}.</p>`}
+        ${trouble && html`<p class="obstacles" role="alert">${quoted(trouble)}</p>`}
+        ${told.locked && html`<p class="obstacles">${sayWith("Only to look at: {why}.", { why: quoted(told.locked) })}</p>`}
         <${SectionForm} told=${told} current=${current} changes=${changes} complaint=${complaint} onChange=${change} />
       </div>
       <div class="doctor-side">
@@ -88,12 +89,12 @@ function Sections({ names, current, changes }) {
   const changed = (name) => Object.keys(changes).filter((key) => key.split(".")[0] === name).length;
   const mark = (name) => (changed(name) ? ` (${changed(name)})` : "");
   return html`
-    <nav class="settings-sections" aria-label="Sections">
+    <nav class="settings-sections" aria-label=${say("Sections")}>
       <ul>
         ${names.map((name) => html`<li key=${name}>
           <a href=${`/doctor/settings/${name}`} aria-current=${name === current ? "page" : null}>${name}${mark(name)}</a></li>`)}
       </ul>
-      <label class="field settings-choice">Section
+      <label class="field settings-choice">${say("Section")}
         <select value=${current} onChange=${(event) => goTo(`/doctor/settings/${event.target.value}`, { keepFocus: true })}>
           ${names.map((name) => html`<option key=${name} value=${name}>${name}${mark(name)}</option>`)}
         </select>
@@ -112,7 +113,7 @@ function SectionForm({ told, current, changes, complaint, onChange }) {
         complaint=${complaint.startsWith(`${name}:`) || complaint.startsWith(`${name}[`) ? complaint : ""} locked=${told.locked} />`;
     });
     const isExpert = table.includes(".expert");
-    const text = html`<p class="quiet">${told.sections[table]}</p>`;
+    const text = html`<p class="quiet">${quoted(told.sections[table])}</p>`;
     return isExpert
       ? html`<details key=${table} class="card settings-table"><summary><h2>${table}</h2></summary>${text}${fields}</details>`
       : html`<section key=${table} class="card settings-table"><h2>${table}</h2>${text}${fields}</section>`;

@@ -1,6 +1,7 @@
 // What drone and station run on, for who is asked why something does not work.
 import { askJson } from "../fetching.js";
 import { html, useEffect, useState } from "../html.js";
+import { say } from "../language.js";
 
 export function VersionsCard({ drone, versions }) {
   const [station, setStation] = useState(null);
@@ -10,10 +11,10 @@ export function VersionsCard({ drone, versions }) {
   const differ = versions && station && versions.flightd !== station.flightd;
   return html`
     <section class="card versions" aria-labelledby="versions-title">
-      <h2 id="versions-title">Versions</h2>
-      ${differ && html`<p class="obstacles">Drone and station are not of the same version: update the older.</p>`}
+      <h2 id="versions-title">${say("Versions")}</h2>
+      ${differ && html`<p class="obstacles">${say("Drone and station are not of the same version: update the older.")}</p>`}
       <table>
-        <thead><tr><th scope="col">Part</th><th scope="col">${drone}</th><th scope="col">Station</th></tr></thead>
+        <thead><tr><th scope="col">${say("Part")}</th><th scope="col">${drone}</th><th scope="col">${say("Station")}</th></tr></thead>
         <tbody>
           ${names(versions, station).map((name) => html`
             <tr key=${name}><th scope="row">${name}</th><td>${versions?.[name] ?? "–"}</td><td>${station?.[name] ?? "–"}</td></tr>

@@ -1,7 +1,8 @@
 // The list of flights: sorted, filtered, and two of them chosen to be compared.
 import { html, useEffect, useRef, useState } from "../html.js";
+import { quoted, say, sayWith } from "../language.js";
 import { goTo } from "../router.js";
-import { capital, count } from "../words.js";
+import { capital } from "../words.js";
 import { date, faultWords, FIGURES, fullDate, outcomeWords, told, tone, verdictWords } from "./figures.js";
 import { flightsState, turnChosen, watchList } from "./flights_state.js";
 import { COLUMNS, readSelection, selectedBy, selectionHref, SHOWN } from "./selection.js";
@@ -19,17 +20,17 @@ export function FlightList({ route }) {
   return html`
     <div class="flights">
       <div class="flights-head">
-        <h2>Flights</h2>
+        <h2>${say("Flights")}</h2>
         <${Search} selection=${selection} choose=${choose} />
         <${Compare} chosen=${chosen} rows=${list.rows} />
       </div>
       <p class="quiet" role="status">${stateWords(list, rows)}</p>
-      ${list.trouble && html`<p class="bad-line">${capital(list.trouble)}</p>`}
+      ${list.trouble && html`<p class="bad-line">${quoted(list.trouble, capital)}</p>`}
       ${rows.length > 0 &&
       html`<${Table} rows=${rows.slice(0, most)} selection=${selection} choose=${choose} chosen=${chosen} />`}
       ${rows.length > most &&
       html`<button class="order more" onClick=${() => setMost(most + AT_ONCE)}>
-        Show ${Math.min(AT_ONCE, rows.length - most)} more of ${rows.length}
+        ${say("Show {n} more of {all}", { n: Math.min(AT_ONCE, rows.length - most), all: rows.length })}
       </button>`}
     </div>
   `;
@@ -37,18 +38,18 @@ export function FlightList({ route }) {
 
 function NoFolder() {
   return html`
-    <section class="card empty"><h2>No folder of flights</h2>
-      <p>Start the station with one: <code>flightd ground --folder out</code> lists every flight log below <code>out</code>.</p>
+    <section class="card empty"><h2>${say("No folder of flights")}</h2>
+      <p>${sayWith("Start the station with one: {command} lists every flight log below {folder}.", { command: html`<code>flightd ground --folder out</code>`, folder: html`<code>out</code>` })}</p>
     </section>
   `;
 }
 
 function stateWords(list, rows) {
-  if (!list.looked && !list.rows.length) return "Looking through the folder …";
-  const shown = rows.length === list.rows.length ? "" : `${rows.length} of `;
-  const parts = [`${shown}${count(list.rows.length, "flight")}`];
-  if (list.unread) parts.push(`${list.unread} still to be read`);
-  if (list.cut) parts.push("more lie there than are listed");
+  if (!list.looked && !list.rows.length) return say("Looking through the folder …");
+  const flights = say("{n} flight|{n} flights", { n: list.rows.length });
+  const parts = [rows.length === list.rows.length ? flights : say("{shown} of {flights}", { shown: rows.length, flights })];
+  if (list.unread) parts.push(say("{n} still to be read", { n: list.unread }));
+  if (list.cut) parts.push(say("more lie there than are listed"));
   return parts.join(", ");
 }
 
@@ -65,14 +66,14 @@ function Search({ selection, choose }) {
   }, []);
   return html`
     <div class="search" role="search">
-      <label class="unseen" for="flight-words">Search flights</label>
+      <label class="unseen" for="flight-words">${say("Search flights")}</label>
       <input
-        id="flight-words" type="search" ref=${field} placeholder="Search: site, node, reason …  ( / )" value=${selection.words}
+        id="flight-words" type="search" ref=${field} placeholder=${say("Search: site, node, reason …  ( / )")} value=${selection.words}
         onInput=${(event) => choose({ words: event.target.value })}
       />
-      <label class="unseen" for="flight-show">Show</label>
+      <label class="unseen" for="flight-show">${say("Show")}</label>
       <select id="flight-show" value=${selection.shown} onChange=${(event) => choose({ shown: event.target.value })}>
-        ${SHOWN.map(([key, name]) => html`<option key=${key} value=${key}>${name}</option>`)}
+        ${SHOWN.map(([key, name]) => html`<option key=${key} value=${key}>${say(name)}</option>`)}
       </select>
     </div>
   `;
@@ -81,9 +82,9 @@ function Search({ selection, choose }) {
 function Compare({ chosen, rows }) {
   const there = chosen.filter((id) => rows.some((row) => row.id === id));
   if (there.length < 2) {
-    return html`<p class="quiet compare-hint">${there.length ? "Choose one more to compare" : "Choose two to compare"}</p>`;
+    return html`<p class="quiet compare-hint">${there.length ? say("Choose one more to compare") : say("Choose two to compare")}</p>`;
   }
-  return html`<a class="order link" href=${`/flights/compare?a=${there[0]}&b=${there[1]}`}>Compare both</a>`;
+  return html`<a class="order link" href=${`/flights/compare?a=${there[0]}&b=${there[1]}`}>${say("Compare both")}</a>`;
 }
 
 function Table({ rows, selection, choose, chosen }) {
@@ -92,7 +93,7 @@ function Table({ rows, selection, choose, chosen }) {
     <table class="card list" role="table">
       <thead role="rowgroup">
         <tr role="row">
-          <th role="columnheader" scope="col"><span class="unseen">Compare</span></th>
+          <th role="columnheader" scope="col"><span class="unseen">${say("Compare")}</span></th>
           ${COLUMNS.map((column) => html`<${Head} key=${column.key} column=${column} selection=${selection} choose=${choose} />`)}
         </tr>
       </thead>
@@ -113,7 +114,7 @@ function Head({ column, selection, choose }) {
   return html`
     <th role="columnheader" scope="col" class=${column.figure ? "figure-cell" : `${column.key}-cell`} aria-sort=${isSorted ? sorted : null}>
       <button onClick=${turn}>
-        ${column.name}${column.unit && html` <small>${column.unit}</small>`}
+        ${say(column.name)}${column.unit && html` <small>${column.unit}</small>`}
         <span class="arrow" aria-hidden="true">${isSorted ? { up: "▲", down: "▼" }[selection.way] : ""}</span>
       </button>
     </th>
@@ -141,7 +142,7 @@ function Row({ row, isChosen }) {
   return html`
     <tr role="row" class=${isChosen ? "chosen" : ""}>
       <td role="cell" class="pick">
-        <input type="checkbox" checked=${isChosen} aria-label=${`Compare ${name}`} onChange=${() => turnChosen(row.id)} />
+        <input type="checkbox" checked=${isChosen} aria-label=${say("Compare {name}", { name })} onChange=${() => turnChosen(row.id)} />
       </td>
       <td role="cell" class="date-cell"><a class="open" href=${`/flights/${row.id}`} title=${fullDate(row)}>${date(row)}</a></td>
       <td role="cell" class="site-cell">${row.site || "–"}</td>
@@ -149,8 +150,8 @@ function Row({ row, isChosen }) {
       <td role="cell" class="mission-cell">${row.mission || "–"}</td>
       <td role="cell" class="outcome-cell">
         <span class=${`how ${row.outcome === "completed" ? "good" : row.outcome === "aborted" ? "bad" : "open"}`}>${outcomeWords(row)}</span>
-        ${row.reason && html`<span class="quiet reason">${row.reason}</span>`}
-        ${row.trouble && html`<span class="quiet trouble-line">${capital(row.trouble)}</span>`}
+        ${row.reason && html`<span class="quiet reason">${quoted(row.reason)}</span>`}
+        ${row.trouble && html`<span class="quiet trouble-line">${quoted(row.trouble, capital)}</span>`}
       </td>
       <td role="cell" class="verdict-cell">
         ${row.verdict ? html`<span class=${`badge ${tone(row)}`}>${verdictWords(row)}</span>` : "–"}
@@ -159,7 +160,7 @@ function Row({ row, isChosen }) {
       ${FIGURES.map(
         (figure) => html`
           <td role="cell" key=${figure.key} class=${figure.of(row) == null ? "figure-cell unknown" : "figure-cell"}>
-            <span class="label" aria-hidden="true">${figure.name}</span>${told(figure, row)}
+            <span class="label" aria-hidden="true">${say(figure.name)}</span>${told(figure, row)}
             ${figure.unit && told(figure, row) !== "–" && html`<span class="unit"> ${figure.unit}</span>`}
           </td>
         `,

@@ -1,5 +1,6 @@
 // One plot over time: uPlot for the curves; ours are the bands of the phases, the marks and the line at the time.
 import { html, useEffect, useRef } from "../html.js";
+import { language, plain, say } from "../language.js";
 import { number } from "../words.js";
 import uPlot from "../../vendor/uplot.module.js";
 import { clock } from "./figures.js";
@@ -37,20 +38,20 @@ export function Plot({ plot, curves, data, shown, bands, marks, at, values, onSe
   }, [data, shown[0], shown[1], curves]);
   useEffect(() => {
     drawn.current?.redraw(false); // true would take back the scale that is being set
-  }, [bands, marks]);
+  }, [bands, marks, language()]);
   useEffect(() => moveLine(drawn.current, now.current), [at]);
-  const name = `${plot.name}, ${plot.unit}`;
+  const name = `${say(plot.name)}, ${plot.unit}`;
   return html`
     <figure class="card plot">
       <figcaption>
-        <strong>${plot.name} <small class="quiet">${plot.unit}</small></strong>
+        <strong>${say(plot.name)} <small class="quiet">${plot.unit}</small></strong>
         ${curves.map(
           (curve, place) => html`
-            <span key=${curve.key} class="curve"><i class=${`line-${curve.role}`} />${curve.name} <b>${number(values[place], plot.digits).replace("-", "−")}</b></span>
+            <span key=${curve.key} class="curve"><i class=${`line-${curve.role}`} />${say(curve.name)} <b>${number(values[place], plot.digits).replace("-", "−")}</b></span>
           `,
         )}
       </figcaption>
-      <div class="chart" ref=${holder} role="img" aria-label=${`${name}, over time`} />
+      <div class="chart" ref=${holder} role="img" aria-label=${say("{name}, over time", { name })} />
     </figure>
   `;
 }
@@ -70,7 +71,7 @@ function made(holder, plot, curves, now) {
     },
     axes: [
       { ...axis, size: 22, values: (_, times) => times.map((time) => (time < 0 ? `−${clock(-time)}` : clock(time))), space: 60, incrs: [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1200, 3600] },
-      { ...axis, size: AXIS, space: 26, values: (_, marks) => marks.map((mark) => `${+mark.toFixed(3)}`.replace("-", "−")) },
+      { ...axis, size: AXIS, space: 26, values: (_, marks) => marks.map((mark) => plain(+mark.toFixed(3)).replace("-", "−")) },
     ],
     series: [
       {},

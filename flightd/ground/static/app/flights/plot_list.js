@@ -1,40 +1,42 @@
 // What is plotted: which curves stand in which plot, in which unit.
+import { english } from "../language.js";
+
 const DEGREES = 180 / Math.PI;
 
 // `least`: the smallest range of values that is shown, so that noise does not fill a plot; `zero`: it holds 0.
 export const PLOTS = [
   {
-    key: "height", name: "Height", unit: "m", digits: 2, least: 1, zero: true,
+    key: "height", name: english("Height"), unit: "m", digits: 2, least: 1, zero: true,
     curves: [
-      { key: "height_m", name: "measured", role: "own" },
-      { key: "height_goal_m", name: "goal", role: "goal" },
-      { key: "true_height_m", name: "true", role: "truth" },
+      { key: "height_m", name: english("measured"), role: "own" },
+      { key: "height_goal_m", name: english("goal"), role: "goal" },
+      { key: "true_height_m", name: english("true"), role: "truth" },
     ],
   },
-  { key: "speed", name: "Speed", unit: "m/s", digits: 2, least: 0.5, zero: true, curves: [{ key: "speed_mps", name: "estimated", role: "own" }] },
+  { key: "speed", name: english("Speed"), unit: "m/s", digits: 2, least: 0.5, zero: true, curves: [{ key: "speed_mps", name: english("estimated"), role: "own" }] },
   {
-    key: "cross", name: "Beside the line", unit: "cm", scale: 100, digits: 1, least: 12, zero: true,
+    key: "cross", name: english("Beside the line"), unit: "cm", scale: 100, digits: 1, least: 12, zero: true,
     curves: [
-      { key: "cross_track_m", name: "estimated", role: "own" },
-      { key: "true_cross_track_m", name: "true", role: "truth" },
-    ],
-  },
-  {
-    key: "hover", name: "Beside the node", unit: "cm", scale: 100, digits: 1, least: 8, zero: true,
-    curves: [
-      { key: "hover_error_m", name: "estimated", role: "own" },
-      { key: "true_hover_error_m", name: "true", role: "truth" },
+      { key: "cross_track_m", name: english("estimated"), role: "own" },
+      { key: "true_cross_track_m", name: english("true"), role: "truth" },
     ],
   },
   {
-    key: "tilt", name: "Tilt", unit: "°", scale: DEGREES, digits: 1, least: 6, zero: true,
+    key: "hover", name: english("Beside the node"), unit: "cm", scale: 100, digits: 1, least: 8, zero: true,
     curves: [
-      { key: "tilt_rad", name: "measured", role: "own" },
-      { key: "tilt_goal_rad", name: "setpoint", role: "goal" },
+      { key: "hover_error_m", name: english("estimated"), role: "own" },
+      { key: "true_hover_error_m", name: english("true"), role: "truth" },
     ],
   },
-  { key: "latency", name: "Picture to setpoint", unit: "ms", scale: 1000, digits: 0, least: 40, zero: true, curves: [{ key: "latency_s", name: "latency", role: "own" }] },
-  { key: "battery", name: "Battery", unit: "%", scale: 100, digits: 0, least: 10, curves: [{ key: "battery_frac", name: "charge", role: "own" }] },
+  {
+    key: "tilt", name: english("Tilt"), unit: "°", scale: DEGREES, digits: 1, least: 6, zero: true,
+    curves: [
+      { key: "tilt_rad", name: english("measured"), role: "own" },
+      { key: "tilt_goal_rad", name: english("setpoint"), role: "goal" },
+    ],
+  },
+  { key: "latency", name: english("Picture to setpoint"), unit: "ms", scale: 1000, digits: 0, least: 40, zero: true, curves: [{ key: "latency_s", name: english("latency"), role: "own" }] },
+  { key: "battery", name: english("Battery"), unit: "%", scale: 100, digits: 0, least: 10, curves: [{ key: "battery_frac", name: english("charge"), role: "own" }] },
 ];
 
 // The lowest and highest value that a plot shows.

@@ -1,5 +1,6 @@
 // All plots of one flight, or of two over each other, on one axis of time.
 import { html, useMemo } from "../html.js";
+import { english, say } from "../language.js";
 import uPlot from "../../vendor/uplot.module.js";
 import { phaseSpans, valueAt } from "./at_time.js";
 import { scaled, timesOf, useSeries } from "./curves.js";
@@ -18,9 +19,9 @@ export function Plots({ id, flight, span, marks }) {
   const bands = useMemo(() => spans.map((one) => ({ ...one, tone: toneOf(one.phase) })), [spans]);
   const shown = useMemo(() => (series ? PLOTS.map((plot) => ownPlot(plot, series)).filter(Boolean) : []), [series]);
   const kept = useStableCurves(shown);
-  if (!series) return html`<p class="loading quiet" role="status">Loading the plots …</p>`;
+  if (!series) return html`<p class="loading quiet" role="status">${say("Loading the plots …")}</p>`;
   return html`
-    <section class="plots" aria-label="Over time">
+    <section class="plots" aria-label=${say("Over time")}>
       ${shown.map(
         ({ plot, data }, place) => html`
           <${Plot}
@@ -47,9 +48,9 @@ export function ComparedPlots({ flights, span }) {
     [...series, ...shifts],
   );
   const kept = useStableCurves(shown);
-  if (!series.every(Boolean)) return html`<p class="loading quiet" role="status">Loading the plots …</p>`;
+  if (!series.every(Boolean)) return html`<p class="loading quiet" role="status">${say("Loading the plots …")}</p>`;
   return html`
-    <section class="plots" aria-label="Over time">
+    <section class="plots" aria-label=${say("Over time")}>
       ${shown.map(
         ({ plot, data }, place) => html`
           <${Plot}
@@ -65,8 +66,8 @@ export function ComparedPlots({ flights, span }) {
 
 function Tones({ spans }) {
   return html`
-    <ul class="legend tones" aria-label="Phases">
-      ${toneLegend(spans).map(([tone, name]) => html`<li key=${tone}><i class=${`swatch tone-${tone}`} />${name}</li>`)}
+    <ul class="legend tones" aria-label=${say("Phases")}>
+      ${toneLegend(spans).map(([tone, name]) => html`<li key=${tone}><i class=${`swatch tone-${tone}`} />${say(name)}</li>`)}
     </ul>
   `;
 }
@@ -89,7 +90,7 @@ function pairPlot(plot, series, shifts) {
   const key = bestOf(plot, series);
   if (!key) return null;
   const tables = series.map((one, which) => [timesOf(one, shifts[which]), scaled(one, key, plot.scale)]);
-  const curves = ["first", "second"].map((role, which) => ({ key: `${key} ${which}`, name: role, role: `own-${role}` }));
+  const curves = [english("first"), english("second")].map((role, which) => ({ key: `${key} ${which}`, name: role, role: `own-${role}` }));
   return { plot, curves, data: uPlot.join(tables) };
 }
 

@@ -1,5 +1,6 @@
 // One flight played back: map, picture, plots and events at one time.
 import { html, useEffect, useMemo, useRef } from "../html.js";
+import { english, language, quoted, say, sayWith } from "../language.js";
 import { useTitle } from "../router.js";
 import { capital, phaseWords } from "../words.js";
 import { isMark, lastBefore, momentAt, phaseSpans } from "./at_time.js";
@@ -14,17 +15,17 @@ import { ReplayPicture } from "./replay_picture.js";
 export function Replay({ id }) {
   const known = opened(id);
   if (known.trouble) return html`<${Missing} id=${id} trouble=${known.trouble} />`;
-  if (!known.flight) return html`<p class="loading quiet" role="status">Reading the flight …</p>`;
-  if (!known.flight.moments.length) return html`<${Missing} id=${id} trouble="the log holds no flight" />`;
+  if (!known.flight) return html`<p class="loading quiet" role="status">${say("Reading the flight …")}</p>`;
+  if (!known.flight.moments.length) return html`<${Missing} id=${id} trouble=${english("the log holds no flight")} />`;
   return html`<${Played} id=${id} flight=${known.flight} row=${known.row} />`;
 }
 
 export function Missing({ id, trouble }) {
   return html`
     <section class="card empty">
-      <h2>The flight cannot be shown</h2>
-      <p>${capital(trouble)}.</p>
-      <p><button class="order" onClick=${() => forgetFlight(id)}>Try again</button> <a href="/flights">All flights</a></p>
+      <h2>${say("The flight cannot be shown")}</h2>
+      <p>${quoted(trouble, capital)}.</p>
+      <p><button class="order" onClick=${() => forgetFlight(id)}>${say("Try again")}</button> <a href="/flights">${say("All flights")}</a></p>
     </section>
   `;
 }
@@ -41,7 +42,7 @@ function Played({ id, flight, row }) {
   return html`
     <div class="replay">
       <${ReplayHead} id=${id} flight=${flight} row=${row} />
-      <div class="sight"><${ReplayMap} shown=${[{ flight, t, kind: "", name: "The drone" }]} /></div>
+      <div class="sight"><${ReplayMap} shown=${[{ flight, t, kind: "", name: say("The drone") }]} /></div>
       <div class="beside">
         <${ReplayPicture} id=${id} flight=${flight} t=${t} />
         <${Now} flight=${flight} moment=${moment} />
@@ -57,15 +58,15 @@ function ReplayHead({ id, flight, row }) {
   return html`
     <header class="replay-head">
       <div>
-        <p class="quiet"><a href="/flights">Flights</a>${row?.path && html` / <span class="path">${row.path}</span>`}</p>
+        <p class="quiet"><a href="/flights">${say("Flights")}</a>${row?.path && html` / <span class="path">${row.path}</span>`}</p>
         <h2>${title(row, flight)} ${row?.verdict && html`<span class=${`badge ${tone(row)}`}>${verdictWords(row)}</span>`}</h2>
-        ${row && html`<p class="quiet"><time title=${fullDate(row)}>${date(row)}</time> · ${outcomeWords(row)}${row.reason && `: ${row.reason}`}${row.faults.length > 0 && ` · ${faultWords(row)}`}</p>`}
-        ${row?.running && html`<p class="quiet">The log is being recorded: it goes on after the last time that is shown.</p>`}
-        ${flight.damage && !row?.running && html`<p class="bad-line">The log is ${flight.damage}: what you see is what was recorded.</p>`}
+        ${row && html`<p class="quiet"><time title=${fullDate(row)}>${date(row)}</time> · ${outcomeWords(row)}${row.reason && [": ", quoted(row.reason)]}${row.faults.length > 0 && ` · ${faultWords(row)}`}</p>`}
+        ${row?.running && html`<p class="quiet">${say("The log is being recorded: it goes on after the last time that is shown.")}</p>`}
+        ${flight.damage && !row?.running && html`<p class="bad-line">${sayWith("The log is {damage}: what you see is what was recorded.", { damage: quoted(flight.damage) })}</p>`}
       </div>
       <div class="ways">
-        ${row?.running && html`<button class="order" onClick=${() => forgetFlight(id)}>Read again</button>`}
-        <a class="order link" href=${`/api/flights/${id}/report`} target="_blank" rel="noopener">Report</a>
+        ${row?.running && html`<button class="order" onClick=${() => forgetFlight(id)}>${say("Read again")}</button>`}
+        <a class="order link" href=${`/api/flights/${id}/report`} target="_blank" rel="noopener">${say("Report")}</a>
       </div>
       ${row && html`<${Figures} row=${row} flight=${flight} />`}
     </header>
@@ -73,7 +74,7 @@ function ReplayHead({ id, flight, row }) {
 }
 
 export const title = (row, flight) =>
-  [row?.site || flight.floor?.name || "Flight", row?.mission].filter(Boolean).join(", ");
+  [row?.site || flight.floor?.name || say("Flight"), row?.mission].filter(Boolean).join(", ");
 
 function Figures({ row, flight }) {
   const filled = withEstimates(row, flight);
@@ -82,9 +83,9 @@ function Figures({ row, flight }) {
       ${FIGURES.map(
         (figure) => html`
           <div key=${figure.key}>
-            <dt>${figure.name}</dt>
+            <dt>${say(figure.name)}</dt>
             <dd>${told(figure, filled)}${figure.unit && figure.of(filled) != null && html` <small>${figure.unit}</small>`}
-              ${isEstimate(figure, filled) && html` <small class="quiet">estimated</small>`}</dd>
+              ${isEstimate(figure, filled) && html` <small class="quiet">${say("estimated")}</small>`}</dd>
           </div>
         `,
       )}
@@ -94,10 +95,10 @@ function Figures({ row, flight }) {
 
 function Now({ flight, moment }) {
   return html`
-    <section class="card now-card" aria-label="What it does">
+    <section class="card now-card" aria-label=${say("What it does")}>
       <h3>${phaseWords(moment)}</h3>
-      <p class="quiet">${capital(moment.reason)}</p>
-      <p>${moment.nodes_done} of ${moment.nodes_planned} nodes visited${moment.node && `, near ${moment.node}`}</p>
+      <p class="quiet">${quoted(moment.reason, capital)}</p>
+      <p>${say("{done} of {planned} nodes visited", { done: moment.nodes_done, planned: moment.nodes_planned })}${moment.node && `, ${say("near {node}", { node: moment.node })}`}</p>
       <p class="quiet">flightd ${flight.version}</p>
     </section>
   `;
@@ -105,7 +106,7 @@ function Now({ flight, moment }) {
 
 function EventList({ flight, t, span }) {
   const now = lastBefore(flight.events, t);
-  return useMemo(() => html`<${EventsUntil} flight=${flight} now=${now} span=${span} />`, [flight, now, span]);
+  return useMemo(() => html`<${EventsUntil} flight=${flight} now=${now} span=${span} />`, [flight, now, span, language()]);
 }
 
 // Drawn again only where another event is the newest one: there are thousands of them.
@@ -117,18 +118,18 @@ function EventsUntil({ flight, now, span }) {
   }, [now]);
   return html`
     <section class="card events" aria-labelledby="replay-events">
-      <h3 id="replay-events">Events</h3>
+      <h3 id="replay-events">${say("Events")}</h3>
       <ol ref=${list} class="event-list">
         ${flight.events.map(
           (event, place) => html`
             <li key=${place} class=${event.level} aria-current=${place === now ? "true" : null}>
               <button onClick=${() => seek(event.t_s, span)}>
-                <time>${clock(event.t_s)}</time><span><span class="what">${event.name.replaceAll("_", " ")}</span> ${event.text}</span>
+                <time>${clock(event.t_s)}</time><span><span class="what">${quoted(event.name.replaceAll("_", " "))}</span> ${quoted(event.text)}</span>
               </button>
             </li>
           `,
         )}
-        ${flight.events.length === 0 && html`<li class="quiet">Nothing was reported.</li>`}
+        ${flight.events.length === 0 && html`<li class="quiet">${say("Nothing was reported.")}</li>`}
       </ol>
     </section>
   `;

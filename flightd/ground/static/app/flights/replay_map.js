@@ -1,13 +1,14 @@
 // The map at a time of the playback: of one flight, or of two over each other.
 import { html, useMemo } from "../html.js";
+import { english, quoted, say, sayWith } from "../language.js";
 import { around, Drone, Legend, M, markScale, Nodes, Track, Way } from "../live/map_marks.js";
 import { bounds, Floor } from "../live/site_plan.js";
 import { state, update } from "../store.js";
 import { lastBefore, momentAt, pointsUntil, poseAt, seenAt, visitedAt, wayAt } from "./at_time.js";
 
-const ONE = [["leg", "next leg"], ["way", "way after it"], ["track", "track"], ["seen", "lines seen"], ["visited", "visited"]];
-const TRUTH = [["truth", "true track"]];
-const TWO = [["first", "first flight"], ["second", "second flight"]];
+const ONE = [["leg", english("next leg")], ["way", english("way after it")], ["track", english("track")], ["seen", english("lines seen")], ["visited", english("visited")]];
+const TRUTH = [["truth", english("true track")]];
+const TWO = [["first", english("first flight")], ["second", english("second flight")]];
 
 // `shown` are one or two {flight, t, kind, name}; the first one's map is drawn.
 export function ReplayMap({ shown }) {
@@ -23,10 +24,10 @@ export function ReplayMap({ shown }) {
   const way = alone ? wayAt(flight, t).map((id) => nodes.get(id)).filter(Boolean) : [];
   return html`
     <section class="card map" aria-labelledby="replay-map">
-      <h2 id="replay-map" class="unseen">Map</h2>
+      <h2 id="replay-map" class="unseen">${say("Map")}</h2>
       <svg
         viewBox=${view.map((value) => value * M).join(" ")} role="group" style=${{ "--scale": scale }}
-        aria-label=${floor ? `Map of ${floor.name}` : "Map"}
+        aria-label=${floor ? say("Map of {site}", { site: floor.name }) : say("Map")}
       >
         ${plan}
         <${WholeTracks} shown=${shown} />
@@ -38,9 +39,9 @@ export function ReplayMap({ shown }) {
       </svg>
       <div class="map-foot">
         <${Legend} marks=${alone ? [...ONE, ...(flight.truth ? TRUTH : [])] : TWO} />
-        <button class="order follow" aria-pressed=${state.followed} onClick=${turnFollowed}>Follow the drone</button>
+        <button class="order follow" aria-pressed=${state.followed} onClick=${turnFollowed}>${say("Follow the drone")}</button>
       </div>
-      ${flight.map_error && html`<p class="quiet">No map is drawn: ${flight.map_error}.</p>`}
+      ${flight.map_error && html`<p class="quiet">${sayWith("No map is drawn: {why}.", { why: quoted(flight.map_error) })}</p>`}
     </section>
   `;
 }

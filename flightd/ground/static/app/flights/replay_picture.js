@@ -1,6 +1,7 @@
 // The down camera's picture before the time of the playback, with the lines that were found in it.
 import { askStation } from "../fetching.js";
 import { html, useEffect, useRef, useState } from "../html.js";
+import { english, quoted, say } from "../language.js";
 import { drawPicture, foundWords, WIDTH } from "../live/camera.js";
 import { lastBefore } from "./at_time.js";
 import { fineClock } from "./figures.js";
@@ -25,16 +26,16 @@ export function ReplayPicture({ id, flight, t }) {
       setSeen({ place, head: told.head, trouble: told.trouble });
     });
   }, [id, place, wanted]);
-  if (!wanted) return html`<section class="card camera none"><p class="quiet">The log holds no pictures.</p></section>`;
+  if (!wanted) return html`<section class="card camera none"><p class="quiet">${say("The log holds no pictures.")}</p></section>`;
   const found = seen?.head ? foundWords(seen.head) : "";
   return html`
     <figure class="card camera">
-      <canvas ref=${canvas} width=${WIDTH} height=${WIDTH * 0.5625} role="img" aria-label=${`Down camera: ${found || "no picture yet"}`} />
+      <canvas ref=${canvas} width=${WIDTH} height=${WIDTH * 0.5625} role="img" aria-label=${`${say("Down camera")}: ${found || say("no picture yet")}`} />
       <figcaption>
-        <strong>Down camera</strong>
+        <strong>${say("Down camera")}</strong>
         ${seen?.trouble
-          ? html`<span class="trouble">${seen.trouble}</span>`
-          : html`<span class="quiet">${found && `${found}, `}at ${fineClock(flight.pictures[seen?.place ?? place].t_s)}, ${place + 1} of ${flight.pictures.length}</span>`}
+          ? html`<span class="trouble">${quoted(seen.trouble)}</span>`
+          : html`<span class="quiet">${found && `${found}, `}${say("at {time}, {number} of {all}", { time: fineClock(flight.pictures[seen?.place ?? place].t_s), number: place + 1, all: flight.pictures.length })}</span>`}
       </figcaption>
     </figure>
   `;
@@ -86,6 +87,6 @@ async function fetched(id, place) {
     const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
     return { head, picture: await createImageBitmap(new Blob([new Uint8Array(data, 4 + length)], { type: "image/jpeg" })) };
   } catch (error) {
-    return { trouble: error.message || "the picture cannot be shown" };
+    return { trouble: error.message || english("the picture cannot be shown") };
   }
 }

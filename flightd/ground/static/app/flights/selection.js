@@ -1,27 +1,28 @@
 // Which flights the list shows, and in which order: read from the address, so that it can be kept and sent.
+import { english } from "../language.js";
 import { FIGURES, isBroken, outcomeWords, verdictWords } from "./figures.js";
 
 const text = (value) => (a, b) => value(a).localeCompare(value(b), undefined, { numeric: true });
 
 // Each column: how two rows compare, and which way comes first.
 export const COLUMNS = [
-  { key: "date", name: "Date", compare: (a, b) => a.started_s - b.started_s, first: "down" },
-  { key: "site", name: "Site", compare: text((row) => row.site), first: "up" },
-  { key: "drone", name: "Drone", compare: text((row) => row.drone), first: "up" },
-  { key: "mission", name: "Mission", compare: text((row) => row.mission), first: "up" },
-  { key: "outcome", name: "Outcome", compare: text(outcomeWords), first: "up" },
-  { key: "verdict", name: "Verdict", compare: text(verdictWords), first: "up" },
+  { key: "date", name: english("Date"), compare: (a, b) => a.started_s - b.started_s, first: "down" },
+  { key: "site", name: english("Site"), compare: text((row) => row.site), first: "up" },
+  { key: "drone", name: english("Drone"), compare: text((row) => row.drone), first: "up" },
+  { key: "mission", name: english("Mission"), compare: text((row) => row.mission), first: "up" },
+  { key: "outcome", name: english("Outcome"), compare: text(outcomeWords), first: "up" },
+  { key: "verdict", name: english("Verdict"), compare: text(verdictWords), first: "up" },
   ...FIGURES.map((figure) => ({
     key: figure.key, name: figure.name, unit: figure.unit, figure, compare: known(figure.of), first: "down",
   })),
 ];
 
 export const SHOWN = [
-  ["", "All flights"],
-  ["good", "Good verdict"],
-  ["bad", "Bad verdict"],
-  ["aborted", "Not completed"],
-  ["trouble", "Broken or running logs"],
+  ["", english("All flights")],
+  ["good", english("Good verdict")],
+  ["bad", english("Bad verdict")],
+  ["aborted", english("Not completed")],
+  ["trouble", english("Broken or running logs")],
 ];
 
 // What is unknown comes last, whichever way the others are sorted.

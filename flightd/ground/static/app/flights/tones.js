@@ -1,4 +1,6 @@
 // Which colour stands for a phase, as in the flight's report.
+import { english } from "../language.js";
+
 export const TONES = {
   __proto__: null,
   preflight: "ground", arming: "ground", swap: "ground", done: "ground",
@@ -7,8 +9,8 @@ export const TONES = {
   recover: "hold", hold: "hold", relocate: "hold", pilot: "hold", aborted: "bad",
 };
 const NAMES = {
-  ground: "on the ground", climb: "up and down", seek: "finding lines", follow: "flying", hover: "over a node",
-  turn: "turning", hold: "holding", bad: "ended early",
+  ground: english("on the ground"), climb: english("up and down"), seek: english("finding lines"), follow: english("flying"), hover: english("over a node"),
+  turn: english("turning"), hold: english("holding"), bad: english("ended early"),
 };
 
 export const toneOf = (phase) => TONES[phase] ?? "ground";

@@ -1,6 +1,7 @@
 // One page of the guide.  Its HTML is the station's own: made of Markdown without any raw HTML.
 import { askJson } from "../fetching.js";
 import { html, useEffect, useRef, useState } from "../html.js";
+import { quoted, say } from "../language.js";
 import { useTitle } from "../router.js";
 import { capital } from "../words.js";
 
@@ -24,20 +25,20 @@ export function GuideArticle({ topic, hash }) {
   useEffect(() => {
     if (page?.html) arrive(article.current, hash);
   }, [page, hash]);
-  if (!page) return html`<p class="loading quiet" role="status">Loading …</p>`;
+  if (!page) return html`<p class="loading quiet" role="status">${say("Loading …")}</p>`;
   if (page.trouble) {
     return html`
-      <section class="card empty"><h2>The page cannot be shown</h2>
-        <p>${capital(page.trouble)}. <a href="/guide">All pages</a></p>
-        <button class="tab" onClick=${() => setAgain(again + 1)}>Try again</button></section>
+      <section class="card empty"><h2>${say("The page cannot be shown")}</h2>
+        <p>${quoted(page.trouble, capital)}. <a href="/guide">${say("All pages")}</a></p>
+        <button class="tab" onClick=${() => setAgain(again + 1)}>${say("Try again")}</button></section>
     `;
   }
   return html`
     <div class="guide-main">
-      <article class="card prose" ref=${article} tabindex="-1" aria-label=${page.title} dangerouslySetInnerHTML=${{ __html: page.html }} />
-      <nav class="guide-next" aria-label="Pages before and after">
-        ${page.before && html`<a href=${address(page.before)}><small>Before</small>${page.before.title}</a>`}
-        ${page.after && html`<a class="after" href=${address(page.after)}><small>After</small>${page.after.title}</a>`}
+      <article class="card prose" ref=${article} tabindex="-1" aria-label=${page.title} lang="en" dangerouslySetInnerHTML=${{ __html: page.html }} />
+      <nav class="guide-next" aria-label=${say("Pages before and after")}>
+        ${page.before && html`<a href=${address(page.before)}><small>${say("Before")}</small><span lang="en">${page.before.title}</span></a>`}
+        ${page.after && html`<a class="after" href=${address(page.after)}><small>${say("After")}</small><span lang="en">${page.after.title}</span></a>`}
       </nav>
     </div>
     <${Headings} headings=${page.headings.filter(({ level }) => level === 2)} />
@@ -70,9 +71,9 @@ function decoded(text) {
 function Headings({ headings }) {
   if (headings.length < HEADINGS_FROM) return null;
   return html`
-    <nav class="guide-headings" aria-label="On this page">
-      <p class="quiet">On this page</p>
-      <ul>${headings.map(({ id, text }) => html`<li key=${id}><a href=${`#${id}`}>${text}</a></li>`)}</ul>
+    <nav class="guide-headings" aria-label=${say("On this page")}>
+      <p class="quiet">${say("On this page")}</p>
+      <ul lang="en">${headings.map(({ id, text }) => html`<li key=${id}><a href=${`#${id}`}>${text}</a></li>`)}</ul>
     </nav>
   `;
 }

@@ -1,6 +1,7 @@
 // The guide: its pages at /guide and /guide/TOPIC, a search over all of them at /guide/search?q=WORDS.
 import { askJson } from "../fetching.js";
 import { html, useEffect, useRef, useState } from "../html.js";
+import { say } from "../language.js";
 import { goTo } from "../router.js";
 import { GuideArticle } from "./guide_article.js";
 import { SearchHits } from "./search_hits.js";
@@ -38,9 +39,9 @@ function SearchField({ words }) {
   };
   return html`
     <div role="search">
-      <label class="unseen" for="guide-words">Search the guide</label>
+      <label class="unseen" for="guide-words">${say("Search the guide")}</label>
       <input
-        id="guide-words" type="search" ref=${field} placeholder="Search the guide  ( / )" value=${words}
+        id="guide-words" type="search" ref=${field} placeholder=${say("Search the guide  ( / )")} value=${words}
         onInput=${(event) => search(event.target.value)}
       />
     </div>
@@ -66,19 +67,19 @@ function PageList({ topic }) {
     if (event.key === "Enter") choose(event);
   };
   return html`
-    <nav class="guide-pages" aria-label="Guide">
+    <nav class="guide-pages" aria-label=${say("Guide")}>
       <ul>
         ${pages.map(
           ({ topic: one, title }) => html`
-            <li key=${one}><a href=${one === "index" ? "/guide" : `/guide/${one}`} aria-current=${one === shown ? "page" : null}>${one === "index" ? "All pages" : title}</a></li>
+            <li key=${one}><a href=${one === "index" ? "/guide" : `/guide/${one}`} aria-current=${one === shown ? "page" : null} lang=${one === "index" ? null : "en"}>${one === "index" ? say("All pages") : title}</a></li>
           `,
         )}
       </ul>
-      <label class="guide-choice">Page
+      <label class="guide-choice">${say("Page")}
         <select value=${picked ?? (current ? shown : "")} onPointerDown=${() => (byKeys.current = false)} onKeyDown=${onKeyDown}
           onChange=${onChange} onBlur=${choose}>
-          ${!current && html`<option value="">choose a page</option>`}
-          ${pages.map(({ topic: one, title }) => html`<option key=${one} value=${one}>${one === "index" ? "All pages" : title}</option>`)}
+          ${!current && html`<option value="">${say("choose a page")}</option>`}
+          ${pages.map(({ topic: one, title }) => html`<option key=${one} value=${one} lang=${one === "index" ? null : "en"}>${one === "index" ? say("All pages") : title}</option>`)}
         </select>
       </label>
     </nav>

@@ -1,7 +1,7 @@
 // The places of the guide that hold the words, best first, each with the words around it.
 import { askJson } from "../fetching.js";
 import { html, useEffect, useState } from "../html.js";
-import { count } from "../words.js";
+import { quoted, say } from "../language.js";
 
 const WAIT_MS = 120;
 
@@ -25,7 +25,7 @@ export function SearchHits({ words }) {
       <ol class="hits">
         ${(told?.hits ?? []).map(
           (hit) => html`
-            <li key=${`${hit.topic} ${hit.id}`} class="card">
+            <li key=${`${hit.topic} ${hit.id}`} class="card" lang="en">
               <a href=${address(hit)}>${hit.title}${hit.heading !== hit.title && html`<span class="below"> › ${hit.heading}</span>`}</a>
               <p>${hit.parts.map(([text, isHit]) => (isHit ? html`<mark>${text}</mark>` : text))}</p>
             </li>
@@ -37,10 +37,10 @@ export function SearchHits({ words }) {
 }
 
 function said(words, told) {
-  if (!words.trim()) return "Search the guide";
-  if (!told) return "Searching …";
-  if (told.trouble) return told.trouble;
-  return told.hits.length ? count(told.hits.length, "place") : `Nothing in the guide holds “${words}”`;
+  if (!words.trim()) return say("Search the guide");
+  if (!told) return say("Searching …");
+  if (told.trouble) return quoted(told.trouble);
+  return told.hits.length ? say("{n} place|{n} places", { n: told.hits.length }) : say("Nothing in the guide holds “{words}”", { words });
 }
 
 const address = ({ topic, id }) => `/guide${topic === "index" ? "" : `/${topic}`}${id ? `#${id}` : ""}`;

@@ -1,10 +1,11 @@
 // One camera's newest picture, with what the drone found in it drawn over it.
 import { showPictures } from "../connection.js";
 import { html, useEffect, useRef, useState } from "../html.js";
+import { english, quoted, say } from "../language.js";
 import { shown, state } from "../store.js";
-import { age, count } from "../words.js";
+import { age } from "../words.js";
 
-const NAMES = { down: "Down camera", front: "Front camera" };
+const NAMES = { down: english("Down camera"), front: english("Front camera") };
 export const WIDTH = 640;
 
 export function Camera({ camera }) {
@@ -23,18 +24,18 @@ export function Camera({ camera }) {
   const found = seen ? foundWords(seen.head) : "";
   return html`
     <figure class="card camera">
-      <canvas ref=${canvas} width=${WIDTH} height=${WIDTH * 0.75} role="img" aria-label=${`${NAMES[camera]}: ${found || "no picture yet"}`} />
+      <canvas ref=${canvas} width=${WIDTH} height=${WIDTH * 0.75} role="img" aria-label=${`${say(NAMES[camera])}: ${found || say("no picture yet")}`} />
       <figcaption>
-        <strong>${NAMES[camera]}</strong>
-        <span class=${trouble ? "trouble" : "quiet"}>${trouble || caption(seen, found)}</span>
+        <strong>${say(NAMES[camera])}</strong>
+        <span class=${trouble ? "trouble" : "quiet"}>${trouble ? quoted(trouble) : caption(seen, found)}</span>
       </figcaption>
     </figure>
   `;
 }
 
 function caption(seen, found) {
-  if (!seen) return "no picture yet";
-  return `${found}, ${age(pictureAgeMs(seen, shown().clockMs, performance.now()) / 1000)} old`;
+  if (!seen) return say("no picture yet");
+  return say("{found}, {age} old", { found, age: age(pictureAgeMs(seen, shown().clockMs, performance.now()) / 1000) });
 }
 
 // Since the exposure, the way to this page with it.  The quickest status tells the drone's clock, `clockMs`; before
@@ -46,8 +47,8 @@ export function pictureAgeMs({ head, at }, clockMs, now) {
 
 export function foundWords({ lines, areas }) {
   const codes = areas.filter((area) => area.kind === "code").length;
-  const parts = [lines.length && count(lines.length, "line"), codes && count(codes, "code")].filter(Boolean);
-  return parts.join(", ") || "nothing found";
+  const parts = [lines.length && say("{n} line|{n} lines", { n: lines.length }), codes && say("{n} code|{n} codes", { n: codes })].filter(Boolean);
+  return parts.join(", ") || say("nothing found");
 }
 
 // `picture` is an ImageBitmap, `head` says what was found in it: `lines` and `areas`.

@@ -1,5 +1,6 @@
 // What happened, newest first, in the reader's own time.
 import { html } from "../html.js";
+import { quoted, say } from "../language.js";
 import { shown } from "../store.js";
 import { time } from "../words.js";
 
@@ -10,17 +11,17 @@ export function Events() {
   const newest = events.slice(-SHOWN).reverse();
   return html`
     <section class="card events" aria-labelledby="events">
-      <h2 id="events">Events</h2>
+      <h2 id="events">${say("Events")}</h2>
       <ol tabindex="0" aria-labelledby="events">
         ${newest.map(
           (event) => html`
             <li key=${event.seq} class=${event.level}>
               <time>${when(event, status, heardAt)}</time>
-              <span><span class="what">${event.name.replaceAll("_", " ")}</span> ${event.text}</span>
+              <span><span class="what">${quoted(event.name.replaceAll("_", " "))}</span> ${quoted(event.text)}</span>
             </li>
           `,
         )}
-        ${newest.length === 0 && html`<li class="quiet">Nothing happened yet.</li>`}
+        ${newest.length === 0 && html`<li class="quiet">${say("Nothing happened yet.")}</li>`}
       </ol>
     </section>
   `;

@@ -1,15 +1,16 @@
 // The live map: the site to scale, and on it the drone, how sure it is of its place, where it was and flies next.
 import { html, useMemo } from "../html.js";
+import { english, say } from "../language.js";
 import { shown, state, update } from "../store.js";
 import { around, ChoosableNodes, Drone, Legend, M, markScale, Track, Way } from "./map_marks.js";
 import { Floor, bounds } from "./site_plan.js";
 
 const MARKS = [
-  ["leg", "next leg"],
-  ["way", "way after it"],
-  ["track", "track"],
-  ["visited", "visited"],
-  ["keep", "keep out"],
+  ["leg", english("next leg")],
+  ["way", english("way after it")],
+  ["track", english("track")],
+  ["visited", english("visited")],
+  ["keep", english("keep out")],
 ];
 
 export function FloorMap({ floor }) {
@@ -27,11 +28,11 @@ export function FloorMap({ floor }) {
     });
   return html`
     <section class="card map" aria-labelledby="map">
-      <h2 id="map" class="unseen">Map</h2>
+      <h2 id="map" class="unseen">${say("Map")}</h2>
       <svg
         viewBox=${view.map((value) => value * M).join(" ")}
         role="group"
-        aria-label=${`Map of ${floor.name}`}
+        aria-label=${say("Map of {site}", { site: floor.name })}
         style=${{ "--scale": scale }}
       >
         ${plan}
@@ -55,5 +56,5 @@ function Follow() {
     update((s) => {
       s.followed = !s.followed;
     });
-  return html`<button class="order follow" aria-pressed=${state.followed} onClick=${turn}>Follow the drone</button>`;
+  return html`<button class="order follow" aria-pressed=${state.followed} onClick=${turn}>${say("Follow the drone")}</button>`;
 }

@@ -1,5 +1,6 @@
 // The hazards that hold, what the drone does about each, and since when.
 import { html } from "../html.js";
+import { quoted, say } from "../language.js";
 import { ACTIONS, age, capital } from "../words.js";
 
 export function Hazards({ hazards }) {
@@ -7,14 +8,14 @@ export function Hazards({ hazards }) {
     <div role="alert" class="alarm">
       ${hazards.length > 0 &&
       html`
-        <section class="card hazards" aria-label="Hazards">
-          <h2>${hazards.length === 1 ? "A hazard" : `${hazards.length} hazards`}</h2>
+        <section class="card hazards" aria-label=${say("Hazards")}>
+          <h2>${say("A hazard|{n} hazards", { n: hazards.length })}</h2>
           <ul>
             ${hazards.map(
               (hazard) => html`
                 <li key=${hazard.text}>
-                  <span>${capital(hazard.text)}</span>
-                  <span class="quiet">${ACTIONS[hazard.action] ?? hazard.action}, for ${age(hazard.age_s)}</span>
+                  <span>${quoted(hazard.text, capital)}</span>
+                  <span class="quiet">${say("{action}, for {age}", { action: say(ACTIONS[hazard.action] ?? hazard.action), age: age(hazard.age_s) })}</span>
                 </li>
               `,
             )}

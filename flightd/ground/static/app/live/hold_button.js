@@ -1,5 +1,6 @@
 // A button that acts only when it is held, by mouse, finger or key: what moves a drone needs more than a touch.
 import { html, useEffect, useRef, useState } from "../html.js";
+import { say } from "../language.js";
 
 const HOLD_MS = 1000;
 
@@ -42,7 +43,7 @@ export function HoldButton({ disabled, onHeld, children }) {
       onContextMenu=${(event) => event.preventDefault()}
     >
       <span class="fill" aria-hidden="true" /><span class="label">${children}</span>
-      <small>${hint ? "keep holding" : "hold"}</small>
+      <small>${hint ? say("keep holding") : say("hold")}</small>
     </button>
   `;
 }

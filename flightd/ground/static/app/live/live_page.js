@@ -1,6 +1,7 @@
 // The live page: where the drone is, what it sees, what it does and why, and what a person may order.
 import { hears } from "../hearing.js";
 import { html } from "../html.js";
+import { say } from "../language.js";
 import { shown, state } from "../store.js";
 import { Acts } from "./acts_card.js";
 import { Camera } from "./camera.js";
@@ -13,8 +14,8 @@ import { Phase } from "./phase.js";
 export default function LivePage() {
   const { welcome, status } = shown();
   if (!welcome) {
-    return html`<section class="card empty"><h2>No drone yet</h2>
-      <p>Start one: <code>flightd sim --speed 1 --set ground.listen=127.0.0.1</code></p></section>`;
+    return html`<section class="card empty"><h2>${say("No drone yet")}</h2>
+      <p>${say("Start one:")} <code>flightd sim --speed 1 --set ground.listen=127.0.0.1</code></p></section>`;
   }
   return html`
     <div class=${hears().good ? "live" : "live old"}>

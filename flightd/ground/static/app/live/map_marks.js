@@ -1,5 +1,6 @@
 // What is drawn on a map over the site: nodes, tracks, ways, drones.  The same live and played back.
 import { html } from "../html.js";
+import { english, say } from "../language.js";
 import { nextInDirection } from "./map_keys.js";
 
 export const M = 100; // units of the drawing per metre
@@ -55,7 +56,7 @@ export function ChoosableNodes({ floor, visited, goal, chosen, onChoose, scale }
         transform=${nodeTransform(node, scale)}
         role="button"
         aria-pressed=${node.id === chosen}
-        aria-label=${`Node ${node.id}${visited.has(node.id) ? ", visited" : ""}`}
+        aria-label=${say(visited.has(node.id) ? english("Node {node}, visited") : english("Node {node}"), { node: node.id })}
         tabindex=${node.id === inTabOrder ? 0 : -1}
         onClick=${() => onChoose(node.id)}
         onKeyDown=${(event) => onKey(event, node)}
@@ -95,7 +96,7 @@ function nodeClass(id, chosen, visited, goal) {
 }
 
 // A drone with its heading and how sure it is of both; sigmas may be null.
-export function Drone({ position, scale, name = "The drone", kind = "" }) {
+export function Drone({ position, scale, name = say("The drone"), kind = "" }) {
   const { x_m: x, y_m: y, yaw_rad: yaw } = position;
   const turn = (yaw * 180) / Math.PI;
   const spread = Math.min(SURE * (position.sigma_yaw_rad ?? 0), Math.PI / 2);
@@ -115,8 +116,8 @@ export function Drone({ position, scale, name = "The drone", kind = "" }) {
 // `marks` are [mark, text]: the mark's class is mark-…
 export function Legend({ marks }) {
   return html`
-    <ul class="legend" aria-label="Legend">
-      ${marks.map(([mark, text]) => html`<li key=${mark}><i class=${`mark-${mark}`} />${text}</li>`)}
+    <ul class="legend" aria-label=${say("Legend")}>
+      ${marks.map(([mark, text]) => html`<li key=${mark}><i class=${`mark-${mark}`} />${say(text)}</li>`)}
     </ul>
   `;
 }

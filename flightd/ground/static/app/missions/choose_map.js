@@ -1,5 +1,6 @@
 // The map to choose on: each node a button, numbered in the order in which it is flown.
 import { html, useMemo } from "../html.js";
+import { english, say } from "../language.js";
 import { nextInDirection } from "../live/map_keys.js";
 import { Drone, Legend, M, markScale } from "../live/map_marks.js";
 import { bounds, Floor } from "../live/site_plan.js";
@@ -7,9 +8,9 @@ import { shown } from "../store.js";
 import { missions, toggleNode } from "./missions_state.js";
 
 const MARKS = [
-  ["chosen", "chosen, in the order of flight"],
-  ["way", "the way"],
-  ["keep", "keep out"],
+  ["chosen", english("chosen, in the order of flight")],
+  ["way", english("the way")],
+  ["keep", english("keep out")],
 ];
 
 export function ChooseMap({ floor, planned }) {
@@ -21,12 +22,12 @@ export function ChooseMap({ floor, planned }) {
   const { status } = shown();
   return html`
     <section class="card map choosing" aria-labelledby="choose-map">
-      <h3 id="choose-map">Choose nodes on the map</h3>
-      <p class="quiet">Click a node, or go from node to node with the arrow keys and choose with the space bar.</p>
+      <h3 id="choose-map">${say("Choose nodes on the map")}</h3>
+      <p class="quiet">${say("Click a node, or go from node to node with the arrow keys and choose with the space bar.")}</p>
       <svg
         viewBox=${box.map((value) => value * M).join(" ")}
         role="group"
-        aria-label=${`Map of ${floor.name} to choose on`}
+        aria-label=${say("Map of {site} to choose on", { site: floor.name })}
         style=${{ "--scale": scale }}
       >
         ${plan}
@@ -67,7 +68,7 @@ function Nodes({ floor, order, scale }) {
   return floor.nodes.map((node) => {
     const isChosen = chosen.includes(node.id);
     const place = order ? order.indexOf(node.id) + 1 : 0;
-    const words = `Node ${node.id}${isChosen && place ? `, flown as number ${place}` : ""}`;
+    const words = say(isChosen && place ? english("Node {node}, flown as number {place}") : english("Node {node}"), { node: node.id, place });
     return html`
       <g
         key=${node.id}

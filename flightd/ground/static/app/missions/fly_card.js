@@ -1,10 +1,11 @@
 // What the chosen flight takes by the drone's own plan, and its start.
 import { mayOperate } from "../access/session.js";
 import { html } from "../html.js";
+import { quoted, say, sayWith } from "../language.js";
 import { Obstacles } from "../live/acts_card.js";
 import { HoldButton } from "../live/hold_button.js";
 import { shown, state } from "../store.js";
-import { capital, count, duration, isGrounded, percent } from "../words.js";
+import { capital, duration, isGrounded, percent } from "../words.js";
 import { fly, flyConfigured } from "./missions_source.js";
 import { missions } from "./missions_state.js";
 
@@ -17,15 +18,15 @@ export function FlyCard({ estimate, waits }) {
   const may = welcome.role === "operator" && mayOperate();
   return html`
     <section class="card fly" aria-labelledby="fly">
-      <h3 id="fly">${flies ? "In flight" : "This flight"}</h3>
-      ${note && html`<p class="note">${note}</p>`}
+      <h3 id="fly">${flies ? say("In flight") : say("This flight")}</h3>
+      ${note && html`<p class="note">${quoted(note)}</p>`}
       ${flies && plan && html`<${Under} plan=${plan} />`}
       ${waits && status.plan && html`<${Handed} status=${status} may=${may} />`}
-      ${!nodes.length && !flies && html`<p class="quiet">Choose aisles or nodes: what it takes is shown here at once.</p>`}
-      ${nodes.length > 0 && !waits && html`<p class="quiet">What a flight takes is told by the drone while it waits on the ground.</p>`}
+      ${!nodes.length && !flies && html`<p class="quiet">${say("Choose aisles or nodes: what it takes is shown here at once.")}</p>`}
+      ${nodes.length > 0 && !waits && html`<p class="quiet">${say("What a flight takes is told by the drone while it waits on the ground.")}</p>`}
       ${nodes.length > 0 && waits && html`<${Takes} estimate=${estimate} />`}
       ${nodes.length > 0 && waits && may && html`<${Start} estimate=${estimate} status=${status} />`}
-      ${!may && html`<p class="quiet">Only looking on: ${mayOperate() ? "a start needs an operator’s key." : `${state.session.name} is a viewer; what is kept and flown needs an operator.`}</p>`}
+      ${!may && html`<p class="quiet">${mayOperate() ? say("Only looking on: a start needs an operator’s key.") : say("Only looking on: {name} is a viewer; what is kept and flown needs an operator.", { name: state.session.name })}</p>`}
     </section>
   `;
 }
@@ -33,8 +34,8 @@ export function FlyCard({ estimate, waits }) {
 // What the drone holds already: the next start flies it, wherever that is given.
 function Handed({ status, may }) {
   return html`
-    <p class="note">The drone holds a flight over ${count(status.nodes_planned, "node")} that was handed to it: the next start flies it.
-      ${may && html`<button class="order" onClick=${flyConfigured}>Fly as configured instead</button>`}</p>
+    <p class="note">${say("The drone holds a flight over {n} node that was handed to it: the next start flies it.|The drone holds a flight over {n} nodes that was handed to it: the next start flies it.", { n: status.nodes_planned })}
+      ${may && html`<button class="order" onClick=${flyConfigured}>${say("Fly as configured instead")}</button>`}</p>
   `;
 }
 
@@ -43,32 +44,32 @@ function Under({ plan }) {
   const done = new Set(plan.visited).size;
   const total = new Set(plan.nodes).size;
   return html`
-    <p><strong>${done} of ${count(total, "node")}</strong> visited</p>
-    <progress value=${done} max=${total} aria-label="Nodes visited" />
-    ${plan.remaining.length > 0 && html`<p class="quiet">Next: ${plan.remaining.slice(0, 6).join(", ")}${plan.remaining.length > 6 ? " …" : ""}</p>`}
+    <p>${sayWith("{done} visited", { done: html`<strong>${say("{done} of {n} node|{done} of {n} nodes", { done, n: total })}</strong>` })}</p>
+    <progress value=${done} max=${total} aria-label=${say("Nodes visited")} />
+    ${plan.remaining.length > 0 && html`<p class="quiet">${say("Next: {nodes}", { nodes: plan.remaining.slice(0, 6).join(", ") })}${plan.remaining.length > 6 ? " …" : ""}</p>`}
   `;
 }
 
 function Takes({ estimate }) {
-  if (!estimate) return html`<p class="quiet" role="status">The drone plans it …</p>`;
+  if (!estimate) return html`<p class="quiet" role="status">${say("The drone plans it …")}</p>`;
   const { planned, trouble } = estimate;
-  if (trouble) return html`<p class="refusal" role="alert">${capital(trouble)}</p>`;
+  if (trouble) return html`<p class="refusal" role="alert">${quoted(trouble, capital)}</p>`;
   const figures = [
-    ["Time in the air", minutes(planned.seconds)],
-    ["Batteries", planned.batteries],
-    ["Way", `${Math.round(planned.way_m)} m`],
-    ["Places", planned.places || "none counted"],
+    [say("Time in the air"), minutes(planned.seconds)],
+    [say("Batteries"), planned.batteries],
+    [say("Way"), `${Math.round(planned.way_m)} m`],
+    [say("Places"), planned.places || say("none counted")],
   ];
   return html`
     <dl class="takes">
       ${figures.map(([name, value]) => html`<div key=${name}><dt>${name}</dt><dd>${value}</dd></div>`)}
     </dl>
     <p class="quiet">
-      The drone’s own estimate: its speeds and turns along this way, and each view of a shelf at its longest; mostly it takes less.
-      ${" "}Its battery has ${percent(planned.charge)}; a full one lasts ${duration(planned.battery_s)} down to its reserve.
+      ${say("The drone’s own estimate: its speeds and turns along this way, and each view of a shelf at its longest; mostly it takes less.")}
+      ${" "}${say("Its battery has {charge}; a full one lasts {time} down to its reserve.", { charge: percent(planned.charge), time: duration(planned.battery_s) })}
     </p>
     <details class="flown-order">
-      <summary>Order of flight</summary>
+      <summary>${say("Order of flight")}</summary>
       <ol>${planned.nodes.map((node) => html`<li key=${node}>${node}</li>`)}</ol>
     </details>
   `;
@@ -86,9 +87,9 @@ function Start({ estimate, status }) {
     ${
       status.possible.includes("plan")
         ? html`<${Obstacles} obstacles=${status.obstacles} />`
-        : html`<p class="note">It takes a mission only before its first start, while it stands disarmed and no start is given.</p>`
+        : html`<p class="note">${say("It takes a mission only before its first start, while it stands disarmed and no start is given.")}</p>`
     }
-    <${HoldButton} disabled=${!may} onHeld=${() => fly({ ...known })}>Start this mission<//>
+    <${HoldButton} disabled=${!may} onHeld=${() => fly({ ...known })}>${say("Start this mission")}<//>
     <${Outcome} />
   `;
 }
@@ -98,7 +99,7 @@ function Outcome() {
   const { flying, refused } = missions();
   const newest = state.acts.get(state.selected);
   const start = newest?.command === "start" && performance.now() - newest.at < OUTCOME_MS ? newest : null;
-  const words = { sent: "Start: sent …", accepted: "Start: accepted", refused: `Start: ${start?.text}` }[start?.stage];
+  const words = { sent: say("Start: sent …"), accepted: say("Start: accepted"), refused: sayWith("Start: {why}", { why: quoted(start?.text) }) }[start?.stage];
   const kind = flying ? (refused ? "refused" : "") : (start?.stage ?? "");
-  return html`<p class=${`outcome ${kind}`} role="status">${flying ? capital(flying) : words}</p>`;
+  return html`<p class=${`outcome ${kind}`} role="status">${flying ? quoted(flying, capital) : words}</p>`;
 }

@@ -1,5 +1,6 @@
 // The page Missions: choose what to fly, see what it takes, keep it, fly it, and fly the rest of what was cut.
 import { html, useEffect } from "../html.js";
+import { say } from "../language.js";
 import { shown, state } from "../store.js";
 import { ChooseCard } from "./choose_card.js";
 import { ChooseMap } from "./choose_map.js";
@@ -35,15 +36,15 @@ export default function MissionsPage() {
     };
   }, [key, waits]);
   if (!welcome) {
-    return html`<section class="card empty"><h2>No drone yet</h2>
-      <p>A mission is planned by the drone that flies it, on its own map. Start one:
+    return html`<section class="card empty"><h2>${say("No drone yet")}</h2>
+      <p>${say("A mission is planned by the drone that flies it, on its own map. Start one:")}
         <code>flightd sim --speed 1 --set ground.listen=127.0.0.1</code></p></section>`;
   }
   const estimate = known.estimate?.key === key ? known.estimate : null;
   return html`
     <div class="missions">
       <div class="missions-main">
-        <h2 class="missions-title">Missions <small>${known.name || "a new one"}</small></h2>
+        <h2 class="missions-title">${say("Missions")} <small>${known.name || say("a new one")}</small></h2>
         <${ChooseMap} floor=${welcome.floor} planned=${estimate?.planned} />
         <${ChooseCard} floor=${welcome.floor} />
       </div>

@@ -1,4 +1,5 @@
 // What the page Missions asks of the station, and has it do.
+import { english, say } from "../language.js";
 import { act, newId } from "../acts.js";
 import { askJson, askStation, isGivenUp } from "../fetching.js";
 import { shown, state } from "../store.js";
@@ -71,8 +72,9 @@ export async function saveChosen() {
 
 export async function duplicate(mission) {
   const names = new Set((missions().list ?? []).map(({ name }) => name));
-  let name = `${mission.name} copy`;
-  for (let i = 2; names.has(name); i += 1) name = `${mission.name} copy ${i}`;
+  const copy = say("{name} copy", { name: mission.name });
+  let name = copy;
+  for (let i = 2; names.has(name); i += 1) name = `${copy} ${i}`;
   const kept = await save({ ...mission, id: "", name });
   if (kept) open(kept);
 }
@@ -88,7 +90,7 @@ export async function fly({ nodes, levels, best, id }) {
   const { welcome, status } = shown();
   const given = { id: newId(), drone, nodes, levels, best_order: best, mission: id };
   const seen = { session: welcome?.session ?? "", seen_ns: status?.stamp_ns ?? 0 };
-  change({ flying: "Handing the nodes to the drone …", refused: false });
+  change({ flying: english("Handing the nodes to the drone …"), refused: false });
   try {
     await handOver({ ...given, ...seen });
     await taken(given.id);
@@ -119,7 +121,7 @@ async function handOver(given) {
     const answer = await askStation("/api/missions/fly", { method: "POST", headers: JSON_BODY, goesOn: true, body });
     if (answer.ok) return;
     const { refused } = await answer.json().catch(() => ({}));
-    if (answer.status !== 503 || performance.now() > until) throw new Error(refused ?? `the ground station answers ${answer.status}`);
+    if (answer.status !== 503 || performance.now() > until) throw new Error(refused ?? english("the ground station answers {status}", { status: answer.status }));
     await passed(AGAIN_MS);
   }
 }
@@ -129,7 +131,7 @@ const passed = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 async function taken(plan) {
   const until = performance.now() + TAKEN_MS;
   while (shown().status?.plan !== plan) {
-    if (performance.now() > until) throw new Error("the drone has not taken the nodes: look at its events on Live");
+    if (performance.now() > until) throw new Error(english("the drone has not taken the nodes: look at its events on Live"));
     await passed(LOOK_MS);
   }
 }
@@ -138,10 +140,12 @@ async function taken(plan) {
 export async function recount(store, places) {
   const query = new URLSearchParams([["store", store], ...places.map((place) => ["place", place])]);
   const { nodes, levels, without } = await askJson(`/api/missions/recount?${query}`);
-  if (!nodes.length) throw new Error("nobody knows from which node these places are seen");
+  if (!nodes.length) throw new Error(english("nobody knows from which node these places are seen"));
   const floor = shown().welcome?.floor;
-  const lost = without.length ? `; ${without.length} of them have no node and are left out` : "";
-  const note = `Counts ${places.length - without.length} places of the inventory again${lost}.`;
-  const name = places.length === 1 ? `Recount ${places[0]}` : `Recount ${places.length} places`;
+  const counted = { n: places.length - without.length, lost: without.length };
+  const note = without.length
+    ? english("Counts {n} places of the inventory again; {lost} more have no node and are left out.", counted)
+    : english("Counts {n} places of the inventory again.", counted);
+  const name = places.length === 1 ? say("Recount {place}", { place: places[0] }) : say("Recount {n} places", { n: places.length });
   change({ site: floor?.name ?? "", id: "", name, nodes, levels, best: true, note, flying: "", trouble: "", list: null });
 }

@@ -1,5 +1,6 @@
 // A map under the editor's hands: {site, lists: {aisle: [{values, at}], …}, text}.  Functions here give new drafts
 // and leave the old ones as they are; what the station said of a draft is never worked out here.
+import { say } from "../language.js";
 
 export const LISTS = ["aisle", "cross", "blocked", "keep_out", "rack", "pad", "marker"];
 
@@ -134,15 +135,15 @@ function changed(row, key, value) {
 // How an element is called in lists and headings.
 export function titleOf(draft, { table, index }) {
   const values = valuesOf(draft, { table, index }) ?? {};
-  const pair = (values.nodes ?? []).join(" to ");
+  const pair = (values.nodes ?? []).join(` ${say("to")} `);
   switch (table) {
-    case "site": return `Site ${values.name ?? ""}`;
-    case "aisle": return `Aisle ${values.id ?? "?"}`;
-    case "cross": return `Cross ${pair}`;
-    case "blocked": return `Blocked ${pair}`;
-    case "keep_out": return `Keep-out ${index + 1}`;
-    case "rack": return `Rack ${index + 1}`;
-    case "pad": return `Pad ${values.id ?? "?"}`;
-    default: return `Marker ${values.id ?? "?"}`;
+    case "site": return say("Site {site}", { site: values.name ?? "" });
+    case "aisle": return say("Aisle {id}", { id: values.id ?? "?" });
+    case "cross": return say("Cross {pair}", { pair });
+    case "blocked": return say("Blocked {pair}", { pair });
+    case "keep_out": return say("Keep-out {number}", { number: index + 1 });
+    case "rack": return say("Rack {rack}", { rack: index + 1 });
+    case "pad": return say("Pad {id}", { id: values.id ?? "?" });
+    default: return say("Marker {id}", { id: values.id ?? "?" });
   }
 }

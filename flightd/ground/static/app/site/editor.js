@@ -1,5 +1,6 @@
 // One site: its orders, the drawing in the middle, elements beside it, the check under them.
 import { html, useEffect, useState } from "../html.js";
+import { dateFormat, english, quoted, say } from "../language.js";
 import { CoverageCard } from "./coverage_card.js";
 import { ElementCard, remove } from "./element_card.js";
 import { ElementList } from "./element_list.js";
@@ -9,8 +10,8 @@ import { zoomBy } from "./zoom.js";
 import { checkSoon, download, openFile, save, showVersion } from "./site_source.js";
 import { change, isChanged, redo, site, undo } from "./site_state.js";
 
-const EXPORTS = [["toml", "Site file (TOML)"], ["lif", "VDMA LIF"], ["csv", "Nodes (CSV)"], ["locations", "Location codes (CSV)"], ["svg", "Floor plan (SVG)"]];
-const SNAPS = [[0, "off"], [0.01, "1 cm"], [0.05, "5 cm"], [0.1, "10 cm"], [0.5, "50 cm"]];
+const EXPORTS = [["toml", english("Site file (TOML)")], ["lif", english("VDMA LIF")], ["csv", english("Nodes (CSV)")], ["locations", english("Location codes (CSV)")], ["svg", english("Floor plan (SVG)")]];
+const SNAPS = [[0, english("off")], [0.01, "1 cm"], [0.05, "5 cm"], [0.1, "10 cm"], [0.5, "50 cm"]];
 
 export function Editor() {
   const { draft, camera, withCamera, name, trouble, said, notes, losesComments } = site();
@@ -19,11 +20,11 @@ export function Editor() {
   return html`
     <div class="site-editor">
       <${Head} />
-      ${trouble && html`<p class="site-trouble" role="alert">${trouble}</p>`}
-      <p class="quiet site-said" role="status">${said}</p>
-      ${losesComments && html`<p class="site-trouble">${name} is not written as [site] and [[…]] tables: saving writes it anew, and its comments move to the top.</p>`}
+      ${trouble && html`<p class="site-trouble" role="alert">${quoted(trouble)}</p>`}
+      <p class="quiet site-said" role="status">${quoted(said)}</p>
+      ${losesComments && html`<p class="site-trouble">${say("{file} is not written as [site] and [[…]] tables: saving writes it anew, and its comments move to the top.", { file: name })}</p>`}
       ${notes.length > 0 && html`<${Notes} notes=${notes} />`}
-      <section class="card site-drawing" aria-labelledby="drawing"><h3 id="drawing" class="unseen">Drawing</h3><${Plan} /><${Foot} /></section>
+      <section class="card site-drawing" aria-labelledby="drawing"><h3 id="drawing" class="unseen">${say("Drawing")}</h3><${Plan} /><${Foot} /></section>
       <${ElementList} />
       <div class="site-beside"><${FindingsCard} /><${ElementCard} /><${CoverageCard} /></div>
     </div>
@@ -31,8 +32,8 @@ export function Editor() {
 }
 
 function Notes({ notes }) {
-  return html`<div class="obstacles site-notes"><p>Before you go on:</p><ul>${notes.map((note) => html`<li key=${note}>${note}</li>`)}</ul>
-    <button class="order" onClick=${() => change({ notes: [] })}>Understood</button></div>`;
+  return html`<div class="obstacles site-notes"><p>${say("Before you go on:")}</p><ul>${notes.map((note) => html`<li key=${note}>${quoted(note)}</li>`)}</ul>
+    <button class="order" onClick=${() => change({ notes: [] })}>${say("Understood")}</button></div>`;
 }
 
 function Head() {
@@ -51,24 +52,24 @@ function Head() {
   };
   return html`
     <form class="site-head" onSubmit=${onSave}>
-      <h2>${draft.site.name ?? "Site"} <small>${name || "new, no file yet"}${stamp && isChanged() ? ", changed" : ""}</small></h2>
+      <h2>${draft.site.name ?? say("Site")} <small>${name || say("new, no file yet")}${stamp && isChanged() ? `, ${say("changed")}` : ""}</small></h2>
       <div class="site-orders">
-        <button type="button" class="order" disabled=${!past.length} title="Ctrl Z" onClick=${undo}>Undo</button>
-        <button type="button" class="order" disabled=${!future.length} title="Ctrl Shift Z" onClick=${redo}>Redo</button>
-        ${asked !== null && html`<label class="field">File <input value=${asked} maxlength="85" onInput=${(event) => setNewName(event.target.value)} /></label>`}
-        <button class="order main-order" disabled=${busy || (asked === null && !isChanged())} title="Ctrl S">${busy ? "Wait …" : "Save"}</button>
-        ${stamp && html`<button type="button" class="order" aria-expanded=${asked !== null} onClick=${() => setNewName(asked === null ? suggested : null)}>${asked === null ? "Save as" : "Not as another"}</button>`}
-        <${Menu} words="Export" options=${EXPORTS} onChoice=${download} />
-        ${site().versions.length > 0 && html`<${Menu} words="Old versions" options=${site().versions.map((at) => [at, whenOf(at)])} onChoice=${showVersion} />`}
-        ${stamp && html`<button type="button" class="order" onClick=${() => openFile(name)}>Open anew</button>`}
-        <a class="order as-link" href="/site">All sites</a>
+        <button type="button" class="order" disabled=${!past.length} title=${say("Ctrl Z")} onClick=${undo}>${say("Undo")}</button>
+        <button type="button" class="order" disabled=${!future.length} title=${say("Ctrl Shift Z")} onClick=${redo}>${say("Redo")}</button>
+        ${asked !== null && html`<label class="field">${say("File")} <input value=${asked} maxlength="85" onInput=${(event) => setNewName(event.target.value)} /></label>`}
+        <button class="order main-order" disabled=${busy || (asked === null && !isChanged())} title=${say("Ctrl S")}>${busy ? say("Wait …") : say("Save")}</button>
+        ${stamp && html`<button type="button" class="order" aria-expanded=${asked !== null} onClick=${() => setNewName(asked === null ? suggested : null)}>${asked === null ? say("Save as") : say("Not as another")}</button>`}
+        <${Menu} words=${say("Export")} options=${EXPORTS} onChoice=${download} />
+        ${site().versions.length > 0 && html`<${Menu} words=${say("Old versions")} options=${site().versions.map((at) => [at, whenOf(at)])} onChoice=${showVersion} />`}
+        ${stamp && html`<button type="button" class="order" onClick=${() => openFile(name)}>${say("Open anew")}</button>`}
+        <a class="order as-link" href="/site">${say("All sites")}</a>
       </div>
     </form>
   `;
 }
 
-const WHEN = new Intl.DateTimeFormat([], { month: "short", day: "numeric", hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" });
-const whenOf = (at) => `replaced ${WHEN.format(new Date(at.replace(/T(\d\d)-(\d\d)-/, "T$1:$2:")))}`;
+const WHEN = dateFormat({ month: "short", day: "numeric", hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" });
+const whenOf = (at) => say("replaced {when}", { when: WHEN.format(new Date(at.replace(/T(\d\d)-(\d\d)-/, "T$1:$2:"))) });
 
 // A list that does something with what is chosen, and then shows its heading again.
 function Menu({ words, options, onChoice }) {
@@ -77,23 +78,23 @@ function Menu({ words, options, onChoice }) {
     event.target.value = "";
     if (value) onChoice(value);
   };
-  return html`<select class="order menu" aria-label=${words} value="" onChange=${choose}><option value="">${words} …</option>${options.map(([value, text]) => html`<option key=${value} value=${value}>${text}</option>`)}</select>`;
+  return html`<select class="order menu" aria-label=${words} value="" onChange=${choose}><option value="">${words} …</option>${options.map(([value, text]) => html`<option key=${value} value=${value}>${say(text)}</option>`)}</select>`;
 }
 
 function Foot() {
   const { snap_m: snap, tool, sound, checked, zoom } = site();
   return html`
     <div class="site-foot">
-      <label class="field snap">Snap to <select value=${snap} onChange=${(event) => change({ snap_m: Number(event.target.value) })}>${SNAPS.map(([value, words]) => html`<option key=${value} value=${value}>${words}</option>`)}</select></label>
-      <div class="zoom" role="group" aria-label="Zoom">
-        <button class="order" aria-label="Larger" onClick=${() => zoomBy(1.5)}>+</button>
-        <button class="order" aria-label="Smaller" disabled=${zoom <= 1} onClick=${() => zoomBy(1 / 1.5)}>−</button>
-        <button class="order" disabled=${zoom <= 1} onClick=${() => zoomBy(0)}>Whole</button>
+      <label class="field snap">${say("Snap to")} <select value=${snap} onChange=${(event) => change({ snap_m: Number(event.target.value) })}>${SNAPS.map(([value, words]) => html`<option key=${value} value=${value}>${say(words)}</option>`)}</select></label>
+      <div class="zoom" role="group" aria-label=${say("Zoom")}>
+        <button class="order" aria-label=${say("Larger")} onClick=${() => zoomBy(1.5)}>+</button>
+        <button class="order" aria-label=${say("Smaller")} disabled=${zoom <= 1} onClick=${() => zoomBy(1 / 1.5)}>−</button>
+        <button class="order" disabled=${zoom <= 1} onClick=${() => zoomBy(0)}>${say("Whole")}</button>
       </div>
-      ${tool && html`<button class="order" onClick=${() => change({ tool: "", picked: "", sketch: null, said: "" })}>Stop drawing</button>`}
-      ${isLost(sound) && html`<p class="quiet lost-words"><i /> is not read</p>`}
-      ${sound && checked?.sound === false && html`<p class="quiet">In pale colours: the map as it was sound last.</p>`}
-      <p class="quiet">Drag aisles, nodes, pads, markers and keep-outs. x runs along the aisles, y to its right; the grid is ${sound && Math.max(sound.facts.length_m, sound.facts.width_m) > 57 ? "10 m" : "1 m"}.</p>
+      ${tool && html`<button class="order" onClick=${() => change({ tool: "", picked: "", sketch: null, said: "" })}>${say("Stop drawing")}</button>`}
+      ${isLost(sound) && html`<p class="quiet lost-words"><i /> ${say("is not read")}</p>`}
+      ${sound && checked?.sound === false && html`<p class="quiet">${say("In pale colours: the map as it was sound last.")}</p>`}
+      <p class="quiet">${say("Drag aisles, nodes, pads, markers and keep-outs. x runs along the aisles, y to its right; the grid is {step}.", { step: sound && Math.max(sound.facts.length_m, sound.facts.width_m) > 57 ? "10 m" : "1 m" })}</p>
     </div>
   `;
 }

@@ -1,8 +1,9 @@
 // The form of the element that is chosen: every number can be typed; an aisle's nodes are listed one by one.
 import { html } from "../html.js";
+import { say, sayWith } from "../language.js";
 import { placesOf, rounded, rowsOf, titleOf, valuesOf, withAisleNamed, withNodeAfter, withNodeAt, without, withoutNode, withValues } from "./draft.js";
 import { Field } from "./field.js";
-import { FIELDS, ONE_OF } from "./fields.js";
+import { FIELDS, REMOVE } from "./fields.js";
 import { focusOn } from "./hand.js";
 import { RackSketch } from "./rack_sketch.js";
 import { choose, edit, site } from "./site_state.js";
@@ -22,7 +23,7 @@ export function ElementCard() {
     <section class="card element" aria-labelledby="element">
       <div class="element-head">
         <h3 id="element" tabindex="-1">${titleOf(draft, chosen)}</h3>
-        ${table !== "site" && html`<button class="order" onClick=${remove}>Remove ${ONE_OF[table]}</button>`}
+        ${table !== "site" && html`<button class="order" onClick=${remove}>${say(REMOVE[table])}</button>`}
       </div>
       <div class="element-fields">
         ${FIELDS[table].map((field) => html`<${Field} key=${`${table}${index}${field.key}${field.at ?? ""}`} field=${field} values=${values} index=${index} onValue=${onValue} />`)}
@@ -52,13 +53,13 @@ function Nodes({ values, index, chosen }) {
   const to = (number, x) => x !== undefined && edit(withNodeAt(draft, index, number, x), { what: `node ${index} ${number}` });
   return html`
     <details class="nodes" open=${at !== null}>
-      <summary>${places.length} nodes</summary>
+      <summary>${say("{n} node|{n} nodes", { n: places.length })}</summary>
       <ul>
         ${places.map((x, number) => html`
           <li key=${number} class=${number === at ? "chosen" : ""} onFocusIn=${() => number !== at && choose("aisle", index, number)}>
             <${Field} field=${field(number)} values=${{ [`node${number}`]: rounded(x) }} onValue=${(changes) => to(number, changes[`node${number}`])} />
-            <button class="order" aria-label=${`Add a node after ${values.id}${number + 1}`} onClick=${() => edit(withNodeAfter(draft, index, number), { chosen: { ...chosen, node: number + 1 } })}>Add after</button>
-            <button class="order" aria-label=${`Remove node ${values.id}${number + 1}`} disabled=${places.length < 3} onClick=${() => edit(withoutNode(draft, index, number), { chosen: { ...chosen, node: null } })}>Remove</button>
+            <button class="order" aria-label=${say("Add a node after {node}", { node: `${values.id}${number + 1}` })} onClick=${() => edit(withNodeAfter(draft, index, number), { chosen: { ...chosen, node: number + 1 } })}>${say("Add after")}</button>
+            <button class="order" aria-label=${say("Remove node {node}", { node: `${values.id}${number + 1}` })} disabled=${places.length < 3} onClick=${() => edit(withoutNode(draft, index, number), { chosen: { ...chosen, node: null } })}>${say("Remove")}</button>
           </li>
         `)}
       </ul>
@@ -70,5 +71,7 @@ function Codes({ index }) {
   const { sound, checked, checkedDraft, draft } = site();
   const codes = sound?.codes[index];
   if (!codes || !checked?.sound || rowsOf(checkedDraft, "rack").length !== rowsOf(draft, "rack").length) return null;
-  return html`<p class="quiet" role="status">${codes.bays} bays, ${codes.places} places${codes.places > 0 && html`: <code>${codes.first}</code> to <code>${codes.last}</code>`}</p>`;
+  const [first, last] = [codes.first, codes.last].map((code) => html`<code>${code}</code>`);
+  const words = say("{bays} bays, {places} places", codes);
+  return html`<p class="quiet" role="status">${words}${codes.places > 0 && [": ", sayWith("{first} to {last}", { first, last })]}</p>`;
 }

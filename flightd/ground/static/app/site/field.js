@@ -1,5 +1,6 @@
 // One input of an element's form: what is typed is taken when it is left or Enter is pressed.
 import { html, useState } from "../html.js";
+import { english, say } from "../language.js";
 import { nodesOf, rounded, rowsOf } from "./draft.js";
 import { PaintInput } from "./paint_field.js";
 import { site } from "./site_state.js";
@@ -18,24 +19,24 @@ function Typed({ field, shown, onText, at = null }) {
   const id = fieldId(field.key, at);
   const leave = ({ target }) => {
     const problem = (target.value !== shown && onText(target.value.trim())) || "";
-    target.setCustomValidity(problem); // a form around it is not sent then
+    target.setCustomValidity(say(problem)); // a form around it is not sent then
     setText(problem ? target.value : null);
     setWrong(problem);
   };
   return html`
-    <label class="field" for=${id}><span>${field.words}${field.unit && html` <small>${field.unit}</small>`}</span>
+    <label class="field" for=${id}><span>${say(field.words)}${field.unit && html` <small>${field.unit}</small>`}</span>
       <input
-        id=${id} value=${text ?? shown} placeholder=${field.placeholder ?? ""} inputmode=${field.kind === "text" ? "text" : "decimal"} autocomplete="off"
+        id=${id} value=${text ?? shown} placeholder=${field.placeholder ? say(field.placeholder) : ""} inputmode=${field.kind === "text" ? "text" : "decimal"} autocomplete="off"
         aria-invalid=${wrong ? "true" : null} aria-describedby=${wrong ? `${id}-wrong` : null}
         onInput=${(event) => setText(event.target.value)} onChange=${leave} onBlur=${leave}
       />
-      ${wrong && html`<span id=${`${id}-wrong`} class="refusal" role="alert">${wrong}</span>`}
+      ${wrong && html`<span id=${`${id}-wrong`} class="refusal" role="alert">${say(wrong)}</span>`}
     </label>
   `;
 }
 
 const asNumber = (text) => (/^[-+]?(\d+([.,]\d*)?|[.,]\d+)$/.test(text) ? Number(text.replace(",", ".")) : NaN);
-const NO_NUMBER = "A number, as in 1.5";
+const NO_NUMBER = english("A number, as in 1.5");
 const told = (value) => (value === undefined || value === null ? "" : String(value));
 
 function NumberInput({ field, values, set }) {
@@ -55,7 +56,7 @@ function NumbersInput({ field, values, set }) {
   const now = values[field.key];
   const onText = (text) => {
     const parts = text.split(/[;\s]+|,\s+|,(?=\d*\.)/).filter(Boolean).map((part) => asNumber(part.replace(/,$/, "")));
-    return parts.some(Number.isNaN) || !parts.length ? "Numbers with blanks between, as in 1.5 1.8" : set(parts);
+    return parts.some(Number.isNaN) || !parts.length ? english("Numbers with blanks between, as in 1.5 1.8") : set(parts);
   };
   return html`<${Typed} field=${{ ...field, kind: "text" }} shown=${Array.isArray(now) ? now.join(" ") : told(now)} onText=${onText} />`;
 }
@@ -87,17 +88,17 @@ function PitchInput({ field, values, index, onValue }) {
 function CheckInput({ field, values, set }) {
   const id = fieldId(field.key);
   const on = values[field.key] ?? field.normal;
-  return html`<label class="check" for=${id}><input id=${id} type="checkbox" checked=${on} onChange=${(event) => set(event.target.checked)} /> ${field.words}</label>`;
+  return html`<label class="check" for=${id}><input id=${id} type="checkbox" checked=${on} onChange=${(event) => set(event.target.checked)} /> ${say(field.words)}</label>`;
 }
 
 function Select({ field, at, value, options, onChoice }) {
   const id = fieldId(field.key, at);
   const known = options.some(([one]) => one === value);
   return html`
-    <label class="field" for=${id}>${field.words}
+    <label class="field" for=${id}>${say(field.words)}
       <select id=${id} value=${value} onChange=${(event) => onChoice(event.target.value)}>
-        ${!known && html`<option value=${value}>${value || "choose"}</option>`}
-        ${options.map(([one, words]) => html`<option key=${one} value=${one}>${words}</option>`)}
+        ${!known && html`<option value=${value}>${value || say("choose")}</option>`}
+        ${options.map(([one, words]) => html`<option key=${one} value=${one}>${say(words)}</option>`)}
       </select>
     </label>
   `;
@@ -108,7 +109,7 @@ function ChoiceInput({ field, values, set }) {
 }
 
 function Paint({ field, values, set }) {
-  return html`<${PaintInput} id=${fieldId(field.key)} words=${field.words} paint=${told(values[field.key] ?? field.normal)} set=${set} />`;
+  return html`<${PaintInput} id=${fieldId(field.key)} words=${say(field.words)} paint=${told(values[field.key] ?? field.normal)} set=${set} />`;
 }
 
 function NodeInput({ field, values, set }) {
@@ -122,13 +123,13 @@ function NodeInput({ field, values, set }) {
 function Boxes({ field, all, on, set }) {
   const turn = (one, isOn) => set(all.filter((other) => (other === one ? isOn : on.includes(other))));
   return html`
-    <fieldset class="boxes" id=${fieldId(field.key)} tabindex="-1"><legend>${field.words}</legend>
-      ${all.map((one) => html`<label key=${one} class="check"><input type="checkbox" checked=${on.includes(one)} onChange=${(event) => turn(one, event.target.checked)} /> ${one}</label>`)}
+    <fieldset class="boxes" id=${fieldId(field.key)} tabindex="-1"><legend>${say(field.words)}</legend>
+      ${all.map((one) => html`<label key=${one} class="check"><input type="checkbox" checked=${on.includes(one)} onChange=${(event) => turn(one, event.target.checked)} /> ${say(one)}</label>`)}
     </fieldset>
   `;
 }
 
-const SIDES = ["left", "right"];
+const SIDES = [english("left"), english("right")];
 function SidesInput({ field, values, set }) {
   return html`<${Boxes} field=${field} all=${SIDES} on=${values[field.key] ?? SIDES} set=${set} />`;
 }
@@ -138,7 +139,7 @@ function AislesInput({ field, values, set }) {
   const all = rowsOf(site().draft, "aisle").map((row) => row.values.id);
   const isAll = values.aisles === undefined;
   return html`
-    <label class="check"><input type="checkbox" checked=${isAll} onChange=${(event) => set(event.target.checked ? undefined : all)} /> All aisles with shelves on these sides</label>
+    <label class="check"><input type="checkbox" checked=${isAll} onChange=${(event) => set(event.target.checked ? undefined : all)} /> ${say("All aisles with shelves on these sides")}</label>
     ${!isAll && html`<${Boxes} field=${field} all=${[...new Set([...all, ...values.aisles])]} on=${values.aisles} set=${set} />`}
   `;
 }

@@ -1,40 +1,44 @@
 // What the check says, beside the drawing: each finding leads to its element.
 import { html } from "../html.js";
+import { english, plain, quoted, say } from "../language.js";
 import { fieldId } from "./field.js";
 import { FIELDS } from "./fields.js";
 import { nodesOf, rowsOf } from "./draft.js";
 import { focusOn } from "./hand.js";
 import { choose, site } from "./site_state.js";
 
-const KINDS = { error: "Mistake", problem: "Not read", note: "Note" };
+const KINDS = { error: english("Mistake"), problem: english("Not read"), note: english("Note") };
 
 export function FindingsCard() {
   const { checked, checkedDraft, draft } = site();
   const isOld = checkedDraft !== draft;
-  const words = !checked || isOld ? "Checking …" : checked.sound ? "Sound: a drone can fly by it." : "Not sound yet: no drone can fly by it.";
+  const words = !checked || isOld ? say("Checking …") : checked.sound ? say("Sound: a drone can fly by it.") : say("Not sound yet: no drone can fly by it.");
   return html`
     <section class="card findings" aria-labelledby="findings">
-      <h3 id="findings">Check</h3>
+      <h3 id="findings">${say("Check")}</h3>
       <p class=${!checked || isOld ? "quiet" : checked.sound ? "ready" : "refusal"} role="status">${words}</p>
       ${checked?.findings.length > 0 && html`
-        <ul class="finding-list" aria-label="Findings">
+        <ul class="finding-list" aria-label=${say("Findings")}>
           ${checked.findings.map((finding, i) => html`<li key=${i}><${Finding} finding=${finding} /></li>`)}
         </ul>
       `}
-      ${checked?.sound && html`<details><summary>In figures</summary><${Facts} facts=${checked.facts} /></details>`}
+      ${checked?.sound && html`<details><summary>${say("In figures")}</summary><${Facts} facts=${checked.facts} /></details>`}
     </section>
   `;
 }
 
 function Facts({ facts }) {
-  const size = `${facts.length_m} × ${facts.width_m} m`;
-  const told = [["floor", size], ["nodes", facts.nodes], ["places", facts.locations], ["paint", `${facts.paint_m} m`], ["whole route", `${facts.route_m} m`], ["closed lines", facts.closed]];
+  const size = `${plain(facts.length_m)} × ${plain(facts.width_m)} m`;
+  const told = [
+    [say("floor"), size], [say("nodes"), facts.nodes], [say("places"), facts.locations], [say("paint"), `${plain(facts.paint_m)} m`],
+    [say("whole route"), `${plain(facts.route_m)} m`], [say("closed lines"), facts.closed],
+  ];
   return html`<dl class="site-facts">${told.map(([name, value]) => html`<div key=${name}><dt>${name}</dt><dd>${value}</dd></div>`)}</dl>`;
 }
 
 function Finding({ finding }) {
   const place = placeOf(finding);
-  const body = html`<b class=${`finding-${finding.kind}`}>${KINDS[finding.kind]}</b> ${finding.text}`;
+  const body = html`<b class=${`finding-${finding.kind}`}>${say(KINDS[finding.kind])}</b> ${quoted(finding.text)}`;
   return place ? html`<button class="finding" onClick=${() => lead(place, finding)}>${body}</button>` : html`<p class="finding">${body}</p>`;
 }
 

@@ -1,4 +1,5 @@
 // The mouse, a finger and the arrow keys on the drawing: choosing, moving, drawing anew.
+import { english } from "../language.js";
 import { nodesOf, rounded, rowsOf, valuesOf, withNew, withNodeAt, withValues } from "./draft.js";
 import { freshValues } from "./new_elements.js";
 import { change, choose, drag, dropped, edit, site } from "./site_state.js";
@@ -111,7 +112,7 @@ function drawn(tool, from, to, id) {
   change({ sketch: null });
   if (NODES_TOOLS.has(tool)) {
     if (!id) return;
-    if (!picked || picked === id) change({ picked: id, said: `${id}: now click the other node.` });
+    if (!picked || picked === id) change({ picked: id, said: english("{id}: now click the other node.", { id }) });
     else add(tool, { nodes: [picked, id] });
     return;
   }

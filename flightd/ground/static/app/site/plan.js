@@ -1,5 +1,6 @@
 // The drawing: the floor as the station laid it out last, and over it what can be taken and moved.
 import { html, useMemo, useRef } from "../html.js";
+import { say } from "../language.js";
 import { Floor } from "../live/site_plan.js";
 import { nodesOf, placesOf, rowsOf } from "./draft.js";
 import { Fronts } from "./fronts.js";
@@ -23,7 +24,7 @@ export function Plan() {
   return html`
     <svg
       class=${`site-plan ${tool ? "drawing" : ""}`} viewBox=${view.map((value) => value * M).join(" ")} style=${{ "--scale": scale }}
-      tabindex="0" role="group" aria-label="Drawing. Arrow keys move what is chosen, Shift and an arrow ten times as far; everything is in the list of elements, too."
+      tabindex="0" role="group" aria-label=${say("Drawing. Arrow keys move what is chosen, Shift and an arrow ten times as far; everything is in the list of elements, too.")}
       onKeyDown=${nudge} onPointerDown=${begin} onPointerMove=${move} onPointerUp=${release} onPointerCancel=${release}
     >
       <${Grid} view=${view} />

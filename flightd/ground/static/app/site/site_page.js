@@ -1,5 +1,6 @@
 // The page Site: the sites at /site, a new one at /site/new, one in the editor at /site/edit?name=FILE.
 import { html, useEffect } from "../html.js";
+import { quoted, say } from "../language.js";
 import { useTitle } from "../router.js";
 import { Editor } from "./editor.js";
 import { NewSite } from "./new_site.js";
@@ -19,9 +20,9 @@ function Edited({ name }) {
     if (!list) loadList();
     if (name && name !== site().name) openFile(name);
   }, [name]);
-  useTitle(name || "New site");
+  useTitle(name || say("New site"));
   const isHere = draft && (!name || opened === name);
   if (isHere) return html`<${Editor} />`;
-  if (name && !trouble) return html`<p class="loading quiet" role="status">Loading …</p>`;
-  return html`<section class="card empty"><h2>${trouble ? "It cannot be opened" : "No site is open"}</h2><p>${trouble} <a href="/site">All sites</a></p></section>`;
+  if (name && !trouble) return html`<p class="loading quiet" role="status">${say("Loading …")}</p>`;
+  return html`<section class="card empty"><h2>${trouble ? say("It cannot be opened") : say("No site is open")}</h2><p>${quoted(trouble)} <a href="/site">${say("All sites")}</a></p></section>`;
 }

@@ -1,4 +1,5 @@
 // What the page asks of the station: files, checks, saving, other programs' files.
+import { english } from "../language.js";
 import { askJson, askStation, isGivenUp } from "../fetching.js";
 import { begin, change, edit, site } from "./site_state.js";
 
@@ -53,7 +54,7 @@ export const showVersion = (version) =>
   tried(async () => {
     const told = await askJson(`/api/site/version?name=${named(site().name)}&version=${named(version)}`);
     edit(told.draft, { chosen: { table: "site", index: 0, node: null } });
-    change({ said: `The version of ${version.slice(0, 10)} is shown. Save puts it back.` });
+    change({ said: english("The version of {day} is shown. Save puts it back.", { day: version.slice(0, 10) }) });
   });
 
 // Save under the file's own name, or as a new file.
@@ -65,7 +66,7 @@ export async function save(newName = "") {
     const told = await askJson(`/api/site/file?name=${named(to)}`, sent({ draft, stamp: isNew ? "" : stamp }, "PUT"));
     const common = { name: to, stamp: told.stamp, versions: told.versions, losesComments: told.loses_comments, kept: told.draft };
     const isStill = site().draft === draft; // else it was edited on meanwhile, over the text of before
-    change({ ...common, ...(isStill && { draft: told.draft, checkedDraft: told.draft }), said: `Saved as ${to}. Fly it in simulation, in the station's folder: flightd sim --warehouse "${to}"` });
+    change({ ...common, ...(isStill && { draft: told.draft, checkedDraft: told.draft }), said: english("Saved as {file}. Fly it in simulation, in the station's folder: {command}", { file: to, command: `flightd sim --warehouse "${to}"` }) });
     loadListQuietly();
   });
 }

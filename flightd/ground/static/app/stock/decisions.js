@@ -1,4 +1,5 @@
 // What people decided about places that need a look, and which of them are still open.
+import { english } from "../language.js";
 import { signedInName } from "../access/session.js";
 import { newId } from "../acts.js";
 import { isGivenUp } from "../fetching.js";
@@ -7,11 +8,11 @@ import { byKey, change, differs, inOrder, sourceQuery, stock, tellTrouble } from
 
 export const DECISIONS = {
   __proto__: null,
-  looking: { order: "I look", name: "is looked at" },
-  put_right: { order: "Put right", name: "put right" },
-  count_again: { order: "Count again", name: "to be counted again" },
-  fine: { order: "Fine as it is", name: "fine as it is" },
-  open: { order: "Open again", name: "open again" },
+  looking: { order: english("I look"), name: english("is looked at") },
+  put_right: { order: english("Put right"), name: english("put right") },
+  count_again: { order: english("Count again"), name: english("to be counted again") },
+  fine: { order: english("Fine as it is"), name: english("fine as it is") },
+  open: { order: english("Open again"), name: english("open again") },
 };
 const NEEDS_A_LOOK = new Set(["several", "unreadable", "occluded", "contradicted"]);
 const CLOSING = new Set(["put_right", "fine"]);

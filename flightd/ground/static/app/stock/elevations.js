@@ -1,6 +1,7 @@
 // The fronts of the racks as who stands before them sees them, cell by cell, each with its state.
 import { html, useMemo } from "../html.js";
-import { COUNTED, placeWords, STATES } from "./states.js";
+import { language, say } from "../language.js";
+import { COUNTED, placeWords, rackWords, STATES } from "./states.js";
 import { differs, isShown, stock } from "./stock_state.js";
 import { neighbour, rowsOf } from "./walk.js";
 
@@ -21,7 +22,7 @@ function Front({ front, rows, onChoose }) {
   const here = front.spots.some(([code]) => code === chosen) ? chosen : "";
   return useMemo(
     () => drawn(front, rows, { places, here, fresh, states, found, expected }, onChoose),
-    [front, rows, places, here, fresh, states, found, expected],
+    [front, rows, places, here, fresh, states, found, expected, language()],
   );
 }
 
@@ -45,7 +46,7 @@ function drawn(front, rows, known, onChoose) {
   const wide = (rows[0]?.length ?? 0) > WIDE_COLUMNS || !front.placed;
   return html`
     <section class=${wide ? "card front wide" : "card front"} aria-label=${title}>
-      <h3>${title} <small>${counted} of ${front.spots.length} counted</small></h3>
+      <h3>${title} <small>${say("{counted} of {all} counted", { counted, all: front.spots.length })}</small></h3>
       <div class="rack-scroll" onClick=${onClick} onKeyDown=${onKeyDown}>
         ${front.placed ? rack(rows, known, inTabOrder) : html`<div class="loose">${rows[0].map((spot) => cell(spot, known, inTabOrder))}</div>`}
       </div>
@@ -57,9 +58,9 @@ function drawn(front, rows, known, onChoose) {
 export const placeCell = (code) => document.querySelector(`[data-code="${CSS.escape(code)}"]`);
 
 function titleOf({ aisle, side, placed }) {
-  if (!placed) return "Places whose rack is not known";
-  if (!aisle) return "Rack";
-  return side ? `Aisle ${aisle}, ${side}` : `Rack ${aisle}`;
+  if (!placed) return say("Places whose rack is not known");
+  if (!aisle) return say("Rack");
+  return rackWords(aisle, side);
 }
 
 function rack(rows, known, inTabOrder) {
@@ -96,7 +97,7 @@ function cell({ code }, known, inTabOrder) {
   if (known.fresh.has(code)) classes.push("fresh");
   if (!isShown(code, known)) classes.push("aside");
   if (differs(code, known.expected)) classes.push("differs");
-  const words = placeWords(code, place) + (differs(code, known.expected) ? ", not as expected" : "");
+  const words = placeWords(code, place) + (differs(code, known.expected) ? `, ${say("not as expected")}` : "");
   return html`
     <button
       key=${code}

@@ -2,9 +2,9 @@
 import { mayOperate } from "../access/session.js";
 import { isGivenUp } from "../fetching.js";
 import { html, useMemo, useState } from "../html.js";
+import { quoted, say } from "../language.js";
 import { recount } from "../missions/missions_source.js";
 import { goTo } from "../router.js";
-import { count } from "../words.js";
 import { DECISIONS, exceptions } from "./decisions.js";
 import { outcomeWords } from "./expected_card.js";
 import { STATES } from "./states.js";
@@ -23,10 +23,10 @@ export function ExceptionsCard({ onChoose }) {
   return html`
     <section class="card exceptions" aria-labelledby="exceptions">
       <div class="expected-head">
-        <h3 id="exceptions">${open.length ? `${count(open.length, "place")} to look at` : "Nothing to look at"}</h3>
+        <h3 id="exceptions">${open.length ? say("{n} place to look at|{n} places to look at", { n: open.length }) : say("Nothing to look at")}</h3>
         ${all.length > open.length &&
         html`<button class="order" aria-pressed=${known.withClosed} onClick=${() => change({ withClosed: !known.withClosed })}>
-          ${count(all.length - open.length, "closed place")}
+          ${say("{n} closed place|{n} closed places", { n: all.length - open.length })}
         </button>`}
       </div>
       ${mayOperate() && html`<${Recount} places=${recounted(open)} source=${known.source} />`}
@@ -36,7 +36,7 @@ export function ExceptionsCard({ onChoose }) {
           ${listed.slice(0, SHOWN).map((one) => html`<${Row} key=${one.code} ...${one} onChoose=${onChoose} />`)}
         </ol>
       `}
-      ${listed.length > SHOWN && html`<p class="quiet">and ${listed.length - SHOWN} more</p>`}
+      ${listed.length > SHOWN && html`<p class="quiet">${say("and {n} more", { n: listed.length - SHOWN })}</p>`}
     </section>
   `;
 }
@@ -60,8 +60,8 @@ function Recount({ places, source }) {
   };
   return html`
     <div class="recount">
-      <button class="order" onClick=${plan}>Recount ${count(places.length, "place")} as a mission</button>
-      ${trouble && html`<p class="refusal" role="alert">${trouble}</p>`}
+      <button class="order" onClick=${plan}>${say("Recount {n} place as a mission|Recount {n} places as a mission", { n: places.length })}</button>
+      ${trouble && html`<p class="refusal" role="alert">${quoted(trouble)}</p>`}
     </div>
   `;
 }
@@ -69,8 +69,8 @@ function Recount({ places, source }) {
 function Row({ code, decision, open, onChoose }) {
   const { places, expected, chosen } = stock();
   const place = places[code];
-  const matter = [STATES[place.state].name];
-  if (expected?.outcomes?.[code]) matter.push(`against the books: ${outcomeWords(expected.outcomes[code])}`);
+  const matter = [say(STATES[place.state].name)];
+  if (expected?.outcomes?.[code]) matter.push(say("against the books: {outcome}", { outcome: outcomeWords(expected.outcomes[code]) }));
   return html`
     <li>
       <button class=${open ? "exception" : "exception closed"} aria-pressed=${code === chosen} onClick=${() => onChoose(code)}>
@@ -78,7 +78,7 @@ function Row({ code, decision, open, onChoose }) {
         <strong>${code}</strong>
         <span>${matter.join(", ")}</span>
         ${decision && decision.what !== "open" &&
-        html`<span class="quiet">${DECISIONS[decision.what].name}, ${decision.who}${decision.note && `: ${decision.note}`}</span>`}
+        html`<span class="quiet">${say(DECISIONS[decision.what].name)}, ${decision.who}${decision.note && `: ${decision.note}`}</span>`}
       </button>
     </li>
   `;

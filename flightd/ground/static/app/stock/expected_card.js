@@ -1,19 +1,20 @@
 // The expected stock: upload, which column is what, and every difference to the count.
 import { html, useEffect, useRef } from "../html.js";
+import { english, quoted, say, sayWith } from "../language.js";
 import { choose, compareAgain, download, forget, upload } from "./expected_stock.js";
 import { stock } from "./stock_state.js";
 
 const OUTCOMES = {
   __proto__: null,
-  match: "as expected",
-  missing: "missing",
-  wrong: "another code there",
-  moved: "elsewhere",
-  unexpected: "unexpected",
-  empty_but_expected: "empty",
-  uncounted: "not countable",
+  match: english("as expected"),
+  missing: english("missing"),
+  wrong: english("another code there"),
+  moved: english("elsewhere"),
+  unexpected: english("unexpected"),
+  empty_but_expected: english("empty"),
+  uncounted: english("not countable"),
 };
-export const outcomeWords = (outcome) => OUTCOMES[outcome] ?? outcome;
+export const outcomeWords = (outcome) => say(OUTCOMES[outcome] ?? outcome);
 
 export function ExpectedCard({ onChoose }) {
   const { expected, source, tag } = stock();
@@ -25,14 +26,14 @@ export function ExpectedCard({ onChoose }) {
   return html`
     <section class="card expected" aria-labelledby="expected">
       <div class="expected-head">
-        <h3 id="expected">Expected stock</h3>
-        <${Choose} words=${expected ? "Another file" : "Upload CSV or XLSX"} />
-        ${expected && html`<button class="order" onClick=${forget}>Remove</button>`}
+        <h3 id="expected">${say("Expected stock")}</h3>
+        <${Choose} words=${expected ? say("Another file") : say("Upload CSV or XLSX")} />
+        ${expected && html`<button class="order" onClick=${forget}>${say("Remove")}</button>`}
       </div>
       ${!expected &&
-      html`<p class="quiet">What your books say lies where. It is compared with the count here, and kept nowhere.</p>`}
-      ${expected?.busy && html`<p class="quiet" role="status">Comparing ${expected.name} …</p>`}
-      ${expected?.trouble && html`<p class="refusal" role="alert">${expected.name}: ${expected.trouble}</p>`}
+      html`<p class="quiet">${say("What your books say lies where. It is compared with the count here, and kept nowhere.")}</p>`}
+      ${expected?.busy && html`<p class="quiet" role="status">${say("Comparing {file} …", { file: expected.name })}</p>`}
+      ${expected?.trouble && html`<p class="refusal" role="alert">${expected.name}: ${quoted(expected.trouble)}</p>`}
       ${expected?.columns && html`<${Columns} /><${Outcomes} /><${Differences} onChoose=${onChoose} />`}
     </section>
   `;
@@ -57,21 +58,21 @@ function Columns() {
   const pick = (role, words, optional) => html`
     <label class="field">${words}
       <select value=${chosen[role] ?? ""} onChange=${(event) => choose({ [role]: event.target.value === "" ? null : Number(event.target.value) })}>
-        ${optional && html`<option value="">none</option>`}
+        ${optional && html`<option value="">${say("none")}</option>`}
         ${columns.map((column, i) => html`<option key=${i} value=${i}>${column}</option>`)}
       </select>
     </label>
   `;
-  const roles = { [chosen.place]: "place", [chosen.code]: "code", [chosen.quantity ?? -1]: "quantity" };
+  const roles = { [chosen.place]: say("place"), [chosen.code]: say("code"), [chosen.quantity ?? -1]: say("quantity") };
   return html`
-    <p class="quiet">${name}: ${kind}, ${rows} rows</p>
+    <p class="quiet">${say("{name}: {kind}, {n} row|{name}: {kind}, {n} rows", { name, kind, n: rows })}</p>
     <div class="find-row">
-      ${pick("place", "Places are in")}${pick("code", "Codes are in")}${pick("quantity", "Quantities are in", true)}
-      <label class="check"><input type="checkbox" checked=${chosen.heading} onChange=${(event) => choose({ heading: event.target.checked })} /> The first row names the columns</label>
+      ${pick("place", say("Places are in"))}${pick("code", say("Codes are in"))}${pick("quantity", say("Quantities are in"), true)}
+      <label class="check"><input type="checkbox" checked=${chosen.heading} onChange=${(event) => choose({ heading: event.target.checked })} /> ${say("The first row names the columns")}</label>
     </div>
     <details>
-      <summary>The first rows</summary>
-      <div class="table-scroll" tabindex="0" role="group" aria-label="The first rows">
+      <summary>${say("The first rows")}</summary>
+      <div class="table-scroll" tabindex="0" role="group" aria-label=${say("The first rows")}>
         <table>
           <thead><tr>${columns.map((column, i) => html`<th key=${i} scope="col">${column}${roles[i] && html` <small>${roles[i]}</small>`}</th>`)}</tr></thead>
           <tbody>${sample.map((row, i) => html`<tr key=${i}>${row.map((cell, j) => html`<td key=${j}>${cell}</td>`)}</tr>`)}</tbody>
@@ -86,12 +87,12 @@ function Problems() {
   const { expected } = stock();
   return html`
     <${LeftOut}
-      title=${(many) => (many === 1 ? "One row is left out:" : `${many} rows are left out:`)}
+      title=${english("One row is left out:|{n} rows are left out:")}
       lines=${expected.problems}
       total=${expected.problem_count}
     />
     <${LeftOut}
-      title=${(many) => (many === 1 ? "One place of the file is not in this inventory:" : `${many} places of the file are not in this inventory:`)}
+      title=${english("One place of the file is not in this inventory:|{n} places of the file are not in this inventory:")}
       lines=${expected.unknown_places}
       total=${expected.unknown_place_count}
     />
@@ -102,9 +103,9 @@ function LeftOut({ title, lines, total }) {
   if (!total) return null;
   return html`
     <div class="obstacles left-out">
-      <p>${title(total)}</p>
-      <ul>${lines.map((line) => html`<li key=${line}>${line}</li>`)}</ul>
-      ${total > lines.length && html`<p>and ${total - lines.length} more</p>`}
+      <p>${say(title, { n: total })}</p>
+      <ul>${lines.map((line) => html`<li key=${line}>${quoted(line)}</li>`)}</ul>
+      ${total > lines.length && html`<p>${say("and {n} more", { n: total - lines.length })}</p>`}
     </div>
   `;
 }
@@ -113,14 +114,14 @@ function Outcomes() {
   const { outcome_counts: counts } = stock().expected;
   return html`
     <div class="find-row">
-      <ul class="outcome-counts" aria-label="Outcomes">
+      <ul class="outcome-counts" aria-label=${say("Outcomes")}>
         ${Object.entries(counts)
           .filter(([, count]) => count)
           .map(([outcome, count]) => html`<li key=${outcome} class=${`outcome-${outcome}`}><b>${count}</b> ${outcomeWords(outcome)}</li>`)}
       </ul>
-      <div class="downloads" role="group" aria-label="Download the comparison">
-        <button class="order" onClick=${() => download("csv")}>Comparison CSV</button>
-        <button class="order" onClick=${() => download("json")}>Comparison JSON</button>
+      <div class="downloads" role="group" aria-label=${say("Download the comparison")}>
+        <button class="order" onClick=${() => download("csv")}>${say("Comparison CSV")}</button>
+        <button class="order" onClick=${() => download("json")}>${say("Comparison JSON")}</button>
       </div>
     </div>
   `;
@@ -129,24 +130,24 @@ function Outcomes() {
 function Differences({ onChoose }) {
   const { expected, places } = stock();
   const { lines, difference_count: count } = expected;
-  if (!count) return html`<p class="ready"><span class="dot" />No difference.</p>`;
+  if (!count) return html`<p class="ready"><span class="dot" />${say("No difference.")}</p>`;
   return html`
-    <div class="table-scroll" tabindex="0" role="group" aria-label="Differences">
+    <div class="table-scroll" tabindex="0" role="group" aria-label=${say("Differences")}>
       <table>
-        <thead><tr><th scope="col">Place</th><th scope="col">Outcome</th><th scope="col">Expected</th><th scope="col">Found</th></tr></thead>
+        <thead><tr><th scope="col">${say("Place")}</th><th scope="col">${say("Outcome")}</th><th scope="col">${say("Expected")}</th><th scope="col">${say("Found")}</th></tr></thead>
         <tbody>
           ${lines.map((line, i) => html`
             <tr key=${i}>
               <td>${places[line.location] ? html`<button class="link" onClick=${() => onChoose(line.location)}>${line.location}</button>` : line.location}</td>
               <td>${outcomeWords(line.outcome)}</td>
-              <td>${line.outcome === "unexpected" ? "" : line.text}${line.quantity && html` <small>quantity ${line.quantity}</small>`}</td>
+              <td>${line.outcome === "unexpected" ? "" : line.text}${line.quantity && html` <small>${say("quantity {quantity}", { quantity: line.quantity })}</small>`}</td>
               <td>${line.outcome === "unexpected" ? line.text : line.found}
-                ${line.found_at && html`at <button class="link" onClick=${() => onChoose(line.found_at)}>${line.found_at}</button>`}</td>
+                ${line.found_at && sayWith("at {place}", { place: html`<button class="link" onClick=${() => onChoose(line.found_at)}>${line.found_at}</button>` })}</td>
             </tr>
           `)}
         </tbody>
       </table>
     </div>
-    ${count > lines.length && html`<p class="quiet">${count - lines.length} more: download the comparison.</p>`}
+    ${count > lines.length && html`<p class="quiet">${say("{n} more: download the comparison.", { n: count - lines.length })}</p>`}
   `;
 }

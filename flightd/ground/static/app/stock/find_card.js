@@ -1,5 +1,6 @@
 // Which inventory is shown, what is looked for in it, and how many places are in which state.
 import { html, useEffect, useRef } from "../html.js";
+import { english, say } from "../language.js";
 import { goTo } from "../router.js";
 import { STATES } from "./states.js";
 import { change, differs, inOrder, isShown, sourceQuery, stock } from "./stock_state.js";
@@ -10,7 +11,7 @@ const FORMATS = { csv: "CSV", xlsx: "XLSX", json: "JSON", epcis: "EPCIS" };
 
 export function FindCard({ onChoose }) {
   return html`
-    <section class="card find" aria-label="Find and filter">
+    <section class="card find" aria-label=${say("Find and filter")}>
       <div class="find-row">
         <${Source} />
         <${Search} onChoose=${onChoose} />
@@ -27,7 +28,7 @@ function Source() {
   const { source, stores, drones, folder } = stock();
   const all = [
     ...stores.map(({ name }) => ({ kind: "store", name, words: name === "." ? folder : name })),
-    ...drones.map((name) => ({ kind: "drone", name, words: `${name}, as it tells now` })),
+    ...drones.map((name) => ({ kind: "drone", name, words: say("{drone}, as it tells now", { drone: name }) })),
   ];
   const choose = (event) => {
     const { kind, name } = all.find((one) => valueOf(one) === event.target.value);
@@ -36,7 +37,7 @@ function Source() {
     goTo(`/stock?${sourceQuery({ kind, name })}`, { replace: true });
   };
   return html`
-    <label class="field">Inventory
+    <label class="field">${say("Inventory")}
       <select value=${source ? valueOf(source) : ""} onChange=${choose}>
         ${all.map((one) => html`<option key=${valueOf(one)} value=${valueOf(one)}>${one.words}</option>`)}
       </select>
@@ -65,9 +66,9 @@ function Search({ onChoose }) {
     if (first) onChoose(first);
   };
   return html`
-    <label class="field finder">Code or place
+    <label class="field finder">${say("Code or place")}
       <input type="search" ref=${box} maxlength="200" spellcheck=${false} autocomplete="off" onInput=${onInput} onKeyDown=${onKeyDown} />
-      <span class="quiet" role="status">${found && (found.size === 1 ? "1 place" : `${found.size} places`)}</span>
+      <span class="quiet" role="status">${found && say("{n} place|{n} places", { n: found.size })}</span>
     </label>
   `;
 }
@@ -76,7 +77,7 @@ function Downloads() {
   const { source } = stock();
   if (source?.kind !== "store") return null;
   return html`
-    <div class="downloads" role="group" aria-label="Download the inventory">
+    <div class="downloads" role="group" aria-label=${say("Download the inventory")}>
       ${Object.entries(FORMATS).map(
         ([format, name]) => html`<a key=${format} class="order" href=${exportUrl(source, format)} download>${name}</a>`,
       )}
@@ -98,21 +99,21 @@ function StateFilters() {
     .map(([name, { name: words, means }]) => ({ name, words, means, count: counts[name] ?? 0 }));
   if (expected?.outcomes) {
     const count = Object.keys(places).filter((code) => differs(code, expected)).length;
-    chips.push({ name: "differs", words: "Not as expected", means: "differs from the uploaded stock", count });
+    chips.push({ name: "differs", words: english("Not as expected"), means: english("differs from the uploaded stock"), count });
   }
   const picked = states.size ? Object.keys(places).filter((code) => isShown(code, stock())).length : null;
   return html`
-    <div class="states" role="group" aria-label="States">
+    <div class="states" role="group" aria-label=${say("States")}>
       ${chips.map(
         ({ name, words, means, count }) => html`
-          <button key=${name} class="state-chip" aria-pressed=${states.has(name)} title=${means} onClick=${() => toggle(name)}>
-            <i class=${name === "differs" ? "cell differs" : `cell state-${name}`} aria-hidden="true">${STATES[name]?.mark}</i>${words}
+          <button key=${name} class="state-chip" aria-pressed=${states.has(name)} title=${say(means)} onClick=${() => toggle(name)}>
+            <i class=${name === "differs" ? "cell differs" : `cell state-${name}`} aria-hidden="true">${STATES[name]?.mark}</i>${say(words)}
             <b>${count}</b>
           </button>
         `,
       )}
       ${picked !== null &&
-      html`<button class="state-chip" onClick=${() => change({ states: new Set() })}>Show all</button>`}
+      html`<button class="state-chip" onClick=${() => change({ states: new Set() })}>${say("Show all")}</button>`}
     </div>
   `;
 }

@@ -1,14 +1,15 @@
 // One place: its picture with the codes' outlines, what was read, how sure, and its history over the runs.
 import { html, useEffect, useState } from "../html.js";
+import { dateFormat, decimal, english, quoted, say } from "../language.js";
 import { time } from "../words.js";
 import { DecisionForm } from "./decision_form.js";
 import { outcomeWords } from "./expected_card.js";
 import { differs, inOrder, isShown, stock } from "./stock_state.js";
-import { STATES } from "./states.js";
+import { rackWords, STATES } from "./states.js";
 import { outlinesOf, pictureUrl } from "./stock_source.js";
 
-const STANDINGS = { pending: "not booked yet", confirmed: "", withdrawn: "withdrawn" };
-const DAY = new Intl.DateTimeFormat([], { year: "numeric", month: "short", day: "numeric" });
+const STANDINGS = { pending: english("not booked yet"), confirmed: "", withdrawn: english("withdrawn") };
+const DAY = dateFormat({ year: "numeric", month: "short", day: "numeric" });
 
 export function PlaceCard({ onChoose }) {
   const known = stock();
@@ -31,18 +32,18 @@ export function PlaceCard({ onChoose }) {
     <section class="card place" aria-labelledby="place" onKeyDown=${onKeyDown}>
       <div class="place-head">
         <h2 id="place">${chosen}</h2>
-        <button class="order" onClick=${() => walk(-1)} disabled=${!nextShown(known, -1)} aria-label="Previous place">←</button>
-        <button class="order" onClick=${() => walk(1)} disabled=${!nextShown(known, 1)} aria-label="Next place">→</button>
-        <button class="order" onClick=${() => onChoose("")} aria-label="Close">Close</button>
+        <button class="order" onClick=${() => walk(-1)} disabled=${!nextShown(known, -1)} aria-label=${say("Previous place")}>←</button>
+        <button class="order" onClick=${() => walk(1)} disabled=${!nextShown(known, 1)} aria-label=${say("Next place")}>→</button>
+        <button class="order" onClick=${() => onChoose("")} aria-label=${say("Close")}>${say("Close")}</button>
       </div>
       <p class="place-state" role="status">
         <i class=${`cell state-${place.state}`} aria-hidden="true">${STATES[place.state].mark}</i>
-        <strong>${STATES[place.state].name}</strong>
-        <span class="quiet">${place.pending ? "not booked yet" : STATES[place.state].means}</span>
+        <strong>${say(STATES[place.state].name)}</strong>
+        <span class="quiet">${place.pending ? say("not booked yet") : say(STATES[place.state].means)}</span>
       </p>
       <p class="quiet">${whereIs(chosen, known.fronts)}</p>
       <${Outcome} />
-      ${told?.trouble && html`<p class="refusal">${told.trouble}</p>`}
+      ${told?.trouble && html`<p class="refusal">${quoted(told.trouble)}</p>`}
       ${look?.evidence && html`<${Picture} key=${look.evidence} look=${look} place=${chosen} />`}
       ${look ? html`<${Facts} look=${look} />` : html`<${Told} place=${place} />`}
       <${DecisionForm} key=${chosen} />
@@ -65,7 +66,7 @@ function whereIs(code, fronts) {
     if (!spot) continue;
     const [, bay, level, position] = spot;
     if (!bay) return "";
-    return `${side ? `Aisle ${aisle}, ${side}` : `Rack ${aisle}`} · bay ${bay} · level ${level} · position ${position}`;
+    return say("{rack} · bay {bay} · level {level} · position {position}", { rack: rackWords(aisle, side), bay, level, position });
   }
   return "";
 }
@@ -75,12 +76,12 @@ function Outcome() {
   const lines = expected?.lines?.filter((line) => line.location === chosen || line.found_at === chosen) ?? [];
   if (!lines.length) return null;
   return html`
-    <ul class=${differs(chosen, expected) ? "outcomes differing" : "outcomes"} aria-label="Against the expected stock">
+    <ul class=${differs(chosen, expected) ? "outcomes differing" : "outcomes"} aria-label=${say("Against the expected stock")}>
       ${lines.map(
         ({ outcome, text, found, found_at: at, location }) => html`
-          <li><strong>${outcomeWords(outcome)}</strong>${outcome === "unexpected" ? ": " : ", expected: "}${text}
-            ${found && html`<span>, there is ${found}</span>`}
-            ${at && html`<span>, ${location === chosen ? `found at ${at}` : `by the books at ${location}`}</span>`}
+          <li><strong>${outcomeWords(outcome)}</strong>${outcome === "unexpected" ? ": " : `, ${say("expected:")} `}${text}
+            ${found && html`<span>, ${say("there is {found}", { found })}</span>`}
+            ${at && html`<span>, ${location === chosen ? say("found at {at}", { at }) : say("by the books at {location}", { location })}</span>`}
           </li>
         `,
       )}
@@ -101,11 +102,11 @@ function Picture({ look, place }) {
       gone = true;
     };
   }, [look.evidence]);
-  if (failed) return html`<p class="quiet">Its picture was not kept.</p>`;
+  if (failed) return html`<p class="quiet">${say("Its picture was not kept.")}</p>`;
   const read = new Set(look.reads.map(({ text }) => text));
   return html`
     <figure class="evidence">
-      <img src=${pictureUrl(source, look.evidence)} alt=${`What the camera saw at ${place}`} onError=${() => setFailed(true)} />
+      <img src=${pictureUrl(source, look.evidence)} alt=${say("What the camera saw at {place}", { place })} onError=${() => setFailed(true)} />
       <svg viewBox="0 0 1 1" preserveAspectRatio="none" aria-hidden="true">
         ${outlines.map(
           ({ text, corners }) =>
@@ -119,11 +120,11 @@ function Picture({ look, place }) {
 function Facts({ look }) {
   const { pose } = look;
   const facts = [
-    ["Confidence", `${Math.floor(look.confidence * 100)} %`],
-    ["Looked at", when(look.utc)],
-    ["Run", look.run],
-    ["From", pose && `node ${pose.node}, ${pose.height_m.toFixed(2)} m`],
-    ["Standing", STANDINGS[look.standing]],
+    [say("Confidence"), `${Math.floor(look.confidence * 100)} %`],
+    [say("Looked at"), when(look.utc)],
+    [say("Run"), look.run],
+    [say("From"), pose && say("node {node}, {height} m", { node: pose.node, height: decimal(pose.height_m, 2) })],
+    [say("Standing"), look.standing && STANDINGS[look.standing] && say(STANDINGS[look.standing])],
   ];
   return html`
     <div class="facts">
@@ -155,7 +156,7 @@ const visible = (text) => text.replaceAll("\u001d", "␝");
 function History({ looks, shown, onShow }) {
   return html`
     <div class="history">
-      <h3 id="history">${looks.length === 1 ? "One look" : `${looks.length} looks`}</h3>
+      <h3 id="history">${say("One look|{n} looks", { n: looks.length })}</h3>
       <ol aria-labelledby="history">
         ${looks.map(
           (look, i) => html`
@@ -163,7 +164,7 @@ function History({ looks, shown, onShow }) {
               <button aria-pressed=${look === shown} onClick=${() => onShow(i)}>
                 <i class=${`cell state-${look.state}`} aria-hidden="true">${STATES[look.state].mark}</i>
                 <span>${when(look.utc)}</span>
-                <span>${STATES[look.state].name}${STANDINGS[look.standing] && `, ${STANDINGS[look.standing]}`}</span>
+                <span>${say(STATES[look.state].name)}${STANDINGS[look.standing] && `, ${say(STANDINGS[look.standing])}`}</span>
                 <span class="quiet">${look.reads.map(({ text }) => visible(text)).join(", ")}</span>
               </button>
             </li>

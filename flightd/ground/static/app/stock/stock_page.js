@@ -1,5 +1,6 @@
 // The page Stock: every place of an inventory as it stands, filling while a flight counts.
 import { html, useEffect } from "../html.js";
+import { quoted, say } from "../language.js";
 import { goTo } from "../router.js";
 import { state } from "../store.js";
 import { loadDecisions } from "./decisions.js";
@@ -21,19 +22,19 @@ export default function StockPage({ route }) {
   useEffect(() => stay(route), []);
   useEffect(() => follow(route), [route]);
   const { stores, source, troubles, tag, places, chosen } = stock();
-  const trouble = [...new Set(Object.values(troubles).filter(Boolean))].join("; ");
-  if (!stores) return html`<p class="loading quiet" role="status">${trouble || "Loading …"}</p>`;
+  const trouble = [...new Set(Object.values(troubles).filter(Boolean))].flatMap((one, i) => [i ? "; " : "", quoted(one)]);
+  if (!stores) return html`<p class="loading quiet" role="status">${trouble.length ? trouble : say("Loading …")}</p>`;
   if (!source) return html`<${Nothing} />`;
   const codes = Object.keys(places);
   const counted = codes.filter((code) => COUNTED.has(places[code].state)).length;
   return html`
     <div class=${chosen ? "stock with-place" : "stock"}>
       <div class="stock-main">
-        <h2 class="stock-title">Stock <small>${counted} of ${codes.length} places counted</small></h2>
-        ${trouble && html`<p class="stock-trouble" role="alert">${trouble}</p>`}
+        <h2 class="stock-title">${say("Stock")} <small>${say("{counted} of {all} places counted", { counted, all: codes.length })}</small></h2>
+        ${trouble.length > 0 && html`<p class="stock-trouble" role="alert">${trouble}</p>`}
         <${FindCard} onChoose=${choose} />
         ${codes.length > 0 && html`<${Elevations} onChoose=${choose} />`}
-        ${codes.length === 0 && tag && html`<p class="quiet">Nothing was counted yet.</p>`}
+        ${codes.length === 0 && tag && html`<p class="quiet">${say("Nothing was counted yet.")}</p>`}
         <${ExceptionsCard} onChoose=${choose} />
         <${ExpectedCard} onChoose=${choose} />
       </div>
@@ -45,8 +46,8 @@ export default function StockPage({ route }) {
 function Nothing() {
   const { folder } = stock();
   return html`
-    <section class="card empty"><h2>No inventory yet</h2>
-      <p>${folder ? "No inventory lies under the station's folder." : "Name the folder in which inventories lie:"}
+    <section class="card empty"><h2>${say("No inventory yet")}</h2>
+      <p>${folder ? say("No inventory lies under the station's folder.") : say("Name the folder in which inventories lie:")}
         ${!folder && html` <code>flightd ground --folder out</code>`}</p></section>
   `;
 }

@@ -1,4 +1,5 @@
 // Asks the station for inventories, places, looks, and what words mean.
+import { english } from "../language.js";
 import { askStation, isGivenUp } from "../fetching.js";
 import { byKey, change, NOTHING, sourceQuery, stock, tellTrouble } from "./stock_state.js";
 
@@ -16,7 +17,7 @@ async function refusal(answer) {
   try {
     return (await answer.json()).refused;
   } catch {
-    return `the ground station answers ${answer.status}`;
+    return english("the ground station answers {status}", { status: answer.status });
   }
 }
 

@@ -3,11 +3,12 @@ import { showPictures } from "../connection.js";
 import { askJson, askStation } from "../fetching.js";
 import { flightsState, watchList } from "../flights/flights_state.js";
 import { html, useEffect, useRef, useState } from "../html.js";
+import { english, say } from "../language.js";
 import { drawPicture, WIDTH } from "../live/camera.js";
 import { state } from "../store.js";
 import { asked, change, choosePicture, reloadSet, setPath, told } from "./studio_state.js";
 
-const SOURCES = [["flight", "From a flight"], ["live", "Live"], ["files", "Files"]];
+const SOURCES = [["flight", english("From a flight")], ["live", english("Live")], ["files", english("Files")]];
 const AT_ONCE = 8;
 const READING_MS = 120000; // of a long log, when it is read first
 const JPEG = 0.95;
@@ -15,9 +16,9 @@ const JPEG = 0.95;
 export function AddPictures() {
   const [source, setSource] = useState("");
   return html`
-    <div class="add" role="group" aria-label="Add pictures">
+    <div class="add" role="group" aria-label=${say("Add pictures")}>
       <div class="tools">
-        ${SOURCES.map(([key, words]) => html`<button key=${key} class="order" aria-expanded=${key === source} onClick=${() => setSource(key === source ? "" : key)}>${words}</button>`)}
+        ${SOURCES.map(([key, words]) => html`<button key=${key} class="order" aria-expanded=${key === source} onClick=${() => setSource(key === source ? "" : key)}>${say(words)}</button>`)}
       </div>
       ${source === "flight" && html`<${FromFlight} />`}${source === "live" && html`<${Live} />`}${source === "files" && html`<${Files} />`}
     </div>
@@ -62,26 +63,26 @@ function FromFlight() {
     });
     setBusy(false);
   };
-  if (!rows.length && !looked) return html`<p class="quiet" role="status">Looking for flights …</p>`;
-  if (!rows.length) return html`<p class="quiet">No flight log lies below the station's folder yet.</p>`;
+  if (!rows.length && !looked) return html`<p class="quiet" role="status">${say("Looking for flights …")}</p>`;
+  if (!rows.length) return html`<p class="quiet">${say("No flight log lies below the station's folder yet.")}</p>`;
   return html`
     <div class="from-flight">
-      <label class="field">Flight
+      <label class="field">${say("Flight")}
         <select value=${flight} onChange=${(event) => choose(event.target.value)}>
           ${rows.map((row) => html`<option key=${row.id} value=${row.id}>${row.site || row.path} · ${row.path}</option>`)}
         </select>
       </label>
-      ${pictures === null && html`<p class="quiet" role="status">Reading the flight …</p>`}
-      ${pictures === 0 && html`<p class="quiet">This log holds no pictures.</p>`}
+      ${pictures === null && html`<p class="quiet" role="status">${say("Reading the flight …")}</p>`}
+      ${pictures === 0 && html`<p class="quiet">${say("This log holds no pictures.")}</p>`}
       ${pictures > 0 &&
       html`
         <${FlightPicture} flight=${flight} place=${place} />
-        <label class="field">Picture ${place + 1} of ${pictures}
+        <label class="field">${say("Picture {number} of {all}", { number: place + 1, all: pictures })}
           <input type="range" min="0" max=${pictures - 1} value=${place} onInput=${(event) => setPlace(Number(event.target.value))} />
         </label>
         <div class="tools">
-          <button class="order main-order" onClick=${() => taken(() => take(place))}>Take this picture</button>
-          <button class="order" disabled=${busy} onClick=${several}>${busy ? "Taking …" : `Take ${Math.min(AT_ONCE, pictures)} from all of the flight`}</button>
+          <button class="order main-order" onClick=${() => taken(() => take(place))}>${say("Take this picture")}</button>
+          <button class="order" disabled=${busy} onClick=${several}>${busy ? say("Taking …") : say("Take {n} from all of the flight", { n: Math.min(AT_ONCE, pictures) })}</button>
         </div>
       `}
     </div>
@@ -111,7 +112,7 @@ function FlightPicture({ flight, place }) {
       ends.abort();
     };
   }, [flight, place]);
-  return html`<canvas ref=${canvas} class="preview" width=${WIDTH} height=${WIDTH * 0.5625} role="img" aria-label=${`Picture ${place + 1} of the flight`} />`;
+  return html`<canvas ref=${canvas} class="preview" width=${WIDTH} height=${WIDTH * 0.5625} role="img" aria-label=${say("Picture {number} of the flight", { number: place + 1 })} />`;
 }
 
 function Live() {
@@ -135,9 +136,9 @@ function Live() {
   };
   return html`
     <div class="from-flight">
-      <canvas ref=${canvas} class="preview" width=${WIDTH} height=${WIDTH * 0.5625} role="img" aria-label="Down camera, live" />
-      ${!seen && html`<p class="quiet" role="status">No picture of ${drone || "a drone"} yet.</p>`}
-      <div class="tools"><button class="order main-order" disabled=${!seen} onClick=${() => taken(take)}>Take this picture</button></div>
+      <canvas ref=${canvas} class="preview" width=${WIDTH} height=${WIDTH * 0.5625} role="img" aria-label=${say("Down camera, live")} />
+      ${!seen && html`<p class="quiet" role="status">${say("No picture of {drone} yet.", { drone: drone || say("a drone") })}</p>`}
+      <div class="tools"><button class="order main-order" disabled=${!seen} onClick=${() => taken(take)}>${say("Take this picture")}</button></div>
     </div>
   `;
 }
@@ -152,7 +153,7 @@ function Files() {
       return last;
     });
   return html`
-    <label class="field">JPEG or PNG, seen from above as the drone sees the floor
+    <label class="field">${say("JPEG or PNG, seen from above as the drone sees the floor")}
       <input ref=${input} type="file" accept="image/jpeg,image/png" multiple onChange=${add} />
     </label>
   `;

@@ -1,6 +1,7 @@
 // The lens by pictures of a chessboard: where in the picture it was shown, how well one lens fits, the keys to copy.
 import { html, useState } from "../html.js";
-import { capital, count } from "../words.js";
+import { decimal, quoted, say } from "../language.js";
+import { capital, percent } from "../words.js";
 import { asked, choosePicture, setPath, studio, told } from "./studio_state.js";
 
 export function LensCard() {
@@ -18,11 +19,11 @@ export function LensCard() {
     <label class="field">${name} <input type="number" min="3" max="40" required value=${value} onInput=${(event) => set(Number(event.target.value))} /></label>
   `;
   return html`
-    <section class="card lens" aria-labelledby="lens"><h3 id="lens">Lens</h3>
-      <p class="quiet">Show a flat chessboard, all of it, tilted and turned, in every part of the picture; take 8 pictures or more into a set of their own.</p>
+    <section class="card lens" aria-labelledby="lens"><h3 id="lens">${say("Lens")}</h3>
+      <p class="quiet">${say("Show a flat chessboard, all of it, tilted and turned, in every part of the picture; take 8 pictures or more into a set of their own.")}</p>
       <form class="tools" onSubmit=${look}>
-        ${side("Inner corners across", columns, setColumns)}${side("down", rows, setRows)}
-        <button class="order" disabled=${busy || !studio().set.pictures.length}>${busy ? "Looking …" : "Look for the board"}</button>
+        ${side(say("Inner corners across"), columns, setColumns)}${side(say("down"), rows, setRows)}
+        <button class="order" disabled=${busy || !studio().set.pictures.length}>${busy ? say("Looking …") : say("Look for the board")}</button>
       </form>
       ${study && html`<${Study} study=${study} />`}
     </section>
@@ -35,24 +36,24 @@ function Study({ study }) {
   const cells = study.coverage.flat();
   const seen = cells.filter(Boolean).length;
   return html`
-    <p role="status">The board is seen in ${study.boards.length} of ${count(study.pictures, "picture")}, in ${Math.round((100 * seen) / cells.length)} % of the picture.</p>
+    <p role="status">${say("The board is seen in {boards} of {n} picture, in {share} of the picture.|The board is seen in {boards} of {n} pictures, in {share} of the picture.", { boards: study.boards.length, n: study.pictures, share: percent(seen / cells.length) })}</p>
     ${study.boards.length > 0 &&
     html`
-      <svg class="coverage" viewBox="0 0 160 90" role="img" aria-label=${`Where the board was shown: ${seen} of ${cells.length} parts of the picture`}>
+      <svg class="coverage" viewBox="0 0 160 90" role="img" aria-label=${say("Where the board was shown: {seen} of {all} parts of the picture", { seen, all: cells.length })}>
         ${study.coverage.map((row, j) => row.map((many, i) => html`<rect key=${`${i} ${j}`} class=${many ? "seen" : "blank"} x=${i * 20} y=${j * 15} width="20" height="15" />`))}
         ${study.boards.map((one) => one.corners.map(([x, y], i) => html`<circle key=${`${one.file} ${i}`} cx=${x * 160} cy=${y * 90} r="0.7" />`))}
       </svg>
     `}
-    ${study.refused && html`<p class="refusal">${capital(study.refused)}</p>`}
+    ${study.refused && html`<p class="refusal">${quoted(study.refused, capital)}</p>`}
     ${study.config &&
     html`
-      <p>One lens fits all of them to ${study.error_px.toFixed(2)} px, its focal length is sure to ${study.sigma_focal_px.toFixed(1)} px.</p>
-      <ul class="residuals" aria-label="How well each picture fits">
-        ${study.boards.map((one) => html`<li key=${one.file}><button class="tab" onClick=${() => choosePicture(one.file)}>${numberOf(one.file)}: ${one.error_px.toFixed(2)} px</button></li>`)}
+      <p>${say("One lens fits all of them to {error} px, its focal length is sure to {sigma} px.", { error: decimal(study.error_px, 2), sigma: decimal(study.sigma_focal_px, 1) })}</p>
+      <ul class="residuals" aria-label=${say("How well each picture fits")}>
+        ${study.boards.map((one) => html`<li key=${one.file}><button class="tab" onClick=${() => choosePicture(one.file)}>${`${numberOf(one.file)}: ${decimal(one.error_px, 2)} px`}</button></li>`)}
       </ul>
-      <p class="quiet">For the drone's configuration:</p><pre tabindex="0">${study.config}</pre>
+      <p class="quiet">${say("For the drone's configuration:")}</p><pre tabindex="0">${study.config}</pre>
     `}
   `;
 }
 
-const numberOf = (file) => `Picture ${studio().set.pictures.findIndex((one) => one.file === file) + 1}`;
+const numberOf = (file) => say("Picture {number}", { number: studio().set.pictures.findIndex((one) => one.file === file) + 1 });

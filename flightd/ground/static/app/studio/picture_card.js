@@ -1,13 +1,14 @@
 // The picture in hand: paint and floor are shown with strokes or boxes, lines by two clicks; by mouse, finger or keys.
 import { mayOperate } from "../access/session.js";
 import { html, useEffect, useRef, useState } from "../html.js";
+import { english, quoted, say, sayWith } from "../language.js";
 import { percent } from "../words.js";
 import { drawAll } from "./drawing.js";
 import { box, line, round, stroke, within, withoutLast } from "./marks.js";
 import { asked, change, chooseMask, choosePicture, mark, pictureHref, pictureInHand, setPath, studio, told } from "./studio_state.js";
 
-const TOOLS = [["paint", "Paint", "1"], ["floor", "Floor", "2"], ["line", "Line", "3"]];
-const SHAPES = [["stroke", "Stroke"], ["box", "Box"]];
+const TOOLS = [["paint", english("Paint"), "1"], ["floor", english("Floor"), "2"], ["line", english("Line"), "3"]];
+const SHAPES = [["stroke", english("Stroke")], ["box", english("Box")]];
 const STEP_PX = 4;
 const FAR_PX = 24;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -33,15 +34,15 @@ export function PictureCard() {
     mark(withoutLast(label, kind));
   };
   return html`
-    <section class="card picture-card" aria-label="Picture">
+    <section class="card picture-card" aria-label=${say("Picture")}>
       ${mayOperate() &&
       html`<div class="tools">
-        <${Choice} name="Mark" options=${TOOLS} chosen=${tool} choose=${setTool} />
-        ${tool !== "line" && html`<${Choice} name="With" options=${SHAPES} chosen=${shape} choose=${setShape} />`}
-        <label class="field">${tool === "line" ? "Width of the paint" : "Width"} ${width} px
+        <${Choice} name=${say("Mark")} options=${TOOLS} chosen=${tool} choose=${setTool} />
+        ${tool !== "line" && html`<${Choice} name=${say("With")} options=${SHAPES} chosen=${shape} choose=${setShape} />`}
+        <label class="field">${say(tool === "line" ? english("Width of the paint {width} px") : english("Width {width} px"), { width })}
           <input type="range" min="2" max="80" value=${width} onInput=${(event) => setWidth(Number(event.target.value))} />
         </label>
-        <button class="order" disabled=${!label.regions.length && !label.lines.length} onClick=${undo}>Undo</button>
+        <button class="order" disabled=${!label.regions.length && !label.lines.length} onClick=${undo}>${say("Undo")}</button>
       </div>`}
       <${Canvas} key=${label.file} label=${label} kind=${tool === "line" ? "line" : shape} onMark=${add} onUndo=${undo} setTool=${setTool} />
       <${MaskRow} />
@@ -55,7 +56,7 @@ function Choice({ name, options, chosen, choose }) {
     <fieldset class="choice"><legend>${name}</legend>
       ${options.map(
         ([key, words, hint]) => html`
-          <button key=${key} type="button" class="tab" aria-pressed=${key === chosen} onClick=${() => choose(key)}>${words}${hint && html` <kbd>${hint}</kbd>`}</button>
+          <button key=${key} type="button" class="tab" aria-pressed=${key === chosen} onClick=${() => choose(key)}>${say(words)}${hint && html` <kbd>${hint}</kbd>`}</button>
         `,
       )}
     </fieldset>
@@ -72,7 +73,7 @@ function Canvas({ label, kind, onMark, onUndo, setTool }) {
   useEffect(() => {
     const image = new Image();
     image.src = pictureHref(label.file);
-    image.decode().then(() => setPicture(image), () => change({ trouble: "the picture cannot be shown" }));
+    image.decode().then(() => setPicture(image), () => change({ trouble: english("the picture cannot be shown") }));
   }, [label.file]);
   useEffect(() => drawAll(canvas.current, { picture, mask, label, began, cursor, focused }));
   const at = (event) => {
@@ -123,52 +124,56 @@ function Canvas({ label, kind, onMark, onUndo, setTool }) {
     }
     event.preventDefault();
   };
-  if (!mayOperate()) return html`<canvas ref=${canvas} class="seen-only" width=${label.width} height=${label.height} role="img" aria-label="Picture" />`;
+  if (!mayOperate()) return html`<canvas ref=${canvas} class="seen-only" width=${label.width} height=${label.height} role="img" aria-label=${say("Picture")} />`;
   return html`
     <canvas
       ref=${canvas} class="hand" width=${label.width} height=${label.height} tabindex="0" role="application"
-      aria-label="Picture to mark in" aria-describedby="mark-help"
+      aria-label=${say("Picture to mark in")} aria-describedby="mark-help"
       onPointerDown=${down} onPointerMove=${move} onPointerUp=${up} onPointerCancel=${() => setBegan(null)} onKeyDown=${key}
       onFocus=${() => setFocused(true)} onBlur=${() => setFocused(false)}
     />
-    <p id="mark-help" class="quiet">${kind === "line" ? "Click where the line enters the picture, and where it leaves it." : "Draw over what you mean."}
-      ${" "}By keys: arrows move the cursor (with <kbd>Shift</kbd> farther), <kbd>Space</kbd> begins and ends a mark, <kbd>⌫</kbd> takes the last one away.
-      <span class="unseen" role="status">${focused ? `Cursor at ${cursor.map(Math.round).join(", ")}${began ? ", marking" : ""}` : ""}</span></p>
+    <p id="mark-help" class="quiet">${kind === "line" ? say("Click where the line enters the picture, and where it leaves it.") : say("Draw over what you mean.")}
+      ${" "}${sayWith("By keys: arrows move the cursor (with {shift} farther), {space} begins and ends a mark, {delete} takes the last one away.", {
+        shift: html`<kbd>${say("Shift")}</kbd>`, space: html`<kbd>${say("Space")}</kbd>`, delete: html`<kbd>⌫</kbd>`,
+      })}
+      <span class="unseen" role="status">${focused ? say(began ? english("Cursor at {place}, marking") : english("Cursor at {place}"), { place: cursor.map(Math.round).join(", ") }) : ""}</span></p>
   `;
 }
 
 function MaskRow() {
   const { mask, by, overview, set } = studio();
   const ways = [
-    ["strokes", "what your marks teach"],
-    ...(set.outcome ? [["trained", "the trained profile"]] : []),
-    ...(set.profile.versions.length ? [["installed", "the installed profile"]] : []),
-    ...overview.shipped.map((name) => [name, `shipped: ${name}`]),
-    ["none", "nothing: the bare picture"],
+    ["strokes", say("what your marks teach")],
+    ...(set.outcome ? [["trained", say("the trained profile")]] : []),
+    ...(set.profile.versions.length ? [["installed", say("the installed profile")]] : []),
+    ...overview.shipped.map((name) => [name, say("shipped: {name}", { name })]),
+    ["none", say("nothing: the bare picture")],
   ];
   return html`
     <div class="mask-row">
-      <label class="field">Seen by
+      <label class="field">${say("Seen by")}
         <select value=${by} onChange=${(event) => chooseMask(event.target.value)}>
           ${ways.map(([key, words]) => html`<option key=${key} value=${key}>${words}</option>`)}
         </select>
       </label>
       <div>
         <p role="status" class=${mask?.trouble ? "refusal" : "quiet"}>${maskWords(studio())}</p>
-        ${mask?.picture && html`<p class="quiet legend"><i class="paint" />taken for paint <i class="dropped" />doubtful, left out <i class="found" />line found</p>`}
+        ${mask?.picture && html`<p class="quiet legend"><i class="paint" />${say("taken for paint")} <i class="dropped" />${say("doubtful, left out")} <i class="found" />${say("line found")}</p>`}
       </div>
     </div>
   `;
 }
 
 function maskWords({ mask, by, saved, looking, trouble }) {
-  if (!saved) return trouble ? "Not saved yet." : "Saving …";
+  if (!saved) return trouble ? say("Not saved yet.") : say("Saving …");
   if (by === "none") return "";
-  if (looking && !mask) return "Looking …";
-  if (!mask) return "Mark some paint and some floor to see what they teach.";
-  if (mask.trouble) return mask.trouble;
+  if (looking && !mask) return say("Looking …");
+  if (!mask) return say("Mark some paint and some floor to see what they teach.");
+  if (mask.trouble) return quoted(mask.trouble);
   const lines = mask.head.lines.length;
-  return `${percent(mask.head.share)} of the picture is taken for paint, ${lines || "no"} line${lines === 1 ? "" : "s"} found in it.`;
+  return lines
+    ? say("{share} of the picture is taken for paint, {n} line found in it.|{share} of the picture is taken for paint, {n} lines found in it.", { share: percent(mask.head.share), n: lines })
+    : say("{share} of the picture is taken for paint, no lines found in it.", { share: percent(mask.head.share) });
 }
 
 function PictureRow({ label }) {
@@ -182,9 +187,9 @@ function PictureRow({ label }) {
     });
   return html`
     <div class="picture-row">
-      <label class="check"><input type="checkbox" checked=${label.complete} onChange=${(event) => mark({ complete: event.target.checked })} /> Every line in it is labelled</label>
-      <label class="check"><input type="checkbox" checked=${label.negative} disabled=${label.lines.length > 0} onChange=${(event) => mark({ negative: event.target.checked })} /> It shows no line</label>
-      <button class="order" onClick=${takeOut}>Take the picture out</button>
+      <label class="check"><input type="checkbox" checked=${label.complete} onChange=${(event) => mark({ complete: event.target.checked })} /> ${say("Every line in it is labelled")}</label>
+      <label class="check"><input type="checkbox" checked=${label.negative} disabled=${label.lines.length > 0} onChange=${(event) => mark({ negative: event.target.checked })} /> ${say("It shows no line")}</label>
+      <button class="order" onClick=${takeOut}>${say("Take the picture out")}</button>
     </div>
   `;
 }

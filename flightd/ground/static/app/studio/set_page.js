@@ -1,9 +1,9 @@
 // One set: the picture in hand with what is marked in it, all its pictures, and what is learnt from them.
 import { mayOperate } from "../access/session.js";
 import { html } from "../html.js";
+import { say } from "../language.js";
 import { toneOf } from "../paints.js";
 import { useTitle } from "../router.js";
-import { count } from "../words.js";
 import { AddPictures } from "./add_pictures.js";
 import { LensCard } from "./lens_card.js";
 import { PictureCard } from "./picture_card.js";
@@ -15,21 +15,21 @@ export function SetPage({ name }) {
   useTitle(name);
   const { set, trouble } = studio();
   if (!set) {
-    return trouble ? html`<p><a href="/studio">All sets</a></p>` : html`<p class="loading quiet" role="status">Opening the set …</p>`;
+    return trouble ? html`<p><a href="/studio">${say("All sets")}</a></p>` : html`<p class="loading quiet" role="status">${say("Opening the set …")}</p>`;
   }
   const shows = set.pictures.filter(showsPaint).length;
   return html`
     <header class="studio-head">
-      <p class="quiet"><a href="/studio">Studio</a></p>
-      <h2>${name} <small><i class="paint-swatch" style=${{ background: toneOf(set.paint) }} aria-hidden="true" />${set.paint} paint</small></h2>
+      <p class="quiet"><a href="/studio">${say("Studio")}</a></p>
+      <h2>${name} <small><i class="paint-swatch" style=${{ background: toneOf(set.paint) }} aria-hidden="true" />${say("{paint} paint", { paint: say(set.paint) })}</small></h2>
     </header>
     <div class="studio-grid">
       <div class="studio-main">
         <${PictureCard} />
-        <section class="card strip" aria-labelledby="strip"><h3 id="strip">Pictures <small>${count(set.pictures.length, "picture")}, paint marked in ${shows}</small></h3>
+        <section class="card strip" aria-labelledby="strip"><h3 id="strip">${say("Pictures")} <small>${say("{n} picture, paint marked in {shows}|{n} pictures, paint marked in {shows}", { n: set.pictures.length, shows })}</small></h3>
           <ul>${set.pictures.map((picture, i) => html`<${Thumb} key=${picture.file} picture=${picture} number=${i + 1} />`)}</ul>
-          ${set.pictures.length === 0 && html`<p class="quiet">Start here: take pictures of your floor from a flight, from the drone as it stands, or from files, under every light that the floor has.</p>`}
-          ${mayOperate() ? html`<${AddPictures} />` : html`<p class="quiet">Only looking on: an operator adds and marks pictures.</p>`}
+          ${set.pictures.length === 0 && html`<p class="quiet">${say("Start here: take pictures of your floor from a flight, from the drone as it stands, or from files, under every light that the floor has.")}</p>`}
+          ${mayOperate() ? html`<${AddPictures} />` : html`<p class="quiet">${say("Only looking on: an operator adds and marks pictures.")}</p>`}
         </section>
       </div>
       <div class="studio-side">
@@ -45,12 +45,12 @@ export const showsPaint = (picture) => picture.regions.some((one) => one.paint) 
 
 function Thumb({ picture, number }) {
   const { regions, lines, negative } = picture;
-  const marked = negative ? "no line" : [regions.length && count(regions.length, "mark"), lines.length && count(lines.length, "line")].filter(Boolean).join(", ");
+  const marked = negative ? say("no line") : [regions.length && say("{n} mark|{n} marks", { n: regions.length }), lines.length && say("{n} line|{n} lines", { n: lines.length })].filter(Boolean).join(", ");
   return html`
     <li>
       <button class="thumb" aria-pressed=${picture.file === studio().chosen} onClick=${() => choosePicture(picture.file)}>
         <img src=${pictureHref(picture.file)} alt="" loading="lazy" width="128" height="72" />
-        <span>${number}. ${marked || "nothing marked"}</span>
+        <span>${number}. ${marked || say("nothing marked")}</span>
       </button>
     </li>
   `;

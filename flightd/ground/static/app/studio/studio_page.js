@@ -1,5 +1,6 @@
 // The page Studio: all picture sets, installed profiles and the camera's exposure, or one set with its pictures in hand.
 import { html, useEffect } from "../html.js";
+import { quoted, say } from "../language.js";
 import { ExposureCard } from "./exposure_card.js";
 import { SetList } from "./set_list.js";
 import { SetPage } from "./set_page.js";
@@ -13,10 +14,10 @@ export default function StudioPage({ route }) {
   }, [name]);
   const { overview, trouble } = studio();
   if (overview && !overview.folder) return html`<div class="studio"><${NoFolder} /><${ExposureCard} /></div>`;
-  if (!overview && !trouble) return html`<p class="loading quiet" role="status">Loading …</p>`;
+  if (!overview && !trouble) return html`<p class="loading quiet" role="status">${say("Loading …")}</p>`;
   return html`
     <div class="studio">
-      ${trouble && html`<p class="studio-trouble" role="alert">${trouble}</p>`}
+      ${trouble && html`<p class="studio-trouble" role="alert">${quoted(trouble)}</p>`}
       ${name ? html`<${SetPage} name=${name} />` : overview && html`<${SetList} overview=${overview} /><${ExposureCard} />`}
     </div>
   `;
@@ -24,8 +25,8 @@ export default function StudioPage({ route }) {
 
 function NoFolder() {
   return html`
-    <section class="card empty"><h2>No folder to work in</h2>
-      <p>Pictures and profiles are kept in the station's folder. Start it with one: <code>flightd ground --folder out</code>.</p>
+    <section class="card empty"><h2>${say("No folder to work in")}</h2>
+      <p>${say("Pictures and profiles are kept in the station's folder. Start it with one:")} <code>flightd ground --folder out</code>.</p>
     </section>
   `;
 }

@@ -1,0 +1,17 @@
+// All German texts.  A text that is said on several pages stands in frame.js.
+import access from "./access.js";
+import doctor from "./doctor.js";
+import flights from "./flights.js";
+import frame from "./frame.js";
+import guide from "./guide.js";
+import live from "./live.js";
+import missions from "./missions.js";
+import reported from "./reported.js";
+import site from "./site.js";
+import stock from "./stock.js";
+import studio from "./studio.js";
+
+export const REPORTED = reported;
+export const TEXTS = Object.assign(
+  Object.create(null), access, doctor, flights, frame, guide, live, missions, reported, site, stock, studio,
+);

@@ -1,0 +1,101 @@
+"""The pages in German: switched to, kept, without English left, for everybody."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from flightd.config.schema import load_config
+from flightd.site.site_file import site_toml
+from tests.replay.synthetic_flight import write_flight
+from tests.unit.mission.shelves import FITTED
+from tests.web.chromium import NARROW, hindrances, opened, station
+from tests.web.live_flight import LiveFlight
+from tests.web.stock_rig import RACKS, counted_store
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
+from playwright.sync_api import expect
+
+CONFIG = load_config(Path(__file__).parents[2] / "configs" / "sim.toml").with_values(
+    mission={"autostart": False}, front_camera=FITTED
+)
+PAGES = (
+    ("/", "Flugbereit"),
+    ("/stock?store=monday&place=AL-01-1-1", "GS1|Als leer|Gelesen"),
+    ("/missions", "Knoten auf der Karte wählen"),
+    ("/flights", "1 Flug"),
+    ("/studio", "Bildsätze"),
+    ("/site/edit?name=hall.toml", "Stimmig: Eine Drohne kann danach fliegen."),
+    ("/site/new", "Neue Halle"),
+    ("/doctor", "Diagnose"),
+    ("/guide", "Alle Seiten"),
+)
+"""Where a page is, and what it says once it is there."""
+ENGLISH_LEFT = """async () => {
+  const { TEXTS } = await import("/static/app/german/catalogue.js");
+  const escaped = (text) => text.replace(/[.*+?^$()|[\\]\\\\]/g, "\\\\$&").replace(/\\{\\w+\\}/g, ".+");
+  const forms = Object.entries(TEXTS).filter(([text, german]) => text !== german).flatMap(([text]) => text.split("|"));
+  const english = forms.filter((text) => !Object.values(TEXTS).includes(text)).map((text) => new RegExp(`^${escaped(text)}$`, "s"));
+  const shown = [];
+  const nodes = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (nodes.nextNode()) {
+    if (!nodes.currentNode.parentElement.closest("body [lang=en], code, pre, noscript")) shown.push(nodes.currentNode.data);
+  }
+  for (const name of ["aria-label", "title", "placeholder", "alt"]) {
+    for (const element of document.querySelectorAll(`[${name}]`)) {
+      if (!element.closest("body [lang=en]")) shown.push(element.getAttribute(name));
+    }
+  }
+  return shown.map((text) => text.trim()).filter((text) => text && english.some((one) => one.test(text)));
+}"""
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A station whose drone waits, with an inventory, a flight and a map in its folder."""
+    folder = tmp_path_factory.mktemp("hall")
+    counted_store(folder / "monday")
+    (folder / "hall.toml").write_text(site_toml(RACKS))
+    (folder / "flown").mkdir()
+    write_flight(folder / "flown")
+    with LiveFlight(RACKS, CONFIG, speed=1.0) as flight:
+        status, command = flight.ports
+        with station([f"demo=127.0.0.1:{status}/{command}"], folder=folder) as url:
+            yield url
+
+
+def is_german_for_everybody(page: Page, size: tuple[int, int]) -> None:
+    assert page.evaluate(ENGLISH_LEFT) == [], page.url
+    assert page.evaluate("document.documentElement.scrollWidth") == size[0], page.url
+    assert hindrances(page) == [], page.url
+
+
+def test_every_page_is_german_once_it_is_asked_for_and_stays_so(browser: Browser, url: str) -> None:
+    with opened(browser, url, NARROW) as page:
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+        assert page.evaluate(ENGLISH_LEFT) != []
+        page.get_by_role("button", name="DE, Deutsch").click()
+        expect(page.get_by_text("Flugbereit")).to_be_visible()
+        expect(page).to_have_title("Live · flightd")
+        expect(page.locator("html")).to_have_attribute("lang", "de")
+        for path, said in PAGES:
+            page.goto(f"{url}{path}")
+            expect(page.get_by_text(said).first).to_be_visible()
+            is_german_for_everybody(page, NARROW)
+        expect(page.get_by_role("link", name="Handbuch")).to_be_visible()
+        expect(page.locator("article[lang=en]")).to_be_visible()
+        page.get_by_role("button", name="EN, English").click()
+        expect(page).to_have_title("Guide · flightd")
+
+
+def test_whose_browser_is_german_reads_german_numbers_and_dates(browser: Browser, url: str) -> None:
+    with opened(browser, f"{url}/flights", locale="de-DE") as page:
+        expect(page.locator("html")).to_have_attribute("lang", "de")
+        expect(page.get_by_role("columnheader", name="Quer rms")).to_be_visible()
+        assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]  # type: ignore[index]
