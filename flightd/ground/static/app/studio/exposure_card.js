@@ -7,21 +7,22 @@ import { nameOf } from "../doctor/settings_keys.js";
 import { useComplaint } from "../doctor/settings_view.js";
 import { mayChange } from "../access/session.js";
 import { html, useEffect, useState } from "../html.js";
+import { decimal, english, plain, quoted, say, sayWith } from "../language.js";
 import { shown, state } from "../store.js";
 import { capital } from "../words.js";
 import { ExposurePicture } from "./exposure_picture.js";
 
 const CHECKS = { down: ["exposure", "brightness", "flicker", "blur"], front: ["front exposure"] };
 const KEYS = ["exposure_s", "manual_exposure", "gain", "anti_flicker_hz"];
-const NAMES = { down: "Down camera", front: "Front camera" };
+const NAMES = { down: english("Down camera"), front: english("Front camera") };
 
 export function ExposureCard() {
   const drone = state.selected;
   return html`
-    <section class="card exposure" aria-labelledby="exposure"><h3 id="exposure">Camera exposure</h3>
+    <section class="card exposure" aria-labelledby="exposure"><h3 id="exposure">${say("Camera exposure")}</h3>
       ${drone
         ? html`<${OfDrone} key=${drone} drone=${drone} />`
-        : html`<p class="quiet">This station was started without a drone: give <code>--drone NAME=HOST</code>.</p>`}
+        : html`<p class="quiet">${sayWith("This station was started without a drone: give {option}.", { option: html`<code>--drone NAME=HOST</code>` })}</p>`}
     </section>
   `;
 }
@@ -47,22 +48,22 @@ function OfDrone({ drone }) {
   const take = (now) => setKnown((before) => ({ ...before, settings: now }));
   return html`
     <div class="exposure-head">
-      <p class="quiet">By hand and short: 5 ms at most, so that lines and labels do not smear. ${drone} is asked while it stands on the ground.</p>
+      <p class="quiet">${say("By hand and short: 5 ms at most, so that lines and labels do not smear. {drone} is asked while it stands on the ground.", { drone })}</p>
       <div class="tools">
         ${report?.exposures?.length > 1 && report.exposures.map(({ camera: name }) => html`
-          <button key=${name} class="tab" aria-pressed=${name === camera} onClick=${() => setCamera(name)}>${NAMES[name]}</button>`)}
-        <button class="order" disabled=${looking} onClick=${look}>${looking ? "Looking …" : "Look again"}</button>
+          <button key=${name} class="tab" aria-pressed=${name === camera} onClick=${() => setCamera(name)}>${say(NAMES[name])}</button>`)}
+        <button class="order" disabled=${looking} onClick=${look}>${looking ? say("Looking …") : say("Look again")}</button>
       </div>
     </div>
-    ${trouble && html`<p class="obstacles" role="alert">${capital(trouble)}</p>`}
+    ${trouble && html`<p class="obstacles" role="alert">${quoted(trouble, capital)}</p>`}
     <div class="exposure-grid">
       <${ExposurePicture} drone=${drone} camera=${camera} />
       <div class="exposure-side">
         ${told && html`<${ReadBack} told=${told} />`}
-        ${report && html`<ul class="check-list" aria-label="What the doctor says">
+        ${report && html`<ul class="check-list" aria-label=${say("What the doctor says")}>
           ${worstFirst(report.checks.filter(({ name }) => CHECKS[camera].includes(name))).map((check) => html`<${CheckRow} key=${check.name} check=${check} />`)}
         </ul>`}
-        ${!report && looking && html`<p class="quiet" role="status">Asking the drone …</p>`}
+        ${!report && looking && html`<p class="quiet" role="status">${say("Asking the drone …")}</p>`}
       </div>
       ${told && settings && html`<${Change} key=${`${camera} ${session}`} drone=${drone} told=${told} settings=${settings} take=${take} />`}
     </div>
@@ -70,32 +71,35 @@ function OfDrone({ drone }) {
 }
 
 function ReadBack({ told }) {
+  const [left, untold] = [say("left to the camera"), say("not told")];
   const rows = [
-    ["Exposure", time(told.set_exposure_s, "left to the camera"), time(told.exposure_s, "not told")],
-    ["Automatic", told.set_exposure_s === null ? "left to the camera" : "off", told.manual === null ? "not told" : told.manual ? "off" : "on"],
-    ["Gain", told.set_gain ?? "left to the camera", told.gain ?? "not told"],
-    ["Anti-flicker", mains(told.set_anti_flicker_hz || null, "left to the camera"), mains(told.anti_flicker_hz, "not told")],
+    [say("Exposure"), time(told.set_exposure_s, left), time(told.exposure_s, untold)],
+    [say("Automatic"), told.set_exposure_s === null ? left : say("off"), told.manual === null ? untold : told.manual ? say("off") : say("on")],
+    [say("Gain"), figure(told.set_gain, left), figure(told.gain, untold)],
+    [say("Anti-flicker"), mains(told.set_anti_flicker_hz || null, left), mains(told.anti_flicker_hz, untold)],
   ];
   return html`
     <table>
-      <thead><tr><td></td><th scope="col">Set</th><th scope="col">Read back</th></tr></thead>
+      <thead><tr><td></td><th scope="col">${say("Set")}</th><th scope="col">${say("Read back")}</th></tr></thead>
       <tbody>${rows.map(([name, set, found]) => html`<tr key=${name}><th scope="row">${name}</th><td>${set}</td><td>${found}</td></tr>`)}</tbody>
     </table>
     ${told.camera === "down" && html`<p>${told.blur_px === null
-      ? "How far the floor smears in flight is not known: the camera does not tell its exposure."
-      : html`In flight the floor smears by <b>${told.blur_px.toFixed(1)} px</b> in a picture.`}</p>`}
+      ? say("How far the floor smears in flight is not known: the camera does not tell its exposure.")
+      : sayWith("In flight the floor smears by {blur} in a picture.", { blur: html`<b>${`${decimal(told.blur_px, 1)} px`}</b>` })}</p>`}
   `;
 }
 
-const time = (seconds, none) => (seconds === null ? none : `${Number((seconds * 1000).toPrecision(3))} ms`);
+const time = (seconds, none) => (seconds === null ? none : `${plain(Number((seconds * 1000).toPrecision(3)))} ms`);
 
-const mains = (hz, none) => (hz === null ? none : hz ? `${hz} Hz` : "off");
+const figure = (value, none) => (value === null ? none : plain(value));
+
+const mains = (hz, none) => (hz === null ? none : hz ? `${hz} Hz` : say("off"));
 
 function Change({ drone, told, settings, take }) {
   const [changes, setChanges] = useState({});
-  const known = !mayChange() && !settings.locked ? { ...settings, locked: "an admin changes settings" } : settings;
+  const known = !mayChange() && !settings.locked ? { ...settings, locked: english("an admin changes settings") } : settings;
   const complaint = useComplaint(drone, known, changes);
-  if (told.refused) return html`<p class="quiet exposure-change">Nothing to set here: ${told.refused}.</p>`;
+  if (told.refused) return html`<p class="quiet exposure-change">${sayWith("Nothing to set here: {reason}.", { reason: quoted(told.refused) })}</p>`;
   const keys = known.keys.filter((key) => key.section === told.section && KEYS.includes(key.key));
   const change = (name, value) =>
     setChanges(({ [name]: _, ...others }) => (value === undefined ? others : { ...others, [name]: value }));
@@ -106,7 +110,7 @@ function Change({ drone, told, settings, take }) {
   return html`
     <div class="exposure-change">
       <div>
-        ${known.locked && html`<p class="quiet">Only to look at: ${known.locked}.</p>`}
+        ${known.locked && html`<p class="quiet">${sayWith("Only to look at: {why}.", { why: quoted(known.locked) })}</p>`}
         ${keys.map((key) => {
           const name = nameOf(key);
           return html`<${SettingField} key=${name} about=${key} table=${known.table} change=${changes[name]} onChange=${change}

@@ -1,9 +1,11 @@
 // The newest picture of a camera, and how its brightness is spread.
 import { showPictures } from "../connection.js";
 import { html, useEffect, useRef, useState } from "../html.js";
+import { decimal, english, quoted, say } from "../language.js";
 import { shown } from "../store.js";
 import { BINS, brightnessOf } from "./brightness.js";
 
+const NEWEST = { down: english("Newest picture of the down camera"), front: english("Newest picture of the front camera") };
 const WIDTH = 320;
 const TALL = 40;
 
@@ -24,9 +26,9 @@ export function ExposurePicture({ drone, camera }) {
   const trouble = shown().trouble[camera];
   return html`
     <figure class="exposure-picture">
-      <canvas ref=${canvas} class="preview" width=${WIDTH} height=${WIDTH * 0.5625} role="img" aria-label=${`Newest picture of the ${camera} camera`} />
+      <canvas ref=${canvas} class="preview" width=${WIDTH} height=${WIDTH * 0.5625} role="img" aria-label=${say(NEWEST[camera])} />
       <${Histogram} seen=${seen} />
-      <figcaption class=${trouble ? "refusal" : "quiet"}>${trouble || (seen ? words(seen) : "No picture yet.")}</figcaption>
+      <figcaption class=${trouble ? "refusal" : "quiet"}>${trouble ? quoted(trouble) : seen ? words(seen) : say("No picture yet.")}</figcaption>
     </figure>
   `;
 }
@@ -34,7 +36,7 @@ export function ExposurePicture({ drone, camera }) {
 function Histogram({ seen }) {
   const most = seen ? Math.max(...seen.bins) : 1;
   return html`
-    <svg class="histogram" viewBox=${`0 0 ${BINS} ${TALL}`} preserveAspectRatio="none" role="img" aria-label=${seen ? `Brightness from dark to bright: ${words(seen)}` : "Brightness: no picture yet"}>
+    <svg class="histogram" viewBox=${`0 0 ${BINS} ${TALL}`} preserveAspectRatio="none" role="img" aria-label=${seen ? say("Brightness from dark to bright: {figures}", { figures: words(seen) }) : say("Brightness: no picture yet")}>
       ${seen?.bins.map((share, at) => {
         const tall = (TALL * share) / most;
         return html`<rect key=${at} class=${at === 0 || at === BINS - 1 ? "lost" : ""} x=${at} y=${TALL - tall} width="1" height=${tall} />`;
@@ -43,6 +45,7 @@ function Histogram({ seen }) {
   `;
 }
 
-const words = ({ median, black, burnt }) => `Median ${median} of 255, ${share(burnt)} burnt out, ${share(black)} black`;
+const words = ({ median, black, burnt }) =>
+  say("Median {median} of 255, {burnt} burnt out, {black} black", { median, burnt: share(burnt), black: share(black) });
 
-const share = (part) => `${(100 * part).toFixed(part < 0.1 ? 1 : 0)} %`;
+const share = (part) => `${decimal(100 * part, part < 0.1 ? 1 : 0)} %`;

@@ -65,17 +65,7 @@ function Doubtful({ files }) {
   const shown = files.map((file) => [file, pictures.findIndex((picture) => picture.file === file) + 1]).filter(([, number]) => number);
   return html`
     <div class="obstacles"><p>${say("Marks that the other pictures contradict: does floor run over paint, or paint beside it?")}</p>
-      <div class="tools">${shown.map(([file, number]) => html`<button key=${file} class="order" onClick=${() => choosePicture(file)}>${say("Picture {n}", { n: number })}</button>`)}</div></div>
-  `;
-}
-
-// Most often a stroke of floor that runs over paint: one such picture spoils what all of them teach.
-function Doubtful({ files }) {
-  const { pictures } = studio().set;
-  const shown = files.map((file) => [file, pictures.findIndex((picture) => picture.file === file) + 1]).filter(([, number]) => number);
-  return html`
-    <div class="obstacles"><p>Marks that the other pictures contradict: does floor run over paint, or paint beside it?</p>
-      <div class="tools">${shown.map(([file, number]) => html`<button key=${file} class="order" onClick=${() => choosePicture(file)}>Picture ${number}</button>`)}</div></div>
+      <div class="tools">${shown.map(([file, number]) => html`<button key=${file} class="order" onClick=${() => choosePicture(file)}>${say("Picture {number}", { number })}</button>`)}</div></div>
   `;
 }
 
