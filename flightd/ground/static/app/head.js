@@ -57,7 +57,7 @@ function Pages() {
 function Drones() {
   const names = state.station?.drones ?? [];
   const site = shown().welcome?.floor.name;
-  if (names.length < 2) return html`<p class="site">${site ? say("Site {site}", { site }) : ""}</p>`;
+  if (names.length < 2) return site ? html`<p class="site">${site}</p>` : null;
   return html`
     <nav class="drones" aria-label=${say("Drones")}>
       ${names.map(

@@ -46,7 +46,6 @@ export default {
   "Guide": "Handbuch",
   "{n} place|{n} places": "{n} Platz|{n} Plätze",
   "Pages": "Seiten",
-  "Site {site}": "Halle {site}",
   "Drones": "Drohnen",
   "Level at once and down at once, without steering": "Sofort waagerecht und sofort hinunter, ohne zu steuern",
   "STOPPING": "STOPPT",
