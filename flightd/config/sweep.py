@@ -39,7 +39,10 @@ class SweepConfig(Section):
         json_schema_extra=unit("share"),
     )
     read_s: float = Field(
-        0.25, gt=0.005, le=10, description="what a code reader takes for a picture; faster frames are left out"
+        0.25,
+        gt=0.005,
+        le=10,
+        description="what a code reader takes for a picture; faster frames are left out",
     )
     unread_views: int = Field(
         4, ge=2, le=50, description="whole, well-lit views without a code that make a place unreadable"

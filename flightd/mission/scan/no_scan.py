@@ -55,7 +55,9 @@ class NoScan:
     def leave(self) -> None:
         """Nothing is left."""
 
-    def legs(self, _run: Sequence[str], _here: str, _yaw_rad: float, _height_m: float) -> tuple[SweepLeg, ...]:
+    def legs(
+        self, _run: Sequence[str], _here: str, _yaw_rad: float, _height_m: float
+    ) -> tuple[SweepLeg, ...]:
         return ()
 
     def begin_sweep(self, legs: Sequence[SweepLeg]) -> None:

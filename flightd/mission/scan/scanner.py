@@ -49,7 +49,9 @@ class Scanner:
         self._params = params
         self._assigner = Assigner(site, sight, params.expert.least_probability)
         self._planner = ViewPlanner(site, sight, self._assigner, params, highest_m, aside_per_height)
-        self._sweeps = optics and SweepPlanner(site, self._planner, self._assigner, optics)
+        self._sweeps: SweepPlanner | None = None
+        if optics is not None:
+            self._sweeps = SweepPlanner(site, self._planner, self._assigner, optics)
         self._sweep: SweepTask | None = None
         self._swept: set[str] = set()
         self._owners: dict[str, str] = {}
@@ -218,9 +220,7 @@ class Scanner:
         aisles = dict.fromkeys(self._aisle_of.values())
         return tuple(lane for aisle in aisles for lane in self._sweeps.lanes(aisle, self._wanted))
 
-    def legs(
-        self, run: Sequence[str], here: str, yaw_rad: float, height_m: float
-    ) -> tuple[SweepLeg, ...]:
+    def legs(self, run: Sequence[str], here: str, yaw_rad: float, height_m: float) -> tuple[SweepLeg, ...]:
         """The legs past what is left to count at the nodes `run` of an aisle, for a drone over its node
         `here`; none where all is counted by stopping."""
         if self._sweeps is None or self.doubted:

@@ -103,9 +103,7 @@ class SweepTask:
 
     def step(self, now_ns: int) -> None:
         """Decide what has been flown past."""
-        self._pass(
-            [code for code, votes in self._votes.items() if 0 < votes.newest_ns < now_ns - _GONE_NS]
-        )
+        self._pass([code for code, votes in self._votes.items() if 0 < votes.newest_ns < now_ns - _GONE_NS])
 
     def end(self) -> None:
         """The last leg is over: decide all that was seen."""
@@ -149,7 +147,9 @@ class SweepTask:
         if votes is None:
             return Undecided.UNSEEN
         verdict = votes.verdict(self._owners)
-        if isinstance(verdict, Finding) and any(self._is_elsewhere(code, read.text) for read in verdict.reads):
+        if isinstance(verdict, Finding) and any(
+            self._is_elsewhere(code, read.text) for read in verdict.reads
+        ):
             return Undecided.ELSEWHERE
         return verdict
 
