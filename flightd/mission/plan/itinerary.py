@@ -91,7 +91,8 @@ class Itinerary:
 
     @property
     def _run_left(self) -> tuple[str, ...]:
-        return tuple(node for node in self._run if node not in self.visited or self.wanted(node))
+        run = dict.fromkeys(self._run)
+        return tuple(node for node in run if node not in self.visited or self.wanted(node))
 
     @property
     def way(self) -> tuple[str, ...]:
@@ -150,17 +151,18 @@ class Itinerary:
         later = (stop.sweep for stop in self._stops[self._next + 1 :] if stop.sweep is not None)
         if any(node in leg.nodes for leg in later) or abs(pose.along_m) > _OVER_NODE_M:
             return
-        self.visited.append(node)
+        self.visited += [node] * self._run.count(node)
         self._events.report(now_ns, EventLevel.INFO, "visited", node)
 
     def visit_undecided(self, now_ns: int) -> None:
         """The legs are flown: stop before what they left open, in the best order, then go on with the rest."""
         due, rest = self._run_left, self.ahead
+        again = [node for node in due for _ in range(self._run.count(node) - 1)]
         self._run = ()
         here = self.goal
         due, rest = in_best_order(self._site, here.node, due, rest, self._home)
         self._stops[self._next + 1 :] = self._onward(here, [*due, *rest]).stops
-        self.visited = [node for node in self.visited if node not in due]
+        self.visited = [*(node for node in self.visited if node not in due), *again]
         if due:
             self._events.report(now_ns, EventLevel.INFO, "sweep", f"{', '.join(due)} to stop at")
 

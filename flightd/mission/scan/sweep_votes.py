@@ -21,8 +21,9 @@ _SEEN_SHARE = 0.6
 """Part of what can be seen of a place that a picture must show to say anything of it."""
 _WHOLE_SHARE = 0.9
 _LEAST_WHOLE = 2
-"""Pictures that must show a place whole before it is said to be unreadable."""
+"""Pictures that must show a place whole, and goods in it, before it is said to be unreadable."""
 _CODES = (LocationState.READ, LocationState.SEVERAL)
+_OCCUPIED = (Occupancy.GOODS, Occupancy.COVERED)
 _UNREAD = (LocationState.UNREADABLE, LocationState.OCCLUDED)
 
 
@@ -31,6 +32,7 @@ class Undecided(enum.StrEnum):
 
     UNSEEN = "too few views"
     LIGHT = "badly lit"
+    UNSURE = "perhaps empty"
     ONCE = "a code that only one view gives"
     APART = "codes that no view shows together"
     TORN = "one label read differently"
@@ -50,7 +52,7 @@ class SweepVotes:
         self._texts: set[str] = set()
         self._fair_rad: list[float] = []
         self._whole = 0
-        self._unfair = 0
+        self._unfair = self._occupied = 0
         self._doubtful: set[str] = set()
         self.newest_ns = 0
         """When it was in a picture last; 0 before the first."""
@@ -81,6 +83,7 @@ class SweepVotes:
                 self.newest_ns = max(self.newest_ns, pose.stamp_ns)
                 fair = place.light is Light.FAIR or place.occupancy is Occupancy.EMPTY
                 self._unfair += not fair
+                self._occupied += fair and place.occupancy in _OCCUPIED
                 if fair:
                     self._fair_rad.append(bearing_rad)
                     self._whole += share >= _WHOLE_SHARE
@@ -122,6 +125,8 @@ class SweepVotes:
             return Undecided.ONCE
         if len(self._fair_rad) < sweep.unread_views:
             return Undecided.LIGHT if self._unfair else Undecided.UNSEEN
+        if self._occupied < _LEAST_WHOLE:
+            return Undecided.UNSURE
         spread_rad = max(self._fair_rad) - min(self._fair_rad)
         enough = self._whole >= _LEAST_WHOLE and spread_rad >= math.radians(sweep.unread_spread_deg)
         return found if enough else Undecided.UNSEEN
