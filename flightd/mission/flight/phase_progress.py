@@ -29,6 +29,7 @@ class PhaseProgress:
     def __init__(self, config: Config, itinerary: Itinerary, scan: ShelfScan, scanner: AnyScanner) -> None:
         self._params = config.mission
         self._battery = config.battery
+        self._stands_s = config.scan.pictures / config.front_camera.fps
         self._itinerary = itinerary
         self._scan = scan
         self._scanner = scanner
@@ -84,7 +85,8 @@ class PhaseProgress:
                     and abs(wrap_pi(goal.yaw_rad - s.pose.yaw_rad)) < p.expert.arrive_yaw_rad
                 )
                 level = goal.sweep is None or state.returning or self._is_level(s, goal.sweep.height_m)
-                done, trigger = self._settled(s, turned and level), Trigger.TURNED
+                stands_s = max(p.settle_s, self._stands_s) if goal.sweep is not None else p.settle_s
+                done, trigger = self._settled(s, turned and level, stands_s), Trigger.TURNED
             case Phase.FOLLOW:
                 there = self._rests_at((goal.x_m, goal.y_m))
                 done, trigger = self._settled(s, there), Trigger.ARRIVED
@@ -145,9 +147,10 @@ class PhaseProgress:
         rise_m = abs(sweep.height_m - s.height_m) if sweep is not None else 0.0
         return 0.0 if math.isnan(rise_m) else rise_m / self._params.climb_mps
 
-    def _settled(self, s: MissionInputs, condition: bool) -> bool:
-        """True once `condition` has held for the settling time."""
-        return self._settling.step(condition, s.now_ns) >= self._params.settle_s and condition
+    def _settled(self, s: MissionInputs, condition: bool, for_s: float | None = None) -> bool:
+        """True once `condition` has held for the settling time, or for another one."""
+        needed_s = self._params.settle_s if for_s is None else for_s
+        return self._settling.step(condition, s.now_ns) >= needed_s and condition
 
     def _time_limit_s(self, s: MissionInputs, phase: Phase) -> float:
         """How long the phase just begun may take: a fixed slack, and a multiple of its way's own time.  A

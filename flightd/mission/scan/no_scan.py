@@ -63,7 +63,7 @@ class NoScan:
     def begin_sweep(self, legs: Sequence[SweepLeg]) -> None:
         """Nothing begins."""
 
-    def begin_leg(self, leg: SweepLeg, now_ns: int) -> None:
+    def begin_leg(self, now_ns: int) -> None:
         """Nothing begins."""
 
     def pause_leg(self) -> None:

@@ -95,8 +95,8 @@ class Scanner:
     @property
     def exposure(self) -> float:
         """What the front camera's pictures are wanted with, as a part of its usual exposure."""
-        if self._sweep is not None and self._sweep.leg is not None:
-            return self._sweep.leg.exposure
+        if self._sweep is not None and self._sweep.looking:
+            return self._sweep.exposure
         return self.view.exposure if self.view is not None else 1.0
 
     @property
@@ -235,13 +235,11 @@ class Scanner:
         cells, node_of = self._assigner.cells, self._node_of.__getitem__
         self._sweep = SweepTask(legs, cells, node_of, self._params, self._sweeps.share)
 
-    def begin_leg(self, leg: SweepLeg, now_ns: int) -> None:
-        """A leg begins, or goes on."""
-        if self._sweep is not None and not self.doubted:
-            if self._sweep.leg is None:
-                self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
-            self._sweep.begin(leg, now_ns)
-            self._gather_sweep()
+    def begin_leg(self, now_ns: int) -> None:
+        """A leg is flown to, begins, or goes on."""
+        if self._sweep is not None and not self.doubted and not self._sweep.looking:
+            self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
+            self._sweep.begin(now_ns)
 
     def pause_leg(self) -> None:
         """The leg is interrupted."""
@@ -271,13 +269,13 @@ class Scanner:
     @property
     def looking(self) -> bool:
         """Whether the front camera's pictures are wanted now."""
-        if self._sweep is not None and self._sweep.leg is not None:
+        if self._sweep is not None and self._sweep.looking:
             return True
         return self._task is not None and bool(self._task.looking)
 
     def places(self, pose: BodyPose) -> tuple[Place, ...]:
         """The places wanted in a picture taken at `pose`; none for one that would not count."""
-        if self._sweep is not None and self._sweep.leg is not None:
+        if self._sweep is not None and self._sweep.looking:
             return self._assigner.places(pose, self._sweep.near(pose)) if pose.certain else ()
         task = self._task
         if task is None or task.since_ns is None or pose.stamp_ns < task.since_ns or not pose.certain:
@@ -288,7 +286,10 @@ class Scanner:
         """One picture and the pose at its exposure."""
         if self.doubted:
             return
-        if self._sweep is not None and (leg := self._sweep.leg) is not None:
+        if self._sweep is not None and self._sweep.looking:
+            leg = self._sweep.leg_at(pose)
+            if leg is None:
+                return
             look = self._assigner.look(codes, pose, (leg.aisle, leg.side))
             agreeing = self._proven(look, f"aisle {leg.aisle}")
             if agreeing is not None:

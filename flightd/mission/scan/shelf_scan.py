@@ -128,9 +128,9 @@ class ShelfScan:
         """Pictures count from the beginning of a leg until the next one's, but for interruptions."""
         if phase in _ENDS or (trigger is Trigger.TURNED and stop.sweep is None):
             self.end_sweep(s.now_ns)
-        elif trigger is Trigger.TURNED and stop.sweep is not None:
-            self._scanner.begin_leg(stop.sweep, s.now_ns)
-        elif phase not in _PASSING:
+        elif phase in _PASSING:
+            self._scanner.begin_leg(s.now_ns)
+        else:
             self._scanner.pause_leg()
 
 

@@ -17,15 +17,17 @@ from flightd.site.shelf_cells import Cell
 
 _FACES_RAD = math.radians(15.0)
 """A picture counts while the nose is so near to the shelf's direction."""
-_AT_HEIGHT_M = 0.25
+_AT_HEIGHT_M = 0.15
 """And the drone so near to the leg's height: between two levels labels of both are cut off."""
 _GONE_NS = 1_500_000_000
 """A place that was in no picture for so long has been flown past."""
 
 
 class SweepTask:
-    """Call `begin` with each leg, `take` with what the pictures show, `step` at each tick, `end` after the
-    last.  `drain` gives what was decided since."""
+    """Call `begin` where legs are flown, `take` with what the pictures show, `step` at each tick, `end` after
+    the last leg.  `drain` gives what was decided since.
+
+    A picture counts for the leg from whose height, and facing whose side, it was taken."""
 
     def __init__(
         self,
@@ -46,20 +48,25 @@ class SweepTask:
         self._findings: list[Finding] = []
         self._owners: dict[str, set[str]] = {}
         self._apart: set[tuple[str, str, str]] = set()
-        self.leg: SweepLeg | None = None
-        self._since_ns = 0
+        self._since_ns: int | None = None
+        self.exposure = legs[0].exposure
+        """What pictures are wanted with, as a part of the camera's usual exposure."""
         self.undecided: dict[str, Undecided] = {}
         """Places that were flown past and not decided, and why."""
 
-    def begin(self, leg: SweepLeg, now_ns: int) -> None:
-        """A leg begins, or goes on after an interruption: pictures exposed from now on count."""
-        if self.leg is not None and self.leg is not leg:
-            self._pass([code for code in self.leg.locations if code not in leg.locations])
-        self.leg, self._since_ns = leg, now_ns
+    @property
+    def looking(self) -> bool:
+        """Whether pictures are wanted now."""
+        return self._since_ns is not None
+
+    def begin(self, now_ns: int) -> None:
+        """Legs are flown, or flown on after an interruption: pictures exposed from now on count."""
+        if self._since_ns is None:
+            self._since_ns = now_ns
 
     def pause(self) -> None:
-        """The leg is interrupted: no picture counts until it begins again."""
-        self.leg = None
+        """The leg is interrupted: no picture counts until it goes on."""
+        self._since_ns = None
 
     def forget(self) -> None:
         """The place was in doubt: what is not decided yet counts for nothing."""
@@ -67,29 +74,37 @@ class SweepTask:
             self.undecided[code] = Undecided.DOUBTED
             self._closed.add(code)
         self._votes.clear()
-        self.leg = None
+        self.pause()
+
+    def leg_at(self, pose: BodyPose) -> SweepLeg | None:
+        """The leg that a picture taken at `pose` counts for."""
+        if self._since_ns is None or pose.stamp_ns < self._since_ns:
+            return None
+        facing = [leg for leg in self._legs if abs(wrap_pi(pose.yaw_rad - leg.yaw_rad)) < _FACES_RAD]
+        nearest = min(facing, key=lambda leg: abs(leg.height_m - pose.height_m), default=None)
+        off_m = math.inf if nearest is None else abs(nearest.height_m - pose.height_m)
+        return nearest if off_m < _AT_HEIGHT_M else None
 
     def near(self, pose: BodyPose) -> tuple[str, ...]:
-        """The locations that a picture taken at `pose` is wanted of; the rest is not in it, or is decided."""
-        leg = self.leg
-        if leg is None or pose.stamp_ns < self._since_ns or not self._fits(leg, pose):
-            return ()
-        return tuple(code for code in leg.locations if code not in self._closed)
+        """The locations that a picture taken at `pose` is wanted of: what is not decided."""
+        leg = self.leg_at(pose)
+        return () if leg is None else tuple(code for code in leg.locations if code not in self._closed)
 
     def take(self, look: ShelfLook) -> None:
         """One picture."""
-        leg, pose = self.leg, look.pose
-        if leg is None or pose.stamp_ns < self._since_ns or not self._fits(leg, pose):
+        pose = look.pose
+        leg = self.leg_at(pose)
+        if leg is None:
             return
         places = {place.location: place for place in look.codes.places}
         reads: dict[str, list[PlacedRead]] = {}
-        for placed in look.reads:
-            reads.setdefault(placed.location, []).append(placed)
-        self._note_owners(look.reads)
         doubtful: dict[str, set[str]] = {}
         for placed in look.reads:
-            if not placed.location:
+            if placed.location:
+                reads.setdefault(placed.location, []).append(placed)
+            else:
                 doubtful.setdefault(placed.likeliest, set()).add(placed.read.text)
+        self._note_owners(look.reads)
         for code in leg.locations:
             place, own = places.get(code), reads.get(code, [])
             if code in self._closed or (place is None and not own):
@@ -107,8 +122,8 @@ class SweepTask:
 
     def end(self) -> None:
         """The last leg is over: decide all that was seen."""
-        self._pass([code for leg in self._legs for code in leg.locations])
-        self.leg = None
+        self._pass(dict.fromkeys(code for leg in self._legs for code in leg.locations))
+        self.pause()
 
     def drain(self) -> tuple[Finding, ...]:
         """The locations decided since the last call."""
@@ -119,10 +134,6 @@ class SweepTask:
     def why(self) -> Counter[Undecided]:
         """How many places are not decided, by the reason."""
         return Counter(self.undecided.values())
-
-    def _fits(self, leg: SweepLeg, pose: BodyPose) -> bool:
-        faces = abs(wrap_pi(pose.yaw_rad - leg.yaw_rad)) < _FACES_RAD
-        return faces and abs(pose.height_m - leg.height_m) < _AT_HEIGHT_M
 
     def _votes_of(self, code: str, leg: SweepLeg) -> SweepVotes:
         if code not in self._votes:

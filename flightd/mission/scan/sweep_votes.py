@@ -51,7 +51,7 @@ class SweepVotes:
         self._together: set[tuple[str, str]] = set()
         self._texts: set[str] = set()
         self._fair_rad: list[float] = []
-        self._whole = 0
+        self._whole_rad: list[float] = []
         self._unfair = self._occupied = 0
         self._doubtful: set[str] = set()
         self.newest_ns = 0
@@ -86,7 +86,7 @@ class SweepVotes:
                 self._occupied += fair and place.occupancy in _OCCUPIED
                 if fair:
                     self._fair_rad.append(bearing_rad)
-                    self._whole += share >= _WHOLE_SHARE
+                    self._whole_rad += [bearing_rad] * (share >= _WHOLE_SHARE)
         if reads:
             self.newest_ns = max(self.newest_ns, pose.stamp_ns)
         self._doubtful.update(doubtful)
@@ -125,8 +125,13 @@ class SweepVotes:
             return Undecided.ONCE
         if len(self._fair_rad) < sweep.unread_views:
             return Undecided.LIGHT if self._unfair else Undecided.UNSEEN
-        if self._occupied < _LEAST_WHOLE:
-            return Undecided.UNSURE
-        spread_rad = max(self._fair_rad) - min(self._fair_rad)
-        enough = self._whole >= _LEAST_WHOLE and spread_rad >= math.radians(sweep.unread_spread_deg)
+        spread_rad = math.radians(sweep.unread_spread_deg)
+        if self._occupied < _LEAST_WHOLE:  # an empty place would have shown its deck to so many views
+            sure = len(self._whole_rad) >= sweep.unread_views and _spread(self._whole_rad) >= 2.0 * spread_rad
+            return found if sure else Undecided.UNSURE
+        enough = len(self._whole_rad) >= _LEAST_WHOLE and _spread(self._fair_rad) >= spread_rad
         return found if enough else Undecided.UNSEEN
+
+
+def _spread(bearings_rad: Sequence[float]) -> float:
+    return max(bearings_rad) - min(bearings_rad)
