@@ -19,9 +19,9 @@ class ScanMode(enum.StrEnum):
 class SweepConfig(Section):
     """How shelves are counted in passing, with `scan.mode = "sweep"`.
 
-    The speed is the highest that keeps the blur within 0.75 module, gives `views` whole views of each place and
-    does not exceed `mission.speed_mps`. An aisle whose labels get less than 2.5 pixels for each module, or
-    whose lines are not open both ways, is counted by stopping."""
+    The speed is the highest that keeps the blur within 0.75 module, gives `views` whole views of each place
+    and does not exceed `mission.speed_mps`. An aisle whose labels get less than 2.5 pixels for each module,
+    or whose lines are not open both ways, is counted by stopping."""
 
     module_m: float = Field(
         0.003, ge=0.0001, le=0.1, description="size of a module (the narrowest bar) of the smallest label"

@@ -472,9 +472,9 @@ class Mission:
     def _pass_by(self, s: MissionInputs) -> None:
         """What is flown past is decided, and its nodes are visited."""
         self._scan.step(s.now_ns)
-        if self.phase is Phase.FOLLOW and s.pose is not None and s.localised and s.is_sure(self._params):
-            if not self.state.returning:
-                self._route.note_passed(s.now_ns, s.pose)
+        known = s.localised and s.is_sure(self._params)
+        if self.phase is Phase.FOLLOW and known and s.pose is not None and not self.state.returning:
+            self._route.note_passed(s.now_ns, s.pose)
 
     def _relocate(self, s: MissionInputs) -> None:
         """Begin to look for the position."""

@@ -127,8 +127,8 @@ class Sorties:
     def must_not_go_on(
         self, here: str, there: str, speed_mps: float = math.inf, *, stops: bool = True
     ) -> ChargeShort | None:
-        """Why the drone should not fly on from `here`, no faster than `speed_mps`, to visit `there` (only to be
-        there, if it never `stops` for a count), None if it may."""
+        """Why the drone should not fly on from `here`, no faster than `speed_mps`, to visit `there` (only to
+        be there, if it never `stops` for a count), None if it may."""
         pace = self._legs.pace
         try:
             on_s = self._legs.way_s(here, there)

@@ -18,7 +18,6 @@ from flightd.mission.scan.no_scan import AnyScanner
 from flightd.mission.scan.shelf_scan import ShelfScan
 from flightd.mission.triggers import Trigger
 
-
 _READING_S = 0.8
 """At the end of the last leg past a shelf its pictures are still being read."""
 

@@ -237,8 +237,8 @@ class ReferenceGenerator:
         return True
 
     def _height_goal_m(self, task: ReferenceTask) -> float:
-        """The view's height while scanning, that of the leg past a shelf; the legs between an aisle's scanned nodes are flown at the last
-        one's, unless a doubt on the way asks for a wider view."""
+        """The view's height while scanning, that of a leg past a shelf; the legs between an aisle's scanned
+        nodes are flown at the last one's, unless a doubt on the way asks for a wider view."""
         if task.view is not None:
             self._cruise_m = task.view.height_m
         elif task.phase is Phase.RELOCATE:

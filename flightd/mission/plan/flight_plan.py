@@ -40,8 +40,8 @@ class HeadingPolicy:
 @dataclass(frozen=True, slots=True)
 class Stop:
     """A node to stop at.  `yaw_rad` is flown from the stop before up to here; `visit` says that the node
-    is one of the wanted ones (dwell, scan), not just a corner on the way; `sweep` is what is flown past on the
-    way to it."""
+    is one of the wanted ones (dwell, scan), not just a corner on the way; `sweep` is what is flown past on
+    the way to it."""
 
     node: str
     x_m: float

@@ -155,7 +155,7 @@ class Itinerary:
         self._events.report(now_ns, EventLevel.INFO, "visited", node)
 
     def visit_undecided(self, now_ns: int) -> None:
-        """The legs are flown: stop before what they left open, in the best order, then go on with the rest."""
+        """The legs are flown: stop before what they left open, in the best order, and go on from there."""
         due, rest = self._run_left, self.ahead
         again = [node for node in due for _ in range(self._run.count(node) - 1)]
         self._run = ()

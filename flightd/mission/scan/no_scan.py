@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
+from flightd.core.planned_flight import PlannedSweep
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
 from flightd.core.types import Event
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.code_assignment import Sighting
 from flightd.mission.scan.scanner import Scanner
-from flightd.mission.scan.sweep_planner import Lane
 
 
 class NoScan:
@@ -26,7 +26,6 @@ class NoScan:
     doubted = False
     looking = False
     sweeps = False
-    lanes: tuple[Lane, ...] = ()
 
     def wants(self, _node: str) -> bool:
         return False
@@ -54,6 +53,9 @@ class NoScan:
 
     def leave(self) -> None:
         """Nothing is left."""
+
+    def told_sweeps(self, _nodes: Iterable[str], _levels: Sequence[int] = ()) -> tuple[PlannedSweep, ...]:
+        return ()
 
     def legs(
         self, _run: Sequence[str], _here: str, _yaw_rad: float, _height_m: float

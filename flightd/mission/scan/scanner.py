@@ -12,6 +12,7 @@ import math
 from collections.abc import Collection, Iterable, Sequence
 
 from flightd.config.scan import ScanConfig
+from flightd.core.planned_flight import PlannedSweep
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
 from flightd.core.types import Event, EventLevel
 from flightd.mission.plan.leg_times import Pace
@@ -22,7 +23,7 @@ from flightd.mission.scan.code_identity import names_one_thing
 from flightd.mission.scan.label_checks import LabelChecks
 from flightd.mission.scan.node_scan import ScanTask
 from flightd.mission.scan.pending_findings import PendingFindings
-from flightd.mission.scan.sweep_planner import Lane, SweepPlanner
+from flightd.mission.scan.sweep_planner import SweepPlanner, told
 from flightd.mission.scan.sweep_speed import SweepOptics
 from flightd.mission.scan.sweep_task import SweepTask
 from flightd.mission.scan.sweep_votes import Undecided
@@ -212,13 +213,13 @@ class Scanner:
         """Whether shelves are counted in passing first."""
         return self._sweeps is not None
 
-    @property
-    def lanes(self) -> tuple[Lane, ...]:
-        """What is flown past to count everything, aisle by aisle, and how; empty where nothing is."""
+    def told_sweeps(self, nodes: Iterable[str], levels: Sequence[int] = ()) -> tuple[PlannedSweep, ...]:
+        """How what hangs at some nodes, on all levels or these, is flown past; empty where it never is."""
         if self._sweeps is None:
             return ()
-        aisles = dict.fromkeys(self._aisle_of.values())
-        return tuple(lane for aisle in aisles for lane in self._sweeps.lanes(aisle, self._wanted))
+        codes = [code for node in nodes for code in self.places_at(node, levels)]
+        aisles = dict.fromkeys(self._aisle_of[self._node_of[code]] for code in codes)
+        return told(lane for aisle in aisles for lane in self._sweeps.lanes(aisle, codes))
 
     def legs(self, run: Sequence[str], here: str, yaw_rad: float, height_m: float) -> tuple[SweepLeg, ...]:
         """The legs past what is left to count at the nodes `run` of an aisle, for a drone over its node
@@ -310,8 +311,8 @@ class Scanner:
             self._pending.confirm_at(self._task.node)
 
     def _proven(self, look: ShelfLook, where: str) -> list[str] | None:
-        """The location labels in a picture that agree with the map; None where one contradicts it, and nothing
-        of the picture may count."""
+        """The location labels in a picture that agree with the map; None where one contradicts it, and
+        nothing of the picture may count."""
         self._sightings += look.sightings
         stamp_ns = look.pose.stamp_ns
         for text in self._labels.new_unmapped(look.unmapped):

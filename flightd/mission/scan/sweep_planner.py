@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from flightd.core.geometry import wrap_pi
+from flightd.core.planned_flight import PlannedSweep
 from flightd.core.scanning import BodyPose
 from flightd.mission.plan.leg_times import Pace, profile_s
 from flightd.mission.plan.sweep_leg import SweepLeg
@@ -38,40 +37,50 @@ class Lane:
     speed: SweepSpeed
     places: tuple[Location, ...]
 
-    def facts(self) -> dict[str, Any]:
-        """As JSON has it."""
-        speed = self.speed
-        return {
-            "aisle": self.aisle,
-            "side": self.side.value,
-            "levels": list(self.levels),
-            "places": len(self.places),
-            "height_m": round(self.height_m, 3),
-            "distance_m": round(self.distance_m, 3),
-            "speed_mps": round(speed.speed_mps, 3),
-            "limit": speed.limit.value,
-            "limits_mps": {limit.value: round(value, 3) for limit, value in speed.limits_mps},
-            "exposure": round(speed.exposure, 3),
-            "blur_modules": round(speed.blur_modules, 3),
-            "px_per_module": round(speed.px_per_module, 2),
-            "views": round(speed.views, 1),
-            "fps": round(speed.fps, 2),
-            "needed_fps": round(speed.needed_fps, 2) if math.isfinite(speed.needed_fps) else None,
-            "swept": speed.readable,
-        }
+
+def told(lanes: Iterable[Lane]) -> tuple[PlannedSweep, ...]:
+    """What is flown past and how, in words and numbers; lanes that are alike in many aisles are told once."""
+    alike: dict[tuple[object, ...], list[Lane]] = {}
+    for lane in lanes:
+        key = lane.levels, round(lane.height_m, 2), round(lane.distance_m, 2), round(lane.speed.speed_mps, 3)
+        alike.setdefault((*key, lane.speed.limit, lane.speed.readable), []).append(lane)
+    return tuple(_told(group) for group in alike.values())
 
 
-def in_words(lane: Lane) -> str:
-    """What is flown past, how, and why no faster, in a line."""
-    levels = "level " + " and ".join(map(str, lane.levels))
-    what = f"aisle {lane.aisle}, {lane.side} side, {levels}"
-    speed = lane.speed
-    if not speed.readable:
-        return f"{what}: counted by stopping, {speed.px_per_module:.2f} px per module"
-    return (
-        f"{what}: {speed.speed_mps:.2f} m/s at {lane.height_m:.2f} m, {lane.distance_m:.2f} m away,"
-        f" {speed.views:.1f} whole views of each place; limited by {LIMIT_WORDS[speed.limit]}"
+def _told(lanes: Sequence[Lane]) -> PlannedSweep:
+    lane, speed = lanes[0], lanes[0].speed
+    aisles = tuple(dict.fromkeys(lane.aisle for lane in lanes))
+    what = f"{_named('aisle', aisles)}, {_named('level', lane.levels)}"
+    text = (
+        f"{what}: {speed.speed_mps:.2f} m/s at {lane.height_m:.2f} m, {lane.distance_m:.2f} m from the shelf,"
+        f" {speed.views:.1f} whole views of each place at {speed.fps:g} frames a second; no faster because of"
+        f" {LIMIT_WORDS[speed.limit]}"
     )
+    if not speed.readable:
+        text = f"{what}: by stopping, its labels have {speed.px_per_module:.2f} pixels for each module"
+    return PlannedSweep(
+        aisles=aisles,
+        levels=lane.levels,
+        places=sum(len(lane.places) for lane in lanes),
+        height_m=round(lane.height_m, 3),
+        distance_m=round(lane.distance_m, 3),
+        speed_mps=round(speed.speed_mps, 3),
+        limit=speed.limit.value,
+        limits_mps={limit.value: round(value, 3) for limit, value in speed.limits_mps},
+        exposure=round(speed.exposure, 3),
+        blur_modules=round(speed.blur_modules, 3),
+        px_per_module=round(speed.px_per_module, 2),
+        views=round(speed.views, 1),
+        fps=round(speed.fps, 2),
+        needed_fps=round(speed.needed_fps, 2),
+        swept=speed.readable,
+        text=text,
+    )
+
+
+def _named(kind: str, names: Sequence[object]) -> str:
+    texts = list(map(str, names))
+    return f"{kind} {texts[0]}" if len(texts) == 1 else f"{kind}s {', '.join(texts[:-1])} and {texts[-1]}"
 
 
 class SweepPlanner:
@@ -97,8 +106,8 @@ class SweepPlanner:
     def legs(
         self, run: Sequence[str], wanted: frozenset[str], here: str, yaw_rad: float, height_m: float
     ) -> tuple[SweepLeg, ...]:
-        """The legs over the nodes `run` of one aisle for a drone over its node `here`, from end to end, up one
-        side and down the other; none where all is sooner counted by stopping, or may only be so."""
+        """The legs over the nodes `run` of one aisle for a drone over its node `here`, from end to end, up
+        one side and down the other; none where all is sooner counted by stopping, or may only be so."""
         site = self._site
         aisle = site.nodes[here].aisle
         nodes = [node.id for node in site.aisle_nodes(aisle)]

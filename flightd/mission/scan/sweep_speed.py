@@ -16,6 +16,7 @@ from flightd.site.coverage import MAX_BLUR_MODULES, MIN_PX_PER_MODULE, FrontView
 _POSE_M = 0.04
 _POSE_RAD = math.radians(2.0)
 """How far off the picture may lie on the shelf: the drone's place, and its heading."""
+_SLACK = 1e-6
 
 
 class Limit(enum.StrEnum):
@@ -123,5 +124,5 @@ def sweep_speed(shelf: Shelf, optics: SweepOptics) -> SweepSpeed:
         views=window_m * optics.fps / speed_mps if speed_mps > 0.0 else 0.0,
         fps=optics.fps,
         needed_fps=optics.views * speed_mps / window_m if window_m > 0.0 else math.inf,
-        readable=px >= MIN_PX_PER_MODULE and window_m > 0.0,
+        readable=px >= MIN_PX_PER_MODULE * (1.0 - _SLACK) and window_m > 0.0,
     )

@@ -96,8 +96,8 @@ class SweepVotes:
         self._votes.add(frame_seq, pose, place, reads)
 
     def verdict(self, others: Collection[str] = ()) -> Finding | Undecided:
-        """What the views say together, asked when the place is out of the picture; `others` are the codes that
-        surely belong elsewhere."""
+        """What the views say together, asked when the place is out of the picture; `others` are the codes
+        that surely belong elsewhere."""
         found = self._votes.finding(final=False) or self._votes.finding(final=True)
         if found is None or self._votes.looks < self._params.pictures:
             return Undecided.UNSEEN

@@ -67,6 +67,7 @@ function Takes({ estimate }) {
       The drone’s own estimate: its speeds and turns along this way, and each view of a shelf at its longest; mostly it takes less.
       ${" "}Its battery has ${percent(planned.charge)}; a full one lasts ${duration(planned.battery_s)} down to its reserve.
     </p>
+    ${planned.sweeps.length > 0 && html`<p class="quiet">Counted in passing, then by stopping what that leaves open:</p><ul class="quiet">${planned.sweeps.map((text) => html`<li key=${text}>${capital(text)}</li>`)}</ul>`}
     <details class="flown-order">
       <summary>Order of flight</summary>
       <ol>${planned.nodes.map((node) => html`<li key=${node}>${node}</li>`)}</ol>
