@@ -52,7 +52,7 @@ class SweepVotes:
         self._texts: set[str] = set()
         self._fair_rad: list[float] = []
         self._whole_rad: list[float] = []
-        self._unfair = self._occupied = 0
+        self._unfair = self._occupied = self._empty = 0
         self._doubtful: set[str] = set()
         self.newest_ns = 0
         """When it was in a picture last; 0 before the first."""
@@ -84,6 +84,7 @@ class SweepVotes:
                 fair = place.light is Light.FAIR or place.occupancy is Occupancy.EMPTY
                 self._unfair += not fair
                 self._occupied += fair and place.occupancy in _OCCUPIED
+                self._empty += place.occupancy is Occupancy.EMPTY
                 if fair:
                     self._fair_rad.append(bearing_rad)
                     self._whole_rad += [bearing_rad] * (share >= _WHOLE_SHARE)
@@ -125,6 +126,8 @@ class SweepVotes:
             return Undecided.ONCE
         if len(self._fair_rad) < sweep.unread_views:
             return Undecided.LIGHT if self._unfair else Undecided.UNSEEN
+        if self._occupied and self._empty:
+            return Undecided.UNSURE
         spread_rad = math.radians(sweep.unread_spread_deg)
         if self._occupied < _LEAST_WHOLE:  # an empty place would have shown its deck to so many views
             sure = len(self._whole_rad) >= sweep.unread_views and _spread(self._whole_rad) >= 2.0 * spread_rad
