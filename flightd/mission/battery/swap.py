@@ -37,7 +37,8 @@ class BatterySwap:
         self._route = itinerary
         self._monitor = monitor
         self._short = False
-        self._visited_before = 0
+        self._scanner = scanner
+        self._done_before = 0
 
     @property
     def _goes_on(self) -> bool:
@@ -48,7 +49,12 @@ class BatterySwap:
     def swaps(self) -> bool:
         """Goes on from this pad, something having been done on the last battery: one that does nothing is
         the last."""
-        return self._goes_on and len(self._route.visited) > self._visited_before
+        return self._goes_on and self._done > self._done_before
+
+    @property
+    def _done(self) -> int:
+        """Grows with each node that is visited and each place that is counted."""
+        return len(self._route.visited) + self._scanner.decided
 
     @property
     def endurance_s(self) -> tuple[float, float]:
@@ -96,7 +102,7 @@ class BatterySwap:
 
     def await_battery(self, now_ns: int) -> None:
         """Stand on the pad with the rest of the plan ahead."""
-        self._visited_before = len(self._route.visited)
+        self._done_before = self._done
         self._short = False
         self._route.resume_from_pad(now_ns)
 

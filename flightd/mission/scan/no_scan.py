@@ -25,6 +25,7 @@ class NoScan:
     blind = None
     doubted = False
     looking = False
+    decided = 0
     sweeps = False
 
     def wants(self, _node: str) -> bool:

@@ -107,6 +107,11 @@ class Scanner:
             return None
         return NothingRead(self._begun_blind, self._begun)
 
+    @property
+    def decided(self) -> int:
+        """How many locations are counted."""
+        return len(self._done)
+
     def wants(self, node: str) -> bool:
         """Whether locations of a node are left to count."""
         return not self.doubted and bool(self._left(node))

@@ -131,9 +131,7 @@ def test_the_plan_says_once_what_is_alike_and_what_limits_it() -> None:
 
 @settings(max_examples=40)
 @given(st.sets(st.sampled_from(NODES), min_size=1), st.sampled_from(NODES), st.permutations(NODES))
-def test_the_best_order_is_no_longer_than_any_other(
-    due: set[str], here: str, other: list[str]
-) -> None:
+def test_the_best_order_is_no_longer_than_any_other(due: set[str], here: str, other: list[str]) -> None:
     order, rest = in_best_order(SITE, here, sorted(due), (), "A1")
     assert set(order) == due
     assert rest == ()

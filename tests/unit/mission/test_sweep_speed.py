@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -16,7 +17,7 @@ from tests.unit.mission.configured import configured
 SHELF = Shelf(distance_m=1.2, place_m=0.65)
 
 
-def of(**sections: dict[str, object]) -> SweepOptics:
+def of(**sections: Any) -> SweepOptics:
     return SweepOptics.of(Config.model_validate(configured().model_dump() | sections))
 
 
