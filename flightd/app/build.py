@@ -40,6 +40,7 @@ from flightd.app.setpoint_pump import SetpointPump
 from flightd.config.ground import GroundConfig
 from flightd.config.mission import HEIGHT_ROOM_M
 from flightd.config.schema import Config
+from flightd.config.sweep import ScanMode
 from flightd.core.errors import FlightdError, InputError
 from flightd.core.flight_order import FlightOrder
 from flightd.core.learnt import LearntSensors
@@ -57,6 +58,7 @@ from flightd.mission.plan.route_optimiser import ordered_best
 from flightd.mission.scan.code_assignment import FrontSight
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.scanner import Scanner
+from flightd.mission.scan.sweep_speed import SweepOptics
 from flightd.mission.scan.views import view_height_m
 from flightd.pilot import Pilot
 from flightd.ports import Camera, Clock, Ground, Interlock, Monitor, PoseTaker, Recorder, Vehicle
@@ -272,7 +274,8 @@ def scanner_of(config: Config, site: Site) -> AnyScanner:
             f" {site.name} ({site.ceiling_m} m)"
         )
     sight = FrontSight(front.lens(), front.mount())
-    return Scanner(site, sight, config.scan, highest_m, config.camera.aside_per_height)
+    optics = SweepOptics.of(config) if config.scan.mode is ScanMode.SWEEP else None
+    return Scanner(site, sight, config.scan, highest_m, config.camera.aside_per_height, optics)
 
 
 def flown_between_m(config: Config, site: Site) -> tuple[float, float]:

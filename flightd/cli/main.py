@@ -16,6 +16,7 @@ from flightd.cli import (
     inventory,
     keygen,
     log,
+    plan,
     replay,
     report,
     run,
@@ -28,8 +29,8 @@ from flightd.cli.exits import run_app
 
 app = application("flightd")
 for command in (
-    detect, evaluate, codes, bench, train_colour, sim, calibrate, run, ground, doctor, report, replay, log,
-    keygen, site_map, inventory, guide,
+    detect, evaluate, codes, bench, train_colour, sim, calibrate, plan, run, ground, doctor, report, replay,
+    log, keygen, site_map, inventory, guide,
 ):  # fmt: skip
     command.register(app)
 

@@ -7,6 +7,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from flightd.config.section import Section, unit
+from flightd.config.sweep import ScanMode, SweepConfig
 
 
 class ScanExpert(Section):
@@ -49,6 +50,9 @@ class ScanConfig(Section):
     Before that, where the light is the trouble, it is looked at again from the same place, `expert.darker`
     or `expert.brighter`."""
 
+    mode: ScanMode = Field(
+        ScanMode.STOP, description="stop: before each place; sweep: in passing, then before what is left"
+    )
     min_height_m: float = Field(0.8, ge=0.5, le=20, description="lowest flight along a shelf")
     max_height_m: float | None = Field(
         None, ge=0.5, le=20, description="highest; none: as high as the site's ceiling lets it"
@@ -71,6 +75,7 @@ class ScanConfig(Section):
     )
     workers: int = Field(1, ge=1, le=16, description="code reader processes")
     timeout_s: float = Field(3.0, gt=0.05, le=30, description="a reader that takes longer is replaced")
+    sweep: SweepConfig = SweepConfig()
     expert: ScanExpert = ScanExpert()
 
     @model_validator(mode="after")

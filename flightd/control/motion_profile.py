@@ -21,8 +21,8 @@ class Profile:
     def reset(self, position: float, velocity: float = 0.0) -> None:
         self.position, self.velocity, self.acceleration = position, velocity, 0.0
 
-    def step(self, target: float, dt_s: float) -> None:
-        """Advance by `dt_s` towards `target`."""
+    def step(self, target: float, dt_s: float, speed: float = math.inf) -> None:
+        """Advance by `dt_s` towards `target`, no faster than `speed`."""
         a, distance = self._max_accel, target - self.position
         if abs(distance) <= 0.5 * a * dt_s * dt_s and abs(self.velocity) <= a * dt_s:
             self.position, velocity = target, 0.0
@@ -31,7 +31,7 @@ class Profile:
             towards = math.copysign(1.0, distance)
             left = max(abs(distance) - 0.5 * towards * self.velocity * dt_s, 0.0)
             stop = a * (math.sqrt(0.25 * dt_s * dt_s + 2.0 * left / a) - 0.5 * dt_s)
-            wanted = towards * min(self._max_speed, stop)
+            wanted = towards * min(self._max_speed, speed, stop)
             velocity = self.velocity + min(max(wanted - self.velocity, -a * dt_s), a * dt_s)
             self.position += 0.5 * (self.velocity + velocity) * dt_s
         self.acceleration = (velocity - self.velocity) / dt_s

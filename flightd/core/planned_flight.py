@@ -16,7 +16,8 @@ class PlannedFlight:
     them (none: all).  `places` is how many locations that is; `way` are all nodes where it stops or
     turns, from pad to pad, `way_m` how long that is.
     `seconds` in the air need `batteries`, full ones but for the first, of which `charge` is left; a battery
-    is taken to last `battery_s` in the air down to its reserve."""
+    is taken to last `battery_s` in the air down to its reserve.  `sweeps` is what is flown past, empty where
+    shelves are counted by stopping."""
 
     nodes: tuple[str, ...]
     levels: tuple[int, ...]
@@ -27,6 +28,35 @@ class PlannedFlight:
     batteries: int
     charge: float
     battery_s: float
+    sweeps: tuple[PlannedSweep, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedSweep:
+    """How `places` on these levels are counted in passing, in all the aisles where it is the same.
+
+    Flown at `height_m`, `distance_m` from the shelf, at `speed_mps`, which `limit` keeps from being more;
+    `limits_mps` is what each limit alone allows.  `exposure` is a part of the front camera's usual one,
+    `views` how many whole views each place gets of the `fps` frames read in a second, `needed_fps` how many
+    that speed needs.  Not `swept`: its labels are too small in the picture, it is counted by stopping.
+    `text` says so in a line."""
+
+    aisles: tuple[str, ...]
+    levels: tuple[int, ...]
+    places: int
+    height_m: float
+    distance_m: float
+    speed_mps: float
+    limit: str
+    limits_mps: dict[str, float]
+    exposure: float
+    blur_modules: float
+    px_per_module: float
+    views: float
+    fps: float
+    needed_fps: float
+    swept: bool
+    text: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,6 +81,7 @@ class ChosenPlans:
             batteries=flown.batteries,
             charge=charge,
             battery_s=(1.0 - self._battery.reserve) / rate_per_s,
+            sweeps=self._scanner.told_sweeps(dict.fromkeys(nodes), levels),
         )
 
     def _sorties(self, levels: Sequence[int]) -> Sorties:

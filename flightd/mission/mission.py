@@ -14,7 +14,7 @@ from flightd.config.schema import Config
 from flightd.core.errors import InputError
 from flightd.core.outlook import Outlook
 from flightd.core.planned_flight import PlannedFlight, StandingPlan
-from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, Phase
+from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, GridPose, Phase
 from flightd.mission.battery.swap import BatterySwap
 from flightd.mission.chosen_plan import ChosenPlans
 from flightd.mission.event_log import EventLog
@@ -76,6 +76,7 @@ class Mission:
         autostart: bool | None = None,
     ) -> None:
         start = site.nodes[plan.start]
+        self._params = config.mission
         self.plan = self._configured = plan
         self._chosen = ChosenPlans(site, plan, policy, config, scanner)
         self._scanner = scanner
@@ -83,12 +84,14 @@ class Mission:
         self._levels: tuple[int, ...] = ()
         self._armed = False
         """The vehicle was armed at the newest tick."""
+        self._pose: GridPose | None = None
         self._events = EventLog()
         self._orders = StandingOrders()
         by_itself = config.mission.autostart if autostart is None else autostart
         self._clearance = StartClearance(config, self._events, autostart=by_itself)
         self._losses = LossActions(config, self._events)
         self._route = Itinerary(site, plan, policy, self._events)
+        self._route.wanted = scanner.wants
         self._scan = ShelfScan(site, scanner)
         self._progress = PhaseProgress(config, self._route, self._scan, scanner)
         self._monitor = HazardMonitor(config)
@@ -213,6 +216,7 @@ class Mission:
         if kind is CommandKind.HOME:
             self._go_home(trigger, Happened(trigger), now_ns)
         elif kind is CommandKind.GOTO:
+            self._route.shorten(self._pose)
             self._route.go_to(now_ns, command.node)
 
     def _take_plan(self, command: Command, now_ns: int) -> None:
@@ -249,6 +253,8 @@ class Mission:
     def step(self, inputs: MissionInputs) -> Guidance:
         """Advance by one tick."""
         self._armed = inputs.vehicle is not None and inputs.vehicle.armed
+        self._pose = inputs.pose
+        self._pass_by(inputs)
         doubts = self._relocator.step(inputs, self.phase, self._progress.phase_s(inputs.now_ns))
         if self._relocator.jumped:
             self._correct(inputs)
@@ -379,6 +385,7 @@ class Mission:
 
     def _go_home(self, trigger: Trigger, reason: Reason, now_ns: int) -> None:
         """Fly to the home pad; in need by the shortest way, against one-way lines too."""
+        self._route.shorten(self._pose)
         self._route.turn_home(now_ns, reason, in_need=trigger is Trigger.HOME_IN_NEED)
         self._turn_back(trigger)
 
@@ -401,9 +408,11 @@ class Mission:
         if outcome is None:
             return
         self.state = outcome.state
-        if trigger in _VISITED and not before.returning:
+        if trigger in _VISITED and not before.returning and not self._scan.legs:
             self._route.note_visit(s.now_ns)
         self._scan.follow(s, before.phase, self.phase, trigger, self.goal, self._relocator.shift_m)
+        if trigger is Trigger.ARRIVED:
+            self._scan.look_ahead(s, self.goal, () if self.state.returning else self._route.run)
         if trigger is Trigger.DWELLED:
             self._go_on(s)
         self._anchor(s, trigger)
@@ -448,8 +457,24 @@ class Mission:
     def _go_on(self, s: MissionInputs) -> None:
         """To the next stop, which is the way back where the battery does not reach another one."""
         if not self.state.returning:
+            self._lead_sweep(s.now_ns)
             self._turn_back(self._charging.look_ahead(s.now_ns))
         self._route.advance(s.pose, either_side=self._scan.is_scanned(self.goal))
+
+    def _lead_sweep(self, now_ns: int) -> None:
+        """Fly past the shelves that lie ahead, or stop before what the legs past them left open."""
+        if self._scan.legs:
+            self._route.sweep(now_ns, self._scan.begin_sweep())
+        elif self.goal.sweep is not None and self.goal.sweep.last:
+            self._scan.end_sweep(now_ns)
+            self._route.visit_undecided(now_ns)
+
+    def _pass_by(self, s: MissionInputs) -> None:
+        """What is flown past is decided, and its nodes are visited."""
+        self._scan.step(s.now_ns)
+        known = s.localised and s.is_sure(self._params)
+        if self.phase is Phase.FOLLOW and known and s.pose is not None and not self.state.returning:
+            self._route.note_passed(s.now_ns, s.pose)
 
     def _relocate(self, s: MissionInputs) -> None:
         """Begin to look for the position."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 
-from flightd.adapters.ground_link.messages.answers import Code, PlanAnswer, Planned
+import msgspec
+
+from flightd.adapters.ground_link.messages.answers import Code, PlanAnswer, Planned, PlannedPass
 from flightd.adapters.ground_link.messages.requests import AskPlan, PlanFlight
 from flightd.core.errors import InputError
 from flightd.core.planned_flight import Planner
@@ -49,6 +51,7 @@ class PlanAnswers:
             batteries=plan.batteries,
             charge=plan.charge,
             battery_s=round(plan.battery_s, 1),
+            sweeps=tuple(msgspec.convert(each, PlannedPass, from_attributes=True) for each in plan.sweeps),
             dry=request.dry,
         )
 

@@ -76,7 +76,8 @@ def _planned(plan: Planned) -> list[str]:
         f"{len(plan.nodes)} nodes, {plan.way_m:.0f} m{counted}, about {plan.seconds / 60:.1f} min in the air"
     )
     taken = "only asked for" if plan.dry else "taken; start it with: flightctl start"
-    return [" ".join(plan.nodes), f"{figures}, {batteries}", taken]
+    sweeps = [f"in passing, {each.text}" for each in plan.sweeps]
+    return [" ".join(plan.nodes), f"{figures}, {batteries}", *sweeps, taken]
 
 
 def _standing(plan: PlanAnswer) -> list[str]:

@@ -198,4 +198,5 @@ def _told(planned: Planned) -> dict[str, object]:
         "batteries": planned.batteries,
         "charge": planned.charge,
         "battery_s": planned.battery_s,
+        "sweeps": [each.text for each in planned.sweeps],
     }

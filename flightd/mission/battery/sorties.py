@@ -116,20 +116,29 @@ class Sorties:
             self._ways[node] = min(found, key=lambda way: way.seconds)
         return self._ways[node]
 
-    def must_return(self, goal: str, left_m: float) -> ChargeShort | None:
+    def must_return(self, goal: str, left_m: float, speed_mps: float = math.inf) -> ChargeShort | None:
         """Why the drone must turn back now, None if it need not: the charge only just suffices for the rest
-        of the leg to `goal`, `left_m`, the way back from there, and the reserve."""
+        of the leg to `goal`, `left_m`, flown no faster than `speed_mps`, the way back from there, and the
+        reserve."""
         back = self.way_back(goal)
-        rest_s = self._legs.pace.leg_s(left_m) if left_m > 0.0 else 0.0
+        rest_s = self._legs.pace.leg_s(left_m, speed_mps) if left_m > 0.0 else 0.0
         return self._short(rest_s + back.seconds, "", back.pad)
 
-    def must_not_go_on(self, here: str, there: str) -> ChargeShort | None:
-        """Why the drone should not fly on from `here` to visit `there`, None if it may."""
+    def must_not_go_on(
+        self, here: str, there: str, speed_mps: float = math.inf, *, stops: bool = True
+    ) -> ChargeShort | None:
+        """Why the drone should not fly on from `here`, no faster than `speed_mps`, to visit `there` (only to
+        be there, if it never `stops` for a count), None if it may."""
+        pace = self._legs.pace
         try:
             on_s = self._legs.way_s(here, there)
+            if speed_mps < pace.speed_mps:
+                length_m = self._site.length_m((here, there))
+                on_s += pace.leg_s(length_m, speed_mps) - pace.leg_s(length_m)
         except NoWayError:  # the way was left by an order: the return is watched anyway
             return None
-        return self._short(self._out_s(on_s, there), there, self.way_back(there).pad)
+        needed_s = self._out_s(on_s, there) if stops else on_s + self.way_back(there).seconds
+        return self._short(needed_s, there, self.way_back(there).pad)
 
     def out_of_reach(self, nodes: Sequence[str]) -> tuple[str, ...]:
         """The nodes that cannot be visited from any charge pad on one full battery."""

@@ -37,7 +37,8 @@ class BatterySwap:
         self._route = itinerary
         self._monitor = monitor
         self._short = False
-        self._visited_before = 0
+        self._scanner = scanner
+        self._done_before = 0
 
     @property
     def _goes_on(self) -> bool:
@@ -48,7 +49,12 @@ class BatterySwap:
     def swaps(self) -> bool:
         """Goes on from this pad, something having been done on the last battery: one that does nothing is
         the last."""
-        return self._goes_on and len(self._route.visited) > self._visited_before
+        return self._goes_on and self._done > self._done_before
+
+    @property
+    def _done(self) -> int:
+        """Grows with each node that is visited and each place that is counted."""
+        return len(self._route.visited) + self._scanner.decided
 
     @property
     def endurance_s(self) -> tuple[float, float]:
@@ -70,11 +76,13 @@ class BatterySwap:
         if not state.airborne or state.returning or state.phase is Phase.LAND:
             return None
         if self._monitor.battery_low(s):
+            self._route.shorten(s.pose)
             low = CellsLow(s.charge.cell_v, self._cell_home_v) if s.charge.low else ChargeLow(charge)
             return self._go_charge(s.now_ns, low, in_need=True)
         goal = self._route.goal
         left_m = s.distance_m((goal.x_m, goal.y_m)) if state.phase is Phase.FOLLOW else 0.0
-        if math.isfinite(left_m) and (reason := self._sorties.must_return(goal.node, left_m)):
+        speed_mps = math.inf if goal.sweep is None else goal.sweep.speed_mps
+        if math.isfinite(left_m) and (reason := self._sorties.must_return(goal.node, left_m, speed_mps)):
             return self._go_charge(s.now_ns, reason, in_need=False)
         return None
 
@@ -82,15 +90,19 @@ class BatterySwap:
         """Turn back here rather than half-way to a stop that the battery does not reach.  How it turned
         back, None if it did not."""
         route = self._route
-        why = self._sorties.must_not_go_on(route.goal.node, route.ahead[0]) if route.ahead else None
+        end = route.next_end
+        if end is None:
+            return None
+        speed_mps = math.inf if end.sweep is None else end.sweep.speed_mps
+        why = self._sorties.must_not_go_on(route.goal.node, end.node, speed_mps, stops=end.visit)
         if why is None:
             return None
-        route.leave(route.ahead)
+        route.leave(route.onward)
         return self._go_charge(now_ns, why, in_need=False)
 
     def await_battery(self, now_ns: int) -> None:
         """Stand on the pad with the rest of the plan ahead."""
-        self._visited_before = len(self._route.visited)
+        self._done_before = self._done
         self._short = False
         self._route.resume_from_pad(now_ns)
 

@@ -18,6 +18,9 @@ from flightd.mission.scan.no_scan import AnyScanner
 from flightd.mission.scan.shelf_scan import ShelfScan
 from flightd.mission.triggers import Trigger
 
+_READING_S = 0.8
+"""At the end of the last leg past a shelf its pictures are still being read."""
+
 
 class PhaseProgress:
     """The phase in hand: call `begin` when it changes, then `step` at each tick."""
@@ -25,6 +28,7 @@ class PhaseProgress:
     def __init__(self, config: Config, itinerary: Itinerary, scan: ShelfScan, scanner: AnyScanner) -> None:
         self._params = config.mission
         self._battery = config.battery
+        self._stands_s = config.scan.pictures / config.front_camera.fps
         self._itinerary = itinerary
         self._scan = scan
         self._scanner = scanner
@@ -79,7 +83,9 @@ class PhaseProgress:
                     s.pose is not None
                     and abs(wrap_pi(goal.yaw_rad - s.pose.yaw_rad)) < p.expert.arrive_yaw_rad
                 )
-                done, trigger = self._settled(s, turned), Trigger.TURNED
+                level = goal.sweep is None or state.returning or self._is_level(s, goal.sweep.height_m)
+                stands_s = max(p.settle_s, self._stands_s) if goal.sweep is not None else p.settle_s
+                done, trigger = self._settled(s, turned and level, stands_s), Trigger.TURNED
             case Phase.FOLLOW:
                 there = self._rests_at((goal.x_m, goal.y_m))
                 done, trigger = self._settled(s, there), Trigger.ARRIVED
@@ -102,8 +108,9 @@ class PhaseProgress:
             return done, Trigger.VIEW_DONE if more else over
         if due:
             return True, Trigger.SCAN_DUE
-        dwelt = not goal.visit or returning or scan.is_scanned(goal)
-        dwell_s = 0.0 if dwelt else self._params.dwell_s
+        dwelt = not goal.visit or returning or scan.is_scanned(goal) or bool(scan.legs)
+        last = goal.sweep is not None and goal.sweep.last and not returning
+        dwell_s = _READING_S if last else 0.0 if dwelt else self._params.dwell_s
         return self.phase_s(s.now_ns) >= dwell_s and s.is_sure(self._params), over
 
     def _at_view(self, s: MissionInputs) -> bool:
@@ -112,8 +119,15 @@ class PhaseProgress:
         if view is None or s.pose is None:
             return False
         there = self._rests_at((view.x_m, view.y_m))
-        level = abs(s.height_m - view.height_m) < p.expert.view_height_m
-        return there and level and abs(wrap_pi(view.yaw_rad - s.pose.yaw_rad)) < p.expert.arrive_yaw_rad
+        return (
+            there
+            and self._is_level(s, view.height_m)
+            and abs(wrap_pi(view.yaw_rad - s.pose.yaw_rad)) < p.expert.arrive_yaw_rad
+        )
+
+    def _is_level(self, s: MissionInputs, height_m: float) -> bool:
+        """Whether the drone is at the height from which a shelf is looked at."""
+        return abs(s.height_m - height_m) < self._params.expert.view_height_m
 
     def _rests_at(self, place_m: tuple[float, float]) -> bool:
         """Whether the drone is at a place of the map, but for what it swings about it."""
@@ -126,9 +140,16 @@ class PhaseProgress:
         rise_m = abs(view.height_m - s.height_m) if view is not None else 0.0
         return math.pi / p.turn_rate_radps + (0.0 if math.isnan(rise_m) else rise_m / p.climb_mps)
 
-    def _settled(self, s: MissionInputs, condition: bool) -> bool:
-        """True once `condition` has held for the settling time."""
-        return self._settling.step(condition, s.now_ns) >= self._params.settle_s and condition
+    def _to_height_s(self, s: MissionInputs) -> float:
+        """How long it may take to reach the height of a leg past a shelf."""
+        sweep = self._itinerary.goal.sweep
+        rise_m = abs(sweep.height_m - s.height_m) if sweep is not None else 0.0
+        return 0.0 if math.isnan(rise_m) else rise_m / self._params.climb_mps
+
+    def _settled(self, s: MissionInputs, condition: bool, for_s: float | None = None) -> bool:
+        """True once `condition` has held for the settling time, or for another one."""
+        needed_s = self._params.settle_s if for_s is None else for_s
+        return self._settling.step(condition, s.now_ns) >= needed_s and condition
 
     def _time_limit_s(self, s: MissionInputs, phase: Phase) -> float:
         """How long the phase just begun may take: a fixed slack, and a multiple of its way's own time.  A
@@ -150,7 +171,7 @@ class PhaseProgress:
             case Phase.HOLD:
                 return self._battery.hover_s
             case Phase.TURN:
-                way_s = math.pi / p.turn_rate_radps
+                way_s = math.pi / p.turn_rate_radps + self._to_height_s(s)
             case Phase.CLIMB:
                 way_s = self._to_view_s(s)
             case Phase.LAND:
@@ -158,7 +179,8 @@ class PhaseProgress:
                 way_s = height_m / min(p.land_mps, p.expert.touch_mps, p.expert.touch_blind_mps) + AIM_S
             case Phase.FOLLOW:
                 here_m = s.distance_m((goal.x_m, goal.y_m))
-                way_s = (0.0 if math.isinf(here_m) else here_m) / p.speed_mps
+                speed_mps = p.speed_mps if goal.sweep is None else min(goal.sweep.speed_mps, p.speed_mps)
+                way_s = (0.0 if math.isinf(here_m) else here_m) / speed_mps
             case _:
                 way_s = 0.0
         return p.expert.phase_slack_s + p.expert.phase_share * way_s

@@ -226,8 +226,9 @@ class ReferenceGenerator:
         if task.view is not None:
             x, y, yaw = task.view.x_m, task.view.y_m, task.view.yaw_rad
         if math.hypot(self._x.position - pose.x_m, self._y.position - pose.y_m) < p.expert.max_lead_m:
-            self._x.step(x, s.dt_s)
-            self._y.step(y, s.dt_s)
+            speed_mps = _speed_mps(task)
+            self._x.step(x, s.dt_s, speed_mps)
+            self._y.step(y, s.dt_s, speed_mps)
         else:  # wait for the vehicle at rest: a speed kept here would be fed forward and hold it off
             self._x.brake(s.dt_s)
             self._y.brake(s.dt_s)
@@ -236,12 +237,14 @@ class ReferenceGenerator:
         return True
 
     def _height_goal_m(self, task: ReferenceTask) -> float:
-        """The view's height while scanning; the legs between an aisle's scanned nodes are flown at the last
-        one's, unless a doubt on the way asks for a wider view."""
+        """The view's height while scanning, that of a leg past a shelf; the legs between an aisle's scanned
+        nodes are flown at the last one's, unless a doubt on the way asks for a wider view."""
         if task.view is not None:
             self._cruise_m = task.view.height_m
         elif task.phase is Phase.RELOCATE:
             self._cruise_m = max(self._cruise_m, self._params.height_m)
+        elif task.goal.sweep is not None and not task.state.on_pad:
+            self._cruise_m = task.goal.sweep.height_m
         elif task.cruise:
             self._cruise_m = self._params.height_m
         return self._cruise_m
@@ -259,6 +262,12 @@ class ReferenceGenerator:
             yaw_rate_radps=self._yaw.velocity,
             climb_mps=climb_mps,
         )
+
+
+def _speed_mps(task: ReferenceTask) -> float:
+    """How fast the way may be flown, where it is past a shelf."""
+    sweep = task.goal.sweep
+    return math.inf if sweep is None or task.phase is not Phase.FOLLOW else sweep.speed_mps
 
 
 def _target(s: MissionInputs, task: ReferenceTask) -> tuple[float, float] | None:

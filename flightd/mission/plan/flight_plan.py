@@ -13,7 +13,12 @@ from dataclasses import dataclass
 
 from flightd.config.mission import Heading
 from flightd.config.schema import Config
+from flightd.config.sweep import ScanMode
+from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.site.site import Side, Site
+
+_AHEAD_DEG = 45.0
+"""A front camera that is turned aside by less looks along the nose."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,20 +30,25 @@ class HeadingPolicy:
 
     @classmethod
     def of(cls, config: Config) -> HeadingPolicy:
-        """The mission's heading, flown with the configured down camera."""
-        return cls(config.mission.heading, config.camera.long_side_ahead)
+        """The mission's heading, flown with the configured down camera; nose to the shelf where shelves are
+        flown past with a camera that looks ahead."""
+        ahead = abs(config.front_camera.mount_yaw_deg) < _AHEAD_DEG
+        swept = config.scan.mode is ScanMode.SWEEP and config.front_camera.is_fitted and ahead
+        return cls(Heading.SHELF if swept else config.mission.heading, config.camera.long_side_ahead)
 
 
 @dataclass(frozen=True, slots=True)
 class Stop:
     """A node to stop at.  `yaw_rad` is flown from the stop before up to here; `visit` says that the node
-    is one of the wanted ones (dwell, scan), not just a corner on the way."""
+    is one of the wanted ones (dwell, scan), not just a corner on the way; `sweep` is what is flown past on
+    the way to it."""
 
     node: str
     x_m: float
     y_m: float
     yaw_rad: float
     visit: bool
+    sweep: SweepLeg | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from flightd.config.mission import Heading
@@ -11,12 +12,17 @@ from flightd.core.geometry import wrap_pi
 from flightd.core.types import EventLevel, GridPose
 from flightd.mission.event_log import EventLog
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop, make_plan
+from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.reasons import Reason, in_words
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
 
 _WAY_SHOWN = 32
 """So many nodes ahead are told."""
+_OVER_NODE_M = 0.15
+"""A node that is flown over so near was visited."""
+_STOPS_M = 0.8
+"""The way in which a drone that flies past a shelf comes to rest."""
 
 
 class Itinerary:
@@ -35,10 +41,13 @@ class Itinerary:
         self.stand = (plan.start, plan.start_yaw_rad)
         """The node on which the drone stands before it flies, and its heading there."""
         self.visited: list[str] = []
+        self._run: tuple[str, ...] = ()
+        self.wanted: Callable[[str], bool] = lambda _node: False
+        """Whether anything is left to count at a node."""
 
     def begin(self, plan: FlightPlan) -> None:
         """Fly this plan instead, on the ground: from the same pad, before anything was visited."""
-        self._stops, self._next = list(plan.stops), 0
+        self._stops, self._next, self._run = list(plan.stops), 0, ()
 
     @property
     def goal(self) -> Stop:
@@ -61,6 +70,31 @@ class Itinerary:
         return tuple(stop.node for stop in self._stops[self._next + 1 :] if stop.visit)
 
     @property
+    def onward(self) -> tuple[str, ...]:
+        """What is to be visited after the goal: also what is being flown past, as far as it is not done."""
+        return (*self._run_left, *self.ahead)
+
+    @property
+    def next_end(self) -> Stop | None:
+        """The next stop after the goal that is a visit, or the end of a leg past a shelf."""
+        ahead = self._stops[self._next + 1 :]
+        return next((stop for stop in ahead if stop.visit or stop.sweep is not None), None)
+
+    @property
+    def run(self) -> tuple[str, ...]:
+        """The goal and the visits that follow it in its aisle without another stop between."""
+        aisle = self._site.nodes[self.goal.node].aisle
+        following = itertools.takewhile(
+            lambda stop: stop.visit and self._site.nodes[stop.node].aisle == aisle, self._stops[self._next :]
+        )
+        return tuple(stop.node for stop in following)
+
+    @property
+    def _run_left(self) -> tuple[str, ...]:
+        run = dict.fromkeys(self._run)
+        return tuple(node for node in run if node not in self.visited or self.wanted(node))
+
+    @property
     def way(self) -> tuple[str, ...]:
         """The nodes that are flown over next, the goal first; those far ahead are left out."""
         return tuple(stop.node for stop in self._stops[self._next : self._next + _WAY_SHOWN])
@@ -74,7 +108,7 @@ class Itinerary:
     def remaining(self) -> tuple[str, ...]:
         """The stops that this mission still wants to visit, in order."""
         ahead = (stop.node for stop in self._stops[self._next :] if stop.visit)
-        return self._left_over or tuple(ahead)
+        return self._left_over or (*self._run_left, *ahead)
 
     def advance(self, pose: GridPose | None, *, either_side: bool) -> None:
         """Go on to the next stop; backwards where that saves half a turn and `either_side` of the aisle may
@@ -82,6 +116,7 @@ class Itinerary:
         before, stop = self.goal, self.next_stop
         sideways = self._site.nodes[before.node].aisle == self._site.nodes[stop.node].aisle
         self._next += 1
+        either_side = either_side and stop.sweep is None
         if not either_side or not sideways or self._policy.heading is not Heading.SHELF or pose is None:
             return
         if abs(wrap_pi(stop.yaw_rad - pose.yaw_rad)) > math.pi * 0.75:
@@ -92,6 +127,67 @@ class Itinerary:
         if self.goal.visit:
             self.visited.append(self.goal.node)
             self._events.report(now_ns, EventLevel.INFO, "visited", self.goal.node)
+
+    # Counting in passing
+
+    def sweep(self, now_ns: int, legs: Sequence[SweepLeg]) -> None:
+        """Fly past the shelves of the `run` that begins here, by these legs."""
+        run = self.run
+        rest = [stop.node for stop in self._stops[self._next + len(run) :] if stop.visit]
+        end = self._sweep_stop(legs[-1])
+        onward = self._onward(end, rest)
+        self._stops[self._next + 1 :] = [*(self._sweep_stop(leg) for leg in legs), *onward.stops]
+        self._stops[self._next] = replace(self.goal, visit=False)
+        self._run = run
+        speed_mps = min(leg.speed_mps for leg in legs)
+        text = f"aisle {legs[0].aisle}: {len(legs)} legs at {speed_mps:.2f} m/s, {len(run)} nodes"
+        self._events.report(now_ns, EventLevel.INFO, "sweep", text)
+
+    def note_passed(self, now_ns: int, pose: GridPose) -> None:
+        """Nodes that are flown over on the last leg past what is counted there are visited."""
+        sweep, node = self.goal.sweep, pose.node
+        if sweep is None or node not in sweep.nodes or node not in self._run or node in self.visited:
+            return
+        later = (stop.sweep for stop in self._stops[self._next + 1 :] if stop.sweep is not None)
+        if any(node in leg.nodes for leg in later) or abs(pose.along_m) > _OVER_NODE_M:
+            return
+        self.visited += [node] * self._run.count(node)
+        self._events.report(now_ns, EventLevel.INFO, "visited", node)
+
+    def visit_undecided(self, now_ns: int) -> None:
+        """The legs are flown: stop before what they left open, in the best order, and go on from there."""
+        due, rest = self._run_left, self.ahead
+        again = [node for node in due for _ in range(self._run.count(node) - 1)]
+        self._run = ()
+        here = self.goal
+        due, rest = in_best_order(self._site, here.node, due, rest, self._home)
+        self._stops[self._next + 1 :] = self._onward(here, [*due, *rest]).stops
+        self.visited = [*(node for node in self.visited if node not in due), *again]
+        if due:
+            self._events.report(now_ns, EventLevel.INFO, "sweep", f"{', '.join(due)} to stop at")
+
+    def shorten(self, pose: GridPose | None) -> None:
+        """Stop at the next node of a leg past a shelf rather than at its end."""
+        sweep, goal = self.goal.sweep, self.goal
+        if sweep is None or pose is None:
+            return
+        towards = math.copysign(1.0, goal.x_m - pose.x_m)
+        nodes = (self._site.nodes[node] for node in sweep.nodes)
+        ahead = [node for node in nodes if towards * (node.x_m - pose.x_m) > _STOPS_M]
+        node = min(ahead, key=lambda node: abs(node.x_m - pose.x_m), default=self._site.nodes[goal.node])
+        self._stops[self._next] = Stop(node.id, node.x_m, node.y_m, goal.yaw_rad, visit=False)
+
+    def _onward(self, here: Stop, visits: Sequence[str]) -> FlightPlan:
+        """From a stop over the visits home; against one-way lines where there is no legal way."""
+        ends, yaw_rad = (here.node, self._home), here.yaw_rad
+        try:
+            return make_plan(self._site, visits, *ends, self._policy, yaw_rad)
+        except NoWayError:
+            return make_plan(self._site, visits, *ends, self._policy, yaw_rad, in_need=True)
+
+    def _sweep_stop(self, leg: SweepLeg) -> Stop:
+        at = self._site.nodes[leg.end]
+        return Stop(at.id, at.x_m, at.y_m, leg.yaw_rad, visit=False, sweep=leg)
 
     def leave(self, nodes: Sequence[str]) -> None:
         """Visit these later, on another battery."""
@@ -152,7 +248,8 @@ class Itinerary:
         if not due:
             return
         if not returning:
-            nodes = [*due, *(stop.node for stop in self._stops[self._next :] if stop.visit)]
+            left = (stop.node for stop in self._stops[self._next :] if stop.visit)
+            nodes = [*due, *(node for node in self._run_left if node not in due), *left]
             try:
                 rest = make_plan(self._site, nodes, due[0], self._home, self._policy, self.goal.yaw_rad)
             except NoWayError as err:
@@ -161,6 +258,7 @@ class Itinerary:
                 )
                 return
             self._stops[self._next :] = rest.stops
+            self._run = ()
         else:
             self._left_over = (*due, *self._left_over)
         self.visited = [node for node in self.visited if node not in due]
@@ -189,3 +287,29 @@ class Itinerary:
             in_need=in_need,
         )
         self._stops[self._next + 1 :] = onward.stops
+        self._run = ()
+
+
+def in_best_order(
+    site: Site, here: str, due: Sequence[str], rest: Sequence[str], home: str
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The nodes `due` of one aisle, for a drone over its node `here`, and the visits after them, in the order
+    of the least way: to one end of them and along to the other, and from there to that end of the next
+    aisle's visits that is nearer."""
+    aisle = site.nodes[rest[0]].aisle if rest else ""
+    following = tuple(itertools.takewhile(lambda node: site.nodes[node].aisle == aisle, rest))
+    ways = [tuple(rest)]
+    if len(following) > 1:
+        ways.append((*following[::-1], *rest[len(following) :]))
+    along = sorted(due, key=lambda node: site.nodes[node].x_m)
+    orders = [tuple(along), tuple(along[::-1])]
+
+    def metres(choice: tuple[tuple[str, ...], tuple[str, ...]]) -> float:
+        order, way = choice
+        try:
+            return site.length_m((here, *order, way[0] if way else home))
+        except NoWayError:
+            return math.inf
+
+    best = min(itertools.product(orders, ways), key=lambda choice: round(metres(choice), 3))
+    return best if math.isfinite(metres(best)) else (tuple(due), tuple(rest))

@@ -69,9 +69,9 @@ class Pace:
             max(p.height_m - x.touch_below_m, 0.0) / p.land_mps + x.touch_below_m / x.touch_mps,
         )
 
-    def leg_s(self, metres: float) -> float:
-        """A straight leg from rest to rest, settled at its end."""
-        return profile_s(metres, self.speed_mps, self.accel_mps2) + self.settle_s
+    def leg_s(self, metres: float, speed_mps: float = math.inf) -> float:
+        """A straight leg from rest to rest, no faster than `speed_mps`, settled at its end."""
+        return profile_s(metres, min(self.speed_mps, speed_mps), self.accel_mps2) + self.settle_s
 
     def climb_s(self, metres: float) -> float:
         """Up or down from one height to another, settled there."""

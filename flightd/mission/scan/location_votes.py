@@ -51,6 +51,11 @@ class LocationVotes:
         return self._seen.total()
 
     @property
+    def any_read(self) -> bool:
+        """Whether any code was read here, believed or not."""
+        return self._votes.any_read
+
+    @property
     def exhausted(self) -> bool:
         """More pictures from the same place would show no more: codes are read, the rest is cut off."""
         return self.looks >= self._least and self._quiet >= 2 and bool(self._votes.believed())

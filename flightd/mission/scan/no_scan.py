@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
+from flightd.core.planned_flight import PlannedSweep
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
 from flightd.core.types import Event
 from flightd.mission.plan.leg_times import Pace
+from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.code_assignment import Sighting
 from flightd.mission.scan.scanner import Scanner
 
@@ -23,6 +25,8 @@ class NoScan:
     blind = None
     doubted = False
     looking = False
+    decided = 0
+    sweeps = False
 
     def wants(self, _node: str) -> bool:
         return False
@@ -50,6 +54,29 @@ class NoScan:
 
     def leave(self) -> None:
         """Nothing is left."""
+
+    def told_sweeps(self, _nodes: Iterable[str], _levels: Sequence[int] = ()) -> tuple[PlannedSweep, ...]:
+        return ()
+
+    def legs(
+        self, _run: Sequence[str], _here: str, _yaw_rad: float, _height_m: float
+    ) -> tuple[SweepLeg, ...]:
+        return ()
+
+    def begin_sweep(self, legs: Sequence[SweepLeg]) -> None:
+        """Nothing begins."""
+
+    def begin_leg(self, now_ns: int) -> None:
+        """Nothing begins."""
+
+    def pause_leg(self) -> None:
+        """Nothing is interrupted."""
+
+    def step_sweep(self, now_ns: int) -> None:
+        """Nothing is decided."""
+
+    def end_sweep(self, now_ns: int) -> None:
+        """Nothing ends."""
 
     def reached(self, node: str, certain: bool) -> None:
         """Nothing is proven."""

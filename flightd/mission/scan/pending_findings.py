@@ -39,6 +39,24 @@ class PendingFindings:
         """Something was found at the node arrived at."""
         self._nodes[-1].locations.append(location)
 
+    def add_at(self, node: str, location: str) -> None:
+        """Something was found at a node in passing."""
+        at = next((at for at in self._nodes if at.node == node), None)
+        if at is None:
+            at = _AtNode(node)
+            self._nodes.append(at)
+        at.locations.append(location)
+        at.stops = 0
+
+    def recall(self, location: str) -> bool:
+        """What was found at one location counts no more; False where it is confirmed already."""
+        at = next((at for at in self._nodes if location in at.locations), None)
+        if at is None:
+            return False
+        at.locations.remove(location)
+        self._settled.append(Settled((location,), confirmed=False))
+        return True
+
     def reached(self, node: str, present: str) -> None:
         """Another certain stop: it proves what lies far enough back."""
         for at in self._nodes:

@@ -12,14 +12,21 @@ import math
 from collections.abc import Collection, Iterable, Sequence
 
 from flightd.config.scan import ScanConfig
+from flightd.core.planned_flight import PlannedSweep
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
 from flightd.core.types import Event, EventLevel
 from flightd.mission.plan.leg_times import Pace
+from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.reasons import NothingRead
-from flightd.mission.scan.code_assignment import Assigner, FrontSight, Sighting
+from flightd.mission.scan.code_assignment import Assigner, FrontSight, ShelfLook, Sighting
+from flightd.mission.scan.code_identity import names_one_thing
 from flightd.mission.scan.label_checks import LabelChecks
 from flightd.mission.scan.node_scan import ScanTask
 from flightd.mission.scan.pending_findings import PendingFindings
+from flightd.mission.scan.sweep_planner import SweepPlanner, told
+from flightd.mission.scan.sweep_speed import SweepOptics
+from flightd.mission.scan.sweep_task import SweepTask
+from flightd.mission.scan.sweep_votes import Undecided
 from flightd.mission.scan.views import View, ViewPlanner, views_s
 from flightd.site.site import Site
 
@@ -29,7 +36,7 @@ _BLIND_NODES = 3
 
 class Scanner:
     """The scan phase of a flight, for the mission to ask and for pictures to be given to; `highest_m` and
-    `aside_per_height` are those of `ViewPlanner`."""
+    `aside_per_height` are those of `ViewPlanner`; with `optics` shelves are counted in passing first."""
 
     def __init__(
         self,
@@ -38,10 +45,19 @@ class Scanner:
         params: ScanConfig,
         highest_m: float = math.inf,
         aside_per_height: float = 0.35,
+        optics: SweepOptics | None = None,
     ) -> None:
         self._params = params
         self._assigner = Assigner(site, sight, params.expert.least_probability)
         self._planner = ViewPlanner(site, sight, self._assigner, params, highest_m, aside_per_height)
+        self._sweeps: SweepPlanner | None = None
+        if optics is not None:
+            self._sweeps = SweepPlanner(site, self._planner, self._assigner, optics)
+        self._sweep: SweepTask | None = None
+        self._swept: set[str] = set()
+        self._owners: dict[str, str] = {}
+        self._node_of = {location.code: location.node for location in site.locations.values()}
+        self._aisle_of = {node.id: node.aisle for node in site.nodes.values()}
         self._planned = self._wanted = frozenset(site.locations)
         self._levels = {location.code: location.level for location in site.locations.values()}
         self._done: set[str] = set()
@@ -80,6 +96,8 @@ class Scanner:
     @property
     def exposure(self) -> float:
         """What the front camera's pictures are wanted with, as a part of its usual exposure."""
+        if self._sweep is not None and self._sweep.looking:
+            return self._sweep.exposure
         return self.view.exposure if self.view is not None else 1.0
 
     @property
@@ -88,6 +106,11 @@ class Scanner:
         if not self._begun or self._begun_blind < min(_BLIND_NODES, self._begun):
             return None
         return NothingRead(self._begun_blind, self._begun)
+
+    @property
+    def decided(self) -> int:
+        """How many locations are counted."""
+        return len(self._done)
 
     def wants(self, node: str) -> bool:
         """Whether locations of a node are left to count."""
@@ -98,6 +121,9 @@ class Scanner:
         of what hangs on these (empty: on any), counted already or not.  0 where nothing is to be counted."""
         if levels is None and not self.wants(node):
             return 0.0
+        swept_s = self._passed_s(node, pace, levels)
+        if swept_s:
+            return swept_s
         places = self._left(node) if levels is None else self.places_at(node, levels)
         views = self._planner.views(node, places, pace.height_m, 0.0) if places else ()
         return views_s(views, pace, self._params.view_s) if views else 0.0
@@ -157,13 +183,20 @@ class Scanner:
     def doubt(self) -> None:
         """The place may be another one: assign nothing, and keep what is pending, until `trust`."""
         self.leave()
+        if self._sweep is not None:
+            self._sweep.forget()
+            self._gather_sweep()
         self.doubted = True
 
     def withdraw(self, now_ns: int, reason: str) -> None:
         """The place was or may have been another one: what is pending counts no more."""
         self.leave()
+        if self._sweep is not None:
+            self._sweep.forget()
+            self._gather_sweep()
         codes = self._pending.withdraw()
         self._done.difference_update(codes)
+        self._owners = {text: code for text, code in self._owners.items() if code not in codes}
         if codes or (self._labels.contradict and not self.doubted):
             text = f"{reason}; {len(codes)} findings withdrawn"
             self._events.append(Event(now_ns, EventLevel.WARNING, "map_contradiction", text))
@@ -178,15 +211,78 @@ class Scanner:
         visit; each at most `revisits` times in a flight."""
         return self._pending.take_due()
 
+    # Counting in passing
+
+    @property
+    def sweeps(self) -> bool:
+        """Whether shelves are counted in passing first."""
+        return self._sweeps is not None
+
+    def told_sweeps(self, nodes: Iterable[str], levels: Sequence[int] = ()) -> tuple[PlannedSweep, ...]:
+        """How what hangs at some nodes, on all levels or these, is flown past; empty where it never is."""
+        if self._sweeps is None:
+            return ()
+        codes = [code for node in nodes for code in self.places_at(node, levels)]
+        aisles = dict.fromkeys(self._aisle_of[self._node_of[code]] for code in codes)
+        return told(lane for aisle in aisles for lane in self._sweeps.lanes(aisle, codes))
+
+    def legs(self, run: Sequence[str], here: str, yaw_rad: float, height_m: float) -> tuple[SweepLeg, ...]:
+        """The legs past what is left to count at the nodes `run` of an aisle, for a drone over its node
+        `here`; none where all is counted by stopping."""
+        if self._sweeps is None or self.doubted:
+            return ()
+        left = frozenset(code for node in run for code in self._left(node)) - self._swept
+        return self._sweeps.legs(run, left, here, yaw_rad, height_m) if left else ()
+
+    def begin_sweep(self, legs: Sequence[SweepLeg]) -> None:
+        """These legs are flown now."""
+        assert self._sweeps is not None
+        self.leave()
+        cells, node_of = self._assigner.cells, self._node_of.__getitem__
+        self._sweep = SweepTask(legs, cells, node_of, self._params, self._sweeps.share)
+
+    def begin_leg(self, now_ns: int) -> None:
+        """A leg is flown to, begins, or goes on."""
+        if self._sweep is not None and not self.doubted and not self._sweep.looking:
+            self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
+            self._sweep.begin(now_ns)
+
+    def pause_leg(self) -> None:
+        """The leg is interrupted."""
+        if self._sweep is not None:
+            self._sweep.pause()
+
+    def step_sweep(self, now_ns: int) -> None:
+        """Decide what has been flown past by now."""
+        if self._sweep is not None:
+            self._sweep.step(now_ns)
+            self._gather_sweep()
+
+    def end_sweep(self, now_ns: int) -> None:
+        """The legs are over, flown or not: what they left open is counted by stopping."""
+        if self._sweep is None:
+            return
+        self._sweep.end()
+        self._gather_sweep()
+        why = self._sweep.why
+        left = ", ".join(f"{count} {reason}" for reason, count in sorted(why.items()))
+        text = f"{why.total()} places to stop before" + (f": {left}" if left else "")
+        self._events.append(Event(now_ns, EventLevel.INFO, "swept", text))
+        self._sweep = None
+
     # What pictures bring
 
     @property
     def looking(self) -> bool:
         """Whether the front camera's pictures are wanted now."""
+        if self._sweep is not None and self._sweep.looking:
+            return True
         return self._task is not None and bool(self._task.looking)
 
     def places(self, pose: BodyPose) -> tuple[Place, ...]:
         """The places wanted in a picture taken at `pose`; none for one that would not count."""
+        if self._sweep is not None and self._sweep.looking:
+            return self._assigner.places(pose, self._sweep.near(pose)) if pose.certain else ()
         task = self._task
         if task is None or task.since_ns is None or pose.stamp_ns < task.since_ns or not pose.certain:
             return ()
@@ -194,27 +290,49 @@ class Scanner:
 
     def take(self, codes: CodeSet, pose: BodyPose) -> None:
         """One picture and the pose at its exposure."""
+        if self.doubted:
+            return
+        if self._sweep is not None and self._sweep.looking:
+            leg = self._sweep.leg_at(pose)
+            if leg is None:
+                return
+            look = self._assigner.look(codes, pose, (leg.aisle, leg.side))
+            agreeing = self._proven(look, f"aisle {leg.aisle}")
+            if agreeing is not None:
+                self._sweep.take(look)
+                for node in dict.fromkeys(self._node_of[code] for code in agreeing):
+                    self._pending.confirm_at(node)
+            return
         view = self.view
-        if self._task is None or view is None or self.doubted:
+        if self._task is None or view is None:
             return
         look = self._assigner.look(codes, pose, (view.aisle, view.side))
+        agreeing = self._proven(look, self._task.node)
+        if agreeing is None:
+            return
+        self._task.take(look)
+        self._gather()
+        if agreeing:
+            self._pending.confirm_at(self._task.node)
+
+    def _proven(self, look: ShelfLook, where: str) -> list[str] | None:
+        """The location labels in a picture that agree with the map; None where one contradicts it, and
+        nothing of the picture may count."""
         self._sightings += look.sightings
+        stamp_ns = look.pose.stamp_ns
         for text in self._labels.new_unmapped(look.unmapped):
-            words = f"label {text}, seen from {self._task.node}, is not on the map: not counted as stock"
-            self._events.append(Event(pose.stamp_ns, EventLevel.WARNING, "unknown_location", words))
+            words = f"label {text}, seen from {where}, is not on the map: not counted as stock"
+            self._events.append(Event(stamp_ns, EventLevel.WARNING, "unknown_location", words))
         against = self._labels.against(look.sightings)
         if against is not None:
             text = f"label {against.location} seen {against.off_m:+.2f} m from its place"
-            self.withdraw(pose.stamp_ns, f"at {self._task.node}: {text}")
+            self.withdraw(stamp_ns, f"at {where}: {text}")
             self.doubted = True
-            return
+            return None
         self._begun_blind = 0
-        self._task.take(look)
-        self._gather()
         agreeing = [seen.location for seen in look.sightings if not seen.contradicts]
         self._labels.agree(agreeing)
-        if agreeing:
-            self._pending.confirm_at(self._task.node)
+        return agreeing
 
     # What goes out
 
@@ -247,6 +365,51 @@ class Scanner:
             self._found.append(found)
             self._done.add(found.location)
             self._pending.add(found.location)
+
+    def _gather_sweep(self) -> None:
+        """Take what was decided in passing, unless it is at another place as well."""
+        assert self._sweep is not None
+        for found in self._sweep.drain():
+            self._swept.add(found.location)
+            others = self._elsewhere(found)
+            if others:
+                self._sweep.undecided[found.location] = Undecided.ELSEWHERE
+                self._recall(found, others)
+                continue
+            self._owners.update((read.text, found.location) for read in found.reads)
+            self._found.append(found)
+            self._done.add(found.location)
+            self._pending.add_at(found.node, found.location)
+        self._swept.update(self._sweep.undecided)
+
+    def _elsewhere(self, found: Finding) -> set[str]:
+        """The places at which this flight has found the same single thing."""
+        texts = (read.text for read in found.reads if names_one_thing(read))
+        return {self._owners[text] for text in texts if text in self._owners} - {found.location}
+
+    def _recall(self, found: Finding, others: Iterable[str]) -> None:
+        """One thing cannot be at two places: both are counted again, by stopping."""
+        for other in others:
+            if other in self._done:
+                self._pending.recall(other)
+                self._done.discard(other)
+                text = f"one code at {other} and {found.location}: both are looked at again"
+                self._events.append(Event(found.stamp_ns, EventLevel.WARNING, "contradiction", text))
+
+    def _passed_s(self, node: str, pace: Pace, levels: Sequence[int] | None) -> float:
+        """A node's share of the time in which its aisle is counted in passing; 0 where it is not."""
+        if self._sweeps is None:
+            return 0.0
+        aisle = self._aisle_of[node]
+        nodes = [other for other, of in self._aisle_of.items() if of == aisle]
+        left = {code for other in nodes for code in self._left(other)} - self._swept
+        if levels:
+            left = {code for code in left if self._levels[code] in levels}
+        if not any(self._node_of[code] == node for code in left):
+            return 0.0
+        legs = self._sweeps.legs(nodes, frozenset(left), nodes[0], 0.0, pace.height_m)
+        counted = {self._node_of[code] for leg in legs for code in leg.locations}
+        return self._sweeps.seconds(legs, pace, 0.0) / len(counted) if node in counted else 0.0
 
 
 def nodes_to_count(site: Site, nodes: Iterable[str], counted: Collection[str]) -> tuple[str, ...]:

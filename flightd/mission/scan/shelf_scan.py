@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 from flightd.core.types import Event, Phase
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.plan.flight_plan import Stop
+from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.reasons import NothingRead
 from flightd.mission.scan.no_scan import AnyScanner
 from flightd.mission.scan.views import View
@@ -19,6 +21,8 @@ _ENDS = (Phase.LAND, Phase.DONE, Phase.ABORTED, Phase.PILOT)
 _SAME_SHARE = 0.5
 """A position that is corrected by less than this part of the way to the nearest other place is the same."""
 _OVER = (Trigger.DWELLED, Trigger.ROUTE_DONE)
+_PASSING = (Phase.FOLLOW, Phase.HOVER, Phase.TURN)
+"""In which the pictures of a flight past a shelf count."""
 
 
 class ShelfScan:
@@ -27,6 +31,9 @@ class ShelfScan:
     def __init__(self, site: Site, scanner: AnyScanner) -> None:
         self._scanner = scanner
         self._scanned = ""
+        self._sweeping = False
+        self.legs: tuple[SweepLeg, ...] = ()
+        """What is to be flown past from the stop that is hovered at."""
         self._apart_m = _least_apart_m(site)
 
     @property
@@ -53,7 +60,7 @@ class ShelfScan:
 
     def due(self, phase: Phase, stop: Stop) -> bool:
         """Whether there is anything (left) to scan at the stop that is hovered at."""
-        if not stop.visit:
+        if not stop.visit or self.legs:
             return False
         if phase in _TO_VIEW:
             return self._scanner.view is not None
@@ -62,6 +69,30 @@ class ShelfScan:
     def is_scanned(self, stop: Stop) -> bool:
         """Whether the hover at this stop follows its scan."""
         return stop.node == self._scanned
+
+    def look_ahead(self, s: MissionInputs, stop: Stop, run: Sequence[str]) -> None:
+        """The stop is reached, and with it the nodes `run` of its aisle are to be counted."""
+        self.legs = ()
+        if stop.visit and s.pose is not None:
+            self.legs = self._scanner.legs(run, stop.node, s.pose.yaw_rad, s.height_m)
+
+    def begin_sweep(self) -> tuple[SweepLeg, ...]:
+        """Fly past what is to be flown past: its legs."""
+        legs, self.legs = self.legs, ()
+        self._scanner.begin_sweep(legs)
+        self._sweeping = True
+        return legs
+
+    def step(self, now_ns: int) -> None:
+        """Decide what has been flown past by now."""
+        if self._sweeping:
+            self._scanner.step_sweep(now_ns)
+
+    def end_sweep(self, now_ns: int) -> None:
+        """What was not decided in passing is counted by stopping."""
+        if self._sweeping:
+            self._scanner.end_sweep(now_ns)
+            self._sweeping = False
 
     def follow(
         self, s: MissionInputs, before: Phase, phase: Phase, trigger: Trigger, stop: Stop, shift_m: float
@@ -88,8 +119,19 @@ class ShelfScan:
         elif before in _TO_VIEW and phase not in _TO_VIEW:
             scanner.leave()
             self._scanned = stop.node if trigger in _OVER else ""
+        if self._sweeping:
+            self._lead_sweep(s, phase, trigger, stop)
         if trigger is Trigger.ROUTE_DONE:
             scanner.home(certain)
+
+    def _lead_sweep(self, s: MissionInputs, phase: Phase, trigger: Trigger, stop: Stop) -> None:
+        """Pictures count from the beginning of a leg until the next one's, but for interruptions."""
+        if phase in _ENDS or (trigger is Trigger.TURNED and stop.sweep is None):
+            self.end_sweep(s.now_ns)
+        elif phase in _PASSING:
+            self._scanner.begin_leg(s.now_ns)
+        else:
+            self._scanner.pause_leg()
 
 
 def _least_apart_m(site: Site) -> float:

@@ -71,7 +71,7 @@ class ViewPlanner:
         )
         ordered: list[View] = []
         for side in sides:
-            column = self._column(node, [location for location in here if location.side is side])
+            column = self.column(node, [location for location in here if location.side is side])
             if column and abs(column[-1].height_m - height_m) < abs(column[0].height_m - height_m):
                 column.reverse()
             ordered += column
@@ -121,7 +121,7 @@ class ViewPlanner:
                 return replace(view, x_m=x, y_m=y, height_m=height_m, locations=codes, retake=number + 1)
         return None
 
-    def _column(self, node: str, places: Sequence[Location]) -> list[View]:
+    def column(self, node: str, places: Sequence[Location]) -> list[View]:
         """One side's views from the lowest level up; levels whose labels fit one picture share a view."""
         at = self._site.nodes[node]
         groups: list[list[Location]] = []

@@ -38,6 +38,28 @@ class Accepted(DaemonAnswer, frozen=True, tag="accepted"):
     repeated: Annotated[bool, Meta(description="this id was done before; it was not done again")] = False
 
 
+class PlannedPass(msgspec.Struct, frozen=True):
+    """How places are counted in passing, in all the aisles where it is the same."""
+
+    aisles: tuple[str, ...]
+    levels: Annotated[tuple[int, ...], Meta(description="flown past at once")]
+    places: Annotated[int, Meta(description="locations that are counted")]
+    height_m: Annotated[float, Meta(description="of the flight, m")]
+    distance_m: Annotated[float, Meta(description="from the shelf, m")]
+    speed_mps: Annotated[float, Meta(description="m/s")]
+    limit: Annotated[
+        str, Meta(description="what keeps it from being faster: blur, overlap, cruise, configured")
+    ]
+    limits_mps: Annotated[dict[str, float], Meta(description="what each limit alone allows, m/s")]
+    exposure: Annotated[float, Meta(description="part of the front camera's usual one")]
+    px_per_module: Annotated[float, Meta(description="pixels for each module of a label")]
+    views: Annotated[float, Meta(description="pictures that show each place whole")]
+    fps: Annotated[float, Meta(description="frames that are read, 1/s")]
+    needed_fps: Annotated[float, Meta(description="frames that this speed needs, 1/s")]
+    swept: Annotated[bool, Meta(description="false: counted by stopping, its labels are too small")]
+    text: Annotated[str, Meta(description="all that in a line")]
+
+
 class Planned(DaemonAnswer, frozen=True, tag="planned"):
     """What the flight over the nodes is; not `dry`, it waits for the start."""
 
@@ -52,6 +74,7 @@ class Planned(DaemonAnswer, frozen=True, tag="planned"):
         float, Meta(description="of the battery that is in it, by which that is estimated, 0..1")
     ]
     battery_s: Annotated[float, Meta(description="time in the air of a full battery down to its reserve, s")]
+    sweeps: Annotated[tuple[PlannedPass, ...], Meta(description="what is counted in passing, and how")] = ()
     dry: Annotated[bool, Meta(description="only said, not taken")] = False
     repeated: Annotated[bool, Meta(description="this id was done before; it was not done again")] = False
 

@@ -1,0 +1,222 @@
+"""Flying past the shelves of an aisle: which levels at once, from which end to which, how fast.  Pure."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from flightd.core.geometry import wrap_pi
+from flightd.core.planned_flight import PlannedSweep
+from flightd.core.scanning import BodyPose
+from flightd.mission.plan.leg_times import Pace, profile_s
+from flightd.mission.plan.sweep_leg import SweepLeg
+from flightd.mission.scan.code_assignment import Assigner
+from flightd.mission.scan.sweep_speed import LIMIT_WORDS, Shelf, SweepOptics, SweepSpeed, sweep_speed
+from flightd.mission.scan.views import View, ViewPlanner
+from flightd.site.site import Location, Side, Site
+from flightd.site.ways import NoWayError
+
+_WHOLE_SHARE = 0.9
+"""Levels are flown past together only where each place of them is so far in the picture."""
+_LEAST_NODES = 2
+"""Places before fewer nodes are sooner counted by stopping."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """The levels of one side of an aisle that are flown past at once, from their height: `places` on them by
+    the node that faces each."""
+
+    aisle: str
+    side: Side
+    levels: tuple[int, ...]
+    height_m: float
+    yaw_rad: float
+    distance_m: float
+    speed: SweepSpeed
+    places: tuple[Location, ...]
+
+
+def told(lanes: Iterable[Lane]) -> tuple[PlannedSweep, ...]:
+    """What is flown past and how, in words and numbers; lanes that are alike in many aisles are told once."""
+    alike: dict[tuple[object, ...], list[Lane]] = {}
+    for lane in lanes:
+        key = lane.levels, round(lane.height_m, 2), round(lane.distance_m, 2), round(lane.speed.speed_mps, 3)
+        alike.setdefault((*key, lane.speed.limit, lane.speed.readable), []).append(lane)
+    return tuple(_told(group) for group in alike.values())
+
+
+def _told(lanes: Sequence[Lane]) -> PlannedSweep:
+    lane, speed = lanes[0], lanes[0].speed
+    aisles = tuple(dict.fromkeys(lane.aisle for lane in lanes))
+    what = f"{_named('aisle', aisles)}, {_named('level', lane.levels)}"
+    text = (
+        f"{what}: {speed.speed_mps:.2f} m/s at {lane.height_m:.2f} m, {lane.distance_m:.2f} m from the shelf,"
+        f" {speed.views:.1f} whole views of each place at {speed.fps:g} frames a second; no faster because of"
+        f" {LIMIT_WORDS[speed.limit]}"
+    )
+    if not speed.readable:
+        text = f"{what}: by stopping, its labels have {speed.px_per_module:.2f} pixels for each module"
+    return PlannedSweep(
+        aisles=aisles,
+        levels=lane.levels,
+        places=sum(len(lane.places) for lane in lanes),
+        height_m=round(lane.height_m, 3),
+        distance_m=round(lane.distance_m, 3),
+        speed_mps=round(speed.speed_mps, 3),
+        limit=speed.limit.value,
+        limits_mps={limit.value: round(value, 3) for limit, value in speed.limits_mps},
+        exposure=round(speed.exposure, 3),
+        blur_modules=round(speed.blur_modules, 3),
+        px_per_module=round(speed.px_per_module, 2),
+        views=round(speed.views, 1),
+        fps=round(speed.fps, 2),
+        needed_fps=round(speed.needed_fps, 2),
+        swept=speed.readable,
+        text=text,
+    )
+
+
+def _named(kind: str, names: Sequence[object]) -> str:
+    texts = list(map(str, names))
+    return f"{kind} {texts[0]}" if len(texts) == 1 else f"{kind}s {', '.join(texts[:-1])} and {texts[-1]}"
+
+
+class SweepPlanner:
+    """The legs past the shelves of one aisle after the other."""
+
+    def __init__(self, site: Site, views: ViewPlanner, assigner: Assigner, optics: SweepOptics) -> None:
+        self._site = site
+        self._views = views
+        self._assigner = assigner
+        self._optics = optics
+
+    def lanes(self, aisle: str, wanted: Iterable[str]) -> list[Lane]:
+        """What is flown past in an aisle to see the `wanted` locations, side by side and from the lowest
+        level up; also what cannot be, with why."""
+        here = [place for code in wanted if (place := self._site.locations[code]).aisle == aisle]
+        found = []
+        for side in Side:
+            places = sorted((place for place in here if place.side is side), key=_by_height)
+            if places:
+                found += self._on_side(places)
+        return found
+
+    def legs(
+        self, run: Sequence[str], wanted: frozenset[str], here: str, yaw_rad: float, height_m: float
+    ) -> tuple[SweepLeg, ...]:
+        """The legs over the nodes `run` of one aisle for a drone over its node `here`, from end to end, up
+        one side and down the other; none where all is sooner counted by stopping, or may only be so."""
+        site = self._site
+        aisle = site.nodes[here].aisle
+        nodes = [node.id for node in site.aisle_nodes(aisle)]
+        counted = [code for code in wanted if site.locations[code].node in set(run)]
+        lanes = [lane for lane in self.lanes(aisle, counted) if lane.speed.readable]
+        legs: list[SweepLeg] = []
+        at = nodes.index(here)
+        for lane in _ordered(lanes, yaw_rad, height_m):
+            faced = [nodes.index(place.node) for place in lane.places]
+            low, high = min(faced), max(faced)
+            if high - low + 1 < _LEAST_NODES or not self._is_open(nodes, min(low, at), max(high, at), lane):
+                continue
+            near, far = (low, high) if abs(low - at) <= abs(high - at) else (high, low)
+            for target in (near, far) if low < at < high else (far,):
+                step = 1 if target > at else -1
+                passed = tuple(nodes[i] for i in range(at, target + step, step))
+                legs.append(_leg(lane, passed))
+                at = target
+        return (*legs[:-1], replace(legs[-1], last=True)) if legs else ()
+
+    def seconds(self, legs: Sequence[SweepLeg], pace: Pace, yaw_rad: float) -> float:
+        """How long the legs take, from the flying height and `yaw_rad` on."""
+        total, height_m = 0.0, pace.height_m
+        for leg in legs:
+            turn_s = pace.turn_s(abs(wrap_pi(leg.yaw_rad - yaw_rad)))
+            total += max(pace.climb_s(leg.height_m - height_m), turn_s)
+            length_m = self._site.distance_m(leg.nodes[0], leg.end)
+            total += profile_s(length_m, leg.speed_mps, pace.accel_mps2) + pace.settle_s
+            yaw_rad, height_m = leg.yaw_rad, leg.height_m
+        return total
+
+    def _on_side(self, places: Sequence[Location]) -> list[Lane]:
+        """The lanes of one side: levels whose places are in one picture share a lane."""
+        samples = {place.level: place for place in places}
+        at = self._site.nodes[places[0].node]
+        views: list[View] = []
+        for view in self._views.column(at.id, list(samples.values())):
+            whole = len(view.locations) == 1 or self._shows(view)
+            singles = [[self._site.locations[code]] for code in view.locations]
+            views += [view] if whole else [v for one in singles for v in self._views.column(at.id, one)]
+        lanes = []
+        for view in views:
+            levels = tuple(self._site.locations[code].level for code in view.locations)
+            on = tuple(place for place in places if place.level in levels)
+            distance_m = abs(on[0].y_m - at.y_m)
+            cells = (self._assigner.cells[place.code] for place in on)
+            shelf = Shelf(distance_m, max(cell.x1_m - cell.x0_m for cell in cells))
+            lanes.append(
+                Lane(
+                    at.aisle, on[0].side, levels, view.height_m, view.yaw_rad, distance_m,
+                    sweep_speed(shelf, self._optics), on,
+                )
+            )  # fmt: skip
+        return lanes
+
+    def _shows(self, view: View) -> bool:
+        """Whether the places of a view are wholly in the picture, each from before itself."""
+        return all(self.share(code, view.height_m, view.yaw_rad) >= _WHOLE_SHARE for code in view.locations)
+
+    def share(self, code: str, height_m: float, yaw_rad: float) -> float:
+        """The most of a location that is in the picture of a drone on its aisle's line at that height."""
+        place = self._site.locations[code]
+        y_m = self._site.nodes[place.node].y_m
+        pose = BodyPose(0, place.x_m, y_m, height_m, 0.0, 0.0, yaw_rad, 0.0, 0.0, 0.0, True)
+        return next((seen.share for seen in self._assigner.places(pose, (code,))), 0.0)
+
+    def _is_open(self, nodes: Sequence[str], low: int, high: int, lane: Lane) -> bool:
+        """Whether the line is open both ways, and clear at the lane's height."""
+        site = self._site
+        try:
+            straight = all(
+                site.path(a, b) == (a, b) and site.path(b, a) == (b, a)
+                for a, b in itertools.pairwise(nodes[low : high + 1])
+            )
+        except NoWayError:
+            return False
+        one, other = site.nodes[nodes[low]], site.nodes[nodes[high]]
+        h = lane.height_m
+        return straight and site.is_clear((one.x_m, one.y_m, h), (other.x_m, other.y_m, h))
+
+
+def _ordered(lanes: Sequence[Lane], yaw_rad: float, height_m: float) -> list[Lane]:
+    """Up one side, down the other: the least turning and climbing."""
+    sides = sorted(
+        {lane.side: lane.yaw_rad for lane in lanes}.items(), key=lambda item: abs(wrap_pi(item[1] - yaw_rad))
+    )
+    ordered: list[Lane] = []
+    for side, _ in sides:
+        column = [lane for lane in lanes if lane.side is side]
+        if abs(column[-1].height_m - height_m) < abs(column[0].height_m - height_m):
+            column.reverse()
+        ordered += column
+        height_m = column[-1].height_m
+    return ordered
+
+
+def _leg(lane: Lane, nodes: tuple[str, ...]) -> SweepLeg:
+    return SweepLeg(
+        lane.aisle,
+        lane.side,
+        lane.levels,
+        nodes,
+        tuple(place.code for place in lane.places),
+        lane.height_m,
+        lane.yaw_rad,
+        lane.speed.speed_mps,
+        lane.speed.exposure,
+    )
+
+
+def _by_height(place: Location) -> tuple[float, float]:
+    return place.height_m, place.x_m

@@ -1,0 +1,128 @@
+"""How fast a shelf may be flown past so that its labels are still read, and what limits that.  Pure.
+
+A label is read at 2.5 pixels for each module and more, blurred by less than 0.75 module (`site.coverage`);
+each place must be wholly in several pictures on the way.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+from flightd.config.schema import Config
+from flightd.site.coverage import MAX_BLUR_MODULES, MIN_PX_PER_MODULE, FrontView
+
+_POSE_M = 0.04
+_POSE_RAD = math.radians(2.0)
+"""How far off the picture may lie on the shelf: the drone's place, and its heading."""
+_SLACK = 1e-6
+
+
+class Limit(enum.StrEnum):
+    """What keeps a flight past a shelf from being faster."""
+
+    BLUR = "blur"
+    OVERLAP = "overlap"
+    CRUISE = "cruise"
+    CONFIGURED = "configured"
+
+
+LIMIT_WORDS = {
+    Limit.BLUR: "the blur of a module at the shortest exposure that the light allows",
+    Limit.OVERLAP: "the frame rate: each place must be wholly in several pictures",
+    Limit.CRUISE: "mission.speed_mps",
+    Limit.CONFIGURED: "scan.sweep.speed_mps",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Shelf:
+    """What is flown past: how far away, and how wide its widest place is."""
+
+    distance_m: float
+    place_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class SweepOptics:
+    """What sees it: the front camera and its readers, and what they must see."""
+
+    view: FrontView
+    least_exposure: float
+    fps: float
+    label_m: float
+    views: int
+    cruise_mps: float
+    configured_mps: float | None = None
+
+    @classmethod
+    def of(cls, config: Config) -> SweepOptics:
+        """As configured: frames that the readers have no time for are none."""
+        front, scan = config.front_camera, config.scan
+        sweep = scan.sweep
+        fov_rad = 2.0 * math.atan(front.width_px / 2.0 / front.fx_px)
+        return cls(
+            FrontView(fov_rad, front.width_px, front.exposure_s, sweep.module_m),
+            sweep.least_exposure,
+            min(front.fps, scan.workers / sweep.read_s),
+            sweep.label_m,
+            sweep.views,
+            config.mission.speed_mps,
+            sweep.speed_mps,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SweepSpeed:
+    """The fastest flight past a shelf, and what comes of it.
+
+    `exposure` is a part of the camera's usual one, `window_m` the way on which a place is wholly in the
+    picture, `views` how many pictures that gives, `fps` how many frames a second are read and `needed_fps`
+    how many this speed needs; `limits_mps` what each limit alone allows, `limit` the lowest of them.
+    `readable`: the labels are large enough in the picture, and a place fits it."""
+
+    speed_mps: float
+    limit: Limit
+    limits_mps: tuple[tuple[Limit, float], ...]
+    exposure: float
+    blur_modules: float
+    px_per_module: float
+    window_m: float
+    views: float
+    fps: float
+    needed_fps: float
+    readable: bool
+
+
+def sweep_speed(shelf: Shelf, optics: SweepOptics) -> SweepSpeed:
+    """The speed past one shelf front."""
+    view = optics.view
+    wide_m = max(shelf.place_m, optics.label_m)
+    spare_m = _POSE_M + shelf.distance_m * math.tan(_POSE_RAD)
+    window_m = view.seen_m(shelf.distance_m) - wide_m - 2.0 * spare_m
+    limits = {
+        Limit.BLUR: view.speed_limit_mps() / optics.least_exposure,
+        Limit.OVERLAP: max(window_m, 0.0) * optics.fps / optics.views,
+        Limit.CRUISE: optics.cruise_mps,
+    }
+    if optics.configured_mps is not None:
+        limits[Limit.CONFIGURED] = optics.configured_mps
+    limit = min(limits, key=limits.__getitem__)
+    speed_mps = limits[limit]
+    # no darker than the speed asks for
+    exposure = min(1.0, view.speed_limit_mps() / speed_mps) if speed_mps > 0.0 else 1.0
+    px = view.px_per_module(shelf.distance_m)
+    return SweepSpeed(
+        speed_mps=speed_mps,
+        limit=limit,
+        limits_mps=tuple(limits.items()),
+        exposure=exposure,
+        blur_modules=MAX_BLUR_MODULES * speed_mps * exposure / view.speed_limit_mps(),
+        px_per_module=px,
+        window_m=max(window_m, 0.0),
+        views=window_m * optics.fps / speed_mps if speed_mps > 0.0 else 0.0,
+        fps=optics.fps,
+        needed_fps=optics.views * speed_mps / window_m if window_m > 0.0 else math.inf,
+        readable=px >= MIN_PX_PER_MODULE * (1.0 - _SLACK) and window_m > 0.0,
+    )

@@ -1,0 +1,48 @@
+"""A flight past shelves with the simulator's airframe, wind and sensors, and an ideal code reader."""
+
+from __future__ import annotations
+
+import math
+
+from flightd.config.sweep import ScanMode
+from flightd.core.inventory import LocationState
+from flightd.core.types import Phase
+from tests.sim.ideal.ideal_flight import IdealFlight
+from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
+from tests.sim.ideal.test_ideal_scan import CONFIG, findings
+from tests.unit.mission.shelves import SIGHT, SITE
+
+NODES = ("A2", "A3")
+SWEEP = CONFIG.with_values(scan={"mode": ScanMode.SWEEP})
+PLACES = [place.code for place in SITE.locations.values() if place.node in NODES]
+EMPTY, TORN, COVERED, TWO, *READ = PLACES
+LABELS = {code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in [*READ, TORN]}
+STOCK = Stock(
+    LABELS | {TWO: [Label("FRONT", -0.1), Label("SECOND", 0.1)]},
+    frozenset({EMPTY}),
+    frozenset({TORN}),
+    frozenset({COVERED}),
+)
+
+
+def test_shelves_are_counted_in_passing_at_the_height_of_each_level_and_nose_to_them() -> None:
+    front = IdealFront(SITE, SIGHT, STOCK)
+    flown = IdealFlight(SITE, SWEEP, visits=NODES, seed=5, front=front).fly()
+    assert flown.phase is Phase.DONE, flown.reason
+    assert set(flown.visited) == set(NODES)
+    found = findings(flown)
+    assert {code: finding.state for code, finding in found.items()} == {
+        EMPTY: LocationState.EMPTY,
+        TORN: LocationState.UNREADABLE,
+        COVERED: LocationState.OCCLUDED,
+        TWO: LocationState.SEVERAL,
+    } | dict.fromkeys(READ, LocationState.READ)
+    assert {finding.node for finding in found.values()} == set(NODES)
+    confirmed = {c for output in flown.outputs for s in output.settled if s.confirmed for c in s.locations}
+    assert confirmed == set(PLACES)
+    legs = [k for phase, k in flown.truth if phase is Phase.FOLLOW and 1.5 < k.x_m < 2.4]
+    sides = {round(math.degrees(k.yaw_rad) / 90.0) for k in legs}
+    assert sides >= {-1, 1}, "nose to one shelf, then to the other"
+    levels = {min((0.9, 1.8), key=lambda level_m: abs(level_m - k.height_m)) for k in legs}
+    assert levels == {0.9, 1.8}
+    assert max(abs(k.y_m) for k in legs) < 0.15, "along the line"

@@ -1,0 +1,233 @@
+"""A mission that flies past its shelves, fed by hand: what follows what, and what interrupts it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from flightd.app.build import scanner_of
+from flightd.config.battery import BatteryConfig
+from flightd.config.schema import Config
+from flightd.config.sweep import ScanMode
+from flightd.core.inventory import LocationState
+from flightd.core.scanning import BodyPose, CodeSet, Finding, Light, Settled
+from flightd.core.types import CommandKind, Event, LandedState, Phase
+from flightd.mission.plan.flight_plan import HeadingPolicy
+from flightd.mission.scan.scanner import Scanner
+from flightd.sim.plant.kinematics import Kinematics
+from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
+from tests.unit.mission.configured import configured
+from tests.unit.mission.driven import Flight
+from tests.unit.mission.shelves import FITTED, SIGHT, SITE
+
+PLACES = tuple(SITE.locations)
+STOCK = {code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in PLACES}
+PICTURE_NS = 240_000_000
+PASSING = {Phase.TURN, Phase.FOLLOW, Phase.HOVER}
+
+
+def config() -> Config:
+    """The drone that is fed by hand flies a decimetre above its reference."""
+    return configured().with_values(
+        front_camera=FITTED,
+        scan={"mode": ScanMode.SWEEP},
+        mission={"expert": {"view_height_m": 0.15}},
+    )
+
+
+class Sweep(Flight):
+    """The whole aisle of the small site, with an ideal front camera before a known stock."""
+
+    def __init__(self, params: Config | None = None, stock: Stock | None = None) -> None:
+        params = params or config()
+        scanner = scanner_of(params, SITE)
+        assert isinstance(scanner, Scanner)
+        super().__init__(params, SITE, scanner)
+        assert HeadingPolicy.of(params) == HeadingPolicy.of(config())
+        self.scanner = scanner
+        self.front = IdealFront(SITE, SIGHT, stock or Stock(STOCK))
+        self.findings: list[Finding] = []
+        self.settled: list[Settled] = []
+        self.events: list[Event] = []
+        self.phases: list[Phase] = []
+        self.scanned: set[str] = set()
+
+    def fly(self, seconds: float = 240.0, until: Callable[[], bool] = lambda: False) -> None:
+        """Until then, or until it lands."""
+        self.run(seconds, lambda: self._tick() or until() or self.phase is Phase.LAND)
+
+    def down(self) -> None:
+        """It stands on the pad."""
+        self.set(landed=LandedState.ON_GROUND, armed=False)
+        self.run(0.02, follow=False)
+
+    def _tick(self) -> bool:
+        self.phases.append(self.phase)
+        if self.phase is Phase.SCAN:
+            self.scanned.add(self.mission.goal.node)
+        self.events += self.mission.drain_events()
+        findings, settled = self.scanner.drain()
+        self.findings += findings
+        self.settled += settled
+        pose = self.inputs.pose
+        if pose is not None and self.now_ns % PICTURE_NS == 0 and self.scanner.looking:
+            here = BodyPose(
+                self.now_ns,
+                pose.x_m,
+                pose.y_m,
+                pose.height_m,
+                0.0,
+                0.0,
+                pose.yaw_rad,
+                0.01,
+                0.01,
+                0.003,
+                True,
+            )
+            k = Kinematics(
+                self.now_ns,
+                pose.x_m,
+                pose.y_m,
+                pose.height_m,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                pose.yaw_rad,
+                0.0,
+                0.0,
+                0.0,
+            )
+            places = self.scanner.places(here)
+            if places:
+                self.scanner.take(self.front.see(k, places, self.now_ns), here)
+        return False
+
+    @property
+    def on_leg(self) -> bool:
+        """Half-way along a leg past a shelf."""
+        pose, sweep = self.inputs.pose, self.mission.goal.sweep
+        return self.phase is Phase.FOLLOW and sweep is not None and pose is not None and 1.8 < pose.x_m < 2.0
+
+    @property
+    def states(self) -> dict[str, LocationState]:
+        return {finding.location: finding.state for finding in self.findings}
+
+    def said(self, name: str) -> list[str]:
+        return [event.text for event in self.events if event.name == name]
+
+
+def lit(codes: CodeSet, places: set[str]) -> CodeSet:
+    """The picture with these places burnt out."""
+    looks = (replace(look, light=Light.BURNT) if look.location in places else look for look in codes.places)
+    return replace(codes, places=tuple(looks))
+
+
+def test_an_aisle_is_counted_in_passing_and_all_its_nodes_are_visited() -> None:
+    flight = Sweep()
+    flight.fly()
+    assert flight.phase is Phase.LAND, flight.mission.reason
+    assert flight.mission.state.on_pad
+    assert flight.states == dict.fromkeys(PLACES, LocationState.READ)
+    assert Phase.SCAN not in flight.phases
+    assert set(flight.said("visited")) == {"A1", "A2", "A3", "A4"}
+    assert len(flight.mission.visited) == flight.mission.plan.visits
+    assert {code for one in flight.settled if one.confirmed for code in one.locations} == set(PLACES)
+
+
+def test_what_views_leave_open_is_visited_by_stopping_in_the_best_order() -> None:
+    """Two places are badly lit, and one pallet is at two places far from each other."""
+    burnt, twice = {"AL-02-1-1", "AL-04-2-2"}, {"AL-02-2-2", "AR-04-1-1"}
+    labels = {code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in PLACES if code not in burnt}
+    flight = Sweep(stock=Stock(labels | {code: [Label("PALLET 1")] for code in twice}))
+    see = flight.front.see
+    flight.front.see = lambda k, places, stamp_ns: lit(see(k, places, stamp_ns), burnt)  # type: ignore[method-assign]
+    flight.fly()
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert set(flight.states) == set(PLACES)
+    assert {flight.states[code] for code in burnt} == {LocationState.UNREADABLE}
+    assert {flight.states[code] for code in twice} == {LocationState.READ}
+    assert flight.said("contradiction") == ["one code at AL-02-2-2 and AR-04-1-1: both are looked at again"]
+    found = [finding.location for finding in flight.findings]
+    assert [found.count(code) for code in sorted(twice)] == [2, 1], "the first in passing, too"
+    withdrawn = {code for one in flight.settled if not one.confirmed for code in one.locations}
+    assert withdrawn <= {"AL-02-2-2"}
+    # it ends its legs over A1, where the pad is: there is no way but out and back
+    assert "A2, A4 to stop at" in flight.said("sweep")
+    assert flight.scanned == {"A2", "A4"}
+
+
+@pytest.mark.parametrize("kind", [CommandKind.PAUSE, CommandKind.HOME, CommandKind.LAND])
+def test_an_order_on_a_leg_acts_as_anywhere_else(kind: CommandKind) -> None:
+    flight = Sweep()
+    flight.fly(until=lambda: flight.on_leg)
+    assert flight.on_leg
+    flight.order(kind)
+    flight.fly(2.0)
+    if kind is CommandKind.PAUSE:
+        assert flight.phase is Phase.HOLD
+        assert not flight.scanner.looking
+        flight.order(CommandKind.RESUME)
+        flight.fly()
+        assert flight.mission.state.on_pad
+        assert set(flight.states) == set(PLACES)
+        assert set(flight.said("visited")) == {"A1", "A2", "A3", "A4"}
+    elif kind is CommandKind.LAND:
+        assert flight.phase is Phase.LAND
+    else:
+        pose = flight.inputs.pose
+        assert pose is not None
+        assert flight.mission.goal.node in {"A1", "A2", "A3", "A4"}
+        assert abs(flight.mission.goal.x_m - pose.x_m) < 1.6, "not on to the end of the leg"
+        flight.fly()
+        assert flight.mission.state.on_pad
+        assert flight.findings, "what was decided on the way stays"
+
+
+def test_a_battery_that_runs_low_on_the_way_leaves_the_rest_for_the_next() -> None:
+    flight = Sweep(config().with_values(battery=BatteryConfig(swap=True)))
+    flight.fly(until=lambda: flight.on_leg and len(flight.findings) > 3)
+    flight.set(battery_frac=0.15)
+    flight.fly()
+    flight.down()
+    assert flight.phase is Phase.SWAP, flight.mission.reason
+    before = set(flight.states)
+    assert 0 < len(before) < len(PLACES)
+    assert set(flight.mission.remaining)
+    flight.set(battery_frac=0.9, height_m=0.1)
+    flight.fly()
+    assert set(flight.states) == set(PLACES)
+    assert len(flight.findings) == len(PLACES), "nothing is counted twice"
+
+
+def test_a_doubt_on_a_leg_undoes_what_is_open_and_stops_before_it_later() -> None:
+    flight = Sweep()
+    flight.fly(until=lambda: flight.on_leg)
+    flight.scanner.doubt()
+    flight.fly(until=lambda: flight.phase is Phase.RELOCATE)
+    assert flight.phase is Phase.RELOCATE
+    flight.fly()
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert set(flight.states) == set(PLACES)
+    assert any("the position was doubted" in text for text in flight.said("swept"))
+    assert Phase.SCAN in flight.phases
+
+
+def test_without_a_single_picture_the_count_is_none() -> None:
+    scanner = scanner_of(config(), SITE)
+    scanner.begin_sweep(scanner.legs(("A1", "A2"), "A1", 0.0, 1.0))
+    assert scanner.blind is None
+    scanner.begin_leg(1)
+    assert scanner.blind is not None
+
+
+def test_a_camera_that_looks_aside_flies_nose_along_and_past_the_same() -> None:
+    aside = config().with_values(front_camera={"mount_yaw_deg": 90.0})
+    scanner = scanner_of(aside, SITE)
+    legs = scanner.legs(("A1", "A2", "A3", "A4"), "A1", 0.0, 1.6)
+    assert {abs(round(math.degrees(leg.yaw_rad))) for leg in legs} == {0, 180}
+    assert HeadingPolicy.of(aside).heading is configured().mission.heading

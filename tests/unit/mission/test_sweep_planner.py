@@ -1,0 +1,139 @@
+"""The legs past the shelves of an aisle: joined, over all that is wanted, at the right height and side."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flightd.config.front_camera import FrontCameraConfig
+from flightd.config.scan import ScanConfig
+from flightd.config.schema import Config
+from flightd.mission.plan.itinerary import in_best_order
+from flightd.mission.plan.leg_times import Pace
+from flightd.mission.scan.code_assignment import Assigner, FrontSight
+from flightd.mission.scan.sweep_planner import SweepPlanner, told
+from flightd.mission.scan.sweep_speed import SweepOptics
+from flightd.mission.scan.views import ViewPlanner
+from flightd.site.site import Side, Site
+from flightd.site.site_file import parse_site
+from tests.unit.mission.configured import configured
+from tests.unit.mission.shelves import SIGHT, SITE
+
+NODES = ("A1", "A2", "A3", "A4")
+ALL = frozenset(SITE.locations)
+CONFIG = configured()
+
+
+def sweeps(site: Site = SITE, sight: FrontSight = SIGHT, config: Config = CONFIG) -> SweepPlanner:
+    assigner = Assigner(site, sight)
+    return SweepPlanner(
+        site, ViewPlanner(site, sight, assigner, ScanConfig()), assigner, SweepOptics.of(config)
+    )
+
+
+PLANNER = sweeps()
+
+
+@settings(max_examples=40)
+@given(
+    st.sets(st.sampled_from(sorted(ALL)), min_size=1),
+    st.sampled_from(NODES),
+    st.floats(-math.pi, math.pi),
+    st.floats(0.5, 3.0),
+)
+def test_legs_are_joined_and_pass_all_that_is_wanted_before_two_nodes_and_more(
+    wanted: set[str], here: str, yaw_rad: float, height_m: float
+) -> None:
+    legs = PLANNER.legs(NODES, frozenset(wanted), here, yaw_rad, height_m)
+    assert not legs or legs[0].nodes[0] == here
+    assert all(a.end == b.nodes[0] for a, b in pairwise(legs))
+    assert [leg.last for leg in legs] == [False] * (len(legs) - 1) + [True] * bool(legs)
+    passed = {(code, node) for leg in legs for code in leg.locations for node in leg.nodes}
+    for side in Side:
+        for level in (1, 2):
+            places = [SITE.locations[code] for code in wanted]
+            places = [place for place in places if (place.side, place.level) == (side, level)]
+            swept = len({place.node for place in places}) > 1
+            assert all(((place.code, place.node) in passed) is swept for place in places)
+    for leg in legs:
+        assert {SITE.locations[code].side for code in leg.locations} == {leg.side}
+        assert math.sin(leg.yaw_rad) == pytest.approx(1.0 if leg.side is Side.RIGHT else -1.0)
+        assert 0.0 < leg.speed_mps <= CONFIG.mission.speed_mps
+
+
+def test_it_flies_up_one_side_and_down_the_other_from_end_to_end() -> None:
+    legs = PLANNER.legs(NODES, ALL, "A1", -math.pi / 2, 0.9)
+    assert [(leg.side, leg.levels, leg.end) for leg in legs] == [
+        (Side.LEFT, (1,), "A4"),
+        (Side.LEFT, (2,), "A1"),
+        (Side.RIGHT, (2,), "A4"),
+        (Side.RIGHT, (1,), "A1"),
+    ]
+    pace = Pace.of(CONFIG.mission)
+    assert 4 * 3.9 / 0.8 < PLANNER.seconds(legs, pace, -math.pi / 2) < 60.0
+
+
+def test_levels_whose_places_fit_one_picture_are_flown_past_together() -> None:
+    front = FrontCameraConfig(width_px=2400, height_px=2400)
+    tall = sweeps(sight=FrontSight(front.lens(), front.mount()))
+    assert {lane.levels for lane in tall.lanes("A", ALL)} == {(1, 2)}
+    assert {lane.levels for lane in PLANNER.lanes("A", ALL)} == {(1,), (2,)}
+
+
+def test_a_one_way_aisle_is_counted_by_stopping() -> None:
+    text = """
+[site]
+name = "one way"
+ceiling_m = 6.0
+[[aisle]]
+id = "A"
+x_m = 0.0
+y_m = 0.0
+spacing_m = [1.3, 1.3]
+one_way = "+x"
+[[aisle]]
+id = "B"
+x_m = 0.0
+y_m = 3.4
+spacing_m = [1.3, 1.3]
+[[cross]]
+nodes = ["A1", "B1"]
+[[cross]]
+nodes = ["A3", "B3"]
+[[rack]]
+bay_width_m = 1.3
+levels_m = [0.9]
+[[pad]]
+id = "home"
+node = "A1"
+size_m = 0.5
+"""
+    site = parse_site(text, "one way")
+    planner = sweeps(site)
+    everything = frozenset(site.locations)
+    assert not planner.legs(("A1", "A2", "A3"), everything, "A1", 0.0, 1.0)
+    assert planner.legs(("B1", "B2", "B3"), everything, "B1", 0.0, 1.0)
+
+
+def test_the_plan_says_once_what_is_alike_and_what_limits_it() -> None:
+    first, second = told(PLANNER.lanes("A", ALL))
+    assert (first.levels, second.levels, first.places + second.places) == ((1,), (2,), len(ALL))
+    assert first.limit == "cruise"
+    assert "mission.speed_mps" in first.text
+    small = told(sweeps(config=configured().with_values(scan={"sweep": {"module_m": 0.001}})).lanes("A", ALL))
+    assert not small[0].swept
+    assert "by stopping" in small[0].text
+
+
+@settings(max_examples=40)
+@given(st.sets(st.sampled_from(NODES), min_size=1), st.sampled_from(NODES), st.permutations(NODES))
+def test_the_best_order_is_no_longer_than_any_other(due: set[str], here: str, other: list[str]) -> None:
+    order, rest = in_best_order(SITE, here, sorted(due), (), "A1")
+    assert set(order) == due
+    assert rest == ()
+    any_order = [node for node in other if node in due]
+    assert SITE.length_m((here, *order, "A1")) <= SITE.length_m((here, *any_order, "A1")) + 1e-6

@@ -1,0 +1,214 @@
+"""What views in passing decide together, and what they leave for a stop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flightd.config.scan import ScanConfig
+from flightd.core.inventory import LocationState
+from flightd.core.scanning import BodyPose, CodeSet, Finding, Light, Occupancy, PlaceLook
+from flightd.mission.scan.code_assignment import Assigner, PlacedRead, ShelfLook
+from flightd.mission.scan.sweep_planner import SweepPlanner
+from flightd.mission.scan.sweep_task import SweepTask
+from flightd.mission.scan.sweep_votes import SweepVotes, Undecided
+from tests.unit.mission.shelves import SIGHT, SITE, pose, read
+from tests.unit.mission.test_sweep_planner import ALL, NODES, PLANNER
+
+CODE = "AL-02-1-1"
+PARAMS = ScanConfig()
+QUAD = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+GOODS, EMPTY, UNSURE = Occupancy.GOODS, Occupancy.EMPTY, Occupancy.UNSURE
+
+
+def placed(text: str, x_m: float = 1.0, *, sure: bool = True) -> PlacedRead:
+    return PlacedRead(read(text, sure=sure), CODE, CODE, x_m, 0.9, 0.06, 0.999)
+
+
+def verdict(
+    views: Sequence[Sequence[PlacedRead]],
+    seen: Sequence[Occupancy] = (GOODS,) * 6,
+    *,
+    step_deg: float = 8.0,
+    light: Light = Light.FAIR,
+    share: float = 1.0,
+    doubtful: Sequence[str] = (),
+    others: Sequence[str] = (),
+) -> Finding | Undecided:
+    votes = SweepVotes(CODE, "A2", PARAMS, 1.0)
+    for seq, (reads, occupancy) in enumerate(zip(views, seen, strict=False)):
+        look = PlaceLook(CODE, QUAD, share, occupancy, f"picture {seq}", light)
+        bearing = math.radians(step_deg * (seq - 2))
+        here = pose(seq * 250_000_000)
+        votes.add(seq, here, look, reads, bearing_rad=bearing, doubtful=doubtful)
+    return votes.verdict(others)
+
+
+def state(found: Finding | Undecided) -> LocationState | Undecided:
+    return found.state if isinstance(found, Finding) else found
+
+
+NOTHING: Sequence[Sequence[PlacedRead]] = ((),) * 6
+
+
+def test_reads_of_several_views_are_merged() -> None:
+    one = [placed("P1")]
+    found = verdict([(), one, (), one, (), ()])
+    assert isinstance(found, Finding)
+    assert (found.state, [r.text for r in found.reads], found.reads[0].agreeing) == (
+        LocationState.READ, ["P1"], 2,
+    )  # fmt: skip
+    assert found.evidence in {"picture 1", "picture 3"}
+
+
+def test_what_one_view_alone_gives_is_visited_again() -> None:
+    assert verdict([(), [placed("P1")], (), ()]) is Undecided.ONCE
+    assert verdict([(), [placed("P1", sure=False)], (), ()]) is Undecided.ONCE
+
+
+def test_two_codes_are_two_labels_only_where_a_view_shows_both() -> None:
+    one, two = placed("P1", 0.9), placed("P2", 1.2)
+    assert state(verdict([[one, two], [one], [two], [one, two]])) is LocationState.SEVERAL
+    assert verdict([[one], [one], [two], [two]]) is Undecided.APART
+
+
+def test_one_label_read_differently_decides_nothing() -> None:
+    one, two = [placed("P1")], [placed("P2")]
+    assert verdict([one, one, two, two, (), ()]) is Undecided.TORN
+
+
+def test_empty_takes_as_many_views_as_at_a_stop() -> None:
+    assert state(verdict(NOTHING, [UNSURE, EMPTY, EMPTY, EMPTY, UNSURE])) is LocationState.EMPTY
+    assert not isinstance(verdict(NOTHING, [EMPTY, EMPTY]), Finding)
+    assert not isinstance(verdict(NOTHING, [EMPTY, EMPTY, EMPTY, GOODS]), Finding)
+
+
+def test_unreadable_takes_goods_enough_views_angles_and_light() -> None:
+    assert state(verdict(NOTHING)) is LocationState.UNREADABLE
+    assert state(verdict(NOTHING, (Occupancy.COVERED,) * 6)) is LocationState.OCCLUDED
+    assert verdict(NOTHING, (GOODS,) * 3) is Undecided.UNSEEN
+    assert verdict(NOTHING, step_deg=1.0) is Undecided.UNSEEN
+    assert verdict(NOTHING, share=0.7) is Undecided.UNSEEN
+    assert verdict(NOTHING, light=Light.BURNT) is Undecided.LIGHT
+    assert verdict(NOTHING, (UNSURE,) * 6, step_deg=3.0) is Undecided.UNSURE
+    assert state(verdict(NOTHING, (UNSURE,) * 6)) is LocationState.UNREADABLE
+
+
+def test_a_code_that_may_be_a_neighbours_leaves_no_place_without_a_code() -> None:
+    assert verdict(NOTHING, doubtful=["P1"]) is Undecided.NOBODYS
+    assert state(verdict(NOTHING, doubtful=["P1"], others=["P1"])) is LocationState.UNREADABLE
+
+
+LABELS = st.sampled_from(["", "P1", "P2"])
+
+
+@given(
+    st.lists(st.tuples(LABELS, LABELS, st.sampled_from(Occupancy), st.booleans()), max_size=10),
+    st.floats(0.0, 12.0),
+)
+def test_nothing_is_decided_against_what_any_view_shows(
+    views: list[tuple[str, str, Occupancy, bool]], step_deg: float
+) -> None:
+    reads = [
+        [placed(text, x_m, sure=sure) for text, x_m in ((left, 0.9), (right, 1.2)) if text]
+        for left, right, _, sure in views
+    ]
+    found = verdict(reads, [seen for _, _, seen, _ in views], step_deg=step_deg)
+    if not isinstance(found, Finding):
+        return
+    given_by = {text: sum(text in {left, right} for left, right, *_ in views) for text in ("P1", "P2")}
+    for code in found.reads:
+        assert given_by[code.text] >= 2
+    if found.state is LocationState.EMPTY:
+        assert not any(given_by.values())
+        assert sum(seen is EMPTY for _, _, seen, _ in views) >= PARAMS.pictures
+        assert not any(seen in {GOODS, Occupancy.COVERED} for _, _, seen, _ in views)
+    if found.state in {LocationState.UNREADABLE, LocationState.OCCLUDED}:
+        assert not any(given_by.values())
+        assert len(views) >= PARAMS.sweep.unread_views
+
+
+class Passing:
+    """A flight past the lower left level, its pictures made by hand."""
+
+    def __init__(self, planner: SweepPlanner = PLANNER) -> None:
+        legs = planner.legs(NODES, ALL, "A1", -math.pi / 2, 0.9)
+        cells = Assigner(SITE, SIGHT).cells
+        nodes = {code: place.node for code, place in SITE.locations.items()}
+        self.task = SweepTask(legs, cells, nodes.__getitem__, PARAMS, planner.share)
+        self.task.begin(0)
+        self.now_ns = 0
+        self.seq = 0
+
+    def see(self, reads: Mapping[str, Sequence[str]], **changes: float) -> None:
+        """A picture 0.1 m further on, which shows these codes at their places."""
+        self.now_ns += 250_000_000
+        self.seq += 1
+        where = {"x_m": 0.1 * self.seq, "height_m": 0.9} | changes
+        here: BodyPose = pose(self.now_ns, **where)
+        shown = tuple(
+            PlaceLook(code, QUAD, 1.0, GOODS, "e") for code in self.task.near(here) if code in reads
+        )
+        found = tuple(
+            PlacedRead(read(text), code, code, SITE.locations[code].x_m, 0.9, 0.06, 1.0)
+            for code, texts in reads.items()
+            for text in texts
+        )
+        self.task.take(ShelfLook(CodeSet(self.seq, self.now_ns, 1280, 800, (), shown), here, found, ()))
+
+    def found(self) -> dict[str, LocationState]:
+        self.now_ns += 2_000_000_000
+        self.task.step(self.now_ns)
+        return {finding.location: finding.state for finding in self.task.drain()}
+
+
+ONE, TWO = "AL-02-1-1", "AL-02-1-2"
+
+
+def test_a_place_is_decided_once_it_has_been_flown_past() -> None:
+    passing = Passing()
+    for _ in range(4):
+        passing.see({ONE: ["P1"], TWO: ["P2"]})
+    passing.task.step(passing.now_ns)
+    assert not passing.task.drain(), "it is still in the picture"
+    assert passing.found() == {ONE: LocationState.READ, TWO: LocationState.READ}
+    assert ONE not in passing.task.near(pose(passing.now_ns, height_m=0.9))
+
+
+def test_one_code_at_two_neighbours_is_decided_at_neither() -> None:
+    passing = Passing()
+    for code in (ONE, ONE, ONE, TWO, TWO, TWO):
+        passing.see({code: ["P1"], ONE if code == TWO else TWO: []})
+    assert passing.found() == {}
+    assert passing.task.undecided == {ONE: Undecided.ELSEWHERE, TWO: Undecided.ELSEWHERE}
+
+
+def test_one_article_beside_itself_in_one_picture_has_two_labels() -> None:
+    passing = Passing()
+    for _ in range(4):
+        passing.see({ONE: ["4006381333931"], TWO: ["4006381333931"]})
+    assert set(passing.found()) == {ONE, TWO}
+
+
+def test_pictures_from_another_height_or_heading_or_after_a_pause_count_for_nothing() -> None:
+    passing = Passing()
+    for changes in ({"height_m": 1.2}, {"yaw_rad": -1.0}):
+        passing.see({ONE: ["P1"]}, **changes)
+    passing.task.pause()
+    passing.see({ONE: ["P1"]})
+    passing.task.end()
+    assert not passing.task.drain()
+    assert passing.task.undecided[ONE] is Undecided.UNSEEN
+
+
+def test_a_doubt_about_the_place_undoes_what_is_not_decided() -> None:
+    passing = Passing()
+    for _ in range(4):
+        passing.see({ONE: ["P1"]})
+    passing.task.forget()
+    passing.task.begin(passing.now_ns)
+    assert passing.found() == {}
+    assert passing.task.undecided == {ONE: Undecided.DOUBTED}
