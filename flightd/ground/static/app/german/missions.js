@@ -71,4 +71,5 @@ export default {
   "nobody knows from which node these places are seen": "niemand weiß, von welchem Knoten diese Plätze zu sehen sind",
   "Recount {place}": "Nachzählung {place}",
   "Recount {n} places": "Nachzählung {n} Plätze",
+  "Counted in passing, then by stopping what that leaves open:": "Im Vorbeiflug gezählt, was dann offen bleibt im Stehen:",
 };

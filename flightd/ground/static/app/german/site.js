@@ -196,4 +196,5 @@ export default {
   "Import a file": "Datei einlesen",
   "It cannot be opened": "Sie kann nicht geöffnet werden",
   "No site is open": "Keine Halle ist offen",
+  "Site {site}": "Halle {site}",
 };

@@ -68,7 +68,7 @@ function Takes({ estimate }) {
       ${say("The drone’s own estimate: its speeds and turns along this way, and each view of a shelf at its longest; mostly it takes less.")}
       ${" "}${say("Its battery has {charge}; a full one lasts {time} down to its reserve.", { charge: percent(planned.charge), time: duration(planned.battery_s) })}
     </p>
-    ${planned.sweeps.length > 0 && html`<p class="quiet">Counted in passing, then by stopping what that leaves open:</p><ul class="quiet">${planned.sweeps.map((text) => html`<li key=${text}>${capital(text)}</li>`)}</ul>`}
+    ${planned.sweeps.length > 0 && html`<p class="quiet">${say("Counted in passing, then by stopping what that leaves open:")}</p><ul class="quiet">${planned.sweeps.map((text) => html`<li key=${text}>${quoted(text, capital)}</li>`)}</ul>`}
     <details class="flown-order">
       <summary>${say("Order of flight")}</summary>
       <ol>${planned.nodes.map((node) => html`<li key=${node}>${node}</li>`)}</ol>
