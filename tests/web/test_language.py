@@ -40,12 +40,17 @@ PAGES = (
 ENGLISH_LEFT = """async () => {
   const { TEXTS } = await import("/static/app/german/catalogue.js");
   const escaped = (text) => text.replace(/[.*+?^$()|[\\]\\\\]/g, "\\\\$&").replace(/\\{\\w+\\}/g, ".+");
-  const forms = Object.entries(TEXTS).filter(([text, german]) => text !== german).flatMap(([text]) => text.split("|"));
-  const english = forms.filter((text) => !Object.values(TEXTS).includes(text)).map((text) => new RegExp(`^${escaped(text)}$`, "s"));
+  const german = new Set(Object.values(TEXTS));
+  const other = Object.keys(TEXTS).filter((text) => text !== TEXTS[text]);
+  const forms = other.flatMap((text) => text.split("|"));
+  const english = forms
+    .filter((text) => !german.has(text))
+    .map((text) => new RegExp(`^${escaped(text)}$`, "s"));
   const shown = [];
   const nodes = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (nodes.nextNode()) {
-    if (!nodes.currentNode.parentElement.closest("body [lang=en], code, pre, noscript")) shown.push(nodes.currentNode.data);
+    const { data, parentElement } = nodes.currentNode;
+    if (!parentElement.closest("body [lang=en], code, pre, noscript")) shown.push(data);
   }
   for (const name of ["aria-label", "title", "placeholder", "alt"]) {
     for (const element of document.querySelectorAll(`[${name}]`)) {
