@@ -4,7 +4,8 @@ fill, compare it with the books, work the exceptions, download, count again what
 install it, play the flight again.
 
 It takes about eight minutes, most of them in the air, so it is no part of the gate.  Each page is kept as
-a picture, wide and narrow, light and dark, and looked at by axe-core.
+a picture, wide and narrow, light and dark, and looked at by axe-core; `sheets/` has one file a page with all
+four, as flightd/guide/pictures shows them (ground-station-NAME.webp).
 
 python -m tests.web.whole_day FOLDER
 """
@@ -23,6 +24,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import cv2
+import numpy as np
+
 from tests.web.chromium import NARROW, ROOT, WIDE, hindrances, opened, running, station
 
 if TYPE_CHECKING:
@@ -33,6 +37,8 @@ PHASE_MS, FLIGHT_MS, TRAINING_MS = 60_000, 400_000, 300_000
 _HOLD_MS = 1300.0
 _LOOKS = [(WIDE, "light"), (WIDE, "dark"), (NARROW, "light"), (NARROW, "dark")]
 _SETTLE_MS = 700
+_ROW_PX, _QUALITY = 560, 82
+_BETWEEN_BGR = (150, 150, 150)
 
 
 def main() -> None:
@@ -54,6 +60,7 @@ def main() -> None:
             began_s = time.monotonic()
             step(day)
             print(f"{step.__name__.replace('_', ' '):20} {time.monotonic() - began_s:6.1f} s", flush=True)
+    sheets(folder)
     print("\n".join(day.findings) or "axe-core: nothing serious on any page")
     if day.findings:
         raise SystemExit(1)
@@ -137,6 +144,25 @@ class Day:
                 if process.poll() is None:
                     process.terminate()
                 process.wait(60)
+
+
+def sheets(folder: Path) -> None:
+    """One picture of each page: wide at the left, narrow at the right, light above dark."""
+    made = folder / "sheets"
+    made.mkdir(exist_ok=True)
+    for first in sorted((folder / "pictures").glob(f"*-{WIDE[0]}-light.png")):
+        name = first.name.removesuffix(f"-{WIDE[0]}-light.png")
+        rows = []
+        for scheme in ("light", "dark"):
+            looks = []
+            for width in (WIDE[0], NARROW[0]):
+                shot = cv2.imread(str(first.with_name(f"{name}-{width}-{scheme}.png")))
+                assert shot is not None
+                size = (round(shot.shape[1] * _ROW_PX / shot.shape[0]), _ROW_PX)
+                framed = cv2.resize(shot, size, interpolation=cv2.INTER_AREA)
+                looks.append(cv2.copyMakeBorder(framed, 4, 4, 4, 4, cv2.BORDER_CONSTANT, value=_BETWEEN_BGR))
+            rows.append(np.hstack(looks))
+        cv2.imwrite(str(made / f"{name}.webp"), np.vstack(rows), [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
 
 
 def draw(day: Day) -> None:
@@ -238,6 +264,10 @@ def recount(day: Day) -> None:
         day.seen("Time in the air", within_ms=FLIGHT_MS)
         day.button("Keep", exact=True).click()
         day.shoot("missions")
+        day.go("Doctor")
+        page.get_by_role("heading", name=re.compile("Not fit to fly|No error")).first.wait_for()
+        day.shoot("doctor")
+        day.go("Missions")
         day.hold("Start this mission")
         day.seen(re.compile("0 of [12] nodes?"))
         process.wait(FLIGHT_MS // 1000)
@@ -325,9 +355,6 @@ def play(day: Day) -> None:
         page.keyboard.press("ArrowRight")
     assert float(slider.input_value()) > before
     day.shoot("replay")
-    day.go("Doctor")
-    page.get_by_role("heading", level=2).first.wait_for()
-    day.shoot("doctor")
     day.go("Guide")
     page.get_by_role("heading", level=2).first.wait_for()
     day.shoot("guide")
