@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import gzip
+import json
 import os
 import signal
 import subprocess
 import sys
+import time
+import uuid
 from pathlib import Path
 
 import pytest
+from websockets.sync.client import connect
+from websockets.typing import Origin
 
+from flightd.config.schema import load_config
 from flightd.core.errors import InputError
+from flightd.core.types import Phase
 from flightd.ground.drone_names import drone_addresses
 from flightd.ground.guards import own_hosts
 from flightd.ground.pages import STATIC
 from flightd.ground.server import Listening
+from flightd.site.site_file import load_site
+from tests.web.live_flight import LiveFlight
 
 ROOT = Path(__file__).parents[2]
 MOST_BYTES = 300_000
@@ -91,6 +100,52 @@ def test_it_serves_until_ctrl_c_and_ends_in_order() -> None:
         process.send_signal(signal.SIGINT)
         assert process.wait(20) == 0
         assert process.stderr.read() == "flightd: the ground station was ended by SIGINT\n"
+
+
+def test_killed_in_flight_it_is_a_lost_ground_and_nothing_else() -> None:
+    config = load_config(ROOT / "configs" / "sim.toml").with_values(
+        mission={"autostart": False, "start_countdown_s": 0.0}, ground={"lost_action": "land", "lost_s": 2.0}
+    )
+    with LiveFlight(load_site(ROOT / "configs" / "site-demo.toml"), config) as flight:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "flightd", "ground", "--listen", "127.0.0.1:0",
+             "--drone", "demo=127.0.0.1:{}/{}".format(*flight.ports)],
+            cwd=ROOT, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert process.stderr is not None
+        with process.stderr:
+            url = process.stderr.readline().split()[6]
+            try:
+                start_from_a_page(url)
+                passed_through(flight, Phase.FOLLOW)
+            finally:
+                process.kill()
+                process.wait(20)
+        assert passed_through(flight, Phase.ABORTED) <= {Phase.FOLLOW, Phase.HOVER, Phase.LAND, Phase.ABORTED}
+        assert flight.quiet_s > 2.0
+
+
+def start_from_a_page(url: str) -> None:
+    """A page that attends orders the start, again until the drone takes it, and stays open."""
+    page = connect(url.replace("http", "ws") + "/live", origin=Origin(url), proxy=None)
+    act = {"say": "act", "number": 1, "drone": "demo", "act": {"id": "", "command": "start"}}
+    while True:
+        act["act"] = {"id": uuid.uuid4().hex, "command": "start"}
+        page.send(json.dumps(act))
+        while (said := json.loads(page.recv(20)))["topic"] != "answer":
+            pass
+        if said["value"]["status"] == 200:
+            return
+
+
+def passed_through(flight: LiveFlight, last: Phase) -> set[Phase]:
+    """The phases from now until this one."""
+    phases, end_s = {flight.phase}, time.monotonic() + 60.0
+    while flight.phase is not last:
+        assert time.monotonic() < end_s, flight.phase
+        flight.wait_s(0.02)
+        phases.add(flight.phase)
+    return phases
 
 
 @pytest.mark.parametrize(
