@@ -58,13 +58,13 @@ def off_leg(site: Site, start: str, statuses: Sequence[Status], motion: TrueMoti
 
 def _legs(site: Site, start: str, statuses: Sequence[Status]) -> Iterator[_Leg]:
     everywhere = tuple(_between(site, edge.a, edge.b) for edge in site.edges)
-    goal, wherever = "", False
+    goal, wherever, here = "", False, start
     lines: tuple[Segment, ...] = ()
     for status in statuses:
         anywhere = status.phase in _WHEREVER
+        here = status.node or here  # on a pad it sees no lines, and tells no node
         if status.goal == goal and anywhere is wherever:
             continue
-        here = status.node or start
         before, arrived = lines, here == goal
         goal, wherever = status.goal, anywhere
         lines = everywhere if anywhere else _way(site, here, goal)

@@ -74,6 +74,13 @@ def test_who_turns_back_on_the_way_is_still_on_its_leg() -> None:
     assert score(evidence(truth, statuses)).cross_track_max_m == pytest.approx(0.0)
 
 
+def test_who_goes_on_from_the_pad_on_which_it_was_given_a_battery_is_on_its_leg() -> None:
+    """B1's: it is told no node while the drone stands on its pad."""
+    truth = [at(S, 0.0, 3.0), *(at(3 * S + k * 100 * MS, 0.0, 3.0 - 0.3 * k) for k in range(10))]
+    statuses = [status(0, node="B1", goal="B1"), status(100 * MS, Phase.SWAP, node="", goal="A2")]
+    assert score(evidence(truth, statuses)).cross_track_max_m == pytest.approx(0.0, abs=1e-9)
+
+
 def test_what_a_pilot_does_is_not_judged() -> None:
     truth = [at(0), at(S, y_m=1.1), at(2 * S, y_m=2.0, height_m=5.0)]
     flight = evidence(truth, [status(0), status(S, Phase.PILOT)])
