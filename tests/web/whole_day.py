@@ -5,7 +5,7 @@ install it, play the flight again.
 
 It takes about eight minutes, most of them in the air, so it is no part of the gate.  Each page is kept as
 a picture, wide and narrow, light and dark, and looked at by axe-core; `sheets/` has one file a page with all
-four, as flightd/guide/pictures shows them (ground-station-NAME.webp).
+four, as flightd/guide/pictures shows them (ground-station-NAME.jpg).
 
 python -m tests.web.whole_day FOLDER
 """
@@ -162,7 +162,7 @@ def sheets(folder: Path) -> None:
                 framed = cv2.resize(shot, size, interpolation=cv2.INTER_AREA)
                 looks.append(cv2.copyMakeBorder(framed, 4, 4, 4, 4, cv2.BORDER_CONSTANT, value=_BETWEEN_BGR))
             rows.append(np.hstack(looks))
-        cv2.imwrite(str(made / f"{name}.webp"), np.vstack(rows), [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
+        cv2.imwrite(str(made / f"{name}.jpg"), np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
 
 
 def draw(day: Day) -> None:
