@@ -25,9 +25,11 @@ from playwright.sync_api import expect
 CONFIG = load_config(Path(__file__).parents[2] / "configs" / "sim.toml").with_values(
     mission={"autostart": False}, front_camera=FITTED
 )
+expect.set_options(timeout=40_000.0)
+
 PAGES = (
     ("/", "Flugbereit"),
-    ("/stock?store=monday&place=AL-01-1-1", "GS1|Als leer|Gelesen"),
+    ("/stock?store=monday&place=AL-01-1-1", "ein Code, verbürgt"),
     ("/missions", "Knoten auf der Karte wählen"),
     ("/flights", "1 Flug"),
     ("/studio", "Bildsätze"),
