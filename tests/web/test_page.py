@@ -176,7 +176,7 @@ def test_a_hazard_is_shown_with_what_is_done_and_since_when(
 
 
 def test_a_pictures_age_has_its_way_to_the_page_in_it(browser: Browser, url: str) -> None:
-    """Taken at 2 s by the drone's clock, which is 100 s behind the page's; 0.1 s old as it left the station."""
+    """Taken at 2 s by the drone's clock, 100 s behind the page's; 0.1 s old as it left the station."""
     seen = {"head": {"stamp_ns": 2_000_000_000, "age_ms": 100.0}, "at": 102_900.0}
     with opened(browser, url) as page:
         for clock_ms, now_ms, age_ms in (
@@ -190,7 +190,9 @@ def test_a_pictures_age_has_its_way_to_the_page_in_it(browser: Browser, url: str
             assert page.evaluate(f"async () => (await {module}).pictureAgeMs({words})") == age_ms
         expect(page.get_by_text("Ready to fly")).to_be_visible()
         store = "(await import('/static/app/store.js')).shown()"
-        since_ms = f"async () => {{ const s = {store}; return s.heardAt - s.status.stamp_ns / 1e6 - s.clockMs; }}"
+        since_ms = (
+            f"async () => {{ const s = {store}; return s.heardAt - s.status.stamp_ns / 1e6 - s.clockMs; }}"
+        )
         assert 0 <= page.evaluate(since_ms) < WITHIN_MS
 
 
