@@ -24,7 +24,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -298,8 +298,19 @@ def _say(text: str) -> None:
 
 
 def _table(told: dict[str, Any], sink: TextIO) -> None:
-    for name, value in told.items():
-        print(f"{name:8} {json.dumps(value)[:300]}", file=sink)
+    for name, value in _leaves(told):
+        print(f"{name:42} {value}", file=sink)
+
+
+def _leaves(told: dict[str, Any], path: str = "") -> Iterator[tuple[str, str]]:
+    """A row for each value, quantiles in one."""
+    for key, value in told.items():
+        if not isinstance(value, dict):
+            yield path + key, str(value)[:80]
+        elif "count" in value:
+            yield path + key, "  ".join(f"{name} {figure}" for name, figure in value.items())
+        else:
+            yield from _leaves(value, f"{path}{key} ")
 
 
 if __name__ == "__main__":

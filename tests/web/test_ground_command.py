@@ -13,7 +13,7 @@ import uuid
 from pathlib import Path
 
 import pytest
-from websockets.sync.client import connect
+from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from flightd.config.schema import load_config
@@ -116,8 +116,13 @@ def test_killed_in_flight_it_is_a_lost_ground_and_nothing_else() -> None:
         with process.stderr:
             url = process.stderr.readline().split()[6]
             try:
-                start_from_a_page(url)
-                passed_through(flight, Phase.FOLLOW)
+                socket_url = url.replace("http", "ws") + "/live"
+                with connect(
+                    socket_url, origin=Origin(url), proxy=None, max_queue=None, close_timeout=0.3
+                ) as page:
+                    start_from(page)
+                    passed_through(flight, Phase.FOLLOW)
+                    process.kill()
             finally:
                 process.kill()
                 process.wait(20)
@@ -125,13 +130,11 @@ def test_killed_in_flight_it_is_a_lost_ground_and_nothing_else() -> None:
         assert flight.quiet_s > 2.0
 
 
-def start_from_a_page(url: str) -> None:
-    """A page that attends orders the start, again until the drone takes it, and stays open."""
-    page = connect(url.replace("http", "ws") + "/live", origin=Origin(url), proxy=None)
-    act = {"say": "act", "number": 1, "drone": "demo", "act": {"id": "", "command": "start"}}
+def start_from(page: ClientConnection) -> None:
+    """Its person orders the start, again until the drone takes it."""
     while True:
-        act["act"] = {"id": uuid.uuid4().hex, "command": "start"}
-        page.send(json.dumps(act))
+        act = {"id": uuid.uuid4().hex, "command": "start"}
+        page.send(json.dumps({"say": "act", "number": 1, "drone": "demo", "act": act}))
         while (said := json.loads(page.recv(20)))["topic"] != "answer":
             pass
         if said["value"]["status"] == 200:
