@@ -59,12 +59,14 @@ def off_leg(site: Site, start: str, statuses: Sequence[Status], motion: TrueMoti
 def _legs(site: Site, start: str, statuses: Sequence[Status]) -> Iterator[_Leg]:
     everywhere = tuple(_between(site, edge.a, edge.b) for edge in site.edges)
     goal, wherever = "", False
+    last = start
     lines: tuple[Segment, ...] = ()
     for status in statuses:
+        last = status.node or last  # on the pad with a fresh battery it has seen no line yet
         anywhere = status.phase in _WHEREVER
         if status.goal == goal and anywhere is wherever:
             continue
-        here = status.node or start
+        here = last
         before, arrived = lines, here == goal
         goal, wherever = status.goal, anywhere
         lines = everywhere if anywhere else _way(site, here, goal)
