@@ -22,14 +22,28 @@ def flown_folder(root: Path) -> Path:
     return root
 
 
+_FLOOR_CLEAR_PX = 45.0
+
+
 def marks_of(lines: list[dict[str, Any]], shift_px: float = 90.0) -> dict[str, Any]:
-    """Strokes along the first of the lines that a picture's head tells, and beside it; the lines by their
-    ends, as labels."""
-    (x0, y0), (x1, y1) = ([x * WIDTH, y * HEIGHT] for x, y in (lines[0]["points"][0], lines[0]["points"][-1]))
+    """Strokes along the first of the lines that a picture's head tells, and beside it, clear of the others;
+    the lines by their ends, as labels."""
+    ends = [[(x * WIDTH, y * HEIGHT) for x, y in (line["points"][0], line["points"][-1])] for line in lines]
+    (x0, y0), (x1, y1) = ends[0]
     length = math.hypot(x1 - x0, y1 - y0)
     aside = (-(y1 - y0) / length * shift_px, (x1 - x0) / length * shift_px)
-    third = (x0 + (x1 - x0) * 0.3, y0 + (y1 - y0) * 0.3)  # another line crosses farther in
-    beside = [[x + aside[0], y + aside[1]] for x, y in ((x0, y0), third)]
+
+    def beside(side: int, begins: float) -> list[list[float]]:
+        return [
+            [x0 + (x1 - x0) * part + side * aside[0], y0 + (y1 - y0) * part + side * aside[1]]
+            for part in (begins, begins + 0.3)
+        ]
+
+    def room(stroke: list[list[float]]) -> float:
+        inside = min(min(x, WIDTH - x, y, HEIGHT - y) for x, y in stroke)
+        return min(inside - 10 + _FLOOR_CLEAR_PX, *(_nearest(stroke, line) for line in ends))
+
+    floor = max((beside(side, begins) for begins in (0.0, 0.7) for side in (1, -1)), key=room)
     labels = [
         {
             "x1": line["points"][0][0] * WIDTH - 0.5,
@@ -42,9 +56,18 @@ def marks_of(lines: list[dict[str, Any]], shift_px: float = 90.0) -> dict[str, A
     ]
     regions = [
         {"paint": True, "stroke": [[x0, y0], [x1, y1]], "width": 12},
-        {"paint": False, "stroke": beside, "width": 12},
+        {"paint": False, "stroke": floor, "width": 12},
     ]
     return {"regions": regions, "lines": labels, "complete": True}
+
+
+def _nearest(stroke: list[list[float]], line: list[tuple[float, float]]) -> float:
+    """How near the stroke comes to the line between its ends, in pixels."""
+    (ax, ay), (bx, by) = line
+    steps = [k / 20 for k in range(21)]
+    points = [(ax + (bx - ax) * t, ay + (by - ay) * t) for t in steps]
+    (cx, cy), (dx, dy) = stroke
+    return min(math.hypot(cx + (dx - cx) * t - x, cy + (dy - cy) * t - y) for t in steps for x, y in points)
 
 
 async def post(station: Station, path: str, said: object, method: str = "POST") -> tuple[int, Any]:

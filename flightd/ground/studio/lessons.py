@@ -81,7 +81,8 @@ class Scored(msgspec.Struct, frozen=True):
 
 
 class Outcome(msgspec.Struct, frozen=True):
-    """What training came to: the new profile first in `scores`, then those it is compared with."""
+    """What training came to: the new profile first in `scores`, then those it is compared with; `doubtful`
+    are the pictures whose marks those of the others contradict."""
 
     training_hash: str
     trained_on: int
@@ -90,6 +91,7 @@ class Outcome(msgspec.Struct, frozen=True):
     floor_refused: float
     scores: tuple[Scored, ...]
     verdict: Verdict
+    doubtful: tuple[str, ...] = ()
 
 
 def from_log(root: Path, relative: str, place: PicturePlace) -> TakenIn:
@@ -165,6 +167,7 @@ def train_and_score(
         trained.floor_refused,
         scores,
         verdict([(one.name, one.pictures, one.logs) for one in scores]),
+        tuple(taught[number][0].file for number in trained.doubtful),
     )
 
 

@@ -54,6 +54,10 @@ _SVM_C = 4.0
 _UNSEEN = 0.06
 """Colours drawn at random and called floor, as a part of the pixels: what was never seen is not paint."""
 
+_CONTRADICTED = 0.1, 0.5
+"""A picture is doubtful when more than this part of its marked floor is paint by what the other pictures
+teach, or more than that part of its marked paint floor: under another light some is, too."""
+
 _STRONG = (0.003, 0.01, 0.75, 0.0)
 _WEAK = (0.02, 0.05, 0.95, -0.6)
 """Part of the held-out floor that may pass; that may pass at most, if that part of the held-out paint
@@ -79,6 +83,8 @@ class Trained:
     floor_refused: float
     pixels: int
     pictures: int
+    doubtful: tuple[int, ...] = ()
+    """Pictures, in the order they were given in, whose marks the others contradict."""
 
 
 def teaching_from_mask(mask: NDArray[np.uint8]) -> Teaching:
@@ -198,7 +204,21 @@ def train(name: str, colour: str, pixels: Pixels, seed: int) -> Trained:
     score = (kept + refused) / 2
     profile = ColourProfile(name, lut, colour, _digest(colour, pixels, seed), round(score, 4))
     shown = int(pixels.picture.max()) + 1
-    return Trained(profile, score, kept, refused, len(pixels.paint), shown)
+    doubtful = _contradicted(pixels, held_out)
+    return Trained(profile, score, kept, refused, len(pixels.paint), shown, doubtful)
+
+
+def _contradicted(pixels: Pixels, held_out: NDArray[np.float64]) -> tuple[int, ...]:
+    """The pictures whose marks are not what the decision values of the others say."""
+    wrong = (held_out > 0) != pixels.paint
+    found = []
+    for number in range(int(pixels.picture.max()) + 1):
+        for marked, most in zip((~pixels.paint, pixels.paint), _CONTRADICTED, strict=True):
+            here = marked & (pixels.picture == number)
+            if here.any() and wrong[here].mean() > most:
+                found.append(number)
+                break
+    return tuple(found)
 
 
 def sketch(name: str, colour: str, pixels: Pixels, seed: int) -> ColourProfile:

@@ -14,6 +14,7 @@ from flightd.vision.training.colour_training import (
     take_pixels,
     teaching_from_label,
     teaching_from_mask,
+    train,
 )
 from flightd.vision.training.labelled_frames import LabelledImage, LabelledLine, LabelledRegion
 
@@ -66,3 +67,19 @@ def test_too_few_pictures_of_paint_are_refused() -> None:
     floor = (np.full((*SHAPE, 3), 90, np.uint8), np.full(SHAPE, FLOOR, np.uint8))
     with pytest.raises(InputError, match="only 0 pictures"):
         collect([floor] * 8, "yellow", 0)
+
+
+@pytest.mark.parametrize("wrong", [None, 3])
+def test_a_picture_whose_floor_runs_over_paint_is_doubtful(wrong: int | None) -> None:
+    pytest.importorskip("sklearn", reason="training needs scikit-learn: pip install -e '.[train]'")
+    pictures = []
+    for number in range(8):
+        picture = np.full((*SHAPE, 3), 100 + 5 * number, np.uint8)
+        picture[30:60] = (40, 150, 200)
+        teaching = np.full(SHAPE, UNKNOWN, np.uint8)
+        teaching[35:55, :70] = PAINT
+        teaching[35 : 55 if number == wrong else 36, 90:] = FLOOR if number == wrong else UNKNOWN
+        teaching[70:80] = FLOOR
+        pictures.append((picture, teaching))
+    trained = train("hall", "yellow", collect(pictures, "yellow", 0), 0)
+    assert trained.doubtful == (() if wrong is None else (wrong,))

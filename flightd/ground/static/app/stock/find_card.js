@@ -65,7 +65,7 @@ function Search({ onChoose }) {
     if (first) onChoose(first);
   };
   return html`
-    <label class="field search">Code or place
+    <label class="field finder">Code or place
       <input type="search" ref=${box} maxlength="200" spellcheck=${false} autocomplete="off" onInput=${onInput} onKeyDown=${onKeyDown} />
       <span class="quiet" role="status">${found && (found.size === 1 ? "1 place" : `${found.size} places`)}</span>
     </label>

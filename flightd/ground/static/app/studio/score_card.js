@@ -4,7 +4,7 @@ import { flightsState, watchList } from "../flights/flights_state.js";
 import { html, useEffect, useState } from "../html.js";
 import { setWho, who } from "../stock/decisions.js";
 import { capital, count } from "../words.js";
-import { asked, change, reloadSet, setPath, studio, told, watchTraining } from "./studio_state.js";
+import { asked, change, choosePicture, reloadSet, setPath, studio, told, watchTraining } from "./studio_state.js";
 
 const LEAST_SHOWING = 7;
 const MOST_LOGS = 8;
@@ -50,8 +50,19 @@ function Outcome({ outcome }) {
     <p class=${`judged ${tone}`} role="status">${words}</p>
     ${outcome.verdict.reasons.length > 0 && html`<ul class="reasons">${outcome.verdict.reasons.map((reason) => html`<li key=${reason}>${capital(reason)}</li>`)}</ul>`}
     <${Scores} scores=${outcome.scores} />
+    ${outcome.doubtful.length > 0 && html`<${Doubtful} files=${outcome.doubtful} />`}
     <p class="quiet">Learnt from ${outcome.trained_on} pictures, scored on ${outcome.held_back.length} others.</p>
     ${mayChange() ? html`<${Install} outcome=${outcome} />` : html`<p class="quiet">An admin installs it.</p>`}
+  `;
+}
+
+// Most often a stroke of floor that runs over paint: one such picture spoils what all of them teach.
+function Doubtful({ files }) {
+  const { pictures } = studio().set;
+  const shown = files.map((file) => [file, pictures.findIndex((picture) => picture.file === file) + 1]).filter(([, number]) => number);
+  return html`
+    <div class="obstacles"><p>Marks that the other pictures contradict: does floor run over paint, or paint beside it?</p>
+      <div class="tools">${shown.map(([file, number]) => html`<button key=${file} class="order" onClick=${() => choosePicture(file)}>Picture ${number}</button>`)}</div></div>
   `;
 }
 
