@@ -69,6 +69,9 @@ class NoScan:
     def begin_leg(self, now_ns: int) -> None:
         """Nothing begins."""
 
+    def end_leg(self, leg: SweepLeg) -> None:
+        """Nothing ends."""
+
     def pause_leg(self) -> None:
         """Nothing is interrupted."""
 

@@ -247,6 +247,11 @@ class Scanner:
             self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
             self._sweep.begin(now_ns)
 
+    def end_leg(self, leg: SweepLeg) -> None:
+        """The end of a leg is reached."""
+        if self._sweep is not None:
+            self._sweep.flown(leg)
+
     def pause_leg(self) -> None:
         """The leg is interrupted."""
         if self._sweep is not None:

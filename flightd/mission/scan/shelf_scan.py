@@ -126,6 +126,8 @@ class ShelfScan:
 
     def _lead_sweep(self, s: MissionInputs, phase: Phase, trigger: Trigger, stop: Stop) -> None:
         """Pictures count from the beginning of a leg until the next one's, but for interruptions."""
+        if trigger is Trigger.ARRIVED and stop.sweep is not None:
+            self._scanner.end_leg(stop.sweep)
         if phase in _ENDS or (trigger is Trigger.TURNED and stop.sweep is None):
             self.end_sweep(s.now_ns)
         elif phase in _PASSING:

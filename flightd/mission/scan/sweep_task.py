@@ -45,6 +45,7 @@ class SweepTask:
         self._share = share
         self._votes: dict[str, SweepVotes] = {}
         self._closed: set[str] = set()
+        self._flown: set[str] = set()
         self._findings: list[Finding] = []
         self._owners: dict[str, set[str]] = {}
         self._apart: set[tuple[str, str, str]] = set()
@@ -120,9 +121,14 @@ class SweepTask:
         """Decide what has been flown past."""
         self._pass([code for code, votes in self._votes.items() if 0 < votes.newest_ns < now_ns - _GONE_NS])
 
+    def flown(self, leg: SweepLeg) -> None:
+        """The end of this leg is reached."""
+        self._flown.update(leg.locations)
+
     def end(self) -> None:
-        """The last leg is over: decide all that was seen."""
-        self._pass(dict.fromkeys(code for leg in self._legs for code in leg.locations))
+        """No leg follows: decide what was seen, or should have been.  What hangs beside legs that were not
+        flown is left to fly past."""
+        self._pass([*self._votes, *(self._flown - self._votes.keys())])
         self.pause()
 
     def drain(self) -> tuple[Finding, ...]:

@@ -202,6 +202,7 @@ def test_a_battery_that_runs_low_on_the_way_leaves_the_rest_for_the_next() -> No
     flight.fly()
     assert set(flight.states) == set(PLACES)
     assert len(flight.findings) == len(PLACES), "nothing is counted twice"
+    assert len(flight.said("sweep")) == 2 + (len(flight.scanned) > 0), "what was not flown past is flown past"
 
 
 def test_a_doubt_on_a_leg_undoes_what_is_open_and_stops_before_it_later() -> None:

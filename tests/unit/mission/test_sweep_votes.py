@@ -135,7 +135,7 @@ class Passing:
     """A flight past the lower left level, its pictures made by hand."""
 
     def __init__(self, planner: SweepPlanner = PLANNER) -> None:
-        legs = planner.legs(NODES, ALL, "A1", -math.pi / 2, 0.9)
+        self.legs = legs = planner.legs(NODES, ALL, "A1", -math.pi / 2, 0.9)
         cells = Assigner(SITE, SIGHT).cells
         nodes = {code: place.node for code, place in SITE.locations.items()}
         self.task = SweepTask(legs, cells, nodes.__getitem__, PARAMS, planner.share)
@@ -199,6 +199,9 @@ def test_pictures_from_another_height_or_heading_or_after_a_pause_count_for_noth
         passing.see({ONE: ["P1"]}, **changes)
     passing.task.pause()
     passing.see({ONE: ["P1"]})
+    passing.task.end()
+    assert not passing.task.undecided, "the leg was not flown to its end: it is flown anew"
+    passing.task.flown(passing.legs[0])
     passing.task.end()
     assert not passing.task.drain()
     assert passing.task.undecided[ONE] is Undecided.UNSEEN
