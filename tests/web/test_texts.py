@@ -21,8 +21,8 @@ FILLED = re.compile(r'\benglish\("(?:[^"\\]|\\.)*", \{')
 ENTRY = re.compile(r'^  ("(?:[^"\\]|\\.)*"): ("(?:[^"\\]|\\.)*"),$', re.MULTILINE)
 PLACE = re.compile(r"\{\w*\}")
 SAME = {
-    "Autopilot", "Codes", "Export", "Live", "Mission", "Name", "Pause", "Position", "STOP", "Start",
-    "Start: {why}", "Station", "Studio", "VDMA LIF", "Version {number}", "Zoom", "orange",
+    "Autopilot", "CSV, {separator}, {encoding}", "Codes", "Export", "Live", "Mission", "Name", "Pause",
+    "Position", "STOP", "Start", "Start: {why}", "Station", "Studio", "VDMA LIF", "Version {number}", "Zoom", "orange",
 }  # fmt: skip
 """German and English alike."""
 NO_TEXTS = re.compile(

@@ -182,6 +182,11 @@ export default {
   "limit": "begrenzt",
   "continue": "weiter",
   // the station
+  "CSV, {separator}, {encoding}": "CSV, {separator}, {encoding}",
+  "comma": "Komma",
+  "semicolon": "Strichpunkt",
+  "tab": "Tabulator",
+  "bar": "senkrechter Strich",
   "connecting": "verbindet",
   "the link failed": "die Verbindung ist gescheitert",
   "{drone} cannot be reached: {why}": "{drone} ist nicht zu erreichen: {why}",

@@ -1,6 +1,6 @@
 // The expected stock: upload, which column is what, and every difference to the count.
 import { html, useEffect, useRef } from "../html.js";
-import { english, quoted, say, sayWith } from "../language.js";
+import { english, quoted, quotedText, say, sayWith } from "../language.js";
 import { choose, compareAgain, download, forget, upload } from "./expected_stock.js";
 import { stock } from "./stock_state.js";
 
@@ -65,7 +65,7 @@ function Columns() {
   `;
   const roles = { [chosen.place]: say("place"), [chosen.code]: say("code"), [chosen.quantity ?? -1]: say("quantity") };
   return html`
-    <p class="quiet">${say("{name}: {kind}, {n} row|{name}: {kind}, {n} rows", { name, kind, n: rows })}</p>
+    <p class="quiet">${say("{name}: {kind}, {n} row|{name}: {kind}, {n} rows", { name, kind: quotedText(kind), n: rows })}</p>
     <div class="find-row">
       ${pick("place", say("Places are in"))}${pick("code", say("Codes are in"))}${pick("quantity", say("Quantities are in"), true)}
       <label class="check"><input type="checkbox" checked=${chosen.heading} onChange=${(event) => choose({ heading: event.target.checked })} /> ${say("The first row names the columns")}</label>
