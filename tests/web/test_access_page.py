@@ -64,8 +64,7 @@ def sign_in(page: Page, name: str, password: str = PASSWORD) -> None:
     page.keyboard.press("Enter")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [WIDE, NARROW])
+@pytest.mark.parametrize(("size", "scheme"), [(WIDE, "light"), (NARROW, "dark")])
 def test_a_person_signs_in_by_keyboard_sees_who_he_is_and_signs_out(
     browser: Browser, url: str, size: tuple[int, int], scheme: str
 ) -> None:

@@ -23,7 +23,7 @@ from playwright.sync_api import expect
 DRAWN_TWICE = (
     "() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(() => drawn())))"
 )
-SIZES = [(WIDE, "light"), (WIDE, "dark"), (NARROW, "light"), (NARROW, "dark")]
+SIZES = [(WIDE, "light"), (NARROW, "dark")]
 
 
 @pytest.fixture(scope="module")

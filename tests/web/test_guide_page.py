@@ -17,7 +17,7 @@ pytest.importorskip("playwright", reason="the tests of the page need playwright:
 from playwright.sync_api import expect
 
 TABLE = re.compile("Hazards.*The table")
-SIZES = [(WIDE, "light"), (WIDE, "dark"), (NARROW, "light"), (NARROW, "dark")]
+SIZES = [(WIDE, "light"), (NARROW, "dark")]
 
 
 @pytest.fixture(scope="module")

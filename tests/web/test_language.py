@@ -36,7 +36,7 @@ PAGES = (
     ("/site/edit?name=hall.toml", "Stimmig: Eine Drohne kann danach fliegen."),
     ("/site/new", "Neue Halle"),
     ("/doctor", "Diagnose"),
-    ("/guide", "Alle Seiten"),
+    ("/guide", "flightd flies a camera drone"),
 )
 """Where a page is, and what it says once it is there."""
 ENGLISH_LEFT = """async () => {
@@ -98,7 +98,7 @@ def test_every_page_is_german_once_it_is_asked_for_and_stays_so(browser: Browser
         expect(page.get_by_role("link", name="Handbuch")).to_be_visible()
         expect(page.locator("article[lang=en]")).to_be_visible()
         page.get_by_role("button", name="EN, English").click()
-        expect(page).to_have_title("Guide · flightd")
+        expect(page).to_have_title("flightd · Guide · flightd")
 
 
 def test_whose_browser_is_german_reads_german_numbers_and_dates(browser: Browser, url: str) -> None:

@@ -68,8 +68,7 @@ def plain(row: dict[str, str]) -> dict[str, str | float]:
     }
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [WIDE, NARROW])
+@pytest.mark.parametrize(("size", "scheme"), [(WIDE, "light"), (NARROW, "dark")])
 def test_everybody_can_read_it_in_any_light_and_width(
     browser: Browser, url: str, size: tuple[int, int], scheme: str
 ) -> None:

@@ -162,7 +162,7 @@ def test_what_labels_say_is_text_and_never_a_formula(browser: Browser, url: str,
     assert json.loads(saved["EPCIS"].read_text())["type"] == "EPCISDocument"
 
 
-@pytest.mark.parametrize(("size", "scheme"), [(NARROW, "light"), (NARROW, "dark"), (WIDE, "dark")])
+@pytest.mark.parametrize(("size", "scheme"), [(NARROW, "light"), (WIDE, "dark")])
 def test_it_is_for_everybody_on_every_screen(
     browser: Browser, url: str, size: tuple[int, int], scheme: str
 ) -> None:

@@ -24,7 +24,7 @@ from playwright.sync_api import expect
 
 expect.set_options(timeout=40_000.0)
 
-LOOKS = [(WIDE, "light"), (NARROW, "dark"), (NARROW, "light"), (WIDE, "dark")]
+LOOKS = [(NARROW, "light"), (WIDE, "dark")]
 
 
 @pytest.fixture(scope="module")
