@@ -22,8 +22,8 @@ ENTRY = re.compile(r'^  ("(?:[^"\\]|\\.)*"): ("(?:[^"\\]|\\.)*"),$', re.MULTILIN
 PLACE = re.compile(r"\{\w*\}")
 SAME = {
     "Autopilot", "CSV, {separator}, {encoding}", "Codes", "Export", "Live", "Mission", "Name", "Pause",
-    "Position", "STOP", "Start", "Start: {why}", "Station", "Studio", "VDMA LIF", "Version {number}", "Zoom",
-    "orange",
+    "Position", "STOP", "Start", "Start: {why}", "Station", "Studio", "VDMA LIF", "Version {number}",
+    "Zoom", "orange",
 }  # fmt: skip
 """German and English alike."""
 NO_TEXTS = re.compile(
