@@ -28,6 +28,7 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightd train-colour": ("none", "--colour", "pink", "--out", "p.npz"),
     "flightd sim": ("--config", "none.toml"),
     "flightd calibrate": ("none.jpg",),
+    "flightd plan": ("--config", "none.toml"),
     "flightd run": ("--config", "none.toml"),
     "flightd ground": ("--listen", "0.0.0.0"),
     "flightd ground people add": ("ann", "--role", "captain"),
