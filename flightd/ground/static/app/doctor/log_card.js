@@ -1,6 +1,6 @@
 // The daemon's newest log lines and events, newest first.
 import { html } from "../html.js";
-import { dateFormat, say } from "../language.js";
+import { dateFormat, quoted, say } from "../language.js";
 
 const LINE = /^(\S+)T(\S+)Z (\w+) (.*)$/s;
 const CLOCK = dateFormat({ hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" });
@@ -25,7 +25,7 @@ function Line({ line }) {
   return html`
     <li class=${level}>
       ${when && html`<time datetime=${when.toISOString()}>${CLOCK.format(when)}</time>`}
-      ${level !== "info" && html`<b>${level}</b>`} <span lang="en">${text}</span>
+      ${level !== "info" && html`<b>${quoted(level)}</b>`} <span lang="en">${text}</span>
     </li>
   `;
 }

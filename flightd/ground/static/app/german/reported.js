@@ -181,6 +181,9 @@ export default {
   "report": "meldet",
   "limit": "begrenzt",
   "continue": "weiter",
+  // the log
+  "warning": "Warnung",
+  "error": "Fehler",
   // the station
   "CSV, {separator}, {encoding}": "CSV, {separator}, {encoding}",
   "comma": "Komma",

@@ -176,7 +176,7 @@ export default {
   "my hall": "meine Halle",
   "New site": "Neue Halle",
   "Equal aisles, joined at both ends, with the pad at A1. Everything can be changed on the drawing afterwards.": "Gleiche Gänge, an beiden Enden verbunden, mit dem Landeplatz bei A1. Alles lässt sich danach in der Zeichnung ändern.",
-  "Racks along every aisle with shelves": "Regale an jedem Gang mit Regalen",
+  "Racks along every aisle with shelves": "Regale an jedem Gang mit Regalfronten",
   "Drawing …": "Wird gezeichnet …",
   "Draw it": "Zeichnen",
   "Cancel": "Abbrechen",

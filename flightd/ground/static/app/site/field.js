@@ -1,6 +1,6 @@
 // One input of an element's form: what is typed is taken when it is left or Enter is pressed.
 import { html, useState } from "../html.js";
-import { english, say } from "../language.js";
+import { english, plain, say } from "../language.js";
 import { nodesOf, rounded, rowsOf } from "./draft.js";
 import { PaintInput } from "./paint_field.js";
 import { site } from "./site_state.js";
@@ -37,7 +37,7 @@ function Typed({ field, shown, onText, at = null }) {
 
 const asNumber = (text) => (/^[-+]?(\d+([.,]\d*)?|[.,]\d+)$/.test(text) ? Number(text.replace(",", ".")) : NaN);
 const NO_NUMBER = english("A number, as in 1.5");
-const told = (value) => (value === undefined || value === null ? "" : String(value));
+const told = (value) => (typeof value === "number" ? plain(value) : String(value ?? ""));
 
 function NumberInput({ field, values, set }) {
   const onText = (text) => {
@@ -58,7 +58,7 @@ function NumbersInput({ field, values, set }) {
     const parts = text.split(/[;\s]+|,\s+|,(?=\d*\.)/).filter(Boolean).map((part) => asNumber(part.replace(/,$/, "")));
     return parts.some(Number.isNaN) || !parts.length ? english("Numbers with blanks between, as in 1.5 1.8") : set(parts);
   };
-  return html`<${Typed} field=${{ ...field, kind: "text" }} shown=${Array.isArray(now) ? now.join(" ") : told(now)} onText=${onText} />`;
+  return html`<${Typed} field=${{ ...field, kind: "text" }} shown=${Array.isArray(now) ? now.map(told).join(" ") : told(now)} onText=${onText} />`;
 }
 
 // One of two numbers in a list.

@@ -99,7 +99,7 @@ function Change({ drone, told, settings, take }) {
   const [changes, setChanges] = useState({});
   const known = !mayChange() && !settings.locked ? { ...settings, locked: english("an admin changes settings") } : settings;
   const complaint = useComplaint(drone, known, changes);
-  if (told.refused) return html`<p class="quiet exposure-change">${sayWith("Nothing to set here: {reason}.", { reason: quoted(told.refused) })}</p>`;
+  if (told.refused) return html`<div class="exposure-change"><p class="quiet">${sayWith("Nothing to set here: {reason}.", { reason: quoted(told.refused) })}</p></div>`;
   const keys = known.keys.filter((key) => key.section === told.section && KEYS.includes(key.key));
   const change = (name, value) =>
     setChanges(({ [name]: _, ...others }) => (value === undefined ? others : { ...others, [name]: value }));
