@@ -5,6 +5,7 @@ import { html } from "./html.js";
 import { LANGUAGES, keep, language, say, speak } from "./language.js";
 import { hears } from "./hearing.js";
 import { PAGES } from "./pages.js";
+import { retitle } from "./router.js";
 import { shown, state, update } from "./store.js";
 
 export function Head() {
