@@ -22,7 +22,7 @@ export function SettingField({ about, table, change, complaint, locked, onChange
   };
   return html`
     <div class=${`setting ${isChanged ? "changed" : ""} ${complaint ? "wrong" : ""}`}>
-      <label for=${id}>${about.key}${about.unit && html` <span class="quiet">${about.unit}</span>`}</label>
+      <label for=${id}>${about.key}${about.unit && html` <span class="quiet">${quoted(about.unit)}</span>`}</label>
       ${about.fixed ? html`<output id=${id}>${text || bare(about.default) || say("not given")}</output>` : html`<${Field} about=${about} given=${given} />`}
       <p id=${`${id}-text`} class="quiet">
         ${quoted(about.text, capital)}. ${about.range && !isChoice(about) && [quoted(about.range, capital), ". "]}${about.fixed
