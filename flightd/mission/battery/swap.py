@@ -81,8 +81,7 @@ class BatterySwap:
             return self._go_charge(s.now_ns, low, in_need=True)
         goal = self._route.goal
         left_m = s.distance_m((goal.x_m, goal.y_m)) if state.phase is Phase.FOLLOW else 0.0
-        speed_mps = math.inf if goal.sweep is None else goal.sweep.speed_mps
-        if math.isfinite(left_m) and (reason := self._sorties.must_return(goal.node, left_m, speed_mps)):
+        if math.isfinite(left_m) and (reason := self._sorties.must_return(goal.node, left_m, goal.speed_mps)):
             return self._go_charge(s.now_ns, reason, in_need=False)
         return None
 
@@ -93,8 +92,7 @@ class BatterySwap:
         end = route.next_end
         if end is None:
             return None
-        speed_mps = math.inf if end.sweep is None else end.sweep.speed_mps
-        why = self._sorties.must_not_go_on(route.goal.node, end.node, speed_mps, stops=end.visit)
+        why = self._sorties.must_not_go_on(route.goal.node, end.node, end.speed_mps, stops=end.visit)
         if why is None:
             return None
         route.leave(route.onward)

@@ -13,9 +13,11 @@ from flightd.mission.flight.touchdown import AIM_S
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.machine import State
 from flightd.mission.plan.itinerary import Itinerary
+from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.safety.found_flying import FoundFlyingCheck
 from flightd.mission.scan.no_scan import AnyScanner
 from flightd.mission.scan.shelf_scan import ShelfScan
+from flightd.mission.scan.views import View
 from flightd.mission.triggers import Trigger
 
 _READING_S = 0.8
@@ -134,17 +136,11 @@ class PhaseProgress:
         near = self._motion.distance_m(place_m) < self._params.arrive_m
         return near and self._motion.speed_mps < self._params.expert.arrive_mps
 
-    def _to_view_s(self, s: MissionInputs) -> float:
-        """How long it may take to reach the view."""
-        p, view = self._params, self._scanner.view
-        rise_m = abs(view.height_m - s.height_m) if view is not None else 0.0
-        return math.pi / p.turn_rate_radps + (0.0 if math.isnan(rise_m) else rise_m / p.climb_mps)
-
-    def _to_height_s(self, s: MissionInputs) -> float:
-        """How long it may take to reach the height of a leg past a shelf."""
-        sweep = self._itinerary.goal.sweep
-        rise_m = abs(sweep.height_m - s.height_m) if sweep is not None else 0.0
-        return 0.0 if math.isnan(rise_m) else rise_m / self._params.climb_mps
+    def _turn_s(self, s: MissionInputs, to: View | SweepLeg | None) -> float:
+        """How long it may take to turn, and to reach the height of a view or of a leg past a shelf."""
+        rise_m = 0.0 if to is None else abs(to.height_m - s.height_m)
+        climb_s = 0.0 if math.isnan(rise_m) else rise_m / self._params.climb_mps
+        return math.pi / self._params.turn_rate_radps + climb_s
 
     def _settled(self, s: MissionInputs, condition: bool, for_s: float | None = None) -> bool:
         """True once `condition` has held for the settling time, or for another one."""
@@ -171,16 +167,15 @@ class PhaseProgress:
             case Phase.HOLD:
                 return self._battery.hover_s
             case Phase.TURN:
-                way_s = math.pi / p.turn_rate_radps + self._to_height_s(s)
+                way_s = self._turn_s(s, goal.sweep)
             case Phase.CLIMB:
-                way_s = self._to_view_s(s)
+                way_s = self._turn_s(s, self._scanner.view)
             case Phase.LAND:
                 height_m = p.height_m if math.isnan(s.height_m) else s.height_m
                 way_s = height_m / min(p.land_mps, p.expert.touch_mps, p.expert.touch_blind_mps) + AIM_S
             case Phase.FOLLOW:
                 here_m = s.distance_m((goal.x_m, goal.y_m))
-                speed_mps = p.speed_mps if goal.sweep is None else min(goal.sweep.speed_mps, p.speed_mps)
-                way_s = (0.0 if math.isinf(here_m) else here_m) / speed_mps
+                way_s = (0.0 if math.isinf(here_m) else here_m) / min(goal.speed_mps, p.speed_mps)
             case _:
                 way_s = 0.0
         return p.expert.phase_slack_s + p.expert.phase_share * way_s

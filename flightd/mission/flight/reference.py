@@ -226,7 +226,7 @@ class ReferenceGenerator:
         if task.view is not None:
             x, y, yaw = task.view.x_m, task.view.y_m, task.view.yaw_rad
         if math.hypot(self._x.position - pose.x_m, self._y.position - pose.y_m) < p.expert.max_lead_m:
-            speed_mps = _speed_mps(task)
+            speed_mps = task.goal.speed_mps if phase is Phase.FOLLOW else math.inf
             self._x.step(x, s.dt_s, speed_mps)
             self._y.step(y, s.dt_s, speed_mps)
         else:  # wait for the vehicle at rest: a speed kept here would be fed forward and hold it off
@@ -262,12 +262,6 @@ class ReferenceGenerator:
             yaw_rate_radps=self._yaw.velocity,
             climb_mps=climb_mps,
         )
-
-
-def _speed_mps(task: ReferenceTask) -> float:
-    """How fast the way may be flown, where it is past a shelf."""
-    sweep = task.goal.sweep
-    return math.inf if sweep is None or task.phase is not Phase.FOLLOW else sweep.speed_mps
 
 
 def _target(s: MissionInputs, task: ReferenceTask) -> tuple[float, float] | None:

@@ -50,6 +50,11 @@ class Stop:
     visit: bool
     sweep: SweepLeg | None = None
 
+    @property
+    def speed_mps(self) -> float:
+        """What is flown past on the way to it bears no more; infinite where nothing is."""
+        return math.inf if self.sweep is None else self.sweep.speed_mps
+
 
 @dataclass(frozen=True, slots=True)
 class FlightPlan:

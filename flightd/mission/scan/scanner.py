@@ -55,6 +55,8 @@ class Scanner:
             self._sweeps = SweepPlanner(site, self._planner, self._assigner, optics)
         self._sweep: SweepTask | None = None
         self._swept: set[str] = set()
+        self._shared_of: tuple[str, frozenset[str], Pace] | None = None
+        self._shared_s: dict[str, float] = {}
         self._owners: dict[str, str] = {}
         self._node_of = {location.code: location.node for location in site.locations.values()}
         self._aisle_of = {node.id: node.aisle for node in site.nodes.values()}
@@ -96,8 +98,8 @@ class Scanner:
     @property
     def exposure(self) -> float:
         """What the front camera's pictures are wanted with, as a part of its usual exposure."""
-        if self._sweep is not None and self._sweep.looking:
-            return self._sweep.exposure
+        if self._passing is not None:
+            return self._passing.exposure
         return self.view.exposure if self.view is not None else 1.0
 
     @property
@@ -182,24 +184,25 @@ class Scanner:
 
     def doubt(self) -> None:
         """The place may be another one: assign nothing, and keep what is pending, until `trust`."""
-        self.leave()
-        if self._sweep is not None:
-            self._sweep.forget()
-            self._gather_sweep()
+        self._break_off()
         self.doubted = True
 
     def withdraw(self, now_ns: int, reason: str) -> None:
         """The place was or may have been another one: what is pending counts no more."""
-        self.leave()
-        if self._sweep is not None:
-            self._sweep.forget()
-            self._gather_sweep()
+        self._break_off()
         codes = self._pending.withdraw()
         self._done.difference_update(codes)
         self._owners = {text: code for text, code in self._owners.items() if code not in codes}
         if codes or (self._labels.contradict and not self.doubted):
             text = f"{reason}; {len(codes)} findings withdrawn"
             self._events.append(Event(now_ns, EventLevel.WARNING, "map_contradiction", text))
+
+    def _break_off(self) -> None:
+        """The place is no more what was assumed: what is not decided yet counts for nothing."""
+        self.leave()
+        if self._sweep is not None:
+            self._sweep.forget()
+            self._gather_sweep()
 
     def trust(self) -> None:
         """The place is known again; labels that still contradict it hang wrong."""
@@ -278,16 +281,22 @@ class Scanner:
     # What pictures bring
 
     @property
+    def _passing(self) -> SweepTask | None:
+        """The count in passing, while pictures are wanted for it."""
+        return self._sweep if self._sweep is not None and self._sweep.looking else None
+
+    @property
     def looking(self) -> bool:
         """Whether the front camera's pictures are wanted now."""
-        if self._sweep is not None and self._sweep.looking:
+        if self._passing is not None:
             return True
         return self._task is not None and bool(self._task.looking)
 
     def places(self, pose: BodyPose) -> tuple[Place, ...]:
         """The places wanted in a picture taken at `pose`; none for one that would not count."""
-        if self._sweep is not None and self._sweep.looking:
-            return self._assigner.places(pose, self._sweep.near(pose)) if pose.certain else ()
+        passing = self._passing
+        if passing is not None:
+            return self._assigner.places(pose, passing.near(pose)) if pose.certain else ()
         task = self._task
         if task is None or task.since_ns is None or pose.stamp_ns < task.since_ns or not pose.certain:
             return ()
@@ -297,14 +306,15 @@ class Scanner:
         """One picture and the pose at its exposure."""
         if self.doubted:
             return
-        if self._sweep is not None and self._sweep.looking:
-            leg = self._sweep.leg_at(pose)
+        passing = self._passing
+        if passing is not None:
+            leg = passing.leg_at(pose)
             if leg is None:
                 return
             look = self._assigner.look(codes, pose, (leg.aisle, leg.side))
             agreeing = self._proven(look, f"aisle {leg.aisle}")
             if agreeing is not None:
-                self._sweep.take(look)
+                passing.take(look)
                 for node in dict.fromkeys(self._node_of[code] for code in agreeing):
                     self._pending.confirm_at(node)
             return
@@ -410,11 +420,13 @@ class Scanner:
         left = {code for other in nodes for code in self._left(other)} - self._swept
         if levels:
             left = {code for code in left if self._levels[code] in levels}
-        if not any(self._node_of[code] == node for code in left):
-            return 0.0
-        legs = self._sweeps.legs(nodes, frozenset(left), nodes[0], 0.0, pace.height_m)
-        counted = {self._node_of[code] for leg in legs for code in leg.locations}
-        return self._sweeps.seconds(legs, pace, 0.0) / len(counted) if node in counted else 0.0
+        of_aisle = aisle, frozenset(left), pace
+        if of_aisle != self._shared_of:  # asked of one node of an aisle after the other
+            legs = self._sweeps.legs(nodes, frozenset(left), nodes[0], 0.0, pace.height_m)
+            counted = {self._node_of[code] for leg in legs for code in leg.locations}
+            share_s = self._sweeps.seconds(legs, pace, 0.0) / max(len(counted), 1)
+            self._shared_of, self._shared_s = of_aisle, dict.fromkeys(counted, share_s)
+        return self._shared_s.get(node, 0.0)
 
 
 def nodes_to_count(site: Site, nodes: Iterable[str], counted: Collection[str]) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from flightd.mission.plan.leg_times import Pace, profile_s
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.code_assignment import Assigner
 from flightd.mission.scan.sweep_speed import LIMIT_WORDS, Shelf, SweepOptics, SweepSpeed, sweep_speed
-from flightd.mission.scan.views import View, ViewPlanner
+from flightd.mission.scan.views import View, ViewPlanner, up_and_down
 from flightd.site.site import Location, Side, Site
 from flightd.site.ways import NoWayError
 
@@ -194,14 +194,7 @@ def _ordered(lanes: Sequence[Lane], yaw_rad: float, height_m: float) -> list[Lan
     sides = sorted(
         {lane.side: lane.yaw_rad for lane in lanes}.items(), key=lambda item: abs(wrap_pi(item[1] - yaw_rad))
     )
-    ordered: list[Lane] = []
-    for side, _ in sides:
-        column = [lane for lane in lanes if lane.side is side]
-        if abs(column[-1].height_m - height_m) < abs(column[0].height_m - height_m):
-            column.reverse()
-        ordered += column
-        height_m = column[-1].height_m
-    return ordered
+    return up_and_down(([lane for lane in lanes if lane.side is side] for side, _ in sides), height_m)
 
 
 def _leg(lane: Lane, nodes: tuple[str, ...]) -> SweepLeg:

@@ -57,11 +57,6 @@ class SweepVotes:
         self.newest_ns = 0
         """When it was in a picture last; 0 before the first."""
 
-    @property
-    def texts(self) -> frozenset[str]:
-        """Every text that was believed in a picture to be here."""
-        return frozenset(self._texts)
-
     def add(
         self,
         frame_seq: int,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -33,6 +34,27 @@ class View:
     locations: tuple[str, ...]
     retake: int = 0
     exposure: float = 1.0
+
+
+class AtHeight(Protocol):
+    """What is looked at from a height above the floor, m."""
+
+    @property
+    def height_m(self) -> float: ...
+
+
+_T = TypeVar("_T", bound=AtHeight)
+
+
+def up_and_down(columns: Iterable[list[_T]], height_m: float) -> list[_T]:
+    """One column after the other from `height_m` on, each from that end which is nearer in height."""
+    ordered: list[_T] = []
+    for column in columns:
+        if column and abs(column[-1].height_m - height_m) < abs(column[0].height_m - height_m):
+            column.reverse()
+        ordered += column
+        height_m = column[-1].height_m if column else height_m
+    return ordered
 
 
 class ViewPlanner:
@@ -69,14 +91,8 @@ class ViewPlanner:
         sides = sorted(
             {location.side for location in here}, key=lambda side: abs(wrap_pi(self._yaw(side) - yaw_rad))
         )
-        ordered: list[View] = []
-        for side in sides:
-            column = self.column(node, [location for location in here if location.side is side])
-            if column and abs(column[-1].height_m - height_m) < abs(column[0].height_m - height_m):
-                column.reverse()
-            ordered += column
-            height_m = column[-1].height_m if column else height_m
-        return ordered
+        columns = (self.column(node, [one for one in here if one.side is side]) for side in sides)
+        return up_and_down(columns, height_m)
 
     def relit(self, view: View, left: Mapping[str, Light]) -> View | None:
         """The same place with another exposure, if something of what is `left` comes out so dark or so light
