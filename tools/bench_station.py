@@ -24,10 +24,11 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from statistics import linear_regression
 from typing import Any, TextIO
 
 from flightd.core.errors import FlightdError
@@ -203,6 +204,7 @@ def measured_memory(options: Options, seconds: float) -> dict[str, Any]:
                 time.sleep(SAMPLE_S)
         seen = _last_told(crowd)
     half = [row for row in rows if row[0] > rows[-1][0] / 2]
+    slope = linear_regression(*zip(*half, strict=True)).slope if len(half) > 1 else 0.0
     memory = {
         "minutes": round(rows[-1][0] / 60, 1),
         "mb": {
@@ -211,7 +213,7 @@ def measured_memory(options: Options, seconds: float) -> dict[str, Any]:
             "last": rows[-1][1],
             "most": max(mb for _, mb in rows),
         },
-        "slope_mb_per_h": round(_slope(half) * 3600, 2),
+        "slope_mb_per_h": round(slope * 3600, 2),
         "every_minute_mb": [round(mb, 1) for _, mb in rows[:: round(60 / SAMPLE_S)]],
         "pages": seen,
     }
@@ -263,14 +265,6 @@ def _steps_ms(log: FlightLog, since_s: float, until_s: float) -> list[float]:
     ]
     steps = [after - before for before, after in pairwise(stamps)]
     return [step for step in steps if step < MOST_STEP_MS]
-
-
-def _slope(rows: Sequence[tuple[float, float]]) -> float:
-    """Of the straight line that fits best."""
-    mean_x = sum(x for x, _ in rows) / len(rows)
-    mean_y = sum(y for _, y in rows) / len(rows)
-    spread = sum((x - mean_x) ** 2 for x, _ in rows)
-    return sum((x - mean_x) * (y - mean_y) for x, y in rows) / spread if spread else 0.0
 
 
 def _until_airborne(crowd: CrowdProcess, station: Station) -> None:

@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -100,14 +101,17 @@ def measure(folder: Path, nodes: list[str]) -> Use:
 
 def daemon_of(root: int) -> list[int]:
     """The process and all that descends from it, without the world's."""
+    return family_of(root, lambda pid: "spawn_main" not in _command(pid))
+
+
+def family_of(root: int, belongs: Callable[[int], bool] = lambda _pid: True) -> list[int]:
+    """The process and its descendants, as far as they and those between belong."""
     parents = {
         int(path.name): _parent(int(path.name)) for path in Path("/proc").iterdir() if path.name.isdigit()
     }
     found, young = [root], [root]
     while young:
-        young = [
-            pid for pid, parent in parents.items() if parent in young and "spawn_main" not in _command(pid)
-        ]
+        young = [pid for pid, parent in parents.items() if parent in young and belongs(pid)]
         found += young
     return found
 

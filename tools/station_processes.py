@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 from flightd.core.topics import Topic
 from flightd.replay.log import FlightLog, read_log
+from tools.measure_daemon import family_of
 
 ROOT = Path(__file__).parents[1]
 _T = TypeVar("_T")
@@ -43,16 +44,7 @@ class Started:
     @property
     def pids(self) -> list[int]:
         """Its own, and those of all that descend from it."""
-        parents = {}
-        for path in Path("/proc").iterdir():
-            with contextlib.suppress(OSError):
-                if path.name.isdigit():
-                    stat = (path / "stat").read_text().rpartition(")")[2].split()
-                    parents[int(path.name)] = int(stat[1])
-        found = young = [self.process.pid]
-        while young := [pid for pid, parent in parents.items() if parent in young]:
-            found = [*found, *young]
-        return found
+        return family_of(self.process.pid)
 
     def pin(self, core: int, pids: Sequence[int] | None = None) -> None:
         for pid in self.pids if pids is None else pids:

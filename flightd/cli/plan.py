@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from flightd.cli.options import AsJson, ConfigFile
-
-if TYPE_CHECKING:
-    from flightd.core.planned_flight import PlannedFlight
+from flightd.cli.planned_flight import planned_in_words
 
 
 def register(app: typer.Typer) -> None:
@@ -46,14 +44,4 @@ def plan(
     settings = load_config(config)
     mission = pilot_of(settings, load_site(settings.mission.site)).mission
     planned = mission.planned(nodes or (), level or (), best_order=best)
-    print(json.dumps(asdict(planned)) if as_json else "\n".join(_lines(planned)))
-
-
-def _lines(planned: PlannedFlight) -> list[str]:
-    batteries = "1 battery" if planned.batteries == 1 else f"{planned.batteries} batteries"
-    counted = f", {planned.places} places counted" if planned.places else ""
-    figures = (
-        f"{len(planned.nodes)} nodes, {planned.way_m:.0f} m{counted}, about {planned.seconds / 60:.1f} min in"
-        f" the air, {batteries}"
-    )
-    return [" ".join(planned.nodes), figures, *(f"in passing, {each.text}" for each in planned.sweeps)]
+    print(json.dumps(asdict(planned)) if as_json else "\n".join(planned_in_words(planned)))

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
+from tests.rigs.free_ports import free_ports
 from tests.web.chromium import NARROW, ROOT, WIDE, hindrances, opened, running, station
 
 if TYPE_CHECKING:
@@ -48,8 +49,7 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     if any(folder.iterdir()):
         raise SystemExit(f"{folder}: not empty; give a new folder")
-    ports = _free_ports()
-    status, command = ports
+    status, command = ports = free_ports(2, socket.SOCK_STREAM)
     with (
         station([f"north=127.0.0.1:{status}/{command}"], folder=folder) as url,
         running() as browser,
@@ -66,13 +66,6 @@ def main() -> None:
         raise SystemExit(1)
 
 
-def _free_ports() -> tuple[int, int]:
-    with socket.socket() as first, socket.socket() as second:
-        first.bind(("127.0.0.1", 0))
-        second.bind(("127.0.0.1", 0))
-        return first.getsockname()[1], second.getsockname()[1]
-
-
 @dataclass
 class Day:
     """The page, where its station is, the folder of both, and the ports of the drone's link."""
@@ -80,7 +73,7 @@ class Day:
     page: Page
     url: str
     folder: Path
-    ports: tuple[int, int]
+    ports: list[int]
     findings: list[str] = field(default_factory=list)
 
     def button(self, name: str | re.Pattern[str], exact: bool = False) -> Locator:

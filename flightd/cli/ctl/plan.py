@@ -10,6 +10,7 @@ import typer
 
 from flightd.cli.ctl.connection import DaemonConnection
 from flightd.cli.options import AsJson
+from flightd.cli.planned_flight import planned_in_words
 from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -70,14 +71,8 @@ def plan(
 
 
 def _planned(plan: Planned) -> list[str]:
-    batteries = "1 battery" if plan.batteries == 1 else f"{plan.batteries} batteries"
-    counted = f", {plan.places} places counted" if plan.places else ""
-    figures = (
-        f"{len(plan.nodes)} nodes, {plan.way_m:.0f} m{counted}, about {plan.seconds / 60:.1f} min in the air"
-    )
     taken = "only asked for" if plan.dry else "taken; start it with: flightctl start"
-    sweeps = [f"in passing, {each.text}" for each in plan.sweeps]
-    return [" ".join(plan.nodes), f"{figures}, {batteries}", *sweeps, taken]
+    return [*planned_in_words(plan), taken]
 
 
 def _standing(plan: PlanAnswer) -> list[str]:

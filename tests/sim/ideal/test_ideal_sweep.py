@@ -8,21 +8,22 @@ from flightd.config.sweep import ScanMode
 from flightd.core.inventory import LocationState
 from flightd.core.types import Phase
 from tests.sim.ideal.ideal_flight import IdealFlight
-from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
-from tests.sim.ideal.test_ideal_scan import CONFIG, findings
+from tests.sim.ideal.ideal_front import IdealFront
+from tests.sim.ideal.test_ideal_scan import (
+    CONFIG,
+    COVERED,
+    EMPTY,
+    NODES,
+    PLACES,
+    READ,
+    STOCK,
+    TORN,
+    TWO,
+    findings,
+)
 from tests.unit.mission.shelves import SIGHT, SITE
 
-NODES = ("A2", "A3")
 SWEEP = CONFIG.with_values(scan={"mode": ScanMode.SWEEP})
-PLACES = [place.code for place in SITE.locations.values() if place.node in NODES]
-EMPTY, TORN, COVERED, TWO, *READ = PLACES
-LABELS = {code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in [*READ, TORN]}
-STOCK = Stock(
-    LABELS | {TWO: [Label("FRONT", -0.1), Label("SECOND", 0.1)]},
-    frozenset({EMPTY}),
-    frozenset({TORN}),
-    frozenset({COVERED}),
-)
 
 
 def test_shelves_are_counted_in_passing_at_the_height_of_each_level_and_nose_to_them() -> None:
