@@ -140,6 +140,13 @@ def middle(page: Page, selector: str) -> tuple[float, float]:
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
+def take_up(page: Page, element: str) -> None:
+    """To draw such an element; what is said of it then moves the drawing."""
+    tool = page.get_by_role("button", name=f"Draw a new {element}")
+    tool.click()
+    expect(tool).to_have_attribute("aria-pressed", "true")
+
+
 def drag(page: Page, a: tuple[float, float], b: tuple[float, float]) -> None:
     page.mouse.move(*a)
     page.mouse.down()
@@ -163,14 +170,14 @@ def test_the_mouse_moves_and_draws_and_each_stroke_is_one_step_back(
         expect(page.get_by_role("heading", name="Aisle B")).to_be_visible()
         expect(page.get_by_label("Pitch from the aisle before")).to_have_value("3.9")
         expect(page.get_by_text(SOUND)).to_be_visible()
-        page.get_by_role("button", name="Draw a new keep-out").click()
+        take_up(page, "keep-out")
         a4 = middle(page, "[data-id=A4] .mark")
         drag(page, (a4[0] + 0.55 * metre, a4[1] + 0.6 * metre), (a4[0] + 0.9 * metre, a4[1] + 1.4 * metre))
         expect(page.get_by_role("heading", name="Keep-out 1")).to_be_visible()
-        page.get_by_role("button", name="Draw a new pad").click()
+        take_up(page, "pad")
         page.mouse.click(*middle(page, "[data-id=B1] .mark"))
         expect(page.get_by_label("On node")).to_have_value("B1")
-        page.get_by_role("button", name="Draw a new blocked line").click()
+        take_up(page, "blocked line")
         page.mouse.click(*middle(page, "[data-id=A2] .mark"))
         page.mouse.click(*middle(page, "[data-id=A3] .mark"))
         expect(entry(page, "Blocked A2 to A3")).to_have_attribute("aria-pressed", "true")
