@@ -30,4 +30,10 @@ function single(type, text) {
   return type.includes("number") && text !== "" && Number.isFinite(value) ? value : text;
 }
 
+// The changes to send, and this one with them; `undefined` takes it back.
+export function withChange(changes, name, value) {
+  const { [name]: _, ...others } = changes;
+  return value === undefined ? others : { ...others, [name]: value };
+}
+
 export const isSame = (a, b) => JSON.stringify(a ?? null) === JSON.stringify(b ?? null);

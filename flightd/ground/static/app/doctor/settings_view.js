@@ -8,13 +8,16 @@ import { askDrone, sendDrone } from "./asking.js";
 import { ChangesBar } from "./changes_bar.js";
 import { HistoryCard } from "./history_card.js";
 import { SettingField } from "./setting_field.js";
-import { nameOf, topSections } from "./settings_keys.js";
+import { nameOf, topSections, withChange } from "./settings_keys.js";
 
 const TYPED_MS = 250;
 
+// Settings as whoever reads them may change them.
+export const forReader = (settings) => (mayChange() || settings.locked ? settings : { ...settings, locked: english("an admin changes settings") });
+
 export function SettingsView({ drone, section }) {
   const [known, setTold] = useState(null);
-  const told = known && !mayChange() && !known.locked ? { ...known, locked: english("an admin changes settings") } : known;
+  const told = known && forReader(known);
   const [trouble, setTrouble] = useState("");
   const [changes, setChanges] = useState({});
   const complaint = useComplaint(drone, told, changes);
@@ -30,11 +33,7 @@ export function SettingsView({ drone, section }) {
   useEffect(() => {
     load();
   }, [session]);
-  const change = (name, value) =>
-    setChanges((before) => {
-      const { [name]: _, ...others } = before;
-      return value === undefined ? others : { ...others, [name]: value };
-    });
+  const change = (name, value) => setChanges((before) => withChange(before, name, value));
   const take = (settings) => {
     setTold(settings);
     setChanges({});

@@ -84,7 +84,7 @@ function Compare({ chosen, rows }) {
   if (there.length < 2) {
     return html`<p class="quiet compare-hint">${there.length ? say("Choose one more to compare") : say("Choose two to compare")}</p>`;
   }
-  return html`<a class="order link" href=${`/flights/compare?a=${there[0]}&b=${there[1]}`}>${say("Compare both")}</a>`;
+  return html`<a class="order" href=${`/flights/compare?a=${there[0]}&b=${there[1]}`}>${say("Compare both")}</a>`;
 }
 
 function Table({ rows, selection, choose, chosen }) {

@@ -66,7 +66,7 @@ function ReplayHead({ id, flight, row }) {
       </div>
       <div class="ways">
         ${row?.running && html`<button class="order" onClick=${() => forgetFlight(id)}>${say("Read again")}</button>`}
-        <a class="order link" href=${`/api/flights/${id}/report`} target="_blank" rel="noopener">${say("Report")}</a>
+        <a class="order" href=${`/api/flights/${id}/report`} target="_blank" rel="noopener">${say("Report")}</a>
       </div>
       ${row && html`<${Figures} row=${row} flight=${flight} />`}
     </header>

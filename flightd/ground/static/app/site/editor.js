@@ -62,7 +62,7 @@ function Head() {
         <${Menu} words=${say("Export")} options=${EXPORTS} onChoice=${download} />
         ${site().versions.length > 0 && html`<${Menu} words=${say("Old versions")} options=${site().versions.map((at) => [at, whenOf(at)])} onChoice=${showVersion} />`}
         ${stamp && html`<button type="button" class="order" onClick=${() => openFile(name)}>${say("Open anew")}</button>`}
-        <a class="order as-link" href="/site">${say("All sites")}</a>
+        <a class="order" href="/site">${say("All sites")}</a>
       </div>
     </form>
   `;

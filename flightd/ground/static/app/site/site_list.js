@@ -17,7 +17,7 @@ export function SiteList() {
       <h2>${say("Sites")}</h2>
       ${trouble && html`<p class="site-trouble" role="alert">${quoted(trouble)}</p>`}
       ${draft && isChanged() && html`<section class="card"><p>${sayWith("{name} has changes that are not saved. Opening another one loses them.", { name: html`<b>${name || say("A new site")}</b>` })}</p>
-        <p><a class="order as-link" href=${editPath(name)}>${say("Go on with it")}</a></p></section>`}
+        <p><a class="order" href=${editPath(name)}>${say("Go on with it")}</a></p></section>`}
       <section class="card" aria-labelledby="sites">
         <h3 id="sites">${list.folder ? say("In the folder {folder}", { folder: list.folder }) : say("Site files")}</h3>
         ${list.sites.length === 0 && html`<p class="quiet">${list.folder ? say("No site file lies under the station's folder yet. Begin with a new one.") : sayWith("The station was told no folder to keep sites in: {command}. You can draw one, and keep it by Export.", { command: html`<code>flightd ground --folder sites</code>` })}</p>`}
@@ -28,7 +28,7 @@ export function SiteList() {
       </section>
       <section class="card begin-site" aria-labelledby="begin">
         <h3 id="begin">${say("Begin one")}</h3>
-        <a class="order as-link" href="/site/new">${say("New site")}</a>
+        <a class="order" href="/site/new">${say("New site")}</a>
         <${Import} />
         <p class="quiet">${sayWith("Import takes a CSV or XLSX of nodes ({columns}), a VDMA LIF file (.json) or a site file (.toml).", { columns: html`<code>node, x_m, y_m, joined_to, pad</code>` })}</p>
       </section>

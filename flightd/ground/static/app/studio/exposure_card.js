@@ -3,9 +3,8 @@ import { askDrone } from "../doctor/asking.js";
 import { ChangesBar } from "../doctor/changes_bar.js";
 import { CheckRow, worstFirst } from "../doctor/checks_card.js";
 import { SettingField } from "../doctor/setting_field.js";
-import { nameOf } from "../doctor/settings_keys.js";
-import { useComplaint } from "../doctor/settings_view.js";
-import { mayChange } from "../access/session.js";
+import { nameOf, withChange } from "../doctor/settings_keys.js";
+import { forReader, useComplaint } from "../doctor/settings_view.js";
 import { html, useEffect, useState } from "../html.js";
 import { decimal, english, plain, quoted, say, sayWith } from "../language.js";
 import { shown, state } from "../store.js";
@@ -97,12 +96,11 @@ const mains = (hz, none) => (hz === null ? none : hz ? `${hz} Hz` : say("off"));
 
 function Change({ drone, told, settings, take }) {
   const [changes, setChanges] = useState({});
-  const known = !mayChange() && !settings.locked ? { ...settings, locked: english("an admin changes settings") } : settings;
+  const known = forReader(settings);
   const complaint = useComplaint(drone, known, changes);
   if (told.refused) return html`<div class="exposure-change"><p class="quiet">${sayWith("Nothing to set here: {reason}.", { reason: quoted(told.refused) })}</p></div>`;
   const keys = known.keys.filter((key) => key.section === told.section && KEYS.includes(key.key));
-  const change = (name, value) =>
-    setChanges(({ [name]: _, ...others }) => (value === undefined ? others : { ...others, [name]: value }));
+  const change = (name, value) => setChanges((before) => withChange(before, name, value));
   const sent = (now) => {
     setChanges({});
     take(now);

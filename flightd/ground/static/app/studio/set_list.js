@@ -16,7 +16,7 @@ export function SetList({ overview }) {
     <div class="studio-cards">
       <section class="card sets" aria-labelledby="sets"><h3 id="sets">${say("Picture sets")}</h3>
         ${overview.sets.length === 0 && html`<p class="quiet">${say("None yet. A set holds pictures of one floor and its paint; the profile has the set's name.")}</p>`}
-        <ul>${overview.sets.map((name) => html`<li key=${name}><a class="order link" href=${`/studio/${encodeURIComponent(name)}`}>${name}</a></li>`)}</ul>
+        <ul>${overview.sets.map((name) => html`<li key=${name}><a class="order" href=${`/studio/${encodeURIComponent(name)}`}>${name}</a></li>`)}</ul>
         ${mayOperate() ? html`<${NewSet} paints=${overview.paints} />` : html`<p class="quiet">${say("Only looking on: an operator makes sets.")}</p>`}
       </section>
       ${overview.profiles.map((profile) => html`<${Profile} key=${profile.name} profile=${profile} />`)}
