@@ -8,7 +8,6 @@ import { forReader, useComplaint } from "../doctor/settings_view.js";
 import { html, useEffect, useState } from "../html.js";
 import { decimal, english, plain, quoted, say, sayWith } from "../language.js";
 import { shown, state } from "../store.js";
-import { capital } from "../words.js";
 import { ExposurePicture } from "./exposure_picture.js";
 
 const CHECKS = { down: ["exposure", "brightness", "flicker", "blur"], front: ["front exposure"] };
@@ -54,7 +53,7 @@ function OfDrone({ drone }) {
         <button class="order" disabled=${looking} onClick=${look}>${looking ? say("Looking …") : say("Look again")}</button>
       </div>
     </div>
-    ${trouble && html`<p class="obstacles" role="alert">${quoted(trouble, capital)}</p>`}
+    ${trouble && html`<p class="obstacles" role="alert">${quoted(trouble)}</p>`}
     <div class="exposure-grid">
       <${ExposurePicture} drone=${drone} camera=${camera} />
       <div class="exposure-side">
