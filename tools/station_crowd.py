@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import shutil
 import socket
 import sys
 import time
@@ -24,6 +23,7 @@ from websockets.exceptions import WebSocketException
 from websockets.typing import Origin
 
 from tools.slow_line import SlowLine
+from tools.system_browser import system_browser
 
 if TYPE_CHECKING:
     from playwright.async_api import Browser, Page
@@ -326,9 +326,10 @@ class Crowd:
 
             if self._started is None:
                 self._started = await async_playwright().start()
-            path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
             flags = [*_FLAGS, *filter(None, [rule])]
-            self._browsers[rule] = await self._started.chromium.launch(executable_path=path, args=flags)
+            self._browsers[rule] = await self._started.chromium.launch(
+                executable_path=system_browser(), args=flags
+            )
         return self._browsers[rule]
 
     async def _close(self) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -14,6 +13,8 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import pytest
+
+from tools.system_browser import system_browser
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
@@ -32,7 +33,7 @@ _SERIOUS = {"serious", "critical"}
 
 def chromium_path() -> str:
     """Where the system's Chromium is; a test without it is skipped, but not where everything has to run."""
-    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    found = system_browser()
     if found is None:
         text = "no Chromium on this machine: apt install chromium"
         if os.environ.get("CI") == "true":
