@@ -102,7 +102,7 @@ HAZARDS: tuple[Hazard, ...] = (
         None,
         "the autopilot hears neither heartbeats nor setpoints of this computer",
         Action.LAND,
-        "level after 0.3 s (PX4: half a second), then, a second after its death, the autopilot lands"
+        "level after 0.3 s (PX4: half a second), then, within a second of its death, the autopilot lands"
         " by itself (ArduPilot: `FS_GCS_ENABLE`, `FS_GCS_TIMEOUT`, `SYSID_MYGCS`; PX4: `COM_OF_LOSS_T`,"
         " `COM_OBL_RC_ACT`); without these nothing is armed",
         "tests/protocol/mavlink/test_companion_dead.py",

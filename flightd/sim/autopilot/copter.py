@@ -8,6 +8,7 @@ and holds, it does not land; on the floor with nothing asked it disarms after DI
 from __future__ import annotations
 
 import enum
+import random
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -22,6 +23,8 @@ from flightd.sim.plant.airframe import Airframe, AirframeCommand
 _THRUST_IS_COLLECTIVE = 8
 _IDLE_COLLECTIVE = 0.05
 _LAND_DETECT_S = 1.0
+_WATCH_S = 1.0 / 3.0
+"""Failsafes of links are looked at in ArduCopter's loop of 3 Hz."""
 _GCS_LAND = 5
 """FS_GCS_ENABLE: land."""
 _FORCE = 21196
@@ -73,6 +76,8 @@ class ArduCopterPeer(AutopilotPeer):
         self._low_battery_told = False
         self._low_battery_s = 0.0
         self._client_silent_s: float | None = None
+        self._client_lost = False
+        self._watch_due_s = random.Random(config.seed).uniform(0.0, _WATCH_S)
 
     def reboot(self) -> None:
         super().reboot()
@@ -221,15 +226,23 @@ class ArduCopterPeer(AutopilotPeer):
             self._settled_s = 0.0
 
     def _watch_client(self, dt_s: float) -> None:
-        """The failsafe for the ground station: once the system it watches was heard and has fallen silent."""
+        """The failsafe for the ground station: once the system it watches was heard and has fallen silent, as
+        seen three times a second."""
         if self._client_silent_s is None:
             return
-        before_s, self._client_silent_s = self._client_silent_s, self._client_silent_s + dt_s
-        limit_s = self.parameters["FS_GCS_TIMEOUT"]
-        if self.armed and before_s <= limit_s < self._client_silent_s:
+        self._client_silent_s += dt_s
+        self._watch_due_s -= dt_s
+        if self._watch_due_s > 0.0:
+            return
+        self._watch_due_s += _WATCH_S
+        was_silent, self._client_lost = self._client_lost, self._is_client_lost()
+        if self.armed and self._client_lost and not was_silent:
             self.say(dialect.MAV_SEVERITY_WARNING, "GCS Failsafe")
             if self.parameters["FS_GCS_ENABLE"] == _GCS_LAND:
                 self._set_mode(CopterMode.LAND)
+
+    def _is_client_lost(self) -> bool:
+        return self._client_silent_s is not None and self._client_silent_s > self.parameters["FS_GCS_TIMEOUT"]
 
     def _watch_battery(self, dt_s: float) -> None:
         """The failsafe for a voltage that stays low for so long."""

@@ -31,7 +31,7 @@ COPTER_PARAMETERS: dict[str, float] = {
     "DISARM_DELAY": 10,
     "FS_THR_ENABLE": 3,
     "FS_GCS_ENABLE": 5,
-    "FS_GCS_TIMEOUT": 1,
+    "FS_GCS_TIMEOUT": 0.5,
     "FS_EKF_ACTION": 1,
     "FS_EKF_THRESH": 0.8,
     "RC_OPTIONS": 32,
@@ -42,7 +42,7 @@ COPTER_PARAMETERS: dict[str, float] = {
     "GUID_TIMEOUT": 0.3,
     "WPNAV_SPEED_UP": 250,
     "WPNAV_SPEED_DN": 150,
-    "LAND_SPEED": 80,
+    "LAND_SPEED": 100,
     "ANGLE_MAX": 3000,
     "MOT_THST_HOVER": 0.34,
 }

@@ -31,7 +31,7 @@ def known(vehicle: Any) -> VehicleState:
 WAY_DOWN: dict[str, float] = {
     "GUID_TIMEOUT": 0.5,
     "FS_GCS_ENABLE": 5,
-    "FS_GCS_TIMEOUT": 1,
+    "FS_GCS_TIMEOUT": 0.5,
     "SYSID_MYGCS": 191,
 }
 """Without these nothing is armed."""

@@ -60,7 +60,7 @@ async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp
         assert code == 1, "an aborted mission"
         assert "nobody took over after the restart" in (tmp_path / "stderr").read_text()
 
-        rig.set_parameters(GUID_TIMEOUT=0.5, FS_GCS_TIMEOUT=2.0)
+        rig.set_parameters(GUID_TIMEOUT=0.5, FS_GCS_TIMEOUT=1.0)
         third = await rig.start()
         waiting = await rig.until(lambda status: status.reason == _FIT or status.phase is not Phase.PREFLIGHT)
         assert waiting.phase is Phase.PREFLIGHT

@@ -133,10 +133,10 @@ _ARDUPILOT: tuple[Rule, ...] = (
     ),
     Rule(
         ("FS_GCS_TIMEOUT",),
-        _within(0.8, 2.0),
-        "0.8 to 2 s",
-        "so long it drifts, level, without anybody before it lands by itself",
-        1,
+        _within(0.4, 1.0),
+        "0.4 to 1 s",
+        "so long, and up to 0.33 s more, it drifts, level, without anybody before it lands by itself",
+        0.5,
     ),
     Rule(
         ("FS_THR_ENABLE",),
@@ -178,10 +178,10 @@ _ARDUPILOT: tuple[Rule, ...] = (
     Rule(("ARMING_SKIPCHK",), _one_of(0), "0 (none skipped)", "arming unchecked hides faults", 0),
     Rule(
         ("LAND_SPEED",),
-        _within(40, 100),
-        "40 to 100 cm/s",
-        "a landing of last resort is blind: it drifts for as long as it takes (80 cm/s is a drop of 3 cm)",
-        80,
+        _within(70, 100),
+        "70 to 100 cm/s",
+        "a landing of last resort is blind: it drifts for as long as it takes (1 m/s is a drop of 5 cm)",
+        100,
     ),
 )
 

@@ -14,7 +14,7 @@ from flightd.adapters.vehicle.mavlink.link.reconnection import Reconnection
 from flightd.adapters.vehicle.mavlink.link.transport import Source, Transport
 from flightd.ports import Clock
 
-_HEARTBEAT_S = 0.1
+_HEARTBEAT_S = 0.05
 _PARSERS_MAX = 16
 _NAMESAKE_NS = 5_000_000_000
 _LATE_MAX, _LATE_RUN_MAX = 64, 16
@@ -82,7 +82,7 @@ class MavlinkLink:
         await self._reconnection.run(self._beat)
 
     async def _beat(self) -> None:
-        """Our HEARTBEAT ten times a second while the connection stands: a failsafe of one second on the
+        """Our HEARTBEAT twenty times a second while the connection stands: a failsafe of half a second on the
         autopilot's side tolerates nine lost ones."""
         lost = self._reconnection.lost
         while not lost.is_set():
