@@ -77,6 +77,37 @@ def test_without_heights_nothing_takes_its_place() -> None:
     assert all(math.isnan(rate_mps) for rate_mps in sinking.believed(math.nan, 1.0, reads=False)[15:])
 
 
+@pytest.mark.parametrize("stuck_at_s", [0.0, 2.0], ids=["from the floor on", "in the climb"])
+def test_a_height_that_sticks_does_not_contradict_a_rate_that_the_loop_has_not_yet_brought_down(
+    stuck_at_s: float,
+) -> None:
+    """1.05 m/s instead of 0.8, as long as the hover thrust is held for more than it is."""
+    check, told_mps = ClimbCheck(), 1.05
+    for tick in range(1, 250):
+        sampled_ns = tick * TICK_NS // READING_NS * READING_NS
+        check.height(10**9 + sampled_ns, round(0.1 + told_mps * min(sampled_ns * 1e-9, stuck_at_s), 2))
+        assert check.believed_mps(10**9 + tick * TICK_NS, told_mps, 0.8) == told_mps
+
+
+@pytest.mark.parametrize("told_mps", [0.0, 0.3, 1.05])
+@pytest.mark.parametrize("wanted_mps", [-0.3, 0.8])
+def test_a_rate_that_sticks_is_contradicted_by_a_height_that_goes_where_thrust_pushes(
+    told_mps: float, wanted_mps: float
+) -> None:
+    """The vehicle follows the push at half of what it should, and is fast within a second all the same."""
+    check, height_m, true_mps = ClimbCheck(), 5.0, told_mps
+    for tick in range(1, 100):
+        true_mps += 2.0 * (wanted_mps - told_mps) * TICK_NS * 1e-9
+        height_m += true_mps * TICK_NS * 1e-9
+        if tick * TICK_NS % READING_NS < TICK_NS:
+            check.height(10**9 + tick * TICK_NS, round(height_m, 2))
+        check.believed_mps(10**9 + tick * TICK_NS, told_mps, wanted_mps)
+        if check.contradicted:
+            break
+    assert check.contradicted
+    assert abs(true_mps - told_mps) < 2.0
+
+
 @pytest.mark.parametrize(
     ("make", "keeps"),
     [(ardupilot_rig, True), (raw_rig, False), (px4_rig, False), (ardrone_rig, True)],

@@ -2,8 +2,9 @@
 
 A rate that stands still, whatever the vehicle does, is answered with ever more thrust.  It is found by three
 things together: it stays off the rate that is wanted, it does not move although thrust pushes it there, and
-the height does.  A range finder that sticks shows nothing of that: the told rate follows the thrust then.
-Of one that is told no more nothing but the height's is left, too.  Pure.
+the height does.  A range finder that sticks shows nothing of that: its height does not move, though a right
+rate stands still, too, where the hover thrust is learnt too high and the loop has not yet made up for it.
+Of a rate that is told no more nothing but the height's is left.  Pure.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ _OFF_MPS, _STILL_MPS = 0.15, 0.1
 """So far off what is wanted all the while, and no more moved."""
 _AHEAD_MPS, _AHEAD_NS = 0.4, 100_000_000
 """So much further the height's rate is where the told one is pushed to, for so long."""
+_MOVES_M, _MOVES_NS = 0.03, 120_000_000
+"""And the height itself has changed by more within the last moments: one that has just stuck still has a
+slope, and from then on one of nothing, which is ahead of any climb that shall end."""
 
 
 class _Told(NamedTuple):
@@ -69,8 +73,12 @@ class ClimbCheck:
         been told for a while (NaN where there is none of either), m/s, + up; `wanted_mps` is what the loop
         pushes towards, NaN where it does not carry the vehicle."""
         slope_mps = self._slope_mps(now_ns)
-        ahead = self._stands_still(now_ns, told_mps, wanted_mps) and (
-            math.copysign(1.0, wanted_mps - told_mps) * (slope_mps - told_mps) > _AHEAD_MPS  # NaN: no
+        ahead = (
+            self._stands_still(now_ns, told_mps, wanted_mps)
+            and self._height_moves()
+            and (
+                math.copysign(1.0, wanted_mps - told_mps) * (slope_mps - told_mps) > _AHEAD_MPS  # NaN: no
+            )
         )
         self._ahead_ns = (self._ahead_ns or now_ns) if ahead else None
         self.contradicted |= self._ahead_ns is not None and now_ns - self._ahead_ns >= _AHEAD_NS
@@ -94,6 +102,13 @@ class ClimbCheck:
             return False
         mean_mps = sum(abs(rate.off_mps) for rate in rates) / len(rates)
         return VELOCITY_PER_S * mean_mps * (now_ns - rates[0].stamp_ns) * 1e-9 > _PUSHED_MPS
+
+    def _height_moves(self) -> bool:
+        newest_ns, newest_m = self._heights[-1] if self._heights else (0, math.nan)
+        before = (
+            height_m for stamp_ns, height_m in reversed(self._heights) if newest_ns - stamp_ns >= _MOVES_NS
+        )
+        return abs(newest_m - next(before, math.nan)) > _MOVES_M  # NaN: no
 
     def _slope_mps(self, now_ns: int) -> float:
         """Of the height over the last moments, by least squares; NaN where it is not known."""
