@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from tests.web.live_flight import LiveFlight
 from tests.web.stock_rig import RACKS, counted_store
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Locator, Page
+    from playwright.sync_api import Browser, Locator, Page, WebSocketRoute
 
 pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
 from playwright.sync_api import expect
@@ -58,6 +58,26 @@ def press(page: Page, name: str) -> None:
 
 def places(page: Page) -> Locator:
     return page.locator("dl.takes div").filter(has_text="Places").locator("dd")
+
+
+def _held_back(page: Page) -> Callable[[], None]:
+    """What the station tells from now on reaches the page only once this is called."""
+    held: list[str | bytes] = []
+    free: list[Callable[[str | bytes], None]] = []
+
+    def through(socket: WebSocketRoute) -> None:
+        socket.connect_to_server().on_message(lambda said: free[0](said) if free else held.append(said))
+        sockets.append(socket)
+
+    sockets: list[WebSocketRoute] = []
+    page.route_web_socket(re.compile("/live$"), through)
+
+    def hear() -> None:
+        for said in held:
+            sockets[-1].send(said)
+        free.append(sockets[-1].send)
+
+    return hear
 
 
 def test_a_flight_is_chosen_estimated_kept_flown_and_flown_on_and_places_become_one(
@@ -112,8 +132,11 @@ def test_a_flight_is_chosen_estimated_kept_flown_and_flown_on_and_places_become_
 
         page.set_viewport_size({"width": NARROW[0], "height": NARROW[1]})
         page.emulate_media(color_scheme="dark")
+        hear = _held_back(page)
         page.goto(f"{url}/stock?store=monday")
         page.get_by_role("button", name=re.compile("^Recount . places as a mission")).click()
+        expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
+        hear()  # what was chosen before any drone was heard stands
         expect(page.get_by_text(re.compile("^Counts . places of the inventory again"))).to_be_visible()
         expect(page.get_by_label("Name")).to_have_value(re.compile("^Recount . places"))
         expect(button(page, "Node A1")).to_have_attribute("aria-pressed", "true")

@@ -25,8 +25,9 @@ export function change(changes) {
   });
 }
 
-// Another site: nothing that was chosen on the one before stands for it.
-export const enter = (site) => change({ ...EMPTY, site });
+// Another site: nothing that was chosen on the one before stands for it.  What was chosen before any drone was
+// heard (from an inventory) stands: the drone refuses what it does not know.
+export const enter = (site) => change(missions().site ? { ...EMPTY, site } : { site });
 
 // What is chosen becomes another choice; an estimate is asked for anew.
 export const choose = (changes) => change({ note: "", flying: "", ...changes });
