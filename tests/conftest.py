@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Generator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,6 +16,7 @@ from xdist.scheduler.loadscope import LoadScopeScheduling
 
 from tests.command import Command
 from tests.rigs.machine import Meter, Needs, Patience
+from tests.rigs.recorded_flight import fly_once
 
 settings.register_profile(
     "flightd", deadline=None, derandomize=True, database=None, suppress_health_check=[HealthCheck.too_slow]
@@ -94,6 +96,13 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
         raise
     finally:
         item.user_properties.append(("machine", str(meter.load)))
+
+
+@pytest.fixture(scope="session")
+def recorded_flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a simulated flight's files, flown once in a run of the tests; nobody writes there."""
+    own = tmp_path_factory.getbasetemp()
+    return fly_once(own.parent if "PYTEST_XDIST_WORKER" in os.environ else own)
 
 
 @pytest.fixture

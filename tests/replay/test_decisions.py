@@ -34,7 +34,7 @@ ROOT = Path(__file__).parents[2]
 
 def _setting() -> tuple[Config, Site]:
     config = load_config(ROOT / "configs" / "sim.toml")
-    visits = config.mission.model_copy(update={"nodes": ("A2", "A3")})
+    visits = config.mission.model_copy(update={"nodes": ("A2",)})
     return config.model_copy(update={"mission": visits}), load_site(ROOT / "configs" / "site-demo.toml")
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from flightd.config.schema import load_config
 from flightd.core.types import Phase
+from flightd.ground.messages import session_message
 from flightd.site.site_file import load_site
 from tests.rigs.certificates import make_certificate
 from tests.web.chromium import NARROW, WIDE, hindrances, new_context, opened, station
@@ -19,7 +20,7 @@ from tests.web.live_flight import LiveFlight
 from tests.web.people_rig import PASSWORD, audited, with_people
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Page, WebSocketRoute
 
 pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
 from playwright.sync_api import expect
@@ -127,6 +128,34 @@ def test_a_viewer_is_offered_what_he_may_and_stops_the_drone(
             page.get_by_role("button", name="Sign out").click()
         expect(other.get_by_role("heading", name="Sign in")).to_be_visible()
     assert ("start", "refused") in [(line["act"], line["outcome"]) for line in audited(state)]
+
+
+def test_what_a_socket_says_late_of_the_session_before_signs_nobody_out(browser: Browser, url: str) -> None:
+    """The station tells a session's end up to a second later: the next person may have signed in by then."""
+    sockets: list[WebSocketRoute] = []
+    given_up: list[bool] = []
+
+    def hold(socket: WebSocketRoute) -> None:
+        sockets.append(socket)
+        station = socket.connect_to_server()
+        if len(sockets) == 1:
+            station.on_message(lambda _said: None)
+            station.on_close(lambda _code, _reason: None)
+            socket.on_close(lambda _code, _reason: given_up.append(True))
+
+    with opened(browser, f"{url}/guide") as page:
+        expect(page.get_by_role("heading", name="Sign in")).to_be_visible()
+        page.route_web_socket("**/live", hold)
+        sign_in(page, "otto")
+        page.locator("summary").click()
+        page.get_by_role("button", name="Sign out").click()
+        sign_in(page, "vera")
+        expect(page.locator("summary")).to_contain_text("vera")
+        sockets[0].send(session_message(login=True, name="", role=""))
+        for _ in range(100):  # time to take what was said, for a page that still listens
+            if not given_up:
+                page.wait_for_timeout(20)
+        expect(page.locator("summary")).to_contain_text("vera", timeout=1000.0)
 
 
 def test_an_operator_takes_a_live_picture_and_a_viewer_looks_at_it(browser: Browser, url: str) -> None:

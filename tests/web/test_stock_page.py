@@ -37,12 +37,21 @@ def url(folder: Path) -> Iterator[str]:
         yield f"{url}/stock"
 
 
+@pytest.fixture(scope="module")
+def unchanged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The same, for all tests that only look."""
+    folder = tmp_path_factory.mktemp("hall")
+    counted_store(folder / "monday")
+    with station(["demo=127.0.0.1:1/1"], folder=folder) as url:
+        yield f"{url}/stock"
+
+
 def cell(page: Page, place: str) -> Locator:
     return page.get_by_role("button", name=re.compile(rf"^{re.escape(place)},"))
 
 
-def test_every_place_stands_on_its_front_with_its_state(browser: Browser, url: str) -> None:
-    with opened(browser, url) as page:
+def test_every_place_stands_on_its_front_with_its_state(browser: Browser, unchanged: str) -> None:
+    with opened(browser, unchanged) as page:
         expect(page.get_by_role("heading", name="Stock 6 of 11 places counted")).to_be_visible()
         states = page.get_by_role("group", name="States")
         for words, count in {
@@ -63,8 +72,8 @@ def test_every_place_stands_on_its_front_with_its_state(browser: Browser, url: s
         assert hindrances(page) == []
 
 
-def test_a_click_shows_picture_outline_code_and_history(browser: Browser, url: str) -> None:
-    with opened(browser, url) as page:
+def test_a_click_shows_picture_outline_code_and_history(browser: Browser, unchanged: str) -> None:
+    with opened(browser, unchanged) as page:
         cell(page, "AL-01-1-1").click()
         card = page.get_by_role("region", name="AL-01-1-1")
         expect(card.get_by_role("img", name="What the camera saw at AL-01-1-1")).to_be_visible()
@@ -115,8 +124,8 @@ def test_it_is_walked_and_searched_by_keys_alone(browser: Browser, url: str) -> 
         expect(page.get_by_role("button", name="STOPPING")).to_be_visible()
 
 
-def test_states_pick_out_what_next_and_previous_go_through(browser: Browser, url: str) -> None:
-    with opened(browser, url) as page:
+def test_states_pick_out_what_next_and_previous_go_through(browser: Browser, unchanged: str) -> None:
+    with opened(browser, unchanged) as page:
         states = page.get_by_role("group", name="States")
         for name in ("Unreadable 1", "Occluded 1"):
             states.get_by_role("button", name=re.compile(name)).click()
@@ -141,8 +150,10 @@ def test_it_fills_while_a_flight_counts(browser: Browser, url: str, folder: Path
         expect(page.get_by_role("heading", name="Stock 7 of 11 places counted")).to_be_visible()
 
 
-def test_what_labels_say_is_text_and_never_a_formula(browser: Browser, url: str, tmp_path: Path) -> None:
-    with opened(browser, url) as page:
+def test_what_labels_say_is_text_and_never_a_formula(
+    browser: Browser, unchanged: str, tmp_path: Path
+) -> None:
+    with opened(browser, unchanged) as page:
         cell(page, "AL-04-2-1").click()
         expect(page.get_by_role("region", name="AL-04-2-1").locator("code")).to_have_text("<b>PAL-10</b>")
         saved = {}
@@ -164,9 +175,9 @@ def test_what_labels_say_is_text_and_never_a_formula(browser: Browser, url: str,
 
 @pytest.mark.parametrize(("size", "scheme"), [(NARROW, "light"), (WIDE, "dark")])
 def test_it_is_for_everybody_on_every_screen(
-    browser: Browser, url: str, size: tuple[int, int], scheme: str
+    browser: Browser, unchanged: str, size: tuple[int, int], scheme: str
 ) -> None:
-    with opened(browser, url, size, scheme) as page:
+    with opened(browser, unchanged, size, scheme) as page:
         cell(page, "AL-01-1-1").click()
         expect(page.get_by_role("img", name=re.compile("What the camera saw"))).to_be_visible()
         assert page.evaluate("document.documentElement.scrollWidth") == size[0]
@@ -175,8 +186,8 @@ def test_it_is_for_everybody_on_every_screen(
         assert hindrances(page) == []
 
 
-def test_moving_to_the_flight_and_back_keeps_what_was_chosen(browser: Browser, url: str) -> None:
-    with opened(browser, url) as page:
+def test_moving_to_the_flight_and_back_keeps_what_was_chosen(browser: Browser, unchanged: str) -> None:
+    with opened(browser, unchanged) as page:
         cell(page, "AL-02-1-1").click()
         page.get_by_role("link", name="Live").click()
         expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
@@ -344,11 +355,11 @@ def test_a_front_on_the_right_runs_to_the_left_as_who_stands_before_it_sees_it(
 
 
 def test_a_place_of_a_strange_name_and_a_first_answer_that_fails_stop_nothing(
-    browser: Browser, url: str
+    browser: Browser, unchanged: str
 ) -> None:
-    with opened(browser, url) as page:
+    with opened(browser, unchanged) as page:
         page.route(re.compile("/api/stock$"), lambda route: route.abort())
-        page.goto(f"{url}?store=monday&place=constructor")
+        page.goto(f"{unchanged}?store=monday&place=constructor")
         expect(page.get_by_text("the ground station does not answer").first).to_be_visible()
         page.unroute(re.compile("/api/stock$"))
         expect(page.get_by_role("heading", name="Stock 6 of 11 places counted")).to_be_visible()

@@ -114,7 +114,7 @@ def make_hall(seed: int, folder: Path) -> tuple[dict[str, Any], Site]:
     raise AssertionError("no hall fits together")
 
 
-def fly_to_first_scan(seed: int, folder: Path) -> FirstScan:
+def fly_to_first_scan(seed: int, folder: Path, scenario: Scenario) -> FirstScan:
     """Fly to the first node with locations and end when a view of them is scanned.  What the simulation
     raises is not caught, but for a flight that ended by itself."""
     options, site = make_hall(seed, folder)
@@ -122,7 +122,7 @@ def fly_to_first_scan(seed: int, folder: Path) -> FirstScan:
     node = next(node for node in site.serpentine_route() if node in counted)
     watch = _Watch()
     try:
-        fly(Simulation(_config(node), site, Scenario(), seed, None, folder, watch))
+        fly(Simulation(_config(node, scenario), site, scenario, seed, None, folder, watch))
     except RunError:
         if not watch.scanned:
             raise
@@ -154,9 +154,9 @@ class _Watch:
         self._phase = status.phase
 
 
-def _config(node: str) -> Config:
+def _config(node: str, scenario: Scenario) -> Config:
     """What `flightd sim` flies with where there are racks, to one node."""
-    config, scenario = load_config(shipped("sim.toml")), Scenario()
+    config = load_config(shipped("sim.toml"))
     down, front = _lens_keys(scenario.camera.camera().lens), _lens_keys(scenario.front_camera.camera().lens)
     return config.model_copy(
         update={
@@ -220,7 +220,7 @@ def main() -> int:
     given = parser.parse_args()
     if given.one is None:
         return 1 if _fly_each(range(given.first, given.first + given.count)) else 0
-    print(json.dumps(asdict(fly_to_first_scan(given.one, given.folder))))
+    print(json.dumps(asdict(fly_to_first_scan(given.one, given.folder, Scenario()))))
     return 0
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from flightd.cli.main import app
+from tests.rigs.small_camera import small_camera_file
 
 BARE = """
 [[fault]]
@@ -20,7 +21,8 @@ half_m = 1.6
 def test_three_metres_without_paint_are_flown_over(tmp_path: Path) -> None:
     extra, out = tmp_path / "bare.toml", tmp_path / "out"
     extra.write_text(BARE)
-    options = ["--scenario", str(extra), "--out", str(out), "--json", "--seed", "5104"]
+    small = str(small_camera_file(tmp_path))
+    options = ["--scenario", str(extra), "--scenario", small, "--out", str(out), "--json", "--seed", "5104"]
     result = CliRunner().invoke(app, ["sim", *options, "--set", 'mission.nodes=["A2","A4"]'])
     summary = json.loads((out / "summary.json").read_text())
     assert summary["mission"] == "completed", summary

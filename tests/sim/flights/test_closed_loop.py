@@ -17,15 +17,14 @@ from flightd.app.build import detector_pool
 from flightd.app.detection.detector_pool import DetectorPool
 from flightd.app.simulation import launch as simulate
 from flightd.app.simulation.simulation import Simulation
-from flightd.config.schema import Config, load_config
+from flightd.app.simulation.simulator_config import simulator_config
 from flightd.core.snapshot import Snapshot
 from flightd.core.types import Phase
 from flightd.sim.scenario.scenario import Scenario
-from flightd.site.site_file import load_site
 from tests.command import Command
+from tests.rigs.small_camera import small_camera_file, with_small_camera
 
 ROOT = Path(__file__).parents[3]
-CONFIG = ROOT / "configs" / "sim.toml"
 BRIEF = ("--set", 'mission.nodes=["A2"]', "--set", "mission.dwell_s=0.5")
 """One leg; longer flights and other things are looked at elsewhere."""
 WALL = {"wall_time_s"}
@@ -37,7 +36,9 @@ def process(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def flown(folder: Path, *options: str) -> dict[str, Any]:
-    done = process("sim", "--json", "--out", str(folder), *BRIEF, *options)
+    folder.mkdir()
+    small = "--scenario", str(small_camera_file(folder))
+    done = process("sim", "--json", "--out", str(folder), *BRIEF, *small, *options)
     assert done.returncode == 0, done.stderr
     summary: dict[str, Any] = json.loads(done.stdout)
     assert summary == json.loads((folder / "summary.json").read_text())
@@ -113,22 +114,10 @@ def test_a_taken_camera_port_is_one_line(tmp_path: Path) -> None:
 
 
 def short_flight(folder: Path, speed: float, observer: Any) -> Simulation:
-    config = load_config(CONFIG)
-    mission = config.mission.model_copy(update={"nodes": ("A1", "A2"), "autostart_countdown_s": 0.0})
-    vision = config.vision.model_copy(update={"workers": 2})
-    config = _with_sim_lens(config.model_copy(update={"mission": mission, "vision": vision}))
-    return Simulation(config, load_site(mission.site), Scenario(), 2, speed, folder, observer)
-
-
-def _with_sim_lens(config: Config) -> Config:
-    lens = Scenario().camera.camera().lens
-    return config.model_copy(
-        update={
-            "camera": config.camera.model_copy(
-                update={"fx_px": lens.fx_px, "fy_px": lens.fy_px, "distortion": lens.distortion}
-            )
-        }
-    )
+    scenario = with_small_camera(Scenario())
+    settings = 'mission.nodes=["A1", "A2"]', "mission.autostart_countdown_s=0", "vision.workers=2"
+    config, site = simulator_config(None, None, scenario, settings)
+    return Simulation(config, site, scenario, 2, speed, folder, observer)
 
 
 @pytest.mark.realtime

@@ -19,6 +19,7 @@ from flightd.runtime.clock import LoopClock
 from flightd.sim.external.external_simulator import ExternalVehicle
 from flightd.sim.external.external_truth import Placement
 from tests.rigs.event_loops import real
+from tests.rigs.small_camera import small_camera_file
 from tests.rigs.vehicles import Rig
 
 ROOT = Path(__file__).parents[3]
@@ -27,6 +28,7 @@ SHORT = ("--set", 'mission.nodes=["A2"]', "--set", "mission.dwell_s=0.5", *AT_ON
 
 
 def flown(folder: Path, *options: str) -> dict[str, Any]:
+    """By the small camera: more can be drawn in real time on a busy machine."""
     command = [
         sys.executable,
         "-m",
@@ -34,6 +36,8 @@ def flown(folder: Path, *options: str) -> dict[str, Any]:
         "sim",
         "--json",
         *SHORT,
+        "--scenario",
+        str(small_camera_file(folder)),
         "--out",
         str(folder),
         *options,

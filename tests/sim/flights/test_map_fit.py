@@ -11,6 +11,7 @@ from flightd.core.topics import Document, Topic
 from flightd.replay.log import read_log
 from flightd.site.site_file import load_site, parse_site
 from tests.command import Command
+from tests.rigs.small_camera import small_camera_file
 
 DEMO = Path(__file__).parents[3] / "configs" / "site-demo.toml"
 
@@ -20,7 +21,8 @@ def test_lines_are_found_where_they_were_painted(flightd: Command, tmp_path: Pat
     off = tmp_path / "off.toml"
     off.write_text("[floor]\nmap_error_m = 0.10\n")
     flown = tmp_path / "flown"
-    options = ("--seed", 41, "--scenario", off, "--out", flown, "--set", "mission.nodes=A2,A3", "--json")
+    seen = ("--scenario", off, "--scenario", small_camera_file(tmp_path))
+    options = ("--seed", 41, *seen, "--out", flown, "--set", "mission.nodes=A2,A3", "--json")
     code, out, _ = flightd("sim", *options)
     assert (code, json.loads(out)["nodes_visited"]) == (0, 2)  # and safe it was
     truths = read_log(flown / "truth.mcap", {Topic.MAP}).messages(Document, Topic.MAP)

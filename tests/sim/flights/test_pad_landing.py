@@ -35,7 +35,7 @@ def fly(world: Site, seed: int, **others: object) -> tuple[Flown, float]:
     return flown, math.hypot(last.x_m - x_m, last.y_m - y_m)
 
 
-@pytest.mark.parametrize("seed", [*range(1, 12), 23])
+@pytest.mark.parametrize("seed", [*range(1, 6), 23])
 def test_it_lands_within_a_decimetre_of_a_pad_that_was_pushed_away(seed: int) -> None:
     flown, error_m = fly(pushed(seed), seed)
     assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])

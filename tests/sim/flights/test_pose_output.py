@@ -10,13 +10,11 @@ import pytest
 
 from flightd.app.simulation import launch as simulate
 from flightd.app.simulation.simulation import Simulation
-from flightd.config.schema import load_config
+from flightd.app.simulation.simulator_config import simulator_config
 from flightd.core.types import Phase
 from flightd.sim.autopilot.autopilot import AutopilotPeer
 from flightd.sim.scenario.scenario import Scenario
-from flightd.site.site_file import load_site
-
-CONFIG = Path(__file__).parents[3] / "configs" / "sim.toml"
+from tests.rigs.small_camera import with_small_camera
 
 
 @pytest.mark.slow
@@ -32,15 +30,11 @@ def test_a_flight_shares_its_pose_at_thirty_hertz_and_the_pad_while_near(
         receive(self, channel, message)
 
     monkeypatch.setattr(AutopilotPeer, "received", listen)
-    config = load_config(CONFIG)
-    config = config.model_copy(
-        update={
-            "mission": config.mission.model_copy(update={"nodes": ("A2",), "dwell_s": 0.5}),
-            "vehicle": config.vehicle.model_copy(update={"pose_output": "odometry", "landing_target": True}),
-        }
-    )
-    site = load_site(config.mission.site)
-    result = simulate.fly(Simulation(config, site, Scenario(), 2, None, tmp_path, lambda _: None))
+    scenario = with_small_camera(Scenario())
+    mission = 'mission.nodes=["A2"]', "mission.dwell_s=0.5"
+    vehicle = "vehicle.pose_output=odometry", "vehicle.landing_target=true"
+    config, site = simulator_config(None, None, scenario, [*mission, *vehicle])
+    result = simulate.fly(Simulation(config, site, scenario, 2, None, tmp_path, lambda _: None))
     assert result.phase is Phase.DONE
     poses, targets = heard["ODOMETRY"], heard["LANDING_TARGET"]
     span_s = (poses[-1][0].time_usec - poses[0][0].time_usec) * 1e-6

@@ -13,6 +13,7 @@ from flightd.cli.main import app
 from flightd.core.topics import Topic
 from flightd.core.types import Event
 from flightd.replay.log import read_log
+from tests.rigs.small_camera import small_camera_file
 
 FAULTS = """
 [[fault]]
@@ -30,9 +31,8 @@ def test_two_faults_in_one_flight_are_done_found_and_answered(tmp_path: Path) ->
     extra = tmp_path / "extra.toml"
     extra.write_text(FAULTS)
     out = tmp_path / "out"
-    small = tmp_path / "small.toml"
-    small.write_text("[camera]\nwidth_px = 320\nheight_px = 180\nfps = 20\n")
-    options = ["--scenario", str(extra), "--scenario", str(small), "--out", str(out), "--json"]
+    small = str(small_camera_file(tmp_path))
+    options = ["--scenario", str(extra), "--scenario", small, "--out", str(out), "--json"]
     result = CliRunner().invoke(app, ["sim", *options, "--set", 'mission.nodes=["A2"]'])
     assert result.exit_code != 0  # a flight that had to land is no completed mission
     summary = json.loads((out / "summary.json").read_text())

@@ -11,16 +11,15 @@ from typer.testing import CliRunner
 from flightd.cli.main import app
 from flightd.core.types import Event, LineSet
 from flightd.replay.log import read_log
+from tests.rigs.small_camera import small_camera_file
 
 FPS = 30.0
-SMALL = f"[camera]\nwidth_px = 320\nheight_px = 180\nfps = {FPS:g}\n"
 JITTER_S = 0.003
 """Of the simulated camera's delivery."""
 
 
 def test_frames_behind_newer_ones_are_refused_and_move_no_other(tmp_path: Path) -> None:
-    small, out = tmp_path / "small.toml", tmp_path / "out"
-    small.write_text(SMALL)
+    small, out = small_camera_file(tmp_path, fps=FPS), tmp_path / "out"
     options = ["--scenario", "frames_disordered", "--scenario", str(small), "--out", str(out), "--json"]
     result = CliRunner().invoke(app, ["sim", *options, "--set", 'mission.nodes=["A2"]'])
     summary = json.loads((out / "summary.json").read_text())

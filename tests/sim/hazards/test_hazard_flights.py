@@ -12,6 +12,7 @@ from flightd.app.simulation.launch import fly
 from flightd.app.simulation.prepare import SimOptions, prepare
 from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
 from flightd.sim.scenario.scenario_files import load_scenario, shipped_scenarios
+from tests.rigs.small_camera import with_small_camera
 
 ARDUPILOT = ("height_lost", "camera_gone")
 PX4 = ("height_stuck", "climb_lost", "ceiling_left")
@@ -25,11 +26,10 @@ PX4 = ("height_stuck", "climb_lost", "ceiling_left")
 )
 def test_it_is_found_and_ends_as_the_table_says(vehicle: str, hazard: str, tmp_path: Path) -> None:
     scenario = load_scenario(shipped_scenarios()[hazard])
-    small = scenario.camera.model_copy(update={"width_px": 320, "height_px": 180, "fps": 20.0})
     options = SimOptions(seed=1 + len(hazard), vehicle=vehicle)
     simulation = prepare(
         options,
-        scenario.model_copy(update={"camera": small}),
+        with_small_camera(scenario),
         tmp_path,
         lambda _: None,
         sweep_route=SHORT_ROUTE,

@@ -41,7 +41,7 @@ class LateLink:
 
 @pytest.mark.parametrize(("delay_ms", "burst_ms"), [(60, 120), (0, 200), (100, 80), (160, 20)])
 def test_the_drone_flies_on_along_its_line_and_comes_home(delay_ms: int, burst_ms: int) -> None:
-    flight = IdealFlight(SITE, CONFIG, visits=("A2", "A4"), seed=1)
+    flight = IdealFlight(SITE, CONFIG, visits=("A3",), seed=1)
     link, step = LateLink(delay_ms * 1_000_000, burst_ms * 1_000_000), flight.pilot.step
 
     def late(tick: TickInput) -> TickOutput:
@@ -49,7 +49,7 @@ def test_the_drone_flies_on_along_its_line_and_comes_home(delay_ms: int, burst_m
 
     flight.pilot.step = late  # type: ignore[method-assign]
     flown = flight.fly(80)
-    assert (flown.phase, flown.visited) == (Phase.DONE, ["A2", "A4"]), flown.reason
+    assert (flown.phase, flown.visited) == (Phase.DONE, ["A3"]), flown.reason
     assert max(abs(k.y_m) for _, k in flown.truth) < 0.3
 
 
@@ -60,7 +60,7 @@ def test_a_silence_of_many_seconds_in_the_air_is_no_error_of_the_software() -> N
         flight.faults.silent |= phase is Phase.FOLLOW
 
     flight.on_tick = fall_silent
-    flown = flight.fly(60.0)
+    flown = flight.fly(30.0)
     assert flown.phase is Phase.LAND
     assert flown.reason == "vehicle telemetry lost"
     assert not [event for event in flown.events if "software" in event.text]

@@ -19,6 +19,9 @@ CONFIGS = Path(__file__).parents[3] / "configs"
 CONFIG = load_config(CONFIGS / "sim.toml")
 DEMO = load_site(CONFIGS / "site-demo.toml")
 NEAR = ("A1", "A2", "A3")
+WHOLE = DEMO.serpentine_route()
+CORNER = ("A2", "A1", "B1", "B2")
+"""Nodes of both aisles, and the way between them."""
 
 
 def landed_error(flown: Flown) -> float:
@@ -27,12 +30,14 @@ def landed_error(flown: Flown) -> float:
     return math.hypot(k.x_m - pad.x_m, k.y_m - pad.y_m)
 
 
-@pytest.mark.parametrize("heading", list(Heading))
-def test_a_mission_visits_every_node_on_the_line_and_lands_on_the_pad(heading: Heading) -> None:
-    flight = IdealFlight(DEMO, CONFIG.with_values(mission={"heading": heading}), seed=11)
+@pytest.mark.parametrize(("heading", "visits"), [(Heading.ALONG, WHOLE), (Heading.SHELF, CORNER)])
+def test_a_mission_visits_every_node_on_the_line_and_lands_on_the_pad(
+    heading: Heading, visits: tuple[str, ...]
+) -> None:
+    flight = IdealFlight(DEMO, CONFIG.with_values(mission={"heading": heading}), visits=visits, seed=11)
     flown = flight.fly()
     assert (flown.phase, flown.reason) == (Phase.DONE, "landed on the pad")
-    assert flown.visited == list(DEMO.serpentine_route())
+    assert flown.visited == list(visits)
     assert rms_off_line(flown, DEMO) <= 0.05
     assert landed_error(flown) <= 0.15
 

@@ -23,6 +23,8 @@ from tools.write_guide import ROOT, guide_files
 
 _SH = re.compile(r"(?P<before>[^\n]*)\n```sh\n(?P<script>.*?)^```$", re.DOTALL | re.MULTILINE)
 _MARK = re.compile(r"<!-- (?P<what>run|not run)(?:: (?P<text>.+))? -->")
+_FLOWN = "out/flown"
+"""What reads a whole flight, with its pictures, finds one here."""
 _LONGEST_S = 240
 
 
@@ -60,10 +62,12 @@ def checkout(tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", guide_files(), ids=lambda path: path.stem)
-def test_the_commands_of_a_page_run(path: Path, checkout: Path) -> None:
+def test_the_commands_of_a_page_run(path: Path, checkout: Path, request: pytest.FixtureRequest) -> None:
     search = os.pathsep.join([str(checkout / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = {**os.environ, "PATH": search, "PYTHONPATH": str(ROOT)}
     for script in runnable(path):
+        if _FLOWN in script:
+            (checkout / _FLOWN).symlink_to(request.getfixturevalue("recorded_flight"))
         done = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", script],
             cwd=checkout,

@@ -10,9 +10,12 @@ const showing = new Map(); // "drone camera" -> function that draws a picture
 const unanswered = new Map(); // number of an act that was sent -> function that takes its answer
 let acts = 0;
 let socket = null;
+let again = 0; // the timer of the next attempt
 let turnedAway = false; // until somebody signs in, here or in another tab
 
+// In place of the socket there was: what that one has still to say is of whoever was signed in before.
 export function connect() {
+  leave();
   turnedAway = false;
   const url = new URL("/live", location.href);
   url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
@@ -31,8 +34,16 @@ export function connect() {
       s.socket = { ...s.socket, open: false, roundTripMs: null };
     });
     if (code === SIGN_IN_FIRST) turnedAway = true;
-    else setTimeout(connect, AGAIN_MS);
+    else again = setTimeout(connect, AGAIN_MS);
   };
+}
+
+function leave() {
+  clearTimeout(again);
+  if (!socket) return;
+  socket.onopen = socket.onmessage = socket.onclose = null;
+  socket.close();
+  for (const number of unanswered.keys()) answered({ number });
 }
 
 function hear(said) {

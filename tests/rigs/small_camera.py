@@ -1,0 +1,24 @@
+"""The simulated camera at half of what a flight with it costs, for flights that prove something else than
+what a picture shows: fewer pixels, fewer pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from flightd.sim.scenario.scenario import Scenario
+
+SMALL: Final[dict[str, float]] = {"width_px": 320, "height_px": 180, "fps": 20.0}
+
+
+def with_small_camera(scenario: Scenario) -> Scenario:
+    """The same scenario, seen by the small camera."""
+    return scenario.model_copy(update={"camera": scenario.camera.model_copy(update=SMALL)})
+
+
+def small_camera_file(folder: Path, **others: float) -> Path:
+    """A scenario file of the small camera, to be laid over another; `others` are keys of its section."""
+    path = folder / "small-camera.toml"
+    keys = [f"{key} = {value}" for key, value in (SMALL | others).items()]
+    path.write_text("\n".join(["[camera]", *keys, ""]))
+    return path
