@@ -14,6 +14,7 @@ let turnedAway = false; // until somebody signs in, here or in another tab
 
 export function connect() {
   turnedAway = false;
+  leave(socket);
   const url = new URL("/live", location.href);
   url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
   socket = new WebSocket(url);
@@ -33,6 +34,15 @@ export function connect() {
     if (code === SIGN_IN_FIRST) turnedAway = true;
     else setTimeout(connect, AGAIN_MS);
   };
+}
+
+// Another socket takes its place.
+function leave(old) {
+  if (!old || old.readyState >= WebSocket.CLOSING) return;
+  old.onclose = null;
+  old.onmessage = null;
+  old.close();
+  for (const number of unanswered.keys()) answered({ number });
 }
 
 function hear(said) {
