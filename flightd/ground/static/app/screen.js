@@ -21,6 +21,7 @@ async function look() {
   if (![...state.drones.values()].some(isAttending)) {
     lock?.release();
     lock = null;
+    note("");
     return;
   }
   if (lock || document.hidden || performance.now() < asksNext) return;
@@ -34,9 +35,12 @@ async function look() {
   } catch {
     // it has none outside of a secure context, or refuses now: Live says so
   }
-  if (state.mayLock !== !lock) {
-    update((s) => {
-      s.mayLock = !lock;
-    });
-  }
+  note(lock ? "kept on" : "may lock");
+}
+
+function note(screen) {
+  if (state.screen === screen) return;
+  update((s) => {
+    s.screen = screen;
+  });
 }

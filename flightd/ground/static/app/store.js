@@ -27,7 +27,7 @@ export const state = {
   selected: "", // drone that is shown and commanded
   socket: { open: false, heardAt: 0, roundTripMs: null, dropped: 0, picturesDropped: 0 },
   chosenNode: "", // where "go to" leads
-  mayLock: false, // this browser keeps no screen on: see screen.js
+  screen: "", // "kept on" or "may lock" while a drone flies: see screen.js
   followed: false, // the map shows the drone's surroundings, not the whole site
   acts: new Map(), // newest act of each drone: {command, state, text, at}
 };
