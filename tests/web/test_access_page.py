@@ -30,7 +30,9 @@ from playwright.sync_api import expect
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
-CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission={"autostart": False, "start_countdown_s": 0.0})
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(
+    mission={"autostart": False, "start_countdown_s": 0.0}, ground={"lost_action": "land"}
+)
 
 expect.set_options(timeout=40_000.0)
 
