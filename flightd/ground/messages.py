@@ -97,7 +97,7 @@ class LinkState(msgspec.Struct, frozen=True):
     `heard_s` is the time since its newest status (null: never), `round_trip_ms` that of the newest request
     (null: none was answered lately), `missed` what of its messages never arrived, `trouble` why it is not
     heard, in words.  `attends`: the drone counts this station as one that watches the flight.  `flies`: its
-    motors were armed when it was heard last, and not for ever ago."""
+    motors were armed when it was heard last, within this hour."""
 
     connected: bool
     heard_s: float | None

@@ -6,7 +6,7 @@ import { html, useEffect, useRef, useState } from "../html.js";
 import { english, quoted, say } from "../language.js";
 import { shown, state } from "../store.js";
 import { capital } from "../words.js";
-import { isOver, signIn } from "./session.js";
+import { isOver, mayOperate, signIn } from "./session.js";
 
 const SOON_MS = 30 * 60000;
 
@@ -65,7 +65,9 @@ export function FliesOn() {
   const may = shown().status?.possible.includes("pause");
   return html`
     <section class="card ends" aria-label=${say("End of the session")}>
-      <p role="status">${say("Your session has ended, and a drone flies. STOP and Pause stay yours, and this page attends, until it has landed.")}</p>
+      <p role="status">
+        ${mayOperate() ? say("Your session has ended, and a drone flies. STOP and Pause stay yours, and this page attends, until it has landed.") : say("Your session has ended, and a drone flies. STOP and Pause stay yours until it has landed.")}
+      </p>
       <button class="order" disabled=${!may} onClick=${() => act("pause")}>${say("Pause")}</button>
     </section>
   `;

@@ -13,4 +13,5 @@ export default {
   "Sign in again": "Neu anmelden",
   "Password of {name}": "Passwort von {name}",
   "Your session has ended, and a drone flies. STOP and Pause stay yours, and this page attends, until it has landed.": "Ihre Anmeldung ist abgelaufen, und eine Drohne fliegt. STOP und Pause behalten Sie, und diese Seite führt die Aufsicht, bis sie gelandet ist.",
+  "Your session has ended, and a drone flies. STOP and Pause stay yours until it has landed.": "Ihre Anmeldung ist abgelaufen, und eine Drohne fliegt. STOP und Pause behalten Sie, bis sie gelandet ist.",
 };
