@@ -8,7 +8,7 @@ from typing import Any
 
 from flightd.core.errors import FlightdError, InputError
 from flightd.ground.access.access import Access
-from flightd.ground.access.roles import Identity, may_order
+from flightd.ground.access.roles import QUELLING, Identity, may_order
 from flightd.ground.drone_link import DroneLink
 from flightd.ground.json_http import status_of
 from flightd.ground.messages import Act, read_act
@@ -22,12 +22,13 @@ class Orders:
     access: Access
 
     async def carried_out(
-        self, who: Identity, address: str, name: str, body: bytes
+        self, who: Identity, address: str, name: str, body: bytes, over: bool = False
     ) -> tuple[int, dict[str, Any]]:
         """Hand the act in `body` to a drone: an HTTP status, and what is answered.
 
         200: accepted; 4xx, 503: refused, with a reason for a person.  Sent again with the same id it is done
-        once, whichever way it comes."""
+        once, whichever way it comes.  `over`: the person's session ended while a drone flew, which leaves
+        STOP and Pause."""
         drone = self.drones.get(name)
         if drone is None:
             return 404, {"refused": "there is no such drone"}
@@ -35,14 +36,16 @@ class Orders:
             act = read_act(body)
         except InputError as err:
             return 400, {"refused": str(err)}
-        status, answer = await _handed_on(drone, act, self.access.renewed(who))
+        is_left = over and act.command in QUELLING
+        status, answer = await _handed_on(drone, act, who if is_left else self.access.renewed(who))
+        said = "repeated" if answer.get("repeated") else "after the end of the session" if is_left else ""
         self.access.write_down(
             who,
             address,
             f"{act.command} {act.node or act.plan}".rstrip(),
             name,
             outcome="accepted" if status == 200 else "refused",
-            text=str(answer.get("refused", "repeated" if answer.get("repeated") else "")),
+            text=str(answer.get("refused", said)),
             id=act.id,
         )
         return status, answer

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from functools import partial
+from itertools import count
 from pathlib import Path
 
 from starlette.applications import Starlette
@@ -18,7 +19,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from flightd.core.errors import InputError
 from flightd.ground.access.access import Access
 from flightd.ground.access.gate import SIGN_IN_FIRST, address_of, gated, identity_of
-from flightd.ground.access.roles import Identity, Role
+from flightd.ground.access.roles import Role
 from flightd.ground.access.session_routes import session_routes
 from flightd.ground.acts import Orders
 from flightd.ground.browser import Browser
@@ -29,8 +30,16 @@ from flightd.ground.guards import Guard, Hosts
 from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
 from flightd.ground.json_http import as_json, is_json, json_body, status_of
-from flightd.ground.messages import SentAct, answer_message, read_page_message, session_message
+from flightd.ground.messages import (
+    SentAct,
+    SessionState,
+    Want,
+    answer_message,
+    read_page_message,
+    session_message,
+)
 from flightd.ground.missions.routes import mission_routes
+from flightd.ground.page_person import PagePerson, Standing
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.site_page.routes import site_page
@@ -45,6 +54,8 @@ _FULL = 1013
 _OTHER_ROLE = 4403
 """WebSocket: the person has another role by now; the page comes again."""
 _RENEWED_S = 1.0
+_TOLD_EACH = 10
+"""So often a page is told, in `_RENEWED_S`, when its person's session ends: somebody may set the clock."""
 
 
 def application(
@@ -69,7 +80,7 @@ def application(
         *site_page(folder, maps),
         *flight_routes(flights),
         *studio_routes(studio),
-        *doctor_routes(hub.drones),
+        *doctor_routes(hub.drones, access),
         *mission_routes(folder, hub.drones),
         *guide_routes(),
         *session_routes(access),
@@ -87,22 +98,23 @@ class _GoneError(Exception):
 
 
 async def _live(hub: Hub, orders: Orders, socket: WebSocket) -> None:
-    """One page, until it closes, says what no page of ours says, or its person's session ends."""
+    """One page, until it closes, says what no page of ours says, or its person is gone (`PagePerson`)."""
     who = identity_of(socket)
+    person = PagePerson(who, orders.access, hub.drones)
     await socket.accept()
     if hub.is_full:
         await socket.close(_FULL, "too many pages are open")
         return
     with contextlib.suppress(WebSocketDisconnect):  # it is heard of below
-        await _say(socket, session_message(orders.access.login, who.name, who.role))
+        await _say(socket, session_message(person.session_state()))
     async with asyncio.TaskGroup() as acts:  # what was ordered is handed on though its page has gone
         with hub.opened(attends=who.role.covers(Role.OPERATOR)) as browser:
             try:
                 async with asyncio.TaskGroup() as tasks:
                     sending = tasks.create_task(_send(browser, socket), name="page out")
-                    staying = tasks.create_task(_stay(orders.access, who), name="page's person")
+                    staying = tasks.create_task(_stay(hub, browser, person), name="page's person")
                     try:
-                        await _hear(hub, orders, browser, socket, acts)
+                        await _hear(hub, orders, browser, socket, person, acts)
                     finally:
                         sending.cancel()
                         staying.cancel()
@@ -115,19 +127,26 @@ async def _live(hub: Hub, orders: Orders, socket: WebSocket) -> None:
                 assert isinstance(gone, _GoneError)
                 if gone.code == SIGN_IN_FIRST:
                     with contextlib.suppress(WebSocketDisconnect):
-                        await _say(socket, session_message(login=True, name="", role=""))
+                        await _say(socket, session_message(SessionState(login=True)))
                 await _close(socket, gone.code, str(gone))
 
 
-async def _stay(access: Access, who: Identity) -> None:
-    """_GoneError once the session is over, or the role another one."""
-    while True:
+async def _stay(hub: Hub, browser: Browser, person: PagePerson) -> None:
+    """Tell the page when its person's session ends.  _GoneError once he is gone, or has another role."""
+    before = Standing.SIGNED_IN
+    for told in count(1):
         await asyncio.sleep(_RENEWED_S)
-        now = access.renewed(who)
-        if now is None:
+        now = person.standing()
+        if now is Standing.GONE:
             raise _GoneError(SIGN_IN_FIRST, "the session is over")
-        if now != who:
+        if now is Standing.CHANGED:
             raise _GoneError(_OTHER_ROLE, "another role")
+        state = person.session_state()
+        if now is not before or (state.ends_in_s is not None and told % _TOLD_EACH == 0):
+            browser.offer(("", "session"), session_message(state))
+        if now is not before:
+            hub.hear(browser, Want(()))
+        before = now
 
 
 async def _send(browser: Browser, socket: WebSocket) -> None:
@@ -147,9 +166,15 @@ async def _say(socket: WebSocket, message: str | bytes) -> None:
 
 
 async def _hear(
-    hub: Hub, orders: Orders, browser: Browser, socket: WebSocket, acts: asyncio.TaskGroup
+    hub: Hub,
+    orders: Orders,
+    browser: Browser,
+    socket: WebSocket,
+    person: PagePerson,
+    acts: asyncio.TaskGroup,
 ) -> None:
-    """Everything that the page says.  WebSocketDisconnect when it closes, InputError for nonsense."""
+    """Everything that the page says; pictures are for who is signed in.  WebSocketDisconnect when it closes,
+    InputError for nonsense."""
     while True:
         received = await socket.receive()
         if received["type"] == "websocket.disconnect":
@@ -157,14 +182,18 @@ async def _hear(
         message = read_page_message(received.get("text") or received.get("bytes") or "")
         if isinstance(message, SentAct):
             browser.begin_act()
-            acts.create_task(_sent_act(orders, browser, socket, message), name=f"act for {message.drone}")
-        else:
+            sent = _sent_act(orders, browser, socket, person, message)
+            acts.create_task(sent, name=f"act for {message.drone}")
+        elif not isinstance(message, Want) or person.standing() is Standing.SIGNED_IN:
             hub.hear(browser, message)
 
 
-async def _sent_act(orders: Orders, browser: Browser, socket: WebSocket, sent: SentAct) -> None:
+async def _sent_act(
+    orders: Orders, browser: Browser, socket: WebSocket, person: PagePerson, sent: SentAct
+) -> None:
     who, address = identity_of(socket), address_of(socket.scope)
-    status, answer = await orders.carried_out(who, address, sent.drone, bytes(sent.act))
+    over = person.standing() is Standing.OVER
+    status, answer = await orders.carried_out(who, address, sent.drone, bytes(sent.act), over)
     browser.answer_act(sent.number, answer_message(sent.number, status, answer))
 
 

@@ -33,6 +33,8 @@ _TRACK_KEPT = 4000
 MOST_ACTS = 16
 """So many acts may wait for their answer at once; what lands the drone is never turned away."""
 _MOST_QUESTIONS = 4
+_LANDED_S = 3600.0
+"""No drone flies so long after it was heard last."""
 _VISITED = "visited"
 """The event of a node that was visited: its name is the text."""
 _URGENT = frozenset({CommandKind.STOP, CommandKind.LAND})
@@ -83,6 +85,7 @@ class DroneLink:
         self._missed: Counter[type] = Counter()
         self._round_trip_ms: float | None = None
         self._attends = False
+        self._armed = False
         self._trouble = "connecting"
         self._acting = 0
         self._questions = Room(_MOST_QUESTIONS, f"{name} is looked after already")
@@ -91,6 +94,12 @@ class DroneLink:
         """Hears what is left of the drone's plan, whenever that changes."""
         self._plan_changed = asyncio.Event()
         self._plan_seen: tuple[object, ...] = ()
+
+    @property
+    def flies(self) -> bool:
+        """Its motors were armed when it was heard last; silence is no landing, but for an hour of it."""
+        now_s = asyncio.get_running_loop().time()
+        return self._armed and self._heard_at_s is not None and now_s - self._heard_at_s < _LANDED_S
 
     async def run(self) -> None:
         """Connect, and again after whatever went wrong."""
@@ -245,6 +254,8 @@ class DroneLink:
         silent = self._heard_at_s is None or now_s - self._heard_at_s > _STATE_S
         self._heard_at_s = now_s
         self._clock_s = min(self._clock_s, now_s - report.stamp_ns * 1e-9)
+        if report.vehicle is not None:  # a daemon that was started anew in flight has not heard it yet
+            self._armed = report.vehicle.armed
         at = report.position
         if at is not None and (
             not self._track or math.dist(self._track[-1], (at.x_m, at.y_m)) > _TRACK_STEP_M
@@ -313,6 +324,7 @@ class DroneLink:
             round_trip_ms=None if trip_ms is None else round(trip_ms, 1),
             missed=self._missed.total(),
             attends=self._attends,
+            flies=self.flies,
             trouble=self._trouble,
         )
         self._pages.tell(self.name, "link", state)

@@ -78,18 +78,33 @@ class Act(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """`stamp_ns` of the newest status that the page had; 0: that of the station."""
 
 
+class SessionState(msgspec.Struct, frozen=True):
+    """Who the page's person is to the station; with `login` and no name: somebody who has to sign in.
+
+    `ends_in_s` is when the session ends at the latest (null: there is none).  `over`: it has ended while a
+    drone flew, and until that has landed STOP and Pause are left of it."""
+
+    login: bool
+    name: str = ""
+    role: str = ""
+    ends_in_s: float | None = None
+    over: bool = False
+
+
 class LinkState(msgspec.Struct, frozen=True):
     """How the station hears a drone.
 
     `heard_s` is the time since its newest status (null: never), `round_trip_ms` that of the newest request
     (null: none was answered lately), `missed` what of its messages never arrived, `trouble` why it is not
-    heard, in words.  `attends`: the drone counts this station as one that watches the flight."""
+    heard, in words.  `attends`: the drone counts this station as one that watches the flight.  `flies`: its
+    motors were armed when it was heard last, within this hour."""
 
     connected: bool
     heard_s: float | None
     round_trip_ms: float | None
     missed: int
     attends: bool
+    flies: bool
     trouble: str
 
 
@@ -127,9 +142,9 @@ def picture_message(key: PictureKey, picture: LinkPicture) -> bytes:
     return framed_picture(head, picture.jpeg)
 
 
-def session_message(login: bool, name: str, role: str) -> str:
-    """Who the page's person is to the station; with `login` and no name: somebody who has to sign in."""
-    return topic_message("", "session", {"login": login, "name": name, "role": role})
+def session_message(state: SessionState) -> str:
+    """How it stands with the session as it goes to the page."""
+    return topic_message("", "session", state)
 
 
 def answer_message(number: int, status: int, answer: Mapping[str, Any]) -> str:

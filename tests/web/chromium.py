@@ -136,6 +136,7 @@ def new_context(
         ignore_https_errors=True,  # of a certificate that the test has made for itself
     )
     context.set_default_timeout(30_000)
+    context.grant_permissions(["screen-wake-lock"])  # as every browser with a screen has it
     context.add_init_script(path=AXE)
     return context
 

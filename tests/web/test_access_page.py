@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.server
+import re
+import sqlite3
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +31,9 @@ from playwright.sync_api import expect
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
-CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission={"autostart": False, "start_countdown_s": 0.0})
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(
+    mission={"autostart": False, "start_countdown_s": 0.0}, ground={"lost_action": "land"}
+)
 
 expect.set_options(timeout=40_000.0)
 
@@ -273,3 +279,72 @@ def test_another_origins_page_can_neither_read_nor_command(
         expect(page.get_by_text("Ready to fly")).to_be_visible()
         context.close()
     assert flight.phase is Phase.PREFLIGHT
+
+
+def began_before(state: Path, hours: float) -> None:
+    """Whoever is signed in has been so for as long."""
+    with contextlib.closing(sqlite3.connect(state / "people.db", timeout=10)) as book, book:
+        book.execute("UPDATE session SET began_s = ?", (time.time() - hours * 3600,))
+
+
+def until(flight: LiveFlight, wanted: set[Phase]) -> None:
+    end_s = time.monotonic() + 40.0
+    while flight.phase not in wanted:
+        assert time.monotonic() < end_s, flight.phase
+        flight.wait_s(0.05)
+
+
+def test_whose_session_ends_in_flight_keeps_stop_and_the_ground_until_it_has_landed(
+    browser: Browser, url: str, flight: LiveFlight, state: Path
+) -> None:
+    with opened(browser, url) as page:
+        sign_in(page, "otto")
+        expect(page.get_by_text("Ready to fly")).to_be_visible()
+        begin = page.get_by_role("button", name="Start")
+        begin.focus()
+        page.keyboard.down("Space")
+        page.wait_for_timeout(1300)
+        page.keyboard.up("Space")
+        expect(page.get_by_role("heading", name="Flying to A2")).to_be_visible()
+
+        began_before(state, hours=11.8)
+        soon = page.get_by_role("region", name="End of the session")
+        expect(soon.get_by_role("status")).to_have_text(re.compile(r"^Your session ends in 1[12] minutes\.$"))
+        assert hindrances(page) == []
+        soon.get_by_role("button", name="Sign in again").click()
+        page.keyboard.type("wrong password")
+        page.keyboard.press("Enter")
+        expect(soon.get_by_role("alert")).to_have_text("Name or password is wrong.")
+        soon.get_by_label("Password of otto").fill(PASSWORD)
+        page.keyboard.press("Enter")
+        expect(soon).to_have_count(0)
+
+        began_before(state, hours=12.1)
+        expect(page.get_by_role("heading", name="Sign in")).to_be_visible()
+        expect(soon.get_by_role("status")).to_have_text(re.compile("STOP and Pause stay yours"))
+        expect(page.get_by_role("link", name="Stock")).to_have_count(0)
+        assert hindrances(page) == []
+        assert page.evaluate("async () => (await fetch('/api/stock')).status") == 401
+        refused = """async () => (await import("/static/app/connection.js")).sendAct("demo",
+            {id: "12345678", command: "home"})"""
+        assert page.evaluate(refused)["status"] == 401
+        soon.get_by_role("button", name="Pause").click()
+        until(flight, {Phase.HOLD})
+        flight.wait_s(CONFIG.ground.lost_s + 1.0)
+        assert flight.phase is Phase.HOLD, "the ground is not lost"
+        assert flight.quiet_s < CONFIG.ground.lost_s
+
+        expect(page.get_by_role("button", name="STOP")).to_be_in_viewport(ratio=1.0)
+        page.get_by_label("Name").fill("ot")
+        page.keyboard.press("Escape")
+        until(flight, {Phase.ABORTED})
+        expect(page.get_by_role("button", name="STOP")).to_have_count(0)
+        expect(soon).to_have_count(0)
+        expect(page.get_by_label("Name")).to_have_value("ot")
+    told = [(line["act"], line["outcome"], line["text"]) for line in audited(state)]
+    late = "after the end of the session"
+    assert [line for line in told if line[0] in {"home", "pause", "stop"}] == [
+        ("home", "refused", "sign in first"),
+        ("pause", "accepted", late),
+        ("stop", "accepted", late),
+    ]

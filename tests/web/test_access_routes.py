@@ -107,7 +107,8 @@ async def test_nobody_who_has_not_signed_in_is_told_anything(tmp_path: Path) -> 
             else:
                 assert (code, json.loads(text)) == (401, {"refused": "sign in first"}), of
         async with station.page() as page:
-            assert await told(page, "session", "") == {"login": True, "name": "", "role": ""}
+            nobody = {"login": True, "name": "", "role": "", "ends_in_s": None, "over": False}
+            assert await told(page, "session", "") == nobody
             assert await ending(page) == 4401
         forged = {"Cookie": "flightd-session=x", **own}
         assert (await station.ask("GET", "/api/stock", forged))[0] == 401
@@ -118,7 +119,9 @@ async def test_signing_in_makes_a_cookie_that_no_script_and_no_other_site_has(tm
     with_people(tmp_path)
     async with served(NOBODY, folder=tmp_path, state=tmp_path, login=True) as station:
         head, text = await signing_in(station, "Otto")
-        assert json.loads(text) == {"login": True, "name": "otto", "role": "operator"}
+        session = json.loads(text)
+        assert session.pop("ends_in_s") == pytest.approx(43200, abs=30)
+        assert session == {"login": True, "name": "otto", "role": "operator", "over": False}
         cookie = next(line for line in head.splitlines() if line.lower().startswith("set-cookie"))
         for word in ("HttpOnly", "SameSite=strict", "Path=/", "Max-Age=43200"):
             assert word.lower() in cookie.lower()
@@ -316,7 +319,14 @@ async def test_on_this_machine_nobody_is_asked_and_acts_are_written_down_all_the
     async with serving(local()) as link, served(("demo", address_of(link)), state=tmp_path) as station:
         await until(lambda: link.requests > 2)
         async with telling(link), station.page() as page:
-            assert await told(page, "session", "") == {"login": False, "name": "local", "role": "admin"}
+            local_one = {
+                "login": False,
+                "name": "local",
+                "role": "admin",
+                "ends_in_s": None,
+                "over": False,
+            }
+            assert await told(page, "session", "") == local_one
             await told(page, "status")
             assert (await station.act("demo", id="the-only-pause", command="pause"))[0] == 200
         head, _ = await signing_in(station, "otto")

@@ -33,7 +33,9 @@ def is_for_everybody(page: Page, size: tuple[int, int], scheme: str) -> None:
 def test_a_drone_that_stands_is_looked_after(browser: Browser, tmp_path: Path) -> None:
     drone = StandingDrone(tmp_path)
     drones = [drone.at, "away=127.0.0.1:1/1"]
-    with drone.standing(), station(drones) as url, opened(browser, f"{url}/doctor") as page:
+    (state := tmp_path / "state").mkdir()
+    (state / "audit.jsonl").symlink_to("/dev/full")
+    with drone.standing(), station(drones, state=state) as url, opened(browser, f"{url}/doctor") as page:
         is_set_right(page)
         is_for_everybody(page, NARROW, "light")
         is_for_everybody(page, WIDE, "dark")
@@ -44,6 +46,9 @@ def test_a_drone_that_stands_is_looked_after(browser: Browser, tmp_path: Path) -
         expect(page.get_by_text("flightd starts anew: a few seconds.")).to_be_visible(timeout=SLOW_MS)
         assert drone.ended() == 0
         page.get_by_role("link", name="Checks").click()
+        page.reload()
+        lost = re.compile(r"\d lines? of this station.s audit (is|are) lost: its disk is full, or too slow\.")
+        expect(page.get_by_text(lost)).to_be_visible()
         page.get_by_role("button", name="away").click()
         expect(page.get_by_role("heading", name="Not looked at")).to_be_visible(timeout=SLOW_MS)
         expect(page.get_by_role("alert").filter(has_text="away cannot be reached")).to_be_visible()

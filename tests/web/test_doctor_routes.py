@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from pathlib import Path
 
@@ -123,6 +124,22 @@ async def test_what_no_page_of_ours_asks_is_refused_in_words() -> None:
         status, text = await station.ask("GET", "/api/doctor")
         assert status == 200
         assert json.loads(text)["versions"].keys() >= {"flightd", "Python", "starlette"}
+        assert json.loads(text)["audit_lost"] == 0
+
+
+@in_real_time
+async def test_lines_of_the_audit_that_the_disk_refuses_are_told(tmp_path: Path) -> None:
+    (tmp_path / "audit.jsonl").symlink_to("/dev/full")
+    async with served(NOBODY, state=tmp_path) as station:
+        for at in range(3):
+            assert (await station.act("demo", id=f"stop-{at}-of-3", command="stop"))[0] == 503
+
+        async def lost() -> int:
+            return int(json.loads((await station.ask("GET", "/api/doctor"))[1])["audit_lost"])
+
+        async with asyncio.timeout(20):
+            while await lost() < 3:  # noqa: ASYNC110 - its thread tells nobody
+                await asyncio.sleep(0.02)
 
 
 def test_what_is_typed_is_judged_against_what_the_drone_told_last() -> None:

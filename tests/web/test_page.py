@@ -34,6 +34,15 @@ HOLD_MS = 1300.0
 MOST_CONNECTIONS = 6
 DEAF = "WebSocket.prototype.send = () => {}"
 """What the page says over its socket reaches nobody from now on."""
+SEEN_WHERE_PAINTED = """() => {
+  const ends = (line) => ["x1", "y1", "x2", "y2"].map((end) => Number(line.getAttribute(end)));
+  const painted = [...document.querySelectorAll(".paint line")].map(ends);
+  const lies = ([x0, y0, x1, y1]) => painted.some(([a0, b0, a1, b1]) =>
+    y0 === y1 ? b0 === b1 && Math.abs(y0 - b0) < 15 : a0 === a1 && Math.abs(x0 - a0) < 15);
+  const seen = [...document.querySelectorAll(".seen line")].map(ends);
+  return seen.length > 0 && seen.every(lies);
+}"""
+"""Each line that the drone sees is drawn within 15 cm of one that is painted on the floor, and some is."""
 
 expect.set_options(timeout=WITHIN_MS)
 
@@ -90,6 +99,12 @@ def test_a_flight_is_started_watched_paused_sent_elsewhere_and_stopped_by_key(
         phase(page, "Flying to A2")
         expect(page.get_by_role("img", name=re.compile(r"^Down camera: \d lines?$"))).to_be_visible()
         expect(page.get_by_role("img", name="The drone")).to_be_visible()
+        expect(page.get_by_role("list", name="Legend").get_by_text("lines seen")).to_be_visible()
+        page.wait_for_function(SEEN_WHERE_PAINTED)
+        page.wait_for_function(
+            "async () => (await import('/static/app/store.js')).state.screen === 'kept on'"
+        )
+        expect(page.get_by_text("cannot keep the screen on")).to_have_count(0)
         assert hindrances(page) == []
         whole = page.get_by_role("group", name="Map of demo").get_attribute("viewBox")
         page.get_by_role("button", name="Follow the drone").click()
@@ -97,6 +112,13 @@ def test_a_flight_is_started_watched_paused_sent_elsewhere_and_stopped_by_key(
         expect(page.get_by_role("group", name="Map of demo")).not_to_have_attribute("viewBox", whole or "")
         page.keyboard.press("p")
         phase(page, "Holding its place")
+        page.get_by_role("link", name="Guide", exact=True).click()
+        expect(page.get_by_role("link", name="Guide", exact=True)).to_have_attribute("aria-current", "page")
+        page.keyboard.press("r")
+        page.wait_for_timeout(500)
+        page.get_by_role("link", name="Live", exact=True).click()
+        expect(page.get_by_text("Pause: accepted")).to_be_visible()
+        until_phase(flight, {Phase.HOLD})  # a key on another page has resumed nothing
         page.get_by_role("button", name="Resume").click()
         expect(page.get_by_text("Resume: accepted")).to_be_visible()
         phase(page, "Flying to|Over")
@@ -203,7 +225,9 @@ def test_a_page_that_is_loaded_again_or_opened_twice_has_it_all(
         start(page)
         expect(page.get_by_role("button", name="Node A1, visited")).to_be_visible()
         phase(page, "Flying to A2")
+        page.add_init_script("Object.defineProperty(Navigator.prototype, 'wakeLock', {value: undefined})")
         page.reload()
+        expect(page.get_by_text("This browser cannot keep the screen on")).to_be_visible()
         expect(page.get_by_role("button", name="Node A1, visited")).to_be_visible()
         expect(page.get_by_role("list", name="Events").get_by_text("start", exact=True)).to_be_visible()
         track = page.locator("polyline.track")

@@ -22,6 +22,7 @@ from flightd.ground.access.passwords import PasswordCheck, hashed_secret
 from flightd.ground.access.people_book import PeopleBook, Person, Session
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.bounded import Threads
+from flightd.ground.messages import SessionState
 from flightd.ground.own_database import make_private_file
 
 _LOG = logging.getLogger(__name__)
@@ -59,6 +60,7 @@ class Access:
         self._by_key: dict[bytes, Person] = {}
         self._sessions: dict[bytes, Session] = {}
         self._seen: dict[bytes, float] = {}
+        self._found_over: frozenset[bytes] = frozenset()
         self._attempts = Attempts(time.monotonic)
         self._check = PasswordCheck() if login else None
         self._changing = asyncio.Lock()
@@ -102,6 +104,11 @@ class Access:
             with contextlib.suppress(FlightdError):
                 self._tidy()
 
+    @property
+    def audit_lost(self) -> int:
+        """Lines of the audit that its disk did not take."""
+        return self._audit.dropped
+
     def close(self) -> None:
         """Write what waits of the audit."""
         self._audit.close()
@@ -128,13 +135,39 @@ class Access:
         person = self._by_key.get(who.session)
         return None if person is None else Identity(person.name, person.role, "key", who.session)
 
+    def session_state(self, who: Identity | None, over: bool = False) -> SessionState:
+        """How it stands with somebody's session, for the page."""
+        if who is None:
+            return SessionState(self.login)
+        found = self._sessions.get(who.session)
+        ends_in_s = None if found is None else max(found.began_s + ABSOLUTE_S - self._now_s(), 0.0)
+        return SessionState(self.login, who.name, who.role.value, ends_in_s, over)
+
+    def outlived(self, who: Identity) -> Person | None:
+        """Whose session is over by the clock alone; None where it goes on, or was ended by somebody."""
+        found = self._sessions.get(who.session)
+        if found is None or not self._is_over(found, self._now_s()):
+            return None
+        return self._people.get(found.person.casefold())
+
+    def is_known(self, person: Person) -> bool:
+        """The person is as before, with the same role and password."""
+        return self._people.get(person.name.casefold()) == person
+
+    def token_of(self, headers: Headers) -> str:
+        """The session's id in the request's cookie, empty where there is none."""
+        return cookie_parser(headers.get("cookie", "")).get(self.cookie, "")
+
     def session_of(self, headers: Headers) -> bytes:
-        """The hash of the session's id in the request's cookie, empty where there is none."""
-        token = cookie_parser(headers.get("cookie", "")).get(self.cookie, "")
+        """The hash of that id, empty where there is none."""
+        token = self.token_of(headers)
         return hashed_secret(token) if token else b""
 
-    async def sign_in(self, name: str, password: str, address: str) -> tuple[str, Identity] | None:
-        """The id of a new session and whose it is; None where name or password is wrong.
+    async def sign_in(
+        self, name: str, password: str, address: str, held: str = ""
+    ) -> tuple[str, Identity] | None:
+        """The id of a session that begins now, and whose it is; None where name or password is wrong.  It has
+        the id `held` where that is of a session of the same person that goes on: his pages stay open.
         TooManyAttemptsError, UnavailableError."""
         check = self._check
         if check is None:
@@ -145,7 +178,9 @@ class Access:
         fits = await self._trying.run(check.fits, password, kept)
         if person is None or not fits:
             return None
-        token, now_s = secrets.token_urlsafe(32), self._now_s()
+        going_on = self._session(hashed_secret(held)) if held else None
+        is_his = going_on is not None and going_on.person.casefold() == person.name.casefold()
+        token, now_s = held if is_his else secrets.token_urlsafe(32), self._now_s()
         session = Session(hashed_secret(token), person.name, now_s, now_s)
         async with self._changing:
             if not await asyncio.to_thread(self._book.begin, session, kept):
@@ -208,11 +243,12 @@ class Access:
         self._sessions = {session.id: session for session in sessions}
 
     def _tidy(self) -> None:
-        """Note when sessions were used last, and drop those that are over."""
-        now_s = self._now_s()
-        over = list(self._over(now_s))
-        if over:
-            self._book.end(*over)
+        """Note when sessions were used last, and drop those that are over for the second time: open pages
+        have seen by then that it was the clock that ended them."""
+        over = frozenset(self._over(self._now_s()))
+        if gone := over & self._found_over:
+            self._book.end(*gone)
+        self._found_over = over
         if self._seen:
             self._book.note_seen(self._seen.copy())
         for session in list(self._seen):

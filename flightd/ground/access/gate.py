@@ -15,7 +15,7 @@ from flightd.ground.access.access import Access, WrongKeyError
 from flightd.ground.access.roles import Identity
 from flightd.ground.access.route_roles import RULES, Line, Rule
 from flightd.ground.json_http import as_json
-from flightd.ground.messages import session_message
+from flightd.ground.messages import SessionState, session_message
 
 SIGN_IN_FIRST = 4401
 """WebSocket: nobody known asks; the page offers to sign in."""
@@ -147,5 +147,5 @@ async def _turn_away(receive: Receive, send: Send) -> None:
     await receive()
     await send({"type": "websocket.accept"})
     with contextlib.suppress(RuntimeError):  # it has closed by itself meanwhile
-        await send({"type": "websocket.send", "text": session_message(login=True, name="", role="")})
+        await send({"type": "websocket.send", "text": session_message(SessionState(login=True))})
         await send({"type": "websocket.close", "code": SIGN_IN_FIRST, "reason": "sign in first"})

@@ -121,7 +121,8 @@ class PeopleBook:
         self._change(name, "DELETE FROM person WHERE name = ?", ends=True)
 
     def begin(self, session: Session, password: str) -> bool:
-        """Keep a session; False where the person's password, by its hash, is not that one any more."""
+        """Keep a session, or begin it anew; False where the person's password, by its hash, is not that one
+        any more."""
         with self._database.changed() as book:
             book.execute(
                 "DELETE FROM session WHERE id IN"
@@ -129,7 +130,8 @@ class PeopleBook:
                 (MOST_SESSIONS - 1,),
             )
             begun = book.execute(
-                "INSERT INTO session SELECT ?, name, ?, ? FROM person WHERE name = ? AND password = ?",
+                "INSERT OR REPLACE INTO session"
+                " SELECT ?, name, ?, ? FROM person WHERE name = ? AND password = ?",
                 (session.id, session.began_s, session.seen_s, session.person, password),
             )
             return begun.rowcount == 1

@@ -21,7 +21,6 @@ from flightd.ground.access.attempts import TooManyAttemptsError
 from flightd.ground.access.audit import newest_entries
 from flightd.ground.access.gate import address_of
 from flightd.ground.access.passwords import MOST_CHARS
-from flightd.ground.access.roles import Identity
 from flightd.ground.json_http import as_json, is_json, json_body, status_of
 from flightd.ground.shown_text import shown
 
@@ -49,18 +48,18 @@ def session_routes(access: Access) -> list[BaseRoute]:
 
 
 async def _told(access: Access, request: Request) -> Response:
-    return as_json(_document(access, access.identify(request.scope)))
+    return as_json(access.session_state(access.identify(request.scope)))
 
 
 async def _sign_in(access: Access, request: Request) -> Response:
-    address = address_of(request.scope)
+    address, held = address_of(request.scope), access.token_of(request.headers)
     if not access.login:
         return as_json({"refused": "this station asks nobody who he is"}, 409)
     if not is_json(request):
         return as_json({"refused": "who signs in says so as JSON"}, 415)
     try:
         said = _read(await json_body(request, "a sign-in"))
-        signed_in = await access.sign_in(said.name, said.password, address)
+        signed_in = await access.sign_in(said.name, said.password, address, held)
     except TooManyAttemptsError as err:
         return as_json({"refused": str(err)}, 429, {"Retry-After": str(err.wait_s)})
     except FlightdError as err:
@@ -70,9 +69,10 @@ async def _sign_in(access: Access, request: Request) -> Response:
         access.write_down(None, address, "sign in", name, outcome="refused", text="name or password is wrong")
         return as_json({"refused": "name or password is wrong"}, 401)
     token, who = signed_in
-    await access.sign_out(access.session_of(request.headers))  # the one that this browser had before
+    if token != held:
+        await access.sign_out(access.session_of(request.headers))  # the one that this browser had before
     access.write_down(who, address, "sign in", name, outcome="accepted")
-    answer = as_json(_document(access, who))
+    answer = as_json(access.session_state(who))
     _set_cookie(access, answer, token, int(ABSOLUTE_S))
     return answer
 
@@ -82,7 +82,7 @@ async def _sign_out(access: Access, request: Request) -> Response:
     if who is not None and who.by == "password":
         await access.sign_out(who.session)
         access.write_down(who, address_of(request.scope), "sign out", who.name, outcome="accepted")
-    answer = as_json(_document(access, None))
+    answer = as_json(access.session_state(None))
     answer.headers["Clear-Site-Data"] = '"cache"'  # pictures that the browser has kept
     _set_cookie(access, answer, "", 0)
     return answer
@@ -107,8 +107,3 @@ def _read(body: bytes) -> SignIn:
         return _decode(body)
     except DECODE_ERRORS as err:
         raise InputError(f"not a sign-in: {err}") from None
-
-
-def _document(access: Access, who: Identity | None) -> dict[str, object]:
-    """As the topic `session` says it."""
-    return {"login": access.login, "name": who.name if who else "", "role": who.role.value if who else ""}

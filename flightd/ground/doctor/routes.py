@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import re
 from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
 from typing import Annotated, TypeAlias
 
 import msgspec
@@ -18,6 +19,7 @@ from starlette.routing import BaseRoute, Route
 
 from flightd.adapters.ground_link.messages.maintenance import SettingsAnswer, Value
 from flightd.core.errors import FlightdError
+from flightd.ground.access.access import Access
 from flightd.ground.access.gate import identity_of, note_act, person_of
 from flightd.ground.access.roles import Role
 from flightd.ground.doctor.known_settings import KnownSettings
@@ -115,7 +117,7 @@ class DoctorAnswers:
         return told
 
 
-def doctor_routes(drones: Mapping[str, DroneLink]) -> list[BaseRoute]:
+def doctor_routes(drones: Mapping[str, DroneLink], access: Access) -> list[BaseRoute]:
     """The page at /doctor and all that it asks for."""
     answers = DoctorAnswers()
 
@@ -132,7 +134,7 @@ def doctor_routes(drones: Mapping[str, DroneLink]) -> list[BaseRoute]:
         return Route(f"/api/doctor/{{drone}}/{path}", guarded, methods=[method])
 
     return [
-        Route("/api/doctor", _station, methods=["GET"]),
+        Route("/api/doctor", partial(_station, access), methods=["GET"]),
         at("report", answers.report, "GET"),
         at("fix", answers.fix, "POST"),
         at("settings", answers.settings, "GET"),
@@ -144,8 +146,10 @@ def doctor_routes(drones: Mapping[str, DroneLink]) -> list[BaseRoute]:
     ]
 
 
-async def _station(_request: Request) -> Response:
-    return as_json({"versions": await asyncio.to_thread(station_versions)})
+async def _station(access: Access, _request: Request) -> Response:
+    """What this station runs on, and how many lines of its audit its disk did not take."""
+    versions = await asyncio.to_thread(station_versions)
+    return as_json({"versions": versions, "audit_lost": access.audit_lost})
 
 
 def _shown(answer: Response, request: Request) -> Response:

@@ -15,6 +15,7 @@ from flightd.ground.access.attempts import TooManyAttemptsError
 from flightd.ground.access.passwords import hashed_password, hashed_secret, new_key
 from flightd.ground.access.people_book import PeopleBook, Person
 from flightd.ground.access.roles import QUELLING, Identity, Role, may_order
+from flightd.ground.page_person import PagePerson, Standing
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.waiting import until
 
@@ -99,6 +100,74 @@ def test_a_session_ends_when_it_is_not_used_and_after_a_shift_whatever_it_does(
             assert asking(access, used) is not None
         clock.now_s = end_s + 1
         assert asking(access, used) is None
+
+    run()
+
+
+def test_signing_in_again_goes_on_with_the_session_of_the_same_person_alone(
+    access: Access, book: PeopleBook, clock: Clock
+) -> None:
+    @in_real_time
+    async def run() -> None:
+        book.add(Person("ben", Role.OPERATOR, HASH))
+        access._read()  # noqa: SLF001 - as it does each second
+        token = await signed_in(access)
+        who = asking(access, token)
+        assert who is not None
+        clock.now_s += ABSOLUTE_S - 60
+        access._seen[who.session] = clock.now_s  # noqa: SLF001 - an open page
+        assert access.session_state(who).ends_in_s == 60
+        bens = await access.sign_in("ben", WORDS, "10.0.0.1", token)
+        assert bens is not None
+        assert bens[0] != token
+        assert await access.sign_in("ann", "wrong words here", "10.0.0.1", token) is None
+        assert access.session_state(who).ends_in_s == 60
+        again = await access.sign_in("ann", WORDS, "10.0.0.1", token)
+        assert again == (token, who)
+        access._read()  # noqa: SLF001
+        assert access.session_state(who).ends_in_s == ABSOLUTE_S
+        clock.now_s += ABSOLUTE_S + 1
+        over = await access.sign_in("ann", WORDS, "10.0.0.1", token)
+        assert over is not None
+        assert over[0] != token, "what is over does not begin again"
+
+    run()
+
+
+class Drone:
+    flies = True
+
+
+def test_a_session_that_the_clock_ends_in_flight_is_left_until_those_drones_have_landed(
+    access: Access, book: PeopleBook, clock: Clock
+) -> None:
+    @in_real_time
+    async def run() -> None:
+        drones = {"a": Drone(), "b": Drone()}
+        drones["b"].flies = False
+        tokens = [await signed_in(access) for _ in range(3)]
+        identities = [who for who in (asking(access, token) for token in tokens) if who is not None]
+        people = [PagePerson(who, access, drones) for who in identities]
+        assert {person.standing() for person in people} == {Standing.SIGNED_IN}
+        await access.sign_out(identities[2].session)
+        assert people[2].standing() is Standing.GONE, "who signs out is gone, whatever flies"
+        clock.now_s += ABSOLUTE_S + 1
+        assert [person.standing() for person in people[:2]] == [Standing.OVER] * 2
+        state = people[0].session_state()
+        assert (state.name, state.over, state.ends_in_s) == ("ann", True, 0.0)
+        assert asking(access, tokens[0]) is None, "no other request is answered"
+        for dropped in (False, True):
+            access._tidy()  # noqa: SLF001 - as it does each minute
+            access._read()  # noqa: SLF001
+            assert (access._sessions == {}) is dropped, "an open page sees once why it is over"  # noqa: SLF001
+            assert people[0].standing() is Standing.OVER
+        drones["b"].flies, drones["a"].flies = True, False
+        assert people[0].standing() is Standing.GONE, "b took off since"
+        drones["a"].flies = True
+        assert people[1].standing() is Standing.OVER
+        book.set_password("ann", hashed_password("another horse battery", "ann"))
+        access._read()  # noqa: SLF001
+        assert people[1].standing() is Standing.GONE
 
     run()
 

@@ -1,5 +1,6 @@
 // Acts of the person: sent to the drone, the same one again until it is answered, done once.
 import { english } from "./language.js";
+import { isOver } from "./access/session.js";
 import { sendAct } from "./connection.js";
 import { shown, state, update } from "./store.js";
 
@@ -36,7 +37,7 @@ async function sent(drone, given, urgent) {
   const bySocket = sendAct(drone, given);
   const soon = await Promise.race([bySocket, passed(SOCKET_MS)]);
   const { status, ...answer } = soon ?? (await first(bySocket, posted(drone, given, urgent)));
-  return { again: !status || status === 503, ...answer };
+  return { again: !status || status === 503 || (status === 401 && isOver()), ...answer }; // only the socket knows the person then
 }
 
 async function posted(drone, given, urgent) {

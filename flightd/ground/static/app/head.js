@@ -1,5 +1,6 @@
 // The head: pages, which site and drone, how well it is heard, and STOP, always in reach.
 import { PersonMenu } from "./access/person.js";
+import { isOver } from "./access/session.js";
 import { act } from "./acts.js";
 import { html } from "./html.js";
 import { LANGUAGES, keep, language, say, speak } from "./language.js";
@@ -22,12 +23,24 @@ export function Head() {
   `;
 }
 
-export const Brand = () => html`
+// While somebody has to sign in; over a drone that flew as the session ended with STOP.
+export function SignInHead() {
+  return html`
+    <header class="head">
+      <${Brand} />
+      ${isOver() && html`<${Drones} /><${Hearing} />`}
+      <${Language} />
+      ${isOver() && html`<${Stop} />`}
+    </header>
+  `;
+}
+
+const Brand = () => html`
   <h1 class="brand"><img src="/static/icon.svg" alt="" width="28" height="28" /><span>flightd</span></h1>
 `;
 
 // To the other language.
-export function Language() {
+function Language() {
   const other = Object.keys(LANGUAGES).find((one) => one !== language());
   const turn = () =>
     speak(other).then(

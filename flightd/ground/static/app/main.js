@@ -5,6 +5,7 @@ import { preferred, speak } from "./language.js";
 import { listenForKeys } from "./keys.js";
 import { Page } from "./page.js";
 import { followLinks, retitle } from "./router.js";
+import { keepScreenOn } from "./screen.js";
 import { watch } from "./store.js";
 
 const root = document.getElementById("page");
@@ -13,6 +14,7 @@ const draw = () => render(html`<${Page} />`, root);
 const SPOKEN_MS = 3000; // a station that gives no texts by then is read in English
 
 listenForKeys();
+keepScreenOn();
 followLinks();
 connect();
 await Promise.race([speak(preferred()), new Promise((resolve) => setTimeout(resolve, SPOKEN_MS))]).catch(() => {});

@@ -1,23 +1,25 @@
 // The frame of every page: head with STOP, what is wrong with the connection, and the page that is gone to.
 import { Boundary } from "./boundary.js";
-import { Brand, Head, Language } from "./head.js";
+import { Head, SignInHead } from "./head.js";
 import { html } from "./html.js";
 import { say, sayWith } from "./language.js";
 import { forget, loaded } from "./page_loader.js";
 import { Silence } from "./silence.js";
 import { mustSignIn } from "./access/session.js";
+import { EndsSoon, FliesOn } from "./access/session_end.js";
 import { SIGN_IN } from "./pages.js";
 import { state, update } from "./store.js";
 
 export function Page() {
   if (mustSignIn()) {
-    return html`<header class="head"><${Brand} /><${Language} /></header><main id="main"><${Loaded} page=${SIGN_IN} /></main>`;
+    return html`<${SignInHead} /><main id="main"><${FliesOn} /><${Loaded} page=${SIGN_IN} /></main>`;
   }
   return html`
     <a class="skip" href="#main">${say("To the page")}</a>
     <${Head} />
     <main id="main" tabindex="-1">
       <${Silence} />
+      <${EndsSoon} />
       <${Boundary} route=${state.route}><${Shown} route=${state.route} /><//>
     </main>
   `;

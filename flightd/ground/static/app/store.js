@@ -18,7 +18,7 @@ const TRACK_STEP_M = 0.05;
 const TRACK_KEPT = 4000;
 
 export const state = {
-  session: null, // who is signed in: {login, name, role}; see access/session.js
+  session: null, // who is signed in: {login, name, role, over, endsAt}; see access/session.js
   route: null, // page, path below it and query: see router.js
   stock: null, // see stock/stock_state.js
   missions: null, // see missions/missions_state.js
@@ -27,6 +27,7 @@ export const state = {
   selected: "", // drone that is shown and commanded
   socket: { open: false, heardAt: 0, roundTripMs: null, dropped: 0, picturesDropped: 0 },
   chosenNode: "", // where "go to" leads
+  screen: "", // "kept on" or "may lock" while a drone flies: see screen.js
   followed: false, // the map shows the drone's surroundings, not the whole site
   acts: new Map(), // newest act of each drone: {command, state, text, at}
 };
@@ -58,7 +59,7 @@ export function take({ drone, topic, value }) {
   update((s) => {
     s.socket.heardAt = performance.now();
     if (drone === "") {
-      if (topic === "session") s.session = value;
+      if (topic === "session") s.session = sessionOf(value);
       if (topic === "station") takeStation(s, value);
       if (topic === "echo") takeEcho(s, value);
       return;
@@ -67,6 +68,9 @@ export function take({ drone, topic, value }) {
     s.drones.set(drone, { ...known, ...changed(known, topic, value) });
   });
 }
+
+// `ends_in_s` as a time by performance.now(), for it is told only now and then.
+export const sessionOf = (told) => ({ ...told, endsAt: performance.now() + (told.ends_in_s ?? Infinity) * 1000 });
 
 function takeStation(s, value) {
   s.station = value;

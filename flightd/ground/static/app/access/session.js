@@ -1,11 +1,14 @@
 // Who is signed in, and what that person may: the server refuses the rest whatever is shown here.
 import { english } from "../language.js";
-import { state, update } from "../store.js";
+import { sessionOf, state, update } from "../store.js";
 
 const ANSWER_MS = 20000;
 
-// The station asks everybody who he is, and nobody is signed in here.
-export const mustSignIn = () => Boolean(state.session?.login && !state.session.name);
+// The station asks everybody who he is, and nobody is signed in here, or not any more.
+export const mustSignIn = () => Boolean(state.session?.login && (!state.session.name || isOver()));
+
+// The session ended while a drone flew: until it has landed STOP and Pause are left, and the page attends.
+export const isOver = () => Boolean(state.session?.over);
 
 // A viewer looks on and stops; until the station has said who somebody is, nothing is held back.
 export const mayOperate = () => state.session?.role !== "viewer";
@@ -19,7 +22,7 @@ export const signedInName = () => (state.session?.login ? state.session.name : "
 export async function signIn(name, password) {
   const session = await asked("POST", { name, password });
   update((s) => {
-    s.session = session;
+    s.session = sessionOf(session);
   });
 }
 
@@ -27,7 +30,7 @@ export async function signIn(name, password) {
 export async function signOut() {
   const session = await asked("DELETE");
   update((s) => {
-    s.session = session;
+    s.session = sessionOf(session);
   });
 }
 

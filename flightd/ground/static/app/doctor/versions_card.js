@@ -1,13 +1,8 @@
 // What drone and station run on, for who is asked why something does not work.
-import { askJson } from "../fetching.js";
-import { html, useEffect, useState } from "../html.js";
+import { html } from "../html.js";
 import { say } from "../language.js";
 
-export function VersionsCard({ drone, versions }) {
-  const [station, setStation] = useState(null);
-  useEffect(() => {
-    askJson("/api/doctor").then((told) => setStation(told.versions)).catch(() => {});
-  }, []);
+export function VersionsCard({ drone, versions, station }) {
   const differ = versions && station && versions.flightd !== station.flightd;
   return html`
     <section class="card versions" aria-labelledby="versions-title">

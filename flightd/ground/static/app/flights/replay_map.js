@@ -1,7 +1,7 @@
 // The map at a time of the playback: of one flight, or of two over each other.
 import { html, useMemo } from "../html.js";
 import { english, quoted, say, sayWith } from "../language.js";
-import { around, Drone, Legend, M, markScale, Nodes, Track, Way } from "../live/map_marks.js";
+import { around, Drone, Legend, M, markScale, Nodes, Seen, Track, Way } from "../live/map_marks.js";
 import { bounds, Floor } from "../live/site_plan.js";
 import { state, update } from "../store.js";
 import { lastBefore, momentAt, pointsUntil, poseAt, seenAt, visitedAt, wayAt } from "./at_time.js";
@@ -72,14 +72,6 @@ function StillNodes({ flight, t, scale }) {
     () => html`<${Nodes} floor=${floor} visited=${visitedAt(flight, t)} goal=${goal} scale=${scale} />`,
     [flight, visited, goal, scale],
   );
-}
-
-function Seen({ lines }) {
-  return html`
-    <g class="seen" aria-hidden="true">
-      ${lines.map(([x0, y0, x1, y1]) => html`<line x1=${x0 * M} y1=${y0 * M} x2=${x1 * M} y2=${y1 * M} />`)}
-    </g>
-  `;
 }
 
 function Flown({ one, scale }) {

@@ -58,4 +58,6 @@ export default {
   "Drone and station are not of the same version: update the older.": "Drohne und Station haben nicht dieselbe Version: Aktualisieren Sie die ältere.",
   "Part": "Teil",
   "Station": "Station",
+  "{n} line of this station’s audit is lost: its disk is full, or too slow.|{n} lines of this station’s audit are lost: its disk is full, or too slow.": "{n} Zeile im Protokoll dieser Station ist verloren: Ihr Datenträger ist voll oder zu langsam.|{n} Zeilen im Protokoll dieser Station sind verloren: Ihr Datenträger ist voll oder zu langsam.",
+  "{drone} has lost {n} answer, event or line of its audit: a queue or its disk was full.|{drone} has lost {n} answers, events or lines of its audit: a queue or its disk was full.": "{drone} hat {n} Antwort, Ereignis oder Protokollzeile verloren: Eine Warteschlange oder der Datenträger war voll.|{drone} hat {n} Antworten, Ereignisse oder Protokollzeilen verloren: Eine Warteschlange oder der Datenträger war voll.",
 };

@@ -56,4 +56,5 @@ export default {
   "Start one:": "Starten Sie eine:",
   "Node {node}, visited": "Knoten {node}, besucht",
   "Legend": "Legende",
+  "This browser cannot keep the screen on, and a page on a locked screen does not attend: keep it on in the settings of the device.": "Dieser Browser kann den Bildschirm nicht anlassen, und eine Seite auf einem gesperrten Bildschirm führt keine Aufsicht: Lassen Sie ihn in den Einstellungen des Geräts an.",
 };

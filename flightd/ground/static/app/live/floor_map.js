@@ -1,17 +1,21 @@
-// The live map: the site to scale, and on it the drone, how sure it is of its place, where it was and flies next.
+// The live map: the site to scale, and on it the drone, how sure it is of its place, the lines that it sees, where it
+// was and flies next.
 import { html, useMemo } from "../html.js";
 import { english, say } from "../language.js";
 import { shown, state, update } from "../store.js";
-import { around, ChoosableNodes, Drone, Legend, M, markScale, Track, Way } from "./map_marks.js";
+import { around, ChoosableNodes, Drone, Legend, M, markScale, Seen, Track, Way } from "./map_marks.js";
 import { Floor, bounds } from "./site_plan.js";
 
 const MARKS = [
   ["leg", english("next leg")],
   ["way", english("way after it")],
   ["track", english("track")],
+  ["seen", english("lines seen")],
   ["visited", english("visited")],
   ["keep", english("keep out")],
 ];
+const SEEN_M = 1; // of a line that is seen, to both sides of the drone
+const SEEN_S = 1; // and no longer ago
 
 export function FloorMap({ floor }) {
   const box = useMemo(() => bounds(floor), [floor]);
@@ -36,6 +40,7 @@ export function FloorMap({ floor }) {
         style=${{ "--scale": scale }}
       >
         ${plan}
+        <${Seen} lines=${seenLines(status)} />
         <${Way} from=${position} way=${way} />
         <${Track} points=${track} />
         <${ChoosableNodes}
@@ -49,6 +54,15 @@ export function FloorMap({ floor }) {
       </div>
     </section>
   `;
+}
+
+// Where on the map the lines lie that the drone sees now: it tells how far each is from itself.
+function seenLines(status) {
+  if (!status?.position || status.lines_age_s === null || status.lines_age_s > SEEN_S) return [];
+  const { x_m: x, y_m: y } = status.position;
+  return status.lines.map(({ runs, offset_m: offset }) =>
+    runs === "along" ? [x - SEEN_M, y + offset, x + SEEN_M, y + offset] : [x + offset, y - SEEN_M, x + offset, y + SEEN_M],
+  );
 }
 
 function Follow() {

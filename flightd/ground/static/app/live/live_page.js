@@ -2,6 +2,7 @@
 import { hears } from "../hearing.js";
 import { html } from "../html.js";
 import { say } from "../language.js";
+import { isAttending } from "../screen.js";
 import { shown, state } from "../store.js";
 import { Acts } from "./acts_card.js";
 import { Camera } from "./camera.js";
@@ -22,6 +23,7 @@ export default function LivePage() {
       <div class="side">
         ${status && html`<${Phase} status=${status} />`}
         ${status && html`<${Hazards} hazards=${status.hazards} />`}
+        ${state.screen === "may lock" && isAttending(shown()) && html`<p class="quiet" role="status">${say("This browser cannot keep the screen on, and a page on a locked screen does not attend: keep it on in the settings of the device.")}</p>`}
         ${status && html`<${Acts} key=${state.selected} status=${status} welcome=${welcome} />`}
       </div>
       <div class="sight">

@@ -35,6 +35,15 @@ export function Track({ points, kind = "" }) {
   return html`<polyline class=${kind ? `track ${kind}` : "track"} points=${line} aria-hidden="true" />`;
 }
 
+// Lines that the drone sees: [x0_m, y0_m, x1_m, y1_m].
+export function Seen({ lines }) {
+  return html`
+    <g class="seen" aria-hidden="true">
+      ${lines.map(([x0, y0, x1, y1]) => html`<line x1=${x0 * M} y1=${y0 * M} x2=${x1 * M} y2=${y1 * M} />`)}
+    </g>
+  `;
+}
+
 // The nodes, to choose one of them by mouse or keys.
 export function ChoosableNodes({ floor, visited, goal, chosen, onChoose, scale }) {
   const inTabOrder = chosen || floor.home;

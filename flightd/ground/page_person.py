@@ -1,0 +1,61 @@
+"""Who sits at a page that is open, and what is left of a session that ends while a drone flies."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from typing import Protocol
+
+from flightd.ground.access.access import Access
+from flightd.ground.access.people_book import Person
+from flightd.ground.access.roles import Identity
+from flightd.ground.messages import SessionState
+
+
+class Flies(Protocol):
+    """A drone, as far as it matters here."""
+
+    @property
+    def flies(self) -> bool:
+        """It is in the air."""
+        ...
+
+
+class Standing(enum.Enum):
+    """What somebody is to the station by now."""
+
+    SIGNED_IN = enum.auto()
+    CHANGED = enum.auto()
+    """With another role."""
+    OVER = enum.auto()
+    """His session is over, a drone that flew then flies still: he attends, stops and pauses."""
+    GONE = enum.auto()
+
+
+class PagePerson:
+    """Asked again and again: whose session the clock ends stays for STOP and Pause until each drone that flew
+    then has landed.  Who signed out, was removed or got another password or role does not."""
+
+    def __init__(self, who: Identity, access: Access, drones: Mapping[str, Flies]) -> None:
+        self._who = who
+        self._access = access
+        self._drones = drones
+        self._outlived: Person | None = None
+        self._flying: tuple[Flies, ...] | None = None
+        """Those that flew as the session ended."""
+
+    def standing(self) -> Standing:
+        """By now."""
+        if self._flying is None:
+            now = self._access.renewed(self._who)
+            if now is not None:
+                return Standing.SIGNED_IN if now == self._who else Standing.CHANGED
+            self._outlived = self._access.outlived(self._who)
+            self._flying = tuple(drone for drone in self._drones.values() if drone.flies)
+        if self._outlived is None or not self._access.is_known(self._outlived):
+            return Standing.GONE
+        return Standing.OVER if any(drone.flies for drone in self._flying) else Standing.GONE
+
+    def session_state(self) -> SessionState:
+        """For the page."""
+        return self._access.session_state(self._who, over=self.standing() is Standing.OVER)
