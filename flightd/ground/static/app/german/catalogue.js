@@ -6,12 +6,14 @@ import frame from "./frame.js";
 import guide from "./guide.js";
 import live from "./live.js";
 import missions from "./missions.js";
+import refusals from "./refusals.js";
 import reported from "./reported.js";
 import site from "./site.js";
 import stock from "./stock.js";
 import studio from "./studio.js";
 
-export const REPORTED = reported;
+export { readerOf } from "./reading.js";
+export const REPORTED = { ...reported, ...refusals };
 export const TEXTS = Object.assign(
-  Object.create(null), access, doctor, flights, frame, guide, live, missions, reported, site, stock, studio,
+  Object.create(null), access, doctor, flights, frame, guide, live, missions, reported, refusals, site, stock, studio,
 );

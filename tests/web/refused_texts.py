@@ -1,0 +1,189 @@
+"""The texts that the program hands to a page for a person to read: refusals, findings, troubles, events.
+
+Read from the source: what is raised, answered as a refusal, or named as a problem, with its fields as {}.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import flightd
+
+ROOT = Path(flightd.__file__).parent
+SOURCES = (
+    "adapters/ground_link/client.py",
+    "adapters/ground_link/link.py",
+    "adapters/ground_link/maintenance_desk.py",
+    "adapters/ground_link/maintenance_rules.py",
+    "adapters/ground_link/plan_answers.py",
+    "adapters/ground_link/request_handler.py",
+    "app/maintenance",
+    "config/remote_change.py",
+    "core/errors.py",
+    "core/exposure.py",
+    "core/extras.py",
+    "core/paint.py",
+    "ground",
+    "inventory/stock_columns.py",
+    "inventory/stock_table.py",
+    "inventory/uploaded_stock.py",
+    "mission",
+    "replay/log.py",
+    "replay/log_chunks.py",
+    "replay/log_skim.py",
+    "replay/playback",
+    "site",
+    "vision/lens_calibration.py",
+    "vision/training/colour_training.py",
+)
+"""Where a page's texts come from."""
+NO_PAGE = {
+    "ground/drone_names.py": "options of the command line",
+    "ground/foxglove_view": "options of the command line, and Foxglove's own connection",
+    "ground/guide_pages/rendering.py": "markup of the guide, which is English",
+    "ground/server.py": "options of the command line",
+    "ground/tls.py": "options of the command line",
+    "site/aisle_grid.py": "lines of a site file",
+    "site/floor_plan_svg.py": "the floor plan as a document",
+}
+"""What of that no page shows."""
+STAYS_ENGLISH = {
+    "no role is set for {}: add it to route_roles.py": "an error of ours: the station does not start",
+    "{}: it takes every method; name those that it has": "an error of ours: the station does not start",
+    "no role can be set for {}": "an error of ours: the station does not start",
+    "expected {}": "an option of the command line",
+    "belong together: yours, and the daemon's public one": "an option of the command line",
+    "ground.listen {}, {} {}: {}; give an address of this machine and a free port": "the daemon does not start",
+    "no phase {} to {}": "an error of ours",
+    "{} trouble": "the name of a topic",
+    "ceiling_m = {}": "a line of a site file",
+    "interlock = true": "a line of a site file",
+    "by {} ({})": "the end of what was done, which has its German as a whole",
+    "by {}": "the end of what was done, which has its German as a whole",
+    "settings changed: ": "the beginning of what was done, which has its German as a whole",
+    "{}s {} and {}": "aisles and levels, which have their German together",
+}
+"""Texts without German, and why."""
+EXAMPLES = {
+    "the {} camera delivers no picture": "the down camera delivers no picture",
+    "this flight uses no {} camera": "this flight uses no front camera",
+}
+"""Texts whose fields are no names."""
+
+_ERRORS = re.compile(r"(?!Type|Runtime|Assertion)\w*Error")
+_CALLS = frozenset(
+    {"Event", "Room", "SiteMistake", "Threads", "_finding", "append", "note", "refusal", "report"}
+)
+"""What is called with texts for a person."""
+_NAMES = frozenset(
+    {"checks", "figure", "form", "missing", "note", "notes", "over", "problem", "problems", "reason", "reasons",
+     "refusal", "refused", "remedy", "shown", "text", "top", "trouble", "unshown", "what", "where", "why"}
+)  # fmt: skip
+"""Names, arguments, attributes and keys that hold such texts."""
+_PLACED = frozenset({"file", "key", "source", "path"})
+"""Arguments of an error that say where it is."""
+_WORDS = re.compile(r"[a-z]{2}\S* |[a-z] \S*[a-z]{2}|\} [a-z]")
+"""A path, a name, a unit has none."""
+_KEY = re.compile(r"\w+(?:\[\{\}\])? \(\{\}\)(?:\.\w+)?")
+"""A key of a site file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """A text as the source has it; `fields` are {} in it."""
+
+    text: str
+    where: str
+
+    @property
+    def example(self) -> str:
+        """The text with its fields filled in."""
+        return EXAMPLES.get(self.text, self.text.replace("{}", "X7"))
+
+
+def refused_texts() -> list[Refused]:
+    """All that pages may show of what the program says, in the order of the source."""
+    paths = [ROOT / one for one in SOURCES]
+    modules = [one for path in paths for one in (sorted(path.rglob("*.py")) if path.is_dir() else [path])]
+    skipped = tuple(str(ROOT / one) for one in NO_PAGE)
+    return [one for path in modules if not str(path).startswith(skipped) for one in _of(path)]
+
+
+def _of(path: Path) -> Iterator[Refused]:
+    tree = ast.parse(path.read_text())
+    known = {
+        _name(node.targets[0]): node.value.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
+    }
+    seen: set[str] = set()
+    for node in ast.walk(tree):
+        for expression in _texts_of(node):
+            for text, line in _literals(expression, known):
+                whole = f"{{}}{text}" if text.startswith(" ") else text
+                if _WORDS.search(whole) and not _KEY.fullmatch(whole) and whole not in seen:
+                    seen.add(whole)
+                    yield Refused(whole, f"{path.relative_to(ROOT)}:{line}")
+
+
+def _texts_of(node: ast.AST) -> Iterator[ast.expr]:
+    """Expressions whose texts are for a person."""
+    match node:
+        case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
+            if _ERRORS.fullmatch(name) or name in _CALLS:
+                yield from node.args
+                yield from (one.value for one in node.keywords if one.arg not in _PLACED)
+            else:
+                yield from (one.value for one in node.keywords if one.arg in _NAMES)
+        case ast.Dict(keys=keys, values=values):
+            for key, value in zip(keys, values, strict=True):
+                if isinstance(key, ast.Constant) and key.value in _NAMES:
+                    yield value
+        case ast.Assign(targets=[target], value=value) | ast.AnnAssign(
+            target=target, value=ast.expr() as value
+        ):
+            if _name(target).lower().lstrip("_") in _NAMES:
+                yield value
+        case ast.Return(value=ast.expr() as value) | ast.Yield(value=ast.expr() as value):
+            yield value
+
+
+def _name(target: ast.expr) -> str:
+    match target:
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            return name
+    return ""
+
+
+def _literals(expression: ast.expr, known: Mapping[str, object]) -> Iterator[tuple[str, int]]:
+    """The texts that the expression can be, or is made of, with their lines; `known`: constants."""
+
+    def inner(*others: ast.expr) -> Iterator[tuple[str, int]]:
+        for one in others:
+            yield from _literals(one, known)
+
+    match expression:
+        case ast.Constant(value=str(text)):
+            yield text, expression.lineno
+        case ast.JoinedStr(values=values):
+            yield "".join(_part(one, known) for one in values), expression.lineno
+            yield from inner(*(one.value for one in values if isinstance(one, ast.FormattedValue)))
+        case ast.IfExp(body=body, orelse=other):
+            yield from inner(body, other)
+        case ast.BoolOp(values=values) | ast.Tuple(elts=values) | ast.List(elts=values):
+            yield from inner(*values)
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            yield from inner(left, right)
+
+
+def _part(part: ast.expr, known: Mapping[str, object]) -> str:
+    match part:
+        case ast.Constant(value=text):
+            return str(text)
+        case ast.FormattedValue(value=ast.Name(id=name)) if isinstance(known.get(name), str):
+            return str(known[name])
+    return "{}"
