@@ -1,5 +1,6 @@
 // All German texts.  A text that is said on several pages stands in frame.js.
 import access from "./access.js";
+import checks from "./checks.js";
 import doctor from "./doctor.js";
 import flights from "./flights.js";
 import frame from "./frame.js";
@@ -13,7 +14,7 @@ import stock from "./stock.js";
 import studio from "./studio.js";
 
 export { readerOf } from "./reading.js";
-export const REPORTED = { ...reported, ...refusals };
+export const REPORTED = { ...checks, ...refusals, ...reported };
 export const TEXTS = Object.assign(
-  Object.create(null), access, doctor, flights, frame, guide, live, missions, reported, refusals, site, stock, studio,
+  Object.create(null), access, checks, doctor, flights, frame, guide, live, missions, reported, refusals, site, stock, studio,
 );

@@ -4,6 +4,9 @@ const MOST_KEPT = 500;
 const MOST_PARTS = 8; // of a text that is taken to pieces
 const PLACE = /\{(\w+)\}/;
 const NAME = /^(?:\S*|'.*'|".*"|\S+ \(\S*\)\S*)$/s; // one word, quoted, or a key as `pad[0] (home).node`
+const LIST = /^\S+(?:, \S+)+$/;
+// Fields that are shown as they are, even where such a word has its German.
+const VERBATIM = new Set(["columns", "drone", "file", "folder", "home", "key", "known", "name", "node", "pad", "person", "site", "url"]);
 
 // A function from such a text to its parts: {text, foreign: it stays English}.  `texts`: {english: german}, with
 // {names} in those that are `reported`; `decimal` writes a number with so many decimals.
@@ -22,23 +25,43 @@ export function readerOf(texts, reported, decimal) {
   function* ways(text) {
     const whole = texts[text] ?? texts[text.charAt(0).toLowerCase() + text.slice(1)];
     if (whole !== undefined) yield [{ text: whole }];
+    const doubtful = []; // a name that looks like none may be another text
     for (const { pattern, names, german } of patterns) {
-      const found = pattern.exec(text);
-      if (found) yield german.flatMap((part, i) => (i % 2 ? figure(found[names.indexOf(part) + 1]) : [{ text: part }]));
+      const found = pattern.exec(text)?.slice(1);
+      if (!found) continue;
+      const parts = german.flatMap((part, i) => (i % 2 ? filled(part, found[names.indexOf(part)]) : [{ text: part }]));
+      if (names.every((name, i) => !VERBATIM.has(name) || isName(found[i]))) yield parts;
+      else doubtful.push(parts);
     }
-    if (text.endsWith(".")) yield [...read(text.slice(0, -1)), { text: "." }];
-    const places = [...text.matchAll(/[;:] /g)];
-    if (places.length >= MOST_PARTS) return;
-    for (const { index, 0: between } of places) {
-      if (index > 0) yield [...figure(text.slice(0, index)), { text: between }, ...figure(text.slice(index + 2))];
-    }
+    yield* composed(text);
+    yield* doubtful;
   }
+
+  // As what stands between signs.
+  function* composed(text) {
+    if (text.endsWith(".")) yield [...read(text.slice(0, -1)), { text: "." }];
+    const places = [...text.matchAll(/[;:] /g)].filter(({ index }) => index > 0);
+    if (places.length <= MOST_PARTS) {
+      for (const { index, 0: sign } of places) {
+        yield [...figure(text.slice(0, index)), { text: sign }, ...figure(text.slice(index + 2))];
+      }
+    }
+    const [, found, remedy] = /^(.+?) \((.+)\)$/s.exec(text) ?? [];
+    if (found) yield [...figure(found), { text: " (" }, ...figure(remedy), { text: ")" }];
+    const listed = places.length ? [] : text.split(", ");
+    if (listed.length > 1) yield* onlyKnown(listed.flatMap((one, i) => [...(i ? [{ text: ", " }] : []), ...figure(one)]));
+    const [, count, counted] = /^(\d+ )(.+)$/s.exec(text) ?? [];
+    if (count) yield* onlyKnown([{ text: count }, ...read(counted)]);
+  }
+
+  const isName = (text) => NAME.test(text) || LIST.test(text) || !/[a-z]{2}/.test(text);
+  const filled = (name, text) => (VERBATIM.has(name) && isName(text) ? [{ text }] : figure(text));
 
   // What stands in such a text: a number, a name, or another text.
   function figure(text) {
     const [, digits] = /^-?\d+\.(\d+)$/.exec(text) ?? [];
     if (digits) return [{ text: decimal(Number(text), digits.length) }];
-    return NAME.test(text) || !/[a-z]{2}/.test(text) ? [{ text: texts[text] ?? text }] : read(text);
+    return isName(text) && !LIST.test(text) ? [{ text: texts[text] ?? text }] : read(text);
   }
 
   return (text) => {
@@ -46,6 +69,8 @@ export function readerOf(texts, reported, decimal) {
     return read(text);
   };
 }
+
+const onlyKnown = (parts) => (parts.some(({ foreign }) => foreign) ? [] : [parts]);
 
 // Of the ways to read a text the first that leaves nothing English, else the one that leaves least.
 function leastForeign(ways) {
