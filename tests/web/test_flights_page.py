@@ -279,7 +279,7 @@ def test_a_broken_log_is_played_as_far_as_it_goes(browser: Browser, url: str) ->
 def test_a_report_opens_beside_and_reaches_nothing_of_the_station(browser: Browser, url: str) -> None:
     with opened(browser, f"{url}/flights") as page:
         open_flight(page, url)
-        with page.context.expect_page() as other:
+        with page.context.expect_page(timeout=60_000) as other:
             page.get_by_role("link", name="Report").click()
         report = other.value
         expect(report.get_by_role("heading", name="Mission completed")).to_be_visible(timeout=60_000)

@@ -65,6 +65,20 @@ def test_moving_keeps_the_document_and_its_link_to_the_drones(browser: Browser, 
     assert sockets == [], "another one would mean that the first was closed: nobody attended meanwhile"
 
 
+def test_a_page_wears_its_own_styles_wherever_one_comes_from(browser: Browser, url: str) -> None:
+    """Those of pages seen before would change what has the same class there."""
+    rules = """() => [...document.styleSheets, ...document.adoptedStyleSheets]
+        .flatMap((sheet) => [...sheet.cssRules].map((rule) => rule.cssText))"""
+    with opened(browser, f"{url}/flights") as page:
+        expect(page.get_by_role("main").get_by_role("heading").first).to_be_visible()
+        straight = page.evaluate(rules)
+        for name in ("Site", "Studio", "Missions", "Doctor", "Stock", "Flights"):
+            page.get_by_role("link", name=name, exact=True).click()
+            expect(page).to_have_title(re.compile(f"^{name}"))
+            expect(page.get_by_text("Loading …")).to_have_count(0)
+        assert page.evaluate(rules) == straight
+
+
 def test_one_moves_by_keyboard_and_goes_on_with_the_new_pages_first_thing(browser: Browser, url: str) -> None:
     with opened(browser, url) as page:
         lose_the_way(page)

@@ -1,8 +1,8 @@
 """The painted lines along which the drone meant to fly, at any time of a flight.
 
-What is meant comes from the daemon's statuses: the stop that it flies to, and the node at which it believed
-to be when it chose that stop.  Where it really was is no part of it, so a drone in the wrong aisle is as far
-from its leg as the aisles are from each other.
+What is meant comes from the daemon's statuses: the stop that it flies to, the node at which it believed to be
+when it chose that stop, and the place beside it from which it looks at a shelf again.  Where it really was is
+no part of it, so a drone in the wrong aisle is as far from its leg as the aisles are from each other.
 """
 
 from __future__ import annotations
@@ -22,9 +22,12 @@ from flightd.site.ways import NoWayError
 
 _ROUND_A_CORNER_S = 2.0
 """So long after a stop is reached the leg to it still counts: the drone comes to rest, and turns."""
+_BESIDE_M = 1.0
+"""A view from further beside its node is none that a scan takes: it is not believed."""
 _WHEREVER = frozenset({Phase.RELOCATE, Phase.RECOVER})
 """It says itself that it does not know where it is: any line is right."""
 
+_Place = tuple[float, float]
 Segment = tuple[float, float, float, float]
 """x and y of both ends, m."""
 
@@ -59,17 +62,45 @@ def off_leg(site: Site, start: str, statuses: Sequence[Status], motion: TrueMoti
 def _legs(site: Site, start: str, statuses: Sequence[Status]) -> Iterator[_Leg]:
     everywhere = tuple(_between(site, edge.a, edge.b) for edge in site.edges)
     goal, wherever, here = "", False, start
+    view: _Place | None = None
+    way: tuple[Segment, ...] = ()
     lines: tuple[Segment, ...] = ()
     for status in statuses:
         anywhere = status.phase in _WHEREVER
         here = status.node or here  # on a pad it sees no lines, and tells no node
-        if status.goal == goal and anywhere is wherever:
+        looks_from = _view(site, status)
+        if (status.goal, anywhere, looks_from) == (goal, wherever, view):
             continue
-        before, arrived = lines, here == goal
-        goal, wherever = status.goal, anywhere
-        lines = everywhere if anywhere else _way(site, here, goal)
-        until_s = status.stamp_ns * 1e-9 + _ROUND_A_CORNER_S if arrived else math.inf
-        yield _Leg(status.stamp_ns * 1e-9, lines, _incident(site, before, here, arrived=arrived), until_s)
+        begins_s, before = status.stamp_ns * 1e-9, lines
+        if (status.goal, anywhere) == (goal, wherever):
+            lines = (*way, *_to_view(site, goal, view, looks_from))
+            view = looks_from
+            yield _Leg(begins_s, lines, before, begins_s + _ROUND_A_CORNER_S)
+            continue
+        arrived = here == goal
+        goal, wherever, view = status.goal, anywhere, looks_from
+        way = everywhere if anywhere else _way(site, here, goal)
+        lines = (*way, *_to_view(site, goal, None, view))
+        until_s = begins_s + _ROUND_A_CORNER_S if arrived else math.inf
+        yield _Leg(begins_s, lines, _incident(site, before, here, arrived=arrived), until_s)
+
+
+def _view(site: Site, status: Status) -> _Place | None:
+    """The place beside the node of its stop from which it looks at a shelf; None over the node."""
+    x_m, y_m = status.view_x_m, status.view_y_m
+    node = site.nodes.get(status.goal)
+    if node is None or x_m is None or y_m is None:
+        return None
+    return (x_m, y_m) if math.hypot(x_m - node.x_m, y_m - node.y_m) <= _BESIDE_M else None  # NaN: none
+
+
+def _to_view(site: Site, goal: str, before: _Place | None, view: _Place | None) -> tuple[Segment, ...]:
+    """From the node of a stop, and from the view before, to a place beside it."""
+    if view is None or goal not in site.nodes:
+        return ()
+    node = site.nodes[goal]
+    starts = [(node.x_m, node.y_m), *([] if before is None else [before])]
+    return tuple((*start, *view) for start in starts)
 
 
 def _incident(site: Site, before: tuple[Segment, ...], here: str, *, arrived: bool) -> tuple[Segment, ...]:

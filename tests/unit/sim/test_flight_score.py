@@ -81,6 +81,22 @@ def test_who_goes_on_from_the_pad_on_which_it_was_given_a_battery_is_on_its_leg(
     assert score(evidence(truth, statuses)).cross_track_max_m == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize(("aside_m", "believed"), [(0.5, True), (1.4, False)])
+def test_a_look_from_aside_is_on_the_leg_and_so_is_the_way_to_it_and_back(
+    aside_m: float, believed: bool
+) -> None:
+    """Half a metre beside the node and line; further than a scan goes it is not believed."""
+    truth = [at(0), at(200 * MS, y_m=aside_m / 2), at(400 * MS, y_m=aside_m), at(1100 * MS, y_m=aside_m / 2)]
+    truth += [at(1400 * MS), at(4000 * MS, y_m=0.3)]
+    aside = replace(status(MS, Phase.SCAN), view_x_m=1.5, view_y_m=aside_m)
+    statuses = [status(0), aside, status(S, Phase.SCAN)]
+    off_m = score(evidence(truth, statuses)).cross_track_max_m
+    assert off_m == pytest.approx(0.3 if believed else aside_m)
+    assert score(evidence(truth[:-1], statuses)).cross_track_max_m == pytest.approx(
+        0.0 if believed else aside_m
+    )
+
+
 def test_what_a_pilot_does_is_not_judged() -> None:
     truth = [at(0), at(S, y_m=1.1), at(2 * S, y_m=2.0, height_m=5.0)]
     flight = evidence(truth, [status(0), status(S, Phase.PILOT)])
