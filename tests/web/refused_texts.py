@@ -23,6 +23,9 @@ SOURCES = (
     "adapters/ground_link/maintenance_rules.py",
     "adapters/ground_link/plan_answers.py",
     "adapters/ground_link/request_handler.py",
+    "adapters/vehicle/ardrone/refusal.py",
+    "adapters/vehicle/mavlink/refusal.py",
+    "adapters/vehicle/mavlink/required_parameters.py",
     "app/maintenance",
     "config/remote_change.py",
     "core/errors.py",
@@ -73,6 +76,7 @@ STAYS_ENGLISH = {
     "by {} ({})": "the end of what was done, which has its German as a whole",
     "by {}": "the end of what was done, which has its German as a whole",
     "settings changed: ": "the beginning of what was done, which has its German as a whole",
+    "{} in flight": "the middle of an emergency, which has its German with it",
     "{}s {} and {}": "aisles and levels, which have their German together",
 }
 """Texts without German, and why."""
@@ -110,15 +114,15 @@ _BROKEN: tuple[Mapping[str, Any], ...] = (
 
 _ERRORS = re.compile(r"(?!Type|Runtime|Assertion)\w*Error")
 _CALLS = frozenset(
-    {"Check", "Event", "Room", "SiteMistake", "Threads", "__init__", "_finding", "_read", "_refuse",
+    {"Check", "Event", "Room", "Rule", "SiteMistake", "Threads", "__init__", "_finding", "_read", "_refuse",
      "answered", "append", "close", "decoded", "error", "json_body", "kill", "missing_extra",
      "note", "ok", "parse_site", "read_draft", "reader", "refusal", "report", "said", "unseen",
      "warning", "withdraw"}
 )  # fmt: skip
 """What is called with texts for a person."""
 _NAMES = frozenset(
-    {"alone", "by_hand", "calibrate", "checks", "figure", "fixed_keys", "fixed_sections", "form",
-     "holds", "lamps", "left", "limit_words", "map_error", "missing", "most", "note", "notes",
+    {"alone", "by_hand", "calibrate", "checks", "emergency_causes", "figure", "fixed_keys", "fixed_sections",
+     "form", "holds", "lamps", "left", "limit_words", "map_error", "missing", "most", "note", "notes",
      "over", "place", "problem", "problems", "reason", "reasons", "refusal", "refused", "remedy",
      "settings", "shown", "still", "text", "theirs", "told", "top", "trouble", "unshown", "what",
      "where", "why", "words"}

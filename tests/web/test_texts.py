@@ -30,6 +30,7 @@ SAME = {
 }  # fmt: skip
 """German and English alike."""
 COMPOSED = {
+    "emergency in flight",
     "stop the daemon and run flightd doctor on the drone with --rock",
     "the down camera delivers no picture",
     "the front camera delivers no picture",
@@ -65,7 +66,7 @@ def entries(path: Path) -> list[tuple[str, str]]:
 
 REPORTED = {
     english: german
-    for name in ("checks.js", "refusals.js", "reported.js")
+    for name in ("autopilot.js", "checks.js", "refusals.js", "reported.js")
     for english, german in entries(GERMAN / name)
 }
 CATALOGUE = [entry for path in sorted(GERMAN.glob("*.js")) for entry in entries(path)]
@@ -153,4 +154,4 @@ def test_one_who_reads_english_fetches_no_german() -> None:
     assert fetched == ["language.js"]
     text = (APP / "language.js").read_text()
     assert 'await import("./german/catalogue.js")' in text
-    assert sum(len(gzip.compress(path.read_bytes())) for path in GERMAN.glob("*.js")) < 50_000
+    assert sum(len(gzip.compress(path.read_bytes())) for path in GERMAN.glob("*.js")) < 55_000

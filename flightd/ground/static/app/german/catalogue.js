@@ -1,5 +1,6 @@
 // All German texts.  A text that is said on several pages stands in frame.js.
 import access from "./access.js";
+import autopilot from "./autopilot.js";
 import checks from "./checks.js";
 import doctor from "./doctor.js";
 import flights from "./flights.js";
@@ -14,7 +15,7 @@ import stock from "./stock.js";
 import studio from "./studio.js";
 
 export { readerOf } from "./reading.js";
-export const REPORTED = { ...checks, ...refusals, ...reported };
+export const REPORTED = { ...autopilot, ...checks, ...refusals, ...reported };
 export const TEXTS = Object.assign(
-  Object.create(null), access, checks, doctor, flights, frame, guide, live, missions, reported, refusals, site, stock, studio,
+  Object.create(null), access, autopilot, checks, doctor, flights, frame, guide, live, missions, reported, refusals, site, stock, studio,
 );
