@@ -235,8 +235,9 @@ class Mission:
         self._plan_id = command.id if command.nodes else ""
         self._route.begin(plan)
         self._scanner.choose(self._levels)
-        counted = f", counted on level {', '.join(map(str, self._levels))}" if self._levels else ""
-        text = f"{plan.nodes} nodes{counted}" if command.nodes else "as configured again"
+        text = f"{plan.nodes} nodes" if command.nodes else "as configured again"
+        if self._levels:
+            text = f"{text}, counted on level {', '.join(map(str, self._levels))}"
         self._events.report(now_ns, EventLevel.INFO, "plan", text)
 
     def _take_start(self, trigger: Trigger, now_ns: int) -> None:

@@ -131,8 +131,8 @@ def _fill(
     bay = 0
     for shelf in fronts:
         if rack.levels_m[-1] >= shelf.height_m:
-            problem = f"{rack.levels_m[-1]:g} m is above the shelf of aisle {shelf.aisle}"
-            raise RackError(f"{key}.levels_m: {problem} ({shelf.height_m:g} m)")
+            top = f"{rack.levels_m[-1]:g} m is above the shelf of aisle {shelf.aisle} ({shelf.height_m:g} m)"
+            raise RackError(f"{key}.levels_m: {top}")
         place_m = rack.bay_width_m / rack.positions
         for left_x_m in bay_edges(rack, shelf)[:-1]:
             bay += 1

@@ -15,6 +15,7 @@ from tests.replay.synthetic_flight import write_flight
 from tests.unit.mission.shelves import FITTED
 from tests.web.chromium import NARROW, hindrances, opened, station
 from tests.web.live_flight import LiveFlight
+from tests.web.refused_texts import STAYS_ENGLISH, refused_texts, value_mistakes
 from tests.web.stock_rig import RACKS, counted_store
 
 if TYPE_CHECKING:
@@ -66,6 +67,32 @@ ENGLISH_LEFT = """async () => {
 }"""
 
 
+UNKNOWN = (
+    "it was never said by anybody at all",
+    "this is not to be had, or no more",
+    "the pad is blue and no node has it",
+    "3 of 4 or more are on their way already",
+    "there is nothing in it: look at page 7; and then go on (as before)",
+)
+"""What nobody says: no text's German may be taken for its own."""
+READ = """async ({ examples, unknown }) => {
+  const { TEXTS, REPORTED, readerOf } = await import("/static/app/german/catalogue.js");
+  const read = readerOf(TEXTS, REPORTED, (value, digits) => value.toFixed(digits).replace(".", ","));
+  const told = (text) => read(text).map((part) => part.text).join("");
+  const names = (text) => [...text.matchAll(/\\{(\\w+)\\}/g)].map(([, name]) => name);
+  const own = ([english, german]) => {
+    const values = Object.fromEntries(names(english).map((name, i) => [name, `X${i}`]));
+    const fill = (text) => text.replace(/\\{(\\w+)\\}/g, (whole, name) => values[name]);
+    return told(fill(english)) === fill(german);
+  };
+  return {
+    english: examples.filter((text) => read(text).some((part) => part.foreign)),
+    others: Object.entries(REPORTED).filter((entry) => !own(entry)).map(([english]) => english),
+    taken: unknown.filter((text) => !read(text).some((part) => part.foreign)),
+  };
+}"""
+
+
 @pytest.fixture(scope="module")
 def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A station whose drone waits, with an inventory, a flight and a map in its folder."""
@@ -102,6 +129,15 @@ def test_every_page_is_german_once_it_is_asked_for_and_stays_so(browser: Browser
         expect(page.locator("article[lang=en]")).to_be_visible()
         page.get_by_role("button", name="EN, English").click()
         expect(page).to_have_title(re.compile("Guide · flightd$"))
+
+
+def test_what_is_refused_has_its_german_and_no_text_another_ones(browser: Browser, url: str) -> None:
+    examples = [one.example for one in refused_texts() if one.text not in STAYS_ENGLISH]
+    assert len(examples) > 600
+    examples += value_mistakes()
+    with opened(browser, f"{url}/guide", NARROW) as page:
+        found = page.evaluate(READ, {"examples": examples, "unknown": UNKNOWN})
+    assert found == {"english": [], "others": [], "taken": []}
 
 
 def test_whose_browser_is_german_reads_german_numbers_and_dates(browser: Browser, url: str) -> None:

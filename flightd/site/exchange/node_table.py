@@ -83,8 +83,10 @@ def tables_of_rows(rows: Sequence[Sequence[str]]) -> Imported:
     for number, row in enumerate(rows[1:], start=2):
         cells = {name: row[column].strip() for name, column in columns.items() if column < len(row)}
         node = cells.get("node", "")
-        if not node or node in nodes:
-            raise InputError(f"row {number}: {'node ' + repr(node) + ' comes twice' if node else 'no node'}")
+        if not node:
+            raise InputError(f"row {number}: no node")
+        if node in nodes:
+            raise InputError(f"row {number}: node {node!r} comes twice")
         nodes[node] = _metres(cells, "x_m", number), _metres(cells, "y_m", number)
         if cells.get("pad"):
             pads[node] = cells["pad"]

@@ -8,7 +8,7 @@ export const LANGUAGES = { en: "English", de: "Deutsch" };
 let current = "en";
 let wanted = "en";
 let german = null; // {english: german}, once it is fetched
-let patterns = []; // of what drone and station say with figures in it: {pattern, names, german}
+let translated = null; // what somebody else says, in parts: {text, foreign: it stays English}
 
 export const language = () => current;
 const inGerman = (text) => (current === "de" ? german[text] : undefined);
@@ -36,9 +36,9 @@ export function keep(one) {
 export async function speak(one) {
   wanted = one;
   if (one === "de" && !german) {
-    const { TEXTS, REPORTED } = await import("./german/catalogue.js");
+    const { TEXTS, REPORTED, readerOf } = await import("./german/catalogue.js");
     german = TEXTS;
-    patterns = Object.entries(REPORTED).filter(([text]) => text.includes("{")).map(([text, said]) => patternOf(text, said));
+    translated = readerOf(TEXTS, REPORTED, decimal);
   }
   if (wanted !== one) return; // another was chosen meanwhile
   current = one;
@@ -104,33 +104,3 @@ function formed(text, values) {
 
 const filled = (text, values) => (values ? text.replace(/\{(\w+)\}/g, (whole, name) => told(values[name] ?? whole)) : text);
 const told = (value) => (typeof value === "number" ? plain(value) : value);
-
-function patternOf(text, said) {
-  const escaped = text.replace(/[.*+?^$()|[\]\\]/g, "\\$&");
-  return {
-    pattern: new RegExp(`^${escaped.replace(/\{\w+\}/g, "(.+?)")}$`, "s"),
-    names: [...text.matchAll(/\{(\w+)\}/g)].map(([, name]) => name),
-    german: said.split(/\{(\w+)\}/),
-  };
-}
-
-// Parts of what somebody else says: {text, foreign: it stays English}.
-function translated(text) {
-  const whole = german[text] ?? german[text.charAt(0).toLowerCase() + text.slice(1)];
-  if (whole !== undefined) return [{ text: whole }];
-  for (const { pattern, names, german: said } of patterns) {
-    const found = pattern.exec(text);
-    if (found) return said.flatMap((part, i) => (i % 2 ? figure(found[names.indexOf(part) + 1]) : [{ text: part }]));
-  }
-  if (text.endsWith(".")) return [...translated(text.slice(0, -1)), { text: "." }];
-  const colon = text.indexOf(": ");
-  const cause = colon > 0 && german[text.slice(0, colon)];
-  return cause ? [{ text: `${cause}: ` }, ...translated(text.slice(colon + 2))] : [{ text, foreign: true }];
-}
-
-// What stands in such a text: a number, a name, or another text.
-function figure(text) {
-  const [, digits] = /^-?\d+\.(\d+)$/.exec(text) ?? [];
-  if (digits) return [{ text: decimal(Number(text), digits.length) }];
-  return text.includes(" ") ? translated(text) : [{ text: german[text] ?? text }];
-}

@@ -21,7 +21,6 @@ export default {
   "{n} place to look at|{n} places to look at": "{n} Platz anzusehen|{n} Plätze anzusehen",
   "Nothing to look at": "Nichts anzusehen",
   "{n} closed place|{n} closed places": "{n} erledigter Platz|{n} erledigte Plätze",
-  "and {n} more": "und {n} weitere",
   "Recount {n} place as a mission|Recount {n} places as a mission": "{n} Platz als Mission nachzählen|{n} Plätze als Mission nachzählen",
   "against the books: {outcome}": "gegen die Bücher: {outcome}",
   "as expected": "wie erwartet",
