@@ -31,6 +31,7 @@ from flightd.ground.hub import Hub
 from flightd.ground.json_http import as_json, is_json, json_body, status_of
 from flightd.ground.messages import SentAct, answer_message, read_page_message, session_message
 from flightd.ground.missions.routes import mission_routes
+from flightd.ground.packed_json import PackedJson
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.site_page.routes import site_page
@@ -75,7 +76,7 @@ def application(
         *session_routes(access),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    return Guard(Starlette(routes=gated(routes, access)), hosts)
+    return Guard(PackedJson(Starlette(routes=gated(routes, access))), hosts)
 
 
 class _GoneError(Exception):
