@@ -27,7 +27,8 @@ _TABLE = """CREATE TABLE IF NOT EXISTS expected_stock (
     data BLOB NOT NULL
 ) STRICT"""
 """Made with the first upload: files from before it are kept as they are."""
-_FIELDS = "name, who, utc_ns, changed_ns, place, code, quantity, heading"
+_ONE = """SELECT name, who, utc_ns, changed_ns, place, code, quantity, heading FROM expected_stock
+WHERE store = ?"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,7 @@ class ExpectedStockBook:
 
     def kept(self, store: str) -> ExpectedStock | None:
         """The store's upload, None where there is none."""
-        row = self._read(f"SELECT {_FIELDS} FROM expected_stock WHERE store = ?", store)
+        row = self._read(_ONE, store)
         if row is None:
             return None
         name, who, utc_ns, changed_ns, place, code, quantity, heading = row

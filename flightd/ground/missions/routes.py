@@ -120,8 +120,8 @@ class _Missions:
         )))  # fmt: skip
 
     async def recount(self, request: Request) -> Response:
-        """The nodes and levels that see places of an inventory, the places of which none knows from where they
-        are seen, and the site that the inventory is of (empty: nobody knows)."""
+        """The nodes and levels that see places of an inventory, the places that are seen from none, and the
+        site that the inventory is of (empty: nobody knows)."""
         asked = await said(request, Recounted, "places to count again", _MOST_PLACES_BYTES)
         view = await self._threads.run(self._stores.view, asked.store)
         site = await self._threads.run(self._stores.site_name, asked.store)
