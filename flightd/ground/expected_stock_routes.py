@@ -23,6 +23,7 @@ from flightd.ground.json_http import JSON, as_json
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.request_body import whole_body
 from flightd.ground.stock_routes import StockAnswers, answered, download
+from flightd.ground.stores import StockView
 from flightd.ground.uploaded_comparison import Answer, chosen_columns, column_words, compare_upload
 from flightd.inventory.stock_table import MOST_BYTES
 
@@ -98,7 +99,7 @@ class _Kept:
         if kind is not None:
             with self._comparisons.room.taken():
                 return _sent(await self._compared(request, store, upload, {"format": kind}))
-        tag = f'W/"{upload.changed_ns:x}-{view.stamp}"'
+        tag = _tag(upload, view)
         if request.headers.get("if-none-match") == tag:
             return Response(status_code=304, headers={"ETag": tag})
         with self._room.taken():
@@ -106,10 +107,7 @@ class _Kept:
                 document = self._answers.get((store, tag))
                 if document is None:
                     compared = await self._compared(request, store, upload, {})
-                    document = _document(upload, compared.content)
-                    self._answers[store, tag] = document
-                    while len(self._answers) > _ANSWERS_KEPT:
-                        self._answers.popitem(last=False)
+                    document = self._known(store, tag, upload, compared)
         return Response(document, headers={"ETag": tag}, media_type=JSON)
 
     async def keep(self, request: Request) -> Response:
@@ -123,12 +121,13 @@ class _Kept:
         with self._comparisons.room.taken():
             folder = await self._asked.store_folder(request)
             data = await whole_body(request, MOST_BYTES)
-            compared = await self._comparisons.compared(folder, data, asked)
+            view = await self._asked.store_view(request)
+            compared = await self._comparisons.compared(folder, data, _columns_of(asked))
             columns = await self._asked.off_loop(chosen_columns, compared.content)
             who, now = person_of(request, asked.get("who", ""))[:_MOST_WHO], time.time_ns()
-            await self._asked.off_loop(
-                self._book.keep, store, ExpectedStock(name, who, now, now, columns), data
-            )
+            upload = ExpectedStock(name, who, now, now, columns)
+            await self._asked.off_loop(self._book.keep, store, upload, data)
+            self._known(store, _tag(upload, view), upload, compared)
         return as_json({})
 
     async def choose(self, request: Request) -> Response:
@@ -138,7 +137,7 @@ class _Kept:
         with self._comparisons.room.taken():
             folder = await self._asked.store_folder(request)
             data = await self._data(store)
-            compared = await self._comparisons.compared(folder, data, request.query_params)
+            compared = await self._comparisons.compared(folder, data, _columns_of(request.query_params))
             columns = await self._asked.off_loop(chosen_columns, compared.content)
             await self._asked.off_loop(self._book.choose, store, columns, time.time_ns())
         return as_json({})
@@ -150,6 +149,13 @@ class _Kept:
         await self._asked.store_folder(request)
         await self._asked.off_loop(self._book.remove, store)
         return as_json({})
+
+    def _known(self, store: str, tag: str, upload: ExpectedStock, compared: Answer) -> bytes:
+        """The answer under its tag, for whoever asks next."""
+        document = self._answers[store, tag] = _document(upload, compared.content)
+        while len(self._answers) > _ANSWERS_KEPT:
+            self._answers.popitem(last=False)
+        return document
 
     async def _compared(
         self, request: Request, store: str, upload: ExpectedStock, words: Mapping[str, str]
@@ -163,6 +169,15 @@ class _Kept:
         if data is None:
             raise InputError("no expected stock is kept here any more")
         return data
+
+
+def _tag(upload: ExpectedStock, view: StockView) -> str:
+    return f'W/"{upload.changed_ns:x}-{view.stamp}"'
+
+
+def _columns_of(words: Mapping[str, str]) -> dict[str, str]:
+    """Without the format of a download."""
+    return {name: word for name, word in words.items() if name != "format"}
 
 
 def _document(upload: ExpectedStock, comparison: bytes) -> bytes:

@@ -145,8 +145,11 @@ def test_a_flight_is_chosen_estimated_kept_flown_and_flown_on_and_places_become_
         expect(page.get_by_label("Name")).to_have_value(re.compile("^Recount . places"))
         expect(button(page, "Node A1")).to_have_attribute("aria-pressed", "true")
         expect(page.get_by_text("no flight log beside it says of which hall it is")).to_be_visible()
-        page.goto(f"{url}/stock?store=elsewhere&place=AL-01-2-1")
+        page.get_by_role("link", name="Stock").click()
+        page.get_by_role("combobox", name=re.compile("^Inventory")).select_option("store/elsewhere")
+        page.get_by_role("button", name=re.compile("^AL-01-2-1,")).click()
         page.get_by_label("Selected to be counted again").check()
+        page.get_by_role("button", name="Close").click()
         page.get_by_role("button", name="Recount 1 selected place as a mission").click()
         refused = f"the inventory is of {load_site(DEMO).name}, and demo flies in {RACKS.name}"
         expect(page.get_by_role("alert").filter(has_text=refused)).to_be_visible()

@@ -350,6 +350,37 @@ def test_places_are_selected_to_be_counted_again_by_mouse_keys_search_and_state(
         expect(page).to_have_url(re.compile("/missions$"))
 
 
+FLIES_IN = """([two, demo]) => import("/static/app/store.js").then(({ update }) =>
+  update((s) => {
+    for (const [drone, name] of [["two", two], ["demo", demo]]) {
+      const welcome = { role: "operator", floor: { name, nodes: [] } };
+      s.drones.set(drone, { ...s.drones.get(drone), welcome });
+    }
+  }))"""
+
+
+def test_a_recount_goes_to_the_drone_of_the_hall_that_the_inventory_is_of(
+    browser: Browser, tmp_path: Path
+) -> None:
+    counted_store(tmp_path / "monday")
+    flown_log(tmp_path / "monday" / "flight.mcap", RACKS)
+    drones = ["demo=127.0.0.1:1/1", "two=127.0.0.1:1/2"]
+    with station(drones, folder=tmp_path) as url, opened(browser, f"{url}/stock") as page:
+        page.get_by_role("searchbox", name="Code or place").fill("AL-01-2-1")
+        again = page.get_by_role("button", name="Recount what is picked out (1 place)")
+        expect(again).to_be_visible()
+        selected = "import('/static/app/store.js').then(({ state }) => state.selected)"
+        page.evaluate(FLIES_IN, ["hall 3", "hall 2"])
+        again.click()
+        refused = f"the inventory is of {RACKS.name}, and demo flies in hall 2: link a drone of {RACKS.name}"
+        expect(page.get_by_role("alert").filter(has_text=refused)).to_be_visible()
+        assert page.evaluate(selected) == "demo"
+        page.evaluate(FLIES_IN, [RACKS.name, "hall 2"])
+        again.click()
+        expect(page).to_have_url(re.compile("/missions$"))
+        assert page.evaluate(selected) == "two"
+
+
 def test_a_store_that_a_flight_begins_is_shown_instead_of_what_the_drone_tells(
     browser: Browser, tmp_path: Path
 ) -> None:
@@ -446,7 +477,7 @@ def test_a_viewers_comparison_runs_one_at_a_time_and_the_newest_is_asked_for_whe
         page.locator("input[type=file]").set_input_files(books)  # type: ignore[arg-type]
         until_asked(page, asked)
         asked[0].continue_()
-        expect(page.get_by_text(re.compile("^books.csv: CSV"))).to_be_visible()
+        expect(page.get_by_text(re.compile("^books.csv: CSV"))).to_be_visible(timeout=30_000)
         for second in (1, 2, 3):
             with SqliteStore(folder / "monday") as store:
                 store.commit(look("BL-01-1-2", LocationState.EMPTY, at_s=second))

@@ -14,10 +14,11 @@ let loading = false;
 export async function loadKept() {
   const { source, expected } = stock();
   if (source?.kind !== "store" || loading || acting || isOwn(expected)) return;
+  const before = acts;
   loading = true;
   await load(source);
   loading = false;
-  if (stock().source !== source) loadKept();
+  if (stock().source !== source || acts !== before) loadKept();
 }
 
 async function load(source) {
