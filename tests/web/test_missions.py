@@ -140,7 +140,10 @@ async def test_places_to_count_again_are_told_with_what_sees_them_and_the_site_t
         )  # fmt: skip
         flown_log(tmp_path / "monday" / "flight.mcap", RACKS)
         assert (await ask(station, "POST", "/recount", **asked))[1]["site"] == RACKS.name
-        for wrong in ({"places": []}, {"store": "none"}, {"places": ["A"] * 20_001}, {"more": 1}):
+        bad: tuple[dict[str, Any], ...] = (
+            {"places": []}, {"store": "none"}, {"places": ["A"] * 20_001}, {"more": 1}
+        )  # fmt: skip
+        for wrong in bad:
             code, said = await ask(station, "POST", "/recount", **{**asked, **wrong})
             assert code == 400, wrong
             assert "\n" not in said["refused"]
