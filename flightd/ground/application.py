@@ -39,6 +39,7 @@ from flightd.ground.messages import (
     session_message,
 )
 from flightd.ground.missions.routes import mission_routes
+from flightd.ground.packed_json import PackedJson
 from flightd.ground.page_person import PagePerson, Standing
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.reading_process import ReadingProcess
@@ -86,7 +87,7 @@ def application(
         *session_routes(access),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    return Guard(Starlette(routes=gated(routes, access)), hosts)
+    return Guard(PackedJson(Starlette(routes=gated(routes, access))), hosts)
 
 
 class _GoneError(Exception):

@@ -1,4 +1,4 @@
-"""What people decided about places that need a look: the station's own file, to which is only added.
+"""What people decided about places: in the station's own file, to which decisions are only added.
 
 The inventories stay as they are: a decision says what a person found or ordered, never what was counted.
 It holds for the look that the person saw; a newer look makes the place open again.
@@ -60,19 +60,24 @@ class Decision:
     note: str = ""
 
 
+def station_file(folder: Path) -> OwnDatabase:
+    """The station's file about inventories in `folder`, `ground.db`."""
+    return OwnDatabase(
+        file=folder / FILE,
+        holds="the decisions",
+        application=_APPLICATION,
+        version=_VERSION,
+        schema=SCHEMA,
+    )
+
+
 class DecisionBook:
     """The file in `folder`, made with the first decision.  Safe from any thread.
 
     UnavailableError where the disk refuses, InputError for a file that is another program's."""
 
     def __init__(self, folder: Path) -> None:
-        self._database = OwnDatabase(
-            file=folder / FILE,
-            holds="the decisions",
-            application=_APPLICATION,
-            version=_VERSION,
-            schema=SCHEMA,
-        )
+        self._database = station_file(folder)
 
     def add(self, store: str, decision: Decision) -> None:
         """Note a decision about a place of a store; the same one again changes nothing."""

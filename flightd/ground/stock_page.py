@@ -20,4 +20,8 @@ def stock_page(
     """Its routes, over the inventories under `folder` and what the drones tell that they have counted;
     uploads are read in `reading`."""
     asked = StockAnswers(Stores(folder), drones)
-    return [*stock_routes(asked), *expected_stock_routes(asked, reading), *decision_routes(asked, folder)]
+    return [
+        *stock_routes(asked),
+        *expected_stock_routes(asked, reading, folder),
+        *decision_routes(asked, folder),
+    ]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
+from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -30,6 +32,7 @@ T = TypeVar("T")
 _MOST_WORDS = 200
 _AT_ONCE, _MOST_WAITING = 2, 32
 """So many questions are read from the disk at a time: the way to the drones comes first."""
+_DOCUMENTS_KEPT = 4
 _KINDS = {
     "csv": "text/csv; charset=utf-8",
     "xlsx": "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
@@ -83,6 +86,7 @@ class StockAnswers:
     def __init__(self, stores: Stores, drones: Mapping[str, CountingDrone]) -> None:
         self._stores = stores
         self._drones = drones
+        self._documents: OrderedDict[tuple[str, str], tuple[str, bytes]] = OrderedDict()
         self._reading = Threads(_AT_ONCE, _MOST_WAITING, "too many questions about the stock wait already")
 
     async def off_loop(self, work: Callable[..., T], *arguments: Any) -> T:
@@ -122,12 +126,18 @@ class StockAnswers:
         return StockView(f"{hash(places):x}", fronts_of(codes), places, ())
 
     async def places(self, request: Request) -> Response:
-        """Every front with its spots, and every place with its state.  304 while nothing has changed."""
+        """Every front with its spots, and every place with its state.  304 while nothing of it has changed,
+        whatever else was written."""
         view = await self.view(request)
-        tag = f'"{view.stamp}"'
+        key = (request.url.query, view.stamp)
+        known = self._documents.get(key)
+        if known is None:
+            known = self._documents[key] = await self.off_loop(_tagged_document, view)
+            while len(self._documents) > _DOCUMENTS_KEPT:
+                self._documents.popitem(last=False)
+        tag, document = known
         if request.headers.get("if-none-match") == tag:
             return Response(status_code=304, headers={"ETag": tag})
-        document = await self.off_loop(_document, view)
         return Response(document, headers={"ETag": tag}, media_type=JSON)
 
     async def place(self, request: Request) -> Response:
@@ -177,6 +187,12 @@ def told_seconds(utc_ns: int) -> float | None:
 def download(data: bytes, name: str, kind: str) -> Response:
     """A file for the person to keep."""
     return Response(data, headers={"Content-Disposition": f'attachment; filename="{name}"'}, media_type=kind)
+
+
+def _tagged_document(view: StockView) -> tuple[str, bytes]:
+    """With the tag by which a browser knows it, packed or not."""
+    document = _document(view)
+    return f'W/"{hashlib.blake2b(document, digest_size=12).hexdigest()}"', document
 
 
 def _document(view: StockView) -> bytes:

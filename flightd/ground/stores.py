@@ -78,6 +78,12 @@ class Stores:
             self._views.pop(next(iter(self._views)), None)
         return view
 
+    def site_name(self, name: str) -> str:
+        """The name of the site that a store is of, by the map in the flight log beside it; empty without one.
+        InputError where there is no store of the name."""
+        site = self._site(self.folder(name))
+        return "" if site is None else site.name
+
     def looks(self, name: str, code: str) -> Sequence[tuple[Observation, Standing]]:
         """Every look at a place, oldest first.  InputError for one that the store does not know."""
         with SqliteStore(self.folder(name), read_only=True) as store:

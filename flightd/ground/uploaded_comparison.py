@@ -62,6 +62,25 @@ def compare_upload(store: Path, upload: Path, asked: Mapping[str, str]) -> Answe
     return Answer(write(compared.lines, compared.stock), media_type, f"comparison.{kind}")
 
 
+class _Chosen(msgspec.Struct):
+    chosen: StockColumns
+
+
+def chosen_columns(document: bytes) -> StockColumns:
+    """The columns by which a comparison for the page was made."""
+    return msgspec.json.decode(document, type=_Chosen).chosen
+
+
+def column_words(columns: StockColumns) -> dict[str, str]:
+    """As `compare_upload` is asked for them."""
+    return {
+        "place": str(columns.place),
+        "code": str(columns.code),
+        "quantity": "" if columns.quantity is None else str(columns.quantity),
+        "heading": "yes" if columns.heading else "no",
+    }
+
+
 def _compared(data: bytes, records: Sequence[LocationRecord], asked: Mapping[str, str]) -> _Compared:
     table = read_table(data)
     places = [record.code for record in records]

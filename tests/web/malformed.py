@@ -24,6 +24,7 @@ _PAGE = (
 _DECISION = b'{"id":"12345678","place":"AL-01-1-1","what":"fine","who":"ann","seen_s":null,"note":""}'
 _SET = b'{"name":"hall","paint":"yellow"}'
 _PLAN = b'{"id":"12345678","drone":"nobody","nodes":["A1","A2"],"levels":[1],"best_order":true}'
+_RECOUNT = b'{"store":"monday","places":["AL-01-1-1"]}'
 _SIGN_IN = b'{"name":"otto","password":"correct horse battery"}'
 _ODD_VALUES: tuple[Any, ...] = (
     None, True, -1, 1e308, 2**70, "", "\x00", "x" * 3000, [], [[]], {}, {"": {}}, "\ufffd", "../../etc",
@@ -37,7 +38,7 @@ _PATHS = (
     "/api/stock/export?store=monday&format=", "/api/guide/search?q=", "/api/flights?known=",
     "/api/studio/sets/", "/api/studio/sets/hall/pictures/", "/api/studio/profiles/",
     "/api/missions?site=", "/api/missions/estimate?drone=nobody&node=",
-    "/api/missions/recount?store=monday&place=",
+    "/api/stock/expected?store=monday&format=",
 )  # fmt: skip
 
 
@@ -148,7 +149,7 @@ def wrong_types(draw: random.Random, station: Station) -> bytes:
         (
             ("/drones/demo/acts", _ACTS[0]), ("/api/session", _SIGN_IN),
             ("/api/stock/decisions?store=monday", _DECISION), ("/api/missions/fly", _PLAN),
-            ("/api/studio/sets", _SET),
+            ("/api/studio/sets", _SET), ("/api/missions/recount", _RECOUNT),
         )
     )  # fmt: skip
     document = json.loads(good)

@@ -23,6 +23,7 @@ from tests.rigs.event_loops import in_real_time
 from tests.web.live_flight import LiveFlight
 from tests.web.people_rig import audited, with_people
 from tests.web.served import JSON, Station, served, told
+from tests.web.stock_rig import RACKS, counted_store, flown_log
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
@@ -124,6 +125,28 @@ async def test_without_a_folder_missions_are_not_kept_and_it_says_how(tmp_path: 
         code, said = await ask(station, "PUT", "/mission-1", site="demo", name="A", nodes=["A1"])
         assert code == 400
         assert "--folder" in said["refused"]
+
+
+@in_real_time
+async def test_places_to_count_again_are_told_with_what_sees_them_and_the_site_they_are_of(
+    tmp_path: Path,
+) -> None:
+    counted_store(tmp_path / "monday")
+    asked = {"store": "monday", "places": ["AL-01-2-1", "AL-02-1-1", "AL-01-2-1", "nowhere"]}
+    async with served(NOBODY, folder=tmp_path) as station:
+        code, found = await ask(station, "POST", "/recount", **asked)
+        assert (code, found) == (
+            200, {"site": "", "nodes": ["A1"], "levels": [1, 2], "without": ["nowhere"]}
+        )  # fmt: skip
+        flown_log(tmp_path / "monday" / "flight.mcap", RACKS)
+        assert (await ask(station, "POST", "/recount", **asked))[1]["site"] == RACKS.name
+        bad: tuple[dict[str, Any], ...] = (
+            {"places": []}, {"store": "none"}, {"places": ["A"] * 20_001}, {"more": 1}
+        )  # fmt: skip
+        for wrong in bad:
+            code, said = await ask(station, "POST", "/recount", **{**asked, **wrong})
+            assert code == 400, wrong
+            assert "\n" not in said["refused"]
 
 
 @in_real_time

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from flightd.config.schema import load_config
+from flightd.site.site_file import load_site
 from tests.unit.mission.shelves import FITTED
 from tests.web.chromium import NARROW, hindrances, opened, station
 from tests.web.live_flight import LiveFlight
-from tests.web.stock_rig import RACKS, counted_store
+from tests.web.stock_rig import RACKS, counted_store, flown_log
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page, WebSocketRoute
@@ -24,6 +25,7 @@ from playwright.sync_api import expect
 CONFIG = load_config(Path(__file__).parents[2] / "configs" / "sim.toml").with_values(
     mission={"autostart": False, "start_countdown_s": 0.0}, front_camera=FITTED
 )
+DEMO = Path(__file__).parents[2] / "configs" / "site-demo.toml"
 SECOND = list(RACKS.nodes)[1]
 
 expect.set_options(timeout=40_000.0)
@@ -41,6 +43,8 @@ def url(flight: LiveFlight, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     """Its station, with an inventory of that site."""
     folder = tmp_path_factory.mktemp("hall")
     counted_store(folder / "monday")
+    counted_store(folder / "elsewhere")
+    flown_log(folder / "elsewhere" / "flight.mcap", load_site(DEMO))
     status, command = flight.ports
     with station([f"demo=127.0.0.1:{status}/{command}"], folder=folder) as url:
         yield url
@@ -140,5 +144,14 @@ def test_a_flight_is_chosen_estimated_kept_flown_and_flown_on_and_places_become_
         expect(page.get_by_text(re.compile("^Counts . places of the inventory again"))).to_be_visible()
         expect(page.get_by_label("Name")).to_have_value(re.compile("^Recount . places"))
         expect(button(page, "Node A1")).to_have_attribute("aria-pressed", "true")
+        expect(page.get_by_text("no flight log beside it says of which hall it is")).to_be_visible()
+        page.get_by_role("link", name="Stock").click()
+        page.get_by_role("combobox", name=re.compile("^Inventory")).select_option("store/elsewhere")
+        page.get_by_role("button", name=re.compile("^AL-01-2-1,")).click()
+        page.get_by_label("Selected to be counted again").check()
+        page.get_by_role("button", name="Close").click()
+        page.get_by_role("button", name="Recount 1 selected place as a mission").click()
+        refused = f"the inventory is of {load_site(DEMO).name}, and demo flies in {RACKS.name}"
+        expect(page.get_by_role("alert").filter(has_text=refused)).to_be_visible()
         assert hindrances(page) == []
         assert page.evaluate("document.documentElement.scrollWidth") <= NARROW[0]

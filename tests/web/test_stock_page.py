@@ -257,8 +257,18 @@ def test_the_books_are_uploaded_and_every_difference_is_shown(
         expect(page.get_by_text("places, codes and quantities stand in different columns")).to_be_visible()
         page.get_by_label("Quantities are in").select_option("none")
         expect(outcomes(page).first).not_to_have_text("3 as expected")
-        page.get_by_role("button", name="Remove").click()
-        expect(page.get_by_text("kept nowhere")).to_be_visible()
+        page.reload()
+        expect(page.get_by_text("Kept for everybody since")).to_be_visible()
+        expect(page.get_by_label("Codes are in")).to_have_value("1")
+        states = page.get_by_role("group", name="States")
+        states.get_by_role("button", name=re.compile("Not as expected")).click()
+        with opened(browser, url, NARROW, "dark") as other:
+            expect(other.get_by_text("books.csv: CSV")).to_be_visible()
+            expect(other.get_by_text("against the books: empty")).to_be_visible()
+            assert hindrances(other) == []
+            other.get_by_role("button", name="Remove").click()
+            expect(other.get_by_text("kept at this station for everybody")).to_be_visible()
+        expect(page.get_by_text("kept at this station for everybody")).to_be_visible()
         expect(page.get_by_role("button", name=re.compile("Not as expected"))).to_have_count(0)
 
 
@@ -317,6 +327,69 @@ def test_places_that_need_a_look_are_a_queue_with_who_looks_and_what_was_decided
         with SqliteStore(folder / "monday") as store:
             store.commit(look("AL-02-2-1", LocationState.UNREADABLE, at_s=60))
         expect(page.get_by_role("heading", name="4 places to look at")).to_be_visible()
+
+
+def test_places_are_selected_to_be_counted_again_by_mouse_keys_search_and_state(
+    browser: Browser, url: str, folder: Path
+) -> None:
+    with opened(browser, url, NARROW) as page:
+        again = page.get_by_role("group", name="Count again")
+        cell(page, "AL-01-2-1").click(modifiers=["Shift"])  # read, as it should be
+        expect(cell(page, "AL-01-2-1")).to_have_accessible_name("AL-01-2-1, read, 4006381333931, selected")
+        expect(page.get_by_role("region", name="AL-01-2-1")).to_have_count(0)
+        cell(page, "AL-01-2-1").focus()
+        page.keyboard.press("Shift+Enter")
+        expect(again.get_by_text("To count places again")).to_be_visible()
+        page.keyboard.press("Shift+Enter")
+        cell(page, "BL-01-1-2").click()  # never counted
+        page.get_by_label("Selected to be counted again").check()
+        expect(again.get_by_role("button", name="Recount 2 selected places as a mission")).to_be_visible()
+        expect(cell(page, "BL-01-1-2")).to_have_accessible_name("BL-01-1-2, never counted, selected")
+        assert hindrances(page) == []
+        assert page.evaluate("document.documentElement.scrollWidth") == NARROW[0]
+        form = page.get_by_role("group", name="Decision")
+        form.get_by_label("Who").fill("Ann")
+        expect(form.get_by_role("button", name="Put right")).to_have_count(0)
+        form.get_by_role("button", name="Count again").click()
+        queue = page.get_by_role("list", name="5 places to look at")
+        expect(queue.get_by_role("button", name=re.compile("BL-01-1-2.*to be counted again"))).to_be_visible()
+        again.get_by_role("button", name="Clear").click()
+        page.get_by_role("group", name="States").get_by_role("button", name=re.compile("Read 4")).click()
+        expect(again.get_by_role("button", name="Recount what is picked out (4 places)")).to_be_visible()
+        page.get_by_role("searchbox", name="Code or place").fill("BL-")
+        again.get_by_role("button", name="Recount what is picked out (1 place)").click()
+        expect(page).to_have_url(re.compile("/missions$"))
+
+
+FLIES_IN = """([two, demo]) => import("/static/app/store.js").then(({ update }) =>
+  update((s) => {
+    for (const [drone, name] of [["two", two], ["demo", demo]]) {
+      const welcome = { role: "operator", floor: { name, nodes: [] } };
+      s.drones.set(drone, { ...s.drones.get(drone), welcome });
+    }
+  }))"""
+
+
+def test_a_recount_goes_to_the_drone_of_the_hall_that_the_inventory_is_of(
+    browser: Browser, tmp_path: Path
+) -> None:
+    counted_store(tmp_path / "monday")
+    flown_log(tmp_path / "monday" / "flight.mcap", RACKS)
+    drones = ["demo=127.0.0.1:1/1", "two=127.0.0.1:1/2"]
+    with station(drones, folder=tmp_path) as url, opened(browser, f"{url}/stock") as page:
+        page.get_by_role("searchbox", name="Code or place").fill("AL-01-2-1")
+        again = page.get_by_role("button", name="Recount what is picked out (1 place)")
+        expect(again).to_be_visible()
+        selected = "import('/static/app/store.js').then(({ state }) => state.selected)"
+        page.evaluate(FLIES_IN, ["hall 3", "hall 2"])
+        again.click()
+        refused = f"the inventory is of {RACKS.name}, and demo flies in hall 2: link a drone of {RACKS.name}"
+        expect(page.get_by_role("alert").filter(has_text=refused)).to_be_visible()
+        assert page.evaluate(selected) == "demo"
+        page.evaluate(FLIES_IN, [RACKS.name, "hall 2"])
+        again.click()
+        expect(page).to_have_url(re.compile("/missions$"))
+        assert page.evaluate(selected) == "two"
 
 
 def test_a_store_that_a_flight_begins_is_shown_instead_of_what_the_drone_tells(
@@ -398,17 +471,24 @@ def test_the_address_says_which_inventory_and_who_goes_on_is_not_called_back(
         expect(page).to_have_url(re.compile("/guide$"))
 
 
-def test_one_comparison_runs_at_a_time_and_the_newest_is_asked_for_when_it_ends(
+AS_VIEWER = """import("/static/app/store.js").then(({ update }) =>
+  update((s) => { s.session = { login: true, name: "vera", role: "viewer" }; }))"""
+
+
+def test_a_viewers_comparison_runs_one_at_a_time_and_the_newest_is_asked_for_when_it_ends(
     browser: Browser, url: str, folder: Path
 ) -> None:
     with opened(browser, url) as page:
         asked: list[Route] = []
+        page.evaluate(AS_VIEWER)
+        expect(page.get_by_text("kept in this tab only")).to_be_visible()
+        expect(page.get_by_role("group", name="Count again")).to_have_count(0)
         page.route("**/api/stock/compare*", lambda route: asked.append(route))  # noqa: PLW0108 - it is marked
         books = {"name": "books.csv", "mimeType": "text/csv", "buffer": b"place;code\nAL-01-1-1;PAL-1\n"}
         page.locator("input[type=file]").set_input_files(books)  # type: ignore[arg-type]
         until_asked(page, asked)
         asked[0].continue_()
-        expect(page.get_by_text(re.compile("^books.csv: CSV"))).to_be_visible()
+        expect(page.get_by_text(re.compile("^books.csv: CSV"))).to_be_visible(timeout=30_000)
         for second in (1, 2, 3):
             with SqliteStore(folder / "monday") as store:
                 store.commit(look("BL-01-1-2", LocationState.EMPTY, at_s=second))

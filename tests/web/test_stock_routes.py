@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gzip
 import json
 import os
 import shutil
@@ -18,13 +19,18 @@ from flightd.adapters.ground_link.link import ZmqGround
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationState, PlannedLocation
-from flightd.ground import uploaded_comparison
+from flightd.ground import expected_stock_book, uploaded_comparison
+from flightd.ground.access.roles import Role
 from flightd.ground.bounded import Shared, Threads
+from flightd.ground.decision_book import Decided, Decision, DecisionBook
+from flightd.ground.expected_stock_book import MOST_UPLOADS, ExpectedStock, ExpectedStockBook
+from flightd.inventory.stock_columns import StockColumns
 from flightd.inventory.stock_table import MOST_BYTES
 from flightd.runtime.clock import LoopClock
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.ground_link import SITE, address_of, local, serving
 from tests.rigs.waiting import until
+from tests.web.people_rig import audited, with_people
 from tests.web.served import Station, served
 from tests.web.stock_rig import RACKS, SSCC, counted_store, flown_log, look
 
@@ -192,6 +198,83 @@ async def test_an_upload_needs_our_own_page_and_stays_within_bounds(folder: Path
             "POST", f"/api/stock{way}&format=csv", {"Origin": station.origin, **UPLOAD}, BOOKS
         )
         assert 'content-disposition: attachment; filename="comparison.csv"' in head.lower()
+
+
+@in_real_time
+async def test_an_upload_is_kept_for_everybody_until_it_is_removed(folder: Path, tmp_path: Path) -> None:
+    keys = with_people(tmp_path)
+    viewer, operator = ({"Authorization": f"Bearer {keys[role]}"} for role in (Role.VIEWER, Role.OPERATOR))
+    way = "/api/stock/expected?store=monday"
+
+    async def act(method: str, more: str, by: dict[str, str], body: bytes = b"") -> tuple[int, Any]:
+        code, text = await station.ask(method, way + more, {"Origin": station.origin, **UPLOAD, **by}, body)
+        return code, json.loads(text)
+
+    async with served(NOBODY, folder=folder, state=tmp_path, login=True) as station:
+        assert await act("GET", "", viewer) == (200, {"kept": None})
+        assert (await act("PUT", "&name=books.csv", viewer, BOOKS))[0] == 403
+        assert (await act("PUT", "&name=books.csv", operator, b"\x89PNG\x00\x00"))[0] == 400
+        assert await act("GET", "", viewer) == (200, {"kept": None}), "what is refused is not kept"
+        assert (await act("PUT", "&name=books.csv&who=another", operator, BOOKS))[0] == 200
+        head, text = await station.answer("GET", way, viewer)
+        told = json.loads(text)
+        assert (told["kept"]["name"], told["kept"]["who"]) == ("books.csv", "program-operator")
+        assert told["comparison"]["outcome_counts"]["match"] == 1
+        tag = next(line for line in head.splitlines() if line.lower().startswith("etag")).split(" ")[1]
+        assert (await station.ask("GET", way, {**viewer, "If-None-Match": tag}))[0] == 304
+    async with served(NOBODY, folder=folder, state=tmp_path, login=True) as station:
+        columns = "&place=1&code=0&quantity=&heading=yes"
+        assert (await act("POST", "&place=0&code=0", operator))[0] == 400
+        assert (await act("POST", columns, operator))[0] == 200
+        _, told = await act("GET", "", viewer)
+        assert (told["comparison"]["chosen"]["place"], told["kept"]["name"]) == (1, "books.csv")
+        head, _ = await station.answer("GET", f"{way}&format=csv", viewer)
+        assert 'filename="comparison.csv"' in head
+        assert (await act("DELETE", "", operator))[0] == 200
+        assert await act("GET", "", viewer) == (200, {"kept": None})
+    lines = [(line["person"], line["act"], line["text"].partition(";")[0]) for line in audited(tmp_path)]
+    assert ("program-operator", "PUT", "books.csv as the expected stock of monday") in lines
+    assert ("program-operator", "DELETE", "the expected stock of monday") in lines
+
+
+def test_uploads_are_bounded_and_old_ones_go_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    DecisionBook(tmp_path).add("s", Decision("12345678", "A", 1, 1, Decided.FINE, "Ann"))  # a file of before
+    book, columns = ExpectedStockBook(tmp_path), StockColumns(0, 1)
+    assert book.kept("store-0") is None
+    for n in range(MOST_UPLOADS + 2):
+        book.keep(f"store-{n}", ExpectedStock("books.csv", "", n, n, columns), b"x" * 10)
+    assert [n for n in range(MOST_UPLOADS + 2) if book.kept(f"store-{n}") is None] == [0, 1]
+    monkeypatch.setattr(expected_stock_book, "MOST_BYTES", 95)
+    book.keep("store-5", ExpectedStock("newer.csv", "Ann", 100, 100, columns), b"y" * 70)
+    left = [n for n in range(MOST_UPLOADS + 2) if book.kept(f"store-{n}") is not None]
+    assert left == [5, MOST_UPLOADS, MOST_UPLOADS + 1]
+    assert book.data("store-5") == b"y" * 70
+    assert len(DecisionBook(tmp_path).decisions("s")) == 1
+
+
+@in_real_time
+async def test_long_json_is_packed_for_who_takes_it_and_nothing_else_is(folder: Path) -> None:
+    way = "/api/stock/places?store=monday"
+    with SqliteStore(folder / "monday") as store:
+        store.plan(PlannedLocation(f"CL-{bay:02}-1-1", "A1") for bay in range(90))
+    async with served(NOBODY, folder=folder) as station:
+        head, plain = await station.answer("GET", way)
+        assert "content-encoding" not in head.lower()
+        host = f"Host: {station.where.host}:{station.where.port}\r\nAccept-Encoding: br, gzip;q=0.5"
+        for path, is_packed in (
+            (way, True), ("/api/stock", False), ("/api/stock/export?store=monday&format=csv", False),
+            ("/static/style/stock.css", False),
+        ):  # fmt: skip
+            said = await station.say(f"GET {path} HTTP/1.1\r\n{host}\r\nConnection: close\r\n\r\n".encode())
+            raw, _, body = said.partition(b"\r\n\r\n")
+            assert (b"content-encoding: gzip" in raw.lower()) == is_packed, path
+            if is_packed:
+                assert len(body) < len(plain) / 4
+                assert gzip.decompress(body).decode() == plain
+                tag = next(line for line in raw.decode().splitlines() if line.lower().startswith("etag"))
+        os.utime(folder / "monday" / "inventory.db", ns=(1, 1))
+        asked = {"If-None-Match": tag.split(" ")[1], "Accept-Encoding": "gzip"}
+        assert (await station.ask("GET", way, asked))[0] == 304, "written to, and what is shown is the same"
 
 
 @in_real_time

@@ -69,11 +69,15 @@ RULES: Mapping[str, Rule] = {
     "GET /api/stock/outlines": _LOOKS,
     "GET /api/stock/export": _LOOKS,
     "POST /api/stock/compare": _LOOKS,  # a question with a file, which is kept nowhere
+    "GET /api/stock/expected": _LOOKS,
+    "PUT /api/stock/expected": _ACTS,
+    "POST /api/stock/expected": _ACTS,
+    "DELETE /api/stock/expected": _ACTS,
     "GET /api/stock/decisions": _LOOKS,
     "POST /api/stock/decisions": _ACTS,
     "GET /api/missions": _LOOKS,
     "GET /api/missions/estimate": _LOOKS,  # what the drone would do, which changes nothing in it
-    "GET /api/missions/recount": _LOOKS,
+    "POST /api/missions/recount": _LOOKS,  # a question, too long for an address
     "POST /api/missions/fly": _ACTS,
     "PUT /api/missions/{mission}": _ACTS,
     "DELETE /api/missions/{mission}": _ACTS,

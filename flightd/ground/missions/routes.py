@@ -28,6 +28,7 @@ from flightd.ground.stores import Stores
 _LOG = logging.getLogger(__name__)
 _AT_ONCE, _MOST_WAITING = 1, 32
 _MOST_BYTES = 64 << 10
+_MOST_PLACES, _MOST_PLACES_BYTES = 20_000, 2 << 20
 
 _Id = Annotated[str, Meta(min_length=8, max_length=64)]
 _Nodes = Annotated[tuple[Annotated[str, Meta(min_length=1, max_length=64)], ...], Meta(max_length=MOST_NODES)]
@@ -57,6 +58,16 @@ class Flown(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seen_ns: Annotated[int, Meta(ge=0)] = 0
 
 
+class Recounted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Places of an inventory that are to be counted again."""
+
+    store: Annotated[str, Meta(max_length=1000)]
+    places: Annotated[
+        tuple[Annotated[str, Meta(min_length=1, max_length=200)], ...],
+        Meta(min_length=1, max_length=_MOST_PLACES),
+    ]
+
+
 def mission_routes(folder: Path | None, drones: Mapping[str, DroneLink]) -> list[BaseRoute]:
     """The page and its answers; without a `folder` missions are planned and flown, but not kept."""
     missions = _Missions(None if folder is None else MissionBook(folder), Stores(folder), drones)
@@ -65,7 +76,7 @@ def mission_routes(folder: Path | None, drones: Mapping[str, DroneLink]) -> list
     ways: list[tuple[str, str, AnswerTo]] = [
         ("", "GET", missions.listed),
         ("/estimate", "GET", missions.estimate),
-        ("/recount", "GET", missions.recount),
+        ("/recount", "POST", missions.recount),
         ("/fly", "POST", missions.fly),
         ("/{mission}", "PUT", missions.keep),
         ("/{mission}", "DELETE", missions.delete),
@@ -109,18 +120,26 @@ class _Missions:
         )))  # fmt: skip
 
     async def recount(self, request: Request) -> Response:
-        """The nodes and levels that see each `&place=…` of `?store=NAME`, and the places of which none knows
-        from where they are seen."""
-        query = request.query_params
-        view = await self._threads.run(self._stores.view, query.get("store", ""))
+        """The nodes and levels that see places of an inventory, the places that are seen from none, and the
+        site that the inventory is of (empty: nobody knows)."""
+        asked = await said(request, Recounted, "places to count again", _MOST_PLACES_BYTES)
+        view = await self._threads.run(self._stores.view, asked.store)
+        site = await self._threads.run(self._stores.site_name, asked.store)
         node_of = {record.code: record.node for record in view.records}
         levels = {spot.code: spot.level for front in view.fronts for spot in front.spots}
-        places = list(dict.fromkeys(query.getlist("place")))
+        places = list(dict.fromkeys(asked.places))
         seen = [code for code in places if node_of.get(code)]
+        nodes = list(dict.fromkeys(node_of[code] for code in seen))
+        if len(nodes) > MOST_NODES:
+            raise InputError(
+                f"these places are seen from {len(nodes)} nodes, and a flight has at most {MOST_NODES}",
+                remedy="pick out fewer places",
+            )
         known = all(levels.get(code) for code in seen)
         return as_json(
             {
-                "nodes": list(dict.fromkeys(node_of[code] for code in seen)),
+                "site": site,
+                "nodes": nodes,
                 "levels": sorted({levels[code] for code in seen}) if known else [],
                 "without": [code for code in places if code not in seen],
             }

@@ -69,6 +69,7 @@ export default {
   "Handing the nodes to the drone …": "Die Knoten werden der Drohne übergeben …",
   "the drone has not taken the nodes: look at its events on Live": "die Drohne hat die Knoten nicht angenommen: Sehen Sie ihre Ereignisse auf Live an",
   "nobody knows from which node these places are seen": "niemand weiß, von welchem Knoten diese Plätze zu sehen sind",
+  "Counts {places} places, {asked} were asked for: at a node, all on these levels are counted.": "Zählt {places} Plätze, verlangt waren {asked}: An einem Knoten werden alle auf diesen Ebenen gezählt.",
   "Recount {place}": "Nachzählung {place}",
   "Recount {n} places": "Nachzählung {n} Plätze",
   "Counted in passing, then by stopping what that leaves open:": "Im Vorbeiflug gezählt, was dann offen bleibt im Stehen:",

@@ -53,6 +53,7 @@ function Under({ plan }) {
 function Takes({ estimate }) {
   if (!estimate) return html`<p class="quiet" role="status">${say("The drone plans it …")}</p>`;
   const { planned, trouble } = estimate;
+  const { asked } = missions();
   if (trouble) return html`<p class="refusal" role="alert">${quoted(trouble, capital)}</p>`;
   const figures = [
     [say("Time in the air"), minutes(planned.seconds)],
@@ -64,6 +65,8 @@ function Takes({ estimate }) {
     <dl class="takes">
       ${figures.map(([name, value]) => html`<div key=${name}><dt>${name}</dt><dd>${value}</dd></div>`)}
     </dl>
+    ${asked > 0 && planned.places > asked &&
+    html`<p class="note">${say("Counts {places} places, {asked} were asked for: at a node, all on these levels are counted.", { places: planned.places, asked })}</p>`}
     <p class="quiet">
       ${say("The drone’s own estimate: its speeds and turns along this way, and each view of a shelf at its longest; mostly it takes less.")}
       ${" "}${say("Its battery has {charge}; a full one lasts {time} down to its reserve.", { charge: percent(planned.charge), time: duration(planned.battery_s) })}

@@ -2,7 +2,7 @@
 import { english, say } from "../language.js";
 import { act, newId } from "../acts.js";
 import { askJson, askStation, isGivenUp } from "../fetching.js";
-import { shown, state } from "../store.js";
+import { shown, state, update } from "../store.js";
 import { change, missions, open } from "./missions_state.js";
 
 const LOOK_MS = 100;
@@ -136,16 +136,38 @@ async function taken(plan) {
   }
 }
 
-// What has to be flown to count these places of an inventory again becomes the chosen flight.
+// What has to be flown to count these places of an inventory again becomes the chosen flight of a drone in its hall.
 export async function recount(store, places) {
-  const query = new URLSearchParams([["store", store], ...places.map((place) => ["place", place])]);
-  const { nodes, levels, without } = await askJson(`/api/missions/recount?${query}`);
+  const body = JSON.stringify({ store, places });
+  const { site: hall, nodes, levels, without } = await askJson("/api/missions/recount", { method: "POST", headers: JSON_BODY, body });
   if (!nodes.length) throw new Error(english("nobody knows from which node these places are seen"));
-  const floor = shown().welcome?.floor;
-  const counted = { n: places.length - without.length, lost: without.length };
-  const note = without.length
-    ? english("Counts {n} places of the inventory again; {lost} more have no node and are left out.", counted)
-    : english("Counts {n} places of the inventory again.", counted);
+  const site = chooseDroneIn(hall);
+  const asked = places.length - without.length;
+  const note = noteOf({ n: asked, lost: without.length }, hall);
   const name = places.length === 1 ? say("Recount {place}", { place: places[0] }) : say("Recount {n} places", { n: places.length });
-  change({ site: floor?.name ?? "", id: "", name, nodes, levels, best: true, note, flying: "", trouble: "", list: null });
+  change({ site, id: "", name, nodes, levels, best: true, note, asked, hall, flying: "", trouble: "", list: null });
+}
+
+function noteOf(counted, hall) {
+  if (!hall && counted.lost) return english("Counts {n} places of the inventory again; {lost} more have no node and are left out; no flight log beside it says of which hall it is.", counted);
+  if (!hall) return english("Counts {n} places of the inventory again; no flight log beside it says of which hall it is.", counted);
+  if (counted.lost) return english("Counts {n} places of the inventory again; {lost} more have no node and are left out.", counted);
+  return english("Counts {n} places of the inventory again.", counted);
+}
+
+// The drone that is shown, else the first other one, that flies in this hall; the site of whichever is shown then.
+function chooseDroneIn(hall) {
+  const siteOf = (name) => state.drones.get(name)?.welcome?.floor.name ?? "";
+  const here = siteOf(state.selected);
+  if (!hall || here === hall) return here;
+  const other = (state.station?.drones ?? []).find((name) => siteOf(name) === hall);
+  if (!other) {
+    if (here) throw new Error(english("the inventory is of {hall}, and {drone} flies in {site}: link a drone of {hall}", { hall, drone: state.selected, site: here }));
+    return ""; // no drone is heard yet: see missions_state.js
+  }
+  update((s) => {
+    s.selected = other;
+    s.chosenNode = "";
+  });
+  return hall;
 }

@@ -1,4 +1,5 @@
 // What the page Missions knows: what is chosen, what the drone makes of it, and the missions that are kept.
+import { english } from "../language.js";
 import { state, update } from "../store.js";
 
 const EMPTY = {
@@ -9,6 +10,8 @@ const EMPTY = {
   id: "", // of the kept mission that is open; empty: none is
   name: "",
   note: "", // what a person should know of this choice
+  asked: 0, // places that it was chosen for; 0: it was chosen by nodes
+  hall: "", // site that the inventory is of for which it was chosen; empty: of none, or nobody knows
   estimate: null, // {key, planned} or {key, trouble}
   list: null, // missions that are kept; null: not known yet
   kept: true, // this station has a folder to keep them in
@@ -16,6 +19,9 @@ const EMPTY = {
   refused: false, // `flying` is why it was not
   flying: "", // what became of handing the mission over; empty: nothing is under way
 };
+
+// A choice that is not made for an inventory.
+const BY_HAND = { note: "", asked: 0, hall: "" };
 
 export const missions = () => state.missions ?? EMPTY;
 
@@ -27,10 +33,14 @@ export function change(changes) {
 
 // Another site: nothing that was chosen on the one before stands for it.  What was chosen before any drone was
 // heard (from an inventory) stands: the drone refuses what it does not know.
-export const enter = (site) => change(missions().site ? { ...EMPTY, site } : { site });
+export function enter(site) {
+  const { site: before, hall } = missions();
+  const note = hall && hall !== site ? english("Nothing is chosen: the inventory is of {hall}, this drone flies in {site}.", { hall, site }) : "";
+  change(before || note ? { ...EMPTY, site, note } : { site });
+}
 
 // What is chosen becomes another choice; an estimate is asked for anew.
-export const choose = (changes) => change({ note: "", flying: "", ...changes });
+export const choose = (changes) => change({ ...BY_HAND, flying: "", ...changes });
 
 export function toggleNode(id) {
   const { nodes } = missions();
@@ -53,9 +63,9 @@ export function toggleLevel(level) {
 }
 
 export const open = ({ id, name, nodes, levels }) =>
-  change({ id, name, nodes, levels, best: false, note: "", flying: "", trouble: "" });
+  change({ id, name, nodes, levels, best: false, ...BY_HAND, flying: "", trouble: "" });
 
-export const startAnew = () => change({ id: "", name: "", nodes: [], levels: [], best: true, note: "", flying: "", trouble: "" });
+export const startAnew = () => change({ id: "", name: "", nodes: [], levels: [], best: true, ...BY_HAND, flying: "", trouble: "" });
 
 // Whether what is chosen is what the open mission holds.
 export function isKept() {

@@ -15,7 +15,7 @@ export function DecisionForm() {
   const [name, setName] = useState(who());
   const [outcome, setOutcome] = useState({ text: "", good: true });
   const before = decisions[chosen] ?? [];
-  if (source.kind !== "store" || (!needsALook(chosen, known) && !before.length)) return null;
+  if (source.kind !== "store" || (!mayOperate() && !needsALook(chosen, known) && !before.length)) return null;
   const now = standing(chosen, known)?.what ?? "open";
   const send = async (what) => {
     if (!signedInName() && !name.trim()) return setOutcome({ text: english("Say who you are first."), good: false });
@@ -41,7 +41,7 @@ export function DecisionForm() {
       </label>
       <div class="decision-orders">
         ${Object.entries(DECISIONS)
-          .filter(([what]) => what !== "open" || now !== "open")
+          .filter(([what]) => (what === "open" ? now !== "open" : what === "count_again" || needsALook(chosen, known)))
           .map(([what, { order }]) => html`<button key=${what} class="order" aria-pressed=${now === what} onClick=${() => send(what)}>${say(order)}</button>`)}
       </div>`}
       <p class=${outcome.good ? "quiet" : "refusal"} role="status">${quoted(outcome.text)}</p>

@@ -1,6 +1,8 @@
 // The fronts of the racks as who stands before them sees them, cell by cell, each with its state.
+import { mayOperate } from "../access/session.js";
 import { html, useMemo } from "../html.js";
 import { language, say } from "../language.js";
+import { isSelected, toggleSelected } from "./selection.js";
 import { COUNTED, placeWords, rackWords, STATES } from "./states.js";
 import { differs, isShown, stock } from "./stock_state.js";
 import { neighbour, rowsOf } from "./walk.js";
@@ -18,11 +20,11 @@ export function Elevations({ onChoose }) {
 }
 
 function Front({ front, rows, onChoose }) {
-  const { places, chosen, fresh, states, found, expected } = stock();
+  const { places, chosen, fresh, states, found, expected, selected } = stock();
   const here = front.spots.some(([code]) => code === chosen) ? chosen : "";
   return useMemo(
     () => drawn(front, rows, { places, here, fresh, states, found, expected }, onChoose),
-    [front, rows, places, here, fresh, states, found, expected, language()],
+    [front, rows, places, here, fresh, states, found, expected, selected, language()],
   );
 }
 
@@ -32,11 +34,17 @@ function drawn(front, rows, known, onChoose) {
   const inTabOrder = known.here || rows[0]?.find(Boolean)?.code;
   const onClick = (event) => {
     const code = event.target.closest("[data-code]")?.dataset.code;
-    if (code) onChoose(code);
+    if (code && event.shiftKey && maySelect()) toggleSelected(code);
+    else if (code) onChoose(code);
   };
   const onKeyDown = (event) => {
     const code = event.target.dataset?.code;
     if (!code || event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.key === "Enter" && event.shiftKey && maySelect()) {
+      event.preventDefault();
+      toggleSelected(code);
+      return;
+    }
     const next = neighbour(stock().fronts, code, event.key);
     if (!next) return;
     event.preventDefault();
@@ -53,6 +61,8 @@ function drawn(front, rows, known, onChoose) {
     </section>
   `;
 }
+
+const maySelect = () => stock().source?.kind === "store" && mayOperate();
 
 // The cell of a place as it stands on the page.
 export const placeCell = (code) => document.querySelector(`[data-code="${CSS.escape(code)}"]`);
@@ -97,15 +107,21 @@ function cell({ code }, known, inTabOrder) {
   if (known.fresh.has(code)) classes.push("fresh");
   if (!isShown(code, known)) classes.push("aside");
   if (differs(code, known.expected)) classes.push("differs");
-  const words = placeWords(code, place) + (differs(code, known.expected) ? `, ${say("not as expected")}` : "");
+  const words = [placeWords(code, place)];
+  if (differs(code, known.expected)) words.push(say("not as expected"));
+  if (isSelected(code)) {
+    classes.push("selected");
+    words.push(say("selected"));
+  }
+  const label = words.join(", ");
   return html`
     <button
       key=${code}
       class=${classes.join(" ")}
       data-code=${code}
-      aria-label=${words}
+      aria-label=${label}
       aria-pressed=${code === known.here}
-      title=${words}
+      title=${label}
       tabindex=${code === inTabOrder ? 0 : -1}
     >${STATES[place.state].mark}</button>
   `;

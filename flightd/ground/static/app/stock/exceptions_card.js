@@ -1,17 +1,14 @@
 // The places that need a look as a queue: what is the matter, who looks, what was decided.
 import { mayOperate } from "../access/session.js";
-import { isGivenUp } from "../fetching.js";
-import { html, useMemo, useState } from "../html.js";
-import { quoted, say } from "../language.js";
-import { recount } from "../missions/missions_source.js";
-import { goTo } from "../router.js";
+import { html, useMemo } from "../html.js";
+import { say } from "../language.js";
 import { DECISIONS, exceptions } from "./decisions.js";
 import { outcomeWords } from "./expected_card.js";
+import { RecountButton } from "./recount_button.js";
 import { STATES } from "./states.js";
 import { change, stock } from "./stock_state.js";
 
 const SHOWN = 200;
-const MOST_RECOUNTED = 300; // fit into one request
 
 export function ExceptionsCard({ onChoose }) {
   const known = stock();
@@ -19,6 +16,7 @@ export function ExceptionsCard({ onChoose }) {
   const all = useMemo(() => exceptions(known), [fronts, places, expected, decisions]);
   if (known.source?.kind !== "store") return null;
   const open = all.filter((one) => one.open);
+  const again = recounted(open);
   const listed = known.withClosed ? all : open;
   return html`
     <section class="card exceptions" aria-labelledby="exceptions">
@@ -29,7 +27,8 @@ export function ExceptionsCard({ onChoose }) {
           ${say("{n} closed place|{n} closed places", { n: all.length - open.length })}
         </button>`}
       </div>
-      ${mayOperate() && html`<${Recount} places=${recounted(open)} source=${known.source} />`}
+      ${mayOperate() && again.length > 0 &&
+      html`<${RecountButton} places=${again}>${say("Recount {n} place as a mission|Recount {n} places as a mission", { n: again.length })}<//>`}
       ${listed.length > 0 &&
       html`
         <ol aria-labelledby="exceptions">
@@ -44,26 +43,7 @@ export function ExceptionsCard({ onChoose }) {
 // What somebody ordered to be counted again, or else all that is open.
 function recounted(open) {
   const ordered = open.filter(({ decision }) => decision?.what === "count_again");
-  return (ordered.length ? ordered : open).map(({ code }) => code).slice(0, MOST_RECOUNTED);
-}
-
-function Recount({ places, source }) {
-  const [trouble, setTrouble] = useState("");
-  if (!places.length) return null;
-  const plan = async () => {
-    try {
-      await recount(source.name, places);
-      goTo("/missions");
-    } catch (error) {
-      if (!isGivenUp(error)) setTrouble(error.message);
-    }
-  };
-  return html`
-    <div class="recount">
-      <button class="order" onClick=${plan}>${say("Recount {n} place as a mission|Recount {n} places as a mission", { n: places.length })}</button>
-      ${trouble && html`<p class="refusal" role="alert">${quoted(trouble)}</p>`}
-    </div>
-  `;
+  return (ordered.length ? ordered : open).map(({ code }) => code);
 }
 
 function Row({ code, decision, open, onChoose }) {

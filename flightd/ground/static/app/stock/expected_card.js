@@ -1,9 +1,13 @@
 // The expected stock: upload, which column is what, and every difference to the count.
+import { mayOperate } from "../access/session.js";
 import { html, useEffect, useRef } from "../html.js";
-import { english, quoted, quotedText, say, sayWith } from "../language.js";
+import { dateFormat, english, quoted, quotedText, say, sayWith } from "../language.js";
+import { time } from "../words.js";
 import { choose, compareAgain, download, forget, upload } from "./expected_stock.js";
+import { loadKept } from "./kept_stock.js";
 import { stock } from "./stock_state.js";
 
+const DAY = dateFormat({ month: "short", day: "numeric" });
 const OUTCOMES = {
   __proto__: null,
   match: english("as expected"),
@@ -22,21 +26,31 @@ export function ExpectedCard({ onChoose }) {
     const isRefused = expected?.trouble && !expected.chosen;
     if (expected && !expected.busy && !isRefused && expected.tag !== tag) compareAgain();
   }, [tag, expected?.tag, expected?.busy]);
+  useEffect(() => {
+    loadKept();
+  }, [source]);
   if (source?.kind !== "store") return null;
+  const mayRemove = expected && (!expected.kept || mayOperate());
   return html`
     <section class="card expected" aria-labelledby="expected">
       <div class="expected-head">
         <h3 id="expected">${say("Expected stock")}</h3>
         <${Choose} words=${expected ? say("Another file") : say("Upload CSV or XLSX")} />
-        ${expected && html`<button class="order" onClick=${forget}>${say("Remove")}</button>`}
+        ${mayRemove && html`<button class="order" onClick=${forget}>${say("Remove")}</button>`}
       </div>
       ${!expected &&
-      html`<p class="quiet">${say("What your books say lies where. It is compared with the count here, and kept nowhere.")}</p>`}
+      html`<p class="quiet">${mayOperate() ? say("What your books say lies where. It is compared with the count, and kept at this station for everybody until it is removed.") : say("What your books say lies where. It is compared with the count, and kept in this tab only.")}</p>`}
+      ${expected?.kept?.at_s && html`<p class="quiet">${keptWords(expected.kept)}</p>`}
       ${expected?.busy && html`<p class="quiet" role="status">${say("Comparing {file} …", { file: expected.name })}</p>`}
       ${expected?.trouble && html`<p class="refusal" role="alert">${expected.name}: ${quoted(expected.trouble)}</p>`}
       ${expected?.columns && html`<${Columns} /><${Outcomes} /><${Differences} onChoose=${onChoose} />`}
     </section>
   `;
+}
+
+function keptWords({ at_s: at, who }) {
+  const day = `${DAY.format(at * 1000)} ${time(at * 1000)}`;
+  return who ? say("Kept for everybody since {day}, by {who}.", { day, who }) : say("Kept for everybody since {day}.", { day });
 }
 
 function Choose({ words }) {
@@ -55,9 +69,10 @@ function Choose({ words }) {
 function Columns() {
   const { expected } = stock();
   const { columns, chosen, sample, kind, rows, name } = expected;
+  const fixed = Boolean(expected.kept) && !mayOperate();
   const pick = (role, words, optional) => html`
     <label class="field">${words}
-      <select value=${chosen[role] ?? ""} onChange=${(event) => choose({ [role]: event.target.value === "" ? null : Number(event.target.value) })}>
+      <select value=${chosen[role] ?? ""} disabled=${fixed} onChange=${(event) => choose({ [role]: event.target.value === "" ? null : Number(event.target.value) })}>
         ${optional && html`<option value="">${say("none")}</option>`}
         ${columns.map((column, i) => html`<option key=${i} value=${i}>${column}</option>`)}
       </select>
@@ -68,7 +83,7 @@ function Columns() {
     <p class="quiet">${say("{name}: {kind}, {n} row|{name}: {kind}, {n} rows", { name, kind: quotedText(kind), n: rows })}</p>
     <div class="find-row">
       ${pick("place", say("Places are in"))}${pick("code", say("Codes are in"))}${pick("quantity", say("Quantities are in"), true)}
-      <label class="check"><input type="checkbox" checked=${chosen.heading} onChange=${(event) => choose({ heading: event.target.checked })} /> ${say("The first row names the columns")}</label>
+      <label class="check"><input type="checkbox" checked=${chosen.heading} disabled=${fixed} onChange=${(event) => choose({ heading: event.target.checked })} /> ${say("The first row names the columns")}</label>
     </div>
     <details>
       <summary>${say("The first rows")}</summary>

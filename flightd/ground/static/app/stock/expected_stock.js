@@ -1,32 +1,38 @@
-// The books that a person uploads: sent to the station with the columns chosen, compared there, kept nowhere.
+// The books that a viewer uploads: sent to the station with the columns chosen, compared there, kept in this tab.
+// What is kept for everybody is in kept_stock.js.
+import { mayOperate } from "../access/session.js";
 import { isGivenUp } from "../fetching.js";
+import { chooseKept, columnsQuery, downloadKept, keep, loadKept, removeKept, showNone } from "./kept_stock.js";
 import { asked } from "./stock_source.js";
 import { byKey, change, sourceQuery, stock } from "./stock_state.js";
 
 const COMPARE_MS = 60000;
 
-// What is known of the upload: {name, busy, trouble} and, once it was compared, all that the station answers.
+// What is known of the upload: {name, busy, trouble}; once it was compared, all that the station answers; `kept`
+// where the station keeps it, else `file`.
 export async function upload(file) {
+  if (mayOperate()) return keep(file);
   change({ expected: { file, name: file.name, busy: true } });
-  await compare("");
+  return compare("");
 }
 
 // Compare anew with other columns.
 export async function choose(columns) {
   const chosen = { ...stock().expected.chosen, ...columns };
   change({ expected: { ...stock().expected, chosen, busy: true } });
-  await compare(columnsQuery(chosen));
+  return stock().expected.kept ? chooseKept(chosen) : compare(columnsQuery(chosen));
 }
 
 // Again with what was counted since; not while one runs: it is asked for again when that one ends.
 export function compareAgain() {
-  if (!comparing) compare(columnsQuery(stock().expected.chosen));
+  if (stock().expected.kept) loadKept();
+  else if (!comparing) compare(columnsQuery(stock().expected.chosen));
 }
 
-export function forget() {
-  const states = new Set(stock().states);
-  states.delete("differs");
-  change({ expected: null, states });
+export async function forget() {
+  if (stock().expected.kept) return removeKept();
+  showNone();
+  return loadKept();
 }
 
 let comparing = null; // {file, source, ending} of the one comparison that runs
@@ -74,16 +80,11 @@ function posted(query, options = {}) {
   });
 }
 
-function columnsQuery(chosen) {
-  if (!chosen) return "";
-  const { place, code, quantity, heading } = chosen;
-  return `&place=${place}&code=${code}&quantity=${quantity ?? ""}&heading=${heading ? "yes" : "no"}`;
-}
-
 // Hand the whole comparison to the person as a file.
 export async function download(format) {
+  const { kept } = stock().expected;
   try {
-    const answer = await posted(`${columnsQuery(stock().expected.chosen)}&format=${format}`);
+    const answer = await (kept ? downloadKept(format) : posted(`${columnsQuery(stock().expected.chosen)}&format=${format}`));
     const url = URL.createObjectURL(await answer.blob());
     Object.assign(document.createElement("a"), { href: url, download: `comparison.${format}` }).click();
     setTimeout(() => URL.revokeObjectURL(url), 10000);

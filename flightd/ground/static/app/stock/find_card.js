@@ -2,6 +2,7 @@
 import { html, useEffect, useRef } from "../html.js";
 import { english, say } from "../language.js";
 import { goTo } from "../router.js";
+import { SelectionRow } from "./selection_row.js";
 import { STATES } from "./states.js";
 import { change, differs, inOrder, isShown, sourceQuery, stock } from "./stock_state.js";
 import { exportUrl, search, show } from "./stock_source.js";
@@ -18,6 +19,7 @@ export function FindCard({ onChoose }) {
         <${Downloads} />
       </div>
       <${StateFilters} />
+      <${SelectionRow} />
     </section>
   `;
 }

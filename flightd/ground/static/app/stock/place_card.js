@@ -1,10 +1,12 @@
 // One place: its picture with the codes' outlines, what was read, how sure, and its history over the runs.
+import { mayOperate } from "../access/session.js";
 import { html, useEffect, useState } from "../html.js";
 import { dateFormat, decimal, english, quoted, say } from "../language.js";
 import { time } from "../words.js";
 import { DecisionForm } from "./decision_form.js";
 import { outcomeWords } from "./expected_card.js";
 import { differs, inOrder, isShown, stock } from "./stock_state.js";
+import { toggleSelected } from "./selection.js";
 import { rackWords, STATES } from "./states.js";
 import { outlinesOf, pictureUrl } from "./stock_source.js";
 
@@ -42,6 +44,8 @@ export function PlaceCard({ onChoose }) {
         <span class="quiet">${place.pending ? say("not booked yet") : say(STATES[place.state].means)}</span>
       </p>
       <p class="quiet">${whereIs(chosen, known.fronts)}</p>
+      ${known.source.kind === "store" && mayOperate() &&
+      html`<label class="check"><input type="checkbox" checked=${known.selected.has(chosen)} onChange=${() => toggleSelected(chosen)} /> ${say("Selected to be counted again")}</label>`}
       <${Outcome} />
       ${told?.trouble && html`<p class="refusal">${quoted(told.trouble)}</p>`}
       ${look?.evidence && html`<${Picture} key=${look.evidence} look=${look} place=${chosen} />`}

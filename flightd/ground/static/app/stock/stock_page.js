@@ -8,6 +8,7 @@ import { Elevations, placeCell } from "./elevations.js";
 import { ExceptionsCard } from "./exceptions_card.js";
 import { ExpectedCard } from "./expected_card.js";
 import { FindCard } from "./find_card.js";
+import { loadKept } from "./kept_stock.js";
 import { PlaceCard } from "./place_card.js";
 import { change, stock } from "./stock_state.js";
 import { loadLooks, loadPlaces, loadSources } from "./stock_source.js";
@@ -88,7 +89,12 @@ function stay(route) {
     if (asking) timer = setTimeout(again, arrived ? (AGAIN_MS[stock().source?.kind] ?? SOURCES_MS) : TROUBLE_MS);
   };
   again();
-  const decisions = setInterval(() => document.hidden || loadDecisions(), DECISIONS_MS);
+  const said = () => {
+    if (document.hidden) return;
+    loadDecisions();
+    loadKept();
+  };
+  const decisions = setInterval(said, DECISIONS_MS);
   const sources = setInterval(() => document.hidden || !arrived || loadSources(null), SOURCES_MS);
   return () => {
     asking = false;

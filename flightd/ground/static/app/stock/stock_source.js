@@ -46,7 +46,7 @@ export async function loadSources(wanted) {
 export function show(source) {
   change({
     source, tag: "", fronts: [], places: NOTHING, fresh: new Set(), troubles: {}, found: null, words: "", chosen: "", looks: null,
-    expected: null, decisions: NOTHING,
+    selected: new Set(), expected: null, decisions: NOTHING,
   });
   return loadPlaces();
 }

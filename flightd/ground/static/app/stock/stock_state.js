@@ -19,6 +19,7 @@ const EMPTY = {
   states: new Set(), // that are picked out; empty: all
   words: "", // that are looked for
   found: null, // codes of places that the words mean; null: none are looked for
+  selected: new Set(), // codes of places that are to be counted again: see selection.js
   chosen: "", // code of the place in the card
   looks: null, // {code, looks} or {code, trouble}
   expected: null, // see expected_stock.js
