@@ -34,6 +34,7 @@ PORT = 8080
 _PING_S = 4.0
 """A page that does not answer for so long is closed: whoever cannot see does not attend."""
 _LEAVE_S = 2
+_LAST_PORT = 65535
 _LISTEN = re.compile(r"(?P<host>\[[0-9a-fA-F:.%]+\]|[^:\[\]]+)(:(?P<port>\d{1,5}))?")
 
 
@@ -58,6 +59,8 @@ class Listening:
     @classmethod
     def read(cls, text: str, option: str = "--listen", default_port: int = PORT) -> Listening:
         """HOST, HOST:PORT or [HOST]:PORT, given by an `option`.  InputError for anything else."""
+        if text.isdecimal() and int(text) <= _LAST_PORT:
+            raise InputError("is a port alone", key=f"{option} {text}", remedy=f"give 127.0.0.1:{text}")
         found = _LISTEN.fullmatch(text)
         host = text if found is None else found["host"]
         port = default_port if found is None or found["port"] is None else int(found["port"])
@@ -67,7 +70,7 @@ class Listening:
             except ValueError:
                 raise InputError("expected ADDRESS or ADDRESS:PORT", key=f"{option} {text}") from None
         host = host.removeprefix("[").removesuffix("]")
-        if port > 65535:
+        if port > _LAST_PORT:
             raise InputError("a port is at most 65535", key=f"{option} {text}")
         return cls("127.0.0.1" if host == "localhost" else host, port)
 

@@ -111,13 +111,14 @@ def ground(
     from flightd.ground.tls import read_certificate
 
     if folder is not None and not folder.is_dir():
-        raise InputError("there is no such folder", key=f"--folder {folder}")
+        what = "is a file, no folder" if folder.exists() else "there is no such folder"
+        raise InputError(what, key=f"--folder {folder}")
     drones = drone_addresses(drone or (), key, server_key or ())
     certificate = read_certificate(tls_cert, tls_key)
     where = replace(Listening.read(listen), secure=certificate is not None)
     access = Access(state_folder(state), login or where.is_beyond, where.secure)
     with contextlib.ExitStack() as stack:
-        viewer = None if foxglove is None else stack.enter_context(_foxglove_server(foxglove, login, drones))
+        viewer = None if foxglove is None else stack.enter_context(_foxglove_server(foxglove, access.login, drones))
         at = "" if viewer is None else viewer.url
         viewers = () if viewer is None else (viewer,)
         ended_by = run(drones, where, partial(_say_where, at), access, certificate, folder, viewers)

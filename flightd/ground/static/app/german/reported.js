@@ -196,6 +196,7 @@ export default {
   "{where}: refused: this key is not on the daemon's list of clients": "{where}: verweigert: Dieser Schlüssel steht nicht auf der Liste der Drohne",
   "{where}: connected, but no answer in {seconds} s": "{where}: verbunden, aber keine Antwort in {seconds} s",
   "{where}: nobody listens; is flightd running, with [ground] listen set?": "{where}: Niemand hört zu; läuft flightd, und ist [ground] listen gesetzt?",
+  "{where}: this name is not known here; look at its spelling, or give the drone's address": "{where}: Dieser Name ist hier nicht bekannt; prüfen Sie die Schreibweise, oder geben Sie die Adresse der Drohne an",
   "there is no such drone": "diese Drohne gibt es nicht",
   "sign in first": "melden Sie sich zuerst an",
   "name or password is wrong": "Name oder Passwort ist falsch",
