@@ -6,6 +6,7 @@ import { listenForKeys } from "./keys.js";
 import { Page } from "./page.js";
 import { followLinks, retitle } from "./router.js";
 import { watch } from "./store.js";
+import { askBeforeLoss } from "./unsaved.js";
 
 const root = document.getElementById("page");
 const draw = () => render(html`<${Page} />`, root);
@@ -14,6 +15,7 @@ const SPOKEN_MS = 3000; // a station that gives no texts by then is read in Engl
 
 listenForKeys();
 followLinks();
+askBeforeLoss();
 connect();
 await Promise.race([speak(preferred()), new Promise((resolve) => setTimeout(resolve, SPOKEN_MS))]).catch(() => {});
 retitle();

@@ -21,6 +21,7 @@ export const state = {
   session: null, // who is signed in: {login, name, role}; see access/session.js
   route: null, // page, path below it and query: see router.js
   stock: null, // see stock/stock_state.js
+  typedSettings: {}, // of each drone what was typed and not sent: {key: value}, see doctor/settings_view.js
   missions: null, // see missions/missions_state.js
   station: null, // version, drones, browsers
   drones: new Map(),

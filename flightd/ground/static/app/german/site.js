@@ -47,6 +47,7 @@ export default {
   "Export": "Export",
   "Old versions": "Alte Fassungen",
   "Open anew": "Neu öffnen",
+  "Lose what is not saved": "Ungespeichertes verwerfen",
   "All sites": "Alle Hallen",
   "replaced {when}": "ersetzt {when}",
   "Snap to": "Raster",
