@@ -26,6 +26,7 @@ from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
 from flightd.ground.page_socket import PageSocket
 from flightd.ground.quiet_log import quiet_log
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.site_page.simulated_flight import SimulatedFlight
 from flightd.ground.studio.studio import Studio
 from flightd.ground.tls import Certificate
 from flightd.runtime.ending_signals import end_on_signals
@@ -166,13 +167,14 @@ async def serve(
     end; inventories and flights lie under `folder`; `viewers` are told what the pages are."""
     hub, flights, uploads = Hub(drones, viewers), Flights(folder), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
+    simulated = None if folder is None else SimulatedFlight(hub, folder, where.is_beyond)
     quiet_log()
     maps = ReadingProcess(refusal="too many maps are being checked")
     names = () if certificate is None else certificate.names
     hosts = own_hosts(where.host, where.port, certificate is not None, names, where.is_beyond)
     server = _Server(
         uvicorn.Config(
-            application(hub, hosts, access, folder, flights, uploads, maps, studio),
+            application(hub, hosts, access, folder, flights, uploads, maps, studio, simulated),
             http="h11",
             ws=PageSocket,
             lifespan="off",
@@ -195,6 +197,8 @@ async def serve(
         tasks.create_task(flights.run(), name="flights")
         if studio is not None:
             tasks.create_task(studio.run(), name="studio")
+        if simulated is not None:
+            tasks.create_task(simulated.run(), name="simulated flight")
         if access.login:
             tasks.create_task(access.run(), name="people")
         serving = tasks.create_task(server.serve([listener]), name="pages")

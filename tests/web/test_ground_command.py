@@ -185,7 +185,9 @@ def test_drones_are_named_with_host_and_ports() -> None:
     assert dict(drone_addresses([]))["drone"].host == "127.0.0.1"
 
 
-@pytest.mark.parametrize("text", ["a", "=h", "a=", "a b=h", "a=h:0/1", "a=h:1/99999", "a=h/x", "a=u@h", "a=h:", "a=[::1]:5"])
+@pytest.mark.parametrize(
+    "text", ["a", "=h", "a=", "a b=h", "a=h:0/1", "a=h:1/99999", "a=h/x", "a=u@h", "a=h:", "a=[::1]:5"]
+)
 def test_a_drone_that_is_not_named_so_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="--drone"):
         drone_addresses([text])

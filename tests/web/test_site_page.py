@@ -246,7 +246,9 @@ def test_a_finger_draws_what_it_goes_over_and_what_the_browser_takes_away_draws_
     expect(page.get_by_text("Saved as hall.toml.")).to_be_visible()
     context.close()
     drawn = tables(file)["keep_out"][-1]
-    assert [drawn[key] for key in ("x0_m", "y0_m", "x1_m", "y1_m")] == pytest.approx([0.3, 0.5, 1.3, 2.0], abs=0.06)
+    assert [drawn[key] for key in ("x0_m", "y0_m", "x1_m", "y1_m")] == pytest.approx(
+        [0.3, 0.5, 1.3, 2.0], abs=0.06
+    )
 
 
 def test_all_of_it_goes_by_keys_alone_and_nodes_keep_what_lies_on_them(

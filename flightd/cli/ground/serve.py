@@ -118,7 +118,9 @@ def ground(
     where = replace(Listening.read(listen), secure=certificate is not None)
     access = Access(state_folder(state), login or where.is_beyond, where.secure)
     with contextlib.ExitStack() as stack:
-        viewer = None if foxglove is None else stack.enter_context(_foxglove_server(foxglove, access.login, drones))
+        viewer = None
+        if foxglove is not None:
+            viewer = stack.enter_context(_foxglove_server(foxglove, access.login, drones))
         at = "" if viewer is None else viewer.url
         viewers = () if viewer is None else (viewer,)
         ended_by = run(drones, where, partial(_say_where, at), access, certificate, folder, viewers)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -57,11 +57,19 @@ class Flown(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seen_ns: Annotated[int, Meta(ge=0)] = 0
 
 
-def mission_routes(folder: Path | None, drones: Mapping[str, DroneLink]) -> list[BaseRoute]:
-    """The page and its answers; without a `folder` missions are planned and flown, but not kept."""
+def mission_routes(
+    folder: Path | None,
+    drones: Mapping[str, DroneLink],
+    for_each: Callable[[Callable[[DroneLink], None]], None],
+) -> list[BaseRoute]:
+    """The page and its answers; `for_each` prepares each of the drones, those that join, too.  Without a
+    `folder` missions are planned and flown, but not kept."""
     missions = _Missions(None if folder is None else MissionBook(folder), Stores(folder), drones)
-    for drone in drones.values():
+
+    def follow(drone: DroneLink) -> None:
         drone.on_plan = missions.heard
+
+    for_each(follow)
     ways: list[tuple[str, str, AnswerTo]] = [
         ("", "GET", missions.listed),
         ("/estimate", "GET", missions.estimate),

@@ -20,6 +20,7 @@ const TRACK_KEPT = 4000;
 export const state = {
   session: null, // who is signed in: {login, name, role}; see access/session.js
   route: null, // page, path below it and query: see router.js
+  simulation: null, // the simulated flight that the station flies or flew last, see site/simulation_bar.js
   stock: null, // see stock/stock_state.js
   typedSettings: {}, // of each drone what was typed and not sent: {key: value}, see doctor/settings_view.js
   missions: null, // see missions/missions_state.js
@@ -61,6 +62,7 @@ export function take({ drone, topic, value }) {
     if (drone === "") {
       if (topic === "session") s.session = value;
       if (topic === "station") takeStation(s, value);
+      if (topic === "simulation") s.simulation = value;
       if (topic === "echo") takeEcho(s, value);
       return;
     }
@@ -71,6 +73,7 @@ export function take({ drone, topic, value }) {
 
 function takeStation(s, value) {
   s.station = value;
+  for (const name of s.drones.keys()) if (!value.drones.includes(name)) s.drones.delete(name); // it has left
   if (value.drones.includes(s.selected)) return;
   s.selected = value.drones[0] ?? "";
   s.chosenNode = "";

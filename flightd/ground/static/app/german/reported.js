@@ -12,7 +12,7 @@ export default {
   "New {element}: {how}.": "Neu, {element}: {how}.",
   "{id}: now click the other node.": "{id}: Klicken Sie nun auf den anderen Knoten.",
   "The version of {day} is shown. Save puts it back.": "Gezeigt ist die Fassung vom {day}. Speichern stellt sie wieder her.",
-  "Saved as {file}. Fly it in simulation, in the station's folder: {command}": "Gespeichert als {file}. In der Simulation fliegen, im Ordner der Station: {command}",
+  "Saved as {file}.": "Gespeichert als {file}.",
   // roles, paints
   "viewer": "Zuschauer",
   "operator": "Bediener",

@@ -6,6 +6,7 @@ import { ElementCard, remove } from "./element_card.js";
 import { ElementList } from "./element_list.js";
 import { FindingsCard } from "./findings_card.js";
 import { Plan } from "./plan.js";
+import { SimulationBar } from "./simulation_bar.js";
 import { zoomBy } from "./zoom.js";
 import { checkSoon, download, openFile, save, showVersion } from "./site_source.js";
 import { change, isChanged, redo, site, undo } from "./site_state.js";
@@ -20,6 +21,7 @@ export function Editor() {
   return html`
     <div class="site-editor">
       <${Head} />
+      <${SimulationBar} />
       ${trouble && html`<p class="site-trouble" role="alert">${quoted(trouble)}</p>`}
       <p class="quiet site-said" role="status">${quoted(said)}</p>
       ${losesComments && html`<p class="site-trouble">${say("{file} is not written as [site] and [[…]] tables: saving writes it anew, and its comments move to the top.", { file: name })}</p>`}
