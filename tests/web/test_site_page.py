@@ -203,6 +203,14 @@ def test_the_mouse_moves_and_draws_and_each_stroke_is_one_step_back(
             page.get_by_role("button", name="Redo").click()
         page.get_by_role("button", name="Save", exact=True).click()
         expect(page.get_by_text("Saved as hall.toml.")).to_be_visible()
+        page.get_by_role("button", name="Fly it in simulation").click()
+        drones = page.get_by_role("navigation", name="Drones")
+        expect(drones.get_by_role("button", name="simulation")).to_be_visible()
+        page.get_by_role("button", name="End the flight").click()
+        expect(page.get_by_text("was not good")).to_be_visible()
+        expect(page.get_by_role("button", name="Fly again in simulation")).to_be_enabled()
+        expect(drones).to_have_count(0)
+        assert hindrances(page) == []
     saved = tables(file)
     assert saved["aisle"][0]["spacing_m"] == [1.6, 1.0, 1.3]
     assert saved["aisle"][1]["y_m"] == 3.9
