@@ -57,7 +57,7 @@ def ground(*words: str) -> tuple[int, str]:
         (["--drone", "north"], "--drone north: expected NAME=HOST"),
         (["--drone", "a=h", "--drone", "a=k"], "--drone: the same name twice"),
         (["--key", "none.key_secret"], "--key, --server-key: belong together"),
-        (["--drone", "a=127.0.0.1:5571"], "--drone a=127.0.0.1:5571: a drone has two ports, one for its status"),
+        (["--drone", "a=127.0.0.1:5571"], "--drone a=127.0.0.1:5571: a drone has two ports, one"),
         (["--listen", "8080"], "--listen 8080: is a port alone; give 127.0.0.1:8080"),
         (["--folder", "/etc/passwd"], "--folder /etc/passwd: is a file, no folder"),
         (["--listen", "0.0.0.0", "--foxglove", "127.0.0.1:0"], "--foxglove: everybody shall sign in, and"),

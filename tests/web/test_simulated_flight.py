@@ -34,7 +34,8 @@ if STUBBORN:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
 print("hold 0/8 nodes", file=sys.stderr, flush=True)
 if GOOD:
-    (out / "summary.json").write_text(json.dumps({"mission": "done", "reason": "all nodes visited", "more": 1}))
+    summary = {"mission": "done", "reason": "all nodes visited", "more": 1}
+    (out / "summary.json").write_text(json.dumps(summary))
 else:
     time.sleep(60)
 """
