@@ -25,6 +25,7 @@ from flightd.ground.hub import Hub, Viewer
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
 from flightd.ground.page_socket import PageSocket
 from flightd.ground.quiet_log import quiet_log
+from flightd.ground.read_folders import ReadFolder
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.site_page.simulated_flight import SimulatedFlight
 from flightd.ground.studio.studio import Studio
@@ -133,6 +134,7 @@ def run(
     certificate: Certificate | None = None,
     folder: Path | None = None,
     viewers: Sequence[Viewer] = (),
+    others: Sequence[ReadFolder] = (),
 ) -> signal.Signals | None:
     """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had,
     InputError where it must not be listened at (`check_reach`)."""
@@ -142,7 +144,7 @@ def run(
 
     async def until_signal() -> None:
         serving = asyncio.ensure_future(
-            serve(drones, listener, where, access, on_ready, certificate, folder, viewers)
+            serve(drones, listener, where, access, on_ready, certificate, folder, viewers, others)
         )
         end_on_signals(serving, came)
         with contextlib.suppress(asyncio.CancelledError):
@@ -162,10 +164,11 @@ async def serve(
     certificate: Certificate | None = None,
     folder: Path | None = None,
     viewers: Sequence[Viewer] = (),
+    others: Sequence[ReadFolder] = (),
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
-    end; inventories and flights lie under `folder`; `viewers` are told what the pages are."""
-    hub, flights, uploads = Hub(drones, viewers), Flights(folder), ReadingProcess()
+    end; inventories and flights lie under `folder` and the `others`; `viewers` are told what pages are."""
+    hub, flights, uploads = Hub(drones, viewers), Flights(folder, others=others), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
     simulated = None if folder is None else SimulatedFlight(hub, folder, where.is_beyond)
     quiet_log()
@@ -174,7 +177,7 @@ async def serve(
     hosts = own_hosts(where.host, where.port, certificate is not None, names, where.is_beyond)
     server = _Server(
         uvicorn.Config(
-            application(hub, hosts, access, folder, flights, uploads, maps, studio, simulated),
+            application(hub, hosts, access, folder, flights, uploads, maps, studio, simulated, others),
             http="h11",
             ws=PageSocket,
             lifespan="off",
