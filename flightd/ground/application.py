@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import Sequence
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -42,8 +43,10 @@ from flightd.ground.missions.routes import mission_routes
 from flightd.ground.packed_json import PackedJson
 from flightd.ground.page_person import PagePerson, Standing
 from flightd.ground.pages import STATIC, first_page
+from flightd.ground.read_folders import ReadFolder
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.site_page.routes import site_page
+from flightd.ground.site_page.simulated_flight import SimulatedFlight
 from flightd.ground.stock_page import stock_page
 from flightd.ground.studio.routes import studio_routes
 from flightd.ground.studio.studio import Studio
@@ -68,21 +71,23 @@ def application(
     uploads: ReadingProcess,
     maps: ReadingProcess,
     studio: Studio | None = None,
+    simulated: SimulatedFlight | None = None,
+    others: Sequence[ReadFolder] = (),
 ) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks,
-    inventories, site files and `flights` lie under `folder`, `uploads` reads what people send, `maps` lays
-    out maps, `studio` is None without a folder."""
+    inventories, site files and `flights` lie under `folder`, more inventories under the `others`, `uploads`
+    reads what people send, `maps` lays out maps, `studio` and `simulated` are None without a folder."""
     orders = Orders(hub.drones, access)
     routes = [
         first_page(),
         WebSocketRoute("/live", partial(_live, hub, orders)),
         Route("/drones/{drone}/acts", partial(_act, orders), methods=["POST"]),
-        *stock_page(folder, hub.drones, uploads),
-        *site_page(folder, maps),
+        *stock_page(folder, hub.drones, uploads, others),
+        *site_page(folder, maps, simulated),
         *flight_routes(flights),
         *studio_routes(studio),
         *doctor_routes(hub.drones, access),
-        *mission_routes(folder, hub.drones),
+        *mission_routes(folder, hub.drones, hub.for_each, others),
         *guide_routes(),
         *session_routes(access),
         Mount("/static", StaticFiles(directory=STATIC)),

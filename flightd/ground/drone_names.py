@@ -11,6 +11,7 @@ from flightd.core.errors import InputError
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,48}")
 _PORTS = re.compile(r"(?P<host>.+?):(?P<status>\d{1,5})/(?P<command>\d{1,5})")
+_ONE_PORT = re.compile(r"(?P<host>\[.*\]|[^:]*):(?P<port>\d*)")
 _STATUS_PORT, _COMMAND_PORT = 5571, 5572
 
 
@@ -56,6 +57,13 @@ def _address(name: str, text: str, key: Path | None, server_key: Path | None) ->
     host, status, command = text, _STATUS_PORT, _COMMAND_PORT
     if ports is not None:
         host, status, command = ports["host"], int(ports["status"]), int(ports["command"])
+    elif one := _ONE_PORT.fullmatch(text):
+        raise InputError(
+            "a drone has two ports, one for its status and one for commands",
+            key=f"--drone {name}={text}",
+            remedy=f"give {name}={one['host'] or 'HOST'}:STATUS/COMMAND,"
+            f" as in {name}={one['host'] or 'HOST'}:{_STATUS_PORT}/{_COMMAND_PORT}",
+        )
     host = host.removeprefix("[").removesuffix("]")
     if not (0 < status < 65536 and 0 < command < 65536) or re.search(r"[\s/@]", host):
         raise InputError("expected NAME=HOST or NAME=HOST:STATUS/COMMAND", key=f"--drone {name}={text}")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager
 from functools import partial
 from typing import Any, Protocol
 
@@ -52,6 +52,7 @@ class Hub:
         self._browsers: set[Browser] = set()
         self._looking = asyncio.Event()
         self.drones = {name: DroneLink(name, address, self) for name, address in drones}
+        self._each: list[Callable[[DroneLink], None]] = []
         self._tell_station()
 
     async def run(self) -> None:
@@ -67,6 +68,39 @@ class Hub:
         finally:
             for viewer in self._viewers:
                 viewer.attach(None)
+
+    def for_each(self, prepare: Callable[[DroneLink], None]) -> None:
+        """Do it to every drone, and to those that join, before they are heard."""
+        self._each.append(prepare)
+        for drone in self.drones.values():
+            prepare(drone)
+
+    def free_name(self, name: str) -> str:
+        """The name, or one like it where a drone has it already."""
+        number, free = 1, name
+        while free in self.drones:
+            number += 1
+            free = f"{name}-{number}"
+        return free
+
+    @asynccontextmanager
+    async def joined(self, name: str, address: Address) -> AsyncIterator[None]:
+        """A drone more meanwhile, under a name that none has (`free_name`); afterwards it is forgotten."""
+        drone = self.drones[name] = DroneLink(name, address, self)
+        for prepare in self._each:
+            prepare(drone)
+        self._tell_station()
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                running = tasks.create_task(drone.run(), name=f"drone {name}")
+                try:
+                    yield
+                finally:
+                    running.cancel()
+        finally:
+            del self.drones[name]
+            self._latest = {topic: value for topic, value in self._latest.items() if topic[0] != name}
+            self._tell_station()
 
     @property
     def browsers(self) -> int:

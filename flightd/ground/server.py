@@ -25,7 +25,9 @@ from flightd.ground.hub import Hub, Viewer
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
 from flightd.ground.page_socket import PageSocket
 from flightd.ground.quiet_log import quiet_log
+from flightd.ground.read_folders import ReadFolder
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.site_page.simulated_flight import SimulatedFlight
 from flightd.ground.studio.studio import Studio
 from flightd.ground.tls import Certificate
 from flightd.runtime.ending_signals import end_on_signals
@@ -34,6 +36,7 @@ PORT = 8080
 _PING_S = 4.0
 """A page that does not answer for so long is closed: whoever cannot see does not attend."""
 _LEAVE_S = 2
+_LAST_PORT = 65535
 _LISTEN = re.compile(r"(?P<host>\[[0-9a-fA-F:.%]+\]|[^:\[\]]+)(:(?P<port>\d{1,5}))?")
 
 
@@ -58,6 +61,8 @@ class Listening:
     @classmethod
     def read(cls, text: str, option: str = "--listen", default_port: int = PORT) -> Listening:
         """HOST, HOST:PORT or [HOST]:PORT, given by an `option`.  InputError for anything else."""
+        if text.isdecimal() and int(text) <= _LAST_PORT:
+            raise InputError("is a port alone", key=f"{option} {text}", remedy=f"give 127.0.0.1:{text}")
         found = _LISTEN.fullmatch(text)
         host = text if found is None else found["host"]
         port = default_port if found is None or found["port"] is None else int(found["port"])
@@ -67,7 +72,7 @@ class Listening:
             except ValueError:
                 raise InputError("expected ADDRESS or ADDRESS:PORT", key=f"{option} {text}") from None
         host = host.removeprefix("[").removesuffix("]")
-        if port > 65535:
+        if port > _LAST_PORT:
             raise InputError("a port is at most 65535", key=f"{option} {text}")
         return cls("127.0.0.1" if host == "localhost" else host, port)
 
@@ -129,6 +134,7 @@ def run(
     certificate: Certificate | None = None,
     folder: Path | None = None,
     viewers: Sequence[Viewer] = (),
+    others: Sequence[ReadFolder] = (),
 ) -> signal.Signals | None:
     """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had,
     InputError where it must not be listened at (`check_reach`)."""
@@ -138,7 +144,7 @@ def run(
 
     async def until_signal() -> None:
         serving = asyncio.ensure_future(
-            serve(drones, listener, where, access, on_ready, certificate, folder, viewers)
+            serve(drones, listener, where, access, on_ready, certificate, folder, viewers, others)
         )
         end_on_signals(serving, came)
         with contextlib.suppress(asyncio.CancelledError):
@@ -158,18 +164,20 @@ async def serve(
     certificate: Certificate | None = None,
     folder: Path | None = None,
     viewers: Sequence[Viewer] = (),
+    others: Sequence[ReadFolder] = (),
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
-    end; inventories and flights lie under `folder`; `viewers` are told what the pages are."""
-    hub, flights, uploads = Hub(drones, viewers), Flights(folder), ReadingProcess()
+    end; inventories and flights lie under `folder` and the `others`; `viewers` are told what pages are."""
+    hub, flights, uploads = Hub(drones, viewers), Flights(folder, others=others), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
+    simulated = None if folder is None else SimulatedFlight(hub, folder, where.is_beyond)
     quiet_log()
     maps = ReadingProcess(refusal="too many maps are being checked")
     names = () if certificate is None else certificate.names
     hosts = own_hosts(where.host, where.port, certificate is not None, names, where.is_beyond)
     server = _Server(
         uvicorn.Config(
-            application(hub, hosts, access, folder, flights, uploads, maps, studio),
+            application(hub, hosts, access, folder, flights, uploads, maps, studio, simulated, others),
             http="h11",
             ws=PageSocket,
             lifespan="off",
@@ -192,6 +200,8 @@ async def serve(
         tasks.create_task(flights.run(), name="flights")
         if studio is not None:
             tasks.create_task(studio.run(), name="studio")
+        if simulated is not None:
+            tasks.create_task(simulated.run(), name="simulated flight")
         if access.login:
             tasks.create_task(access.run(), name="people")
         serving = tasks.create_task(server.serve([listener]), name="pages")

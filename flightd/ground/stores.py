@@ -14,6 +14,7 @@ from flightd.core.errors import FlightdError, InputError
 from flightd.core.inventory import LocationRecord, Observation, Standing
 from flightd.core.topics import Document, Topic
 from flightd.ground.plain_files import is_plain_file, is_plain_folder, plain_file
+from flightd.ground.read_folders import ReadFolder
 from flightd.ground.shown_text import shown
 from flightd.inventory.elevation import Front, fronts_of
 from flightd.inventory.place_view import PlaceView, place_views
@@ -40,12 +41,14 @@ class StockView:
 
 
 class Stores:
-    """Under `root`: each folder with an `inventory.db`, named by its path from there (`.`: root itself).
+    """Under `root`: each folder with an `inventory.db`, named by its path from there (`.`: root itself);
+    below the `others` with their prefix before it.
 
     Safe from any thread.  Nothing that a browser says is ever made a path: names are looked up."""
 
-    def __init__(self, root: Path | None) -> None:
+    def __init__(self, root: Path | None, others: Sequence[ReadFolder] = ()) -> None:
         self._root = root
+        self._others = tuple(others)
         self._known: dict[str, Path] = {}
         self._views: OrderedDict[str, StockView] = OrderedDict()
         self._sites: dict[Path, tuple[tuple[str, int, int], Site | None]] = {}
@@ -57,9 +60,7 @@ class Stores:
 
     def names(self) -> list[tuple[str, int]]:
         """Every store and when it was written last (UTC, ns), newest first."""
-        if self._root is None:
-            return []
-        found = [(_name(folder, self._root), _written_ns(folder)) for folder in _folders(self._root)]
+        found = [(name, _written_ns(folder)) for name, folder in self._named()]
         return sorted(found, key=lambda store: (-store[1], store[0]))
 
     def view(self, name: str) -> StockView:
@@ -110,8 +111,7 @@ class Stores:
         """Where a store lies.  InputError where there is none of the name."""
         known = self._known.get(name)
         if known is None or not is_plain_file(known / _FILE):
-            if self._root is not None:
-                self._known = {_name(folder, self._root): folder for folder in _folders(self._root)}
+            self._known = dict(self._named())
             if name not in self._known:
                 raise InputError(f"there is no inventory {name!r}")
             known = self._known[name]
@@ -120,6 +120,14 @@ class Stores:
             if os.path.lexists(beside) and not is_plain_file(beside):
                 raise InputError(f"the inventory {name!r} has a {beside.name} that is no plain file")
         return known
+
+    def _named(self) -> Iterator[tuple[str, Path]]:
+        if self._root is not None:
+            for folder in _folders(self._root):
+                yield _name(folder, self._root), folder
+        for other in self._others:
+            for folder in _folders(other.path):
+                yield other.prefix + _name(folder, other.path), folder
 
     def _site(self, folder: Path) -> Site | None:
         """The map that the newest flight log beside the store was flown by; None without one."""

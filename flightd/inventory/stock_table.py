@@ -57,19 +57,20 @@ class StockTable:
         return len(self.rows[0])
 
 
-def read_table(data: bytes) -> StockTable:
-    """The table in a file.  InputError saying what is wrong with it and what to do."""
+def read_table(data: bytes, needed: str = "one of places and one of codes are needed") -> StockTable:
+    """The table in a file.  InputError saying what is wrong with it and what to do; `needed` are the columns
+    without which it is none, in words."""
     if len(data) > MOST_BYTES:
         raise InputError(f"the file has more than {MOST_BYTES // 10**6} MB")
     if data.startswith(b"PK\x03\x04"):
-        return _table("XLSX", _workbook_rows(data))
+        return _table("XLSX", _workbook_rows(data), needed)
     if data.startswith(b"\xd0\xcf\x11\xe0"):
         raise InputError(
             "an old or an encrypted workbook", remedy="save it as .xlsx or CSV, without a password"
         )
     text, encoding = _text_of(data)
     separator = _separator(text)
-    return _table(f"CSV, {_SEPARATORS[separator]}, {encoding}", _csv_rows(text, separator))
+    return _table(f"CSV, {_SEPARATORS[separator]}, {encoding}", _csv_rows(text, separator), needed)
 
 
 def is_rounded(cell: str) -> bool:
@@ -77,7 +78,7 @@ def is_rounded(cell: str) -> bool:
     return _ROUNDED.fullmatch(cell) is not None
 
 
-def _table(kind: str, raw: Iterable[Sequence[str]]) -> StockTable:
+def _table(kind: str, raw: Iterable[Sequence[str]], needed: str) -> StockTable:
     rows: list[tuple[str, ...]] = []
     numbers: list[int] = []
     for number, cells in enumerate(raw, start=1):
@@ -96,7 +97,7 @@ def _table(kind: str, raw: Iterable[Sequence[str]]) -> StockTable:
         numbers.append(number)
     width = max(map(len, rows), default=0)
     if width < 2:
-        raise InputError("it has not two columns: one of places and one of codes are needed")
+        raise InputError(f"it has not two columns: {needed}")
     return StockTable(kind, tuple(row + ("",) * (width - len(row)) for row in rows), tuple(numbers))
 
 

@@ -35,7 +35,7 @@ def copied(flown: Path, folder: Path, name: str = "flight.mcap") -> Path:
 
 
 def row_of(root: Path) -> FlightRow:
-    (row,) = read_rows(root, find_logs(root).logs)
+    (row,) = read_rows(find_logs(root).logs)
     return row
 
 
@@ -67,7 +67,7 @@ def test_a_broken_and_a_running_log_are_told_apart(flown: Path, tmp_path: Path) 
         log = copied(flown, tmp_path / name)
         (log.parent / "summary.json").unlink()
         cut(log, age_s)
-    rows = {row.path: row for row in read_rows(tmp_path, find_logs(tmp_path).logs)}
+    rows = {row.path: row for row in read_rows(find_logs(tmp_path).logs)}
     old, new = rows["old/flight.mcap"], rows["new/flight.mcap"]
     assert (old.running, new.running) == (False, True)
     assert (old.outcome, new.outcome) == ("unfinished", "flying")
@@ -250,7 +250,7 @@ def test_the_date_is_what_the_log_says_else_when_it_was_written(flown: Path, tmp
         pass
     silent = copied(flown, tmp_path / "silent")
     os.utime(silent, (1_700_000_000,) * 2)
-    rows = {row.path: row for row in read_rows(tmp_path, find_logs(tmp_path).logs)}
+    rows = {row.path: row for row in read_rows(find_logs(tmp_path).logs)}
     assert rows["said/flight.mcap"].started_s == datetime(2026, 3, 4, 5, 6, 7, tzinfo=UTC).timestamp()
     assert rows["said/flight.mcap"].trouble == "holds no flight"
     lasted_s = 1_700_000_000 - rows["silent/flight.mcap"].started_s

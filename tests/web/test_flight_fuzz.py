@@ -68,7 +68,7 @@ def test_a_log_of_wild_messages_is_listed_and_played_or_refused(
     played = refused = 0
     for seed in range(60):
         write_spoilt(tmp_path / "flight.mcap", messages, random.Random(seed))
-        (row,) = read_rows(tmp_path, find_logs(tmp_path).logs)
+        (row,) = read_rows(find_logs(tmp_path).logs)
         assert "\n" not in row.trouble
         try:
             view = read_view(tmp_path, "flight.mcap")

@@ -363,7 +363,7 @@ class _FallibleReader:
         self.deaths = 0
 
     async def run(self, function: Any, within_s: float, *args: Any) -> Any:
-        if any(self._deadly == log.relative for logs in args[1:] for log in logs):
+        if any(self._deadly == log.relative for logs in args if isinstance(logs, tuple) for log in logs):
             self.deaths += 1
             raise TransientError("the process that reads logs failed")
         return function(*args)

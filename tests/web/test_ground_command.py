@@ -57,6 +57,10 @@ def ground(*words: str) -> tuple[int, str]:
         (["--drone", "north"], "--drone north: expected NAME=HOST"),
         (["--drone", "a=h", "--drone", "a=k"], "--drone: the same name twice"),
         (["--key", "none.key_secret"], "--key, --server-key: belong together"),
+        (["--drone", "a=127.0.0.1:5571"], "--drone a=127.0.0.1:5571: a drone has two ports, one"),
+        (["--listen", "8080"], "--listen 8080: is a port alone; give 127.0.0.1:8080"),
+        (["--folder", "/etc/passwd"], "--folder /etc/passwd: is a file, no folder"),
+        (["--listen", "0.0.0.0", "--foxglove", "127.0.0.1:0"], "--foxglove: everybody shall sign in, and"),
         (["--foxglove", "0.0.0.0"], "--foxglove 0.0.0.0: reaches beyond this machine, and Foxglove"),
     ],
 )  # fmt: skip
@@ -174,14 +178,16 @@ def test_what_is_no_address_is_refused(text: str) -> None:
 
 
 def test_drones_are_named_with_host_and_ports() -> None:
-    named = dict(drone_addresses(["a=drone-1", "b=127.0.0.1:6571/6572", "c=[fe80::1]"]))
+    named = dict(drone_addresses(["a=drone-1", "b=127.0.0.1:6571/6572", "c=[fe80::1]", "d=::1"]))
     assert (named["a"].host, named["a"].status_port, named["a"].command_port) == ("drone-1", 5571, 5572)
     assert (named["b"].host, named["b"].status_port, named["b"].command_port) == ("127.0.0.1", 6571, 6572)
-    assert named["c"].host == "fe80::1"
+    assert (named["c"].host, named["d"].host) == ("fe80::1", "::1")
     assert dict(drone_addresses([]))["drone"].host == "127.0.0.1"
 
 
-@pytest.mark.parametrize("text", ["a", "=h", "a=", "a b=h", "a=h:0/1", "a=h:1/99999", "a=h/x", "a=u@h"])
+@pytest.mark.parametrize(
+    "text", ["a", "=h", "a=", "a b=h", "a=h:0/1", "a=h:1/99999", "a=h/x", "a=u@h", "a=h:", "a=[::1]:5"]
+)
 def test_a_drone_that_is_not_named_so_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="--drone"):
         drone_addresses([text])

@@ -126,12 +126,25 @@ def test_a_rack_is_changed_checked_and_saved_with_every_comment_and_taken_back(
         page.keyboard.press("Control+s")
         expect(page.get_by_role("alert").filter(has_text="was changed by somebody else")).to_be_visible()
         page.get_by_role("button", name="Open anew").click()
+        page.get_by_role("button", name="Keep it").click()
+        expect(page.get_by_label("Places in a bay")).to_have_value("1")
+        page.get_by_role("link", name="Live").click()
+        expect(page.get_by_role("heading", name="No drone yet")).to_be_visible()
+        assert asks_before_it_goes(page)
+        page.go_back()
+        page.get_by_role("button", name="Open anew").click()
+        page.get_by_role("button", name="Lose what is not saved").click()
         expect(page.get_by_role("heading", name="changed elsewhere hall.toml")).to_be_visible()
+        assert not asks_before_it_goes(page)
         page.get_by_label("Old versions").select_option(index=1)
         expect(page.get_by_text("Save puts it back")).to_be_visible()
         page.get_by_role("button", name="Save", exact=True).click()
         expect(page.get_by_text("Saved as hall.toml.")).to_be_visible()
         assert file.read_text() == before
+
+
+def asks_before_it_goes(page: Page) -> bool:
+    return not page.evaluate("dispatchEvent(new Event('beforeunload', {cancelable: true}))")
 
 
 def middle(page: Page, selector: str) -> tuple[float, float]:
@@ -190,12 +203,60 @@ def test_the_mouse_moves_and_draws_and_each_stroke_is_one_step_back(
             page.get_by_role("button", name="Redo").click()
         page.get_by_role("button", name="Save", exact=True).click()
         expect(page.get_by_text("Saved as hall.toml.")).to_be_visible()
+        page.get_by_role("button", name="Fly it in simulation").click()
+        drones = page.get_by_role("navigation", name="Drones")
+        expect(drones.get_by_role("button", name="simulation")).to_be_visible()
+        page.get_by_role("button", name="End the flight").click()
+        expect(page.get_by_text("was not good")).to_be_visible()
+        expect(page.get_by_role("button", name="Fly again in simulation")).to_be_enabled()
+        expect(drones).to_have_count(0)
+        assert hindrances(page) == []
     saved = tables(file)
     assert saved["aisle"][0]["spacing_m"] == [1.6, 1.0, 1.3]
     assert saved["aisle"][1]["y_m"] == 3.9
     assert [pad["node"] for pad in saved["pad"]] == ["A1", "B1"]
     assert saved["blocked"] == [{"nodes": ["A2", "A3"]}]
     assert "# one bay before each node" in file.read_text()
+
+
+def test_a_finger_draws_what_it_goes_over_and_what_the_browser_takes_away_draws_nothing(
+    browser: Browser, url: str, file: Path
+) -> None:
+    context = browser.new_context(
+        viewport={"width": NARROW[0], "height": NARROW[1]}, has_touch=True, locale="en-US"
+    )
+    page = context.new_page()
+    page.goto(f"{url}/edit?name=hall.toml")
+    expect(page.get_by_text(SOUND)).to_be_visible()
+    take_up(page, "keep-out")
+    page.locator(".site-plan").scroll_into_view_if_needed()
+    finger = context.new_cdp_session(page)
+    a1, a2 = (middle(page, f"[data-id={node}] .mark") for node in ("A1", "A2"))
+    metre = (a2[0] - a1[0]) / 1.3
+
+    def touch(kind: str, *at: tuple[float, float]) -> None:
+        points = [{"x": x, "y": y} for x, y in at]
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    def swipe(ending: str) -> None:
+        touch("touchStart", (a1[0] + 0.3 * metre, a1[1] + 0.5 * metre))
+        for part in (0.25, 0.5, 0.75, 1.0):
+            touch("touchMove", (a1[0] + (0.3 + part) * metre, a1[1] + (0.5 + 1.5 * part) * metre))
+        touch(ending)
+
+    swipe("touchCancel")
+    expect(page.locator(".sketch")).to_have_count(0)
+    expect(entry(page, "Keep-out 1")).to_have_count(0)
+    swipe("touchEnd")
+    expect(page.get_by_role("heading", name="Keep-out 1")).to_be_visible()
+    expect(page.get_by_role("button", name="Redo")).to_be_disabled()
+    page.get_by_role("button", name="Save", exact=True).click()
+    expect(page.get_by_text("Saved as hall.toml.")).to_be_visible()
+    context.close()
+    drawn = tables(file)["keep_out"][-1]
+    assert [drawn[key] for key in ("x0_m", "y0_m", "x1_m", "y1_m")] == pytest.approx(
+        [0.3, 0.5, 1.3, 2.0], abs=0.06
+    )
 
 
 def test_all_of_it_goes_by_keys_alone_and_nodes_keep_what_lies_on_them(

@@ -232,9 +232,12 @@ async def test_pictures_are_fetched_as_long_as_a_page_draws_them() -> None:
 async def test_a_drone_that_nobody_flies_is_said_to_be_unheard_and_heard_when_it_comes() -> None:
     async with serving(local()) as first:
         address = address_of(first)
-    async with served(("demo", address)) as station, station.page() as page:
+    nowhere = Address("no.such.host.invalid")
+    async with served(("demo", address), ("away", nowhere)) as station, station.page() as page:
         async with asyncio.timeout(20):
             while "nobody listens" not in (await told(page, "link"))["trouble"]:
+                pass
+            while "this name is not known here" not in (await told(page, "link", "away"))["trouble"]:
                 pass
         code, text = await station.act("demo", id="12345678", command="stop")
         assert code == 503

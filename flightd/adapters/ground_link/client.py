@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import uuid
 from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -67,6 +68,8 @@ RETRY_S = 1.0
 
 MAINTENANCE_S, PROPOSAL_S = 15.0, 75.0
 """What looks after the drone takes a while: a look, and a proposal that is checked as a whole."""
+
+_NAME_S = 1.0
 
 _KINDS_OF_INPUT = {
     Code.MALFORMED, Code.VERSION, Code.NODE, Code.PLAN, Code.UNAVAILABLE, Code.INVALID,
@@ -340,7 +343,20 @@ class GroundClient:
         if zmq.Event.CONNECTED in seen:
             needs = "wrong server key" if self._address.keys else "it wants a key (--key, --server-key)"
             return f"{where}: something listens there but does not shake hands: {needs}, or it is no flightd"
+        if await self._is_unknown():
+            return f"{where}: this name is not known here; look at its spelling, or give the drone's address"
         return f"{where}: nobody listens; is flightd running, with [ground] listen set?"
+
+    async def _is_unknown(self) -> bool:
+        """The host's name stands for no address; not where nobody says so in time."""
+        loop = asyncio.get_running_loop()
+        try:
+            await asyncio.wait_for(loop.getaddrinfo(self._address.host, None), _NAME_S)
+        except socket.gaierror:
+            return True
+        except (TimeoutError, OSError, UnicodeError):
+            pass
+        return False
 
     async def _note_events(self) -> None:
         """Keep what ZMQ told of the connection since the last call."""

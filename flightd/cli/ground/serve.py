@@ -19,6 +19,7 @@ from flightd.core.errors import InputError
 if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import Address
     from flightd.ground.foxglove_view.live_server import FoxgloveServer
+    from flightd.ground.read_folders import ReadFolder
     from flightd.ground.server import Listening
 
 EXAMPLES = """Examples:
@@ -57,6 +58,15 @@ def ground(
             metavar="DIR",
             help="Where flights, inventories, site files, picture sets and profiles lie; what was flown is"
             " only read.",
+        ),
+    ] = None,
+    flights: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="DIR",
+            help="Another folder with flights and inventories, several by several options: what a daemon of"
+            " this machine leaves, or a copy from a drone.  Nothing is written there.",
+            show_default=False,
         ),
     ] = None,
     key: Annotated[
@@ -111,18 +121,37 @@ def ground(
     from flightd.ground.tls import read_certificate
 
     if folder is not None and not folder.is_dir():
-        raise InputError("there is no such folder", key=f"--folder {folder}")
+        what = "is a file, no folder" if folder.exists() else "there is no such folder"
+        raise InputError(what, key=f"--folder {folder}")
+    others = _others(folder, flights or ())
     drones = drone_addresses(drone or (), key, server_key or ())
     certificate = read_certificate(tls_cert, tls_key)
     where = replace(Listening.read(listen), secure=certificate is not None)
     access = Access(state_folder(state), login or where.is_beyond, where.secure)
     with contextlib.ExitStack() as stack:
-        viewer = None if foxglove is None else stack.enter_context(_foxglove_server(foxglove, login, drones))
+        viewer = None
+        if foxglove is not None:
+            viewer = stack.enter_context(_foxglove_server(foxglove, access.login, drones))
         at = "" if viewer is None else viewer.url
         viewers = () if viewer is None else (viewer,)
-        ended_by = run(drones, where, partial(_say_where, at), access, certificate, folder, viewers)
+        ended_by = run(drones, where, partial(_say_where, at), access, certificate, folder, viewers, others)
     if ended_by is not None:
         print(f"flightd: the ground station was ended by {ended_by.name}", file=sys.stderr)
+
+
+def _others(folder: Path | None, flights: Sequence[Path]) -> tuple[ReadFolder, ...]:
+    """The folders to be read beside `folder`.  One that is not there yet may come: a line says so."""
+    from flightd.ground.read_folders import read_folders
+
+    if flights and folder is None:
+        raise InputError(
+            "is read beside a folder of the station's own", key="--flights", remedy="give --folder DIR"
+        )
+    for path in flights:
+        if not path.is_dir():
+            what = "is no folder" if path.exists() else "there is no such folder yet"
+            print(f"flightd: --flights {path}: {what}", file=sys.stderr)
+    return read_folders(flights)
 
 
 def _foxglove_server(address: str, login: bool, drones: Sequence[tuple[str, Address]]) -> FoxgloveServer:

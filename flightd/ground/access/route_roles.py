@@ -108,6 +108,8 @@ RULES: Mapping[str, Rule] = {
     "POST /api/site/import": _LOOKS,
     "POST /api/site/export": _LOOKS,
     "PUT /api/site/file": _CHANGES,
+    "POST /api/site/simulation": _ACTS,  # an admin's where other machines reach the station
+    "DELETE /api/site/simulation": _ACTS,
     "GET /api/doctor": _LOOKS,
     "GET /api/doctor/{drone}/report": _LOOKS,
     "GET /api/doctor/{drone}/settings": _LOOKS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -15,6 +15,7 @@ import msgspec
 from flightd.core.errors import FlightdError, TransientError
 from flightd.ground.flights.flight_row import FlightRow, read_rows, unreadable
 from flightd.ground.flights.log_folder import FoundLog, FoundLogs, find_logs
+from flightd.ground.read_folders import ReadFolder
 from flightd.ground.reading_process import NotStartedError
 from flightd.ground.shown_text import shown
 
@@ -47,8 +48,9 @@ class _Told:
 class FlightIndex:
     """`run` keeps it going; `listing` is what is known now, as JSON."""
 
-    def __init__(self, root: Path, reader: Reader) -> None:
+    def __init__(self, root: Path, reader: Reader, others: Sequence[ReadFolder] = ()) -> None:
         self._root = root
+        self._others = tuple(others)
         self._reader = reader
         self._found: dict[str, FoundLog] = {}
         self._rows: dict[str, tuple[tuple[int, ...], FlightRow]] = {}
@@ -118,7 +120,7 @@ class FlightIndex:
         return self._rows[log_id][1] if log_id in self._rows else None
 
     async def _look(self) -> None:
-        found: FoundLogs = await self._reader.run(find_logs, _WITHIN_S, self._root)
+        found: FoundLogs = await self._reader.run(find_logs, _WITHIN_S, self._root, self._others)
         self._found = {log.id: log for log in found.logs}
         self._cut = found.cut
         self._looks += 1
@@ -141,7 +143,7 @@ class FlightIndex:
         """A row for each; where they cannot be read together, one by one, so that a log that costs the
         reader its life costs no other its row."""
         try:
-            return await self._reader.run(read_rows, _WITHIN_S, self._root, logs)
+            return await self._reader.run(read_rows, _WITHIN_S, logs)
         except NotStartedError:
             raise  # no log's fault
         except TransientError as err:

@@ -56,9 +56,9 @@ class FlightRow(msgspec.Struct, frozen=True):
     codes_wrong: int | None = None
 
 
-def read_rows(root: Path, logs: tuple[FoundLog, ...]) -> tuple[FlightRow, ...]:
+def read_rows(logs: tuple[FoundLog, ...]) -> tuple[FlightRow, ...]:
     """A row for each log, whatever is wrong with it."""
-    return tuple(_row(root, log) for log in logs)
+    return tuple(_row(log) for log in logs)
 
 
 def unreadable(log: FoundLog, trouble: str) -> FlightRow:
@@ -68,10 +68,10 @@ def unreadable(log: FoundLog, trouble: str) -> FlightRow:
     )
 
 
-def _row(root: Path, log: FoundLog) -> FlightRow:
+def _row(log: FoundLog) -> FlightRow:
     blank = unreadable(log, "")
     try:
-        path = path_of(root, log.relative)
+        path = path_of(log.root, log.relative)
         skimmed = skim(path)
     except InputError as err:
         return msgspec.structs.replace(blank, trouble=err.what)

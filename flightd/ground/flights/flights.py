@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from flightd.ground.flights.flight_row import FlightRow
 from flightd.ground.flights.flight_view import FlightView, read_framed_picture, read_report, read_view
 from flightd.ground.flights.log_folder import FoundLog
 from flightd.ground.flights.sized_cache import SizedCache
+from flightd.ground.read_folders import ReadFolder
 from flightd.ground.reading_process import ReadingProcess
 from flightd.replay.playback.pictures import PicturePlace
 
@@ -59,10 +60,14 @@ class Flights:
     """`run` serves the list until cancelled, and ends the reading processes.  Errors as `ReadingProcess`
     raises them, InputError for a flight or a picture that there is not."""
 
-    def __init__(self, root: Path | None, reading: Callable[[], ReadingProcess] = ReadingProcess) -> None:
-        self.root = root
+    def __init__(
+        self,
+        root: Path | None,
+        reading: Callable[[], ReadingProcess] = ReadingProcess,
+        others: Sequence[ReadFolder] = (),
+    ) -> None:
         self._listing, self._playing = reading(), reading()
-        self.index = FlightIndex(root, self._listing) if root is not None else None
+        self.index = FlightIndex(root, self._listing, others) if root is not None else None
         self._plotting = Threads(_PLOTS_AT_ONCE, _MOST_PLOTS, "too many plots wait already")
         self._viewing = asyncio.Lock()
         self._views: SizedCache[_Key, FlightView] = SizedCache(_VIEWS_BYTES)
@@ -105,13 +110,16 @@ class Flights:
         tag = f'"{seen.stamp}-{place}"'
         if known == tag:
             return FlightPicture(tag, stays=stamp == seen.stamp)
-        root, wanted, lens = self._root(), seen.view.pictures[place], seen.view.lens
-        content = await self._playing.run(read_framed_picture, _WITHIN_S, root, log.relative, wanted, lens)
+        wanted, lens = seen.view.pictures[place], seen.view.lens
+        content = await self._playing.run(
+            read_framed_picture, _WITHIN_S, log.root, log.relative, wanted, lens
+        )
         return FlightPicture(tag, stays=stamp == seen.stamp, content=content)
 
     async def where(self, log_id: str) -> tuple[Path, str]:
-        """The folder of flights, and a flight's log below it."""
-        return self._root(), (await self._log(log_id)).relative
+        """The folder in which a flight lies, and its log below it."""
+        log = await self._log(log_id)
+        return log.root, log.relative
 
     async def whereabouts(self, log_id: str, place: int) -> tuple[Path, str, PicturePlace]:
         """Where a picture of a flight lies: folder, log, place in the log."""
@@ -119,7 +127,7 @@ class Flights:
         seen = self._recorded(log) or await self._view(log)
         if not 0 <= place < len(seen.view.pictures):
             raise InputError("the flight has no such picture")
-        return self._root(), log.relative, seen.view.pictures[place]
+        return log.root, log.relative, seen.view.pictures[place]
 
     async def report(self, log_id: str) -> bytes:
         """Its HTML report."""
@@ -127,7 +135,7 @@ class Flights:
         key = (log.id, log.stamp)
         page = self._reports.get(key)
         if page is None:
-            page = await self._listing.run(read_report, _WITHIN_S, self._root(), log.relative)
+            page = await self._listing.run(read_report, _WITHIN_S, log.root, log.relative)
             self._reports.put(key, page, len(page))
         return page
 
@@ -137,7 +145,7 @@ class Flights:
             async with self._viewing:  # whoever waits for the same flight finds it then
                 if (view := self._views.get(key)) is None:
                     row = self._row(log)
-                    view = await self._playing.run(read_view, _WITHIN_S, self._root(), log.relative)
+                    view = await self._playing.run(read_view, _WITHIN_S, log.root, log.relative)
                     self._views.put(key, view, view.size)
                     if row is not None:
                         self._newest[log.id] = _Newest(key, log.mark, row.started_s)
@@ -164,8 +172,3 @@ class Flights:
         if log is None:
             raise InputError("there is no such flight")
         return log
-
-    def _root(self) -> Path:
-        if self.root is None:
-            raise InputError("there is no folder of flights")
-        return self.root

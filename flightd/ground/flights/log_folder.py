@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from flightd.core.errors import InputError
+from flightd.ground.read_folders import ReadFolder
 
 MOST_LOGS = 10_000
 MOST_ENTRIES = 500_000
@@ -27,13 +28,16 @@ _LOG_ENDING = ".mcap"
 class FoundLog:
     """A log below the folder; `stamp` changes whenever it, or what is told of it, does.
 
-    `relative` is its path below the folder as the system has it, perhaps no valid text."""
+    `relative` is its path below the folder `root` as the system has it, perhaps no valid text; `under` stands
+    before it for people, empty for the station's own folder."""
 
     id: str
     relative: str
     size: int
     mtime_ns: int
     stamp: tuple[int, ...]
+    root: Path
+    under: str = ""
 
     @property
     def mark(self) -> str:
@@ -43,7 +47,7 @@ class FoundLog:
     @property
     def shown_path(self) -> str:
         """The path for people."""
-        return os.fsencode(self.relative).decode(errors="replace")
+        return self.under + os.fsencode(self.relative).decode(errors="replace")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,26 +63,34 @@ def log_id(relative: str) -> str:
     return hashlib.sha256(os.fsencode(relative)).hexdigest()[:16]
 
 
-def find_logs(root: Path) -> FoundLogs:
-    """The logs below `root`.  InputError where it cannot be looked at."""
+def find_logs(root: Path, others: Sequence[ReadFolder] = ()) -> FoundLogs:
+    """The logs below `root`, and those below the `others` that can be looked at.  InputError where `root`
+    cannot."""
     try:
         os.scandir(root).close()
     except OSError as err:
         raise InputError(f"cannot be looked at: {err.strerror}", file=root) from None
     found: list[FoundLog] = []
-    cut = False
+    cut = _find(root, "", found)
+    for other in others:
+        cut = _find(other.path, other.prefix, found) or cut
+    return FoundLogs(tuple(sorted(found, key=lambda log: -log.mtime_ns)), cut)
+
+
+def _find(root: Path, under: str, found: list[FoundLog]) -> bool:
+    """Add the logs below `root`; whether there are more than are looked at."""
     for relative, entry in _files(root):
         if len(found) >= MOST_LOGS or entry is None:
-            cut = True
-            break
+            return True
         try:
             status = entry.stat(follow_symlinks=False)
         except OSError:  # gone meanwhile
             continue
         beside = _stamps_beside(Path(entry.path))
         stamp = (status.st_size, status.st_mtime_ns, *beside)
-        found.append(FoundLog(log_id(relative), relative, status.st_size, status.st_mtime_ns, stamp))
-    return FoundLogs(tuple(sorted(found, key=lambda log: -log.mtime_ns)), cut)
+        identity = log_id(under + relative)
+        found.append(FoundLog(identity, relative, status.st_size, status.st_mtime_ns, stamp, root, under))
+    return False
 
 
 def path_of(root: Path, relative: str) -> Path:

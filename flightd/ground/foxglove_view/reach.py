@@ -12,7 +12,7 @@ OPTION = "--foxglove"
 
 def foxglove_address(text: str, login: bool) -> Listening:
     """HOST, HOST:PORT or [HOST]:PORT.  InputError for anything else, for an address that other machines
-    reach, and where people of this machine have to sign in, too (`login`)."""
+    reach, and where people have to sign in at the station (`login`), be it for its own address alone."""
     where = Listening.read(text, OPTION, PORT)
     if where.is_beyond:
         tunnel = f"ssh -L {where.port}:127.0.0.1:{where.port} HOST"
@@ -25,6 +25,6 @@ def foxglove_address(text: str, login: bool) -> Listening:
         raise InputError(
             "everybody shall sign in, and Foxglove's protocol has no sign-in",
             key=OPTION,
-            remedy=f"leave out {OPTION} or --login",
+            remedy=f"leave out {OPTION}, or listen on this machine alone without --login",
         )
     return where

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +23,7 @@ from flightd.ground.drone_link import DroneLink
 from flightd.ground.json_http import AnswerTo, as_json, decoded, or_refused, said
 from flightd.ground.missions.mission_book import Mission, MissionBook
 from flightd.ground.pages import page
+from flightd.ground.read_folders import ReadFolder
 from flightd.ground.stores import Stores
 
 _LOG = logging.getLogger(__name__)
@@ -68,11 +69,20 @@ class Recounted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ]
 
 
-def mission_routes(folder: Path | None, drones: Mapping[str, DroneLink]) -> list[BaseRoute]:
-    """The page and its answers; without a `folder` missions are planned and flown, but not kept."""
-    missions = _Missions(None if folder is None else MissionBook(folder), Stores(folder), drones)
-    for drone in drones.values():
+def mission_routes(
+    folder: Path | None,
+    drones: Mapping[str, DroneLink],
+    for_each: Callable[[Callable[[DroneLink], None]], None],
+    others: Sequence[ReadFolder] = (),
+) -> list[BaseRoute]:
+    """The page and its answers; `for_each` prepares each of the drones, those that join, too.  Without a
+    `folder` missions are planned and flown, but not kept."""
+    missions = _Missions(None if folder is None else MissionBook(folder), Stores(folder, others), drones)
+
+    def follow(drone: DroneLink) -> None:
         drone.on_plan = missions.heard
+
+    for_each(follow)
     ways: list[tuple[str, str, AnswerTo]] = [
         ("", "GET", missions.listed),
         ("/estimate", "GET", missions.estimate),

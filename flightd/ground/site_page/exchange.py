@@ -9,7 +9,7 @@ from flightd.core.errors import InputError
 from flightd.ground.site_page.drafts import opened_document
 from flightd.inventory.stock_table import read_table
 from flightd.site.exchange.map_files import EXPORTS, tables_of_lif_file, text_of
-from flightd.site.exchange.node_table import tables_of_rows
+from flightd.site.exchange.node_table import COLUMNS, tables_of_rows
 from flightd.site.site_draft import SiteDraft, draft_of, draft_text, read_draft
 from flightd.site.site_tables import SiteTablesError, site_of
 
@@ -18,6 +18,7 @@ NAMED = {
     **{kind: (made.suffix, made.media_type) for kind, made in EXPORTS.items()},
 }
 """Of each kind of file: how its name ends, and its media type."""
+_NODES_NEEDED = f"a table of nodes has {', '.join(COLUMNS)}"
 
 
 def exported(kind: str, draft: SiteDraft) -> bytes:
@@ -38,7 +39,7 @@ def imported(kind: str, data: bytes) -> dict[str, Any]:
     if kind == "toml":
         return {**opened_document(read_draft(text_of(data), "the file")), "notes": []}
     if kind == "csv":
-        found = tables_of_rows(read_table(data).rows)
+        found = tables_of_rows(read_table(data, _NODES_NEEDED).rows)
     elif kind == "lif":
         found = tables_of_lif_file(data)
     else:

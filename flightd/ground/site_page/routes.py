@@ -10,7 +10,9 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from flightd.config.front_camera import FrontCameraConfig
-from flightd.core.errors import InputError
+from flightd.core.errors import InputError, RunError
+from flightd.ground.access.gate import identity_of, note_act
+from flightd.ground.access.roles import Role
 from flightd.ground.bounded import Room, Threads
 from flightd.ground.json_http import JSON, as_json, is_json
 from flightd.ground.pages import page
@@ -18,6 +20,7 @@ from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.request_body import whole_body
 from flightd.ground.site_page import exchange
 from flightd.ground.site_page.drafts import MOST_BYTES
+from flightd.ground.site_page.simulated_flight import SimulatedFlight
 from flightd.ground.site_page.site_files import SiteFiles
 from flightd.ground.site_page.work import check_sent, export_sent, new_sent, opened_text, text_sent
 from flightd.ground.stock_routes import answered, download
@@ -27,9 +30,12 @@ _WORK_S = 20.0
 _MOST_TOGETHER = 8
 
 
-def site_page(folder: Path | None, working: ReadingProcess) -> list[BaseRoute]:
-    """The page over the site files under `folder`; maps are laid out and checked in `working`."""
-    asked = SiteAnswers(SiteFiles(folder), working)
+def site_page(
+    folder: Path | None, working: ReadingProcess, simulated: SimulatedFlight | None
+) -> list[BaseRoute]:
+    """The page over the site files under `folder`; maps are laid out and checked in `working`, and flown by
+    `simulated`."""
+    asked = SiteAnswers(SiteFiles(folder), working, simulated)
     ways = [
         ("GET", "", asked.sites),
         ("GET", "/file", asked.open),
@@ -39,6 +45,8 @@ def site_page(folder: Path | None, working: ReadingProcess) -> list[BaseRoute]:
         ("POST", "/import", asked.take_in),
         ("POST", "/export", asked.give_out),
         ("PUT", "/file", asked.save),
+        ("POST", "/simulation", asked.fly),
+        ("DELETE", "/simulation", asked.end_flight),
     ]
     return [
         *page("/site"),
@@ -52,8 +60,9 @@ def site_page(folder: Path | None, working: ReadingProcess) -> list[BaseRoute]:
 class SiteAnswers:
     """What the page may ask.  Files are read and written in threads, maps are worked on in a process."""
 
-    def __init__(self, files: SiteFiles, working: ReadingProcess) -> None:
+    def __init__(self, files: SiteFiles, working: ReadingProcess, simulated: SimulatedFlight | None) -> None:
         self._files = files
+        self._simulated = simulated
         self._working = working
         self._threads = Threads(1, 16, "too many questions about site files wait already")
         self._uploads = Room(_MOST_TOGETHER, "too many maps are being sent already")
@@ -117,6 +126,27 @@ class SiteAnswers:
         data = await self._working.run(export_sent, _WORK_S, kind, await self._json(request))
         suffix, media_type = exchange.NAMED[kind]
         return download(data, f"site{suffix}", media_type)
+
+    async def fly(self, request: Request) -> Response:
+        """Fly a site file in the simulator: `?name=`; how it goes the pages are told by themselves."""
+        flight, name = self._flight(request), _name(request)
+        file = await self._threads.run(self._files.path, name)
+        folder = flight.start(name, file)
+        note_act(request, f"{name} into {folder}")
+        return as_json({"folder": folder})
+
+    async def end_flight(self, request: Request) -> Response:
+        """End the simulated flight that is under way."""
+        self._flight(request).end()
+        return as_json({})
+
+    def _flight(self, request: Request) -> SimulatedFlight:
+        if self._simulated is None:
+            raise RunError("the station was told no folder to fly into", remedy="give it --folder DIR")
+        role = identity_of(request).role
+        if self._simulated.admins_only and not role.covers(Role.ADMIN):
+            raise RunError("other machines reach this station: an admin has flights simulated")
+        return self._simulated
 
     async def _json(self, request: Request) -> bytes:
         if not is_json(request):

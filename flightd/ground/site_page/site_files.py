@@ -64,14 +64,14 @@ class SiteFiles:
 
     def open(self, name: str) -> OpenedFile:
         """What is in a file.  InputError where there is none of the name, or it is no text."""
-        return _opened(name, self._path(name))
+        return _opened(name, self.path(name))
 
     def save(self, name: str, stamp: str, text: str) -> OpenedFile:
         """Put a new version in the place of the one with that stamp, which is kept.
 
         RunError where the file is another one meanwhile, InputError where there is none of the name or the
         new one is too large, UnavailableError where the disk refuses."""
-        path, data = self._path(name), _data(text)
+        path, data = self.path(name), _data(text)
         with self._saving:
             now = _opened(name, path)
             if now.stamp != stamp:
@@ -123,16 +123,17 @@ class SiteFiles:
 
     def versions(self, name: str) -> list[str]:
         """The old versions of a file, newest first: when each was replaced (UTC)."""
-        return [path.stem for path in _versions(self._path(name))][::-1]
+        return [path.stem for path in _versions(self.path(name))][::-1]
 
     def version(self, name: str, version: str) -> str:
         """The text of an old version.  InputError where there is none."""
-        for path in _versions(self._path(name)):
+        for path in _versions(self.path(name)):
             if path.stem == version:
                 return _opened(f"{name}, {version}", path).text
         raise InputError(f"{name} has no version {shown(version)!r}")
 
-    def _path(self, name: str) -> Path:
+    def path(self, name: str) -> Path:
+        """Where a file lies.  InputError where there is none of the name."""
         known = self._known.get(name)
         if known is None or not is_plain_file(known):
             self.names()

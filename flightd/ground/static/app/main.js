@@ -7,6 +7,7 @@ import { Page } from "./page.js";
 import { followLinks, retitle } from "./router.js";
 import { keepScreenOn } from "./screen.js";
 import { watch } from "./store.js";
+import { askBeforeLoss } from "./unsaved.js";
 
 const root = document.getElementById("page");
 const draw = () => render(html`<${Page} />`, root);
@@ -16,6 +17,7 @@ const SPOKEN_MS = 3000; // a station that gives no texts by then is read in Engl
 listenForKeys();
 keepScreenOn();
 followLinks();
+askBeforeLoss();
 connect();
 await Promise.race([speak(preferred()), new Promise((resolve) => setTimeout(resolve, SPOKEN_MS))]).catch(() => {});
 retitle();

@@ -20,7 +20,9 @@ const TRACK_KEPT = 4000;
 export const state = {
   session: null, // who is signed in: {login, name, role, over, endsAt}; see access/session.js
   route: null, // page, path below it and query: see router.js
+  simulation: null, // the simulated flight that the station flies or flew last, see site/simulation_bar.js
   stock: null, // see stock/stock_state.js
+  typedSettings: {}, // of each drone what was typed and not sent: {key: value}, see doctor/settings_view.js
   missions: null, // see missions/missions_state.js
   station: null, // version, drones, browsers
   drones: new Map(),
@@ -61,6 +63,7 @@ export function take({ drone, topic, value }) {
     if (drone === "") {
       if (topic === "session") s.session = sessionOf(value);
       if (topic === "station") takeStation(s, value);
+      if (topic === "simulation") s.simulation = value;
       if (topic === "echo") takeEcho(s, value);
       return;
     }
@@ -74,6 +77,7 @@ export const sessionOf = (told) => ({ ...told, endsAt: performance.now() + (told
 
 function takeStation(s, value) {
   s.station = value;
+  for (const name of s.drones.keys()) if (!value.drones.includes(name)) s.drones.delete(name); // it has left
   if (value.drones.includes(s.selected)) return;
   s.selected = value.drones[0] ?? "";
   s.chosenNode = "";

@@ -3,7 +3,7 @@ import { mayChange } from "../access/session.js";
 import { html, useEffect, useRef, useState } from "../html.js";
 import { english, quoted, say, sayWith } from "../language.js";
 import { goTo } from "../router.js";
-import { shown } from "../store.js";
+import { shown, state, update } from "../store.js";
 import { askDrone, sendDrone } from "./asking.js";
 import { ChangesBar } from "./changes_bar.js";
 import { HistoryCard } from "./history_card.js";
@@ -19,7 +19,15 @@ export function SettingsView({ drone, section }) {
   const [known, setTold] = useState(null);
   const told = known && forReader(known);
   const [trouble, setTrouble] = useState("");
-  const [changes, setChanges] = useState({});
+  const [changes, setOwn] = useState(state.typedSettings[drone] ?? {}); // kept beyond this view, too
+  const setChanges = (made) =>
+    setOwn((before) => {
+      const after = made(before);
+      update((s) => {
+        s.typedSettings = { ...s.typedSettings, [drone]: after };
+      });
+      return after;
+    });
   const complaint = useComplaint(drone, told, changes);
   const session = shown().welcome?.session ?? "";
   const load = () =>
@@ -36,7 +44,7 @@ export function SettingsView({ drone, section }) {
   const change = (name, value) => setChanges((before) => withChange(before, name, value));
   const take = (settings) => {
     setTold(settings);
-    setChanges({});
+    setChanges(() => ({}));
   };
   if (!told) {
     return html`<section class="card settings-none"><h2>${say("Settings")}</h2>
@@ -56,7 +64,7 @@ export function SettingsView({ drone, section }) {
       </div>
       <div class="doctor-side">
         <${ChangesBar} drone=${drone} told=${told} changes=${changes} complaint=${complaint} onTake=${take}
-          onDrop=${() => setChanges({})} onUndo=${(name) => change(name, undefined)} />
+          onDrop=${() => setChanges(() => ({}))} onUndo=${(name) => change(name, undefined)} />
         <${HistoryCard} drone=${drone} told=${told} onTake=${take} />
       </div>
     </div>

@@ -1,4 +1,5 @@
 // The list of flights: sorted, filtered, and two of them chosen to be compared.
+import { HowFlightsCome } from "../how_flights_come.js";
 import { html, useEffect, useRef, useState } from "../html.js";
 import { quoted, say, sayWith } from "../language.js";
 import { goTo } from "../router.js";
@@ -26,6 +27,7 @@ export function FlightList({ route }) {
       </div>
       <p class="quiet" role="status">${stateWords(list, rows)}</p>
       ${list.trouble && html`<p class="bad-line">${quoted(list.trouble, capital)}</p>`}
+      ${list.looked && list.rows.length === 0 && !list.unread && html`<${HowFlightsCome} />`}
       ${rows.length > 0 &&
       html`<${Table} rows=${rows.slice(0, most)} selection=${selection} choose=${choose} chosen=${chosen} />`}
       ${rows.length > most &&

@@ -1,5 +1,7 @@
 // The frame of every page, the phases of a flight, and what several pages say.
 export default {
+  "Flights are those under {folder}; {flights} adds the folder that a daemon on this computer fills, or a copy from a drone.": "Flüge sind die unter {folder}; {flights} nimmt den Ordner hinzu, den ein Daemon auf diesem Rechner füllt, oder eine Kopie von einer Drohne.",
+  "How they get here": "Wie sie hierher kommen",
   "the ground station does not answer": "die Bodenstation antwortet nicht",
   "Sign in": "Anmelden",
   "Name": "Name",

@@ -16,7 +16,7 @@ export default {
   "New {element}: {how}.": "Neu, {element}: {how}.",
   "{id}: now click the other node.": "{id}: Klicken Sie nun auf den anderen Knoten.",
   "The version of {day} is shown. Save puts it back.": "Gezeigt ist die Fassung vom {day}. Speichern stellt sie wieder her.",
-  "Saved as {file}. Fly it in simulation, in the station's folder: {command}": "Gespeichert als {file}. In der Simulation fliegen, im Ordner der Station: {command}",
+  "Saved as {file}.": "Gespeichert als {file}.",
   // roles, paints
   "viewer": "Zuschauer",
   "operator": "Bediener",
@@ -200,6 +200,7 @@ export default {
   "{where}: refused: this key is not on the daemon's list of clients": "{where}: verweigert: Dieser Schlüssel steht nicht auf der Liste der Drohne",
   "{where}: connected, but no answer in {seconds} s": "{where}: verbunden, aber keine Antwort in {seconds} s",
   "{where}: nobody listens; is flightd running, with [ground] listen set?": "{where}: Niemand hört zu; läuft flightd, und ist [ground] listen gesetzt?",
+  "{where}: this name is not known here; look at its spelling, or give the drone's address": "{where}: Dieser Name ist hier nicht bekannt; prüfen Sie die Schreibweise, oder geben Sie die Adresse der Drohne an",
   "there is no such drone": "diese Drohne gibt es nicht",
   "sign in first": "melden Sie sich zuerst an",
   "name or password is wrong": "Name oder Passwort ist falsch",

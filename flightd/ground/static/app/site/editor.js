@@ -6,6 +6,7 @@ import { ElementCard, remove } from "./element_card.js";
 import { ElementList } from "./element_list.js";
 import { FindingsCard } from "./findings_card.js";
 import { Plan } from "./plan.js";
+import { SimulationBar } from "./simulation_bar.js";
 import { zoomBy } from "./zoom.js";
 import { checkSoon, download, openFile, save, showVersion } from "./site_source.js";
 import { change, isChanged, redo, site, undo } from "./site_state.js";
@@ -20,6 +21,7 @@ export function Editor() {
   return html`
     <div class="site-editor">
       <${Head} />
+      <${SimulationBar} />
       ${trouble && html`<p class="site-trouble" role="alert">${quoted(trouble)}</p>`}
       <p class="quiet site-said" role="status">${quoted(said)}</p>
       ${losesComments && html`<p class="site-trouble">${say("{file} is not written as [site] and [[…]] tables: saving writes it anew, and its comments move to the top.", { file: name })}</p>`}
@@ -38,6 +40,7 @@ function Notes({ notes }) {
 
 function Head() {
   const { draft, name, stamp, past, future, busy } = site();
+  const [asksAnew, setAsksAnew] = useState(false); // whether what is not saved may go
   const [newName, setNewName] = useState(null); // of a file to save as; null: not asked for
   const suggested = `${String(draft.site.name ?? "site").toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-+|-+$/g, "") || "site"}.toml`;
   const asked = newName ?? (stamp ? null : suggested);
@@ -50,6 +53,10 @@ function Head() {
       history.replaceState(null, "", `/site/edit?name=${encodeURIComponent(site().name)}`);
     }
   };
+  const openAnew = () => {
+    setAsksAnew(false);
+    openFile(name);
+  };
   return html`
     <form class="site-head" onSubmit=${onSave}>
       <h2>${draft.site.name ?? say("Site")} <small>${name || say("new, no file yet")}${stamp && isChanged() ? `, ${say("changed")}` : ""}</small></h2>
@@ -61,7 +68,10 @@ function Head() {
         ${stamp && html`<button type="button" class="order" aria-expanded=${asked !== null} onClick=${() => setNewName(asked === null ? suggested : null)}>${asked === null ? say("Save as") : say("Not as another")}</button>`}
         <${Menu} words=${say("Export")} options=${EXPORTS} onChoice=${download} />
         ${site().versions.length > 0 && html`<${Menu} words=${say("Old versions")} options=${site().versions.map((at) => [at, whenOf(at)])} onChoice=${showVersion} />`}
-        ${stamp && html`<button type="button" class="order" onClick=${() => openFile(name)}>${say("Open anew")}</button>`}
+        ${stamp && (asksAnew && isChanged()
+          ? html`<button type="button" class="order sure-anew" onClick=${openAnew}>${say("Lose what is not saved")}</button>
+              <button type="button" class="order" onClick=${() => setAsksAnew(false)}>${say("Keep it")}</button>`
+          : html`<button type="button" class="order" onClick=${() => (isChanged() ? setAsksAnew(true) : openAnew())}>${say("Open anew")}</button>`)}
         <a class="order" href="/site">${say("All sites")}</a>
       </div>
     </form>
@@ -118,11 +128,6 @@ function listen() {
       undo();
     } else if (key === "delete" && !isTyping && !isOrder) remove();
   };
-  const onLeave = (event) => isChanged() && event.preventDefault();
   window.addEventListener("keydown", onKey);
-  window.addEventListener("beforeunload", onLeave);
-  return () => {
-    window.removeEventListener("keydown", onKey);
-    window.removeEventListener("beforeunload", onLeave);
-  };
+  return () => window.removeEventListener("keydown", onKey);
 }

@@ -10,7 +10,7 @@ const STEP_M = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 const MOVED_M = 0.02; // less is a click
 const NODES_TOOLS = new Set(["cross", "blocked"]);
 
-let held = null; // {before, from: [x, y], table, index, node, corner} while a pointer is down
+let held = null; // {before, pointer, from: [x, y], table, index, node, corner} while a pointer is down
 export const isDragging = () => held !== null;
 
 const snapped = (value) => {
@@ -25,26 +25,27 @@ function pointOf(event) {
 }
 
 export function begin(event) {
-  if (event.button !== 0) return;
+  if (event.button !== 0 || !event.isPrimary) return; // a second finger draws nothing
   const { tool, draft } = site();
+  const own = { before: draft, pointer: event.pointerId };
   const mark = event.target.closest("[data-table]");
   const from = pointOf(event);
   event.currentTarget.setPointerCapture(event.pointerId);
   if (tool) {
-    held = { before: draft, from, tool, id: mark?.dataset.id };
+    held = { ...own, from, tool, id: mark?.dataset.id };
     return;
   }
   if (!mark) {
-    held = { before: draft, pan: beginPan(event) };
+    held = { ...own, pan: beginPan(event) };
     return;
   }
   const { table, index, node, id } = mark.dataset;
-  held = { before: draft, from, table, index: Number(index), node: node === undefined ? null : Number(node), id, corner: event.target.dataset.corner };
+  held = { ...own, from, table, index: Number(index), node: node === undefined ? null : Number(node), id, corner: event.target.dataset.corner };
   choose(table, held.index, held.node);
 }
 
 export function move(event) {
-  if (!held) return;
+  if (held?.pointer !== event.pointerId) return;
   if (held.pan) {
     held.pan(event);
     return;
@@ -61,12 +62,20 @@ export function move(event) {
 }
 
 export function release(event) {
-  if (!held) return;
+  if (held?.pointer !== event.pointerId) return;
   const { before, moving, tool, from, id } = held;
   held = null;
   if (tool) drawn(tool, from, pointOf(event), id);
   else if (moving) dropped(before);
   else change({}); // the drawing fits itself again
+}
+
+// The browser took the pointer for something else, as for scrolling: nothing was drawn, nothing moved.
+export function cancel(event) {
+  if (held?.pointer !== event.pointerId) return;
+  const { before, moving } = held;
+  held = null;
+  change({ sketch: null, ...(moving && { draft: before }) });
 }
 
 export function nudge(event) {

@@ -4,7 +4,7 @@ import { say } from "../language.js";
 import { Floor } from "../live/site_plan.js";
 import { nodesOf, placesOf, rowsOf } from "./draft.js";
 import { Fronts } from "./fronts.js";
-import { begin, isDragging, move, nudge, release } from "./hand.js";
+import { begin, cancel, isDragging, move, nudge, release } from "./hand.js";
 import { zoomed } from "./zoom.js";
 import { site } from "./site_state.js";
 
@@ -12,7 +12,7 @@ const M = 100;
 const MARGIN_M = 1.2;
 
 export function Plan() {
-  const { draft, sound, checkedDraft, checked, chosen, tool } = site();
+  const { draft, sound, checkedDraft, checked, chosen, tool, zoom } = site();
   const box = useRef(null);
   const drawn = useMemo(() => sound && { ...sound.floor, keep_outs: [], pads: [] }, [sound]);
   const floor = useMemo(() => drawn && html`<${Floor} floor=${drawn} />`, [drawn]);
@@ -23,9 +23,9 @@ export function Plan() {
   const scale = Math.min(2.4, Math.max(0.7, view[2] / 12));
   return html`
     <svg
-      class=${`site-plan ${tool ? "drawing" : ""}`} viewBox=${view.map((value) => value * M).join(" ")} style=${{ "--scale": scale }}
+      class=${`site-plan ${tool ? "drawing" : ""} ${zoom > 1 ? "zoomed" : ""}`} viewBox=${view.map((value) => value * M).join(" ")} style=${{ "--scale": scale }}
       tabindex="0" role="group" aria-label=${say("Drawing. Arrow keys move what is chosen, Shift and an arrow ten times as far; everything is in the list of elements, too.")}
-      onKeyDown=${nudge} onPointerDown=${begin} onPointerMove=${move} onPointerUp=${release} onPointerCancel=${release}
+      onKeyDown=${nudge} onPointerDown=${begin} onPointerMove=${move} onPointerUp=${release} onPointerCancel=${cancel}
     >
       <${Grid} view=${view} />
       <g class=${isOld ? "laid-out old" : "laid-out"}>

@@ -66,10 +66,14 @@ export async function save(newName = "") {
     const told = await askJson(`/api/site/file?name=${named(to)}`, sent({ draft, stamp: isNew ? "" : stamp }, "PUT"));
     const common = { name: to, stamp: told.stamp, versions: told.versions, losesComments: told.loses_comments, kept: told.draft };
     const isStill = site().draft === draft; // else it was edited on meanwhile, over the text of before
-    change({ ...common, ...(isStill && { draft: told.draft, checkedDraft: told.draft }), said: english("Saved as {file}. Fly it in simulation, in the station's folder: {command}", { file: to, command: `flightd sim --warehouse "${to}"` }) });
+    change({ ...common, ...(isStill && { draft: told.draft, checkedDraft: told.draft }), said: english("Saved as {file}.", { file: to }) });
     loadListQuietly();
   });
 }
+
+// Have a file flown in the simulator, and end that: how it goes is told on the topic "simulation".
+export const fly = (name) => tried(() => askJson(`/api/site/simulation?name=${named(name)}`, { method: "POST", goesOn: true }));
+export const endFlight = () => tried(() => askJson("/api/site/simulation", { method: "DELETE", goesOn: true }));
 
 const loadListQuietly = () => askJson("/api/site").then((list) => change({ list })).catch(() => {});
 

@@ -1,4 +1,5 @@
 // The page Stock: every place of an inventory as it stands, filling while a flight counts.
+import { HowFlightsCome } from "../how_flights_come.js";
 import { html, useEffect } from "../html.js";
 import { quoted, say } from "../language.js";
 import { goTo } from "../router.js";
@@ -49,7 +50,8 @@ function Nothing() {
   return html`
     <section class="card empty"><h2>${say("No inventory yet")}</h2>
       <p>${folder ? say("No inventory lies under the station's folder.") : say("Name the folder in which inventories lie:")}
-        ${!folder && html` <code>flightd ground --folder out</code>`}</p></section>
+        ${!folder && html` <code>flightd ground --folder out</code>`}</p>
+      ${folder && html`<${HowFlightsCome} />`}</section>
   `;
 }
 

@@ -2,6 +2,7 @@
 import { showPictures } from "../connection.js";
 import { askJson, askStation } from "../fetching.js";
 import { flightsState, watchList } from "../flights/flights_state.js";
+import { HowFlightsCome } from "../how_flights_come.js";
 import { html, useEffect, useRef, useState } from "../html.js";
 import { english, say } from "../language.js";
 import { drawPicture, WIDTH } from "../live/camera.js";
@@ -64,7 +65,7 @@ function FromFlight() {
     setBusy(false);
   };
   if (!rows.length && !looked) return html`<p class="quiet" role="status">${say("Looking for flights …")}</p>`;
-  if (!rows.length) return html`<p class="quiet">${say("No flight log lies below the station's folder yet.")}</p>`;
+  if (!rows.length) return html`<p class="quiet">${say("No flight log lies below the station's folder yet.")}</p><${HowFlightsCome} />`;
   return html`
     <div class="from-flight">
       <label class="field">${say("Flight")}
