@@ -37,12 +37,13 @@ class Version(msgspec.Struct, frozen=True):
 
 class Shelved(msgspec.Struct, frozen=True):
     """A profile's versions, oldest first; `current` is the number of the one to fly by, None where its file
-    is none of them."""
+    is none of them.  `trouble`: why its versions cannot be read, nothing can be installed or taken back."""
 
     name: str
     file: str
     current: int | None
     versions: tuple[Version, ...]
+    trouble: str = ""
 
 
 class ProfileShelf:
@@ -62,7 +63,13 @@ class ProfileShelf:
         return [self.of(name) for name in names]
 
     def of(self, name: str) -> Shelved:
-        """A profile's versions; none where it was never installed."""
+        """A profile's versions; none where it was never installed, or where they cannot be read."""
+        try:
+            return self._shelved(name)
+        except InputError as err:
+            return Shelved(name, str(self._file(name).resolve()), None, (), str(err))
+
+    def _shelved(self, name: str) -> Shelved:
         versions = self._versions(name)
         installed = plain_file(self._file(name), _MOST_PROFILE_BYTES)
         digest = None if installed is None else _hash(installed)
@@ -74,7 +81,7 @@ class ProfileShelf:
 
         What is installed already stays as it is."""
         with self._lock:
-            before = self.of(name)
+            before = self._shelved(name)
             versions = before.versions
             if any(one.number == before.current and one.file_hash == _hash(profile) for one in versions):
                 return before
@@ -111,7 +118,7 @@ class ProfileShelf:
         try:
             return tuple(msgspec.json.decode(text, type=list[Version]))
         except (msgspec.DecodeError, UnicodeDecodeError) as err:
-            raise InputError(f"{name}/{_BOOK}: {err}", remedy="put it aside") from None
+            raise InputError(f"{FOLDER}/{name}/{_BOOK}: {err}", remedy="put it aside") from None
 
     def _file(self, name: str) -> Path:
         return self._folder / f"{name}.npz"

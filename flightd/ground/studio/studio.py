@@ -27,6 +27,7 @@ from flightd.ground.studio.lessons import (
     from_upload,
     mask_of,
     train_and_score,
+    training_hash_of,
 )
 from flightd.ground.studio.picture_sets import PictureSet, PictureSets
 from flightd.ground.studio.profile_shelf import ProfileShelf, Shelved
@@ -135,21 +136,23 @@ class Studio:
         return await self._looking.run(study_boards, _BOARDS_S, self.sets.folder_of(name), files, board)
 
     async def install(self, name: str, training_hash: str, who: str, again: bool) -> Shelved:
-        """Install what was trained last.  RunError where it is another than the one of `training_hash`, and
-        where it is worse and not said `again`."""
+        """Install what was trained last.  RunError where it, or its score, is another than the one of
+        `training_hash`, and where it is worse and not said `again`."""
         known, outcome = await self.disk.run(self.sets.read, name), await self.outcome_of(name)
-        if outcome is None:
+        content = await self.disk.run(plain_file, self.sets.folder_of(name) / TRAINED, _MOST_BYTES)
+        if outcome is None or content is None:
             raise InputError("nothing was trained yet")
-        if outcome.training_hash != training_hash:
-            raise RunError("it was trained anew meanwhile", remedy="look at its score first")
+        # the file may lie there without its score: a training ends between the two, or was cut off there
+        trained = await self._looking.run(training_hash_of, _WITHIN_S, content, f"{name}/{TRAINED}")
+        if not trained == outcome.training_hash == training_hash:
+            raise RunError(
+                "it was trained anew meanwhile", remedy="look at its score first, or let it learn once more"
+            )
         if outcome.verdict.judged is Judged.WORSE and not again:
             raise RunError(
                 f"it is worse than what flies: {'; '.join(outcome.verdict.reasons)}",
                 remedy="say yes a second time to install it all the same",
             )
-        content = await self.disk.run(plain_file, self.sets.folder_of(name) / TRAINED, _MOST_BYTES)
-        if content is None:
-            raise InputError("nothing was trained yet")
         learnt = (training_hash, outcome.verdict.judged.value)
         return await self.disk.run(self.shelf.install, name, content, who, known.paint, learnt)
 
@@ -197,7 +200,7 @@ class Studio:
 
 
 def _keep_outcome(folder: Path, profile: Path, outcome: Outcome) -> None:
-    """First the profile, then what is said of it: what is installed is asked for by its training hash."""
+    """First the profile, then what is said of it; what is installed is read once and has the hash of both."""
     try:
         profile.replace(folder / TRAINED)
         replace_file(folder / OUTCOME, folder / f".{OUTCOME}.part", msgspec.json.encode(outcome))
