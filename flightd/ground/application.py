@@ -69,7 +69,7 @@ def application(
         *site_page(folder, maps),
         *flight_routes(flights),
         *studio_routes(studio),
-        *doctor_routes(hub.drones),
+        *doctor_routes(hub.drones, None if studio is None else studio.shelf),
         *mission_routes(folder, hub.drones),
         *guide_routes(),
         *session_routes(access),

@@ -111,6 +111,7 @@ RULES: Mapping[str, Rule] = {
     "POST /api/doctor/{drone}/fix": _CHANGES,
     "POST /api/doctor/{drone}/settings": _CHANGES,
     "POST /api/doctor/{drone}/take-back": _CHANGES,
+    "POST /api/doctor/{drone}/profile": _CHANGES,
     "POST /api/doctor/{drone}/restart": _CHANGES,
     "GET /api/guide": _LOOKS,
     "GET /api/guide/search": _LOOKS,

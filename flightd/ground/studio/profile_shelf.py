@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-from flightd.core.errors import InputError, UnavailableError
+from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.ground.plain_files import is_plain_file, is_plain_folder, plain_file
 from flightd.runtime.durable_files import replace_file
 
@@ -75,6 +75,15 @@ class ProfileShelf:
         digest = None if installed is None else _hash(installed)
         current = next((one.number for one in reversed(versions) if one.file_hash == digest), None)
         return Shelved(name, str(self._file(name).resolve()), current, versions)
+
+    def installed(self, name: str, file_hash: str) -> bytes:
+        """The file to fly by.  InputError where there is none, RunError where it is another."""
+        content = plain_file(self._file(name), _MOST_PROFILE_BYTES)
+        if content is None:
+            raise InputError(f"no profile {name} is installed")
+        if _hash(content) != file_hash:
+            raise RunError("another version was installed meanwhile", remedy="look at it again")
+        return content
 
     def install(self, name: str, profile: bytes, who: str, paint: str, learnt: tuple[str, str]) -> Shelved:
         """A profile's file as the next version; `learnt` are its training hash and the verdict on it.
