@@ -178,6 +178,17 @@ def test_a_colour_is_learnt_compared_installed_and_taken_back(
         expect(versions.filter(has_text="Version 1")).to_contain_text("installed")
         assert load_profile(flies).training_hash == first
 
+        page.get_by_role("button", name="eye", exact=True).click()
+        card = page.get_by_role("region", name="Profile hall")
+        card.get_by_role("button", name="To the drone eye").click()
+        expect(card.get_by_text("eye is set to the shipped profile of its floor's paint.")).to_be_visible()
+        card.get_by_role("button", name="Send version 1 to eye").click()
+        expect(card.get_by_text("eye is set to version 1.")).to_be_visible()
+        expect(card.get_by_text(re.compile("The drone has it"))).to_be_visible()
+        expect(card.get_by_role("button", name="Send version")).to_have_count(0)
+        card.get_by_role("button", name="Start flightd anew").click()
+        expect(card.get_by_text("flightd starts anew")).to_be_visible()
+
         page.get_by_role("button", name="Look for the board").click()
         expect(page.get_by_text("The board is seen in 0 of 8 pictures")).to_be_visible()
         serves_everybody(page)

@@ -4,6 +4,7 @@ import { html } from "../html.js";
 import { dateFormat, quoted, say, sayWith } from "../language.js";
 import { time } from "../words.js";
 import { asked, change, loadOverview, studio, told } from "./studio_state.js";
+import { ToDrone } from "./to_drone.js";
 
 const DAY = dateFormat({ year: "numeric", month: "short", day: "numeric" });
 
@@ -31,7 +32,9 @@ export function Profile({ profile }) {
           `,
         )}
       </ol>
-      <details><summary>${say("How it comes to the drone")}</summary>
+      ${!trouble && html`<p class="quiet">${say("Installed at the station: a drone flies by it once it was sent there, and flightd started anew.")}</p>`}
+      <${ToDrone} profile=${profile} />
+      <details><summary>${say("Without the ground link")}</summary>
         <p>${sayWith("Copy {file} beside the drone's configuration, and name it there:", { file: html`<code>${profile.file}</code>` })}</p>
         <pre tabindex="0">[vision]
 profile = "${name}.npz"</pre>
