@@ -27,7 +27,7 @@ async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) 
     async with rig.world(GUID_TIMEOUT=3.0):
         daemon = await rig.start()
         await rig.until(lambda status: status.vehicle is not None)
-        async with GroundClient(rig.address, timeout_s=60.0) as client, asyncio.timeout(120):
+        async with GroundClient(rig.address, timeout_s=60.0) as client, asyncio.timeout(240):
             await client.hello()
             report = await client.doctor()
             while all(check.fix != "GUID_TIMEOUT" for check in report.checks):
