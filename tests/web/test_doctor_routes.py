@@ -95,7 +95,7 @@ async def test_everybody_looks_and_an_admin_changes_under_his_own_name(tmp_path:
             ({"profile": "attic"}, 400, "no profile attic is installed"),
             ({"profile": "../hall"}, 400, "not a profile to be sent"),
         ):
-            body = json.dumps(bodies["profile"] | wrong).encode()
+            body = json.dumps({**bodies["profile"], **wrong}).encode()
             status, text = await station.ask("POST", "/api/doctor/demo/profile", bears[Role.ADMIN], body)
             assert (status, words in json.loads(text)["refused"]) == (code, True), text
         own = {"Cookie": await sign_in(station, "ada"), "Origin": station.origin, **JSON}

@@ -87,6 +87,7 @@ RULES: Mapping[str, Rule] = {
     "GET /api/studio/sets/{set}/pictures/{file}": _LOOKS,
     "GET /api/studio/sets/{set}/pictures/{file}/mask": _LOOKS,
     "GET /api/studio/sets/{set}/boards": _LOOKS,
+    "GET /api/studio/flights/{flight}/sensors": _LOOKS,
     "GET /api/studio/profiles/{set}/file": _LOOKS,
     "POST /api/studio/sets": _ACTS,  # pictures and what is learnt of them fly nothing
     "POST /api/studio/sets/{set}/pictures": _ACTS,

@@ -113,6 +113,11 @@ class Flights:
         """The folder of flights, and a flight's log below it."""
         return self._root(), (await self._log(log_id)).relative
 
+    def site_of(self, log_id: str) -> str:
+        """The site of a flight in the list; "" where that is not known."""
+        row = self.index.row(log_id) if self.index is not None else None
+        return "" if row is None else row.site
+
     async def whereabouts(self, log_id: str, place: int) -> tuple[Path, str, PicturePlace]:
         """Where a picture of a flight lies: folder, log, place in the log."""
         log = await self._log(log_id)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from flightd.config.camera import CameraConfig
+from flightd.config.front_camera import FrontCameraConfig
 from flightd.core.errors import InputError
+from flightd.core.geometry import Lens
+from flightd.core.preview import CameraName
 from flightd.studies.calibrate import lens_keys
 from flightd.studies.frame_files import read_image
 from flightd.vision.lens_calibration import FEWEST_PICTURES, Board, calibrate, find_board
@@ -18,6 +22,10 @@ from flightd.vision.lens_calibration import FEWEST_PICTURES, Board, calibrate, f
 COVERAGE = (8, 6)
 """The picture in cells across and down: each should have seen a corner of the board."""
 _MOST_PICTURES = 60
+_SECTIONS = {
+    CameraName.DOWN: ("camera", CameraConfig.model_fields),
+    CameraName.FRONT: ("front_camera", FrontCameraConfig.model_fields),
+}
 
 
 class ShownBoard(msgspec.Struct, frozen=True):
@@ -31,7 +39,7 @@ class ShownBoard(msgspec.Struct, frozen=True):
 
 class BoardStudy(msgspec.Struct, frozen=True):
     """`coverage` counts corners by cell, row by row; `refused` says why there is no lens, `config` is the
-    lens as a configuration has it."""
+    lens as a configuration has it, by camera ("down", "front")."""
 
     pictures: int
     needed: int
@@ -41,7 +49,7 @@ class BoardStudy(msgspec.Struct, frozen=True):
     coverage: list[list[int]]
     error_px: float | None = None
     sigma_focal_px: float | None = None
-    config: str = ""
+    config: dict[str, str] = {}
     refused: str = ""
 
 
@@ -73,14 +81,19 @@ def study_boards(folder: Path, files: Sequence[str], board: Board) -> BoardStudy
         ShownBoard(one.file, one.corners, round(error, 3))
         for one, error in zip(boards, found.view_errors_px, strict=True)
     ]
-    keys = "\n".join(f"{key} = {json.dumps(value)}" for key, value in lens_keys(found.lens).items())
     return msgspec.structs.replace(
         plain,
         boards=fitted,
         error_px=round(found.error_px, 3),
         sigma_focal_px=round(found.sigma_focal_px, 2),
-        config=f"[camera]\n{keys}",
+        config={camera: _keys(found.lens, *section) for camera, section in _SECTIONS.items()},
     )
+
+
+def _keys(lens: Lens, section: str, known: Collection[str]) -> str:
+    """As far as the section has them."""
+    keys = [f"{key} = {json.dumps(value)}" for key, value in lens_keys(lens).items() if key in known]
+    return "\n".join([f"[{section}]", *keys])
 
 
 def _coverage(views: Sequence[NDArray[np.float32]], width: int, height: int) -> list[list[int]]:

@@ -31,6 +31,7 @@ from flightd.ground.studio.lessons import (
 )
 from flightd.ground.studio.picture_sets import PictureSet, PictureSets
 from flightd.ground.studio.profile_shelf import ProfileShelf, Shelved
+from flightd.ground.studio.sensor_study import SensorStudy, study_sensors
 from flightd.ground.studio.verdict import Judged
 from flightd.runtime.durable_files import replace_file
 from flightd.vision.lens_calibration import Board
@@ -39,7 +40,7 @@ from flightd.vision.lines.colour_profile import SHIPPED
 TRAINED, OUTCOME = "trained.npz", "trained.json"
 INSTALLED = "installed"
 MOST_LOGS = 8
-_WITHIN_S, _TRAIN_S, _BOARDS_S = 60.0, 1800.0, 240.0
+_WITHIN_S, _TRAIN_S, _BOARDS_S, _SENSORS_S = 60.0, 1800.0, 240.0, 240.0
 _MOST_BYTES = 4 << 20
 
 
@@ -100,6 +101,9 @@ class Studio:
             raise missing_extra("train", "training a colour profile")
         if len(flights) > MOST_LOGS:
             raise InputError(f"at most {MOST_LOGS} flights are scored on")
+        sites = sorted({site for flight in flights if (site := self._flights.site_of(flight))})
+        if len(sites) > 1:
+            raise InputError(f"flights of several sites ({', '.join(sites)})", remedy="take those of one")
         if any(one.running for one in self._trainings.values()):
             raise UnavailableError("a profile is being trained already", remedy="wait until it is done")
         self._trainings[name] = Training(name, running=True)
@@ -134,6 +138,10 @@ class Studio:
         known = await self.disk.run(self.sets.read, name)
         files = [label.file for label in known.labels]
         return await self._looking.run(study_boards, _BOARDS_S, self.sets.folder_of(name), files, board)
+
+    async def sensors(self, flight: str) -> SensorStudy:
+        """What a recorded flight says of the drone's sensors."""
+        return await self._looking.run(study_sensors, _SENSORS_S, *await self._flights.where(flight))
 
     async def install(self, name: str, training_hash: str, who: str, again: bool) -> Shelved:
         """Install what was trained last.  RunError where it, or its score, is another than the one of
