@@ -71,6 +71,11 @@ async def test_a_colour_is_learnt_scored_installed_and_taken_back(folder: Path, 
         assert outcome["verdict"]["judged"] in {"same", "better"}
 
         seen = outcome["training_hash"]
+        code, text = await station.ask("GET", f"/api/studio/flights/{flight}/sensors", within_s=90.0)
+        assert (code, "mission: is missing" in json.loads(text)["refused"]) == (404, True), text
+        code, text = await station.ask("GET", "/api/studio/flights/nothing/sensors")
+        assert (code, json.loads(text)["refused"]) == (404, "there is no such flight")
+
         code, said = await post(station, f"{at}/install", {"training_hash": "another", "who": "Ann"})
         assert (code, "trained anew" in said["refused"]) == (409, True)
         code, shelved = await post(station, f"{at}/install", {"training_hash": seen, "who": "Ann"})
@@ -223,6 +228,20 @@ async def test_spoilt_versions_of_one_profile_leave_the_others_alone(tmp_path: P
         for path, said in (("sets/spoilt/install", install), ("profiles/spoilt/back", {"version": 1})):
             code, answer = await post(station, f"/api/studio/{path}", said)
             assert (code, answer["refused"]) == (400, profiles[1]["trouble"])
+
+
+class TwoSites(Flights):
+    def site_of(self, log_id: str) -> str:
+        return log_id[:1]
+
+
+def test_flights_of_one_site_are_scored_on(tmp_path: Path) -> None:
+    studio = Studio(tmp_path, TwoSites(None))
+    with pytest.raises(InputError, match=r"flights of several sites \(a, b\): take those of one"):
+        studio.order_training("hall", ("b1", "a1", "a2"))
+    assert studio.training_of("hall") is None
+    studio.order_training("hall", ("a1", "a2"))
+    assert studio.training_of("hall") is not None
 
 
 async def photographs_are_taken_in(station: Station) -> None:

@@ -70,9 +70,7 @@ class DroneMaintainer:
             if self.flight is not None and stands_idle(self.flight):
                 return
 
-    async def _changed(
-        self, request: ProposeSettings | TakeSettingsBack | InstallProfile, peer: Peer
-    ) -> str:
+    async def _changed(self, request: ProposeSettings | TakeSettingsBack | InstallProfile, peer: Peer) -> str:
         """What was changed of the settings, in words."""
         match request:
             case ProposeSettings():
