@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.config.camera import CameraConfig
-from flightd.config.front_camera import FrontCameraConfig
 from flightd.core.errors import InputError
-from flightd.core.geometry import Lens
 from flightd.core.preview import CameraName
 from flightd.studies.calibrate import lens_keys
 from flightd.studies.frame_files import read_image
@@ -22,10 +19,7 @@ from flightd.vision.lens_calibration import FEWEST_PICTURES, Board, calibrate, f
 COVERAGE = (8, 6)
 """The picture in cells across and down: each should have seen a corner of the board."""
 _MOST_PICTURES = 60
-_SECTIONS = {
-    CameraName.DOWN: ("camera", CameraConfig.model_fields),
-    CameraName.FRONT: ("front_camera", FrontCameraConfig.model_fields),
-}
+_SECTIONS = {CameraName.DOWN: "camera", CameraName.FRONT: "front_camera"}
 
 
 class ShownBoard(msgspec.Struct, frozen=True):
@@ -81,19 +75,14 @@ def study_boards(folder: Path, files: Sequence[str], board: Board) -> BoardStudy
         ShownBoard(one.file, one.corners, round(error, 3))
         for one, error in zip(boards, found.view_errors_px, strict=True)
     ]
+    keys = "\n".join(f"{key} = {json.dumps(value)}" for key, value in lens_keys(found.lens).items())
     return msgspec.structs.replace(
         plain,
         boards=fitted,
         error_px=round(found.error_px, 3),
         sigma_focal_px=round(found.sigma_focal_px, 2),
-        config={camera: _keys(found.lens, *section) for camera, section in _SECTIONS.items()},
+        config={camera: f"[{section}]\n{keys}" for camera, section in _SECTIONS.items()},
     )
-
-
-def _keys(lens: Lens, section: str, known: Collection[str]) -> str:
-    """As far as the section has them."""
-    keys = [f"{key} = {json.dumps(value)}" for key, value in lens_keys(lens).items() if key in known]
-    return "\n".join([f"[{section}]", *keys])
 
 
 def _coverage(views: Sequence[NDArray[np.float32]], width: int, height: int) -> list[list[int]]:

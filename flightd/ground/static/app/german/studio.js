@@ -91,7 +91,6 @@ export default {
   "By a chessboard": "Mit einem Schachbrett",
   "By a flight": "Mit einem Flug",
   "A flight tells of the down camera alone: of its delay, mount and lens.": "Ein Flug sagt nur etwas über die Bodenkamera: über ihre Verzögerung, ihren Einbau und ihr Objektiv.",
-  "The front camera's section takes its size and focal lengths alone.": "Der Abschnitt der Frontkamera nimmt nur ihre Größe und ihre Brennweiten.",
   "Look what it found": "Nachsehen, was er fand",
   "All of the flight is fitted at once: up to some minutes.": "Der ganze Flug wird auf einmal angepasst: bis zu einigen Minuten.",
   "By {n} frame of the flight:|By {n} frames of the flight:": "Mit {n} Bild des Fluges:|Mit {n} Bildern des Fluges:",

@@ -63,7 +63,6 @@ function Study({ study, camera }) {
         ${study.boards.map((one) => html`<li key=${one.file}><button class="tab" onClick=${() => choosePicture(one.file)}>${`${numberOf(one.file)}: ${decimal(one.error_px, 2)} px`}</button></li>`)}
       </ul>
       <p class="quiet">${say("For the drone's configuration:")}</p><pre tabindex="0">${study.config[camera]}</pre>
-      ${camera === "front" && html`<p class="quiet">${say("The front camera's section takes its size and focal lengths alone.")}</p>`}
     `}
   `;
 }
