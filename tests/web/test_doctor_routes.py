@@ -71,7 +71,7 @@ async def test_everybody_looks_and_an_admin_changes_under_his_own_name(tmp_path:
     ):
         await until(lambda: link.requests > 2)
         bears = {role: {"Authorization": f"Bearer {keys[role]}", **JSON} for role in Role}
-        bodies = {
+        bodies: dict[str, dict[str, object]] = {
             "settings": {"base": "now", "changes": {"mission.height_m": 1.5}, "person": "ann"},
             "take-back": {"base": "now", "version": 1, "person": "ann"},
             "profile": {"base": "now", "profile": "hall", "file_hash": file_hash, "person": "ann"},

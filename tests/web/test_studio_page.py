@@ -112,7 +112,7 @@ def score_on(page: Page) -> None:
     expect(page.get_by_text("Also scored on 1 flight log of one site.")).to_be_visible()
     page.get_by_text("Flights to score on").click()
     assert page.get_by_label("Site").input_value()
-    flown = page.get_by_role("checkbox", name=re.compile("flown/flight.mcap"))
+    flown = page.get_by_role("checkbox", name=re.compile("flight.mcap"))
     flown.uncheck()
     expect(page.get_by_text("Scored on no flight log: none is chosen.")).to_be_visible()
     flown.check()
