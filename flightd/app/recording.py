@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
 from dataclasses import dataclass
 
 from flightd.adapters.foxglove.cameras import calibration, cameras_on_drone
@@ -18,19 +16,19 @@ from flightd.adapters.foxglove.warehouse import warehouse_scene
 from flightd.adapters.ground_link.camera_optics import camera_optics
 from flightd.adapters.ground_link.floor_status import floor_status
 from flightd.app.flight_orders import configured_order
-from flightd.config.schema import Config, recorded_config
-from flightd.core.errors import InputError
+from flightd.config.schema import Config
 from flightd.core.flight_order import FlightOrder
 from flightd.core.learnt import LearntSensors
 from flightd.core.preview import CameraName
 from flightd.core.topics import Document, Topic
 from flightd.ports import Recorder
+from flightd.replay.flown_by import FLOWN_BY, flown_config, flown_site
 from flightd.replay.log import FlightLog
 from flightd.site.site import Site
-from flightd.site.site_file import parse_site, site_toml
+from flightd.site.site_file import site_toml
 
 _CALIBRATIONS = {CameraName.DOWN: Topic.DOWN_CALIBRATION, CameraName.FRONT: Topic.FRONT_CALIBRATION}
-SETTING_TOPICS = frozenset({Topic.CONFIG, Topic.MAP, Topic.ORDER, Topic.LEARNT})
+SETTING_TOPICS = FLOWN_BY | {Topic.ORDER, Topic.LEARNT}
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,20 +67,7 @@ def recorded_setting(log: FlightLog) -> FlightSetting:
     """What a recorded flight was flown by; the log holds SETTING_TOPICS.  A log without an order is of a
     time when the configuration was recorded with the order laid over it.  InputError for a log without
     configuration or map."""
-    text = _document(log, Topic.CONFIG)
-    try:
-        table = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
-    except ValueError as err:
-        raise InputError(f"{log.path}: its configuration cannot be read ({err})") from None
-    config = recorded_config(table, log.path)
-    site = parse_site(_document(log, Topic.MAP), f"{log.path} (map)")
+    config, site = flown_config(log), flown_site(log)
     orders, learnt = log.messages(FlightOrder), log.messages(LearntSensors)
     order = orders[-1] if orders else configured_order(config)
     return FlightSetting(config, site, order, learnt[-1] if learnt else None)
-
-
-def _document(log: FlightLog, topic: str) -> str:
-    documents = log.messages(Document, topic)
-    if not documents:
-        raise InputError(f"{log.path}: holds no {topic.strip('/')}, so it cannot be replayed")
-    return documents[-1].text

@@ -62,27 +62,18 @@ def calibrate(
 
 def _by_flight(path: Path, *, as_json: bool) -> None:
     """The sensors of the drone that flew it, and what to configure."""
-    from flightd.app.recording import SETTING_TOPICS, recorded_setting
-    from flightd.replay.log import read_log
-    from flightd.studies.flight_fit.record import READ, flight_record
-    from flightd.studies.sensor_fit import fit_sensors
-    from flightd.studies.sensor_fit_document import keys_to_set, sensor_rows, sensors_document
+    from flightd.studies.flight_calibration import calibrate_by_flight
 
-    log = read_log(path, {*READ, *SETTING_TOPICS})
-    setting, record = recorded_setting(log), flight_record(log)
-    camera = setting.config.camera
-    found = fit_sensors(record, setting.config, setting.site)
-    rows = sensor_rows(found, camera, record.sensors)
+    fitted = calibrate_by_flight(path)
     if as_json:
-        print(json.dumps({"log": str(path), **sensors_document(found, rows, camera)}, indent=2))
+        print(json.dumps({"log": str(path), **fitted.document()}, indent=2))
         return
-    _print(rows, found.frames)
-    keys = keys_to_set(rows, camera)
-    if not keys:
+    _print(fitted.rows, fitted.found.frames)
+    if not fitted.keys:
         print("# nothing differs surely from what is configured")
         return
     print("[camera]")
-    for key, value in keys.items():
+    for key, value in fitted.keys.items():
         print(f"{key} = {value}")
 
 

@@ -86,7 +86,7 @@ def application(
         *site_page(folder, maps, simulated),
         *flight_routes(flights),
         *studio_routes(studio),
-        *doctor_routes(hub.drones, access),
+        *doctor_routes(hub.drones, access, None if studio is None else studio.shelf),
         *mission_routes(folder, hub.drones, hub.for_each, others),
         *guide_routes(),
         *session_routes(access),

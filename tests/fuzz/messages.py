@@ -78,6 +78,8 @@ def target(folder: Path) -> Target:
         head + b'"take_back", "base": "0123456789abcdef", "version_kept": 3}',
         head + b'"propose", "base": "0123456789abcdef", "changes": {"mission.height_m": 1.5, '
         b'"mission.nodes": ["A1"], "scan.pictures": null, "control.yaw.kp": 2, "vehicle.name": "seven"}}',
+        head + b'"install_profile", "base": "0123456789abcdef", "name": "hall", "content": "UEsDBA==", '
+        b'"file_hash": "00", "person": "ann"}',
         head + b'"plan"}',
         head + b'"plan_flight", "nodes": ["A2", "A1"], "levels": [1], "best_order": true}',
         head + b'"plan_flight", "nodes": ["A2"], "dry": true}',

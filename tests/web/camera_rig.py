@@ -20,6 +20,7 @@ from flightd.adapters.ground_link.messages.maintenance import (
     AskDoctor,
     CheckReport,
     DoctorAnswer,
+    InstallProfile,
     Maintenance,
     ProposeSettings,
     Restart,
@@ -27,6 +28,7 @@ from flightd.adapters.ground_link.messages.maintenance import (
 )
 from flightd.adapters.ground_link.peer import Peer
 from flightd.adapters.ground_link.protocol import Answer
+from flightd.adapters.store.sent_profiles import sent_name
 from flightd.app.maintenance.checks import exposure_reports
 from flightd.app.maintenance.settings import key_reports, section_texts
 from flightd.config.remote_change import checked, proposed
@@ -90,6 +92,9 @@ class CameraDrone:
             case ProposeSettings():
                 checked(self.table, request.changes, FILE)
                 self.table = proposed(self.table, request.changes)
+            case InstallProfile():
+                file = sent_name(request.name, request.content)
+                self.table = proposed(self.table, {"vision.profile": file})
             case Restart():
                 self.ran = self.table
                 return Accepted(request=request.id)

@@ -19,6 +19,7 @@ from flightd.core.errors import RunError, UnavailableError
 from flightd.core.types import Phase
 from flightd.ground.access.roles import Role
 from flightd.ground.doctor.known_settings import KnownSettings
+from flightd.ground.studio.profile_shelf import ProfileShelf
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.ground_link import address_of, local, serving, telling
 from tests.rigs.waiting import until
@@ -62,16 +63,19 @@ class NotingDrone:
 @in_real_time
 async def test_everybody_looks_and_an_admin_changes_under_his_own_name(tmp_path: Path) -> None:
     keys, drone = with_people(tmp_path), NotingDrone()
+    shelved = ProfileShelf(tmp_path).install("hall", b"a profile", "ann", "yellow", ("", "alone"))
+    file_hash = shelved.versions[0].file_hash
     async with (
         serving(local(), maintainer=drone) as link,
-        served(("demo", address_of(link)), state=tmp_path, login=True) as station,
+        served(("demo", address_of(link)), folder=tmp_path, state=tmp_path, login=True) as station,
         telling(link, Phase.PREFLIGHT),
     ):
         await until(lambda: link.requests > 2)
         bears = {role: {"Authorization": f"Bearer {keys[role]}", **JSON} for role in Role}
-        bodies = {
+        bodies: dict[str, dict[str, object]] = {
             "settings": {"base": "now", "changes": {"mission.height_m": 1.5}, "person": "ann"},
             "take-back": {"base": "now", "version": 1, "person": "ann"},
+            "profile": {"base": "now", "profile": "hall", "file_hash": file_hash, "person": "ann"},
         }
         for role in Role:
             status, text = await station.ask("GET", "/api/doctor/demo/settings", bears[role])
@@ -81,18 +85,27 @@ async def test_everybody_looks_and_an_admin_changes_under_his_own_name(tmp_path:
             typed = json.dumps({"base": "now", "changes": {"mission.height_m": 50}}).encode()
             status, text = await station.ask("POST", "/api/doctor/demo/check", bears[role], typed)
             assert (status, "outside" in json.loads(text)["complaint"]) == (200, True)
-            for path in ("fix", "settings", "take-back", "restart"):
+            for path in ("fix", "settings", "take-back", "profile", "restart"):
                 if role is Role.ADMIN and path not in bodies:
                     continue
                 body = json.dumps(bodies.get(path, {})).encode()
                 status, _ = await station.ask("POST", f"/api/doctor/demo/{path}", bears[role], body)
                 assert (status == 403) == (role is not Role.ADMIN), (role, path)
+        for wrong, code, words in (
+            ({"file_hash": "00"}, 409, "another version was installed meanwhile"),
+            ({"profile": "attic"}, 400, "no profile attic is installed"),
+            ({"profile": "../hall"}, 400, "not a profile to be sent"),
+        ):
+            body = json.dumps({**bodies["profile"], **wrong}).encode()
+            status, text = await station.ask("POST", "/api/doctor/demo/profile", bears[Role.ADMIN], body)
+            assert (status, words in json.loads(text)["refused"]) == (code, True), text
         own = {"Cookie": await sign_in(station, "ada"), "Origin": station.origin, **JSON}
         body = json.dumps(bodies["settings"]).encode()
         assert (await station.ask("POST", "/api/doctor/demo/settings", own, body))[0] == 200
     assert drone.changed == [
         ("ProposeSettings", "program-admin"),
         ("TakeSettingsBack", "program-admin"),
+        ("InstallProfile", "program-admin"),
         ("ProposeSettings", "ada"),
     ]
     lines = [line for line in audited(tmp_path) if line["target"].startswith("/api/doctor")]

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from pathlib import Path
+from typing import Any
 
 import cv2
 import msgspec
 import numpy as np
 import pytest
 
+from flightd.core.errors import InputError, RunError
 from flightd.ground.access.roles import Role
+from flightd.ground.flights.flights import Flights
 from flightd.ground.studio import studio as studio_module
 from flightd.ground.studio.lessons import Outcome
 from flightd.ground.studio.picture_sets import PictureSets
+from flightd.ground.studio.studio import Studio
 from flightd.ground.studio.verdict import Judged, Verdict
 from flightd.studies.train import train_colour
 from flightd.vision.lines.colour_profile import classify, grow, load_profile, save_profile
@@ -66,6 +71,11 @@ async def test_a_colour_is_learnt_scored_installed_and_taken_back(folder: Path, 
         assert outcome["verdict"]["judged"] in {"same", "better"}
 
         seen = outcome["training_hash"]
+        code, text = await station.ask("GET", f"/api/studio/flights/{flight}/sensors", within_s=90.0)
+        assert (code, "mission: is missing" in json.loads(text)["refused"]) == (404, True), text
+        code, text = await station.ask("GET", "/api/studio/flights/nothing/sensors")
+        assert (code, json.loads(text)["refused"]) == (404, "there is no such flight")
+
         code, said = await post(station, f"{at}/install", {"training_hash": "another", "who": "Ann"})
         assert (code, "trained anew" in said["refused"]) == (409, True)
         code, shelved = await post(station, f"{at}/install", {"training_hash": seen, "who": "Ann"})
@@ -147,6 +157,91 @@ async def test_an_operator_learns_and_an_admin_installs_under_his_own_name(tmp_p
     assert ("program-operator", "accepted", "made the set new; HTTP 200") in lines
     assert ("program-admin", "accepted", "version 1 installed, alone; HTTP 200") in lines
     assert ("program-admin", "accepted", "version 1 taken back; HTTP 200") in lines
+
+
+class Hasty(Studio):
+    """What was trained is replaced by the shipped white: `at_once`, when its score was read, or once the file
+    was read, too."""
+
+    def __init__(self, folder: Path, *, at_once: bool) -> None:
+        super().__init__(folder, Flights(None))
+        self.at_once = at_once
+
+    async def outcome_of(self, name: str) -> Outcome | None:
+        outcome = await super().outcome_of(name)
+        trained = self.sets.folder_of(name) / "trained.npz"
+        if self.at_once:
+            save_profile(load_profile("white"), trained)
+        else:
+            reads = self.disk.run
+
+            async def replaced(function: Any, *args: Any) -> Any:
+                got = await reads(function, *args)
+                save_profile(load_profile("white"), trained)
+                return got
+
+            setattr(self.disk, "run", replaced)  # noqa: B010 - a method, for once
+        return outcome
+
+
+@in_real_time
+async def test_no_profile_is_installed_under_the_score_of_another(tmp_path: Path) -> None:
+    yellow = load_profile("yellow").training_hash
+    for at_once in (True, False):
+        name, flies = f"hall-{at_once}".lower(), tmp_path / "profiles" / f"hall-{at_once}.npz".lower()
+        with_outcome(tmp_path, name)
+        studio = Hasty(tmp_path, at_once=at_once)
+        running = asyncio.ensure_future(studio.run())
+        try:
+            if at_once:
+                with pytest.raises(RunError, match="trained anew meanwhile"):
+                    await studio.install(name, yellow, "Ann", again=False)
+                assert not flies.exists()
+                (tmp_path / "studio" / name / "trained.npz").write_bytes(b"PK spoilt")
+                studio.at_once = False
+                with pytest.raises(InputError, match=r"trained\.npz: not a colour profile"):
+                    await studio.install(name, yellow, "Ann", again=False)
+            else:
+                await studio.install(name, yellow, "Ann", again=False)
+                assert load_profile(flies).training_hash == yellow
+        finally:
+            running.cancel()
+            await asyncio.wait([running])
+
+
+@in_real_time
+async def test_spoilt_versions_of_one_profile_leave_the_others_alone(tmp_path: Path) -> None:
+    install = {"training_hash": load_profile("yellow").training_hash, "who": "Ann"}
+    async with served(folder=tmp_path) as station:
+        for name in ("good", "spoilt"):
+            with_outcome(tmp_path, name)
+            assert (await post(station, f"/api/studio/sets/{name}/install", install))[0] == 200
+        (tmp_path / "profiles" / "spoilt" / "versions.json").write_bytes(b'[{"number": 1')
+        profiles = (await got(station, "/api/studio"))["profiles"]
+        assert [(one["name"], one["current"], bool(one["trouble"])) for one in profiles] == [
+            ("good", 1, False),
+            ("spoilt", None, True),
+        ]
+        assert profiles[1]["trouble"].startswith("profiles/spoilt/versions.json: ")
+        assert (await got(station, "/api/studio/sets/spoilt"))["profile"] == profiles[1]
+        assert (await post(station, "/api/studio/sets/good/install", install))[1]["current"] == 1
+        for path, said in (("sets/spoilt/install", install), ("profiles/spoilt/back", {"version": 1})):
+            code, answer = await post(station, f"/api/studio/{path}", said)
+            assert (code, answer["refused"]) == (400, profiles[1]["trouble"])
+
+
+class TwoSites(Flights):
+    def site_of(self, log_id: str) -> str:
+        return log_id[:1]
+
+
+def test_flights_of_one_site_are_scored_on(tmp_path: Path) -> None:
+    studio = Studio(tmp_path, TwoSites(None))
+    with pytest.raises(InputError, match=r"flights of several sites \(a, b\): take those of one"):
+        studio.order_training("hall", ("b1", "a1", "a2"))
+    assert studio.training_of("hall") is None
+    studio.order_training("hall", ("a1", "a2"))
+    assert studio.training_of("hall") is not None
 
 
 async def photographs_are_taken_in(station: Station) -> None:

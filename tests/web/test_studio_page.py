@@ -107,6 +107,49 @@ def mistake_the_buttons(page: Page, seen: dict[str, list[dict[str, Any]]]) -> No
     page.reload()
 
 
+def score_on(page: Page) -> None:
+    """The one flight of the site, and none."""
+    expect(page.get_by_text("Also scored on 1 flight log of one site.")).to_be_visible()
+    page.get_by_text("Flights to score on").click()
+    assert page.get_by_label("Site").input_value()
+    flown = page.get_by_role("checkbox", name=re.compile("flight.mcap"))
+    flown.uncheck()
+    expect(page.get_by_text("Scored on no flight log: none is chosen.")).to_be_visible()
+    flown.check()
+    expect(page.get_by_text("Also scored on 1 flight log of one site.")).to_be_visible()
+
+
+def fit_a_flight(page: Page) -> None:
+    """What the made-up flight is refused, then what a flight that tells enough is shown as."""
+    lens = page.get_by_role("region", name="Lens")
+    look = lens.get_by_role("button", name="Look what it found")
+    look.click()
+    expect(page.get_by_role("alert").filter(has_text="mission: is missing")).to_be_visible()
+    delay = {
+        "name": "camera delay",
+        "unit": "s",
+        "key": "camera.latency_s",
+        "configured": 0.06,
+        "change": True,
+    }
+    delay |= {"fitted": 0.05269, "sigma": 0.00411, "online": 0.05323, "online_sigma": 0.004, "note": ""}
+    leak = {"name": "attitude leak", "unit": "1/s", "key": "", "configured": 0.0, "change": False}
+    leak |= {"fitted": None, "sigma": None, "online": None, "online_sigma": None}
+    leak["note"] = "not told by this flight"
+    study = {"frames": 584, "sensors": [delay, leak], "config": "[camera]\nlatency_s = 0.0527"}
+    page.route("**/api/studio/flights/*/sensors", lambda route: route.fulfill(json=study))
+    look.click()
+    row = lens.get_by_role("row", name=re.compile("Camera delay, s camera.latency_s"))
+    expect(row.get_by_role("cell")).to_have_text(["0.06", "0.05323 ± 0.004", "0.05269 ± 0.0041"])
+    expect(lens.get_by_role("row", name=re.compile("Not told by this flight"))).to_be_visible()
+    expect(lens.get_by_text("latency_s = 0.0527")).to_be_visible()
+    lens.get_by_role("button", name="Front camera").click()
+    expect(lens.get_by_text("A flight tells of the down camera alone")).to_be_visible()
+    lens.get_by_role("button", name="Down camera").click()
+    look.click()
+    expect(row).to_be_visible()
+
+
 def serves_everybody(page: Page) -> None:
     """Wide and narrow, light and dark: nothing hinders, nothing overflows."""
     for size, scheme in LOOKS:
@@ -156,6 +199,7 @@ def test_a_colour_is_learnt_compared_installed_and_taken_back(
         expect(page.get_by_text(taught)).to_be_visible()
         expect(page.get_by_text("Saving …")).to_have_count(0)
 
+        score_on(page)
         mistake_the_buttons(page, seen)
         page.get_by_role("button", name="Learn from the marks").click()
         expect(page.get_by_text("Worse than what flies now", exact=True)).to_be_visible(timeout=300_000)
@@ -178,8 +222,20 @@ def test_a_colour_is_learnt_compared_installed_and_taken_back(
         expect(versions.filter(has_text="Version 1")).to_contain_text("installed")
         assert load_profile(flies).training_hash == first
 
+        page.get_by_role("button", name="eye", exact=True).click()
+        card = page.get_by_role("region", name="Profile hall")
+        card.get_by_role("button", name="To the drone eye").click()
+        expect(card.get_by_text("eye is set to the shipped profile of its floor's paint.")).to_be_visible()
+        card.get_by_role("button", name="Send version 1 to eye").click()
+        expect(card.get_by_text("eye is set to version 1.")).to_be_visible()
+        expect(card.get_by_text(re.compile("The drone has it"))).to_be_visible()
+        expect(card.get_by_role("button", name="Send version")).to_have_count(0)
+        card.get_by_role("button", name="Start flightd anew").click()
+        expect(card.get_by_text("flightd starts anew")).to_be_visible()
+
         page.get_by_role("button", name="Look for the board").click()
         expect(page.get_by_text("The board is seen in 0 of 8 pictures")).to_be_visible()
+        fit_a_flight(page)
         serves_everybody(page)
         page.get_by_role("link", name="Studio", exact=True).first.click()
         expect(page.get_by_role("link", name="hall")).to_be_visible()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import socket
 import uuid
 from collections.abc import AsyncIterator, Mapping, Sequence
@@ -28,10 +29,12 @@ from flightd.adapters.ground_link.messages.answers import (
 )
 from flightd.adapters.ground_link.messages.base import VERSION
 from flightd.adapters.ground_link.messages.maintenance import (
+    MOST_PROFILE_BYTES,
     AskDoctor,
     AskSettings,
     DoctorAnswer,
     FixParameter,
+    InstallProfile,
     ProposeSettings,
     Restart,
     SettingsAnswer,
@@ -258,6 +261,24 @@ class GroundClient:
         """Have a kept version of the settings brought back."""
         request = TakeSettingsBack(
             version=VERSION, id=_new_id(), base=base, version_kept=version, person=person
+        )
+        return await self._ask(request, SettingsAnswer, PROPOSAL_S)
+
+    async def install_profile(self, base: str, name: str, content: bytes, person: str = "") -> SettingsAnswer:
+        """Have a colour profile laid beside the settings that `base` names, and named in them; InputError
+        where it is none."""
+        if len(content) > MOST_PROFILE_BYTES:
+            raise InputError(
+                f"profile {name} has {len(content)} bytes; {MOST_PROFILE_BYTES} at most are sent"
+            )
+        request = InstallProfile(
+            version=VERSION,
+            id=_new_id(),
+            base=base,
+            name=name,
+            content=content,
+            file_hash=hashlib.sha256(content).hexdigest(),
+            person=person,
         )
         return await self._ask(request, SettingsAnswer, PROPOSAL_S)
 

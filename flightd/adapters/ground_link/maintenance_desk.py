@@ -134,7 +134,7 @@ def _details(request: Maintenance) -> str:
     """What was asked for, in short, and by whom."""
     fields = msgspec.structs.asdict(request)
     person = str(fields.pop("person", ""))
-    for plain in ("version", "id", "base"):
+    for plain in ("version", "id", "base", "content"):
         fields.pop(plain, None)
     said = request.changes if isinstance(request, ProposeSettings) else fields
     text = msgspec.json.encode(said).decode()[:_DETAILS_SHOWN]

@@ -43,6 +43,7 @@ from flightd.adapters.ground_link.messages.maintenance import (
     DoctorAnswer,
     ExposureReport,
     FixParameter,
+    InstallProfile,
     KeptVersion,
     KeyChange,
     KeyReport,
@@ -120,7 +121,7 @@ DECODE_ERRORS = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 PUBLISHED = (StatusReport, EventReport)
 REQUESTS = (
     Hello, Order, PlanFlight, AskPlan, AskStatus, AskPicture, AskInventory, Attend, AskDoctor, FixParameter,
-    AskSettings, ProposeSettings, TakeSettingsBack, Restart,
+    AskSettings, ProposeSettings, TakeSettingsBack, InstallProfile, Restart,
 )  # fmt: skip
 ANSWERS = (
     Welcome, Accepted, Planned, PlanAnswer, Refused, StatusAnswer, PictureAnswer, InventoryAnswer,

@@ -9,6 +9,7 @@ from flightd.adapters.ground_link.messages.maintenance import (
     AskDoctor,
     AskSettings,
     FixParameter,
+    InstallProfile,
     Maintenance,
     ProposeSettings,
     Restart,
@@ -53,12 +54,8 @@ class DroneMaintainer:
                 return await self._checks.report(request.id, flight, outcome)
             case AskSettings():
                 return await self._settings.answer(request.id)
-            case ProposeSettings():
-                done = await self._settings.propose(request, peer.name)
-                self._tell(flight, f"{done} {_by(request.person, peer)}")
-                return await self._settings.answer(request.id)
-            case TakeSettingsBack():
-                done = await self._settings.take_back(request, peer.name)
+            case ProposeSettings() | TakeSettingsBack() | InstallProfile():
+                done = await self._changed(request, peer)
                 self._tell(flight, f"{done} {_by(request.person, peer)}")
                 return await self._settings.answer(request.id)
             case Restart():
@@ -72,6 +69,16 @@ class DroneMaintainer:
             self._restart.clear()
             if self.flight is not None and stands_idle(self.flight):
                 return
+
+    async def _changed(self, request: ProposeSettings | TakeSettingsBack | InstallProfile, peer: Peer) -> str:
+        """What was changed of the settings, in words."""
+        match request:
+            case ProposeSettings():
+                return await self._settings.propose(request, peer.name)
+            case TakeSettingsBack():
+                return await self._settings.take_back(request, peer.name)
+            case InstallProfile():
+                return await self._settings.install_profile(request, peer.name)
 
     def _asked_to_restart(self, request: Restart, peer: Peer, flight: Flight) -> Accepted:
         if not self._restarts:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
 import json
 import os
 import sys
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from flightd.adapters.ground_link.messages.maintenance import (
+    InstallProfile,
     KeptVersion,
     KeyChange,
     KeyReport,
@@ -26,11 +28,13 @@ from flightd.adapters.ground_link.messages.maintenance import (
     SettingsAnswer,
     TakeSettingsBack,
 )
+from flightd.adapters.store.sent_profiles import SentProfiles, sent_name
 from flightd.adapters.store.settings_file import Change, SettingsFile, Version, tag_of
 from flightd.config.edited_text import edited
 from flightd.config.reference import rows, tables
 from flightd.config.remote_change import Value, checked, differences, fixed_because, value_in
 from flightd.core.errors import InputError, RunError, UnavailableError
+from flightd.vision.lines.colour_profile import read_profile
 
 _CHECK_S = 60.0
 _GENTLY = 10
@@ -48,6 +52,7 @@ class DroneSettings:
     ) -> None:
         self._unfit = unfit
         self._file = file
+        self._profiles = SentProfiles(file.path.parent)
         self._running_tag = tag_of(running)
         self._restarts = restarts
 
@@ -73,6 +78,25 @@ class DroneSettings:
         if not changes:
             raise InputError(f"version {request.version_kept} says the same as what stands there")
         return await self._bring(before, text, changes, client, request.person)
+
+    async def install_profile(self, request: InstallProfile, client: str) -> str:
+        """Lay a colour profile beside the file and have it named there; what was changed, in words.
+        InputError where it is none, or was spoilt on its way."""
+        before = await self._as_seen(request.base)
+        if hashlib.sha256(request.content).hexdigest() != request.file_hash:
+            raise InputError("the profile is not the one of its hash", remedy="send it again")
+        await asyncio.to_thread(read_profile, request.content, request.name)
+        file, key = sent_name(request.name, request.content), "vision.profile"
+        is_new = await asyncio.to_thread(self._profiles.keep, file, request.content)
+        if value_in(tomllib.loads(before), key) == file:
+            return f"{key} is {file} already"
+        changes: dict[str, Value] = {key: file}
+        try:
+            return await self._bring(before, edited(before, changes), changes, client, request.person)
+        except InputError:  # nothing names it
+            if is_new:
+                await asyncio.to_thread(self._profiles.withdraw, file)
+            raise
 
     async def _as_seen(self, base: str) -> str:
         """The file's text, if it is what the person saw.  RunError where it is not, or nothing can change."""

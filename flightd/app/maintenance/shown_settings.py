@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from flightd.adapters.ground_link.messages.maintenance import (
+    InstallProfile,
     ProposeSettings,
     SettingsAnswer,
     TakeSettingsBack,
@@ -38,4 +39,7 @@ class ShownSettings:
         raise UnavailableError(_WHY)
 
     async def take_back(self, request: TakeSettingsBack, client: str) -> str:  # noqa: ARG002
+        raise UnavailableError(_WHY)
+
+    async def install_profile(self, request: InstallProfile, client: str) -> str:  # noqa: ARG002
         raise UnavailableError(_WHY)

@@ -91,6 +91,7 @@ RULES: Mapping[str, Rule] = {
     "GET /api/studio/sets/{set}/pictures/{file}": _LOOKS,
     "GET /api/studio/sets/{set}/pictures/{file}/mask": _LOOKS,
     "GET /api/studio/sets/{set}/boards": _LOOKS,
+    "GET /api/studio/flights/{flight}/sensors": _LOOKS,
     "GET /api/studio/profiles/{set}/file": _LOOKS,
     "POST /api/studio/sets": _ACTS,  # pictures and what is learnt of them fly nothing
     "POST /api/studio/sets/{set}/pictures": _ACTS,
@@ -117,6 +118,7 @@ RULES: Mapping[str, Rule] = {
     "POST /api/doctor/{drone}/fix": _CHANGES,
     "POST /api/doctor/{drone}/settings": _CHANGES,
     "POST /api/doctor/{drone}/take-back": _CHANGES,
+    "POST /api/doctor/{drone}/profile": _CHANGES,
     "POST /api/doctor/{drone}/restart": _CHANGES,
     "GET /api/guide": _LOOKS,
     "GET /api/guide/search": _LOOKS,

@@ -18,7 +18,7 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from flightd.adapters.ground_link.messages.maintenance import SettingsAnswer, Value
-from flightd.core.errors import FlightdError
+from flightd.core.errors import FlightdError, InputError
 from flightd.ground.access.access import Access
 from flightd.ground.access.gate import identity_of, note_act, person_of
 from flightd.ground.access.roles import Role
@@ -27,6 +27,7 @@ from flightd.ground.doctor.versions import station_versions
 from flightd.ground.drone_link import DroneLink
 from flightd.ground.json_http import as_json, refusal, said, status_of
 from flightd.ground.pages import page
+from flightd.ground.studio.profile_shelf import ProfileShelf
 
 _Person = Annotated[str, Meta(max_length=64)]
 _Tag = Annotated[str, Meta(max_length=64)]
@@ -66,6 +67,15 @@ class TakeBack(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     person: _Person = ""
 
 
+class SendProfile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Send an installed colour profile to the drone: that of `file_hash`."""
+
+    base: _Tag
+    profile: Annotated[str, Meta(max_length=40, pattern=r"^[a-z0-9][a-z0-9-]*\Z")]
+    file_hash: Annotated[str, Meta(max_length=64)]
+    person: _Person = ""
+
+
 class StartAnew(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Start the daemon anew."""
 
@@ -73,10 +83,11 @@ class StartAnew(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class DoctorAnswers:
-    """What the page is answered, drone by drone."""
+    """What the page is answered, drone by drone; profiles lie on the `shelf`, if there is one."""
 
-    def __init__(self) -> None:
+    def __init__(self, shelf: ProfileShelf | None) -> None:
         self._known = KnownSettings()
+        self._shelf = shelf
 
     async def report(self, drone: DroneLink, _request: Request) -> object:
         return await drone.ask(lambda client: client.doctor())
@@ -108,6 +119,18 @@ class DoctorAnswers:
         told = await drone.ask(lambda client: client.take_back(asked.base, asked.version, person))
         return self._noted(drone, told)
 
+    async def send_profile(self, drone: DroneLink, request: Request) -> object:
+        asked = await said(request, SendProfile, "a profile to be sent")
+        note_act(request, f"profile {asked.profile} {asked.file_hash[:12]}")
+        if self._shelf is None:
+            raise InputError("there is no folder with profiles", remedy="flightd ground --folder out")
+        content = await asyncio.to_thread(self._shelf.installed, asked.profile, asked.file_hash)
+        person = person_of(request, asked.person)
+        told = await drone.ask(
+            lambda client: client.install_profile(asked.base, asked.profile, content, person)
+        )
+        return self._noted(drone, told)
+
     async def restart(self, drone: DroneLink, request: Request) -> object:
         asked = await said(request, StartAnew, _SETTINGS)
         return await drone.ask(lambda client: client.restart(person_of(request, asked.person)))
@@ -117,9 +140,11 @@ class DoctorAnswers:
         return told
 
 
-def doctor_routes(drones: Mapping[str, DroneLink], access: Access) -> list[BaseRoute]:
-    """The page at /doctor and all that it asks for."""
-    answers = DoctorAnswers()
+def doctor_routes(
+    drones: Mapping[str, DroneLink], access: Access, shelf: ProfileShelf | None
+) -> list[BaseRoute]:
+    """The page at /doctor and all that it asks for; profiles that are sent lie on the `shelf`."""
+    answers = DoctorAnswers(shelf)
 
     def at(path: str, answer: _Answer, method: str) -> Route:
         async def guarded(request: Request) -> Response:
@@ -141,6 +166,7 @@ def doctor_routes(drones: Mapping[str, DroneLink], access: Access) -> list[BaseR
         at("check", answers.check, "POST"),
         at("settings", answers.propose, "POST"),
         at("take-back", answers.take_back, "POST"),
+        at("profile", answers.send_profile, "POST"),
         at("restart", answers.restart, "POST"),
         *page("/doctor"),
     ]

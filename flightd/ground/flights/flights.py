@@ -121,6 +121,11 @@ class Flights:
         log = await self._log(log_id)
         return log.root, log.relative
 
+    def site_of(self, log_id: str) -> str:
+        """The site of a flight in the list; "" where that is not known."""
+        row = self.index.row(log_id) if self.index is not None else None
+        return "" if row is None else row.site
+
     async def whereabouts(self, log_id: str, place: int) -> tuple[Path, str, PicturePlace]:
         """Where a picture of a flight lies: folder, log, place in the log."""
         log = await self._log(log_id)

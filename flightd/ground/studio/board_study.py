@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.errors import InputError
+from flightd.core.preview import CameraName
 from flightd.studies.calibrate import lens_keys
 from flightd.studies.frame_files import read_image
 from flightd.vision.lens_calibration import FEWEST_PICTURES, Board, calibrate, find_board
@@ -18,6 +19,7 @@ from flightd.vision.lens_calibration import FEWEST_PICTURES, Board, calibrate, f
 COVERAGE = (8, 6)
 """The picture in cells across and down: each should have seen a corner of the board."""
 _MOST_PICTURES = 60
+_SECTIONS = {CameraName.DOWN: "camera", CameraName.FRONT: "front_camera"}
 
 
 class ShownBoard(msgspec.Struct, frozen=True):
@@ -31,7 +33,7 @@ class ShownBoard(msgspec.Struct, frozen=True):
 
 class BoardStudy(msgspec.Struct, frozen=True):
     """`coverage` counts corners by cell, row by row; `refused` says why there is no lens, `config` is the
-    lens as a configuration has it."""
+    lens as a configuration has it, by camera ("down", "front")."""
 
     pictures: int
     needed: int
@@ -41,7 +43,7 @@ class BoardStudy(msgspec.Struct, frozen=True):
     coverage: list[list[int]]
     error_px: float | None = None
     sigma_focal_px: float | None = None
-    config: str = ""
+    config: dict[str, str] = {}
     refused: str = ""
 
 
@@ -79,7 +81,7 @@ def study_boards(folder: Path, files: Sequence[str], board: Board) -> BoardStudy
         boards=fitted,
         error_px=round(found.error_px, 3),
         sigma_focal_px=round(found.sigma_focal_px, 2),
-        config=f"[camera]\n{keys}",
+        config={camera: f"[{section}]\n{keys}" for camera, section in _SECTIONS.items()},
     )
 
 

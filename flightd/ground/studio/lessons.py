@@ -28,6 +28,7 @@ from flightd.vision.lines.colour_profile import (
     classify,
     grow,
     load_profile,
+    read_profile,
     save_profile,
 )
 from flightd.vision.lines.sampling import grid_for, sample
@@ -110,6 +111,11 @@ def from_upload(file: Path) -> TakenIn:
     return TakenIn(
         cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes(), width, height
     )
+
+
+def training_hash_of(content: bytes, source: str) -> str:
+    """What the profile in a file's content was trained on.  InputError where it is none."""
+    return read_profile(content, source).training_hash
 
 
 def mask_of(folder: Path, paint: str, labels: Sequence[LabelledImage], file: str, by: str) -> bytes:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-from flightd.core.errors import InputError, UnavailableError
+from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.ground.plain_files import is_plain_file, is_plain_folder, plain_file
 from flightd.runtime.durable_files import replace_file
 
@@ -37,12 +37,13 @@ class Version(msgspec.Struct, frozen=True):
 
 class Shelved(msgspec.Struct, frozen=True):
     """A profile's versions, oldest first; `current` is the number of the one to fly by, None where its file
-    is none of them."""
+    is none of them.  `trouble`: why its versions cannot be read, nothing can be installed or taken back."""
 
     name: str
     file: str
     current: int | None
     versions: tuple[Version, ...]
+    trouble: str = ""
 
 
 class ProfileShelf:
@@ -62,19 +63,34 @@ class ProfileShelf:
         return [self.of(name) for name in names]
 
     def of(self, name: str) -> Shelved:
-        """A profile's versions; none where it was never installed."""
+        """A profile's versions; none where it was never installed, or where they cannot be read."""
+        try:
+            return self._shelved(name)
+        except InputError as err:
+            return Shelved(name, str(self._file(name).resolve()), None, (), str(err))
+
+    def _shelved(self, name: str) -> Shelved:
         versions = self._versions(name)
         installed = plain_file(self._file(name), _MOST_PROFILE_BYTES)
         digest = None if installed is None else _hash(installed)
         current = next((one.number for one in reversed(versions) if one.file_hash == digest), None)
         return Shelved(name, str(self._file(name).resolve()), current, versions)
 
+    def installed(self, name: str, file_hash: str) -> bytes:
+        """The file to fly by.  InputError where there is none, RunError where it is another."""
+        content = plain_file(self._file(name), _MOST_PROFILE_BYTES)
+        if content is None:
+            raise InputError(f"no profile {name} is installed")
+        if _hash(content) != file_hash:
+            raise RunError("another version was installed meanwhile", remedy="look at it again")
+        return content
+
     def install(self, name: str, profile: bytes, who: str, paint: str, learnt: tuple[str, str]) -> Shelved:
         """A profile's file as the next version; `learnt` are its training hash and the verdict on it.
 
         What is installed already stays as it is."""
         with self._lock:
-            before = self.of(name)
+            before = self._shelved(name)
             versions = before.versions
             if any(one.number == before.current and one.file_hash == _hash(profile) for one in versions):
                 return before
@@ -111,7 +127,7 @@ class ProfileShelf:
         try:
             return tuple(msgspec.json.decode(text, type=list[Version]))
         except (msgspec.DecodeError, UnicodeDecodeError) as err:
-            raise InputError(f"{name}/{_BOOK}: {err}", remedy="put it aside") from None
+            raise InputError(f"{FOLDER}/{name}/{_BOOK}: {err}", remedy="put it aside") from None
 
     def _file(self, name: str) -> Path:
         return self._folder / f"{name}.npz"

@@ -111,6 +111,7 @@ def studio_routes(studio: Studio | None) -> list[BaseRoute]:
         at(picture, asked.take_out, "DELETE"),
         at(f"{picture}/mask", asked.mask, "GET"),
         at("/sets/{set}/boards", asked.boards, "GET"),
+        at("/flights/{flight}/sensors", asked.sensors, "GET"),
         at("/sets/{set}/train", asked.train, "POST"),
         at("/sets/{set}/install", asked.install, "POST"),
         at("/profiles/{set}/back", asked.take_back, "POST"),
@@ -220,6 +221,9 @@ class _Asked:
         if not all(re.fullmatch(r"[0-9]{1,2}", side) and 3 <= int(side) <= 40 for side in sides):
             raise InputError("a board has 3 to 40 inner corners a side")
         return as_json(await self._studio.boards(request.path_params["set"], Board(*map(int, sides))))
+
+    async def sensors(self, request: Request) -> Response:
+        return as_json(await self._studio.sensors(request.path_params["flight"]))
 
     async def install(self, request: Request) -> Response:
         asked = await said(request, Install, "what to install")

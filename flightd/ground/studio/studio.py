@@ -27,9 +27,11 @@ from flightd.ground.studio.lessons import (
     from_upload,
     mask_of,
     train_and_score,
+    training_hash_of,
 )
 from flightd.ground.studio.picture_sets import PictureSet, PictureSets
 from flightd.ground.studio.profile_shelf import ProfileShelf, Shelved
+from flightd.ground.studio.sensor_study import SensorStudy, study_sensors
 from flightd.ground.studio.verdict import Judged
 from flightd.runtime.durable_files import replace_file
 from flightd.vision.lens_calibration import Board
@@ -38,7 +40,7 @@ from flightd.vision.lines.colour_profile import SHIPPED
 TRAINED, OUTCOME = "trained.npz", "trained.json"
 INSTALLED = "installed"
 MOST_LOGS = 8
-_WITHIN_S, _TRAIN_S, _BOARDS_S = 60.0, 1800.0, 240.0
+_WITHIN_S, _TRAIN_S, _BOARDS_S, _SENSORS_S = 60.0, 1800.0, 240.0, 240.0
 _MOST_BYTES = 4 << 20
 
 
@@ -99,6 +101,9 @@ class Studio:
             raise missing_extra("train", "training a colour profile")
         if len(flights) > MOST_LOGS:
             raise InputError(f"at most {MOST_LOGS} flights are scored on")
+        sites = sorted({site for flight in flights if (site := self._flights.site_of(flight))})
+        if len(sites) > 1:
+            raise InputError(f"flights of several sites ({', '.join(sites)})", remedy="take those of one")
         if any(one.running for one in self._trainings.values()):
             raise UnavailableError("a profile is being trained already", remedy="wait until it is done")
         self._trainings[name] = Training(name, running=True)
@@ -134,22 +139,28 @@ class Studio:
         files = [label.file for label in known.labels]
         return await self._looking.run(study_boards, _BOARDS_S, self.sets.folder_of(name), files, board)
 
+    async def sensors(self, flight: str) -> SensorStudy:
+        """What a recorded flight says of the drone's sensors."""
+        return await self._looking.run(study_sensors, _SENSORS_S, *await self._flights.where(flight))
+
     async def install(self, name: str, training_hash: str, who: str, again: bool) -> Shelved:
-        """Install what was trained last.  RunError where it is another than the one of `training_hash`, and
-        where it is worse and not said `again`."""
+        """Install what was trained last.  RunError where it, or its score, is another than the one of
+        `training_hash`, and where it is worse and not said `again`."""
         known, outcome = await self.disk.run(self.sets.read, name), await self.outcome_of(name)
-        if outcome is None:
+        content = await self.disk.run(plain_file, self.sets.folder_of(name) / TRAINED, _MOST_BYTES)
+        if outcome is None or content is None:
             raise InputError("nothing was trained yet")
-        if outcome.training_hash != training_hash:
-            raise RunError("it was trained anew meanwhile", remedy="look at its score first")
+        # the file may lie there without its score: a training ends between the two, or was cut off there
+        trained = await self._looking.run(training_hash_of, _WITHIN_S, content, f"{name}/{TRAINED}")
+        if not trained == outcome.training_hash == training_hash:
+            raise RunError(
+                "it was trained anew meanwhile", remedy="look at its score first, or let it learn once more"
+            )
         if outcome.verdict.judged is Judged.WORSE and not again:
             raise RunError(
                 f"it is worse than what flies: {'; '.join(outcome.verdict.reasons)}",
                 remedy="say yes a second time to install it all the same",
             )
-        content = await self.disk.run(plain_file, self.sets.folder_of(name) / TRAINED, _MOST_BYTES)
-        if content is None:
-            raise InputError("nothing was trained yet")
         learnt = (training_hash, outcome.verdict.judged.value)
         return await self.disk.run(self.shelf.install, name, content, who, known.paint, learnt)
 
@@ -197,7 +208,7 @@ class Studio:
 
 
 def _keep_outcome(folder: Path, profile: Path, outcome: Outcome) -> None:
-    """First the profile, then what is said of it: what is installed is asked for by its training hash."""
+    """First the profile, then what is said of it; what is installed is read once and has the hash of both."""
     try:
         profile.replace(folder / TRAINED)
         replace_file(folder / OUTCOME, folder / f".{OUTCOME}.part", msgspec.json.encode(outcome))

@@ -14,15 +14,18 @@ its tint from grey only as much as cameras and lamps make it.
 
 from __future__ import annotations
 
+import io
 import json
 import math
+import tokenize
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import IO, TypeAlias
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile
 
 import cv2
 import numpy as np
@@ -38,6 +41,12 @@ NONE, WEAK, STRONG = 0, 1, 2
 SHIPPED = ("yellow", "white", "red", "blue", "green", "black", "orange")
 TABLE_SIZE = 65536
 FORMAT_VERSION = 1
+_MOST_UNPACKED_BYTES = 1 << 20
+_UNREADABLE = (
+    OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, SyntaxError, MemoryError,
+    BadZipFile, zlib.error, tokenize.TokenError,
+)  # fmt: skip
+"""All that a spoilt file makes of numpy's reader."""
 
 FLOOR_GREY = 112.0
 """Brightness to which the floor is brought; leaves a factor of two above it for white paint."""
@@ -102,6 +111,18 @@ def load_profile(name_or_path: str | Path) -> ColourProfile:
         return _read(stream, str(path))
 
 
+def read_profile(content: bytes, source: str) -> ColourProfile:
+    """A profile by its file's content; `source` says whose it is.  InputError where it is none."""
+    try:
+        with ZipFile(io.BytesIO(content)) as packed:
+            unpacked = sum(part.file_size for part in packed.infolist())
+    except _UNREADABLE as err:
+        raise InputError(f"profile {source}: not a colour profile ({err})") from err
+    if unpacked > _MOST_UNPACKED_BYTES:
+        raise InputError(f"profile {source}: not a colour profile (it unpacks to {unpacked} bytes)")
+    return _read(io.BytesIO(content), source)
+
+
 def save_profile(profile: ColourProfile, path: Path) -> None:
     """Write `profile` as a compressed .npz, the same bytes for the same profile."""
     about = {
@@ -135,7 +156,7 @@ def _read(stream: IO[bytes], source: str) -> ColourProfile:
         profile = ColourProfile(
             str(about["name"]), lut, str(about["colour"]), str(about["training_hash"]), float(about["score"])
         )
-    except (OSError, ValueError, KeyError, TypeError, BadZipFile, EOFError) as err:
+    except _UNREADABLE as err:
         raise InputError(f"profile {source}: not a colour profile ({err})") from err
     lut.flags.writeable = False
     return profile

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import asyncio
 import json
+from importlib import resources
 from pathlib import Path
 
 import pytest
 
 from flightd.adapters.ground_link.client import GroundClient
+from flightd.adapters.store.sent_profiles import sent_name
 from flightd.core.errors import InputError, RunError
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.service import ServiceRig
@@ -25,7 +27,7 @@ async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) 
     async with rig.world(GUID_TIMEOUT=3.0):
         daemon = await rig.start()
         await rig.until(lambda status: status.vehicle is not None)
-        async with GroundClient(rig.address, timeout_s=60.0) as client, asyncio.timeout(120):
+        async with GroundClient(rig.address, timeout_s=60.0) as client, asyncio.timeout(240):
             await client.hello()
             report = await client.doctor()
             while all(check.fix != "GUID_TIMEOUT" for check in report.checks):
@@ -53,6 +55,12 @@ async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) 
             assert changed.table["mission"]["height_m"] == 1.5
             with pytest.raises(RunError, match="changed meanwhile"):
                 await client.propose(stands.tag, {"mission.height_m": 1.4})
+            profile = (resources.files("flightd.vision.lines") / "profiles" / "white.npz").read_bytes()
+            sent = await client.install_profile(changed.tag, "hall", profile, "ann")
+            file = sent_name("hall", profile)
+            assert (sent.table["vision"]["profile"], (tmp_path / file).read_bytes()) == (file, profile)
+            with pytest.raises(InputError, match="not a colour profile"):
+                await client.install_profile(sent.tag, "hall", profile[:900])
             await client.restart("ann")
             assert await daemon.wait() == 0
         again = await rig.start()
@@ -60,9 +68,9 @@ async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) 
         async with GroundClient(rig.address, timeout_s=60.0) as client, asyncio.timeout(60):
             await client.hello()
             stands = await client.settings()
-            assert (stands.pending, [version.person for version in stands.versions]) == (False, ["ann"])
-            keys = [change.key for change in stands.versions[0].changes]
-            assert keys == ["mission.height_m", "scan.pictures"]
+            assert (stands.pending, [version.person for version in stands.versions]) == (False, ["ann"] * 2)
+            keys = [[change.key for change in version.changes] for version in stands.versions]
+            assert keys == [["vision.profile"], ["mission.height_m", "scan.pictures"]]
         again.terminate()
         assert await again.wait() == 143
     assert not (tmp_path / ".flightd.toml.proposed").exists()
@@ -73,6 +81,8 @@ async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) 
         ("propose", "invalid"),
         ("propose", "accepted"),
         ("propose", "phase"),
+        ("install_profile", "accepted"),
+        ("install_profile", "invalid"),
         ("restart", "accepted"),
     ]
     assert "by ann" in audit[0]["text"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,9 +18,11 @@ from flightd.adapters.ground_link.maintenance_rules import HEARD_S, objection
 from flightd.adapters.ground_link.messages.answers import Accepted, Code, Refused
 from flightd.adapters.ground_link.messages.base import VERSION, Role
 from flightd.adapters.ground_link.messages.maintenance import (
+    MOST_PROFILE_BYTES,
     AskDoctor,
     AskSettings,
     FixParameter,
+    InstallProfile,
     Maintenance,
     ProposeSettings,
     Restart,
@@ -27,7 +30,7 @@ from flightd.adapters.ground_link.messages.maintenance import (
 )
 from flightd.adapters.ground_link.messages.published import StatusReport, VehicleReport
 from flightd.adapters.ground_link.peer import Peer
-from flightd.adapters.ground_link.protocol import Answer
+from flightd.adapters.ground_link.protocol import MAX_REQUEST_BYTES, Answer, encode
 from flightd.core.errors import InputError
 from flightd.core.types import CommandKind, LandedState, Phase
 from tests.rigs.event_loops import real
@@ -43,6 +46,7 @@ CHANGES: tuple[Maintenance, ...] = (
     ProposeSettings(version=VERSION, id="change-02", base="x", changes={"mission.height_m": 1.5}),
     TakeSettingsBack(version=VERSION, id="change-03", base="x", version_kept=1),
     Restart(version=VERSION, id="change-04"),
+    InstallProfile(version=VERSION, id="change-05", base="x", name="hall", content=b"PK", file_hash="0"),
 )
 STANDS = VehicleReport("STABILIZE", False, False, "on_ground", 0.0, 0.0, 0.9, 12.0, 0.1, 0.1, "")
 WAITS = frozenset({CommandKind.START, CommandKind.LAND, CommandKind.STOP})
@@ -120,6 +124,45 @@ def test_a_malformed_proposal_is_refused(fields: dict[str, Any]) -> None:
     answer = RequestHandlerRig(Phase.PREFLIGHT).hand(body("propose", **fields))
     assert isinstance(answer, Refused)
     assert answer.code is Code.MALFORMED
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"name": "../hall"},
+        {"name": "hall.npz"},
+        {"name": ".hall"},
+        {"name": "h" * 41},
+        {"name": ""},
+        {"name": "hall\n"},
+        {"content": base64.b64encode(bytes(MOST_PROFILE_BYTES + 1)).decode()},
+        {"content": "no base64"},
+        {"content": 3},
+        {"file_hash": "0" * 65},
+        {"person": "p" * 65},
+        {"path": "/etc/passwd"},
+    ],
+)
+def test_a_malformed_profile_is_refused(wrong: dict[str, Any]) -> None:
+    good = {"base": "x", "name": "hall", "content": "UEs=", "file_hash": "0"}
+    rig = RequestHandlerRig(Phase.PREFLIGHT)
+    assert isinstance(rig.hand(body("install_profile", **good)), InstallProfile)
+    answer = rig.hand(body("install_profile", **{**good, **wrong}))
+    assert isinstance(answer, Refused)
+    assert answer.code is Code.MALFORMED
+
+
+def test_the_longest_profile_fits_into_a_request() -> None:
+    longest = InstallProfile(
+        version=VERSION,
+        id="i" * 64,
+        base="b" * 64,
+        name="n" * 40,
+        content=bytes(MOST_PROFILE_BYTES),
+        file_hash="0" * 64,
+        person="p" * 64,
+    )
+    assert len(encode(longest)) < MAX_REQUEST_BYTES
 
 
 def test_nothing_is_started_while_the_drone_is_looked_after() -> None:
@@ -231,5 +274,25 @@ def test_a_drone_that_began_to_fly_while_it_waited_is_left_alone() -> None:
         await rig.work()
         assert rig.maintainer.done == []
         assert [getattr(answer, "code", None) for answer in rig.sent] == [Code.PHASE]
+
+    real(asked())
+
+
+def test_what_is_written_down_of_a_profile_is_its_name_and_hash() -> None:
+    async def asked() -> None:
+        rig = Desk()
+        sent = InstallProfile(
+            version=VERSION,
+            id="send-00001",
+            base="x",
+            name="hall",
+            content=b"PK" * 99,
+            file_hash="00ff",
+            person="Ann",
+        )
+        rig.desk.hand_in([b""], sent, OPERATOR)
+        await rig.work()
+        assert [(entry.command, entry.outcome) for entry in rig.audit] == [("install_profile", "accepted")]
+        assert rig.audit[0].text == '{"name":"hall","file_hash":"00ff"} by Ann'
 
     real(asked())

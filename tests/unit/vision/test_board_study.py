@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
+from flightd.config.camera import CameraConfig
+from flightd.config.front_camera import FrontCameraConfig
 from flightd.ground.studio.board_study import study_boards
 from tests.unit.vision.test_calibration import BOARD, boards
 
@@ -30,12 +32,16 @@ def test_coverage_residuals_and_the_configurations_keys_are_told(tmp_path: Path)
     assert study.error_px is not None
     assert study.error_px < 0.3
     assert all(one.error_px is not None and one.error_px < 0.5 for one in study.boards)
-    assert tomllib.loads(study.config)["camera"]["fx_px"] == pytest.approx(380, rel=0.02)
+    down, front = (tomllib.loads(study.config[camera]) for camera in ("down", "front"))
+    assert down["camera"]["fx_px"] == pytest.approx(380, rel=0.02)
+    assert front["front_camera"] == down["camera"]
+    assert CameraConfig.model_validate(down["camera"]).fx_px == down["camera"]["fx_px"]
+    assert FrontCameraConfig.model_validate(front["front_camera"]).fx_px == down["camera"]["fx_px"]
 
 
 def test_too_few_boards_say_how_many_are_needed_and_still_show_where_they_were(tmp_path: Path) -> None:
     study = study_boards(tmp_path, kept(tmp_path, 2), BOARD)
     assert "8 are needed" in study.refused
-    assert study.config == ""
+    assert study.config == {}
     assert len(study.boards) <= 2
     assert study_boards(tmp_path, [], BOARD).boards == []

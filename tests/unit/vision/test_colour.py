@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from flightd.vision.lines.colour_profile import (
     grow,
     level,
     load_profile,
+    read_profile,
     save_profile,
 )
 
@@ -157,6 +159,20 @@ def test_a_file_that_is_no_profile_is_named(tmp_path: Path, content: bytes) -> N
     path.write_bytes(content)
     with pytest.raises(InputError, match=r"bad\.npz"):
         load_profile(path)
+
+
+def test_spoilt_content_is_no_profile(tmp_path: Path) -> None:
+    save_profile(load_profile("yellow"), tmp_path / "good.npz")
+    good = (tmp_path / "good.npz").read_bytes()
+    assert read_profile(good, "good").training_hash == load_profile("yellow").training_hash
+    for at in range(0, len(good), 7):
+        with contextlib.suppress(InputError):  # what is no lookup and no name may be anything
+            read_profile(good[:at] + bytes([good[at] ^ 0xFF]) + good[at + 1 :], "spoilt")
+        with pytest.raises(InputError, match="profile spoilt: not a colour profile"):
+            read_profile(good[:at], "spoilt")
+    np.savez_compressed(tmp_path / "bomb.npz", lut=np.zeros(2 << 20, np.uint8), about=np.zeros(1, np.uint8))
+    with pytest.raises(InputError, match=r"unpacks to \d+ bytes"):
+        read_profile((tmp_path / "bomb.npz").read_bytes(), "bomb")
 
 
 def test_an_unknown_name_lists_the_shipped_ones() -> None:

@@ -10,6 +10,9 @@ from msgspec import Meta
 from flightd.adapters.ground_link.messages.base import ClientRequest, DaemonAnswer
 from flightd.core.preview import CameraName
 
+MOST_PROFILE_BYTES = 16384
+"""Of a colour profile that is sent; a trained one has some 2,500."""
+
 _Person = Annotated[str, Meta(max_length=64, description="who asks, for audit log and versions")]
 
 
@@ -62,6 +65,28 @@ class TakeSettingsBack(ClientRequest, frozen=True, tag="take_back"):
     person: _Person = ""
 
 
+class InstallProfile(ClientRequest, frozen=True, tag="install_profile"):
+    """Lay a colour profile beside the configuration's file and have `vision.profile` name it: a change of
+    settings like any other; operators only, while it stands disarmed.  Answer: `settings`, as they stand
+    then."""
+
+    base: Annotated[str, Meta(max_length=64, description="`tag` of the `settings` that the person saw")]
+    name: Annotated[
+        str,
+        Meta(
+            max_length=40,
+            pattern=r"^[a-z0-9][a-z0-9-]*\Z",
+            description="of the profile: small letters, digits and hyphens",
+        ),
+    ]
+    content: Annotated[
+        bytes,
+        Meta(max_length=MOST_PROFILE_BYTES, description="of the profile's file, in base64; 16 KiB at most"),
+    ]
+    file_hash: Annotated[str, Meta(max_length=64, description="SHA-256 of the file, in hexadecimal digits")]
+    person: _Person = ""
+
+
 class Restart(ClientRequest, frozen=True, tag="restart"):
     """End the daemon so that systemd starts it anew, by its changed settings; operators only, while it stands
     disarmed.  Answer: `accepted`."""
@@ -69,7 +94,9 @@ class Restart(ClientRequest, frozen=True, tag="restart"):
     person: _Person = ""
 
 
-Maintenance: TypeAlias = AskDoctor | FixParameter | AskSettings | ProposeSettings | TakeSettingsBack | Restart
+Maintenance: TypeAlias = (
+    AskDoctor | FixParameter | AskSettings | ProposeSettings | TakeSettingsBack | InstallProfile | Restart
+)
 """What looks after a drone on the ground."""
 
 

@@ -1,6 +1,24 @@
 // What drone, station and pages report: shown where it arrives, and matched against these with its figures in
 // it.  What is not here stays English.
 export default {
+  "camera delay": "Verzögerung der Kamera",
+  "mount roll": "Einbau, Rollen",
+  "mount pitch": "Einbau, Nicken",
+  "mount yaw": "Einbau, Gieren",
+  "focal length": "Brennweite",
+  "height scale": "Maßstab der Höhe",
+  "lens residual k1": "Restfehler des Objektivs k1",
+  "tilt bias roll": "Fehler der Lage, Rollen",
+  "tilt bias pitch": "Fehler der Lage, Nicken",
+  "attitude leak": "Nachgeben der Lage",
+  "against the attitude's times": "gegen die Zeiten der Lage",
+  "not told by this flight": "von diesem Flug nicht verraten",
+  "if the range finder is right": "wenn der Abstandssensor recht hat",
+  "if camera.fx_px is right: pictures tell height and focal length only together": "wenn camera.fx_px stimmt: Bilder sagen Höhe und Brennweite nur zusammen",
+  "by the lines' width towards the edge; a board tells it better: flightd calibrate PATH…": "nach der Breite der Linien zum Rand hin; ein Schachbrett sagt es besser: flightd calibrate PFAD…",
+  "the drone never turned far: a steady draught looks the same": "die Drohne hat nie weit gedreht: stetiger Wind sieht genauso aus",
+  "true less told: level the autopilot": "wahr weniger gemeldet: richten Sie den Autopiloten aus",
+  "rate towards what is felt": "Rate zu dem hin, was gefühlt wird",
   // pages
   "the ground station answers {status}": "die Bodenstation antwortet mit {status}",
   "Setting {name} right …": "{name} wird richtiggestellt …",

@@ -1,15 +1,16 @@
 // An installed profile: its versions, the way back to an earlier one, and how it comes to the drone.
 import { mayChange } from "../access/session.js";
 import { html } from "../html.js";
-import { dateFormat, say, sayWith } from "../language.js";
+import { dateFormat, quoted, say, sayWith } from "../language.js";
 import { time } from "../words.js";
 import { asked, change, loadOverview, studio, told } from "./studio_state.js";
+import { ToDrone } from "./to_drone.js";
 
 const DAY = dateFormat({ year: "numeric", month: "short", day: "numeric" });
 
 export function Profile({ profile }) {
-  const { name, versions, current } = profile;
-  if (!versions.length) return null;
+  const { name, versions, current, trouble } = profile;
+  if (!versions.length && !trouble) return null;
   const back = (version) =>
     told(async () => {
       const now = await asked(`/profiles/${encodeURIComponent(name)}/back`, "POST", { version });
@@ -18,7 +19,8 @@ export function Profile({ profile }) {
     });
   return html`
     <section class="card profile" aria-label=${say("Profile {name}", { name })}><h3>${say("Profile {name}", { name })}</h3>
-      ${current === null && html`<p class="refusal">${say("Its file is none of these versions.")}</p>`}
+      ${trouble && html`<p class="refusal" role="alert">${quoted(trouble)}</p>`}
+      ${current === null && !trouble && html`<p class="refusal">${say("Its file is none of these versions.")}</p>`}
       <ol>
         ${versions.toReversed().map(
           (one) => html`
@@ -30,7 +32,9 @@ export function Profile({ profile }) {
           `,
         )}
       </ol>
-      <details><summary>${say("How it comes to the drone")}</summary>
+      ${!trouble && html`<p class="quiet">${say("Installed at the station: a drone flies by it once it was sent there, and flightd started anew.")}</p>`}
+      <${ToDrone} profile=${profile} />
+      <details><summary>${say("Without the ground link")}</summary>
         <p>${sayWith("Copy {file} beside the drone's configuration, and name it there:", { file: html`<code>${profile.file}</code>` })}</p>
         <pre tabindex="0">[vision]
 profile = "${name}.npz"</pre>

@@ -5,6 +5,7 @@ import { html, useEffect, useState } from "../html.js";
 import { decimal, english, quoted, say } from "../language.js";
 import { setWho, who } from "../stock/decisions.js";
 import { capital } from "../words.js";
+import { flightWords, sitesOf, siteWords, wholeFlights } from "./flight_choice.js";
 import { asked, change, choosePicture, reloadSet, setPath, studio, told, watchTraining } from "./studio_state.js";
 
 const LEAST_SHOWING = 7;
@@ -15,7 +16,12 @@ export function ScoreCard({ shows }) {
   const running = set.training?.running;
   const { rows, looked, unread } = flightsState().list;
   useEffect(watchList, []);
-  const flights = rows.filter((row) => !row.running && !row.trouble).slice(0, MOST_LOGS).map((row) => row.id);
+  const [site, setSite] = useState(null); // null: of the flight that the set's newest picture is from
+  const [dropped, setDropped] = useState({}); // by flight: true, not scored on; false, scored on
+  const whole = wholeFlights(rows);
+  const at = site ?? (whole.find(({ id }) => id === flightOf(set)) ?? whole[0])?.site;
+  const here = whole.filter((row) => row.site === at);
+  const flights = scoredOn(here, dropped);
   const train = () =>
     told(async () => {
       await asked(setPath("/train"), "POST", { flights });
@@ -26,7 +32,18 @@ export function ScoreCard({ shows }) {
     <section class="card score" aria-labelledby="score"><h3 id="score">${say("Learn and compare")}</h3>
       ${overview.missing
         ? html`<p class="obstacles"><strong>${say("Nothing can be learnt yet.")}</strong> ${quoted(overview.missing, capital)}</p>`
-        : html`<p class="quiet">${shows < LEAST_SHOWING ? say("Mark paint and floor in {n} more picture.|Mark paint and floor in {n} more pictures.", { n: LEAST_SHOWING - shows }) : say("Every fourth picture is held back from learning, and scored on.")} ${logWords(looked && !unread, flights.length)}</p>`}
+        : html`<p class="quiet">${shows < LEAST_SHOWING ? say("Mark paint and floor in {n} more picture.|Mark paint and floor in {n} more pictures.", { n: LEAST_SHOWING - shows }) : say("Every fourth picture is held back from learning, and scored on.")} ${logWords(looked && !unread, flights.length, here.length)}</p>`}
+      ${!overview.missing && here.length > 0 && html`
+        <details class="flights-to-score"><summary>${say("Flights to score on")}</summary>
+          <label class="field">${say("Site")}
+            <select value=${at} onChange=${(event) => setSite(event.target.value)}>
+              ${sitesOf(whole).map((one) => html`<option key=${one} value=${one}>${siteWords(one)}</option>`)}
+            </select>
+          </label>
+          <ul>${here.map((row) => html`
+            <li key=${row.id}><label><input type="checkbox" checked=${flights.includes(row.id)} disabled=${!flights.includes(row.id) && flights.length >= MOST_LOGS}
+              onChange=${(event) => setDropped({ ...dropped, [row.id]: !event.target.checked })} /> ${flightWords(row)}</label></li>`)}</ul>
+        </details>`}
       ${mayOperate() && html`<button class="order main-order" disabled=${running || !looked || shows < LEAST_SHOWING || overview.missing} onClick=${train}>${running ? say("Learning …") : say("Learn from the marks")}</button>`}
       ${running && html`<p class="quiet" role="status">${say("Learning and scoring: up to some minutes. You may leave the page.")}</p>`}
       ${set.training?.refused && html`<p class="refusal" role="alert">${quoted(set.training.refused, capital)}</p>`}
@@ -35,8 +52,19 @@ export function ScoreCard({ shows }) {
   `;
 }
 
-function logWords(known, many) {
-  if (many) return say("Also scored on the newest flight log.|Also scored on the {n} newest flight logs.", { n: many });
+// The newest that nobody has taken out, and those that somebody has put in.
+function scoredOn(here, dropped) {
+  const put = here.filter(({ id }) => dropped[id] === false);
+  const newest = here.slice(0, MOST_LOGS).filter(({ id }) => dropped[id] === undefined);
+  return [...put, ...newest].slice(0, MOST_LOGS).map(({ id }) => id);
+}
+
+// A picture says from where it was taken: of a flight, by its id and the place in it.
+const flightOf = ({ pictures }) => pictures.map(({ tags }) => (tags?.[0] ?? "").split(" ")[0]).findLast(Boolean);
+
+function logWords(known, many, all) {
+  if (many) return say("Also scored on {n} flight log of one site.|Also scored on {n} flight logs of one site.", { n: many });
+  if (all) return say("Scored on no flight log: none is chosen.");
   return known ? say("Also scored on no flight log: none lies in the folder.") : say("Looking for flight logs …");
 }
 
