@@ -16,7 +16,7 @@ import pytest
 
 from flightd.config.schema import load_config
 from flightd.core.types import Phase
-from flightd.ground.messages import session_message
+from flightd.ground.messages import SessionState, session_message
 from flightd.site.site_file import load_site
 from tests.rigs.certificates import make_certificate
 from tests.web.chromium import NARROW, WIDE, hindrances, new_context, opened, station
@@ -157,7 +157,7 @@ def test_what_a_socket_says_late_of_the_session_before_signs_nobody_out(browser:
         page.get_by_role("button", name="Sign out").click()
         sign_in(page, "vera")
         expect(page.locator("summary")).to_contain_text("vera")
-        sockets[0].send(session_message(login=True, name="", role=""))
+        sockets[0].send(session_message(SessionState(login=True)))
         for _ in range(100):  # time to take what was said, for a page that still listens
             if not given_up:
                 page.wait_for_timeout(20)
