@@ -58,7 +58,7 @@ def routes_of(tmp_path: Path) -> list[str]:
     )
     access.close()
     found: list[str] = []
-    for route in guard._app.routes:  # type: ignore[attr-defined]  # noqa: SLF001
+    for route in guard._app._app.routes:  # type: ignore[attr-defined]  # noqa: SLF001
         kind = type(route).__name__
         methods = {"Mount": ["MOUNT"], "WebSocketRoute": ["WEBSOCKET"]}.get(kind) or route.methods - {"HEAD"}
         found += [f"{method} {route.path}" for method in methods]
