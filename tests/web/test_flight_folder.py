@@ -18,6 +18,8 @@ from flightd.ground.flights.flight_row import FlightRow, read_rows
 from flightd.ground.flights.flight_view import read_report, read_view
 from flightd.ground.flights.log_folder import find_logs, log_id, path_of
 from flightd.ground.flights.sized_cache import SizedCache
+from flightd.ground.read_folders import read_folders
+from flightd.ground.stores import Stores
 from tests.replay.synthetic_flight import write_flight
 from tests.web.stock_rig import look
 
@@ -37,6 +39,27 @@ def copied(flown: Path, folder: Path, name: str = "flight.mcap") -> Path:
 def row_of(root: Path) -> FlightRow:
     (row,) = read_rows(find_logs(root).logs)
     return row
+
+
+def test_flights_of_further_folders_are_named_by_them_and_one_that_is_not_there_is_passed_over(
+    flown: Path, tmp_path: Path
+) -> None:
+    root, others = tmp_path / "root", [tmp_path / "a" / "drone", tmp_path / "b" / "drone", tmp_path / "gone"]
+    for folder in (root, *others[:2]):
+        copied(flown, folder / "one")
+    (root / "inventory.db").touch()
+    (others[1] / "inventory.db").touch()
+    named = read_folders(others)
+    found = find_logs(root, named)
+    assert len({log.id for log in found.logs}) == 3
+    rows = {row.path: row for row in read_rows(found.logs)}
+    assert set(rows) == {
+        "one/flight.mcap", "drone:one/flight.mcap", "drone-2:one/flight.mcap"
+    }  # fmt: skip
+    assert {row.site for row in rows.values()} == {"demo"}
+    stores = Stores(root, named)
+    assert {name for name, _ in stores.names()} >= {".", "drone-2:."}
+    assert stores.folder("drone-2:.") == others[1]
 
 
 def test_a_flight_is_listed_with_what_its_judge_said(flown: Path, tmp_path: Path) -> None:

@@ -115,9 +115,7 @@ def test_the_ground_station_is_shut_in_as_the_daemon_is() -> None:
 def test_the_units_words_start_a_ground_station(tmp_path: Path) -> None:
     line = next(line for line in settings(GROUND_UNIT) if line.startswith("ExecStart="))
     words = line.replace("$OPTIONS", "--listen 127.0.0.1:0").split()[1:]
-    assert words[words.index("--flights") + 1] == "/var/lib/flightd", (
-        "what the daemon on this computer records"
-    )
+    assert words[words.index("--flights") + 1] == "/var/lib/flightd", "the daemon's"
     for folder in ("state", "flights"):
         (tmp_path / folder).mkdir()
     words = [word.replace("/var/lib/flightd-ground", str(tmp_path)) for word in words]
