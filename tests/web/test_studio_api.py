@@ -237,7 +237,7 @@ class TwoSites(Flights):
 
 def test_flights_of_one_site_are_scored_on(tmp_path: Path) -> None:
     studio = Studio(tmp_path, TwoSites(None))
-    with pytest.raises(InputError, match=r"flights of several sites \(a, b\): take those of one"):
+    with pytest.raises(InputError, match=r"flights of several sites \(a, b\); take those of one"):
         studio.order_training("hall", ("b1", "a1", "a2"))
     assert studio.training_of("hall") is None
     studio.order_training("hall", ("a1", "a2"))
