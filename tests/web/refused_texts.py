@@ -72,6 +72,8 @@ STAYS_ENGLISH = {
     "{} -m pip install {}": "a command to type",
     "{} trouble": "the name of a topic",
     "ceiling_m = {}": "a line of a site file",
+    "flightd ground --folder out": "a command to type",
+    "SELECT data FROM expected_stock WHERE store = ?": "a question to the book",
     "interlock = true": "a line of a site file",
     "by {} ({})": "the end of what was done, which has its German as a whole",
     "by {}": "the end of what was done, which has its German as a whole",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import ssl
 import subprocess
 import sys
@@ -85,7 +86,7 @@ def test_beyond_this_machine_it_starts_only_with_people_and_tls(tmp_path: Path) 
         trusting = ssl.create_default_context(cafile=str(cert))
         with urllib.request.urlopen(f"{url}/api/session", context=trusting, timeout=20) as answer:
             assert answer.headers["Strict-Transport-Security"] == "max-age=31536000"
-            assert answer.read() == b'{"login":true,"name":"","role":""}'
+            assert {"login": True, "name": ""}.items() <= json.loads(answer.read()).items()
         said = f'{{"name":"otto","password":"{PASSWORD}"}}'.encode()
         headers = {"Origin": url, "Content-Type": "application/json"}
         request = urllib.request.Request(f"{url}/api/session", said, headers)

@@ -21,7 +21,6 @@ export default {
   "{n} place to look at|{n} places to look at": "{n} Platz anzusehen|{n} Plätze anzusehen",
   "Nothing to look at": "Nichts anzusehen",
   "{n} closed place|{n} closed places": "{n} erledigter Platz|{n} erledigte Plätze",
-  "and {n} more": "und {n} weitere",
   "Recount what is picked out ({n} place)|Recount what is picked out ({n} places)": "Herausgesuchtes nachzählen ({n} Platz)|Herausgesuchtes nachzählen ({n} Plätze)",
   "{n} place selected|{n} places selected": "{n} Platz ausgewählt|{n} Plätze ausgewählt",
   "Recount {n} selected place as a mission|Recount {n} selected places as a mission": "{n} ausgewählten Platz als Mission nachzählen|{n} ausgewählte Plätze als Mission nachzählen",
