@@ -7,7 +7,7 @@ import { LANGUAGES, keep, language, say, speak } from "./language.js";
 import { hears } from "./hearing.js";
 import { PAGES } from "./pages.js";
 import { retitle } from "./router.js";
-import { shown, state, update } from "./store.js";
+import { selectDrone, shown, state, update } from "./store.js";
 
 export function Head() {
   return html`
@@ -80,11 +80,7 @@ function Drones() {
             key=${name}
             class="tab"
             aria-pressed=${name === state.selected}
-            onClick=${() =>
-              update((s) => {
-                s.selected = name;
-                s.chosenNode = "";
-              })}
+            onClick=${() => selectDrone(name)}
           >
             ${name}
           </button>

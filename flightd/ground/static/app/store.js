@@ -75,6 +75,13 @@ export function take({ drone, topic, value }) {
 // `ends_in_s` as a time by performance.now(), for it is told only now and then.
 export const sessionOf = (told) => ({ ...told, endsAt: performance.now() + (told.ends_in_s ?? Infinity) * 1000 });
 
+// Show and command another drone.
+export const selectDrone = (name) =>
+  update((s) => {
+    if (s.selected !== name) s.chosenNode = "";
+    s.selected = name;
+  });
+
 function takeStation(s, value) {
   s.station = value;
   for (const name of s.drones.keys()) if (!value.drones.includes(name)) s.drones.delete(name); // it has left

@@ -64,3 +64,8 @@ const CLOCK = dateFormat({
   hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23",
 });
 export const time = (date) => CLOCK.format(date);
+
+const DAY = dateFormat({ month: "short", day: "numeric" });
+const DATE = dateFormat({ year: "numeric", month: "short", day: "numeric" });
+export const dayAndTime = (date) => `${DAY.format(date)} ${time(date)}`;
+export const dateAndTime = (date) => `${DATE.format(date)} ${time(date)}`;

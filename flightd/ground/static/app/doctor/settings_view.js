@@ -4,6 +4,7 @@ import { html, useEffect, useRef, useState } from "../html.js";
 import { english, quoted, say, sayWith } from "../language.js";
 import { goTo } from "../router.js";
 import { shown, state, update } from "../store.js";
+import { losesWork } from "../unsaved.js";
 import { askDrone, sendDrone } from "./asking.js";
 import { ChangesBar } from "./changes_bar.js";
 import { HistoryCard } from "./history_card.js";
@@ -11,6 +12,11 @@ import { SettingField } from "./setting_field.js";
 import { nameOf, topSections, withChange } from "./settings_keys.js";
 
 const TYPED_MS = 250;
+const NONE = {};
+
+// What was typed and not sent outlives this view.
+const typedFor = (drone) => state.typedSettings[drone] ?? NONE;
+losesWork(() => Object.values(state.typedSettings).some((changes) => Object.keys(changes).length > 0));
 
 // Settings as whoever reads them may change them.
 export const forReader = (settings) => (mayChange() || settings.locked ? settings : { ...settings, locked: english("an admin changes settings") });
@@ -19,14 +25,10 @@ export function SettingsView({ drone, section }) {
   const [known, setTold] = useState(null);
   const told = known && forReader(known);
   const [trouble, setTrouble] = useState("");
-  const [changes, setOwn] = useState(state.typedSettings[drone] ?? {}); // kept beyond this view, too
+  const changes = typedFor(drone);
   const setChanges = (made) =>
-    setOwn((before) => {
-      const after = made(before);
-      update((s) => {
-        s.typedSettings = { ...s.typedSettings, [drone]: after };
-      });
-      return after;
+    update((s) => {
+      s.typedSettings = { ...s.typedSettings, [drone]: made };
     });
   const complaint = useComplaint(drone, told, changes);
   const session = shown().welcome?.session ?? "";
@@ -41,10 +43,10 @@ export function SettingsView({ drone, section }) {
   useEffect(() => {
     load();
   }, [session]);
-  const change = (name, value) => setChanges((before) => withChange(before, name, value));
+  const change = (name, value) => setChanges(withChange(typedFor(drone), name, value));
   const take = (settings) => {
     setTold(settings);
-    setChanges(() => ({}));
+    setChanges(NONE);
   };
   if (!told) {
     return html`<section class="card settings-none"><h2>${say("Settings")}</h2>
@@ -64,7 +66,7 @@ export function SettingsView({ drone, section }) {
       </div>
       <div class="doctor-side">
         <${ChangesBar} drone=${drone} told=${told} changes=${changes} complaint=${complaint} onTake=${take}
-          onDrop=${() => setChanges(() => ({}))} onUndo=${(name) => change(name, undefined)} />
+          onDrop=${() => setChanges(NONE)} onUndo=${(name) => change(name, undefined)} />
         <${HistoryCard} drone=${drone} told=${told} onTake=${take} />
       </div>
     </div>

@@ -2,7 +2,7 @@
 import { english, say } from "../language.js";
 import { act, newId } from "../acts.js";
 import { askJson, askStation, isGivenUp } from "../fetching.js";
-import { shown, state, update } from "../store.js";
+import { selectDrone, shown, state } from "../store.js";
 import { change, missions, open } from "./missions_state.js";
 
 const LOOK_MS = 100;
@@ -165,9 +165,6 @@ function chooseDroneIn(hall) {
     if (here) throw new Error(english("the inventory is of {hall}, and {drone} flies in {site}: link a drone of {hall}", { hall, drone: state.selected, site: here }));
     return ""; // no drone is heard yet: see missions_state.js
   }
-  update((s) => {
-    s.selected = other;
-    s.chosenNode = "";
-  });
+  selectDrone(other);
   return hall;
 }

@@ -3,7 +3,7 @@ import { mayChange, mayOperate } from "../access/session.js";
 import { html } from "../html.js";
 import { quoted, say, sayWith } from "../language.js";
 import { goTo } from "../router.js";
-import { state, update } from "../store.js";
+import { selectDrone, state } from "../store.js";
 import { endFlight, fly } from "./site_source.js";
 import { isChanged, site } from "./site_state.js";
 
@@ -32,9 +32,6 @@ function words({ site: name, drone, good, folder }) {
 }
 
 function look(drone) {
-  update((s) => {
-    if (s.selected !== drone) s.chosenNode = "";
-    s.selected = drone;
-  });
+  selectDrone(drone);
   goTo("/");
 }

@@ -1,12 +1,11 @@
 // The sites under the station's folder, a new one, and one from another program.
 import { html, useEffect, useRef } from "../html.js";
-import { dateFormat, quoted, say, sayWith } from "../language.js";
+import { quoted, say, sayWith } from "../language.js";
 import { goTo } from "../router.js";
-import { time } from "../words.js";
+import { dateAndTime } from "../words.js";
 import { isChanged, site } from "./site_state.js";
 import { loadList, takeIn } from "./site_source.js";
 
-const DAY = dateFormat({ year: "numeric", month: "short", day: "numeric" });
 
 export function SiteList() {
   useEffect(() => void loadList(), []);
@@ -23,7 +22,7 @@ export function SiteList() {
         ${list.sites.length === 0 && html`<p class="quiet">${list.folder ? say("No site file lies under the station's folder yet. Begin with a new one.") : sayWith("The station was told no folder to keep sites in: {command}. You can draw one, and keep it by Export.", { command: html`<code>flightd ground --folder sites</code>` })}</p>`}
         <ul class="site-files">
           ${list.sites.map((one) => html`<li key=${one.name}><a href=${editPath(one.name)}>${one.name}</a>
-            <span class="quiet">${DAY.format(one.written_s * 1000)} ${time(one.written_s * 1000)}</span></li>`)}
+            <span class="quiet">${dateAndTime(one.written_s * 1000)}</span></li>`)}
         </ul>
       </section>
       <section class="card begin-site" aria-labelledby="begin">

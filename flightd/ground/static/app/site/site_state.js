@@ -1,5 +1,6 @@
 // What the page knows: the sites there are, the one that is edited with what was before and after, what is chosen.
 import { state, update } from "../store.js";
+import { losesWork } from "../unsaved.js";
 
 const MERGED_MS = 1500;
 const MOST_STEPS = 300;
@@ -40,6 +41,7 @@ export function change(changes) {
 }
 
 export const isChanged = () => site().draft !== site().kept;
+losesWork(isChanged);
 
 // Put a draft in the place of the one that is shown, with a step to go back to.  Edits of the same thing in a row
 // (`what`) are one step.

@@ -1,12 +1,11 @@
 // What a person decides about the place in the card, with a name and a note; and what was decided before.
 import { mayOperate, signedInName } from "../access/session.js";
 import { html, useState } from "../html.js";
-import { dateFormat, english, quoted, say } from "../language.js";
-import { time } from "../words.js";
+import { english, quoted, say } from "../language.js";
+import { dayAndTime } from "../words.js";
 import { DECISIONS, decide, needsALook, setWho, standing, who } from "./decisions.js";
 import { stock } from "./stock_state.js";
 
-const DAY = dateFormat({ month: "short", day: "numeric" });
 
 export function DecisionForm() {
   const known = stock();
@@ -49,7 +48,7 @@ export function DecisionForm() {
       html`
         <ol class="decided" aria-label=${say("Decided so far")}>
           ${before.toReversed().map(({ at_s: at, what, who: by, note: said }) => html`
-            <li key=${at}><span class="quiet">${DAY.format(at * 1000)} ${time(at * 1000)}</span> ${say(DECISIONS[what].name)}, ${by}${said && `: ${said}`}</li>
+            <li key=${at}><span class="quiet">${dayAndTime(at * 1000)}</span> ${say(DECISIONS[what].name)}, ${by}${said && `: ${said}`}</li>
           `)}
         </ol>
       `}

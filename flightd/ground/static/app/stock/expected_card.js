@@ -1,13 +1,12 @@
 // The expected stock: upload, which column is what, and every difference to the count.
 import { mayOperate } from "../access/session.js";
 import { html, useEffect, useRef } from "../html.js";
-import { dateFormat, english, quoted, quotedText, say, sayWith } from "../language.js";
-import { time } from "../words.js";
+import { english, quoted, quotedText, say, sayWith } from "../language.js";
+import { dayAndTime } from "../words.js";
 import { choose, compareAgain, download, forget, upload } from "./expected_stock.js";
 import { loadKept } from "./kept_stock.js";
 import { stock } from "./stock_state.js";
 
-const DAY = dateFormat({ month: "short", day: "numeric" });
 const OUTCOMES = {
   __proto__: null,
   match: english("as expected"),
@@ -49,7 +48,7 @@ export function ExpectedCard({ onChoose }) {
 }
 
 function keptWords({ at_s: at, who }) {
-  const day = `${DAY.format(at * 1000)} ${time(at * 1000)}`;
+  const day = dayAndTime(at * 1000);
   return who ? say("Kept for everybody since {day}, by {who}.", { day, who }) : say("Kept for everybody since {day}.", { day });
 }
 

@@ -1,8 +1,8 @@
 // One place: its picture with the codes' outlines, what was read, how sure, and its history over the runs.
 import { mayOperate } from "../access/session.js";
 import { html, useEffect, useState } from "../html.js";
-import { dateFormat, decimal, english, quoted, say } from "../language.js";
-import { time } from "../words.js";
+import { decimal, english, quoted, say } from "../language.js";
+import { dateAndTime } from "../words.js";
 import { DecisionForm } from "./decision_form.js";
 import { outcomeWords } from "./expected_card.js";
 import { differs, inOrder, isShown, stock } from "./stock_state.js";
@@ -11,7 +11,6 @@ import { rackWords, STATES } from "./states.js";
 import { outlinesOf, pictureUrl } from "./stock_source.js";
 
 const STANDINGS = { pending: english("not booked yet"), confirmed: "", withdrawn: english("withdrawn") };
-const DAY = dateFormat({ year: "numeric", month: "short", day: "numeric" });
 
 export function PlaceCard({ onChoose }) {
   const known = stock();
@@ -179,7 +178,4 @@ function History({ looks, shown, onShow }) {
   `;
 }
 
-function when(utc) {
-  const date = new Date(utc);
-  return `${DAY.format(date)} ${time(date)}`;
-}
+const when = (utc) => dateAndTime(new Date(utc));

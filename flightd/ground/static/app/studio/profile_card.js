@@ -1,12 +1,11 @@
 // An installed profile: its versions, the way back to an earlier one, and how it comes to the drone.
 import { mayChange } from "../access/session.js";
 import { html } from "../html.js";
-import { dateFormat, quoted, say, sayWith } from "../language.js";
-import { time } from "../words.js";
+import { quoted, say, sayWith } from "../language.js";
+import { dateAndTime } from "../words.js";
 import { asked, change, loadOverview, studio, told } from "./studio_state.js";
 import { ToDrone } from "./to_drone.js";
 
-const DAY = dateFormat({ year: "numeric", month: "short", day: "numeric" });
 
 export function Profile({ profile }) {
   const { name, versions, current, trouble } = profile;
@@ -26,7 +25,7 @@ export function Profile({ profile }) {
           (one) => html`
             <li key=${one.number} aria-current=${one.number === current ? "true" : null}>
               <span><b>${say("Version {number}", { number: one.number })}</b> ${say(one.paint)}, ${one.who}${one.verdict === "worse" && html` <span class="refusal">${say("worse")}</span>`}
-                <small>${DAY.format(one.utc_s * 1000)} ${time(one.utc_s * 1000)}</small></span>
+                <small>${dateAndTime(one.utc_s * 1000)}</small></span>
               ${one.number === current ? html`<span class="ready">${say("installed")}</span>` : mayChange() && html`<button class="order" onClick=${() => back(one.number)}>${say("Take back to {number}", { number: one.number })}</button>`}
             </li>
           `,
