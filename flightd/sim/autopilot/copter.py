@@ -235,14 +235,12 @@ class ArduCopterPeer(AutopilotPeer):
         if self._watch_due_s > 0.0:
             return
         self._watch_due_s += _WATCH_S
-        was_silent, self._client_lost = self._client_lost, self._is_client_lost()
-        if self.armed and self._client_lost and not was_silent:
+        was_lost = self._client_lost
+        self._client_lost = self._client_silent_s > self.parameters["FS_GCS_TIMEOUT"]
+        if self.armed and self._client_lost and not was_lost:
             self.say(dialect.MAV_SEVERITY_WARNING, "GCS Failsafe")
             if self.parameters["FS_GCS_ENABLE"] == _GCS_LAND:
                 self._set_mode(CopterMode.LAND)
-
-    def _is_client_lost(self) -> bool:
-        return self._client_silent_s is not None and self._client_silent_s > self.parameters["FS_GCS_TIMEOUT"]
 
     def _watch_battery(self, dt_s: float) -> None:
         """The failsafe for a voltage that stays low for so long."""

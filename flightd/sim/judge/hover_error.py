@@ -13,7 +13,7 @@ from flightd.core.types import AT_STOP, Event, Phase, Status
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.site.site import Site
 
-_Place: TypeAlias = tuple[float, float]
+Place: TypeAlias = tuple[float, float]
 
 
 def hover_errors(flight: FlightEvidence, visits: Iterable[Event]) -> list[float]:
@@ -41,17 +41,20 @@ def hover_errors(flight: FlightEvidence, visits: Iterable[Event]) -> list[float]
     return errors
 
 
-def _wanted(stop: Iterable[Status], site: Site, node: str) -> list[tuple[_Place, _Place]]:
+def told_view(status: Status) -> Place | None:
+    """The place on the map from which a shelf is looked at; None where the status tells none."""
+    x_m, y_m = status.view_x_m, status.view_y_m
+    return None if x_m is None or y_m is None or not math.isfinite(x_m + y_m) else (x_m, y_m)
+
+
+def _wanted(stop: Iterable[Status], site: Site, node: str) -> list[tuple[Place, Place]]:
     """At each status of a stop the line that the drone may be on: from the place before to the one it flies
     to, and where it is to stand that place alone."""
     over_node = site.nodes[node].x_m, site.nodes[node].y_m
     before = here = over_node
     lines = []
     for status in stop:
-        x_m, y_m = status.view_x_m, status.view_y_m
-        place = over_node
-        if x_m is not None and y_m is not None and math.isfinite(x_m + y_m):
-            place = x_m, y_m
+        place = told_view(status) or over_node
         if place != here:
             before, here = here, place
         if status.phase is not Phase.CLIMB:
@@ -60,7 +63,7 @@ def _wanted(stop: Iterable[Status], site: Site, node: str) -> list[tuple[_Place,
     return lines
 
 
-def _apart_m(x_m: float, y_m: float, a: _Place, b: _Place) -> float:
+def _apart_m(x_m: float, y_m: float, a: Place, b: Place) -> float:
     """Distance of a point from the line between two others."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     length2 = dx * dx + dy * dy

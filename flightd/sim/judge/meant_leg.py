@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from flightd.core.types import Phase, Status
+from flightd.sim.judge.hover_error import Place, told_view
 from flightd.sim.judge.motion import TrueMotion, Values
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
@@ -27,7 +28,6 @@ _BESIDE_M = 1.0
 _WHEREVER = frozenset({Phase.RELOCATE, Phase.RECOVER})
 """It says itself that it does not know where it is: any line is right."""
 
-_Place = tuple[float, float]
 Segment = tuple[float, float, float, float]
 """x and y of both ends, m."""
 
@@ -62,41 +62,40 @@ def off_leg(site: Site, start: str, statuses: Sequence[Status], motion: TrueMoti
 def _legs(site: Site, start: str, statuses: Sequence[Status]) -> Iterator[_Leg]:
     everywhere = tuple(_between(site, edge.a, edge.b) for edge in site.edges)
     goal, wherever, here = "", False, start
-    view: _Place | None = None
+    view: Place | None = None
     way: tuple[Segment, ...] = ()
     lines: tuple[Segment, ...] = ()
     for status in statuses:
         anywhere = status.phase in _WHEREVER
         here = status.node or here  # on a pad it sees no lines, and tells no node
         looks_from = _view(site, status)
-        if (status.goal, anywhere, looks_from) == (goal, wherever, view):
+        stays = (status.goal, anywhere) == (goal, wherever)
+        if stays and looks_from == view:
             continue
         begins_s, before = status.stamp_ns * 1e-9, lines
-        if (status.goal, anywhere) == (goal, wherever):
-            lines = (*way, *_to_view(site, goal, view, looks_from))
-            view = looks_from
-            yield _Leg(begins_s, lines, before, begins_s + _ROUND_A_CORNER_S)
-            continue
-        arrived = here == goal
-        goal, wherever, view = status.goal, anywhere, looks_from
-        way = everywhere if anywhere else _way(site, here, goal)
-        lines = (*way, *_to_view(site, goal, None, view))
-        until_s = begins_s + _ROUND_A_CORNER_S if arrived else math.inf
-        yield _Leg(begins_s, lines, _incident(site, before, here, arrived=arrived), until_s)
+        until_s = begins_s + _ROUND_A_CORNER_S
+        if not stays:
+            arrived = here == goal
+            before = _incident(site, before, here, arrived=arrived)
+            until_s = until_s if arrived else math.inf
+            goal, wherever, view = status.goal, anywhere, None
+            way = everywhere if anywhere else _way(site, here, goal)
+        lines = (*way, *_to_view(site, goal, view, looks_from))
+        view = looks_from
+        yield _Leg(begins_s, lines, before, until_s)
 
 
-def _view(site: Site, status: Status) -> _Place | None:
-    """The place beside the node of its stop from which it looks at a shelf; None over the node."""
-    x_m, y_m = status.view_x_m, status.view_y_m
-    node = site.nodes.get(status.goal)
-    if node is None or x_m is None or y_m is None:
+def _view(site: Site, status: Status) -> Place | None:
+    """The place beside the node of its stop from which it looks at a shelf; None where it does not."""
+    view, node = told_view(status), site.nodes.get(status.goal)
+    if view is None or node is None:
         return None
-    return (x_m, y_m) if math.hypot(x_m - node.x_m, y_m - node.y_m) <= _BESIDE_M else None  # NaN: none
+    return view if math.dist(view, (node.x_m, node.y_m)) <= _BESIDE_M else None
 
 
-def _to_view(site: Site, goal: str, before: _Place | None, view: _Place | None) -> tuple[Segment, ...]:
+def _to_view(site: Site, goal: str, before: Place | None, view: Place | None) -> tuple[Segment, ...]:
     """From the node of a stop, and from the view before, to a place beside it."""
-    if view is None or goal not in site.nodes:
+    if view is None:
         return ()
     node = site.nodes[goal]
     starts = [(node.x_m, node.y_m), *([] if before is None else [before])]

@@ -76,9 +76,7 @@ class ClimbCheck:
         ahead = (
             self._stands_still(now_ns, told_mps, wanted_mps)
             and self._height_moves()
-            and (
-                math.copysign(1.0, wanted_mps - told_mps) * (slope_mps - told_mps) > _AHEAD_MPS  # NaN: no
-            )
+            and math.copysign(1.0, wanted_mps - told_mps) * (slope_mps - told_mps) > _AHEAD_MPS  # NaN: no
         )
         self._ahead_ns = (self._ahead_ns or now_ns) if ahead else None
         self.contradicted |= self._ahead_ns is not None and now_ns - self._ahead_ns >= _AHEAD_NS
