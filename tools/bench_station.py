@@ -21,6 +21,7 @@ import contextlib
 import json
 import os
 import signal
+import socket
 import sys
 import tempfile
 import time
@@ -34,7 +35,7 @@ from typing import Any, TextIO
 from flightd.core.errors import FlightdError
 from flightd.core.types import AttitudeSetpoint, Event, EventLevel, Status
 from flightd.replay.log import FlightLog
-from tests.rigs.free_ports import free_ports
+from flightd.runtime.free_ports import free_ports
 from tools.measure_daemon import daemon_of
 from tools.station_crowd import quantiles
 from tools.station_processes import CrowdProcess, SimulatedFlight, Started, Station, ending, until
@@ -103,7 +104,7 @@ def _or_why_not(measured: Callable[[], dict[str, Any]], name: str) -> dict[str, 
 
 def measured_crowd(options: Options) -> dict[str, Any]:
     """One flight; windows without pages and with them take turns."""
-    ports, folder = free_ports(2), options.folder / "crowd"
+    ports, folder = free_ports(2, socket.SOCK_STREAM), options.folder / "crowd"
     windows: dict[str, list[tuple[float, float]]] = {"alone": [], "crowd": []}
     ages: dict[str, Any] = {}
     with ending() as started:
@@ -150,7 +151,7 @@ def measured_crowd(options: Options) -> dict[str, Any]:
 
 def measured_line_and_kill(options: Options) -> dict[str, Any]:
     """Another flight: a page at the end of each line, then kill -9 of the station."""
-    ports, folder = free_ports(2), options.folder / "line"
+    ports, folder = free_ports(2, socket.SOCK_STREAM), options.folder / "line"
     lines: dict[str, Any] = {}
     with ending() as started:
         settings = ("ground.lost_action=home", "mission.dwell_s=12", "mission.autostart_countdown_s=1")
@@ -188,7 +189,7 @@ def _seen_at_the_end(
 
 def measured_memory(options: Options, seconds: float) -> dict[str, Any]:
     """The station's memory while pages come and go, and a drone flies mission after mission."""
-    ports, rows = free_ports(2), []
+    ports, rows = free_ports(2, socket.SOCK_STREAM), []
     with ending() as started:
         words = [sys.executable, "-m", "tools.station_drone", *map(str, ports)]
         started(Started(words, options.folder / "drone.log", options.nice))

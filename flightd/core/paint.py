@@ -19,6 +19,9 @@ NAMED_PAINTS: Final[dict[str, Srgb]] = {
 }
 """Floor paint as a camera sees it clean and in good light."""
 
+PROFILE_NAME: Final = r"[a-z0-9][a-z0-9-]{0,39}"
+"""What a colour profile may be called, as a regular expression."""
+
 _TONE = re.compile(r"#[0-9a-f]{6}", re.IGNORECASE)
 
 

@@ -24,7 +24,7 @@ from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.request_body import whole_body
 from flightd.ground.stock_routes import StockAnswers, answered, download
 from flightd.ground.stores import StockView
-from flightd.ground.uploaded_comparison import Answer, chosen_columns, column_words, compare_upload
+from flightd.ground.uploaded_comparison import Answer, column_words, compare_upload
 from flightd.inventory.stock_table import MOST_BYTES
 
 MOST_COMPARISONS = 4
@@ -123,9 +123,8 @@ class _Kept:
             data = await whole_body(request, MOST_BYTES)
             view = await self._asked.store_view(request)
             compared = await self._comparisons.compared(folder, data, _columns_of(asked))
-            columns = await self._asked.off_loop(chosen_columns, compared.content)
             who, now = person_of(request, asked.get("who", ""))[:_MOST_WHO], time.time_ns()
-            upload = ExpectedStock(name, who, now, now, columns)
+            upload = ExpectedStock(name, who, now, now, compared.columns)
             await self._asked.off_loop(self._book.keep, store, upload, data)
             self._known(store, _tag(upload, view), upload, compared)
         return as_json({})
@@ -138,8 +137,7 @@ class _Kept:
             folder = await self._asked.store_folder(request)
             data = await self._data(store)
             compared = await self._comparisons.compared(folder, data, _columns_of(request.query_params))
-            columns = await self._asked.off_loop(chosen_columns, compared.content)
-            await self._asked.off_loop(self._book.choose, store, columns, time.time_ns())
+            await self._asked.off_loop(self._book.choose, store, compared.columns, time.time_ns())
         return as_json({})
 
     async def remove(self, request: Request) -> Response:

@@ -12,6 +12,7 @@ from flightd import __version__
 from flightd.adapters.ground_link.client import Address
 from flightd.ground.browser import Browser, Topic
 from flightd.ground.drone_link import DroneLink
+from flightd.ground.free_name import free_name
 from flightd.ground.messages import LinkPicture, PageMessage, PictureKey, picture_message, topic_message
 
 MOST_BROWSERS = 64
@@ -77,11 +78,7 @@ class Hub:
 
     def free_name(self, name: str) -> str:
         """The name, or one like it where a drone has it already."""
-        number, free = 1, name
-        while free in self.drones:
-            number += 1
-            free = f"{name}-{number}"
-        return free
+        return free_name(name, self.drones)
 
     @asynccontextmanager
     async def joined(self, name: str, address: Address) -> AsyncIterator[None]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from flightd.ground.free_name import free_name
 from flightd.ground.shown_text import shown
 
 
@@ -25,10 +26,6 @@ def read_folders(paths: Sequence[Path]) -> tuple[ReadFolder, ...]:
     """The folders, each named as it is called itself, with a number where two are called alike."""
     found: dict[str, ReadFolder] = {}
     for path in dict.fromkeys(path.absolute() for path in paths):
-        number, called = 1, shown(path.name) or "/"
-        name = called
-        while name in found:
-            number += 1
-            name = f"{called}-{number}"
+        name = free_name(shown(path.name) or "/", found)
         found[name] = ReadFolder(name, path)
     return tuple(found.values())

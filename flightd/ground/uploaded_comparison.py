@@ -28,8 +28,10 @@ _FORMATS = {"csv": (comparison_csv, "text/csv; charset=utf-8"), "json": (compari
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What is sent; `name` is that of a file for the person to keep, empty for the page."""
+    """What is sent, and by which columns it was compared; `name` is that of a file for the person to keep,
+    empty for the page."""
 
+    columns: StockColumns
     content: bytes
     media_type: str
     name: str = ""
@@ -55,20 +57,12 @@ def compare_upload(store: Path, upload: Path, asked: Mapping[str, str]) -> Answe
     compared = _compared(upload.read_bytes(), records, asked)
     kind = asked.get("format")
     if kind is None:
-        return Answer(msgspec.json.encode(_document(compared)), "application/json")
+        return Answer(compared.columns, msgspec.json.encode(_document(compared)), "application/json")
     if kind not in _FORMATS:
         raise InputError(f"no format is called {kind!r}; choose one of {', '.join(_FORMATS)}")
     write, media_type = _FORMATS[kind]
-    return Answer(write(compared.lines, compared.stock), media_type, f"comparison.{kind}")
-
-
-class _Chosen(msgspec.Struct):
-    chosen: StockColumns
-
-
-def chosen_columns(document: bytes) -> StockColumns:
-    """The columns by which a comparison for the page was made."""
-    return msgspec.json.decode(document, type=_Chosen).chosen
+    content = write(compared.lines, compared.stock)
+    return Answer(compared.columns, content, media_type, f"comparison.{kind}")
 
 
 def column_words(columns: StockColumns) -> dict[str, str]:

@@ -7,7 +7,7 @@ import socket
 
 
 def free_ports(count: int, kind: int = socket.SOCK_DGRAM) -> list[int]:
-    """So many different ones: of UDP, or of TCP where `kind` is SOCK_STREAM."""
+    """So many different ones: of UDP, or of TCP where `kind` is SOCK_STREAM.  OSError where there is none."""
     with contextlib.ExitStack() as stack:
         probes = [stack.enter_context(socket.socket(socket.AF_INET, kind)) for _ in range(count)]
         for probe in probes:
@@ -16,5 +16,6 @@ def free_ports(count: int, kind: int = socket.SOCK_DGRAM) -> list[int]:
 
 
 def free_port(kind: int = socket.SOCK_DGRAM) -> int:
+    """One of them."""
     (port,) = free_ports(1, kind)
     return port

@@ -17,6 +17,7 @@ from flightd.core.geometry import Mount
 from flightd.doctor.check import CheckLevel
 from flightd.doctor.delay import judge_delay
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.free_ports import free_ports
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.floor.renderer import Renderer
@@ -27,7 +28,6 @@ from flightd.site.site_file import load_site
 from flightd.tracking.delay_by_tilt import DelayByTilt
 from tests.command import Command
 from tests.rigs.event_loops import real
-from tests.rigs.free_ports import free_ports
 
 ROOT = Path(__file__).parents[2]
 SITE = load_site(ROOT / "configs" / "site-demo.toml")

@@ -26,12 +26,12 @@ from flightd.adapters.vehicle.mavlink.link.codec import Codec
 from flightd.app.simulation.world_process import run_world
 from flightd.core.topics import Topic
 from flightd.replay.log import read_log
+from flightd.runtime.free_ports import free_ports
 from flightd.runtime.message_channel import Channel
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import SimCamera, wide_lens
 from flightd.sim.world import WorldSpec
 from flightd.site.site_file import load_site
-from tests.rigs.free_ports import free_ports
 
 ROOT = Path(__file__).parents[2]
 SITE_FILE = ROOT / "configs" / "site-demo.toml"

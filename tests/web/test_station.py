@@ -22,8 +22,8 @@ from flightd.ground.drone_link import MOST_ACTS
 from flightd.ground.guards import HEADERS
 from flightd.ground.hub import MOST_BROWSERS
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.free_ports import free_port
 from tests.rigs.event_loops import in_real_time
-from tests.rigs.free_ports import free_port
 from tests.rigs.ground_link import Keyring, address_of, event, local, serving, tell_once, telling
 from tests.rigs.waiting import until
 from tests.web.served import JSON, Station, pictured, served, told, until_told

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from tests.rigs.free_ports import free_ports
+from flightd.runtime.free_ports import free_ports
 from tests.web.chromium import NARROW, ROOT, WIDE, hindrances, opened, running, station
 
 if TYPE_CHECKING:

@@ -10,10 +10,11 @@ import re
 from pathlib import Path
 
 from flightd.core.errors import InputError, UnavailableError
+from flightd.core.paint import PROFILE_NAME
 from flightd.runtime.durable_files import replace_file
 
 MOST_KEPT = 100
-_SENT = re.compile(r"[a-z0-9][a-z0-9-]{0,39}-[0-9a-f]{12}\.npz")
+_SENT = re.compile(rf"{PROFILE_NAME}-[0-9a-f]{{12}}\.npz")
 
 
 def sent_name(name: str, content: bytes) -> str:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import socket
 from dataclasses import dataclass
 
 from flightd.adapters.camera.connect import ARDRONE_URL
 from flightd.app.build import Peers
 from flightd.config.schema import Config
 from flightd.core.errors import UnavailableError
+from flightd.runtime.free_ports import free_ports as free_port_numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,9 +21,14 @@ class WorldPorts:
 
 
 def free_ports(config: Config) -> WorldPorts:
-    """Ports for the vehicle (one, or the AR.Drone's four) and the cameras."""
-    vehicle = tuple(free_port() for _ in range(4 if config.vehicle.kind == "ardrone" else 1))
-    return WorldPorts(vehicle, free_port(), free_port() if config.front_camera.is_fitted else None)
+    """Ports for the vehicle (one, or the AR.Drone's four) and the cameras, which nobody uses now."""
+    vehicles = 4 if config.vehicle.kind == "ardrone" else 1
+    try:
+        ports = free_port_numbers(vehicles + 1 + config.front_camera.is_fitted)
+    except OSError as err:
+        raise UnavailableError(f"no free UDP port on 127.0.0.1: {err.strerror}") from err
+    front = ports[vehicles + 1] if config.front_camera.is_fitted else None
+    return WorldPorts(tuple(ports[:vehicles]), ports[vehicles], front)
 
 
 def peers_at(ports: WorldPorts, config: Config) -> Peers:
@@ -34,13 +39,3 @@ def peers_at(ports: WorldPorts, config: Config) -> Peers:
         return Peers(f"ardrone://127.0.0.1?{query}", ARDRONE_URL, front_url)
     vehicle_url = f"udpout://127.0.0.1:{ports.vehicle[0]}"
     return Peers(vehicle_url, f"udp://127.0.0.1:{ports.camera}", front_url)
-
-
-def free_port() -> int:
-    """A UDP port of the loopback interface that nobody uses now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind(("127.0.0.1", 0))
-        except OSError as err:
-            raise UnavailableError(f"no free UDP port on 127.0.0.1: {err.strerror}") from err
-        return int(probe.getsockname()[1])

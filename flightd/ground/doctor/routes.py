@@ -19,6 +19,7 @@ from starlette.routing import BaseRoute, Route
 
 from flightd.adapters.ground_link.messages.maintenance import SettingsAnswer, Value
 from flightd.core.errors import FlightdError, InputError
+from flightd.core.paint import PROFILE_NAME
 from flightd.ground.access.access import Access
 from flightd.ground.access.gate import identity_of, note_act, person_of
 from flightd.ground.access.roles import Role
@@ -71,7 +72,7 @@ class SendProfile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Send an installed colour profile to the drone: that of `file_hash`."""
 
     base: _Tag
-    profile: Annotated[str, Meta(max_length=40, pattern=r"^[a-z0-9][a-z0-9-]*\Z")]
+    profile: Annotated[str, Meta(max_length=40, pattern=rf"^{PROFILE_NAME}\Z")]
     file_hash: Annotated[str, Meta(max_length=64)]
     person: _Person = ""
 

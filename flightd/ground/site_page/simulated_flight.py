@@ -21,6 +21,7 @@ import msgspec
 from flightd.adapters.ground_link.client import Address
 from flightd.core.errors import RunError, UnavailableError
 from flightd.ground.shown_text import shown
+from flightd.runtime.free_ports import free_ports
 
 SIMULATOR: tuple[str, ...] = (sys.executable, "-m", "flightd", "sim", "--speed", "1")
 """What is started: by the clock, since in lockstep a drone has no ground link."""
@@ -137,7 +138,7 @@ class SimulatedFlight:
 
     async def _flown(self, wanted: _Wanted) -> bool:
         """Whether the simulator calls it good, once it has ended."""
-        status, command = _free_ports()
+        status, command = free_ports(2, socket.SOCK_STREAM)
         settings = (
             "ground.listen=127.0.0.1", f"ground.status_port={status}", f"ground.command_port={command}",
         )  # fmt: skip
@@ -202,10 +203,3 @@ def _last_line(log: Path) -> str:
         return ""
     said = [line.strip() for line in lines if line.strip()]
     return shown(said[-1][:_LINE_CHARS]).removeprefix("flightd: ") if said else ""
-
-
-def _free_ports() -> tuple[int, int]:
-    with socket.socket() as one, socket.socket() as other:
-        for probe in (one, other):
-            probe.bind(("127.0.0.1", 0))
-        return int(one.getsockname()[1]), int(other.getsockname()[1])

@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.paint import checked_paint
+from flightd.core.paint import PROFILE_NAME, checked_paint
 from flightd.ground.plain_files import is_plain_file, is_plain_folder, plain_file
 from flightd.runtime.durable_files import replace_file
 from flightd.vision.training.labelled_frames import LABELS_NAME, LabelledImage, Labels, labels_text
@@ -21,7 +21,7 @@ FOLDER = "studio"
 MOST_SETS, MOST_PICTURES = 100, 400
 MOST_PICTURE_BYTES = 8 << 20
 _MOST_LABELS_BYTES = 16 << 20
-_NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")
+_NAME = re.compile(PROFILE_NAME)
 _PICTURE = re.compile(r"[A-Za-z0-9][A-Za-z0-9-]{0,79}\.jpg")
 
 

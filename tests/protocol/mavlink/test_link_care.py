@@ -18,6 +18,7 @@ from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.core.geometry import wrap_pi
 from flightd.core.refusal import words
 from flightd.core.types import Demand, Event, EventLevel, GridPose
+from flightd.runtime.free_ports import free_port
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.radio import RadioParams
 from tests.protocol.mavlink.scripted_autopilot import (
@@ -29,7 +30,6 @@ from tests.protocol.mavlink.scripted_autopilot import (
     scripted,
 )
 from tests.rigs.event_loops import virtual
-from tests.rigs.free_ports import free_port
 from tests.rigs.vehicles import ardupilot_rig
 
 

@@ -34,13 +34,13 @@ from flightd.core.types import Attitude, Demand, LandedState
 from flightd.ports import CountsDrops
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import ScaledLoop
+from flightd.runtime.free_ports import free_port
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.link import MavlinkChannel, Message
 from flightd.sim.autopilot.px4 import Px4Mode, Px4Peer
 from flightd.sim.plant.airframe import Airframe
 from tests.rigs.event_loops import real, run_in
-from tests.rigs.free_ports import free_port
 from tests.rigs.patient_loop import patient
 from tests.rigs.vehicles import Rig, mavlink_rig, mavsdk_rig
 

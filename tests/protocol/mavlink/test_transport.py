@@ -30,11 +30,11 @@ from flightd.runtime.datagrams import (
     open_datagrams,
     open_paced_datagrams,
 )
+from flightd.runtime.free_ports import free_port
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
 from flightd.sim.plant.airframe import Airframe
 from tests.rigs.event_loops import real, virtual
-from tests.rigs.free_ports import free_port
 from tests.rigs.vehicles import Rig
 
 _TIOCGEXCL = 0x80045440

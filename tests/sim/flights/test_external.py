@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.app.simulation.ports import free_port
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.geometry import wrap_pi
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.free_ports import free_port
 from flightd.sim.external.external_simulator import ExternalVehicle
 from flightd.sim.external.external_truth import Placement, TruthReader
 from flightd.sim.plant.kinematics import Kinematics

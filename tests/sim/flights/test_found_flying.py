@@ -17,7 +17,6 @@ from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.detection.detector_pool import Detection
 from flightd.app.flight_orders import configured_order
-from flightd.app.simulation.ports import free_port
 from flightd.config.schema import Config, load_config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.snapshot import Snapshot
@@ -25,6 +24,7 @@ from flightd.core.types import Command, CommandKind, Demand, Phase
 from flightd.ports import Monitor
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameTicket
+from flightd.runtime.free_ports import free_port
 from flightd.sim.autopilot.copter import CopterMode
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import virtual

@@ -13,8 +13,8 @@ import pytest
 from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.types import CommandKind, Phase
+from flightd.runtime.free_ports import free_ports
 from tests.rigs.event_loops import in_real_time
-from tests.rigs.free_ports import free_ports
 
 ROOT = Path(__file__).parents[3]
 

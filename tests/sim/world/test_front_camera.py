@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from flightd.adapters.camera.shared_memory import SharedCamera
-from flightd.app.simulation.ports import free_port
 from flightd.app.simulation.simulation import Simulation, truth_of
 from flightd.app.simulation.simulator_config import simulator_config
 from flightd.config.schema import Config
@@ -23,6 +22,7 @@ from flightd.core.errors import RunError
 from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
+from flightd.runtime.free_ports import free_port
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera, front_lens

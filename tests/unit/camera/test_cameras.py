@@ -22,8 +22,8 @@ from flightd.core.errors import InputError, TransientError, UnavailableError
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_notice import FrameNotice, encode_notice
 from flightd.runtime.frame_ring import FrameTicket
+from flightd.runtime.free_ports import free_port
 from tests.rigs.event_loops import real, virtual
-from tests.rigs.free_ports import free_port
 
 
 def notice(seq: int, device_ns: int, width: int = 64) -> bytes:

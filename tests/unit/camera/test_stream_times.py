@@ -19,8 +19,8 @@ from flightd.adapters.camera.source import parse_source
 from flightd.core.errors import TransientError
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
+from flightd.runtime.free_ports import free_port
 from tests.rigs.event_loops import real
-from tests.rigs.free_ports import free_port
 from tests.rigs.video_stream import HEIGHT_PX, WIDTH_PX, read_time_ns, sending
 from tests.rigs.waiting import until
 

@@ -8,6 +8,7 @@ import msgspec
 from msgspec import Meta
 
 from flightd.adapters.ground_link.messages.base import ClientRequest, DaemonAnswer
+from flightd.core.paint import PROFILE_NAME
 from flightd.core.preview import CameraName
 
 MOST_PROFILE_BYTES = 16384
@@ -75,7 +76,7 @@ class InstallProfile(ClientRequest, frozen=True, tag="install_profile"):
         str,
         Meta(
             max_length=40,
-            pattern=r"^[a-z0-9][a-z0-9-]*\Z",
+            pattern=rf"^{PROFILE_NAME}\Z",
             description="of the profile: small letters, digits and hyphens",
         ),
     ]
