@@ -9,29 +9,42 @@ import itertools
 import re
 import statistics
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from flightd.core.errors import InputError
+from flightd.site.exchange.listed import listed
+from flightd.site.exchange.low_ways import low_way_tables
+from flightd.site.exchange.places import PlaceAt, rack_tables
 
 _STRAIGHT_M: Final = 0.05
 """Nodes that lie so much beside a line are put onto it."""
 _TOLD_M: Final = 0.01
 _ID: Final = re.compile(r"([A-Z]{1,3})([1-9]\d*)")
 _MOST_NODES: Final = 20_000
-_LISTED: Final = 6
 _LETTERS: Final = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+
+
+@dataclass(frozen=True, slots=True)
+class PadAt:
+    """A pad on a node, and how far its centre lies off it (x, y)."""
+
+    id: str
+    charge: bool = True
+    offset_m: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Graph:
     """`nodes` by name (x, y), metres in the frame of a site; `ways` (from, to), each direction by itself; the
-    nodes with pads, and the names of those."""
+    pads by the nodes that they lie on; the heights below which ways are open; the places for goods."""
 
     name: str
     nodes: Mapping[str, tuple[float, float]]
     ways: Collection[tuple[str, str]]
-    pads: Mapping[str, str] = field(default_factory=dict)
+    pads: Mapping[str, PadAt] = field(default_factory=dict)
+    below_m: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    places: Sequence[PlaceAt] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,33 +60,85 @@ def site_tables(graph: Graph) -> Imported:
     if len(graph.nodes) > _MOST_NODES:
         raise InputError(f"more than {_MOST_NODES} nodes")
     notes: list[str] = []
-    graph = _turned(graph, notes)
+    rows = _rows_by_name(graph)
+    if not rows:
+        graph = _turned(graph, notes)
     along, across, askew = _sorted_ways(graph)
     if askew:
-        notes.append(f"neither along x nor along y, left out: {_listed([f'{a} to {b}' for a, b in askew])}")
-    rows, alone = _rows(graph, along)
+        notes.append(f"neither along x nor along y, left out: {listed([f'{a} to {b}' for a, b in askew])}")
     if not rows:
-        raise InputError("no two nodes are joined by a line along x: there is no aisle")
-    if alone:
-        notes.append(f"on no line along x, left out: {_listed(alone)}")
+        rows, alone = _rows(graph, along)
+        if not rows:
+            raise InputError("no two nodes are joined by a line along x: there is no aisle")
+        if alone:
+            notes.append(f"on no line along x, left out: {listed(alone)}")
     named = list(zip(_names(rows), rows, strict=True))
     renamed = {old: f"{aisle}{i}" for aisle, row in named for i, old in enumerate(row, 1)}
     other = [f"{old} = {new}" for old, new in renamed.items() if old != new]
     if other:
-        notes.append(f"nodes are named by their aisles: {_listed(other)}")
-    pads = {graph.pads[node]: renamed[node] for node in graph.pads if node in renamed}
-    if not pads:
-        pads = {"home": f"{named[0][0]}1"}
-        notes.append(f"no charger is told: the pad is put at {pads['home']}")
-    if "home" not in pads:
-        notes.append(f"missions start at the pad {next(iter(pads))}, unless one is called home")
-    tables = {
-        "site": {"name": graph.name[:80] or "imported"},
+        notes.append(f"nodes are named by their aisles: {listed(other)}")
+    site: dict[str, Any] = {"name": graph.name[:80] or "imported"}
+    tables: dict[str, Any] = {
+        "site": site,
         "aisle": [_aisle(graph, name, row, along, notes) for name, row in named],
         "cross": list(_crosses(across, renamed)),
-        "pad": [{"id": pad[:40], "node": node} for pad, node in pads.items()],
+        "blocked": [{"nodes": [renamed[a], renamed[b]]} for row in rows for a, b in _closed(row, along)],
+        "pad": _pads(graph, renamed, named[0][0], notes),
     }
-    return Imported(tables, tuple(notes))
+    ceiling_m, low = low_way_tables(graph.nodes, graph.ways, graph.below_m, renamed, notes)
+    tables["keep_out"] = low
+    if ceiling_m is not None:
+        site["ceiling_m"] = ceiling_m
+    places = [replace(place, node=renamed[place.node]) for place in graph.places if place.node in renamed]
+    if len(places) < len(graph.places):
+        notes.append(f"{len(graph.places) - len(places)} stations are at nodes that are left out")
+    tables = rack_tables(tables, places, notes)
+    return Imported({name: told for name, told in tables.items() if told or name == "cross"}, tuple(notes))
+
+
+def _pads(graph: Graph, renamed: Mapping[str, str], first: str, notes: list[str]) -> list[dict[str, Any]]:
+    pads = [(renamed[node], pad) for node, pad in graph.pads.items() if node in renamed]
+    if not any(pad.charge for _, pad in pads):
+        taken = {node for node, _ in pads}
+        node = f"{first}1"
+        if node in taken:
+            notes.append(f"no charger is told: the pad at {node} is taken for one")
+            pads = [(at, replace(pad, charge=True) if at == node else pad) for at, pad in pads]
+        else:
+            notes.append(f"no charger is told: the pad is put at {node}")
+            pads.append((node, PadAt("home")))
+    if all(pad.id != "home" for _, pad in pads):
+        notes.append(f"missions start at the pad {pads[0][1].id}, unless one is called home")
+    return [
+        {
+            "id": pad.id[:40],
+            "node": node,
+            **({} if pad.charge else {"charge": False}),
+            **({"offset_m": list(pad.offset_m)} if any(pad.offset_m) else {}),
+        }
+        for node, pad in pads
+    ]
+
+
+def _rows_by_name(graph: Graph) -> list[list[str]]:
+    """The aisles where every node goes by one already: A1, A2, … by rising x on a line.  Empty otherwise."""
+    by_aisle: dict[str, list[tuple[int, str]]] = {}
+    for node in graph.nodes:
+        match = _ID.fullmatch(node)
+        if match is None:
+            return []
+        by_aisle.setdefault(match[1], []).append((int(match[2]), node))
+    rows = []
+    for numbered in by_aisle.values():
+        row = [node for _, node in sorted(numbered)]
+        at = [graph.nodes[node] for node in row]
+        level = max(y for _, y in at) - min(y for _, y in at) <= _STRAIGHT_M
+        rising = all(b[0] - a[0] > _STRAIGHT_M for a, b in itertools.pairwise(at))
+        if len(row) < 2 or not level or not rising or max(numbered)[0] != len(row):
+            return []
+        rows.append(row)
+    rows.sort(key=lambda row: (round(_line_y_m(graph, row), 3), graph.nodes[row[0]][0]))
+    return rows
 
 
 def _turned(graph: Graph, notes: list[str]) -> Graph:
@@ -82,8 +147,15 @@ def _turned(graph: Graph, notes: list[str]) -> Graph:
     if len(across) <= len(along):
         return graph
     notes.append("most lines ran along y: the map is turned by a quarter, x is the old y")
-    nodes = {node: (-y, x) for node, (x, y) in graph.nodes.items()}
-    return Graph(graph.name, nodes, graph.ways, graph.pads)
+    return replace(
+        graph,
+        nodes={node: (0.0 - y, x) for node, (x, y) in graph.nodes.items()},
+        places=[replace(place, x_m=0.0 - place.y_m, y_m=place.x_m) for place in graph.places],
+        pads={
+            node: replace(pad, offset_m=(0.0 - pad.offset_m[1], pad.offset_m[0]))
+            for node, pad in graph.pads.items()
+        },
+    )
 
 
 def _sorted_ways(
@@ -173,15 +245,21 @@ def _aisle(
         "spacing_m": [round(b - a, 6) for a, b in itertools.pairwise(at)],
         "shelves": [],
     }
-    up = {(a, b) in along for a, b in itertools.pairwise(row)}
-    down = {(b, a) in along for a, b in itertools.pairwise(row)}
+    steps = [pair for pair in itertools.pairwise(row) if pair not in _closed(row, along)]
+    up = {(a, b) in along for a, b in steps}
+    down = {(b, a) in along for a, b in steps}
     if up == {True} and down == {False}:
         told["one_way"] = "+x"
     elif up == {False} and down == {True}:
         told["one_way"] = "-x"
-    elif up != {True} or down != {True}:
+    elif False in up | down:
         notes.append(f"aisle {name} is one way in parts only; here it is flown both ways")
     return told
+
+
+def _closed(row: Sequence[str], along: Collection[tuple[str, str]]) -> list[tuple[str, str]]:
+    """The neighbours of a row that no way joins."""
+    return [(a, b) for a, b in itertools.pairwise(row) if (a, b) not in along and (b, a) not in along]
 
 
 def _crosses(across: Sequence[tuple[str, str]], renamed: Mapping[str, str]) -> Iterator[dict[str, Any]]:
@@ -193,8 +271,3 @@ def _crosses(across: Sequence[tuple[str, str]], renamed: Mapping[str, str]) -> I
         told.add(frozenset((a, b)))
         one_way = {} if (b, a) in ways else {"one_way": True}
         yield {"nodes": [renamed[a], renamed[b]], **one_way}
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = len(names) - _LISTED
-    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")

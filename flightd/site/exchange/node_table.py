@@ -13,7 +13,7 @@ from typing import Final
 
 from flightd.core.csv_text import inert
 from flightd.core.errors import InputError
-from flightd.site.exchange.graph import Graph, Imported, site_tables
+from flightd.site.exchange.graph import Graph, Imported, PadAt, site_tables
 from flightd.site.site import Site
 
 COLUMNS: Final = ("node", "x_m", "y_m", "joined_to", "pad")
@@ -78,7 +78,7 @@ def tables_of_rows(rows: Sequence[Sequence[str]]) -> Imported:
             f"the first row names no column {missing[0]!r}", remedy=f"head the table {', '.join(COLUMNS)}"
         )
     nodes: dict[str, tuple[float, float]] = {}
-    pads: dict[str, str] = {}
+    pads: dict[str, PadAt] = {}
     joins: list[tuple[int, str, str]] = []
     for number, row in enumerate(rows[1:], start=2):
         cells = {name: row[column].strip() for name, column in columns.items() if column < len(row)}
@@ -89,7 +89,7 @@ def tables_of_rows(rows: Sequence[Sequence[str]]) -> Imported:
             raise InputError(f"row {number}: node {node!r} comes twice")
         nodes[node] = _metres(cells, "x_m", number), _metres(cells, "y_m", number)
         if cells.get("pad"):
-            pads[node] = cells["pad"]
+            pads[node] = PadAt(cells["pad"])
         joins += [
             (number, node, other) for other in re.split(r"[\s,;|]+", cells.get("joined_to", "")) if other
         ]
