@@ -49,10 +49,13 @@ class Graph:
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """Tables of a site file, and what a person should know of how they came about."""
+    """Tables of a site file, and what a person should know of how they came about.  `names`: what the nodes
+    are called here, by what they were called; `turned`: the map was, by a quarter."""
 
     tables: dict[str, Any]
     notes: tuple[str, ...]
+    names: Mapping[str, str] = field(default_factory=dict)
+    turned: bool = False
 
 
 def site_tables(graph: Graph) -> Imported:
@@ -61,7 +64,8 @@ def site_tables(graph: Graph) -> Imported:
         raise InputError(f"more than {_MOST_NODES} nodes")
     notes: list[str] = []
     rows = _rows_by_name(graph)
-    if not rows:
+    turned = not rows and _runs_along_y(graph)
+    if turned:
         graph = _turned(graph, notes)
     along, across, askew = _sorted_ways(graph)
     if askew:
@@ -90,10 +94,12 @@ def site_tables(graph: Graph) -> Imported:
     if ceiling_m is not None:
         site["ceiling_m"] = ceiling_m
     places = [replace(place, node=renamed[place.node]) for place in graph.places if place.node in renamed]
-    if len(places) < len(graph.places):
-        notes.append(f"{len(graph.places) - len(places)} stations are at nodes that are left out")
+    lost = [place.code for place in graph.places if place.node not in renamed]
+    if lost:
+        notes.append(f"stations at nodes that are left out: {listed(lost)}")
     tables = rack_tables(tables, places, notes)
-    return Imported({name: told for name, told in tables.items() if told or name == "cross"}, tuple(notes))
+    kept = {name: told for name, told in tables.items() if told or name == "cross"}
+    return Imported(kept, tuple(notes), renamed, turned)
 
 
 def _pads(graph: Graph, renamed: Mapping[str, str], first: str, notes: list[str]) -> list[dict[str, Any]]:
@@ -141,11 +147,13 @@ def _rows_by_name(graph: Graph) -> list[list[str]]:
     return rows
 
 
+def _runs_along_y(graph: Graph) -> bool:
+    along, across, _ = _sorted_ways(graph)
+    return len(across) > len(along)
+
+
 def _turned(graph: Graph, notes: list[str]) -> Graph:
     """With most of its ways along x: a site's aisles lie so."""
-    along, across, _ = _sorted_ways(graph)
-    if len(across) <= len(along):
-        return graph
     notes.append("most lines ran along y: the map is turned by a quarter, x is the old y")
     return replace(
         graph,

@@ -122,7 +122,7 @@ def tables_of_lif(document: Any, vehicle: str = "") -> Imported:
         notes.append(f"the file has {len(told.layouts)} layouts; this is the first")
     if len(types) > 1 and not vehicle:
         notes.append(f"the ways of all vehicle types are taken: {', '.join(types)}")
-    return Imported(found.tables, (*found.notes, *notes))
+    return replace(found, notes=(*found.notes, *notes))
 
 
 def _vehicle_types(layout: Layout) -> list[str]:
@@ -196,24 +196,24 @@ def _stations(
     own = {node for station, node in met if station.station_description in _PADS}
     pads: dict[str, PadAt] = {}
     places: list[PlaceAt] = []
-    bare = 0
+    bare: list[str] = []
     for station, node in met:
         if node is None:
-            bare += 1
+            bare.append(station.station_id)
             continue
         # a charger is the first thing on the floor at a node where vehicles charge
         charger = node in charging and node not in own and not station.station_height
         if node not in pads and (charger or station.station_description in _PADS):
             pads[node] = _pad(station, node, nodes, node in charging)
         elif station.station_position is None or station.station_height is None:
-            bare += 1
+            bare.append(station.station_id)
         else:
             x_m, y_m = _place(station.station_position)
             places.append(PlaceAt(station.station_id, node, x_m, y_m, station.station_height))
     for node in charging:
         pads.setdefault(node, PadAt(f"pad-{node}"))
     if bare:
-        notes.append(f"{bare} stations are no chargers: draw the racks that they belong to")
+        notes.append(f"stations without node, height or position, left out: {listed(bare)}")
     return pads, places
 
 

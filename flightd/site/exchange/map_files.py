@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from flightd.core.errors import InputError
 from flightd.site.exchange.graph import Imported
 from flightd.site.exchange.lif import lif_document, tables_of_lif
+from flightd.site.exchange.lif_onto import lif_onto
 from flightd.site.exchange.node_table import locations_csv, nodes_csv
 from flightd.site.floor_plan_svg import draw_site
 from flightd.site.site import Site
@@ -42,13 +43,22 @@ EXPORTS: Final[Mapping[str, MapFormat]] = {
 }
 
 
-def tables_of_lif_file(data: bytes) -> Imported:
-    """The map in a VDMA LIF file.  InputError saying what is wrong with it."""
+def tables_of_lif_file(data: bytes, vehicle: str = "") -> Imported:
+    """The map in a VDMA LIF file, for one type of `vehicle` or for all.  InputError saying what is wrong with
+    it."""
+    return tables_of_lif(_document(data), vehicle)
+
+
+def lif_text_onto(base: bytes, site: Site, now: str, vehicle: str = "") -> str:
+    """The LIF file that a site came from, with what has changed since.  InputError where it did not."""
+    return json.dumps(lif_onto(_document(base), site, now, vehicle), indent=2) + "\n"
+
+
+def _document(data: bytes) -> Any:
     try:
-        document = json.loads(text_of(data))
-    except (json.JSONDecodeError, RecursionError):
+        return json.loads(text_of(data))
+    except (ValueError, RecursionError):  # ValueError: also a whole number of thousands of digits
         raise InputError("this is no JSON, and so no LIF") from None
-    return tables_of_lif(document)
 
 
 def text_of(data: bytes) -> str:
