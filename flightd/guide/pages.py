@@ -18,6 +18,7 @@ TOPICS = (
     "cameras",
     "service",
     "ground-station",
+    "exchange",
     "ground-link",
     "hazards",
     "safety-case",

@@ -19,11 +19,11 @@ _MISSING: Final = re.compile(r"Object missing required field `(?P<key>\w+)`")
 _EXPECTED: Final = re.compile(r"Expected `(?P<kind>\w+)")
 _CHOICE: Final = re.compile(r"Invalid enum value (?P<value>.+)")
 _KINDS: Final = {
-    "object": "no JSON object: this is no LIF",
-    "array": "no list: this is no LIF",
-    "str": "no text",
-    "float": "no number",
-    "bool": "neither true nor false",
+    "object": "is no JSON object: this is no LIF",
+    "array": "is no list: this is no LIF",
+    "str": "is no text",
+    "float": "is no number",
+    "bool": "is neither true nor false",
 }
 _LISTS: Final = {"layouts", "nodes", "edges"}
 _REMEDY: Final = "mend it in the program that wrote it"
@@ -232,8 +232,7 @@ def _refusal(told: str) -> InputError:
     if choice := _CHOICE.match(told):
         value = choice["value"].partition(" - at ")[0]
         known = _CHOICES.get(where.rpartition(".")[2], "")
-        return InputError(f"{where} is {value}", remedy=f"LIF knows {known}")
+        return InputError(f"{where}: LIF does not know {value}", remedy=f"one of {known}")
     expected = _EXPECTED.match(told)
-    return InputError(
-        f"{where} is {_KINDS.get(expected['kind'] if expected else '', 'no number')}", remedy=_REMEDY
-    )
+    kind = _KINDS.get(expected["kind"] if expected else "", "is no number")
+    return InputError(f"{where} {kind}", remedy=_REMEDY)

@@ -14,6 +14,7 @@ from flightd.site.site_file import load_site, site_toml
 from tests.command import Command
 
 DEMO = Path(__file__).parents[3] / "configs" / "site-demo.toml"
+HALL_LIF = Path(__file__).parents[1] / "site" / "hall.lif.json"
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -142,7 +143,9 @@ def test_maps_go_out_to_other_programs_and_come_back_as_the_same_floor(
     site.write_text(site_toml(random_site(4)))
     for kind, ending in (("lif", ".lif.json"), ("csv", "-nodes.csv")):
         out = tmp_path / f"hall{ending}"
-        assert flightd("map", "export", site, "--as", kind)[:2] == (0, f"{out}\n")
+        code, told, _ = flightd("map", "export", site, "--as", kind)
+        assert (code, told.splitlines()[0]) == (0, str(out))
+        assert ("  LIF does not hold aisle.cross_half_m (" in told) == (kind == "lif")
         back = tmp_path / f"{kind}.toml"
         code, told, _ = flightd("map", "import", out, back, "--json")
         assert (code, json.loads(told)["ok"]) == (0, True)
@@ -154,6 +157,29 @@ def test_maps_go_out_to_other_programs_and_come_back_as_the_same_floor(
     code, _, err = flightd("map", "import", tmp_path / "hall-nodes.csv", tmp_path / "csv.toml")
     assert code == 2
     assert "there already" in err
+
+
+def test_a_map_goes_back_onto_the_file_that_it_came_from(flightd: Command, tmp_path: Path) -> None:
+    base, site, out = HALL_LIF, tmp_path / "hall.toml", tmp_path / "out.lif.json"
+    code, told, _ = flightd("map", "import", base, site, "--vehicle", "acme.drone")
+    assert code == 0
+    assert "  of stations not held by a site: stationDescription (1), stationName (1), theta (1)\n" in told
+    onto = ("map", "export", site, "--onto", base, "--vehicle", "acme.drone", "--out", out)
+    assert flightd(*onto)[:2] == (0, f"{out}\n")
+    was, now = json.loads(base.read_text()), json.loads(out.read_text())
+    assert now["layouts"] == was["layouts"]
+    for wrong, words in (
+        (
+            ("map", "import", base, site, "--vehicle", "x"),
+            f"{base}: no vehicle type is called 'x'; the file has",
+        ),
+        ((*onto, "--as", "csv"), "--onto: only a LIF is written onto another; leave out --as"),
+        (("map", "export", site, "--onto", tmp_path), f"{tmp_path}: cannot read it"),
+        (("map", "export", site, "--onto", site), f"{site}: this is no JSON, and so no LIF"),
+    ):
+        code, told, err = flightd(*wrong)
+        assert (code, told) == (2, "")
+        assert err.startswith(f"flightd: {words}")
 
 
 def test_a_map_that_is_not_sound_yet_is_imported_and_says_so(flightd: Command, tmp_path: Path) -> None:
