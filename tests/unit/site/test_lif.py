@@ -103,13 +103,14 @@ def sites(draw: st.DrawFn) -> Site:
             )
         ),
     }  # fmt: skip
+    racked = draw(st.booleans())
     offset = draw(st.sampled_from([[0.0, 0.0], [0.25, -0.3]]))
     tables: dict[str, Any] = {
         "site": {"name": "hall", **draw(st.sampled_from([{}, {"ceiling_m": 6.0}])),
                  "line_width_m": draw(st.sampled_from([0.075, 0.06])), "interlock": draw(st.booleans())},
         "aisle": aisles,
         "cross": crosses,
-        "rack": [rack] if shelved and draw(st.booleans()) else [],
+        "rack": [rack] if shelved and racked else [],
         "pad": [
             {"id": "dock", "node": f"{names[-1]}{last}", "charge": draw(st.booleans()), "offset_m": offset},
             {"id": "home", "node": f"{names[0]}1", "size_m": draw(st.sampled_from([0.5, 0.8]))},
