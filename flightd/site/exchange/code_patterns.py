@@ -44,6 +44,11 @@ def patterns(told: Sequence[tuple[str, Numbers]]) -> Iterator[str]:
         yield "".join(parts)
 
 
+def named(pattern: str) -> int:
+    """How many of bay, level and position a pattern names."""
+    return sum(f"{{{name}" in pattern for name in _NUMBERS)
+
+
 def _parts(column: Sequence[tuple[str, Numbers]]) -> Iterator[str]:
     """What a piece of a pattern may be that gives these pieces of codes."""
     pieces = {piece for piece, _ in column}

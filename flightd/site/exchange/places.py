@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from flightd.site.exchange.code_patterns import Numbers, patterns
+from flightd.site.exchange.code_patterns import Numbers, named, patterns
 from flightd.site.exchange.listed import listed
 from flightd.site.racks import RackError, place_locations
 from flightd.site.site import Location, Node, Rack, Shelf, Side, Site
@@ -104,7 +104,7 @@ def _racks(site: Site, by_side: _Row) -> dict[tuple[str, Side], Rack]:
 
 
 def _candidates(key: tuple[str, Side], places: Sequence[PlaceAt], shelves: Sequence[Shelf]) -> Iterator[Rack]:
-    """Racks that may hold the places of one side, from the fewest in a bay on."""
+    """Racks that may hold the places of one side, the likeliest first."""
     levels_m = _distinct(place.height_m for place in places)
     columns_m = _distinct(place.x_m for place in places)
     on = [[x for x in columns_m if shelf.x0_m <= x <= shelf.x1_m] for shelf in shelves]
@@ -112,13 +112,16 @@ def _candidates(key: tuple[str, Side], places: Sequence[PlaceAt], shelves: Seque
     if not on or len(levels_m) * len(columns_m) != len(places) or sum(map(len, on)) != len(columns_m):
         return
     steps_m = [b - a for columns in on for a, b in itertools.pairwise(columns)]
-    for positions in range(1, min(_MOST_POSITIONS, *map(len, on)) + 1):
-        if any(len(columns) % positions for columns in on):
-            continue
-        told = _numbers(key, places, levels_m, on, positions)
-        for pattern in patterns(told):
-            for bay_m in _bay_widths(steps_m, positions, shelves):
-                yield Rack((key[0],), bay_m, levels_m, positions, (key[1],), pattern)
+    divided = [
+        (pattern, positions)
+        for positions in range(1, min(_MOST_POSITIONS, *map(len, on)) + 1)
+        if all(len(columns) % positions == 0 for columns in on)
+        for pattern in patterns(_numbers(key, places, levels_m, on, positions))
+    ]
+    # where codes can be read in several ways, by the one that tells most
+    for pattern, positions in sorted(divided, key=lambda one: -named(one[0])):
+        for bay_m in _bay_widths(steps_m, positions, shelves):
+            yield Rack((key[0],), bay_m, levels_m, positions, (key[1],), pattern)
 
 
 def _bay_widths(steps_m: Sequence[float], positions: int, shelves: Sequence[Shelf]) -> list[float]:

@@ -54,8 +54,8 @@ def held(site: Site) -> dict[str, Any]:
         "ways": {way: near(m) if math.isfinite(m) else m for way, m in ways_of(site).items()},
         "pads": [(pad.id, pad.node, pad.charge, tuple(map(near, pad.offset_m))) for pad in site.pads],
         "places": {
-            place.code: (place.aisle, place.side, place.bay, place.level, place.position, place.node,
-                         near(place.x_m), near(place.y_m), near(place.height_m))
+            place.code: (place.aisle, place.side, place.level, place.node, near(place.x_m), near(place.y_m),
+                         near(place.height_m))
             for place in site.locations.values()
         },
     }  # fmt: skip
@@ -138,7 +138,7 @@ def sites(draw: st.DrawFn) -> Site:
     return site
 
 
-@settings(max_examples=35, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(site=sites())
 def test_a_site_comes_back_from_lif_with_all_that_lif_can_hold(site: Site) -> None:
     found = tables_of_lif(lif_document(site, WRITTEN))
@@ -148,10 +148,12 @@ def test_a_site_comes_back_from_lif_with_all_that_lif_can_hold(site: Site) -> No
     told = {line.removeprefix("LIF does not hold ").partition(" ")[0] for line in lif_losses(site)}
     assert told <= {
         "site.line_width_m", "site.interlock", "aisle.shelves", "aisle.shelf_height_m", "aisle.overrun_m",
-        "aisle.shelf_distance_m", "aisle.one_way", "pad.size_m", "keep_out", "site.ceiling_m",
+        "aisle.shelf_distance_m", "aisle.one_way", "pad.size_m", "keep_out", "rack", "site.ceiling_m",
         "site.ceiling_given",
     }  # fmt: skip
     assert ("site.interlock" in told) == site.interlock
+    if "rack" in told:  # codes of a single bay or place leave open which of the two they number
+        assert any(again.locations[code].position != place.position for code, place in site.locations.items())
     if "aisle.one_way" in told:  # of an aisle that is closed from end to end LIF has no way at all
         open_aisles = {
             site.nodes[a].aisle for a, b in ways_of(site) if site.nodes[a].aisle == site.nodes[b].aisle
