@@ -22,8 +22,9 @@ _ACTION: Final = Table(
 def _clamped(trajectory: Object) -> Object:
     """Degree and knots are required here: those that are meant where none are given."""
     degree = trajectory.get("degree", 1)
-    inner = max(len(trajectory["controlPoints"]) - degree, 1)
-    even = [0.0] * degree + [i / inner for i in range(inner + 1)] + [1.0] * degree
+    spans = len(trajectory["controlPoints"]) - degree
+    # without enough points for its degree it is no curve, and has no knots
+    even = [0.0] * degree + [i / spans for i in range(spans + 1)] + [1.0] * degree if spans > 0 else []
     return {**trajectory, "degree": degree, "knotVector": trajectory.get("knotVector", even)}
 
 

@@ -41,7 +41,7 @@ def check(message: Header, version: Version) -> bytes:
 
 
 @pytest.mark.parametrize("kind", TOPICS)
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(data=st.data())
 def test_a_message_is_valid_and_comes_back_in_both_versions(kind: type[Header], data: st.DataObject) -> None:
     message = data.draw(messages(kind))
@@ -144,7 +144,7 @@ _junk = st.recursive(
 )
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(kind=st.sampled_from(list(TOPICS)), version=st.sampled_from(Version), data=st.data())
 def test_any_value_in_a_message_is_taken_or_refused(
     kind: type[Header], version: Version, data: st.DataObject

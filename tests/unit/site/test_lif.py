@@ -138,7 +138,7 @@ def sites(draw: st.DrawFn) -> Site:
     return site
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(site=sites())
 def test_a_site_comes_back_from_lif_with_all_that_lif_can_hold(site: Site) -> None:
     found = tables_of_lif(lif_document(site, WRITTEN))
@@ -229,7 +229,7 @@ _EXTRAS = st.fixed_dictionaries(
 )  # fmt: skip
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     extras=st.lists(
         st.tuples(st.sampled_from(["nodes", "edges", "stations"]), st.integers(0, 20), _EXTRAS), max_size=5
