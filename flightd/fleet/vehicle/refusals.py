@@ -1,0 +1,124 @@
+"""What an order is refused for before it is compared with the one that is flown."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+from flightd.core.errors import InputError
+from flightd.fleet.vda5050.errors import ErrorType
+from flightd.fleet.vda5050.order import Order
+from flightd.fleet.vda5050.parts import Action
+from flightd.fleet.vehicle.abilities import ABILITIES
+from flightd.fleet.vehicle.floor import Floor
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """`error` says what kind, `what` is for people; `about` are further references, key and value."""
+
+    error: ErrorType
+    what: str
+    about: tuple[tuple[str, str], ...] = ()
+
+
+def malformation(order: Order, known_actions: Collection[str]) -> Refusal | None:
+    """Why an order is none by its form; `known_actions` are the ids of those that it may not have again."""
+    for what in _malformations(order, known_actions):
+        return Refusal(ErrorType.VALIDATION_FAILURE, what)
+    return None
+
+
+def _malformations(order: Order, known_actions: Collection[str]) -> Iterator[str]:
+    nodes, edges = order.nodes, order.edges
+    if not nodes:
+        yield "nodes: there is none"
+        return
+    if len(edges) != len(nodes) - 1:
+        yield f"edges: {len(edges)} for {len(nodes)} nodes; one less than nodes"
+        return
+    first = nodes[0].sequence_id
+    for i, node in enumerate(nodes):
+        if node.sequence_id != first + 2 * i:
+            yield f"nodes[{i}].sequenceId: {node.sequence_id}, not {first + 2 * i}"
+    for i, edge in enumerate(edges):
+        if edge.sequence_id != first + 2 * i + 1:
+            yield f"edges[{i}].sequenceId: {edge.sequence_id}, not {first + 2 * i + 1}"
+    if not nodes[0].released:
+        yield "nodes[0].released: the first node has to be"
+    for i, (edge, (start, end)) in enumerate(zip(edges, itertools.pairwise(nodes), strict=True)):
+        if edge.released and not (start.released and end.released):
+            yield f"edges[{i}].released: its nodes are not"
+        if end.released and not edge.released:
+            yield f"nodes[{i + 1}].released: the edge before it is not"
+    ids = [action.action_id for part in (*nodes[1:], *edges) for action in part.actions]
+    doubled = [one for one in ids if ids.count(one) > 1 or one in known_actions] if len(ids) < 10_000 else []
+    if doubled:
+        yield f"actionId {doubled[0]!r} comes twice"
+
+
+def impossibility(order: Order, floor: Floor, unusable: Collection[str]) -> Refusal | None:
+    """Why an order of good form cannot be flown here: optional fields (`unusable`, by the names of the model),
+    actions, the map, ways."""
+    return (
+        _unusable_field(order, unusable)
+        or _impossible_action(order, floor)
+        or _other_map(order, floor)
+        or _no_way(order, floor)
+    )
+
+
+def _unusable_field(order: Order, unusable: Collection[str]) -> Refusal | None:
+    for i, edge in enumerate(order.edges):
+        for name in sorted(unusable):
+            if getattr(edge, name, None) is not None:
+                what = f"edges[{i}].{name}"
+                return Refusal(
+                    ErrorType.UNSUPPORTED_PARAMETER, f"{what} cannot be used", (("parameter", what),)
+                )
+    return None
+
+
+def _impossible_action(order: Order, floor: Floor) -> Refusal | None:
+    for edge in order.edges:
+        for action in edge.actions:
+            return _action_refusal(action, "actionType", f"no action is done on edges: {action.action_type}")
+    for node in order.nodes:
+        for action in node.actions:
+            ability = ABILITIES.get(action.action_type)
+            if ability is None:
+                return _action_refusal(action, "actionType", f"no action is called {action.action_type!r}")
+            if action.blocking_type not in ability.blocking:
+                return _action_refusal(action, "blockingType", f"{action.blocking_type} is not supported")
+            try:
+                ability.check(action, node.node_id, floor)
+            except InputError as err:
+                return _action_refusal(action, err.key, f"{action.action_type}: {err.key}: {err.what}")
+    return None
+
+
+def _action_refusal(action: Action, field: str, what: str) -> Refusal:
+    about = (("actionId", action.action_id), ("parameter", field))
+    return Refusal(ErrorType.INVALID_ORDER_ACTION, what, about)
+
+
+def _other_map(order: Order, floor: Floor) -> Refusal | None:
+    for node in order.nodes:
+        if node.node_position is not None and node.node_position.map_id != floor.map_id:
+            told = node.node_position.map_id
+            return Refusal(ErrorType.UNKNOWN_MAP_ID, f"no map is called {told!r}", (("mapId", told),))
+    return None
+
+
+def _no_way(order: Order, floor: Floor) -> Refusal | None:
+    names: Sequence[str] = [node.node_id for node in order.nodes]
+    for name in names[1:]:
+        if name not in floor.nodes:
+            return Refusal(ErrorType.NO_ROUTE_TO_TARGET, f"there is no node {name!r}", (("nodeId", name),))
+    for start, end in itertools.pairwise(names):
+        # where the first node is no place of the floor, the drone stands there: on the way to the next
+        if start in floor.nodes and start != end and (start, end) not in floor.ways:
+            what = f"no open way leads from {start} to {end}"
+            return Refusal(ErrorType.NO_ROUTE_TO_TARGET, what, (("nodeId", end),))
+    return None
