@@ -37,7 +37,7 @@ class ScanShelf:
 
 @dataclass(frozen=True, slots=True)
 class Ability:
-    """An action of orders.  `check` refuses (InputError, its key a parameter) what cannot be done at a node."""
+    """An action of orders.  `check` raises InputError for what a node does not allow, its key a parameter."""
 
     check: Callable[[Action, str, Floor], object]
     blocking: frozenset[BlockingType]

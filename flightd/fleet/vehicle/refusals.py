@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from flightd.core.errors import InputError
 from flightd.fleet.vda5050.errors import ErrorType
-from flightd.fleet.vda5050.order import Order
+from flightd.fleet.vda5050.order import Node, Order
 from flightd.fleet.vda5050.parts import Action
 from flightd.fleet.vehicle.abilities import ABILITIES
 from flightd.fleet.vehicle.floor import Floor
@@ -23,14 +23,17 @@ class Refusal:
     about: tuple[tuple[str, str], ...] = ()
 
 
-def malformation(order: Order, known_actions: Collection[str]) -> Refusal | None:
-    """Why an order is none by its form; `known_actions` are the ids of those that it may not have again."""
-    for what in _malformations(order, known_actions):
+def malformation(order: Order, known_actions: Collection[str], *, is_new: bool) -> Refusal | None:
+    """Why an order is none by its form; `known_actions` are the ids of those that it may not have again.  An
+    update has those of its first node again, and any number to begin with."""
+    if is_new and order.nodes and order.nodes[0].sequence_id:
+        return Refusal(ErrorType.VALIDATION_FAILURE, "nodes[0].sequenceId: a new order begins with 0")
+    for what in _malformations(order, order.nodes if is_new else order.nodes[1:], known_actions):
         return Refusal(ErrorType.VALIDATION_FAILURE, what)
     return None
 
 
-def _malformations(order: Order, known_actions: Collection[str]) -> Iterator[str]:
+def _malformations(order: Order, added: Sequence[Node], known_actions: Collection[str]) -> Iterator[str]:
     nodes, edges = order.nodes, order.edges
     if not nodes:
         yield "nodes: there is none"
@@ -45,22 +48,28 @@ def _malformations(order: Order, known_actions: Collection[str]) -> Iterator[str
     for i, edge in enumerate(edges):
         if edge.sequence_id != first + 2 * i + 1:
             yield f"edges[{i}].sequenceId: {edge.sequence_id}, not {first + 2 * i + 1}"
-    if not nodes[0].released:
+    yield from _releases(order)
+    met = set(known_actions)
+    for actions in (*(node.actions for node in added), *(edge.actions for edge in edges)):
+        for action in actions:
+            if action.action_id in met:
+                yield f"actionId {action.action_id!r} comes twice"
+            met.add(action.action_id)
+
+
+def _releases(order: Order) -> Iterator[str]:
+    if not order.nodes[0].released:
         yield "nodes[0].released: the first node has to be"
-    for i, (edge, (start, end)) in enumerate(zip(edges, itertools.pairwise(nodes), strict=True)):
+    for i, (edge, (start, end)) in enumerate(zip(order.edges, itertools.pairwise(order.nodes), strict=True)):
         if edge.released and not (start.released and end.released):
             yield f"edges[{i}].released: its nodes are not"
         if end.released and not edge.released:
             yield f"nodes[{i + 1}].released: the edge before it is not"
-    ids = [action.action_id for part in (*nodes[1:], *edges) for action in part.actions]
-    doubled = [one for one in ids if ids.count(one) > 1 or one in known_actions] if len(ids) < 10_000 else []
-    if doubled:
-        yield f"actionId {doubled[0]!r} comes twice"
 
 
 def impossibility(order: Order, floor: Floor, unusable: Collection[str]) -> Refusal | None:
-    """Why an order of good form cannot be flown here: optional fields (`unusable`, by the names of the model),
-    actions, the map, ways."""
+    """Why an order of good form cannot be flown here: optional fields (`unusable`, by their names in the
+    model), actions, the map, ways."""
     return (
         _unusable_field(order, unusable)
         or _impossible_action(order, floor)

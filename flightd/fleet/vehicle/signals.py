@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from flightd.fleet.vda5050.codec import MalformedError
 from flightd.fleet.vda5050.factsheet import Factsheet
@@ -16,6 +17,8 @@ from flightd.fleet.vda5050.state import (
     SafetyState,
     State,
 )
+
+_SAFE: Final = SafetyState(active_emergency_stop=EmergencyStop.NONE, field_violation=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +39,7 @@ class Situation:
     node: str | None = None
     position: MobileRobotPosition | None = None
     velocity: Velocity | None = None
-    safety: SafetyState = SafetyState(active_emergency_stop=EmergencyStop.NONE, field_violation=False)
+    safety: SafetyState = _SAFE
 
 
 @dataclass(frozen=True, slots=True)
