@@ -139,5 +139,5 @@ class InstantBook:
             action_status=status,
         )
         over = [name for name, one in self._states.items() if one.action_status.is_over]
-        for name in over[: len(over) - _MOST_KEPT]:
+        for name in over[: max(0, len(over) - _MOST_KEPT)]:
             del self._states[name]

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import json
-from pathlib import Path
 from typing import Any
 
-import jsonschema
 import msgspec
 import pytest
 from hypothesis import given, settings
@@ -20,24 +17,7 @@ from flightd.fleet.vda5050.order import InstantActions, Order
 from flightd.fleet.vda5050.parts import Header
 from flightd.fleet.vda5050.state import Connection, State, Visualization
 from tests.unit.fleet.drawn import messages
-
-SCHEMAS = Path(__file__).parent / "schemas"
-FOLDERS = {Version.V2_1: "2.1.0", Version.V3_0: "3.0"}
-
-
-@functools.cache
-def validator(version: Version, topic: str) -> Any:
-    schema = json.loads((SCHEMAS / FOLDERS[version] / f"{topic}.schema").read_text())
-    kind = jsonschema.validators.validator_for(schema)
-    kind.check_schema(schema)
-    return kind(schema)
-
-
-def check(message: Header, version: Version) -> bytes:
-    """The message as it is sent, valid by the schema."""
-    data = encoded(message, version)
-    validator(version, TOPICS[type(message)]).validate(json.loads(data))
-    return data
+from tests.unit.fleet.vehicle_rig import check
 
 
 @pytest.mark.parametrize("kind", TOPICS)
