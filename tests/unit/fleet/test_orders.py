@@ -267,7 +267,8 @@ def test_an_order_with_a_field_that_cannot_be_used_is_refused_by_its_name(
 ) -> None:
     value = {"trajectory": Trajectory(control_points=[]), "direction": "left"}.get(field, 1.0)
     drone = Drone(version)
-    drone.say(order("A1 A2", **{field: value}))
+    more: dict[str, Any] = {field: value}
+    drone.say(order("A1 A2", **more))
     assert drone.errors == ["UNSUPPORTED_PARAMETER"]
     assert drone.state.errors[0].error_level == "CRITICAL"
     assert drone.about("parameter") == [f"edges[0].{field}"]

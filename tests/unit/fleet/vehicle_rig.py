@@ -1,4 +1,4 @@
-"""A vehicle of VDA 5050 without a drone: what it is told, what it answers, each message held to the schema."""
+"""A vehicle of VDA 5050 without a drone: what it is told, what it answers, all held to the schemas."""
 
 from __future__ import annotations
 
@@ -77,12 +77,7 @@ def order(
     """An order along `way`, its first `released` nodes released; sequence ids from `first` on."""
     ids, told = way.split(), actions or {}
     nodes = [
-        Node(
-            node_id=one,
-            sequence_id=first + 2 * i,
-            released=i < released,
-            actions=(actions or {}).get(one, []),
-        )
+        Node(node_id=one, sequence_id=first + 2 * i, released=i < released, actions=told.get(one, []))
         for i, one in enumerate(ids)
     ]
     edges = [
