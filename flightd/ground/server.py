@@ -8,9 +8,10 @@ import ipaddress
 import re
 import signal
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 
@@ -135,6 +136,7 @@ def run(
     folder: Path | None = None,
     viewers: Sequence[Viewer] = (),
     others: Sequence[ReadFolder] = (),
+    beside: Sequence[Callable[[], Coroutine[Any, Any, None]]] = (),
 ) -> signal.Signals | None:
     """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had,
     InputError where it must not be listened at (`check_reach`)."""
@@ -144,7 +146,7 @@ def run(
 
     async def until_signal() -> None:
         serving = asyncio.ensure_future(
-            serve(drones, listener, where, access, on_ready, certificate, folder, viewers, others)
+            serve(drones, listener, where, access, on_ready, certificate, folder, viewers, others, beside)
         )
         end_on_signals(serving, came)
         with contextlib.suppress(asyncio.CancelledError):
@@ -165,9 +167,11 @@ async def serve(
     folder: Path | None = None,
     viewers: Sequence[Viewer] = (),
     others: Sequence[ReadFolder] = (),
+    beside: Sequence[Callable[[], Coroutine[Any, Any, None]]] = (),
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
-    end; inventories and flights lie under `folder` and the `others`; `viewers` are told what pages are."""
+    end; inventories and flights lie under `folder` and the `others`; `viewers` are told what pages are;
+    `beside` runs as long as the station."""
     hub, flights, uploads = Hub(drones, viewers), Flights(folder, others=others), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
     simulated = None if folder is None else SimulatedFlight(hub, folder, where.is_beyond)
@@ -198,6 +202,7 @@ async def serve(
     async with asyncio.TaskGroup() as tasks:
         station = tasks.create_task(hub.run(), name="hub")
         tasks.create_task(flights.run(), name="flights")
+        running = [tasks.create_task(one(), name="beside the station") for one in beside]
         if studio is not None:
             tasks.create_task(studio.run(), name="studio")
         if simulated is not None:
@@ -212,6 +217,8 @@ async def serve(
             await station
         finally:
             server.should_exit = True
+            for one in running:
+                one.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.shield(asyncio.wait([serving], timeout=_LEAVE_S + 2.0))
             uploads.close()

@@ -19,6 +19,7 @@ from flightd.core.errors import InputError
 if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import Address
     from flightd.ground.foxglove_view.live_server import FoxgloveServer
+    from flightd.ground.mqtt.fleet_link import FleetLink
     from flightd.ground.read_folders import ReadFolder
     from flightd.ground.server import Listening
 
@@ -30,6 +31,7 @@ EXAMPLES = """Examples:
   flightd ground --folder out                  with the flights and inventories under out
   flightd ground --listen 127.0.0.1:9000
   flightd ground --foxglove 127.0.0.1          for Foxglove, too: it connects to ws://127.0.0.1:8765
+  flightd ground --mqtt mqtt://broker --mqtt-version 3.0    for a fleet's manager, by VDA 5050
   flightd ground --listen 0.0.0.0:8443 --tls-cert station.pem --tls-key station.key    for others, who sign in
 """
 
@@ -99,6 +101,21 @@ def ground(
             show_default=False,
         ),
     ] = None,
+    mqtt: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL",
+            envvar="FLIGHTD_MQTT",
+            help="Tell a fleet's manager of the drones, too, by VDA 5050 at this broker:"
+            " mqtt[s]://[USER:PASSWORD@]HOST[:PORT].",
+            show_default=False,
+        ),
+    ] = None,
+    mqtt_version: Annotated[str, typer.Option(metavar="VERSION", help="Of VDA 5050: 2.1 or 3.0.")] = "2.1",
+    mqtt_body: Annotated[
+        str,
+        typer.Option(metavar="LxWxH", help="The drones' size with propellers, m, for their factsheets."),
+    ] = "0.6x0.6x0.3",
     state: State = None,
 ) -> None:
     """Watch and command drones in the browser: map, cameras, hazards, events; start, pause, go to, STOP.
@@ -133,8 +150,12 @@ def ground(
         if foxglove is not None:
             viewer = stack.enter_context(_foxglove_server(foxglove, access.login, drones))
         at = "" if viewer is None else viewer.url
-        viewers = () if viewer is None else (viewer,)
-        ended_by = run(drones, where, partial(_say_where, at), access, certificate, folder, viewers, others)
+        fleet = None if mqtt is None else _fleet_link(mqtt, mqtt_version, mqtt_body, drones)
+        viewers = tuple(one for one in (viewer, fleet) if one is not None)
+        beside = () if fleet is None else (fleet.run,)
+        ended_by = run(
+            drones, where, partial(_say_where, at), access, certificate, folder, viewers, others, beside
+        )
     if ended_by is not None:
         print(f"flightd: the ground station was ended by {ended_by.name}", file=sys.stderr)
 
@@ -165,6 +186,19 @@ def _foxglove_server(address: str, login: bool, drones: Sequence[tuple[str, Addr
 
         raise missing_extra("foxglove", "flightd ground --foxglove") from None
     return FoxgloveServer(where, [name for name, _ in drones])
+
+
+def _fleet_link(url: str, version: str, body: str, drones: Sequence[tuple[str, Address]]) -> FleetLink:
+    from flightd.ground.mqtt.broker_address import read_body, read_broker, read_version
+
+    broker, of, measures = read_broker(url), read_version(version), read_body(body)
+    try:
+        from flightd.ground.mqtt.fleet_link import FleetLink
+    except ModuleNotFoundError:
+        from flightd.core.extras import missing_extra
+
+        raise missing_extra("ground", "flightd ground --mqtt") from None
+    return FleetLink([name for name, _ in drones], broker, of, measures)
 
 
 def _say_where(foxglove: str, where: Listening) -> None:

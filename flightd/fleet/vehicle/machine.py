@@ -8,7 +8,7 @@ The rules are those of the standard's chapters on orders, their update, cancella
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any, Final, TypeVar
 
@@ -125,9 +125,17 @@ class Vehicle:
         out += self._settle()
         wants_state = self._instant.take_state_request()
         if self._instant.take_factsheet_request():
-            out.append(self._with_header(self._factsheet, now))
+            out.append(self.factsheet(now))
         out += self._states(now, wants_state)
         return tuple(out)
+
+    def change_floor(self, floor: Floor) -> None:
+        """The drone was started anew, perhaps with another map; orders are checked by this one."""
+        self._acceptance = replace(self._acceptance, floor=floor)
+
+    def factsheet(self, now: datetime) -> Factsheet:
+        """The message on the topic `factsheet`."""
+        return self._with_header(self._factsheet, now)
 
     def connection(self, state: ConnectionState, now: datetime) -> Connection:
         """The message on the topic `connection`."""
@@ -355,7 +363,8 @@ class Vehicle:
             instant_action_states=instant,
             power_supply=seen.power,
             operating_mode=self._mode,
-            errors=self._errors.states(),
+            errors=[*self._errors.states(), *seen.errors],
+            information=list(seen.information) or None,
             safety_state=seen.safety,
         )
 

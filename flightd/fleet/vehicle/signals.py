@@ -12,6 +12,8 @@ from flightd.fleet.vda5050.parts import Action, MobileRobotPosition, Velocity
 from flightd.fleet.vda5050.state import (
     ActionStatus,
     EmergencyStop,
+    Error,
+    Info,
     OperatingMode,
     PowerSupply,
     SafetyState,
@@ -31,7 +33,8 @@ class Malformed:
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """How the drone is.  `node`: the one that it stands on; `driving`: whether it moves, or turns."""
+    """How the drone is.  `node`: the one that it stands on; `driving`: whether it moves, or turns; `errors`
+    and `information` of its own, beside what is said of orders."""
 
     mode: OperatingMode
     driving: bool
@@ -40,6 +43,8 @@ class Situation:
     position: MobileRobotPosition | None = None
     velocity: Velocity | None = None
     safety: SafetyState = _SAFE
+    errors: tuple[Error, ...] = ()
+    information: tuple[Info, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

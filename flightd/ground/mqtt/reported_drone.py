@@ -1,0 +1,86 @@
+"""A drone as its ground link tells it, in the words of VDA 5050.
+
+Whoever flies it flies it by flightd: a fleet control looks on, as at a vehicle in MANUAL.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from flightd.adapters.ground_link.messages.floor import FloorStatus
+from flightd.adapters.ground_link.messages.published import HazardReport, StatusReport
+from flightd.fleet.vda5050.errors import ErrorType, level_of
+from flightd.fleet.vda5050.parts import MobileRobotPosition, Velocity
+from flightd.fleet.vda5050.state import Error, ErrorLevel, Info, InfoLevel, OperatingMode, PowerSupply
+from flightd.fleet.vehicle.floor import Floor
+from flightd.fleet.vehicle.signals import Situation
+
+_DRIVES_MPS: Final = 0.05
+_ON_NODE_M: Final = 0.3
+_WATCHES: Final = "report"
+"""The action of a hazard about which the drone does nothing but tell."""
+
+
+def floor_of_link(floor: FloorStatus) -> Floor:
+    """The map by its name; no order is taken, so that its ways do not matter."""
+    return Floor(floor.name, frozenset(node.id for node in floor.nodes), frozenset(), {})
+
+
+def situation_of(status: StatusReport, floor: FloorStatus) -> Situation:
+    """How the drone is: y to the left, angles counter-clockwise."""
+    vehicle, at = status.vehicle, status.position
+    position = velocity = None
+    if at is not None:
+        sigmas = [sigma for sigma in (at.sigma_x_m, at.sigma_y_m) if sigma is not None]
+        position = MobileRobotPosition(
+            x=round(at.x_m, 3),
+            y=round(0.0 - at.y_m, 3) + 0.0,
+            theta=round(math.remainder(-at.yaw_rad, math.tau), 4) + 0.0,
+            map_id=floor.name,
+            localized=True,
+            localization_score=min(max(at.integrity, 0.0), 1.0),
+            deviation_range=round(max(sigmas), 3) if sigmas else None,
+        )
+        velocity = Velocity(vx=round(at.speed_mps, 2))
+    charge = vehicle.battery_frac if vehicle else None
+    return Situation(
+        mode=OperatingMode.MANUAL,
+        driving=at is not None and at.speed_mps > _DRIVES_MPS,
+        power=PowerSupply(
+            state_of_charge=round(100.0 * min(max(charge or 0.0, 0.0), 1.0)),
+            charging=False,
+            battery_voltage=vehicle.battery_v if vehicle else None,
+        ),
+        node=_node_under(status, floor),
+        position=position,
+        velocity=velocity,
+        errors=(*_lost(status), *map(_error, status.hazards)),
+        information=(Info(info_type="phase", info_level=InfoLevel.INFO, info_descriptor=status.phase.value),),
+    )
+
+
+def _node_under(status: StatusReport, floor: FloorStatus) -> str | None:
+    at = status.position
+    if at is None:
+        return None
+    near = [node for node in floor.nodes if math.hypot(node.x_m - at.x_m, node.y_m - at.y_m) <= _ON_NODE_M]
+    return near[0].id if near else None
+
+
+def _lost(status: StatusReport) -> list[Error]:
+    flies = status.vehicle is not None and status.vehicle.armed
+    if not flies or status.position is not None:
+        return []
+    kind = ErrorType.LOCALIZATION_ERROR
+    return [Error(error_type=kind, error_level=level_of(kind), error_description=status.reason)]
+
+
+def _error(hazard: HazardReport) -> Error:
+    level = ErrorLevel.WARNING if hazard.action == _WATCHES else ErrorLevel.URGENT
+    return Error(
+        error_type="HAZARD",
+        error_level=level,
+        error_description=hazard.text,
+        error_hint=f"the drone does: {hazard.action}",
+    )
