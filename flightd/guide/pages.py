@@ -19,6 +19,7 @@ TOPICS = (
     "service",
     "ground-station",
     "exchange",
+    "fleet",
     "ground-link",
     "hazards",
     "safety-case",
