@@ -55,6 +55,7 @@ _OVER_PAD_M = 0.5
 _CLIMBS_UNSEEING_S = 1.0
 """So long a take-off, which hardly steers, goes on without a picture."""
 _VISITED = (Trigger.DWELLED, Trigger.ROUTE_DONE)
+_RANK = {trigger: rank for rank, trigger in enumerate(Trigger)}
 
 
 class Mission:
@@ -320,7 +321,7 @@ class Mission:
             reported &= taken_in(self.state)
         elif self.phase in _NEAR_FLOOR:
             reported &= taken_in(self.state) | triggers_of(Action.REPORT, Action.HOME)
-        for trigger in sorted(reported, key=list(Trigger).index):
+        for trigger in sorted(reported, key=_RANK.__getitem__):
             self._events.hazard(now_ns, trigger, ACTIONS[trigger].value)
 
     def _situation(self, paused: bool) -> FlightContext:
