@@ -1,7 +1,9 @@
 """The safety case of the guide: each hazard with its cause, how it is found and answered, and the evidence.
 
-python -m tools.safety_case SWEEP.json...   # the evidence is what flightd sim --scenario all --seeds N --json
-                                            # printed; then run python -m tools.write_guide
+python -m tools.safety_case SWEEP.json... [--pairs PAIRS.json...]
+
+The evidence is what flightd sim --scenario all --seeds N --json printed, and what python -m
+tests.sim.hazards.hazard_pairs N --json wrote; then run python -m tools.write_guide.
 """
 
 from __future__ import annotations
@@ -41,6 +43,18 @@ def evidence_of(flights: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any
     return found
 
 
+def evidence_of_pairs(flights: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What flights with two random faults each show: how many there were and were safe, the worst figures."""
+    nearest = [flight["min_clearance_m"] for flight in flights if flight["min_clearance_m"] is not None]
+    above = [flight["max_overshoot_m"] for flight in flights if flight["max_overshoot_m"] is not None]
+    return {
+        "flights": len(flights),
+        "safe": sum(not flight["unsafe"] for flight in flights),
+        "min_clearance_m": min(nearest, default=None),
+        "max_overshoot_m": max(above, default=None),
+    }
+
+
 def markdown() -> str:
     """The table as the guide prints it."""
     told = json.loads(EVIDENCE.read_text(encoding="utf-8"))
@@ -57,6 +71,12 @@ def markdown() -> str:
         cells = [f"`{row.name}`", _cause(paths[row.name]), row.found_by, str(row.action)]
         cells += ["not yet", *[""] * 5] if shown is None else _cells(shown)
         lines.append(f"| {' | '.join(cells)} |")
+    if pairs := told.get("pairs"):
+        text = (
+            f"Two random faults at random moments: {pairs['flights']} flights, {pairs['safe']} safe; nearest"
+            f" {pairs['min_clearance_m']:.2f} m, at most {pairs['max_overshoot_m']:.2f} m too high."
+        )
+        lines += ["", text]
     return "\n".join(lines) + "\n"
 
 
@@ -78,11 +98,15 @@ def main(arguments: Sequence[str]) -> int:
     plain = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=plain)
     parser.add_argument("sweeps", type=Path, nargs="+")
+    parser.add_argument("--pairs", type=Path, nargs="+", default=[])
     options = parser.parse_args(arguments)
     sweeps = [json.loads(path.read_text(encoding="utf-8")) for path in options.sweeps]
     flights = [flight for sweep in sweeps for flight in sweep["flights"]]
     (world,) = {flight["world"] for flight in flights}  # one page tells of one world
     told = {"flown": f"{datetime.now(UTC):%Y-%m-%d}", "world": world, "hazards": evidence_of(flights)}
+    pairs = [pair for path in options.pairs for pair in json.loads(path.read_text(encoding="utf-8"))["pairs"]]
+    if pairs:
+        told["pairs"] = evidence_of_pairs(pairs)
     EVIDENCE.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     print(f"{EVIDENCE.name}: {len(flights)} flights")
     return 0
