@@ -1,9 +1,10 @@
 """The safety case of the guide: each hazard with its cause, how it is found and answered, and the evidence.
 
-python -m tools.safety_case SWEEP.json... [--pairs PAIRS.json...]
+python -m tools.safety_case SWEEP.json... [--pairs PAIRS.json...] [--add]
 
 The evidence is what flightd sim --scenario all --seeds N --json printed, and what python -m
-tests.sim.hazards.hazard_pairs N --json wrote; then run python -m tools.write_guide.
+tests.sim.hazards.hazard_pairs N --json wrote; then run python -m tools.write_guide.  With --add they are told
+together with those that the page tells of already: give seeds that it has not.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from flightd.sim.scenario.scenario_files import shipped_scenarios
 
 EVIDENCE = FOLDER / "safety-evidence.json"
 _WORST = {"min_clearance_m": min, "off_leg_max_m": max, "max_overshoot_m": max, "down_s": max}
+_COUNTS = ("flights", "good", "safe")
 
 
 def evidence_of(flights: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -53,6 +55,17 @@ def evidence_of_pairs(flights: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "min_clearance_m": min(nearest, default=None),
         "max_overshoot_m": max(above, default=None),
     }
+
+
+def together(told: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """The evidence of two lots of flights of one kind: numbers of flights are added, of the figures the worse
+    one stays."""
+    both: dict[str, Any] = {}
+    for key in told.keys() | more.keys():
+        values = [found[key] for found in (told, more) if found.get(key) is not None]
+        worst = sum if key in _COUNTS else _WORST[key]
+        both[key] = worst(values) if values else None
+    return {key: both[key] for key in (*told, *(more.keys() - told.keys()))}
 
 
 def markdown() -> str:
@@ -99,17 +112,32 @@ def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=plain)
     parser.add_argument("sweeps", type=Path, nargs="+")
     parser.add_argument("--pairs", type=Path, nargs="+", default=[])
+    parser.add_argument("--add", action="store_true")
     options = parser.parse_args(arguments)
-    sweeps = [json.loads(path.read_text(encoding="utf-8")) for path in options.sweeps]
-    flights = [flight for sweep in sweeps for flight in sweep["flights"]]
+    flights, pairs = _read(options.sweeps, "flights"), _read(options.pairs, "pairs")
     (world,) = {flight["world"] for flight in flights}  # one page tells of one world
-    told = {"flown": f"{datetime.now(UTC):%Y-%m-%d}", "world": world, "hazards": evidence_of(flights)}
-    pairs = [pair for path in options.pairs for pair in json.loads(path.read_text(encoding="utf-8"))["pairs"]]
-    if pairs:
-        told["pairs"] = evidence_of_pairs(pairs)
-    EVIDENCE.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-    print(f"{EVIDENCE.name}: {len(flights)} flights")
+    hazards, of_pairs = evidence_of(flights), evidence_of_pairs(pairs)
+    if options.add:
+        told = json.loads(EVIDENCE.read_text(encoding="utf-8"))
+        if told["world"] != world:
+            parser.error(
+                f"{EVIDENCE.name} tells of the {told['world']} world, these flights are of the {world} one"
+            )
+        hazards = {
+            name: together(told["hazards"].get(name, {}), hazards.get(name, {}))
+            for name in (*told["hazards"], *(name for name in hazards if name not in told["hazards"]))
+        }
+        of_pairs = together(told.get("pairs", {}), of_pairs)
+    document = {"flown": f"{datetime.now(UTC):%Y-%m-%d}", "world": world, "hazards": hazards}
+    if of_pairs["flights"]:
+        document["pairs"] = of_pairs
+    EVIDENCE.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    print(f"{EVIDENCE.name}: {len(flights)} flights and {len(pairs)} with two faults")
     return 0
+
+
+def _read(files: Iterable[Path], key: str) -> list[Mapping[str, Any]]:
+    return [flight for file in files for flight in json.loads(file.read_text(encoding="utf-8"))[key]]
 
 
 if __name__ == "__main__":
