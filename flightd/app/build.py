@@ -138,7 +138,7 @@ def build(
         site,
         pilot,
         vehicle=vehicle,
-        setpoints=SetpointPump(vehicle, clock, _noted(vision, recorder), TICK_S),
+        setpoints=SetpointPump(vehicle, clock, _noted(vision, recorder, publishers.barrier), TICK_S),
         vision=vision,
         publishers=publishers,
         clock=clock,
@@ -202,12 +202,16 @@ def assemble(
     )
 
 
-def _noted(vision: DetectionPipeline, recorder: Recorder) -> Callable[[AttitudeSetpoint, int], None]:
+def _noted(
+    vision: DetectionPipeline, recorder: Recorder, barrier: FaultBarrier
+) -> Callable[[AttitudeSetpoint, int], None]:
     """What hears of each setpoint that goes out: it ends a frame's way, and is recorded."""
 
     def sent(setpoint: AttitudeSetpoint, now_ns: int) -> None:
-        vision.latency.sent(now_ns)
-        recorder.record(Topic.SETPOINT, setpoint.stamp_ns, setpoint)
+        barrier.call("detection", lambda: vision.latency.sent(now_ns), None)
+        barrier.call(
+            "recorder", lambda: recorder.record(Topic.SETPOINT, setpoint.stamp_ns, setpoint), None
+        )
 
     return sent
 
