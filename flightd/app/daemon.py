@@ -8,7 +8,7 @@ vehicle, ground -> tick; tick -> recorder, ground, monitors, observers
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -76,22 +76,28 @@ class Daemon:
     def _parts(self) -> Mapping[str, Coroutine[Any, Any, None]]:
         """What runs beside the tick.  What is not critical restarts."""
         flight = self._flight
-        replaceable: Tasks = {
-            "camera": partial(self._look, flight.camera),
-            **flight.vision.tasks(),
-            "recorder": flight.recorder.run,
-            "ground": flight.ground.run,
-            "interlock": flight.interlock.run,
-            "progress": flight.progress.run,
-            "learnt sensors": flight.learnt.run,
-            "front-camera": partial(self._look, flight.front_camera),
-            **flight.counting.tasks(flight.publishers.trouble),
+        parts = {
+            "vehicle": flight.vehicle.run(),
+            "camera": self._kept(partial(self._look, flight.camera)),
+            "pump": flight.setpoints.run(),
+            **self._all_kept(flight.vision.tasks()),
+            "recorder": self._kept(flight.recorder.run),
+            "ground": self._kept(flight.ground.run),
+            "interlock": self._kept(flight.interlock.run),
+            "progress": self._kept(flight.progress.run),
+            "learnt sensors": self._kept(flight.learnt.run),
+            "front-camera": self._kept(partial(self._look, flight.front_camera)),
+            **self._all_kept(flight.counting.tasks(flight.publishers.trouble)),
         }
-        parts = {"vehicle": flight.vehicle.run(), "pump": flight.setpoints.run()}
-        parts |= {name: restarted(part, self.failed) for name, part in replaceable.items()}
         if flight.startup_fault is not None:
             parts["startup fault"] = self._only_look_after(flight.startup_fault)
         return parts
+
+    def _kept(self, part: Callable[[], Awaitable[None]]) -> Coroutine[Any, Any, None]:
+        return restarted(part, self.failed)
+
+    def _all_kept(self, tasks: Tasks) -> dict[str, Coroutine[Any, Any, None]]:
+        return {name: self._kept(part) for name, part in tasks.items()}
 
     async def _tick_until_over(self) -> None:
         """The control tick, at its pace."""

@@ -31,7 +31,7 @@ async def restarted(part: Callable[[], Awaitable[None]], failed: Callable[[Trans
             failed(err)
         except FlightdError:
             raise
-        except Exception as err:
+        except Exception as err:  # noqa: BLE001 - what is not critical ends no flight
             _LOG.exception("a part of the daemon failed and is started again")
             failed(TransientError(f"{type(err).__name__}: {err}"))
         if loop.time() - started_s > 2 * _LONGEST_WAIT_S:

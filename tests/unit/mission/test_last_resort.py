@@ -41,7 +41,11 @@ def answers(vehicle: VehicleState | None, before: Phase = Phase.FOLLOW) -> tuple
         # nothing is heard any more, not even in which mode it is: landed unheard
         (replace(FLYING, in_control=False, attitude=LONG_AGO), Phase.LAND, (Phase.LAND, Demand.LAND, True)),
         # heartbeats alone fail to come: the mode is of the past, and no pilot's
-        (replace(FLYING, in_control=False, heartbeat_ns=LOST_NS), Phase.LAND, (Phase.LAND, Demand.LAND, True)),
+        (
+            replace(FLYING, in_control=False, heartbeat_ns=LOST_NS),
+            Phase.LAND,
+            (Phase.LAND, Demand.LAND, True),
+        ),
         (replace(FLYING, in_control=False), Phase.RECOVER, (Phase.RECOVER, Demand.KEEP, True)),
         (replace(FLYING, heartbeat_ns=0), Phase.FOLLOW, (Phase.LAND, Demand.LAND, True)),
         (VEHICLE, Phase.PREFLIGHT, (Phase.ABORTED, Demand.DISARM, False)),
