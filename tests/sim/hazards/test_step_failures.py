@@ -38,7 +38,8 @@ from flightd.runtime.clock import LoopClock
 from tests.rigs.event_loops import virtual
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_ports import HeldSetpoint, IdealGround, IdealVehicle, IdealVision
-from tests.sim.ideal.test_ideal_scan import CONFIG, SITE, scan_flight
+from tests.sim.ideal.test_ideal_scan import CONFIG, scan_flight
+from tests.unit.mission.shelves import SITE
 
 PACKAGE = str(Path(flightd.__file__).parent)
 MANY = int(os.environ.get("FLIGHTD_FAILURES", "8"))
