@@ -15,6 +15,7 @@ _LOG = logging.getLogger(__name__)
 
 _FIRST_WAIT_S = 0.1
 _LONGEST_WAIT_S = 5.0
+_BEGIN_ANEW_S = 1.0
 
 
 async def restarted(part: Callable[[], Awaitable[None]], failed: Callable[[TransientError], None]) -> None:
@@ -38,6 +39,18 @@ async def restarted(part: Callable[[], Awaitable[None]], failed: Callable[[Trans
             wait_s = _FIRST_WAIT_S
         await asyncio.sleep(wait_s)
         wait_s = min(2 * wait_s, _LONGEST_WAIT_S)
+
+
+async def insisted(work: Callable[[], Awaitable[None]]) -> None:
+    """Do `work` until it ends by itself: what it raises is logged, and it begins anew after a second."""
+    while True:
+        try:
+            await work()
+        except Exception:  # noqa: BLE001 - no flight ends for it
+            _LOG.exception("what runs beside a link failed and begins anew")
+            await asyncio.sleep(_BEGIN_ANEW_S)
+        else:
+            return
 
 
 class FaultBarrier:
