@@ -285,3 +285,8 @@ def test_a_cameras_exposure_is_seen_set_and_read_back(browser: Browser, url: str
         expect(says.get_by_text("gain was set to 200, the camera tells 100")).to_be_visible()
         expect(card.get_by_text(re.compile("the floor smears by 1.1 px"))).to_be_visible()
         serves_everybody(page)
+        page.get_by_role("button", name="DE, Deutsch").click()
+        for width in (390, 521, 700, 1140, 1361):
+            page.set_viewport_size({"width": width, "height": 800})
+            expect(page.get_by_role("button", name="STOP eye")).to_be_in_viewport(ratio=1.0)
+            assert page.evaluate("document.documentElement.scrollWidth") == width
