@@ -75,9 +75,10 @@ def application(
     simulated: SimulatedFlight | None = None,
     others: Sequence[ReadFolder] = (),
 ) -> ASGIApp:
-    """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks, `people`
-    who sits at a page, inventories, site files and `flights` lie under `folder`, more inventories under the `others`, `uploads`
-    reads what people send, `maps` lays out maps, `studio` and `simulated` are None without a folder."""
+    """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks,
+    `people` who sits at a page, inventories, site files and `flights` lie under `folder`, more inventories
+    under the `others`, `uploads` reads what people send, `maps` lays out maps, `studio` and `simulated` are
+    None without a folder."""
     orders = Orders(hub.drones, access)
     routes = [
         first_page(),

@@ -84,9 +84,7 @@ class PagePeople:
 
     def look(self) -> None:
         self._over = {
-            session: person
-            for session, person in self._over.items()
-            if person.standing() is Standing.OVER
+            session: person for session, person in self._over.items() if person.standing() is Standing.OVER
         }
 
     def at(self, who: Identity) -> PagePerson:

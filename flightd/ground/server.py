@@ -22,8 +22,8 @@ from flightd.ground.application import application
 from flightd.ground.flights.flights import Flights
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub, Viewer
-from flightd.ground.page_person import PagePeople
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+from flightd.ground.page_person import PagePeople
 from flightd.ground.page_socket import PageSocket
 from flightd.ground.quiet_log import quiet_log
 from flightd.ground.read_folders import ReadFolder
@@ -179,7 +179,9 @@ async def serve(
     hosts = own_hosts(where.host, where.port, certificate is not None, names, where.is_beyond)
     server = _Server(
         uvicorn.Config(
-            application(hub, hosts, access, people, folder, flights, uploads, maps, studio, simulated, others),
+            application(
+                hub, hosts, access, people, folder, flights, uploads, maps, studio, simulated, others
+            ),
             http="h11",
             ws=PageSocket,
             lifespan="off",

@@ -127,11 +127,11 @@ _CALLS = frozenset(
 )  # fmt: skip
 """What is called with texts for a person."""
 _NAMES = frozenset(
-    {"alone", "by_hand", "calibrate", "cannot", "checks", "emergency_causes", "figure", "fixed_keys", "fixed_sections",
-     "form", "holds", "lamps", "left", "limit_words", "map_error", "missing", "most", "needed", "note", "notes",
-     "over", "place", "problem", "problems", "reason", "reasons", "refusal", "refused", "remedy",
-     "settings", "shown", "still", "text", "theirs", "told", "top", "trouble", "unshown", "what",
-     "where", "why", "words"}
+    {"alone", "by_hand", "calibrate", "cannot", "checks", "emergency_causes", "figure", "fixed_keys",
+     "fixed_sections", "form", "holds", "lamps", "left", "limit_words", "map_error", "missing", "most",
+     "needed", "note", "notes", "over", "place", "problem", "problems", "reason", "reasons", "refusal",
+     "refused", "remedy", "settings", "shown", "still", "text", "theirs", "told", "top", "trouble",
+     "unshown", "what", "where", "why", "words"}
 )  # fmt: skip
 """Names, arguments, attributes and keys that hold such texts."""
 _PLACED = frozenset({"file", "key", "source", "path"})

@@ -84,9 +84,7 @@ def _rule(of: str) -> Rule:
 
 
 class _Gate:
-    def __init__(
-        self, app: ASGIApp, access: Access, rules: Mapping[str, Rule], returning: Returning
-    ) -> None:
+    def __init__(self, app: ASGIApp, access: Access, rules: Mapping[str, Rule], returning: Returning) -> None:
         self._app = app
         self._access = access
         self._rules = rules

@@ -26,7 +26,7 @@ from flightd.ground.shown_text import shown
 
 _SHOWN = 500
 _COOKIE_S = int(ABSOLUTE_S) + 3600
-"""Beyond the session, whose end is the station's matter: who stops a flight that outlasts it is known by it."""
+"""Beyond the session, whose end is the station's matter: by it is known who stops a flight beyond it."""
 
 
 class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

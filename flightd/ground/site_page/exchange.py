@@ -19,6 +19,7 @@ NAMED = {
 }
 """Of each kind of file: how its name ends, and its media type."""
 
+
 def exported(kind: str, draft: SiteDraft) -> bytes:
     """The map as a file.  InputError for an unknown kind, and for a map that is none yet (but as TOML)."""
     if kind not in NAMED:
