@@ -1,7 +1,10 @@
 """The safety case of the guide: each hazard with its cause, how it is found and answered, and the evidence.
 
-python -m tools.safety_case SWEEP.json...   # the evidence is what flightd sim --scenario all --seeds N --json
-                                            # printed; then run python -m tools.write_guide
+python -m tools.safety_case SWEEP.json... [--pairs PAIRS.json...] [--add]
+
+The evidence is what flightd sim --scenario all --seeds N --json printed, and what python -m
+tests.sim.hazards.hazard_pairs N --json wrote; then run python -m tools.write_guide.  With --add they are told
+together with those that the page tells of already: give seeds that it has not.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from flightd.sim.scenario.scenario_files import shipped_scenarios
 
 EVIDENCE = FOLDER / "safety-evidence.json"
 _WORST = {"min_clearance_m": min, "off_leg_max_m": max, "max_overshoot_m": max, "down_s": max}
+_COUNTS = ("flights", "good", "safe")
 
 
 def evidence_of(flights: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -41,6 +45,29 @@ def evidence_of(flights: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any
     return found
 
 
+def evidence_of_pairs(flights: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What flights with two random faults each show: how many there were and were safe, the worst figures."""
+    nearest = [flight["min_clearance_m"] for flight in flights if flight["min_clearance_m"] is not None]
+    above = [flight["max_overshoot_m"] for flight in flights if flight["max_overshoot_m"] is not None]
+    return {
+        "flights": len(flights),
+        "safe": sum(not flight["unsafe"] for flight in flights),
+        "min_clearance_m": min(nearest, default=None),
+        "max_overshoot_m": max(above, default=None),
+    }
+
+
+def together(told: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """The evidence of two lots of flights of one kind: numbers of flights are added, of the figures the worse
+    one stays."""
+    both: dict[str, Any] = {}
+    for key in told.keys() | more.keys():
+        values = [found[key] for found in (told, more) if found.get(key) is not None]
+        worst = sum if key in _COUNTS else _WORST[key]
+        both[key] = worst(values) if values else None
+    return {key: both[key] for key in (*told, *(more.keys() - told.keys()))}
+
+
 def markdown() -> str:
     """The table as the guide prints it."""
     told = json.loads(EVIDENCE.read_text(encoding="utf-8"))
@@ -57,6 +84,12 @@ def markdown() -> str:
         cells = [f"`{row.name}`", _cause(paths[row.name]), row.found_by, str(row.action)]
         cells += ["not yet", *[""] * 5] if shown is None else _cells(shown)
         lines.append(f"| {' | '.join(cells)} |")
+    if pairs := told.get("pairs"):
+        text = (
+            f"Two random faults at random moments: {pairs['flights']} flights, {pairs['safe']} safe; nearest"
+            f" {pairs['min_clearance_m']:.2f} m, at most {pairs['max_overshoot_m']:.2f} m too high."
+        )
+        lines += ["", text]
     return "\n".join(lines) + "\n"
 
 
@@ -78,14 +111,33 @@ def main(arguments: Sequence[str]) -> int:
     plain = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=plain)
     parser.add_argument("sweeps", type=Path, nargs="+")
+    parser.add_argument("--pairs", type=Path, nargs="+", default=[])
+    parser.add_argument("--add", action="store_true")
     options = parser.parse_args(arguments)
-    sweeps = [json.loads(path.read_text(encoding="utf-8")) for path in options.sweeps]
-    flights = [flight for sweep in sweeps for flight in sweep["flights"]]
+    flights, pairs = _read(options.sweeps, "flights"), _read(options.pairs, "pairs")
     (world,) = {flight["world"] for flight in flights}  # one page tells of one world
-    told = {"flown": f"{datetime.now(UTC):%Y-%m-%d}", "world": world, "hazards": evidence_of(flights)}
-    EVIDENCE.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-    print(f"{EVIDENCE.name}: {len(flights)} flights")
+    hazards, of_pairs = evidence_of(flights), evidence_of_pairs(pairs)
+    if options.add:
+        told = json.loads(EVIDENCE.read_text(encoding="utf-8"))
+        if told["world"] != world:
+            parser.error(
+                f"{EVIDENCE.name} tells of the {told['world']} world, these flights are of the {world} one"
+            )
+        hazards = {
+            name: together(told["hazards"].get(name, {}), hazards.get(name, {}))
+            for name in (*told["hazards"], *(name for name in hazards if name not in told["hazards"]))
+        }
+        of_pairs = together(told.get("pairs", {}), of_pairs)
+    document = {"flown": f"{datetime.now(UTC):%Y-%m-%d}", "world": world, "hazards": hazards}
+    if of_pairs["flights"]:
+        document["pairs"] = of_pairs
+    EVIDENCE.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    print(f"{EVIDENCE.name}: {len(flights)} flights and {len(pairs)} with two faults")
     return 0
+
+
+def _read(files: Iterable[Path], key: str) -> list[Mapping[str, Any]]:
+    return [flight for file in files for flight in json.loads(file.read_text(encoding="utf-8"))[key]]
 
 
 if __name__ == "__main__":

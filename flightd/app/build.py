@@ -31,6 +31,7 @@ from flightd.app.absent_parts import (
 from flightd.app.counting.count import Counting
 from flightd.app.counting.flight_count import counts_shelves
 from flightd.app.detection.detector_pool import DetectorPool, Detectors
+from flightd.app.detection.latency import LatencyBook
 from flightd.app.detection.pipeline import DetectionPipeline
 from flightd.app.flight import Count, Flight, SetpointSink, Vision
 from flightd.app.flight_orders import configured_order
@@ -64,6 +65,7 @@ from flightd.pilot import Pilot
 from flightd.ports import Camera, Clock, Ground, Interlock, Monitor, PoseTaker, Recorder, Vehicle
 from flightd.runtime.clock import Hold
 from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
+from flightd.runtime.supervisor import FaultBarrier
 from flightd.site.site import ASSUMED_CEILING_M, Site
 from flightd.vision.line_detector import Detector
 from flightd.vision.lines.colour_profile import SHIPPED
@@ -138,7 +140,7 @@ def build(
         site,
         pilot,
         vehicle=vehicle,
-        setpoints=SetpointPump(vehicle, clock, _noted(vision, recorder), TICK_S),
+        setpoints=SetpointPump(vehicle, clock, noted(vision.latency, recorder, publishers.barrier), TICK_S),
         vision=vision,
         publishers=publishers,
         clock=clock,
@@ -202,12 +204,15 @@ def assemble(
     )
 
 
-def _noted(vision: DetectionPipeline, recorder: Recorder) -> Callable[[AttitudeSetpoint, int], None]:
-    """What hears of each setpoint that goes out: it ends a frame's way, and is recorded."""
+def noted(
+    latency: LatencyBook, recorder: Recorder, barrier: FaultBarrier
+) -> Callable[[AttitudeSetpoint, int], None]:
+    """What hears of each setpoint that goes out: it ends a frame's way, and is recorded; what fails there
+    stays behind the `barrier`."""
 
     def sent(setpoint: AttitudeSetpoint, now_ns: int) -> None:
-        vision.latency.sent(now_ns)
-        recorder.record(Topic.SETPOINT, setpoint.stamp_ns, setpoint)
+        barrier.call("detection", lambda: latency.sent(now_ns), None)
+        barrier.call("recorder", lambda: recorder.record(Topic.SETPOINT, setpoint.stamp_ns, setpoint), None)
 
     return sent
 

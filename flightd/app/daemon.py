@@ -8,8 +8,10 @@ vehicle, ground -> tick; tick -> recorder, ground, monitors, observers
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 from flightd.app.flight import Flight, Tasks
 from flightd.app.tick import Tick
@@ -17,6 +19,7 @@ from flightd.app.tick_pace import TickPace
 from flightd.core.errors import FlightdError, TransientError, UnavailableError
 from flightd.core.tick import TICK_S
 from flightd.core.types import OVER, Command, Phase
+from flightd.ports import Camera
 from flightd.runtime.supervisor import restarted
 
 _FIRST_HEARD_S = 2.0
@@ -70,25 +73,31 @@ class Daemon:
             raise _first(group) from group
         return self.result()
 
-    def _parts(self) -> Tasks:
+    def _parts(self) -> Mapping[str, Coroutine[Any, Any, None]]:
         """What runs beside the tick.  What is not critical restarts."""
         flight = self._flight
         parts = {
             "vehicle": flight.vehicle.run(),
-            "camera": restarted(self._look, self.failed),
+            "camera": self._kept(partial(self._look, flight.camera)),
             "pump": flight.setpoints.run(),
-            **flight.vision.tasks(),
-            "recorder": restarted(flight.recorder.run, self.failed),
-            "ground": restarted(flight.ground.run, self.failed),
-            "interlock": flight.interlock.run(),
-            "progress": restarted(flight.progress.run, self.failed),
-            "learnt sensors": restarted(flight.learnt.run, self.failed),
-            "front-camera": restarted(flight.front_camera.run, self.failed),
-            **flight.counting.tasks(flight.publishers.trouble),
+            **self._all_kept(flight.vision.tasks()),
+            "recorder": self._kept(flight.recorder.run),
+            "ground": self._kept(flight.ground.run),
+            "interlock": self._kept(flight.interlock.run),
+            "progress": self._kept(flight.progress.run),
+            "learnt sensors": self._kept(flight.learnt.run),
+            "front-camera": self._kept(partial(self._look, flight.front_camera)),
+            **self._all_kept(flight.counting.tasks(flight.publishers.trouble)),
         }
         if flight.startup_fault is not None:
             parts["startup fault"] = self._only_look_after(flight.startup_fault)
         return parts
+
+    def _kept(self, part: Callable[[], Awaitable[None]]) -> Coroutine[Any, Any, None]:
+        return restarted(part, self.failed)
+
+    def _all_kept(self, tasks: Tasks) -> dict[str, Coroutine[Any, Any, None]]:
+        return {name: self._kept(part) for name, part in tasks.items()}
 
     async def _tick_until_over(self) -> None:
         """The control tick, at its pace."""
@@ -108,10 +117,10 @@ class Daemon:
             if down and now_ns - over_ns > _LINGER_NS:
                 return
 
-    async def _look(self) -> None:
-        """The camera's run.  One that cannot be had ends the daemon, but not in the air."""
+    async def _look(self, camera: Camera) -> None:
+        """A camera's run.  One that cannot be had ends the daemon, but not in the air."""
         try:
-            await self._flight.camera.run()
+            await camera.run()
         except UnavailableError as err:
             await self._in_air_or(err)
             raise TransientError(str(err)) from err

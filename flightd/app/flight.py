@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias, TypeVar
+from typing import Protocol, TypeAlias, TypeVar
 
 from flightd.adapters.store.progress import LeftOver
 from flightd.app.frame_tap import NO_FRAMES, FrameTap
@@ -20,8 +20,8 @@ from flightd.ports import Camera, Clock, Ground, Interlock, Recorder, Vehicle
 
 T_contra = TypeVar("T_contra", contravariant=True)
 
-Tasks: TypeAlias = Mapping[str, Coroutine[Any, Any, None]]
-"""What runs beside the tick until it is cancelled, by name."""
+Tasks: TypeAlias = Mapping[str, Callable[[], Awaitable[None]]]
+"""What is run beside the tick until it is cancelled, and anew where it fails, by name."""
 
 
 class Vision(Protocol):

@@ -55,8 +55,8 @@ class Tick:
         return Health(vision.latency_p99_s(now_ns), vision.replaced, recorder.restarts, recorder.error)
 
     def _take_commands(self) -> tuple[Command, ...]:
-        orders, self._orders = self._orders, []
-        orders += self._flight.ground.take_commands()
+        taken = self._flight.ground.take_commands()  # first: where it fails no order is lost
+        orders, self._orders = [*self._orders, *taken], []
         if self._flight.startup_fault is not None:  # it may land what flies, and starts nothing
             orders = [order for order in orders if order.kind is not CommandKind.START]
         return tuple(orders)

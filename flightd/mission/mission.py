@@ -16,7 +16,6 @@ from flightd.core.outlook import Outlook
 from flightd.core.planned_flight import PlannedFlight, StandingPlan
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, GridPose, Phase
 from flightd.mission.battery.swap import BatterySwap
-from flightd.mission.chosen_plan import ChosenPlans
 from flightd.mission.event_log import EventLog
 from flightd.mission.flight.phase_progress import PhaseProgress
 from flightd.mission.flight.reference import ReferenceGenerator, ReferenceTask
@@ -36,6 +35,7 @@ from flightd.mission.orders import StandingOrders, refusal
 from flightd.mission.phase_reporter import PhaseReporter
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
+from flightd.mission.plan_in_hand import PlanInHand
 from flightd.mission.reasons import Happened, Reason, in_words
 from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
 from flightd.mission.safety.hazard_table import ACTIONS, Action, triggers_of
@@ -55,6 +55,7 @@ _OVER_PAD_M = 0.5
 _CLIMBS_UNSEEING_S = 1.0
 """So long a take-off, which hardly steers, goes on without a picture."""
 _VISITED = (Trigger.DWELLED, Trigger.ROUTE_DONE)
+_RANK = {trigger: rank for rank, trigger in enumerate(Trigger)}
 
 
 class Mission:
@@ -77,11 +78,7 @@ class Mission:
     ) -> None:
         start = site.nodes[plan.start]
         self._params = config.mission
-        self.plan = self._configured = plan
-        self._chosen = ChosenPlans(site, plan, policy, config, scanner)
-        self._scanner = scanner
-        self._plan_id = ""
-        self._levels: tuple[int, ...] = ()
+        self._plan = PlanInHand(site, plan, policy, config, scanner)
         self._armed = False
         """The vehicle was armed at the newest tick."""
         self._pose: GridPose | None = None
@@ -124,6 +121,11 @@ class Mission:
         return self.state.airborne
 
     @property
+    def plan(self) -> FlightPlan:
+        """The plan that is flown, or would be with the next start."""
+        return self._plan.plan
+
+    @property
     def goal(self) -> Stop:
         """The stop flown to or hovered at."""
         return self._route.goal
@@ -164,18 +166,14 @@ class Mission:
 
     @property
     def standing(self) -> StandingPlan:
-        """The plan that is flown, or would be with the next start."""
-        nodes = tuple(stop.node for stop in self.plan.stops if stop.visit)
-        return StandingPlan(self._plan_id, nodes, self._levels, tuple(self.visited), self.remaining)
+        """What is told of the plan that is flown, or would be with the next start."""
+        return self._plan.standing(self.visited, self.remaining)
 
     def planned(self, nodes: Sequence[str], levels: Sequence[int], *, best_order: bool) -> PlannedFlight:
         """What a flight over the nodes would be, from the pad that it stands on first and with the battery as
         it is told now (none: what the configuration says); changes nothing.  InputError where it
         cannot be flown."""
-        plan, levels = self._configured, tuple(levels) if nodes else ()
-        if nodes:
-            plan = self._chosen.plan(nodes, levels, best_order=best_order)
-        return self._chosen.estimate(plan, levels, *self._charging.charge)
+        return self._plan.planned(nodes, levels, self._charging.charge, best_order=best_order)
 
     def outlook(self, now_ns: int) -> Outlook:
         """What it expects and what troubles it."""
@@ -186,7 +184,7 @@ class Mission:
             way=self._route.way,
             battery_left_s=left_s,
             home_s=home_s,
-            plan=self._plan_id,
+            plan=self._plan.id,
         )
 
     def drain_events(self) -> tuple[Event, ...]:
@@ -203,7 +201,7 @@ class Mission:
             self._take_plan(command, now_ns)
             return
         if self.state.waiting and kind in {CommandKind.START, CommandKind.PAUSE}:
-            if kind is CommandKind.START and command.plan and command.plan != self._plan_id:
+            if kind is CommandKind.START and command.plan and command.plan != self._plan.id:
                 text = "start refused: another plan stands than the one that it was given for"
                 self._events.report(now_ns, EventLevel.WARNING, "command", text)
                 return
@@ -222,22 +220,15 @@ class Mission:
     def _take_plan(self, command: Command, now_ns: int) -> None:
         """Fly other nodes with the next start, or again what the configuration says; one that cannot be flown
         changes nothing."""
-        plan, why = self._configured, "the vehicle is armed" if self._armed else ""
-        try:
-            if command.nodes and not why:
-                plan = self._chosen.plan(command.nodes, command.levels)
-        except InputError as err:
-            why = str(err)
-        if why:
-            self._events.report(now_ns, EventLevel.WARNING, "command", f"plan refused: {why}")
+        if self._armed:
+            self._events.report(now_ns, EventLevel.WARNING, "command", "plan refused: the vehicle is armed")
             return
-        self.plan, self._levels = plan, command.levels if command.nodes else ()
-        self._plan_id = command.id if command.nodes else ""
-        self._route.begin(plan)
-        self._scanner.choose(self._levels)
-        text = f"{plan.nodes} nodes" if command.nodes else "as configured again"
-        if self._levels:
-            text = f"{text}, counted on level {', '.join(map(str, self._levels))}"
+        try:
+            text = self._plan.take(command)
+        except InputError as err:
+            self._events.report(now_ns, EventLevel.WARNING, "command", f"plan refused: {err}")
+            return
+        self._route.begin(self.plan)
         self._events.report(now_ns, EventLevel.INFO, "plan", text)
 
     def _take_start(self, trigger: Trigger, now_ns: int) -> None:
@@ -275,7 +266,8 @@ class Mission:
         """What has happened by this tick.  Turning back acts at once."""
         arming, waiting = self.phase is Phase.ARMING, self.state.waiting
         obstacle = self._grounded(s) if arming or waiting else None
-        may_start = waiting and self._may_start(s.now_ns, obstacle)
+        ordered = self.state.intent is Intent.VISIT
+        may_start = waiting and self._clearance.may_start(s.now_ns, obstacle, ordered=ordered)
         found = self._progress.step(s, self.state, may_start=may_start)
         found |= self._orders.urgent
         if self._losses.ground_lost(s):
@@ -288,10 +280,12 @@ class Mission:
         if s.failed:
             found.add(Trigger.STEP_FAILED)
         if arming:
-            found = self._while_arming(found, s, obstacle)
+            found = self._clearance.while_arming(found, s, obstacle)
         elif waiting and self._clearance.is_void(s.now_ns, obstacle):
             found.add(Trigger.START_EXPIRED)
-            self._void_start(s.now_ns, obstacle)
+            self._clearance.void(s.now_ns)
+            self._clearance.report_void(s.now_ns, obstacle)
+            self._turn(Trigger.START_EXPIRED)
         if Trigger.FOUND_FLYING in found:  # an order to land or stop stands until it may be obeyed
             found -= self._orders.urgent
         found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))
@@ -306,35 +300,6 @@ class Mission:
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._progress.adopting(s, self.phase) else found
-
-    def _may_start(self, now_ns: int, obstacle: Reason | None) -> bool:
-        """Nothing keeps it on the ground, and its start is counted down."""
-        self._clearance.look_again(now_ns, obstacle, ordered=self.state.intent is Intent.VISIT)
-        return obstacle is None and self._clearance.counted_down(now_ns)
-
-    def _while_arming(self, found: set[Trigger], s: MissionInputs, obstacle: Reason | None) -> set[Trigger]:
-        """What becomes of a start while the vehicle is armed for it: it takes off only from a tick on which
-        nothing speaks against that."""
-        if not s.aisle_closed:
-            found.add(Trigger.AISLE_OPEN)
-        hindered = self._clearance.is_hindered(s.now_ns, obstacle)
-        if self._clearance.taken_back:
-            found = found - {Trigger.ARMED} | {Trigger.PAUSE}  # also at the very tick on which it arms
-            self._clearance.void(s.now_ns)
-        elif self._clearance.gives_up(s.now_ns):
-            found.add(Trigger.TIMED_OUT)
-        elif hindered or self._clearance.is_void(s.now_ns, None):
-            found.add(Trigger.START_EXPIRED)
-            if obstacle is not None:
-                self._clearance.report_void(s.now_ns, obstacle)
-            self._clearance.void(s.now_ns)
-        return found if obstacle is None else found - {Trigger.ARMED}
-
-    def _void_start(self, now_ns: int, obstacle: Reason | None) -> None:
-        """A start that came to nothing is not kept for later."""
-        self._clearance.void(now_ns)
-        self._clearance.report_void(now_ns, obstacle)
-        self._turn(Trigger.START_EXPIRED)
 
     def _landed(self) -> set[Trigger]:
         """What a landing on the pad is more than its end."""
@@ -356,7 +321,7 @@ class Mission:
             reported &= taken_in(self.state)
         elif self.phase in _NEAR_FLOOR:
             reported &= taken_in(self.state) | triggers_of(Action.REPORT, Action.HOME)
-        for trigger in sorted(reported, key=list(Trigger).index):
+        for trigger in sorted(reported, key=_RANK.__getitem__):
             self._events.hazard(now_ns, trigger, ACTIONS[trigger].value)
 
     def _situation(self, paused: bool) -> FlightContext:

@@ -55,7 +55,7 @@ class StartClearance:
         others = obstacles(s, self._config, ground_silent, arming=arming)
         return others if stale is None else (stale, *others)
 
-    def counted_down(self, now_ns: int) -> bool:
+    def _counted_down(self, now_ns: int) -> bool:
         """No count-down is under way."""
         return not self._order.left_s(now_ns)
 
@@ -71,9 +71,34 @@ class StartClearance:
         self._report_countdown(now_ns)
         return True
 
-    def look_again(self, now_ns: int, obstacle: Reason | None, *, ordered: bool) -> None:
+    def may_start(self, now_ns: int, obstacle: Reason | None, *, ordered: bool) -> bool:
+        """Nothing keeps it on the ground, and its start is counted down: call at each tick on which it waits,
+        its start `ordered` or not."""
+        self._look_again(now_ns, obstacle, ordered=ordered)
+        return obstacle is None and self._counted_down(now_ns)
+
+    def while_arming(self, found: set[Trigger], s: MissionInputs, obstacle: Reason | None) -> set[Trigger]:
+        """What becomes of what was `found` while the vehicle is armed for a start: it takes off only from a
+        tick on which nothing speaks against that."""
+        found, now_ns = set(found), s.now_ns
+        if not s.aisle_closed:
+            found.add(Trigger.AISLE_OPEN)
+        hindered = self._is_hindered(now_ns, obstacle)
+        if self.taken_back:
+            found = found - {Trigger.ARMED} | {Trigger.PAUSE}  # also at the very tick on which it arms
+            self.void(now_ns)
+        elif self._gives_up(now_ns):
+            found.add(Trigger.TIMED_OUT)
+        elif hindered or self.is_void(now_ns, None):
+            found.add(Trigger.START_EXPIRED)
+            if obstacle is not None:
+                self.report_void(now_ns, obstacle)
+            self.void(now_ns)
+        return found if obstacle is None else found - {Trigger.ARMED}
+
+    def _look_again(self, now_ns: int, obstacle: Reason | None, *, ordered: bool) -> None:
         """With autostart the count-down begins once no `obstacle` keeps the drone on the ground, and anew
-        after one: at each tick on which it waits, its start `ordered` or not."""
+        after one."""
         if not (self.autostart and ordered):
             return
         if obstacle is not None:
@@ -83,7 +108,7 @@ class StartClearance:
         elif not self._order.given:
             self._tried_ns = now_ns if self._tried_ns is None else self._tried_ns
             self._order.give(now_ns, self._config.mission.autostart_countdown_s)
-            if not self.counted_down(now_ns):
+            if not self._counted_down(now_ns):
                 self._report_countdown(now_ns)
 
     def report_waiting(self, now_ns: int) -> None:
@@ -116,12 +141,11 @@ class StartClearance:
         self._hindered = DebounceTimer()
         self._void_ns, self.taken_back = now_ns, False
 
-    def is_hindered(self, now_ns: int, obstacle: Reason | None) -> bool:
-        """Something keeps the drone on the ground, now that it is being armed, and is no passing matter: call
-        at each tick of that."""
+    def _is_hindered(self, now_ns: int, obstacle: Reason | None) -> bool:
+        """Something keeps the drone on the ground, now that it is being armed, and is no passing matter."""
         return self._hindered.step(obstacle is not None, now_ns) > _HINDERED_S
 
-    def gives_up(self, now_ns: int) -> bool:
+    def _gives_up(self, now_ns: int) -> bool:
         """It has started by itself again and again, and was never armed."""
         p = self._config.mission
         given_up_s = p.autostart_countdown_s + p.expert.arm_timeout_s

@@ -15,6 +15,8 @@ from flightd.runtime.latest_slot import Latest
 
 T = TypeVar("T")
 
+_LAST_WRITE_S = 2.0
+
 
 class KeptFile(Generic[T]):
     """`put` from the tick, `run` beside it.  What is put last is what is written, as `encode` says; `what`
@@ -34,14 +36,18 @@ class KeptFile(Generic[T]):
             self._changed.put(True)
 
     async def run(self) -> None:
-        """Write each change until cancelled, the last one too.  TransientError when the disk refuses."""
+        """Write each change until cancelled, the last one too.  TransientError when the disk refuses.
+
+        The loop never waits for the disk, at the end neither: the vehicle is being handed back then."""
         try:
             while True:
                 await self._changed.get()
                 await asyncio.to_thread(self._write)
         except asyncio.CancelledError:
-            with contextlib.suppress(TransientError):  # ending comes before saving what a disk refuses
-                self._write()
+            # ending comes before saving what a disk refuses, or takes too long for
+            with contextlib.suppress(TransientError, TimeoutError):
+                async with asyncio.timeout(_LAST_WRITE_S):
+                    await asyncio.to_thread(self._write)
             raise
 
     def _write(self) -> None:

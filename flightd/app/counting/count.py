@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
-from typing import Any
+from collections.abc import Awaitable, Callable
+from functools import partial
 
 from flightd.app.counting.code_readers import Readers, ShelfWatch
 from flightd.app.counting.store_writer import StoreWriter
@@ -44,10 +44,10 @@ class Counting:
 
     def tasks(self, on_trouble: Callable[[str], None]) -> Tasks:
         """What runs during a flight; what goes wrong is told to `on_trouble`."""
-        tasks: dict[str, Coroutine[Any, Any, None]] = {
-            f"read-{i}": self._watch.run() for i in range(self._workers)
+        tasks: dict[str, Callable[[], Awaitable[None]]] = {
+            f"read-{i}": self._watch.run for i in range(self._workers)
         }
-        return tasks if self._writer is None else tasks | {"store": self._writer.run(on_trouble)}
+        return tasks if self._writer is None else tasks | {"store": partial(self._writer.run, on_trouble)}
 
     def frame(self, ticket: FrameTicket) -> None:
         """A frame of the front camera."""

@@ -51,7 +51,7 @@ class DetectionPipeline:
         self._rate: list[int] = []
 
     def tasks(self) -> Tasks:
-        return {f"detect-{i}": self.run() for i in range(self._workers)}
+        return {f"detect-{i}": self.run for i in range(self._workers)}
 
     async def run(self) -> None:
         """One frame after the other."""

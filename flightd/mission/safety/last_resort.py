@@ -24,6 +24,8 @@ from flightd.mission.triggers import Trigger
 
 _T = TypeVar("_T")
 
+_HEARTBEAT_NS = 2_000_000_000
+"""Heartbeats come each second: without a newer one, modes and arming are those of the past."""
 _GIVE_UP_NS = 60_000_000_000
 """A vehicle that nobody heard for so long is not waited for."""
 # constants: what is answered here calls as little as possible of what may have failed
@@ -103,8 +105,8 @@ class LastResort:
         """Level and down; `before` is the phase answered last."""
         if before in OVER:
             self._end = self._end or before
-        silent_ns = _GIVE_UP_NS if vehicle is None else now_ns - vehicle.attitude.stamp_ns
-        heard = silent_ns <= self._hold_ns
+        silent_ns = _GIVE_UP_NS if vehicle is None else _silent_ns(now_ns, vehicle)
+        heard = silent_ns <= self._hold_ns  # silence is no pilot
         if self._end is None and vehicle is not None:
             if (heard and not vehicle.armed) or silent_ns > _GIVE_UP_NS:
                 self._end = Phase.ABORTED
@@ -128,6 +130,11 @@ class LastResort:
             events.append(Event(now_ns, EventLevel.WARNING, "hazard", f"{_WHY}: {_ACTION}"))
             events.append(Event(now_ns, EventLevel.WARNING, "phase", f"{before} -> {after}: {_WHY}"))
         return tuple(events)
+
+
+def _silent_ns(now_ns: int, vehicle: VehicleState) -> int:
+    """For how long it has not been heard, in attitudes or in heartbeats."""
+    return max(now_ns - vehicle.attitude.stamp_ns, now_ns - vehicle.heartbeat_ns - _HEARTBEAT_NS)
 
 
 def _ended(vehicle: VehicleState | None) -> Demand:

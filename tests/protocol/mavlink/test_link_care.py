@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.services.statustext import TextAssembler, make_texts
@@ -18,8 +19,10 @@ from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.core.geometry import wrap_pi
 from flightd.core.refusal import words
 from flightd.core.types import Demand, Event, EventLevel, GridPose
+from flightd.runtime.clock import LoopClock
 from flightd.runtime.free_ports import free_port
 from flightd.sim.autopilot.autopilot import PeerConfig
+from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.radio import RadioParams
 from tests.protocol.mavlink.scripted_autopilot import (
     ALT_HOLD,
@@ -30,7 +33,7 @@ from tests.protocol.mavlink.scripted_autopilot import (
     scripted,
 )
 from tests.rigs.event_loops import virtual
-from tests.rigs.vehicles import ardupilot_rig
+from tests.rigs.vehicles import PATIENT_COPTER, ardupilot_rig, mavlink_rig
 
 
 def test_rates_that_a_ground_station_overwrote_are_asked_for_again() -> None:
@@ -263,3 +266,50 @@ def test_heartbeats_too_rare_to_see_a_take_over_in_time_are_told_once() -> None:
             assert len(texts) == told
 
     virtual(test())
+
+
+class _Faulty(ArduPilotVehicle):
+    """When told, something beside its demand fails again and again, or something that nobody looks after."""
+
+    def __init__(self, url: str, clock: LoopClock) -> None:
+        super().__init__(url, clock)
+        self.beside, self.within = asyncio.Event(), asyncio.Event()
+        self.failures = 0
+
+    def _serve(self, tasks: asyncio.TaskGroup) -> None:
+        super()._serve(tasks)
+        tasks.create_task(self._once_heard(self._fail_beside), name="beside")
+        tasks.create_task(self._fail(self.within), name="within")
+
+    async def _fail_beside(self) -> None:
+        await self._fail(self.beside)
+
+    async def _fail(self, told: asyncio.Event) -> None:
+        await told.wait()
+        self.failures += 1
+        raise ValueError("a fault")
+
+
+def test_what_fails_beside_the_demand_ends_no_flight_and_an_adapter_that_fails_lands_it() -> None:
+    seen: list[tuple[bool, int, bool]] = []
+
+    async def test() -> None:
+        async with mavlink_rig(ArduCopterPeer, _Faulty, CopterMode.ALT_HOLD, patience=PATIENT_COPTER) as rig:
+            await rig.take_off()
+            vehicle, flying = rig.vehicle, rig.flying_task
+            assert isinstance(vehicle, _Faulty)
+            assert flying is not None
+            vehicle.beside.set()
+            await rig.stream(2.5)
+            assert vehicle.failures > 1
+            seen.append((flying.done(), rig.peer.mode, rig.peer.armed))
+            vehicle.within.set()
+            await asyncio.sleep(0.5)
+            seen.append((flying.done(), rig.peer.mode, rig.peer.armed))
+            await asyncio.sleep(9.5)
+            seen.append((flying.done(), rig.peer.mode, rig.peer.armed))
+
+    with pytest.raises(AssertionError, match="a fault"):  # what the adapter ended with
+        virtual(test())
+    land = CopterMode.LAND
+    assert seen == [(False, CopterMode.GUIDED_NOGPS, True), (True, land, True), (True, land, False)]

@@ -81,7 +81,7 @@ def _packed(message: Message, *, v1: bool = False) -> bytes:
 
 
 _TARGET = dialect.MAVLink_set_attitude_target_message(0, 1, 1, 7, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, 0.5)
-_COMMAND = dialect.MAVLink_command_long_message(1, 1, 21, 0, 0, 0, 0, 0, 0, 0, 0)
+_COMMAND = dialect.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
 @pytest.mark.parametrize("v1", [False, True])
@@ -126,6 +126,7 @@ _SET_MODE = dialect.MAVLink_command_long_message(1, 1, 176, 1, 1, 6, 0, 0, 0, 0,
 _COMMANDS = (
     _SET_MODE,
     dialect.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0),
+    dialect.MAVLink_command_long_message(1, 1, 21, 1, 0, 0, 0, math.nan, 0, 0, 0),
     dialect.MAVLink_command_int_message(1, 1, 0, 176, 0, 0, 1, 6, 0, 0, 0, 0, 0),
     dialect.MAVLink_set_mode_message(1, 1, 6 << 16),
 )
@@ -141,7 +142,7 @@ def test_the_gate_passes_changes_of_mode_and_arming_only_while_we_command(v1: bo
         gate.commanding = True
         assert gate.passes(frame, 5), message
     gate.commanding = False
-    assert gate.passes(_packed(dialect.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0)), 5)
+    assert gate.passes(_packed(_COMMAND), 5)
 
 
 def test_the_library_repeats_no_change_of_mode_once_we_let_go() -> None:

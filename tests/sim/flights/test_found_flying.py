@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import math
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -149,6 +150,45 @@ def test_on_the_floor_a_camera_that_is_gone_is_an_error() -> None:
             with pytest.raises(UnavailableError):
                 await restarted(rig)
             assert not rig.peer.armed
+
+    virtual(test())
+
+
+class BrokenPart:
+    """A part that fails each time it is started."""
+
+    frames = refused = 0
+    is_closed = True
+
+    def __init__(self, err: Exception) -> None:
+        self._err = err
+        self.started = 0
+
+    async def run(self) -> None:
+        self.started += 1
+        raise self._err
+
+    def expose(self, part: float) -> None: ...
+
+    def put(self, value: object) -> None: ...
+
+
+def test_what_is_not_critical_fails_in_the_air_and_the_flight_is_still_ended_by_the_mission() -> None:
+    async def test() -> None:
+        async with ardupilot_rig(patience=PATIENT_COPTER) as rig:
+            await rig.take_off(1.5)
+            await died(rig)
+            config = await config_of(rig, camera_gone=False)
+            flight = build(config, SITE, configured_order(config), clock=LoopClock(), detectors=NoDetectors())
+            front = BrokenPart(UnavailableError("no second camera"))
+            others = [BrokenPart(OSError(12, "no memory")), BrokenPart(ValueError("a fault"))]
+            broken = replace(flight, front_camera=front, interlock=others[0], progress=others[1])
+            async with asyncio.timeout(120):
+                result = await Daemon(broken).fly()
+            assert result.phase is Phase.ABORTED
+            assert not rig.peer.armed
+            assert rig.peer.truth().height_m < 0.15
+            assert min(part.started for part in (front, *others)) > 2
 
     virtual(test())
 

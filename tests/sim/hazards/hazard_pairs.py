@@ -2,12 +2,13 @@
 
 python -m tests.sim.hazards.hazard_pairs 500 flies the first five hundred and prints how each ended, then the
 worst distances; exit 1 where one was unsafe.  `--from 7` begins with another one, `--keep DIR` keeps the logs
-of the unsafe ones.
+of the unsafe ones, `--json FILE` is written for tools.safety_case.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import random
 import shutil
@@ -98,6 +99,17 @@ class FlownPair:
     score: FlightScore
     unsafe: tuple[JudgedFault, ...]
 
+    def document(self) -> dict[str, Any]:
+        """What `evidence_of_pairs` of tools.safety_case reads."""
+        return {
+            "seed": self.seed,
+            "faults": self.faults,
+            "ended": self.ended,
+            "unsafe": [asdict(fault) for fault in self.unsafe],
+            "min_clearance_m": self.score.min_clearance_m,
+            "max_overshoot_m": self.score.max_overshoot_m,
+        }
+
     def __str__(self) -> str:
         words = faults_in_words(map(asdict, self.unsafe)) or "safe"
         return f"{self.seed}: {self.faults}: {self.ended}: {words}"
@@ -143,6 +155,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--from", dest="first", type=int, default=1)
     parser.add_argument("--vehicle", choices=["ardupilot", "px4"], default="ardupilot")
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--json", type=Path)
     options = parser.parse_args(arguments)
     flown = []
     for seed in range(options.first, options.first + options.flights):
@@ -153,6 +166,9 @@ def main(arguments: Sequence[str]) -> int:
                 shutil.copytree(folder, options.keep / str(seed), dirs_exist_ok=True)
         flown.append(pair)
         print(pair, flush=True)
+    if options.json is not None:
+        document = {"pairs": [pair.document() for pair in flown]}
+        options.json.write_text(json.dumps(document, default=str) + "\n", encoding="utf-8")
     unsafe = [pair.seed for pair in flown if pair.unsafe]
     clearances = [pair.score.min_clearance_m for pair in flown if pair.score.min_clearance_m is not None]
     above = [pair.score.max_overshoot_m for pair in flown if pair.score.max_overshoot_m is not None]

@@ -21,16 +21,25 @@ from typing import Any
 import pytest
 
 import flightd
+from flightd.app.absent_parts import NO_RECORDER
+from flightd.app.build import assemble, pilot_of
+from flightd.app.publishers import TelemetryPublishers
+from flightd.app.tick import Tick
+from flightd.core.flight_order import FlightOrder
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
-from flightd.core.types import EventLevel, Phase
+from flightd.core.types import HEALTHY, Command, CommandKind, EventLevel, Phase
 from flightd.mission.guidance import Guidance, MissionInputs
 from flightd.mission.reasons import in_words
 from flightd.mission.safety.last_resort import LastResort
 from flightd.pilot import Pilot
+from flightd.runtime.clock import LoopClock
+from tests.rigs.event_loops import virtual
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
-from tests.sim.ideal.test_ideal_scan import scan_flight
+from tests.sim.ideal.ideal_ports import HeldSetpoint, IdealGround, IdealVehicle, IdealVision
+from tests.sim.ideal.test_ideal_scan import CONFIG, scan_flight
+from tests.unit.mission.shelves import SITE
 
 PACKAGE = str(Path(flightd.__file__).parent)
 MANY = int(os.environ.get("FLIGHTD_FAILURES", "8"))
@@ -249,3 +258,33 @@ def test_a_mission_that_is_given_up_takes_no_command() -> None:
     for now_ns in (20_000_000, 40_000_000):
         pilot.step(TickInput(now_ns))
     assert not pilot.possible_commands
+
+
+def test_an_order_outlasts_a_ground_link_that_fails() -> None:
+    answers: list[Exception | None] = [ValueError("broken"), None]
+
+    def take() -> list[Command]:
+        answer = answers.pop(0)
+        if answer is not None:
+            raise answer
+        return []
+
+    async def test() -> tuple[Phase, Phase]:
+        clock = LoopClock()
+        vehicle, ground = IdealVehicle(lambda: None, lambda _: None), IdealGround(take, lambda: 0.0)
+        flight = assemble(
+            CONFIG,
+            SITE,
+            pilot_of(CONFIG, SITE, FlightOrder(("A2",))),
+            vehicle=vehicle,
+            setpoints=HeldSetpoint(),
+            vision=IdealVision(lambda: HEALTHY),
+            publishers=TelemetryPublishers(clock, vehicle, NO_RECORDER, ground),
+            clock=clock,
+            ground=ground,
+        )
+        tick = Tick(flight)
+        tick.order(Command("order", CommandKind.STOP))
+        return tick.run(TICK_NS).phase, tick.run(2 * TICK_NS).phase
+
+    assert virtual(test()) == (Phase.PREFLIGHT, Phase.ABORTED)

@@ -18,6 +18,7 @@ from tests.unit.mission.test_readiness import VEHICLE
 
 NOW_NS = 10**9
 LONG_AGO = replace(VEHICLE.attitude, stamp_ns=NOW_NS - 4 * 10**9)
+LOST_NS = NOW_NS - 4 * 10**9
 FLYING = replace(VEHICLE, armed=True, in_control=True, landed=LandedState.IN_AIR, height_m=1.5)
 
 
@@ -39,6 +40,12 @@ def answers(vehicle: VehicleState | None, before: Phase = Phase.FOLLOW) -> tuple
         (FLYING, Phase.PILOT, (Phase.PILOT, Demand.HANDS_OFF, False)),
         # nothing is heard any more, not even in which mode it is: landed unheard
         (replace(FLYING, in_control=False, attitude=LONG_AGO), Phase.LAND, (Phase.LAND, Demand.LAND, True)),
+        # heartbeats alone fail to come: the mode is of the past, and no pilot's
+        (
+            replace(FLYING, in_control=False, heartbeat_ns=LOST_NS),
+            Phase.LAND,
+            (Phase.LAND, Demand.LAND, True),
+        ),
         (replace(FLYING, in_control=False), Phase.RECOVER, (Phase.RECOVER, Demand.KEEP, True)),
         (replace(FLYING, heartbeat_ns=0), Phase.FOLLOW, (Phase.LAND, Demand.LAND, True)),
         (VEHICLE, Phase.PREFLIGHT, (Phase.ABORTED, Demand.DISARM, False)),

@@ -178,4 +178,6 @@ def test_trouble_with_the_archive_is_told_at_once_and_the_flight_goes_on(
     assert "cannot make room" in told[0]
     assert "Input/output error" in told[0]
     real(flight(ZeroDivisionError("a fault")))
+    assert told[0] == "ZeroDivisionError: a fault"
+    real(flight(UnavailableError("no folder")))
     assert "not looked after any more" in told[0]

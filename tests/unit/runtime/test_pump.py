@@ -7,9 +7,13 @@ import itertools
 
 import pytest
 
+from flightd.app.absent_parts import NoRecorder
+from flightd.app.build import noted
+from flightd.app.detection.latency import LatencyBook
 from flightd.app.setpoint_pump import SetpointPump
 from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, VehicleState
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.supervisor import FaultBarrier
 from tests.rigs.event_loops import virtual
 
 MS = 1_000_000
@@ -40,6 +44,11 @@ class Wire:
         return True
 
     def notify(self, event: Event) -> None: ...
+
+
+class BrokenRecorder(NoRecorder):
+    def record(self, topic: str, stamp_ns: int, message: object) -> None:
+        raise TypeError("it has no JSON form")
 
 
 async def pumped(
@@ -109,5 +118,27 @@ def test_an_adapter_that_goes_on_failing_is_not_left_alone_with_the_vehicle() ->
         pump.set(AttitudeSetpoint(clock.now_ns()))
         with pytest.raises(ValueError, match="does not fit"):
             await asyncio.wait_for(pump.run(), 1.0)
+
+    virtual(test())
+
+
+def test_whoever_fails_at_being_told_of_a_setpoint_stops_none() -> None:
+    """The flight log and the book of latencies: the wire is not theirs to keep waiting, or to end."""
+
+    async def test() -> None:
+        told: list[str] = []
+        clock = LoopClock()
+        wire = Wire(clock)
+        barrier = FaultBarrier(lambda part, err: told.append(f"{part}: {err}"))
+        pump = SetpointPump(wire, clock, noted(LatencyBook(), BrokenRecorder(), barrier))
+        running = asyncio.ensure_future(pump.run())
+        for _ in range(3):
+            pump.set(AttitudeSetpoint(clock.now_ns()))
+            await asyncio.sleep(0.01)
+        assert not running.done()
+        assert len(wire.sent) == 3
+        assert told == ["recorder: it has no JSON form"]
+        running.cancel()
+        await asyncio.wait([running])
 
     virtual(test())

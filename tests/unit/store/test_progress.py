@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import math
+import threading
 from pathlib import Path
 
 import pytest
 
+from flightd.adapters.store import kept_file
 from flightd.adapters.store.progress import LeftOver, NothingLeftError, load_left_over, progress_file
 from flightd.app.build import plan_of
 from flightd.app.flight_orders import configured_order, resumed
@@ -73,6 +75,28 @@ def test_a_disk_that_refuses_is_trouble_not_the_end(tmp_path: Path) -> None:
 
     with pytest.raises(TransientError, match="progress"):
         real(run())
+
+
+def test_a_disk_that_hangs_does_not_keep_the_end_of_a_flight_waiting(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The loop hands the vehicle back meanwhile."""
+    released = threading.Event()
+    monkeypatch.setattr(kept_file, "replace_file", lambda *_: released.wait(10.0))
+
+    async def test() -> None:
+        file = progress_file(tmp_path / "progress.json", "demo")
+        task = asyncio.ensure_future(file.run())
+        file.put(LeftOver(("A2",), "A1", 3.0))
+        await asyncio.sleep(0.05)
+        task.cancel()
+        for _ in range(3):
+            await asyncio.sleep(0.01)
+            assert not task.done()
+        released.set()
+        await asyncio.gather(task, return_exceptions=True)
+
+    real(test())
 
 
 def test_what_is_left_over_takes_the_place_of_the_configured_nodes(tmp_path: Path) -> None:

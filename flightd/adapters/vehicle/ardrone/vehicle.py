@@ -17,6 +17,7 @@ from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, AttitudeSetpoint, Demand, Event, LandedState, VehicleState
 from flightd.ports import Clock
+from flightd.runtime.supervisor import insisted
 
 _log = logging.getLogger(__name__)
 
@@ -74,8 +75,8 @@ class ArDroneVehicle:
         try:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._beat(), name="ardrone commands")
-                tasks.create_task(self._keep_configured(), name="ardrone configuration")
-                tasks.create_task(self._keep_camera(), name="ardrone camera")
+                tasks.create_task(insisted(self._keep_configured), name="ardrone configuration")
+                tasks.create_task(insisted(self._keep_camera), name="ardrone camera")
         finally:
             await self._release()
             self._link.close()

@@ -49,6 +49,7 @@ from flightd.core.types import (
 )
 from flightd.ports import Clock
 from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
+from flightd.runtime.supervisor import insisted
 
 _LOG = logging.getLogger(__name__)
 
@@ -146,16 +147,24 @@ class MavlinkVehicle(abc.ABC):
         UnavailableError when the link can never be opened (port in use, not a serial device).
         """
         try:
-            async with asyncio.TaskGroup() as tasks:
-                self._serve(tasks)
+            async with asyncio.TaskGroup() as carrying:
+                carrier = carrying.create_task(self.link.run(), name="mavlink link")
                 try:
-                    await self._modes.run()
+                    await self._live()
                 finally:
-                    await self._modes.hand_back()
+                    carrier.cancel()  # it has carried what handing back took
         except ExceptionGroup as group:
             if len(group.exceptions) == 1:
                 raise group.exceptions[0] from None
             raise
+
+    async def _live(self) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            self._serve(tasks)
+            try:
+                await self._modes.run()
+            finally:
+                await self._modes.hand_back()
 
     def state(self) -> VehicleState | None:
         now_ns = self._clock.now_ns()
@@ -271,7 +280,6 @@ class MavlinkVehicle(abc.ABC):
 
     def _serve(self, tasks: asyncio.TaskGroup) -> None:
         """Start what runs beside the demand loop."""
-        tasks.create_task(self.link.run(), name="mavlink link")
         tasks.create_task(self._once_heard(self._compare_clocks), name="mavlink timesync")
         tasks.create_task(self._once_heard(self.streams.run), name="mavlink streams")
         tasks.create_task(self._once_heard(self._read_parameters), name="mavlink parameters")
@@ -322,8 +330,9 @@ class MavlinkVehicle(abc.ABC):
     # Beside the demand
 
     async def _once_heard(self, work: Callable[[], Awaitable[None]]) -> None:
+        """Work that no flight ends for: what it raises is logged, and it begins anew."""
         await self._heard.wait()
-        await work()
+        await insisted(work)
 
     async def _read_parameters(self) -> None:
         """Those by which it is flown; the rest is read on the ground, by the examination."""

@@ -12,11 +12,13 @@ SET_ATTITUDE_TARGET = 82
 _SET_MODE, _COMMAND_INT, _COMMAND_LONG = 11, 75, 76
 _COMMAND_AT = 28
 """Where both COMMAND messages have their command on the wire, from the payload's start."""
-_DO_SET_MODE, _ARM_DISARM = 176, 400
+_NAV_LAND, _DO_SET_MODE, _ARM_DISARM = 21, 176, 400
+"""The library asks for the landing mode by NAV_LAND."""
 
 FRESH_NS = 200_000_000
 """A setpoint older than this does not go out any more; less than any autopilot's own time-out."""
 
+_WHO_FLIES = frozenset({_NAV_LAND, _DO_SET_MODE, _ARM_DISARM})
 _V1, _V2 = 0xFE, 0xFD
 
 
@@ -30,12 +32,12 @@ def message_id(frame: bytes) -> int | None:
 
 
 def commands_flight(frame: bytes) -> bool:
-    """Whether this frame changes the mode, arms or disarms."""
+    """Whether this frame changes the mode, lands, arms or disarms."""
     kind = message_id(frame)
     if kind not in {_COMMAND_INT, _COMMAND_LONG}:
         return kind == _SET_MODE
     at = _COMMAND_AT + (10 if frame[0] == _V2 else 6)
-    return int.from_bytes(frame[at : at + 2], "little") in {_DO_SET_MODE, _ARM_DISARM}
+    return int.from_bytes(frame[at : at + 2], "little") in _WHO_FLIES
 
 
 class SetpointGate:

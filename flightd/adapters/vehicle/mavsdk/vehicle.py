@@ -13,8 +13,9 @@ import contextlib
 import logging
 import math
 from collections import deque
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from mavsdk.autopilot import Autopilot
@@ -51,6 +52,7 @@ from flightd.core.types import (
 from flightd.ports import Clock
 from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 from flightd.runtime.latest_slot import Latest
+from flightd.runtime.supervisor import insisted
 
 _LOG = logging.getLogger(__name__)
 
@@ -257,13 +259,17 @@ class MavsdkVehicle:
         ]
         for source, message_id, take in sources:
             tasks.create_task(self._take(source, streams, message_id, take), name=f"mavsdk {message_id}")
-        tasks.create_task(streams.run(), name="mavsdk streams")
-        tasks.create_task(self._read_parameters(library), name="mavsdk parameters")
-        tasks.create_task(self._compare_clocks(library, plugins), name="mavsdk timesync")
-        tasks.create_task(self._poll_beats(), name="mavsdk heartbeat poll")
+        beside: dict[str, Callable[[], Awaitable[None]]] = {
+            "streams": streams.run,
+            "parameters": partial(self._read_parameters, library),
+            "timesync": partial(self._compare_clocks, library, plugins),
+            "heartbeat poll": self._poll_beats,
+            "texts": partial(self._tell, library, plugins),
+        }
+        for name, work in beside.items():
+            tasks.create_task(insisted(work), name=f"mavsdk {name}")
         tasks.create_task(self._pass_on(library, plugins), name="mavsdk setpoints")
         tasks.create_task(self._idle(), name="mavsdk idle setpoints")
-        tasks.create_task(self._tell(library, plugins), name="mavsdk texts")
 
     async def _take(
         self,
