@@ -55,11 +55,14 @@ NO_PAGE = {
     "ground/drone_names.py": "options of the command line",
     "ground/foxglove_view": "options of the command line, and Foxglove's own connection",
     "ground/guide_pages/rendering.py": "markup of the guide, which is English",
+    "ground/mqtt": "options of the command line, and the broker's own connection",
     "ground/server.py": "options of the command line",
     "ground/tls.py": "options of the command line",
     "mission/machine.py": "errors of ours",
     "mission/safety/hazard_table.py": "the table of hazards in the guide, which is English",
     "site/aisle_grid.py": "lines of a site file",
+    "site/exchange/lif_losses.py": "notes of the command line",
+    "site/exchange/lif_onto.py": "refusals of the command line",
     "site/floor_plan_svg.py": "the floor plan as a document",
 }
 """What of that no page shows."""

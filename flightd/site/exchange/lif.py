@@ -162,14 +162,14 @@ def _ways(
     elsewhere = {node.node_id for layout in layouts[1:] for node in layout.nodes}
     ways: list[tuple[str, str]] = []
     below_m: dict[tuple[str, str], float] = {}
-    away: list[str] = []
+    away: list[tuple[str, str]] = []
     for i, edge in enumerate(layouts[0].edges):
         way = edge.start_node_id, edge.end_node_id
         for node in way:
             if node not in here | elsewhere:
                 raise InputError(f"edges[{i}]: there is no node {node!r}")
         if way[0] not in here or way[1] not in here:
-            away.append(f"{way[0]} to {way[1]}")
+            away.append(way)
         elif _is_for(edge, vehicle) and way[0] in nodes and way[1] in nodes and way[0] != way[1]:
             ways.append(way)
             told = [
@@ -180,7 +180,7 @@ def _ways(
             if told:
                 below_m[way] = min(told)
     if away:
-        notes.append(f"ways to other layouts, left out: {listed(away)}")
+        notes.append(f"ways to other layouts, left out: {listed([f'{a} to {b}' for a, b in away])}")
     return ways, below_m
 
 

@@ -40,10 +40,10 @@ def low_way_tables(
     pairs = dict.fromkeys(tuple(sorted(way)) for way in ways if way[0] in renamed and way[1] in renamed)
     low: dict[tuple[str, str], float] = {}
     for a, b in pairs:
-        told = [below_m[way] for way in ((a, b), (b, a)) if way in below_m]
-        if told:
-            low[a, b] = min(told)
-            if len(set(told)) > 1:
+        both = [below_m[way] for way in ((a, b), (b, a)) if way in below_m]
+        if both:
+            low[a, b] = min(both)
+            if len(set(both)) > 1:
                 notes.append(f"{renamed[a]} to {renamed[b]} has two heights; the lower one is taken")
     ceiling_m = max(low.values()) if low and len(low) == len(pairs) else None
     tables, lost = [], []
@@ -54,7 +54,7 @@ def low_way_tables(
         (ax, ay), (bx, by) = nodes[a], nodes[b]
         room = math.dist((ax, ay), (bx, by)) / 2 - _HALF_M > KEEP_OUT_CLEARANCE_M
         if not room or height_m <= 0.0 or from_m >= min(ceiling_m or _HIGHEST_M, _HIGHEST_M):
-            lost.append(f"{renamed[a]} to {renamed[b]} ({height_m:g} m)")
+            lost.append((renamed[a], renamed[b], height_m))
             continue
         x_m, y_m = (ax + bx) / 2, (ay + by) / 2
         tables.append(
@@ -67,5 +67,6 @@ def low_way_tables(
             }
         )
     if lost:
-        notes.append(f"heights that no keep-out can hold, left out: {listed(lost)}")
+        ways_lost = [f"{a} to {b} ({height_m:g} m)" for a, b, height_m in lost]
+        notes.append(f"heights that no keep-out can hold, left out: {listed(ways_lost)}")
     return ceiling_m, tables
