@@ -160,7 +160,15 @@ def _two_lists(state: Object) -> Object:
 
 _BATTERY: Final = Key(
     "batteryState",
-    Table({**named(stateOfCharge="batteryCharge", range="reach"), **dropped("batteryCurrent")}),
+    Table(
+        {
+            "stateOfCharge": Key("batteryCharge"),
+            # whole numbers by the document, though not by the schema
+            "batteryHealth": Key("batteryHealth", None, round),
+            "range": Key("reach", None, round),
+            **dropped("batteryCurrent"),
+        }
+    ),
 )
 _STATE: Final = Table(
     {

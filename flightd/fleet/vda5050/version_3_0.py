@@ -8,6 +8,7 @@ from typing import Any, Final
 from flightd.fleet.vda5050.order import InstantActions, Order
 from flightd.fleet.vda5050.parts import Header
 from flightd.fleet.vda5050.renaming import Key, Object, Table
+from flightd.fleet.vda5050.state import State
 
 
 def _rotation(edge: Object) -> Object:
@@ -22,8 +23,13 @@ def _never_blocking(_value: Any) -> str:
     return "NONE"
 
 
+# whole numbers by the document, though not by the schema
+_POWER: Final = Table(
+    {"batteryHealth": Key("batteryHealth", None, round), "range": Key("range", None, round)}
+)
 TABLES: Final[Mapping[type[Header], Table]] = {
     Order: Table({"edges": Key("edges", Table(start=_rotation))}),
+    State: Table({"powerSupply": Key("powerSupply", _POWER)}),
     InstantActions: Table(
         {
             "actions": Key(

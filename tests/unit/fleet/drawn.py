@@ -35,6 +35,8 @@ _NAMES: dict[str, st.SearchStrategy[Any]] = {
         st.sampled_from(["order.nodes", "state.errors"]), st.integers(0, 9)
     ),
     "network": st.just({"dnsServers": ["10.0.0.1"], "netmask": "255.0.0.0"}),
+    "battery_health": st.none() | st.integers(0, 100).map(float),
+    "range": st.none() | st.integers(0, 10_000).map(float),
     "supported_zones": st.none() | st.just(["BLOCKED"]),
 }
 
