@@ -18,7 +18,15 @@ from flightd.fleet.vehicle.refusals import Refusal, impossibility, malformation
 from flightd.fleet.vehicle.route import Route
 from flightd.fleet.vehicle.signals import Situation
 
-UNUSABLE: Final = frozenset({"trajectory", "corridor", "minimum_load_handling_device_height", "direction"})
+UNUSABLE: Final = frozenset(
+    {
+        "trajectory",
+        "corridor",
+        "minimum_load_handling_device_height",
+        "maximum_mobile_robot_height",
+        "direction",
+    }
+)
 """Optional fields of edges that a drone on painted lines cannot do as it is told."""
 FLIES: Final = frozenset({OperatingMode.AUTOMATIC, OperatingMode.SEMIAUTOMATIC})
 """The modes in which a fleet control is in control."""
@@ -43,11 +51,13 @@ class Holding:
 
 @dataclass(frozen=True, slots=True)
 class Acceptance:
-    """The rules of one version on one floor.  `in_reach_m`: this near a node the vehicle stands on it."""
+    """The rules of one version on one floor.  `in_reach_m`: this near a node the vehicle stands on it;
+    `speed_mps`: it may fly so fast on every edge."""
 
     version: Version
     floor: Floor
     in_reach_m: float
+    speed_mps: float
 
     def refusal(self, order: Order, holding: Holding) -> Refusal | None:
         """Why the order is not accepted; IGNORED where nothing is said of it, None where it is."""
@@ -70,7 +80,7 @@ class Acceptance:
         first = order.nodes[0]
         if not self._in_reach(first, holding.situation):
             return Refusal(ErrorType.START_NODE_OUT_OF_RANGE, f"the drone is not at node {first.node_id}")
-        return impossibility(order, self.floor, UNUSABLE)
+        return impossibility(order, self.floor, UNUSABLE, self.speed_mps)
 
     def _of_number(self, order: Order, current: Order, holding: Holding) -> Refusal | None:
         """What the ids of an update alone say."""
@@ -97,7 +107,7 @@ class Acceptance:
         if (first.node_id, first.sequence_id) != route.decision or not waits:
             what = f"{first.node_id} with sequenceId {first.sequence_id} is not the decision point"
             return Refusal(ErrorType.START_NODE_OUT_OF_RANGE, what)
-        return impossibility(order, self.floor, UNUSABLE)
+        return impossibility(order, self.floor, UNUSABLE, self.speed_mps)
 
     def _of_mode(self, holding: Holding) -> Refusal | None:
         takes = FLIES if self.version is Version.V2_1 else FLIES | {OperatingMode.INTERVENED}

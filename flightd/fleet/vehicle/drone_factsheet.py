@@ -27,8 +27,6 @@ from flightd.fleet.vehicle.abilities import known_actions
 _USED = (
     "order.nodes.nodePosition",
     "order.nodes.nodePosition.allowedDeviationXY",
-    "order.edges.maximumSpeed",
-    "order.edges.maximumMobileRobotHeight",
 )
 
 

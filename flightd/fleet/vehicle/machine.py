@@ -34,6 +34,7 @@ from flightd.fleet.vehicle.instant_actions import InstantBook
 from flightd.fleet.vehicle.refusals import Refusal
 from flightd.fleet.vehicle.route import Route
 from flightd.fleet.vehicle.signals import (
+    Decided,
     Fly,
     Hold,
     Input,
@@ -53,8 +54,9 @@ _CLEARS: Final = frozenset(
 )
 _LOSES_NODE: Final = _CLEARS - {OperatingMode.MANUAL}
 
-BaseReach = Callable[[Sequence[Node]], int]
-"""How many of the released nodes ahead may be flown to so that the drone still comes home."""
+BaseReach = Callable[[Sequence[Node]], int | None]
+"""How many of the released nodes ahead may be flown to so that the drone still comes home; None: it is not
+known yet, and none is flown to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +69,8 @@ class Identity:
 
 class Vehicle:
     """`base_reach` keeps the base from going beyond the safe return: it is asked in every step, and what it
-    does not give is held back and told.  With `stops_between_nodes` a cancelled order ends where the drone
-    is, otherwise at the next node.  `in_reach_m`: this near a node the drone counts as standing on it."""
+    does not give is held back and told.  A cancelled order ends at the next node.  `in_reach_m`: this near a
+    node the drone counts as standing on it."""
 
     def __init__(
         self,
@@ -78,15 +80,14 @@ class Vehicle:
         factsheet: Factsheet,
         base_reach: BaseReach = len,
         *,
-        stops_between_nodes: bool = False,
         in_reach_m: float = 0.3,
     ) -> None:
         self._identity = identity
         self._version = version
-        self._acceptance = Acceptance(version, floor, in_reach_m)
+        speed_mps = factsheet.physical_parameters.maximum_speed
+        self._acceptance = Acceptance(version, floor, in_reach_m, speed_mps)
         self._factsheet = factsheet
         self._base_reach = base_reach
-        self._stops_between_nodes = stops_between_nodes
         self._headers: dict[type[Header], int] = {}
         self._situation: Situation | None = None
         self._mode = OperatingMode.STARTUP
@@ -98,7 +99,7 @@ class Vehicle:
         self._instant = InstantBook(version)
         self._errors = ErrorBook()
         self._commanded: tuple[Stop, ...] = ()
-        self._allowed = 0
+        self._allowed: int | None = 0
         self._told: State | None = None
         self._told_at: datetime | None = None
 
@@ -109,7 +110,7 @@ class Vehicle:
         for one in inputs:
             match one:
                 case Order():
-                    self._take_order(one)
+                    out += self._take_order(one)
                 case InstantActions():
                     out += self._take_instant(one)
                 case Malformed():
@@ -128,6 +129,16 @@ class Vehicle:
             out.append(self.factsheet(now))
         out += self._states(now, wants_state)
         return tuple(out)
+
+    @property
+    def last_node(self) -> str:
+        """The node that the drone is at, or left last; empty before one is known."""
+        return self._last_node[0]
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether no order is left to be flown or done."""
+        return self._idle
 
     def change_floor(self, floor: Floor) -> None:
         """The drone was started anew, perhaps with another map; orders are checked by this one."""
@@ -167,7 +178,7 @@ class Vehicle:
         is_over = not self._route.nodes and not self._route.edges and self._actions.is_over
         return is_over and not self._instant.cancels
 
-    def _take_order(self, order: Order) -> None:
+    def _take_order(self, order: Order) -> Iterator[Output]:
         horizon = {action.action_id for part in self._route.horizon for action in part.actions}
         holding = Holding(
             order=self._order,
@@ -184,7 +195,9 @@ class Vehicle:
             return
         if refusal is not None:
             self._errors.order_refused(order, refusal)
+            yield Decided(order, refusal)
             return
+        yield Decided(order)
         self._errors.order_accepted()
         if self._order is None or order.order_id != self._order.order_id:
             self._begin(order)
@@ -217,7 +230,9 @@ class Vehicle:
             if refused is not None:
                 self._instant.fail(action)
                 self._errors.instant_refused(message, action, refused)
+                yield Decided(action, refused)
                 continue
+            yield Decided(action)
             self._errors.instant_accepted()
             match action.action_type:
                 case "startPause":
@@ -236,7 +251,7 @@ class Vehicle:
     def _cancel(self) -> Iterator[Output]:
         yield from self._actions.fail()
         driving = self._situation is not None and self._situation.driving
-        on_the_way = driving and bool(self._commanded) and not self._stops_between_nodes
+        on_the_way = driving and bool(self._commanded)
         self._route.cut(1 if on_the_way and self._route.base else 0)
 
     # the way
@@ -299,7 +314,11 @@ class Vehicle:
     def _allowed_nodes(self) -> list[Node]:
         """The part of the base that is flown: as far as the drone still comes home from."""
         base = self._route.base
-        reach = max(0, min(self._base_reach(base), len(base))) if base else 0
+        told = self._base_reach(base) if base else 0
+        if told is None:
+            self._allowed = None
+            return []
+        reach = max(0, min(told, len(base)))
         self._errors.drop(ErrorType.BASE_BEYOND_SAFE_RETURN)
         if reach < len(base):
             beyond = base[reach]
@@ -313,7 +332,7 @@ class Vehicle:
         allowed = self._allowed_nodes()
         stops: tuple[Stop, ...] = ()
         if self._may_fly:
-            stops = tuple(map(self._stop, allowed[: stops_at(allowed)]))
+            stops = tuple(Stop(node.node_id, node.sequence_id) for node in allowed[: stops_at(allowed)])
         if stops == self._commanded:
             return
         if stops:
@@ -321,12 +340,6 @@ class Vehicle:
         elif self._mode in FLIES:
             yield Hold()
         self._commanded = stops
-
-    def _stop(self, node: Node) -> Stop:
-        edge = self._route.edge_to(node)
-        speed = edge.maximum_speed if edge else None
-        height = edge.maximum_mobile_robot_height if edge else None
-        return Stop(node.node_id, node.sequence_id, speed, height)
 
     # messages
 
@@ -356,7 +369,7 @@ class Vehicle:
             edge_states=self._route.edge_states(),
             driving=seen.driving,
             paused=self._instant.paused,
-            new_base_request=bool(self._route.horizon) and self._allowed <= 1,
+            new_base_request=bool(self._route.horizon) and self._allowed in {0, 1},
             mobile_robot_position=seen.position,
             velocity=seen.velocity,
             action_states=order_actions,

@@ -67,11 +67,12 @@ def _releases(order: Order) -> Iterator[str]:
             yield f"nodes[{i + 1}].released: the edge before it is not"
 
 
-def impossibility(order: Order, floor: Floor, unusable: Collection[str]) -> Refusal | None:
+def impossibility(order: Order, floor: Floor, unusable: Collection[str], speed_mps: float) -> Refusal | None:
     """Why an order of good form cannot be flown here: optional fields (`unusable`, by their names in the
-    model), actions, the map, ways."""
+    model; a limit below the vehicle's own `speed_mps`), actions, the map, ways."""
     return (
         _unusable_field(order, unusable)
+        or _speed_limit(order, speed_mps)
         or _impossible_action(order, floor)
         or _other_map(order, floor)
         or _no_way(order, floor)
@@ -86,6 +87,15 @@ def _unusable_field(order: Order, unusable: Collection[str]) -> Refusal | None:
                 return Refusal(
                     ErrorType.UNSUPPORTED_PARAMETER, f"{what} cannot be used", (("parameter", what),)
                 )
+    return None
+
+
+def _speed_limit(order: Order, speed_mps: float) -> Refusal | None:
+    for i, edge in enumerate(order.edges):
+        if edge.maximum_speed is not None and edge.maximum_speed < speed_mps:
+            what = f"edges[{i}].maximum_speed"
+            text = f"{what} cannot be less than {speed_mps:g} m/s"
+            return Refusal(ErrorType.UNSUPPORTED_PARAMETER, text, (("parameter", what),))
     return None
 
 

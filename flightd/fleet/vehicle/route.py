@@ -55,10 +55,6 @@ class Route:
         last = self.nodes[-1].sequence_id if self.nodes else -1
         self.edges = [edge for edge in self.edges if edge.sequence_id < last]
 
-    def edge_to(self, node: Node) -> Edge | None:
-        """The edge that leads to a node ahead."""
-        return next((edge for edge in self.edges if edge.sequence_id == node.sequence_id - 1), None)
-
     def node_states(self) -> list[NodeState]:
         """As the state tells them."""
         return [

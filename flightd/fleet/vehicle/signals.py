@@ -19,6 +19,7 @@ from flightd.fleet.vda5050.state import (
     SafetyState,
     State,
 )
+from flightd.fleet.vehicle.refusals import Refusal
 
 _SAFE: Final = SafetyState(active_emergency_stop=EmergencyStop.NONE, field_violation=False)
 
@@ -68,12 +69,10 @@ Input = Order | InstantActions | Malformed | Situation | Reached | Progress
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """A node of the way; metres a second and metres of height that may not be exceeded on the way to it."""
+    """A node of the way."""
 
     node: str
     sequence_id: int
-    max_speed_mps: float | None = None
-    max_height_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,4 +115,12 @@ class ResumeAction:
     action_id: str
 
 
-Output = Fly | Hold | Begin | Abort | PauseAction | ResumeAction | State | Factsheet
+@dataclass(frozen=True, slots=True)
+class Decided:
+    """An order or an instant action is taken; or refused, and why."""
+
+    about: Order | Action
+    refusal: Refusal | None = None
+
+
+Output = Fly | Hold | Begin | Abort | PauseAction | ResumeAction | Decided | State | Factsheet

@@ -261,7 +261,9 @@ def test_a_malformed_order_is_told_until_an_order_is_accepted(version: Version) 
 
 
 @BOTH
-@pytest.mark.parametrize("field", ["trajectory", "minimum_load_handling_device_height", "direction"])
+@pytest.mark.parametrize(
+    "field", ["trajectory", "minimum_load_handling_device_height", "direction", "maximum_speed"]
+)
 def test_an_order_with_a_field_that_cannot_be_used_is_refused_by_its_name(
     version: Version, field: str
 ) -> None:
@@ -434,19 +436,6 @@ def test_a_cancelled_order_ends_at_the_next_node(version: Version) -> None:
 
 
 @BOTH
-def test_a_vehicle_that_stops_between_nodes_stops_where_it_is(version: Version) -> None:
-    drone = Drone(version, stops_between_nodes=True)
-    drone.say(order("A1 A2 A3"))
-    drone.is_at(None, driving=True)
-    assert drone.say(instant("cancelOrder", "c")) == [Hold()]
-    assert (drone.ahead, drone.state.edge_states, drone.statuses["c"]) == ("", [], "RUNNING")
-    drone.say(order("A1 A2", name="early"))
-    assert drone.errors == ["OTHER_ORDER_ACTIVE"]  # not before it stands
-    drone.is_at(None)
-    assert drone.statuses["c"] == "FINISHED"
-
-
-@BOTH
 def test_a_vehicle_that_stands_cancels_at_once(version: Version) -> None:
     drone = Drone(version)
     drone.say(order("A1 A2 A3"))
@@ -484,11 +473,13 @@ def test_a_cancel_runs_until_actions_that_cannot_be_cancelled_are_over(
 
 @BOTH
 def test_after_a_cancel_a_new_order_begins_where_the_vehicle_is(version: Version) -> None:
-    drone = Drone(version, stops_between_nodes=True)
+    drone = Drone(version)
     drone.say(order("A1 A2 A3"))
     drone.is_at(None, driving=True, at_m=(0.7, 0.0))
-    drone.say(instant("cancelOrder"))
+    drone.say(instant("startPause"))
     drone.is_at(None, at_m=(0.7, 0.0))
+    drone.say(instant("cancelOrder"))
+    drone.say(instant("stopPause"))
     here = msgspec.structs.replace(order("A1 A2", name="n1").nodes[0], node_id="here")
     first = msgspec.structs.replace(order("A1 A2", name="n1"), nodes=[here, order("A1 A2").nodes[1]])
     drone.say(at(first, x=0.7, y=0.0, map_id="demo"))
@@ -684,15 +675,17 @@ def test_a_mode_that_takes_control_away_clears_the_order(version: Version) -> No
 
 @BOTH
 def test_the_base_is_flown_no_further_than_the_drone_comes_home_from(version: Version) -> None:
-    reach = [1]
+    reach: list[int | None] = [None]
     drone = Drone(version, reach=lambda ahead: reach[0])
-    assert flown(drone.say(order("A1 A2 A3 A4", maximum_speed=0.5, maximum_mobile_robot_height=2.0))) == "A2"
+    assert drone.say(order("A1 A2 A3 A4", maximum_speed=2.0)) == []
+    assert (drone.errors, drone.ahead) == ([], "A2 A3 A4"), "nothing is said before it is known"
+    reach[0] = 1
+    assert flown(drone.say()) == "A2"
     assert (drone.errors, drone.about("nodeId")) == (["BASE_BEYOND_SAFE_RETURN"], ["A3"])
     assert drone.ahead == "A2 A3 A4"
     reach[0] = 2
     out = drone.say()
     assert flown(out) == "A2 A3"
-    assert (only(out, Fly)[0].stops[0].max_speed_mps, only(out, Fly)[0].stops[0].max_height_m) == (0.5, 2.0)
     reach[0] = 0  # the battery is worse than it was thought
     assert drone.say() == [Hold()]
     reach[0] = 9

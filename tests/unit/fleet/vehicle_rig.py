@@ -20,7 +20,7 @@ from flightd.fleet.vda5050.state import OperatingMode, PowerSupply, State
 from flightd.fleet.vehicle.drone_factsheet import Measures, drone_factsheet
 from flightd.fleet.vehicle.floor import floor_of
 from flightd.fleet.vehicle.machine import BaseReach, Identity, Vehicle
-from flightd.fleet.vehicle.signals import Input, Output, Situation
+from flightd.fleet.vehicle.signals import Decided, Input, Output, Situation
 from flightd.site.site import Site
 from flightd.site.site_file import load_site
 
@@ -128,7 +128,7 @@ class Drone:
             if isinstance(one, Header):
                 check(one, self.version)
         self.states += [one for one in out if isinstance(one, State)]
-        return [one for one in out if not isinstance(one, State)]
+        return [one for one in out if not isinstance(one, State | Decided)]
 
     def is_at(
         self,
