@@ -31,6 +31,7 @@ from flightd.ground.guards import Guard, Hosts
 from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
 from flightd.ground.json_http import as_json, is_json, json_body, status_of
+from flightd.ground.manager_routes import Managers, manager_routes
 from flightd.ground.messages import (
     SentAct,
     SessionState,
@@ -74,11 +75,12 @@ def application(
     studio: Studio | None = None,
     simulated: SimulatedFlight | None = None,
     others: Sequence[ReadFolder] = (),
+    managers: Managers | None = None,
 ) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks,
     `people` who sits at a page, inventories, site files and `flights` lie under `folder`, more inventories
     under the `others`, `uploads` reads what people send, `maps` lays out maps, `studio` and `simulated` are
-    None without a folder."""
+    None without a folder; `managers` fly drones, too."""
     orders = Orders(hub.drones, access)
     routes = [
         first_page(),
@@ -90,6 +92,7 @@ def application(
         *studio_routes(studio),
         *doctor_routes(hub.drones, access, None if studio is None else studio.shelf),
         *mission_routes(folder, hub.drones, hub.for_each, others),
+        *manager_routes(managers),
         *guide_routes(),
         *session_routes(access),
         Mount("/static", StaticFiles(directory=STATIC)),

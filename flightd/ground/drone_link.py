@@ -92,6 +92,8 @@ class DroneLink:
         self._inventory = Shared(self._asked_inventory)
         self.on_plan: Callable[[PlanAnswer], Awaitable[None]] | None = None
         """Hears what is left of the drone's plan, whenever that changes."""
+        self.on_person: Callable[[], None] = lambda: None
+        """Hears that a person commands the drone, before it does."""
         self._plan_changed = asyncio.Event()
         self._plan_seen: tuple[object, ...] = ()
 
@@ -117,8 +119,10 @@ class DroneLink:
             self._tell_state()
             await asyncio.sleep(_AGAIN_S)
 
-    async def act(self, act: Act) -> Accepted:
+    async def act(self, act: Act, *, by_person: bool = True) -> Accepted:
         """Hand an act to the drone; its answer.  As `GroundClient` raises; RunError where too many wait."""
+        if by_person:
+            self.on_person()
         client = self._client
         if client is None:
             raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
@@ -145,8 +149,11 @@ class DroneLink:
         dry: bool = False,
         session: str = "",
         seen_ns: int = 0,
+        by_person: bool = True,
     ) -> Planned:
         """Hand the drone the nodes of its next flight, or ask what that would be.  As `act` raises."""
+        if by_person and not dry:
+            self.on_person()
         client = self._client
         if client is None:
             raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")

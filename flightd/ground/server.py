@@ -8,10 +8,10 @@ import ipaddress
 import re
 import signal
 import socket
-from collections.abc import Callable, Coroutine, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import uvicorn
 
@@ -33,6 +33,9 @@ from flightd.ground.site_page.simulated_flight import SimulatedFlight
 from flightd.ground.studio.studio import Studio
 from flightd.ground.tls import Certificate
 from flightd.runtime.ending_signals import end_on_signals
+
+if TYPE_CHECKING:
+    from flightd.ground.mqtt.fleet_link import FleetLink
 
 PORT = 8080
 _PING_S = 4.0
@@ -137,7 +140,7 @@ def run(
     folder: Path | None = None,
     viewers: Sequence[Viewer] = (),
     others: Sequence[ReadFolder] = (),
-    beside: Sequence[Callable[[], Coroutine[Any, Any, None]]] = (),
+    fleet: FleetLink | None = None,
 ) -> signal.Signals | None:
     """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had,
     InputError where it must not be listened at (`check_reach`)."""
@@ -147,7 +150,7 @@ def run(
 
     async def until_signal() -> None:
         serving = asyncio.ensure_future(
-            serve(drones, listener, where, access, on_ready, certificate, folder, viewers, others, beside)
+            serve(drones, listener, where, access, on_ready, certificate, folder, viewers, others, fleet)
         )
         end_on_signals(serving, came)
         with contextlib.suppress(asyncio.CancelledError):
@@ -168,11 +171,12 @@ async def serve(
     folder: Path | None = None,
     viewers: Sequence[Viewer] = (),
     others: Sequence[ReadFolder] = (),
-    beside: Sequence[Callable[[], Coroutine[Any, Any, None]]] = (),
+    fleet: FleetLink | None = None,
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
     end; inventories and flights lie under `folder` and the `others`; `viewers` are told what pages are;
-    `beside` runs as long as the station."""
+    `fleet` has the drones flown by somebody else's manager."""
+    viewers = viewers if fleet is None else (*viewers, fleet)
     hub, flights, uploads = Hub(drones, viewers), Flights(folder, others=others), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
     simulated = None if folder is None else SimulatedFlight(hub, folder, where.is_beyond)
@@ -184,7 +188,7 @@ async def serve(
     server = _Server(
         uvicorn.Config(
             application(
-                hub, hosts, access, people, folder, flights, uploads, maps, studio, simulated, others
+                hub, hosts, access, people, folder, flights, uploads, maps, studio, simulated, others, fleet
             ),
             http="h11",
             ws=PageSocket,
@@ -206,7 +210,7 @@ async def serve(
     async with asyncio.TaskGroup() as tasks:
         station = tasks.create_task(hub.run(), name="hub")
         tasks.create_task(flights.run(), name="flights")
-        running = [tasks.create_task(one(), name="beside the station") for one in beside]
+        managed = [] if fleet is None else [tasks.create_task(fleet.run(hub), name="fleet")]
         if studio is not None:
             tasks.create_task(studio.run(), name="studio")
         if simulated is not None:
@@ -222,7 +226,7 @@ async def serve(
             await station
         finally:
             server.should_exit = True
-            for one in running:
+            for one in managed:
                 one.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.shield(asyncio.wait([serving], timeout=_LEAVE_S + 2.0))

@@ -19,6 +19,7 @@ from websockets.typing import Origin
 from flightd.adapters.ground_link.client import Address
 from flightd.ground.access.access import Access
 from flightd.ground.hub import Viewer
+from flightd.ground.mqtt.fleet_link import FleetLink
 from flightd.ground.server import Listening, opened, serve
 
 JSON = {"Content-Type": "application/json"}
@@ -103,6 +104,7 @@ async def served(
     login: bool = False,
     viewers: Sequence[Viewer] = (),
     send_buffer: int | None = None,
+    fleet: FleetLink | None = None,
 ) -> AsyncIterator[Station]:
     """A station that serves meanwhile; flights lie below `folder`, people and audit in `state`; its system
     takes so many bytes at once for a page (None: as many as it likes)."""
@@ -113,7 +115,16 @@ async def served(
     with listener, TemporaryDirectory() as elsewhere:
         access = Access(state or Path(elsewhere), login, secure=False)
         serving = asyncio.ensure_future(
-            serve(drones, listener, where, access, lambda _: ready.set(), folder=folder, viewers=viewers)
+            serve(
+                drones,
+                listener,
+                where,
+                access,
+                lambda _: ready.set(),
+                folder=folder,
+                viewers=viewers,
+                fleet=fleet,
+            )
         )
         try:
             await asyncio.wait_for(ready.wait(), 20)

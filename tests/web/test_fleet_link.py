@@ -82,19 +82,6 @@ class Manager:
                 self.heard.append((topic, told, bool(message.retain)))
 
 
-@contextlib.asynccontextmanager
-async def at_broker(broker: BrokerAddress, version: Version) -> AsyncIterator[FleetLink]:
-    """The station's drone `demo` is at the broker meanwhile."""
-    fleet = FleetLink(["demo"], broker, version, BODY)
-    running = asyncio.create_task(fleet.run())
-    try:
-        yield fleet
-    finally:
-        running.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await running
-
-
 async def _and_a_turn(main: Coroutine[Any, Any, None]) -> None:
     """A task of aiomqtt's ends a turn after its client."""
     await main
@@ -117,9 +104,9 @@ def test_a_manager_sees_the_drone_is_refused_and_loses_it_with_the_link(
         position, broken, refusal = _WORDS[version]
         async with contextlib.AsyncExitStack() as stack, contextlib.AsyncExitStack() as drone:
             link = await drone.enter_async_context(serving(local()))
-            fleet = await stack.enter_async_context(at_broker(read_broker(broker.url), version))
+            fleet = FleetLink(["demo"], read_broker(broker.url), version, BODY)
             await stack.enter_async_context(manager.watching(broker))
-            await stack.enter_async_context(served(("demo", address_of(link)), viewers=(fleet,)))
+            await stack.enter_async_context(served(("demo", address_of(link)), fleet=fleet))
             async with telling(link):
                 await until(lambda: manager.last("visualization"))
                 assert manager.last("connection")["connectionState"] == "ONLINE"
@@ -153,10 +140,10 @@ def test_a_broker_that_dies_stops_nothing_and_is_found_again(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def go(broker: Mosquitto) -> None:
+        fleet = FleetLink(["demo"], read_broker(broker.url), Version.V2_1, BODY)
         async with (
-            at_broker(read_broker(broker.url), Version.V2_1) as fleet,
             serving(local()) as link,
-            served(("demo", address_of(link)), viewers=(fleet,)) as station,
+            served(("demo", address_of(link)), fleet=fleet) as station,
             telling(link),
         ):
             for _ in range(2):

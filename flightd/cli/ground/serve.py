@@ -18,6 +18,7 @@ from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import Address
+    from flightd.ground.access.access import Access
     from flightd.ground.foxglove_view.live_server import FoxgloveServer
     from flightd.ground.mqtt.fleet_link import FleetLink
     from flightd.ground.read_folders import ReadFolder
@@ -32,6 +33,7 @@ EXAMPLES = """Examples:
   flightd ground --listen 127.0.0.1:9000
   flightd ground --foxglove 127.0.0.1          for Foxglove, too: it connects to ws://127.0.0.1:8765
   flightd ground --mqtt mqtt://broker --mqtt-version 3.0    for a fleet's manager, by VDA 5050
+  flightd ground --mqtt mqtt://broker --mqtt-orders         the manager flies them, as long as no person does
   flightd ground --listen 0.0.0.0:8443 --tls-cert station.pem --tls-key station.key    for others, who sign in
 """
 
@@ -116,6 +118,19 @@ def ground(
         str,
         typer.Option(metavar="LxWxH", help="The drones' size with propellers, m, for their factsheets."),
     ] = "0.6x0.6x0.3",
+    mqtt_orders: Annotated[
+        bool,
+        typer.Option(
+            "--mqtt-orders", help="The fleet's manager flies the drones, as long as no person does."
+        ),
+    ] = False,
+    mqtt_hold: Annotated[
+        float,
+        typer.Option(
+            metavar="SECONDS",
+            help="A drone that holds without an order, or without the broker, flies home after so long.",
+        ),
+    ] = 60.0,
     state: State = None,
 ) -> None:
     """Watch and command drones in the browser: map, cameras, hazards, events; start, pause, go to, STOP.
@@ -137,6 +152,10 @@ def ground(
     from flightd.ground.drone_names import drone_addresses
     from flightd.ground.tls import read_certificate
 
+    if mqtt_orders and mqtt is None:
+        raise InputError("there is no broker", key="--mqtt-orders", remedy="give --mqtt mqtt://HOST")
+    if not 5.0 <= mqtt_hold <= 3600.0:
+        raise InputError("expected 5 to 3600 s", key=f"--mqtt-hold {mqtt_hold:g}")
     if folder is not None and not folder.is_dir():
         what = "is a file, no folder" if folder.exists() else "there is no such folder"
         raise InputError(what, key=f"--folder {folder}")
@@ -150,11 +169,11 @@ def ground(
         if foxglove is not None:
             viewer = stack.enter_context(_foxglove_server(foxglove, access.login, drones))
         at = "" if viewer is None else viewer.url
-        fleet = None if mqtt is None else _fleet_link(mqtt, mqtt_version, mqtt_body, drones)
-        viewers = tuple(one for one in (viewer, fleet) if one is not None)
-        beside = () if fleet is None else (fleet.run,)
+        hold_s = mqtt_hold if mqtt_orders else None
+        fleet = None if mqtt is None else _fleet_link(mqtt, mqtt_version, mqtt_body, drones, access, hold_s)
+        viewers = () if viewer is None else (viewer,)
         ended_by = run(
-            drones, where, partial(_say_where, at), access, certificate, folder, viewers, others, beside
+            drones, where, partial(_say_where, at), access, certificate, folder, viewers, others, fleet
         )
     if ended_by is not None:
         print(f"flightd: the ground station was ended by {ended_by.name}", file=sys.stderr)
@@ -188,17 +207,31 @@ def _foxglove_server(address: str, login: bool, drones: Sequence[tuple[str, Addr
     return FoxgloveServer(where, [name for name, _ in drones])
 
 
-def _fleet_link(url: str, version: str, body: str, drones: Sequence[tuple[str, Address]]) -> FleetLink:
+def _fleet_link(
+    url: str,
+    version: str,
+    body: str,
+    drones: Sequence[tuple[str, Address]],
+    access: Access,
+    hold_s: float | None,
+) -> FleetLink:
+    """With orders where a drone `hold_s` without one."""
     from flightd.ground.mqtt.broker_address import read_body, read_broker, read_version
 
     broker, of, measures = read_broker(url), read_version(version), read_body(body)
     try:
         from flightd.ground.mqtt.fleet_link import FleetLink
+        from flightd.ground.mqtt.managed_drone import MANAGER, OrderRules
     except ModuleNotFoundError:
         from flightd.core.extras import missing_extra
 
         raise missing_extra("ground", "flightd ground --mqtt") from None
-    return FleetLink([name for name, _ in drones], broker, of, measures)
+
+    def write_down(act: str, drone: str, outcome: str, text: str) -> None:
+        access.write_down(MANAGER, broker.shown, act, drone, outcome=outcome, text=text)
+
+    rules = None if hold_s is None else OrderRules(hold_s, write_down)
+    return FleetLink([name for name, _ in drones], broker, of, measures, rules)
 
 
 def _say_where(foxglove: str, where: Listening) -> None:

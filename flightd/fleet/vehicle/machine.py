@@ -155,6 +155,10 @@ class Vehicle:
         )
         return self._with_header(blank, now)
 
+    def state(self, now: datetime) -> State | None:
+        """The message on the topic `state`, as it is now; None before the drone told how it is."""
+        return None if self._situation is None else self._with_header(self._state(self._situation), now)
+
     def visualization(self, now: datetime) -> Visualization:
         """The message on the topic `visualization`."""
         seen = self._situation

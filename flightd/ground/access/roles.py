@@ -38,11 +38,12 @@ begins again.  Pause is among them so that a viewer's only way is not the hardes
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Who asks: by a password (`session` is the hash of its id), by a key, or from this machine."""
+    """Who asks: by a password (`session` is the hash of its id), by a key, from this machine, or over a fleet's
+    broker."""
 
     name: str
     role: Role
-    by: Literal["local", "password", "key"]
+    by: Literal["local", "password", "key", "mqtt"]
     session: bytes = b""
 
 

@@ -61,6 +61,7 @@ RULES: Mapping[str, Rule] = {
     # what a viewer may order stands in roles.py
     "WEBSOCKET /live": Rule(Role.VIEWER, Line.OWN),
     "POST /drones/{drone}/acts": Rule(Role.VIEWER, Line.OWN),
+    "POST /drones/{drone}/manager": _ACTS,
     "GET /api/stock": _LOOKS,
     "GET /api/stock/places": _LOOKS,
     "GET /api/stock/place": _LOOKS,

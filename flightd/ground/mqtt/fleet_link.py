@@ -9,85 +9,48 @@ import asyncio
 import contextlib
 import logging
 import secrets
-from collections import deque
 from collections.abc import Callable, Iterable
-from datetime import UTC, datetime
+from functools import partial
 from typing import Any, Final
 
 import aiomqtt
 
-from flightd.adapters.ground_link.messages.published import StatusReport
+from flightd.core.errors import InputError
 from flightd.fleet.vda5050.codec import TOPICS, MalformedError, Version, decoded, encoded
 from flightd.fleet.vda5050.factsheet import Factsheet
 from flightd.fleet.vda5050.order import InstantActions, Order
 from flightd.fleet.vda5050.parts import Header
 from flightd.fleet.vda5050.state import Connection, ConnectionState
-from flightd.fleet.vehicle.drone_factsheet import Measures, drone_factsheet
-from flightd.fleet.vehicle.floor import Floor
-from flightd.fleet.vehicle.machine import Identity, Vehicle
+from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.fleet.vehicle.signals import Input, Malformed
-from flightd.ground.messages import LinkPicture, LinkState, PictureKey
+from flightd.ground.hub import Hub
+from flightd.ground.messages import LinkPicture, PictureKey
 from flightd.ground.mqtt.broker_address import BrokerAddress
-from flightd.ground.mqtt.reported_drone import floor_of_link, situation_of
+from flightd.ground.mqtt.managed_drone import MANUFACTURER, ManagedDrone, OrderRules
 
 _LOG = logging.getLogger(__name__)
-MANUFACTURER: Final = "flightd"
 _INTERFACES: Final = {Version.V2_1: "uagv", Version.V3_0: "vda5050"}
-_STEP_S: Final = 0.1
 _SHOWN_EVERY_S: Final = 0.5
-_SILENT_S: Final = 3.0
 _AGAIN_S: Final = (1.0, 2.0, 5.0, 10.0)
 _ANSWER_S: Final = 5.0
 _LEAVE_S: Final = 1.0
 _MOST_WAITING: Final = 32
+_LOOK_S: Final = 0.1
 _RETAINED: Final = (Connection, Factsheet)
 
 
 class DroneAtBroker:
-    """One drone: `tell` takes what the hub says of it, `run` keeps it at the broker until cancelled."""
+    """One drone's connection: `run` keeps it at the broker until cancelled."""
 
-    def __init__(
-        self,
-        name: str,
-        broker: BrokerAddress,
-        version: Version,
-        measures: Measures,
-        now: Callable[[], datetime] = lambda: datetime.now(UTC),
-    ) -> None:
+    def __init__(self, name: str, broker: BrokerAddress, version: Version, drone: ManagedDrone) -> None:
         self._name = name
         self._broker = broker
         self._version = version
-        self._measures = measures
-        self._now = now
-        self._welcome: dict[str, Any] | None = None
-        self._status: StatusReport | None = None
-        self._heard = False
-        self._asked: deque[Input] = deque(maxlen=_MOST_WAITING)
-        self._vehicle = self._made(Floor("", frozenset(), frozenset(), {}))
+        self._drone = drone
         interface = broker.interface or _INTERFACES[version]
         self._topic = f"{interface}/{version.topic}/{MANUFACTURER}/{name}"
         self._failures = 0
         """In a row; the first is logged."""
-        self.dropped = 0
-        """Messages that came faster than they were taken."""
-
-    def _made(self, floor: Floor) -> Vehicle:
-        sheet = drone_factsheet("flightd", self._measures)
-        return Vehicle(Identity(MANUFACTURER, self._name), self._version, floor, sheet)
-
-    def tell(self, topic: str, value: Any) -> None:
-        """What the hub says of the drone."""
-        match topic:
-            case "welcome":
-                if self._welcome is None or value["session"] != self._welcome["session"]:
-                    self._vehicle.change_floor(floor_of_link(value["floor"]))
-                    self._status = None
-                self._welcome = value
-            case "status":
-                self._status = value
-            case "link":
-                link: LinkState = value
-                self._heard = link.connected and link.heard_s is not None and link.heard_s < _SILENT_S
 
     async def run(self) -> None:
         """Connect, and again after whatever went wrong."""
@@ -101,7 +64,8 @@ class DroneAtBroker:
             self._failures += 1
 
     async def _connected(self) -> None:
-        will = self._vehicle.connection(ConnectionState.CONNECTION_BROKEN, self._now())
+        vehicle = self._drone.vehicle
+        will = vehicle.connection(ConnectionState.CONNECTION_BROKEN, self._drone.now())
         client = aiomqtt.Client(
             self._broker.host,
             self._broker.port,
@@ -121,19 +85,19 @@ class DroneAtBroker:
                 async with asyncio.TaskGroup() as tasks:
                     for kind in (Order, InstantActions):
                         await client.subscribe(self._at(kind))
+                    self._drone.at_broker = True
                     tasks.create_task(self._listen(client), name=f"{self._name} at the broker")
                     tasks.create_task(self._say(client), name=f"{self._name} to the broker")
             finally:
+                self._drone.at_broker = False
                 with contextlib.suppress(aiomqtt.MqttError, TimeoutError):
                     async with asyncio.timeout(_LEAVE_S):
-                        gone = self._vehicle.connection(ConnectionState.OFFLINE, self._now())
+                        gone = vehicle.connection(ConnectionState.OFFLINE, self._drone.now())
                         await self._publish(client, gone)
 
     async def _listen(self, client: aiomqtt.Client) -> None:
         async for message in client.messages:
-            if len(self._asked) == _MOST_WAITING:
-                self.dropped += 1
-            self._asked.append(self._read(str(message.topic), message.payload))
+            self._drone.hear(self._read(str(message.topic), message.payload))
 
     def _read(self, topic: str, payload: Any) -> Input:
         data = bytes(payload) if isinstance(payload, bytes | bytearray) else str(payload).encode()
@@ -145,28 +109,28 @@ class DroneAtBroker:
 
     async def _say(self, client: aiomqtt.Client) -> None:
         """Newest wins: what the drone told meanwhile is not said."""
-        state: ConnectionState | None = None
-        shown_at = -_SHOWN_EVERY_S
+        drone, state, shown_at = self._drone, None, -_SHOWN_EVERY_S
         loop = asyncio.get_running_loop()
-        factsheet_told = False
+        is_known = False
         while True:
-            now_is = ConnectionState.ONLINE if self._heard else ConnectionState.CONNECTION_BROKEN
-            if now_is is not state and (self._heard or state is not None):
+            heard = drone.is_heard_at_all
+            now_is = ConnectionState.ONLINE if heard else ConnectionState.CONNECTION_BROKEN
+            if now_is is not state and (heard or state is not None):
                 state = now_is
-                await self._publish(client, self._vehicle.connection(state, self._now()))
-            if self._heard and self._status is not None and self._welcome is not None:
-                asked = [self._asked.popleft() for _ in range(len(self._asked))]
-                seen = situation_of(self._status, self._welcome["floor"])
-                for one in self._vehicle.step(self._now(), [seen, *asked]):
-                    if isinstance(one, Header):
-                        await self._publish(client, one)
-                if not factsheet_told:
-                    factsheet_told = True
-                    await self._publish(client, self._vehicle.factsheet(self._now()))
+                await self._publish(client, drone.vehicle.connection(state, drone.now()))
+            if drone.is_heard:
+                if not is_known:
+                    is_known = True
+                    drone.say_again()
+                for one in drone.take_messages():
+                    await self._publish(client, one)
                 if loop.time() - shown_at >= _SHOWN_EVERY_S:
                     shown_at = loop.time()
-                    await self._publish(client, self._vehicle.visualization(self._now()))
-            await asyncio.sleep(_STEP_S)
+                    await self._publish(client, drone.vehicle.visualization(drone.now()))
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(_LOOK_S):
+                    await drone.changed.wait()
+            drone.changed.clear()
 
     async def _publish(self, client: aiomqtt.Client, message: Header) -> None:
         kind = type(message)
@@ -180,18 +144,42 @@ class DroneAtBroker:
 
 
 class FleetLink:
-    """A viewer of the hub (`hub.Viewer`) with the given drones; `run` is a task beside the hub's."""
+    """A viewer of the hub (`hub.Viewer`) with the given drones; `run` is a task beside the hub's.  With `rules`
+    the manager may fly them."""
 
     def __init__(
-        self, drones: Iterable[str], broker: BrokerAddress, version: Version, measures: Measures
+        self,
+        drones: Iterable[str],
+        broker: BrokerAddress,
+        version: Version,
+        measures: Measures,
+        rules: OrderRules | None = None,
     ) -> None:
-        self._drones = {name: DroneAtBroker(name, broker, version, measures) for name in drones}
+        self._takes_orders = rules is not None
+        self._drones = {name: ManagedDrone(name, version, measures, rules) for name in drones}
+        self._at_broker = [
+            DroneAtBroker(name, broker, version, drone) for name, drone in self._drones.items()
+        ]
 
-    async def run(self) -> None:
-        """Keep all at the broker until cancelled."""
+    async def run(self, hub: Hub) -> None:
+        """Keep all at the broker until cancelled, and fly as they are ordered."""
         async with asyncio.TaskGroup() as tasks:
             for name, drone in self._drones.items():
-                tasks.create_task(drone.run(), name=f"{name} at the broker")
+                if self._takes_orders:
+                    drone.on_taken = partial(_tell_page, hub, name)
+                    _tell_page(hub, name, False)
+                tasks.create_task(drone.run(hub.drones[name]), name=f"{name} as a vehicle")
+            for one in self._at_broker:
+                tasks.create_task(one.run(), name="at the broker")
+
+    def hand_over(self, name: str, *, to_manager: bool) -> None:
+        """A person takes a drone, or gives it (back) to the manager.  InputError where none flies it."""
+        drone = self._drones.get(name)
+        if drone is None or not self._takes_orders:
+            raise InputError(
+                f"no fleet's manager flies {name}", remedy="start the station with --mqtt-orders"
+            )
+        drone.taken_by_person(not to_manager)
 
     def attach(self, wake: Callable[[], object] | None) -> None:
         """No pictures are wanted here."""
@@ -207,6 +195,10 @@ class FleetLink:
     def has_use_for(self, key: PictureKey) -> bool:  # noqa: ARG002 - as the protocol has it
         """No pictures are wanted here."""
         return False
+
+
+def _tell_page(hub: Hub, name: str, taken: bool) -> None:
+    hub.tell(name, "manager", {"flies": not taken})
 
 
 _QUIET: Final = logging.getLogger(f"{__name__}.client")

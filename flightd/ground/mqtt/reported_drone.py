@@ -1,20 +1,20 @@
-"""A drone as its ground link tells it, in the words of VDA 5050.
-
-Whoever flies it flies it by flightd: a fleet control looks on, as at a vehicle in MANUAL.
-"""
+"""A drone as its ground link tells it, in the words of VDA 5050."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.adapters.ground_link.messages.published import HazardReport, StatusReport
+from flightd.core.types import CommandKind, Phase
 from flightd.fleet.vda5050.errors import ErrorType, level_of
 from flightd.fleet.vda5050.parts import MobileRobotPosition, Velocity
 from flightd.fleet.vda5050.state import Error, ErrorLevel, Info, InfoLevel, OperatingMode, PowerSupply
-from flightd.fleet.vehicle.floor import Floor
 from flightd.fleet.vehicle.signals import Situation
+from flightd.ground.mqtt.order_flight import AT_NODE, WAITS
+from flightd.mission.machine import FLYING
 
 _DRIVES_MPS: Final = 0.05
 _ON_NODE_M: Final = 0.3
@@ -22,13 +22,23 @@ _WATCHES: Final = "report"
 """The action of a hazard about which the drone does nothing but tell."""
 
 
-def floor_of_link(floor: FloorStatus) -> Floor:
-    """The map by its name; no order is taken, so that its ways do not matter."""
-    return Floor(floor.name, frozenset(node.id for node in floor.nodes), frozenset(), {})
+def takes_orders(status: StatusReport, ours: Collection[str]) -> bool:
+    """Whether a fleet's manager could fly the drone now: it waits for a plan, or flies one of `ours`, by their
+    ids, and may be sent on.  Who started another one flies the drone himself."""
+    if status.phase in WAITS:
+        return status.plan in ours or CommandKind.PLAN in status.possible
+    return status.plan in ours and CommandKind.GOTO in status.possible
 
 
-def situation_of(status: StatusReport, floor: FloorStatus) -> Situation:
-    """How the drone is: y to the left, angles counter-clockwise."""
+def situation_of(
+    status: StatusReport,
+    floor: FloorStatus,
+    mode: OperatingMode,
+    stands_on: str | None = None,
+    errors: Sequence[Error] = (),
+) -> Situation:
+    """How the drone is: y to the left, angles counter-clockwise.  `stands_on` is the node on which it waits for
+    its start, where it may see no floor; `errors` are told beside its own."""
     vehicle, at = status.vehicle, status.position
     position = velocity = None
     if at is not None:
@@ -45,19 +55,27 @@ def situation_of(status: StatusReport, floor: FloorStatus) -> Situation:
         velocity = Velocity(vx=round(at.speed_mps, 2))
     charge = vehicle.battery_frac if vehicle else None
     return Situation(
-        mode=OperatingMode.MANUAL,
-        driving=at is not None and at.speed_mps > _DRIVES_MPS,
+        mode=mode,
+        driving=_drives(status),
         power=PowerSupply(
             state_of_charge=round(100.0 * min(max(charge or 0.0, 0.0), 1.0)),
             charging=False,
             battery_voltage=vehicle.battery_v if vehicle else None,
         ),
-        node=_node_under(status, floor),
+        node=(stands_on if status.phase is Phase.PREFLIGHT else None) or _node_under(status, floor),
         position=position,
         velocity=velocity,
-        errors=(*_lost(status), *map(_error, status.hazards)),
+        errors=(*_lost(status), *map(_error, status.hazards), *errors),
         information=(Info(info_type="phase", info_level=InfoLevel.INFO, info_descriptor=status.phase.value),),
     )
+
+
+def _drives(status: StatusReport) -> bool:
+    """It is on its way, or turns for it: not while it looks at the shelf beside a node."""
+    if status.phase in FLYING and status.phase not in {Phase.HOLD, *AT_NODE}:
+        return True
+    at = status.position
+    return status.phase not in AT_NODE and at is not None and at.speed_mps > _DRIVES_MPS
 
 
 def _node_under(status: StatusReport, floor: FloorStatus) -> str | None:

@@ -1,0 +1,79 @@
+"""A drone's floor as its ground link tells it: what orders may ask of it, and how far each way leads."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+
+from flightd.adapters.ground_link.messages.floor import FloorLine, FloorNode, FloorStatus
+from flightd.fleet.vehicle.floor import Floor
+from flightd.site.site import Side
+from flightd.site.ways import Ways
+
+_ON_LINE_M = 0.05
+_PADS = ""
+"""Of all charge pads together, where the way home is measured from."""
+
+
+def floor_of_link(floor: FloorStatus) -> Floor:
+    """The floor that the vehicle's orders are checked by, as `floor_of` makes it of the site itself."""
+    sides: dict[str, set[Side]] = {}
+    for rack in floor.racks:
+        sides.setdefault(rack.aisle, set()).add(Side(rack.side))
+    shelves = {node.id: frozenset(sides.get(node.aisle, ())) for node in floor.nodes}
+    return Floor(floor.name, frozenset(shelves), frozenset(_open_ways(floor)), shelves)
+
+
+class WaysHome:
+    """The metres of ways on a floor, and of those from their ends to the nearest charge pad."""
+
+    def __init__(self, floor: FloorStatus) -> None:
+        self._at = {node.id: (node.x_m, node.y_m) for node in floor.nodes}
+        pads = [pad for pad in floor.pads if pad.charge]
+        landed = [min(self._at, key=lambda node: math.dist(self._at[node], (p.x_m, p.y_m))) for p in pads]
+        back = [(b, a, self._apart_m(a, b)) for a, b in _open_ways(floor)]
+        ways = Ways([_PADS, *self._at], [*((_PADS, node, 0.0) for node in landed), *back])
+        self._home_m = {_PADS: 0.0}
+        for node, before in ways.reach(_PADS).items():
+            if node != _PADS:
+                first = 0.0 if before == _PADS else self._apart_m(before, node)
+                self._home_m[node] = self._home_m[before] + first
+
+    def there_and_home_m(self, here: str, nodes: Sequence[str]) -> Iterator[float]:
+        """For each of the nodes: from `here` along all before it to it, and home; infinite where no way leads
+        home."""
+        gone_m = 0.0
+        for before, node in itertools.pairwise((here, *nodes)):
+            known = before in self._at and node in self._at
+            gone_m += self._apart_m(before, node) if known else math.inf
+            yield gone_m + self._home_m.get(node, math.inf)
+
+    def _apart_m(self, a: str, b: str) -> float:
+        return math.dist(self._at[a], self._at[b])
+
+
+def _open_ways(floor: FloorStatus) -> set[tuple[str, str]]:
+    """From each node to the next on its painted lines, but for what is closed or one way."""
+    found: set[tuple[str, str]] = set()
+    for line in floor.lines:
+        along = sorted(_along(line, floor.nodes))
+        found |= {pair for (_, a), (_, b) in itertools.pairwise(along) for pair in ((a, b), (b, a))}
+    for way in floor.ways:
+        found.discard((way.b, way.a))
+        if way.closed:
+            found.discard((way.a, way.b))
+    return found
+
+
+def _along(line: FloorLine, nodes: Sequence[FloorNode]) -> Iterator[tuple[float, str]]:
+    """The nodes on a line, each with its metres from the line's beginning."""
+    dx, dy = line.x1_m - line.x0_m, line.y1_m - line.y0_m
+    length_m = math.hypot(dx, dy)
+    if not length_m:
+        return
+    for node in nodes:
+        x, y = node.x_m - line.x0_m, node.y_m - line.y0_m
+        along_m, beside_m = (x * dx + y * dy) / length_m, (x * dy - y * dx) / length_m
+        if abs(beside_m) < _ON_LINE_M and -_ON_LINE_M <= along_m <= length_m + _ON_LINE_M:
+            yield along_m, node.id

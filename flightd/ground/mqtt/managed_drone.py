@@ -1,0 +1,465 @@
+"""One drone as a vehicle of a fleet: steps its state machine by what the ground link tells, and has the drone do
+what comes out of it.
+
+Where orders are on, the manager flies the drone as long as no person does: whatever a person commands, at this
+station or at another, wins, and the drone stays his until he gives it back.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import uuid
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any, Final
+
+from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
+from flightd.core.errors import FlightdError, RunError
+from flightd.core.types import CommandKind, EventLevel, Phase
+from flightd.fleet.vda5050.codec import Version
+from flightd.fleet.vda5050.errors import ErrorType, level_of
+from flightd.fleet.vda5050.factsheet import Factsheet
+from flightd.fleet.vda5050.order import Node, Order
+from flightd.fleet.vda5050.parts import Action, Header
+from flightd.fleet.vda5050.state import ActionStatus, Error, OperatingMode, State
+from flightd.fleet.vehicle.abilities import ScanShelf, scan_shelf_of
+from flightd.fleet.vehicle.drone_factsheet import Measures, drone_factsheet
+from flightd.fleet.vehicle.floor import Floor
+from flightd.fleet.vehicle.machine import Identity, Vehicle
+from flightd.fleet.vehicle.signals import (
+    Abort,
+    Begin,
+    Decided,
+    Fly,
+    Hold,
+    Input,
+    Output,
+    PauseAction,
+    Progress,
+    Reached,
+    ResumeAction,
+)
+from flightd.ground.access.roles import Identity, Role
+from flightd.ground.drone_link import DroneLink
+from flightd.ground.messages import Act, LinkState
+from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
+from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck, Wish, next_act, reached
+from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
+from flightd.ground.mqtt.safe_return import SafeReturn, Standing
+
+_LOG = logging.getLogger(__name__)
+MANUFACTURER: Final = "flightd"
+_STEP_S: Final = 0.1
+_SILENT_S: Final = 3.0
+_SAME_AGAIN_S: Final = 1.0
+_ASK_AGAIN_S: Final = 2.0
+_MOST_WAITING: Final = 32
+_MOST_PLANS: Final = 16
+_COMMANDS: Final = frozenset(CommandKind)
+
+MANAGER: Final = Identity("fleet manager", Role.OPERATOR, "mqtt")
+"""Whose orders they are, in the audit."""
+WriteDown = Callable[[str, str, str, str], None]
+"""What the manager did, to which drone, and what came of it: act, drone, outcome, why."""
+
+
+@dataclass(frozen=True, slots=True)
+class OrderRules:
+    """Orders are on.  A drone that holds in the air without an order, or without the broker, for `hold_s` is
+    sent home."""
+
+    hold_s: float
+    write_down: WriteDown
+
+
+@dataclass(slots=True)
+class _Work:
+    """An action that goes on: a count at the node where the drone is, since this time of its own clock."""
+
+    action: Action
+    scan: ScanShelf
+    node: str
+    since_ns: int
+    held: bool = False
+    seen: bool = False
+    """The visit is over; what was counted is being asked for."""
+
+
+class ManagedDrone:
+    """`tell` takes what the hub says of it, `hear` what the broker does; `run` steps it until cancelled.
+    What is to be said to the broker waits in `take_messages`, newest of each kind; `changed` is set by it."""
+
+    def __init__(
+        self,
+        name: str,
+        version: Version,
+        measures: Measures,
+        rules: OrderRules | None = None,
+        now: Callable[[], datetime] = lambda: datetime.now(UTC),
+    ) -> None:
+        self._name = name
+        self._rules = rules
+        self.now = now
+        sheet = drone_factsheet("flightd", measures)
+        nowhere = Floor("", frozenset(), frozenset(), {})
+        identity = Identity(MANUFACTURER, name)
+        self.vehicle = Vehicle(identity, version, nowhere, sheet, lambda nodes: self._reach(nodes))
+        self.changed = asyncio.Event()
+        self.at_broker = False
+        """Somebody may hear what is said."""
+        self.on_taken: Callable[[bool], None] = lambda _taken: None
+        self._messages: dict[type[Header], Header] = {}
+        self._welcome: dict[str, Any] | None = None
+        self._ways: WaysHome | None = None
+        self._status: StatusReport | None = None
+        self._heard = False
+        self._asked: deque[Input] = deque(maxlen=_MOST_WAITING)
+        self.dropped = 0
+        """Messages that came faster than they were taken."""
+        self._link: DroneLink | None = None
+        self._taken = False
+        self._sent: Counter[str] = Counter()
+        self._event_seq: int | None = None
+        self._visits: deque[EventReport] = deque(maxlen=_MOST_WAITING)
+        self._standing: Standing | None = None
+        self._asked_at_s = -_ASK_AGAIN_S
+        self._return = SafeReturn()
+        self._acting: asyncio.Task[None] | None = None
+        self._did: tuple[Next, float, int] = (None, 0.0, 0)
+        """The last act, when, and the status by which it shows."""
+        self._order: Order | None = None
+        self._ahead: list[tuple[str, int]] = []
+        self._works: dict[str, _Work] = {}
+        self._plans: deque[str] = deque(maxlen=_MOST_PLANS)
+        self._planned: tuple[str, tuple[str, ...]] | None = None
+        self._levels: tuple[int, ...] = ()
+        self._trouble: tuple[ErrorType, str] | None = None
+        self._rests_since_s: float | None = None
+
+    # what comes in
+
+    @property
+    def is_heard(self) -> bool:
+        """The drone tells what it does."""
+        return self._heard and self._status is not None and self._welcome is not None
+
+    @property
+    def is_heard_at_all(self) -> bool:
+        """The station hears it."""
+        return self._heard
+
+    def tell(self, topic: str, value: Any) -> None:
+        """What the hub says of the drone."""
+        match topic:
+            case "welcome":
+                self._take_welcome(value)
+            case "status":
+                self._status = value
+            case "events":
+                self._take_events(value)
+            case "link":
+                link: LinkState = value
+                self._heard = link.connected and link.heard_s is not None and link.heard_s < _SILENT_S
+
+    def hear(self, one: Input) -> None:
+        """What the broker says."""
+        self.dropped += len(self._asked) == _MOST_WAITING
+        self._asked.append(one)
+
+    def taken_by_person(self, taken: bool = True) -> None:
+        """A person commands the drone from now on, or gives it back."""
+        if taken and self._acting is not None:
+            self._acting.cancel()  # nothing of the manager's is sent after it
+        if taken is not self._taken:
+            self._taken = taken
+            self.on_taken(taken)
+
+    def _take_welcome(self, welcome: dict[str, Any]) -> None:
+        before, self._welcome = self._welcome, welcome
+        if before is not None and before["session"] == welcome["session"]:
+            return
+        self.vehicle.change_floor(floor_of_link(welcome["floor"]))
+        self._ways = WaysHome(welcome["floor"])
+        self._status = self._standing = self._event_seq = None
+        self._asked_at_s = -_ASK_AGAIN_S
+        self._return = SafeReturn()
+        self._sent.clear()
+
+    def _take_events(self, events: Iterable[EventReport]) -> None:
+        """Commands that are none of ours are a person's; those before the first that is heard are past."""
+        seen = self._event_seq
+        for event in events:
+            if seen is not None and event.seq > seen:
+                self._take_event(event)
+            self._event_seq = max(self._event_seq or 0, event.seq)
+        self._event_seq = self._event_seq or 0
+
+    def _take_event(self, event: EventReport) -> None:
+        if event.name == "visited":
+            self._visits.append(event)
+        is_command = event.name == "command" and event.level is EventLevel.INFO
+        if is_command and event.text.split(" ")[0] in _COMMANDS:
+            if self._sent[event.text]:
+                self._sent[event.text] -= 1
+            else:
+                self.taken_by_person()
+
+    # what goes on
+
+    async def run(self, link: DroneLink | None) -> None:
+        """Step until cancelled; without a `link` the drone is only told of."""
+        self._link = link
+        if link is not None and self._rules is not None:
+            link.on_person = self.taken_by_person
+        loop = asyncio.get_running_loop()
+        async with asyncio.TaskGroup() as tasks:
+            while True:
+                if self._heard and self._status is not None and self._welcome is not None:
+                    self._step(self._status, loop.time(), tasks)
+                await asyncio.sleep(_STEP_S)
+
+    def take_messages(self) -> list[Header]:
+        """What is to be said, newest of each kind."""
+        taken, self._messages = list(self._messages.values()), {}
+        return taken
+
+    def say_again(self) -> None:
+        """Somebody hears what is said for the first time."""
+        state = self.vehicle.state(self.now())
+        self._put(self.vehicle.factsheet(self.now()))
+        if state is not None:
+            self._put(state)
+
+    def _put(self, message: Header) -> None:
+        self._messages[type(message)] = message
+        self.changed.set()
+
+    def _step(self, status: StatusReport, now_s: float, tasks: asyncio.TaskGroup) -> None:
+        assert self._welcome is not None
+        arrived = self._arrived(status)
+        asked = [self._asked.popleft() for _ in range(len(self._asked))]
+        stands_on = None if self._standing is None else self._standing.node
+        mode = self._mode(status)
+        seen = situation_of(status, self._welcome["floor"], mode, stands_on, self._troubles())
+        for one in self.vehicle.step(self.now(), [seen, *arrived, *asked]):
+            self._take_output(one, status)
+        if mode is OperatingMode.AUTOMATIC and self._link is not None:
+            self._go_on(status, now_s, tasks, self._link)
+
+    def _mode(self, status: StatusReport) -> OperatingMode:
+        """AUTOMATIC where the manager may fly the drone."""
+        may = self._rules is not None and not self._taken and self._welcome is not None
+        if may and self._welcome is not None:
+            counts_by_stopping = self._standing is None or not self._standing.sweeps
+            may = self._welcome["role"] == "operator" and counts_by_stopping
+        return OperatingMode.AUTOMATIC if may and takes_orders(status, self._plans) else OperatingMode.MANUAL
+
+    def _arrived(self, status: StatusReport) -> list[Input]:
+        node = reached(status, self._wish)
+        if node is None:
+            return []
+        while self._ahead and self._ahead.pop(0)[0] != node:
+            pass
+        return [Reached(node)]
+
+    @property
+    def _wish(self) -> Wish:
+        works = any(not work.held for work in self._works.values())
+        return Wish(tuple(node for node, _ in self._ahead), self.vehicle.last_node, works)
+
+    def _take_output(self, one: Output, status: StatusReport) -> None:
+        match one:
+            case Fly(stops):
+                self._ahead = [(stop.node, stop.sequence_id) for stop in stops]
+            case Hold():
+                self._ahead = []
+            case Begin(action):
+                self._begin(action, status)
+            case Abort(action_id):
+                self._works.pop(action_id, None)
+            case PauseAction(action_id) | ResumeAction(action_id) if action_id in self._works:
+                self._works[action_id].held = isinstance(one, PauseAction)
+            case Decided():
+                self._decided(one)
+            case State() | Factsheet():
+                self._put(one)
+
+    def _decided(self, one: Decided) -> None:
+        self._trouble = None
+        if isinstance(one.about, Order):
+            if one.refusal is None:
+                self._order = one.about
+            nodes = " ".join(n.node_id if n.released else f"({n.node_id})" for n in one.about.nodes)
+            what = f"order {one.about.order_id}/{one.about.order_update_id}: {nodes}"
+        else:
+            what = f"{one.about.action_type} {one.about.action_id}"
+        refused = "" if one.refusal is None else f"{one.refusal.error}: {one.refusal.what}"
+        self._write_down(what, refused)
+
+    def _write_down(self, what: str, refused: str) -> None:
+        if self._rules is not None:
+            self._rules.write_down(
+                what[:300], self._name, "refused" if refused else "accepted", refused[:300]
+            )
+
+    # actions
+
+    def _begin(self, action: Action, status: StatusReport) -> None:
+        scan = scan_shelf_of(action)
+        if self._standing is not None and not self._standing.counts:
+            self._asked.append(
+                Progress(action.action_id, ActionStatus.FAILED, "this drone counts no shelves")
+            )
+        elif status.phase is not Phase.PREFLIGHT and self._levels and not set(scan.levels) <= {*self._levels}:
+            levels = ", ".join(map(str, self._levels))
+            what = f"this flight began with level {levels} and counts no other"
+            self._asked.append(Progress(action.action_id, ActionStatus.FAILED, what))
+        else:
+            node = self.vehicle.last_node
+            self._works[action.action_id] = _Work(action, scan, node, status.stamp_ns)
+
+    def _visited(self) -> list[_Work]:
+        """The actions whose visit is over."""
+        over = [
+            work
+            for work in self._works.values()
+            if not work.seen
+            and any(one.text == work.node and one.stamp_ns > work.since_ns for one in self._visits)
+        ]
+        for work in over:
+            work.seen = True
+        return over
+
+    async def _finish(self, works: list[_Work], link: DroneLink) -> None:
+        """Tell what was counted, as far as the drone tells it."""
+        try:
+            rows = await link.inventory()
+        except FlightdError:
+            rows = ()
+        for work in works:
+            if self._works.pop(work.action.action_id, None) is not None:
+                result = counted_in_words(rows, work.node, work.scan.expected)
+                self._asked.append(Progress(work.action.action_id, ActionStatus.FINISHED, result))
+
+    # acts
+
+    def _reach(self, nodes: Sequence[Node]) -> int | None:
+        if self._status is None or self._ways is None:
+            return None
+        ids = [node.node_id for node in nodes]
+        return self._return.reach(ids, self.vehicle.last_node, self._status, self._ways, self._standing)
+
+    def _go_on(self, status: StatusReport, now_s: float, tasks: asyncio.TaskGroup, link: DroneLink) -> None:
+        """Begin what is to be done next, one thing after the other."""
+        if self._acting is not None and not self._acting.done():
+            return
+        done = self._visited()
+        waits = status.phase is Phase.PREFLIGHT and CommandKind.PLAN in status.possible
+        asks = waits and (self._standing is None or self._return.is_due(now_s))
+        if done:
+            self._acting = tasks.create_task(self._finish(done, link), name=f"{self._name} counted")
+        elif asks and now_s - self._asked_at_s >= _ASK_AGAIN_S:
+            self._asked_at_s = now_s
+            self._acting = tasks.create_task(self._ask(now_s, link), name=f"{self._name} is asked")
+        else:
+            act = self._homeward(status, now_s) or next_act(status, self._wish, self._planned)
+            if isinstance(act, Stuck):
+                self._trouble = (
+                    ErrorType.NODE_UNREACHABLE,
+                    f"the drone was halted on its way to {act.towards}",
+                )
+            elif act is not None and self._is_due(act, status, now_s):
+                self._did = act, now_s, status.seq + 2
+                self._acting = tasks.create_task(self._do(act, status, link), name=f"{self._name} is sent on")
+
+    def _is_due(self, act: Next, status: StatusReport, now_s: float) -> bool:
+        before, at_s, seq = self._did
+        return status.seq >= seq if act != before else now_s - at_s >= _SAME_AGAIN_S
+
+    def _homeward(self, status: StatusReport, now_s: float) -> Next:
+        """Home, for a drone that holds in the air and has nothing to wait for."""
+        wish = self._wish
+        needless = self.vehicle.is_idle or not self.at_broker
+        if status.phase is not Phase.HOLD or wish.ahead or wish.works or not needless:
+            self._rests_since_s = None
+            return None
+        self._rests_since_s = now_s if self._rests_since_s is None else self._rests_since_s
+        assert self._rules is not None
+        return CommandNext(CommandKind.HOME) if now_s - self._rests_since_s >= self._rules.hold_s else None
+
+    async def _ask(self, now_s: float, link: DroneLink) -> None:
+        """Where it stands, and how far it could fly."""
+        try:
+            if self._standing is None:
+                self._standing = Standing.of(await link.plan_flight((), (), dry=True, by_person=False))
+                self._asked_at_s = -_ASK_AGAIN_S
+            if self._return.is_due(now_s):
+                await self._return.ask(link, now_s)
+                self._asked_at_s = -_ASK_AGAIN_S
+        except FlightdError as err:
+            _LOG.info("%s: %s", self._name, err)
+
+    async def _do(self, act: PlanNext | CommandNext, status: StatusReport, link: DroneLink) -> None:
+        act_id = f"vda5050-{uuid.uuid4().hex}"
+        if isinstance(act, PlanNext):
+            text, levels = "plan", self._levels_of(act.nodes)
+            self._plans.append(act_id)
+        else:
+            text = f"{act.kind} {act.node}".rstrip()
+        self._sent[text] += 1
+        refused = ""
+        try:
+            if isinstance(act, PlanNext):
+                await link.plan_flight(
+                    act.nodes,
+                    levels,
+                    act_id,
+                    session=status.session,
+                    seen_ns=status.stamp_ns,
+                    by_person=False,
+                )
+                self._planned, self._levels = (act_id, act.nodes), levels
+            else:
+                plan = self._planned[0] if act.kind is CommandKind.START and self._planned else ""
+                order = Act(act_id, act.kind, act.node, plan, status.session, status.stamp_ns)
+                await link.act(order, by_person=False)
+            self._trouble = None
+        except FlightdError as err:
+            refused = str(err).removeprefix("refused: ")
+            self._trouble = ErrorType.NODE_UNREACHABLE, refused
+            if isinstance(err, RunError):
+                self._sent[text] -= 1
+        detail = ", ".join(act.nodes) if isinstance(act, PlanNext) else ""
+        self._write_down(f"{text} {detail}".rstrip(), refused)
+
+    def _levels_of(self, nodes: tuple[str, ...]) -> tuple[int, ...]:
+        """The levels that all counts of the order ask for, where one of them is at these nodes; none: all."""
+        scans = {
+            (node.node_id, tuple(sorted(scan_shelf_of(action).levels)))
+            for node in (self._order.nodes if self._order else ())
+            for action in node.actions
+        }
+        levels = {levels for _, levels in scans}
+        return next(iter(levels)) if len(levels) == 1 and any(node in nodes for node, _ in scans) else ()
+
+    def _troubles(self) -> list[Error]:
+        if self._trouble is None:
+            return []
+        kind, what = self._trouble
+        return [Error(error_type=kind, error_level=level_of(kind), error_description=what)]
+
+
+def counted_in_words(
+    rows: Iterable[dict[str, str]], node: str, expected: tuple[str, ...] | None
+) -> str | None:
+    """What was counted at a node, for a scanShelf's result; None where the drone tells nothing."""
+    here = [row for row in rows if row.get("node") == node]
+    if not here:
+        return None
+    read = [row["texts"] for row in here if row.get("texts")]
+    told = f"{len(read)} of {len(here)} places with codes"
+    missing = [code for code in expected or () if not any(code in text.split(" ") for text in read)]
+    return f"{told}; not read: {', '.join(missing)}" if missing else told

@@ -1,0 +1,116 @@
+"""How an order is flown over the ground link: what is asked of the drone next, by its newest status.  Pure.
+
+A plan is handed over on the ground and started.  In the air the link extends no plan: the drone is sent on from
+node to node by `goto`, always before it is done with the node that it is at or makes for, for a drone with
+nothing ahead flies home.  So it has, after each node, either the next one of the base or the same one again, and
+there it is paused.  A station that dies thus leaves a drone that holds, or flies home by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flightd.adapters.ground_link.messages.published import StatusReport
+from flightd.core.types import CommandKind, Phase
+from flightd.mission.machine import FLYING
+
+AT_NODE = frozenset({Phase.HOVER, Phase.CLIMB, Phase.SCAN})
+"""The drone is at its goal, or looks at the shelf beside it."""
+
+WAITS = frozenset({Phase.PREFLIGHT, Phase.ARMING})
+"""It is on the ground, before a flight."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What an order wants by now: the nodes to be flown along, none to stay; the node that the drone is at or
+    left last; whether something goes on there that a pause would interrupt."""
+
+    ahead: tuple[str, ...]
+    last: str
+    works: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PlanNext:
+    """Hand these nodes over for the next flight."""
+
+    nodes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CommandNext:
+    """Give a command; `node` only with goto."""
+
+    kind: CommandKind
+    node: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Stuck:
+    """The drone is on its way to a node that is not of the order, and cannot be turned round."""
+
+    towards: str
+
+
+Next = PlanNext | CommandNext | Stuck | None
+
+
+def reached(status: StatusReport, wish: Wish) -> str | None:
+    """The node ahead at which the drone has arrived."""
+    there = status.phase in AT_NODE and status.goal != wish.last and status.goal in wish.ahead
+    return status.goal if there else None
+
+
+def next_act(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, ...]] | None) -> Next:
+    """What is asked next; `planned` is the id and the nodes of the plan that was handed over last."""
+    if status.phase in WAITS:
+        return _on_ground(status, wish, planned)
+    if status.phase in FLYING and CommandKind.GOTO in status.possible and status.way:
+        return _in_air(status, wish)
+    return None
+
+
+def _on_ground(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, ...]] | None) -> Next:
+    target = each_once(wish.ahead or ((wish.last,) if wish.works else ()))
+    if not target:
+        ours = planned is not None and status.plan == planned[0]
+        return CommandNext(CommandKind.PAUSE) if ours and CommandKind.PAUSE in status.possible else None
+    if CommandKind.PLAN not in status.possible:
+        return None  # it starts already, or is not ready
+    if planned is None or status.plan != planned[0] or target != planned[1]:
+        return PlanNext(target)
+    return CommandNext(CommandKind.START) if CommandKind.START in status.possible else None
+
+
+def _in_air(status: StatusReport, wish: Wish) -> Next:
+    goal, following = status.way[0], status.way[1] if len(status.way) > 2 else ""  # the last one is its pad
+    if goal == wish.last:
+        wanted = wish.ahead[0] if wish.ahead else goal
+    elif goal in wish.ahead:
+        wanted = (*wish.ahead, goal)[wish.ahead.index(goal) + 1]
+    else:
+        return _off_way(status, wish, goal)
+    if following != wanted:
+        return CommandNext(CommandKind.GOTO, wanted)
+    if wish.ahead or wish.works:
+        return CommandNext(CommandKind.RESUME) if status.phase is Phase.HOLD else None
+    return CommandNext(CommandKind.PAUSE) if status.phase in AT_NODE else None
+
+
+def _off_way(status: StatusReport, wish: Wish, goal: str) -> Next:
+    """The drone makes for a node that the order does not have: it was paused on its way there and the order
+    ended, or it has lost its place and comes back to its way."""
+    if status.phase is Phase.HOLD:
+        return Stuck(goal) if wish.ahead else None
+    comes_back = status.phase is Phase.RELOCATE or bool(wish.ahead and wish.ahead[0] in status.way)
+    return None if comes_back else CommandNext(CommandKind.PAUSE)
+
+
+def each_once(nodes: Sequence[str]) -> tuple[str, ...]:
+    """As far as no node comes again: a plan visits each once."""
+    for i, node in enumerate(nodes):
+        if node in nodes[:i]:
+            return tuple(nodes[:i])
+    return tuple(nodes)

@@ -1,0 +1,95 @@
+"""How far an order may lead a drone so that it still comes home: by what the drone itself estimates.
+
+On the ground it is asked what a flight over the base would be.  In the air it plans nothing: there the metres of
+the way, at the pace of its own plan, are held against the time that its battery has left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flightd.adapters.ground_link.messages.answers import Planned
+from flightd.adapters.ground_link.messages.published import StatusReport
+from flightd.core.errors import InputError
+from flightd.ground.drone_link import DroneLink
+from flightd.ground.mqtt.linked_floor import WaysHome
+from flightd.ground.mqtt.order_flight import WAITS, each_once
+
+_ANSWER_OLD_S = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What a drone that waits for its start tells of itself: the node that it stands on, whether it counts and
+    whether that is in passing, and its seconds for each metre of its own plan, from take-off to landing."""
+
+    node: str
+    counts: bool
+    sweeps: bool
+    pace_s: float
+
+    @classmethod
+    def of(cls, planned: Planned) -> Standing:
+        """From what it says of the plan that it is configured to fly."""
+        return cls(
+            planned.way[0],
+            planned.places > 0,
+            any(each.swept for each in planned.sweeps),
+            planned.seconds / max(planned.way_m, 1.0),
+        )
+
+
+class SafeReturn:
+    """Answers at once by what is known; `ask` gets to know what is missing."""
+
+    def __init__(self) -> None:
+        self._answers: dict[tuple[str, ...], tuple[int, float]] = {}
+        self._wanted: tuple[str, ...] = ()
+
+    def reach(
+        self,
+        nodes: Sequence[str],
+        last: str,
+        status: StatusReport,
+        ways: WaysHome,
+        standing: Standing | None,
+    ) -> int | None:
+        """How many of the nodes; None while the drone has not answered."""
+        if status.phase in WAITS:
+            self._wanted = each_once(nodes)
+            known = self._answers.get(self._wanted)
+            full = known is not None and known[0] == len(self._wanted)
+            return len(nodes) if full else None if known is None else known[0]
+        left_s = status.battery_left_s
+        if left_s is None or standing is None:
+            return len(nodes)  # it tells no charge: its own rules bring it home
+        metres = ways.there_and_home_m(last, nodes)
+        return sum(all_m * standing.pace_s <= left_s for all_m in metres)
+
+    def is_due(self, now_s: float) -> bool:
+        """Whether the drone is to be asked."""
+        known = self._answers.get(self._wanted)
+        return bool(self._wanted) and (known is None or now_s - known[1] > _ANSWER_OLD_S)
+
+    async def ask(self, link: DroneLink, now_s: float) -> None:
+        """Ask the drone about the nodes that were wanted last.  As `DroneLink.plan_flight` raises where it
+        does not answer."""
+        nodes = self._wanted
+        fits, beyond = 0, len(nodes) + 1
+        probe = len(nodes)
+        while probe > fits:
+            if await _comes_home(link, nodes[:probe]):
+                fits = probe
+            else:
+                beyond = probe
+            probe = (fits + beyond) // 2
+        self._answers = {nodes: (fits, now_s)}
+
+
+async def _comes_home(link: DroneLink, nodes: Sequence[str]) -> bool:
+    """Whether the drone flies over the nodes and home on the battery that is in it."""
+    try:
+        return (await link.plan_flight(nodes, (), dry=True, by_person=False)).batteries <= 1
+    except InputError:
+        return False
