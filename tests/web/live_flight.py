@@ -145,6 +145,11 @@ class LiveFlight:
         return self._flight.phase
 
     @property
+    def x_m(self) -> float:
+        """Where it really is along the aisles."""
+        return self._flight.airframe.x_m
+
+    @property
     def quiet_s(self) -> float:
         """How long whoever attends has been silent."""
         return self._mailbox.quiet_s

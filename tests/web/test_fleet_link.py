@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import sys
-from collections.abc import AsyncIterator, Coroutine
 from pathlib import Path
-from typing import Any
 
-import aiomqtt
 import pytest
 
 from flightd.core.errors import InputError
@@ -22,71 +18,11 @@ from tests.rigs.broker import Mosquitto, mosquitto
 from tests.rigs.event_loops import real
 from tests.rigs.ground_link import address_of, local, serving, telling
 from tests.rigs.waiting import until
-from tests.unit.fleet.vehicle_rig import instant, order, validator
+from tests.unit.fleet.vehicle_rig import instant, order
+from tests.web.fleet_manager import Manager, and_a_turn
 from tests.web.served import served
 
 BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)
-
-
-class Manager:
-    """A fleet's manager: everything that the broker has of one drone, each message held to its schema."""
-
-    def __init__(self, version: Version) -> None:
-        self._version = version
-        self.top = f"{'uagv' if version is Version.V2_1 else 'vda5050'}/{version.topic}/flightd/demo"
-        self.heard: list[tuple[str, dict[str, Any], bool]] = []
-        self._client: aiomqtt.Client | None = None
-
-    def of(self, topic: str) -> list[dict[str, Any]]:
-        """All messages of a topic."""
-        return [told for name, told, _ in self.heard if name == topic]
-
-    def last(self, topic: str) -> dict[str, Any]:
-        """The newest message of a topic; empty before the first."""
-        return (self.of(topic) or [{}])[-1]
-
-    async def say(self, topic: str, data: bytes) -> None:
-        """To the drone."""
-        assert self._client is not None
-        await self._client.publish(f"{self.top}/{topic}", data)
-
-    @contextlib.asynccontextmanager
-    async def watching(self, broker: Mosquitto) -> AsyncIterator[None]:
-        """It listens meanwhile."""
-        async with asyncio.timeout(20):
-            while True:
-                with contextlib.suppress(aiomqtt.MqttError):
-                    client = aiomqtt.Client("127.0.0.1", broker.port)
-                    await client.__aenter__()
-                    break
-                await asyncio.sleep(0.02)
-        self._client = client
-        await client.subscribe(f"{self.top}/#")
-        listening = asyncio.create_task(self._listen(client))
-        try:
-            yield
-        finally:
-            listening.cancel()
-            with contextlib.suppress(asyncio.CancelledError, aiomqtt.MqttError):
-                await listening
-            with contextlib.suppress(aiomqtt.MqttError):
-                await client.__aexit__(None, None, None)
-
-    async def _listen(self, client: aiomqtt.Client) -> None:
-        async for message in client.messages:
-            topic = str(message.topic).rpartition("/")[2]
-            assert isinstance(message.payload, bytes)
-            told = json.loads(message.payload)
-            if topic not in {"order", "instantActions"}:
-                validator(self._version, topic).validate(told)
-                self.heard.append((topic, told, bool(message.retain)))
-
-
-async def _and_a_turn(main: Coroutine[Any, Any, None]) -> None:
-    """A task of aiomqtt's ends a turn after its client."""
-    await main
-    for _ in range(3):
-        await asyncio.sleep(0)
 
 
 _WORDS = {
@@ -133,7 +69,7 @@ def test_a_manager_sees_the_drone_is_refused_and_loses_it_with_the_link(
         assert late.last("connection")["connectionState"] == "OFFLINE"
 
     with mosquitto(tmp_path) as broker:
-        real(_and_a_turn(go(broker)))
+        real(and_a_turn(go(broker)))
 
 
 def test_a_broker_that_dies_stops_nothing_and_is_found_again(
@@ -157,7 +93,7 @@ def test_a_broker_that_dies_stops_nothing_and_is_found_again(
                 broker.start()
 
     with mosquitto(tmp_path) as broker:
-        real(_and_a_turn(go(broker)))
+        real(and_a_turn(go(broker)))
     assert f"demo: {broker.url}: " in caplog.text
 
 
@@ -181,7 +117,7 @@ def test_of_a_station_that_is_killed_the_broker_says_so(tmp_path: Path) -> None:
             await until(lambda: manager.last("connection")["connectionState"] == "CONNECTIONBROKEN")
 
     with mosquitto(tmp_path) as broker:
-        real(_and_a_turn(go(broker)))
+        real(and_a_turn(go(broker)))
 
 
 def test_a_broker_is_named_by_its_url_and_no_refusal_tells_a_password() -> None:

@@ -220,8 +220,8 @@ def _fleet_link(
 
     broker, of, measures = read_broker(url), read_version(version), read_body(body)
     try:
-        from flightd.ground.mqtt.fleet_link import FleetLink
-        from flightd.ground.mqtt.managed_drone import MANAGER, OrderRules
+        from flightd.ground.mqtt.fleet_link import MANAGER, FleetLink
+        from flightd.ground.mqtt.managed_drone import OrderRules
     except ModuleNotFoundError:
         from flightd.core.extras import missing_extra
 

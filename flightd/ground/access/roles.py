@@ -38,8 +38,8 @@ begins again.  Pause is among them so that a viewer's only way is not the hardes
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Who asks: by a password (`session` is the hash of its id), by a key, from this machine, or over a fleet's
-    broker."""
+    """Who asks: by a password (`session` is the hash of its id), by a key, from this machine, or over a
+    fleet's broker."""
 
     name: str
     role: Role

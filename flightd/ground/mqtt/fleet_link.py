@@ -23,11 +23,14 @@ from flightd.fleet.vda5050.parts import Header
 from flightd.fleet.vda5050.state import Connection, ConnectionState
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.fleet.vehicle.signals import Input, Malformed
+from flightd.ground.access.roles import Identity, Role
 from flightd.ground.hub import Hub
 from flightd.ground.messages import LinkPicture, PictureKey
 from flightd.ground.mqtt.broker_address import BrokerAddress
 from flightd.ground.mqtt.managed_drone import MANUFACTURER, ManagedDrone, OrderRules
 
+MANAGER: Final = Identity("fleet manager", Role.OPERATOR, "mqtt")
+"""Whose orders they are, in the audit."""
 _LOG = logging.getLogger(__name__)
 _INTERFACES: Final = {Version.V2_1: "uagv", Version.V3_0: "vda5050"}
 _SHOWN_EVERY_S: Final = 0.5
@@ -144,8 +147,8 @@ class DroneAtBroker:
 
 
 class FleetLink:
-    """A viewer of the hub (`hub.Viewer`) with the given drones; `run` is a task beside the hub's.  With `rules`
-    the manager may fly them."""
+    """A viewer of the hub (`hub.Viewer`) with the given drones; `run` is a task beside the hub's.  With
+    `rules` the manager may fly them."""
 
     def __init__(
         self,

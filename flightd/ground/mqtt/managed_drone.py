@@ -1,8 +1,8 @@
-"""One drone as a vehicle of a fleet: steps its state machine by what the ground link tells, and has the drone do
-what comes out of it.
+"""One drone as a vehicle of a fleet: steps its state machine by what the ground link tells, and has the
+drone do what comes out of it.
 
-Where orders are on, the manager flies the drone as long as no person does: whatever a person commands, at this
-station or at another, wins, and the drone stays his until he gives it back.
+Where orders are on, the manager flies the drone as long as no person does: whatever a person commands, at
+this station or at another, wins, and the drone stays his until he gives it back.
 """
 
 from __future__ import annotations
@@ -42,7 +42,6 @@ from flightd.fleet.vehicle.signals import (
     Reached,
     ResumeAction,
 )
-from flightd.ground.access.roles import Identity, Role
 from flightd.ground.drone_link import DroneLink
 from flightd.ground.messages import Act, LinkState
 from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
@@ -57,11 +56,10 @@ _SILENT_S: Final = 3.0
 _SAME_AGAIN_S: Final = 1.0
 _ASK_AGAIN_S: Final = 2.0
 _MOST_WAITING: Final = 32
+_MOST_WORDS: Final = 300
 _MOST_PLANS: Final = 16
 _COMMANDS: Final = frozenset(CommandKind)
 
-MANAGER: Final = Identity("fleet manager", Role.OPERATOR, "mqtt")
-"""Whose orders they are, in the audit."""
 WriteDown = Callable[[str, str, str, str], None]
 """What the manager did, to which drone, and what came of it: act, drone, outcome, why."""
 
@@ -106,7 +104,7 @@ class ManagedDrone:
         sheet = drone_factsheet("flightd", measures)
         nowhere = Floor("", frozenset(), frozenset(), {})
         identity = Identity(MANUFACTURER, name)
-        self.vehicle = Vehicle(identity, version, nowhere, sheet, lambda nodes: self._reach(nodes))
+        self.vehicle = Vehicle(identity, version, nowhere, sheet, self._reach)
         self.changed = asyncio.Event()
         self.at_broker = False
         """Somebody may hear what is said."""
@@ -243,7 +241,8 @@ class ManagedDrone:
         asked = [self._asked.popleft() for _ in range(len(self._asked))]
         stands_on = None if self._standing is None else self._standing.node
         mode = self._mode(status)
-        seen = situation_of(status, self._welcome["floor"], mode, stands_on, self._troubles())
+        last, floor = self.vehicle.last_node, self._welcome["floor"]
+        seen = situation_of(status, floor, mode, last, stands_on, self._troubles())
         for one in self.vehicle.step(self.now(), [seen, *arrived, *asked]):
             self._take_output(one, status)
         if mode is OperatingMode.AUTOMATIC and self._link is not None:

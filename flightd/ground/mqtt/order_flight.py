@@ -1,9 +1,9 @@
 """How an order is flown over the ground link: what is asked of the drone next, by its newest status.  Pure.
 
-A plan is handed over on the ground and started.  In the air the link extends no plan: the drone is sent on from
-node to node by `goto`, always before it is done with the node that it is at or makes for, for a drone with
-nothing ahead flies home.  So it has, after each node, either the next one of the base or the same one again, and
-there it is paused.  A station that dies thus leaves a drone that holds, or flies home by itself.
+A plan is handed over on the ground and started.  In the air the link extends no plan: the drone is sent on
+from node to node by `goto`, always before it is done with the node that it is at or makes for, for a drone
+with nothing ahead flies home.  So it has, after each node, either the next one of the base or the same one
+again, and there it is paused.  A station that dies thus leaves a drone that holds, or flies home by itself.
 """
 
 from __future__ import annotations

@@ -16,15 +16,16 @@ from flightd.fleet.vehicle.signals import Situation
 from flightd.ground.mqtt.order_flight import AT_NODE, WAITS
 from flightd.mission.machine import FLYING
 
-_DRIVES_MPS: Final = 0.05
+_DRIVES_MPS: Final = 0.1
+_HALF_TURN: Final = 3.1415
 _ON_NODE_M: Final = 0.3
 _WATCHES: Final = "report"
 """The action of a hazard about which the drone does nothing but tell."""
 
 
 def takes_orders(status: StatusReport, ours: Collection[str]) -> bool:
-    """Whether a fleet's manager could fly the drone now: it waits for a plan, or flies one of `ours`, by their
-    ids, and may be sent on.  Who started another one flies the drone himself."""
+    """Whether a fleet's manager could fly the drone now: it waits for a plan, or flies one of `ours`, by
+    their ids, and may be sent on.  Who started another one flies the drone himself."""
     if status.phase in WAITS:
         return status.plan in ours or CommandKind.PLAN in status.possible
     return status.plan in ours and CommandKind.GOTO in status.possible
@@ -34,11 +35,13 @@ def situation_of(
     status: StatusReport,
     floor: FloorStatus,
     mode: OperatingMode,
+    last_node: str = "",
     stands_on: str | None = None,
     errors: Sequence[Error] = (),
 ) -> Situation:
-    """How the drone is: y to the left, angles counter-clockwise.  `stands_on` is the node on which it waits for
-    its start, where it may see no floor; `errors` are told beside its own."""
+    """How the drone is: y to the left, angles counter-clockwise.  `last_node` is what it reached last,
+    `stands_on` the node on which it waits for its start, where it may see no floor; `errors` are told beside
+    its own."""
     vehicle, at = status.vehicle, status.position
     position = velocity = None
     if at is not None:
@@ -46,7 +49,7 @@ def situation_of(
         position = MobileRobotPosition(
             x=round(at.x_m, 3),
             y=round(0.0 - at.y_m, 3) + 0.0,
-            theta=round(math.remainder(-at.yaw_rad, math.tau), 4) + 0.0,
+            theta=_rounded_angle(-at.yaw_rad),
             map_id=floor.name,
             localized=True,
             localization_score=min(max(at.integrity, 0.0), 1.0),
@@ -56,7 +59,7 @@ def situation_of(
     charge = vehicle.battery_frac if vehicle else None
     return Situation(
         mode=mode,
-        driving=_drives(status),
+        driving=_drives(status, floor, last_node),
         power=PowerSupply(
             state_of_charge=round(100.0 * min(max(charge or 0.0, 0.0), 1.0)),
             charging=False,
@@ -70,12 +73,21 @@ def situation_of(
     )
 
 
-def _drives(status: StatusReport) -> bool:
-    """It is on its way, or turns for it: not while it looks at the shelf beside a node."""
-    if status.phase in FLYING and status.phase not in {Phase.HOLD, *AT_NODE}:
+def _rounded_angle(angle_rad: float) -> float:
+    """To the fourth decimal, and within -pi..pi still."""
+    turned = round(math.remainder(angle_rad, math.tau), 4)
+    return min(max(turned, -_HALF_TURN), _HALF_TURN) + 0.0
+
+
+def _drives(status: StatusReport, floor: FloorStatus, last_node: str) -> bool:
+    """It is on its way, or turns for it: not while it looks at the shelf beside a node, nor where it is held
+    at the last one."""
+    if status.phase in AT_NODE:
+        return False
+    if status.position is not None and status.position.speed_mps > _DRIVES_MPS:
         return True
-    at = status.position
-    return status.phase not in AT_NODE and at is not None and at.speed_mps > _DRIVES_MPS
+    under_way = status.phase in FLYING and status.phase is not Phase.HOLD
+    return under_way and not status.goal == last_node == _node_under(status, floor)
 
 
 def _node_under(status: StatusReport, floor: FloorStatus) -> str | None:

@@ -1,7 +1,7 @@
 """How far an order may lead a drone so that it still comes home: by what the drone itself estimates.
 
-On the ground it is asked what a flight over the base would be.  In the air it plans nothing: there the metres of
-the way, at the pace of its own plan, are held against the time that its battery has left.
+On the ground it is asked what a flight over the base would be.  In the air it plans nothing: there the metres
+of the way, at the pace of its own plan, are held against the time that its battery has left.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ _ANSWER_OLD_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """What a drone that waits for its start tells of itself: the node that it stands on, whether it counts and
-    whether that is in passing, and its seconds for each metre of its own plan, from take-off to landing."""
+    """What a drone that waits for its start tells of itself: the node that it stands on, whether it counts
+    and whether that is in passing, and its seconds for each metre of its own plan, take-off and landing with
+    it."""
 
     node: str
     counts: bool

@@ -1,0 +1,114 @@
+"""A fleet's manager flies a drone: the daemon's own tick and mission on a real ground link, a real broker."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from flightd.adapters.ground_link.client import Address
+from flightd.config.schema import load_config
+from flightd.core.types import Phase
+from flightd.fleet.vda5050.codec import Version, encoded
+from flightd.fleet.vehicle.drone_factsheet import Measures
+from flightd.ground.mqtt.broker_address import read_broker
+from flightd.ground.mqtt.fleet_link import FleetLink
+from flightd.ground.mqtt.managed_drone import OrderRules
+from flightd.site.site_file import load_site
+from tests.rigs.broker import mosquitto
+from tests.rigs.event_loops import real
+from tests.rigs.waiting import until
+from tests.unit.fleet.vehicle_rig import instant, order, scan
+from tests.web.fleet_manager import Manager, and_a_turn
+from tests.web.live_flight import LiveFlight
+from tests.web.served import JSON, Station, served
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+SITE = load_site(CONFIGS / "site-demo.toml")
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission={"autostart": False, "start_countdown_s": 0.0})
+V = Version.V3_0
+BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)
+
+
+class Master(Manager):
+    """It orders."""
+
+    async def order(self, way: str, released: int = 99, **more: Any) -> None:
+        await self.say("order", encoded(order(way, released, **more), V))
+
+    async def instant(self, kind: str, name: str = "") -> None:
+        await self.say("instantActions", encoded(instant(kind, name), V))
+
+    @property
+    def ahead(self) -> str:
+        """The nodes ahead; those of the horizon in brackets."""
+        nodes = self.last("state").get("nodeStates", [])
+        return " ".join(one["nodeId"] if one["released"] else f"({one['nodeId']})" for one in nodes)
+
+    @property
+    def actions(self) -> dict[str, str]:
+        """All actions, and how far they are."""
+        state = self.last("state")
+        told = [*state["actionStates"], *state.get("instantActionStates", ())]
+        return {one["actionId"]: one["actionStatus"] for one in told}
+
+    @property
+    def mode(self) -> str:
+        """Who is in control."""
+        return str(self.last("state").get("operatingMode"))
+
+    def is_at(self, node: str) -> bool:
+        """It was there last, and stands."""
+        state = self.last("state")
+        return state.get("lastNodeId") == node and not state["driving"]
+
+
+def test_a_manager_flies_a_drone_until_a_person_stops_it(tmp_path: Path) -> None:
+    written: list[tuple[str, str, str, str]] = []
+
+    async def go(flight: LiveFlight, station: Station, master: Master) -> None:
+        between = (SITE.nodes["A4"].x_m + SITE.nodes["A5"].x_m) / 2
+        await until(lambda: master.mode == "AUTOMATIC" and master.is_at("A1"))
+        await master.order("A1 A2 A3 A4 A5", 4)
+        await until(lambda: master.last("state")["lastNodeId"] == "A2", 60)
+        await until(lambda: master.is_at("A4") and flight.phase is Phase.HOLD, 60)
+        assert (master.ahead, master.last("state")["newBaseRequest"]) == ("(A5)", True)
+
+        await master.order("A4 A5 A6", number=1, first=6)
+        await until(lambda: flight.x_m > between, 60)
+        await master.instant("startPause")
+        await until(lambda: master.last("state")["paused"] and flight.phase is Phase.HOLD, 60)
+        assert (master.ahead, master.last("state")["lastNodeId"]) == ("A5 A6", "A4")
+        await master.instant("stopPause")
+        await until(lambda: master.last("state")["driving"], 60)
+        await master.instant("cancelOrder")
+        await until(lambda: master.actions.get("cancelOrder") == "FINISHED", 60)
+        assert (master.ahead, master.is_at("A5")) == ("", True)
+
+        await master.order("A5 A4 A3", name="back", actions={"A4": [scan("shelf", side="left")]})
+        await until(lambda: master.actions.get("shelf") == "FINISHED", 60)
+        await until(lambda: flight.phase is Phase.FOLLOW, 60)
+        assert (await station.act("demo", id="stop-0001", command="stop"))[0] == 200
+        await until(lambda: master.mode == "MANUAL" and master.ahead == "")
+        await master.order("A3 A2", name="late")
+        await until(lambda: master.last("state")["errors"])
+        assert master.last("state")["errors"][0]["errorType"] == "MOBILE_ROBOT_NOT_AVAILABLE"
+        assert flight.phase in {Phase.LAND, Phase.ABORTED}
+        back = {"Origin": station.origin, **JSON}
+        assert (await station.ask("POST", "/drones/demo/manager", back, b'{"flies": true}'))[0] == 200
+        assert (await station.ask("POST", "/drones/other/manager", back, b'{"flies": true}'))[0] == 400
+
+    with mosquitto(tmp_path) as broker, LiveFlight(SITE, CONFIG, speed=4.0) as flight:
+
+        async def whole() -> None:
+            rules = OrderRules(60.0, lambda *line: written.append(line))
+            fleet = FleetLink(["demo"], read_broker(broker.url), V, BODY, rules)
+            master = Master(V)
+            demo = ("demo", Address("127.0.0.1", *flight.ports))
+            async with master.watching(broker), served(demo, fleet=fleet) as station:
+                await go(flight, station, master)
+
+        real(and_a_turn(whole()))
+    assert ("order o/1: A4 A5 A6", "demo", "accepted", "") in written
+    assert ("goto A5", "demo", "accepted", "") in written
+    refused = [(act, why.partition(":")[0]) for act, _, outcome, why in written if outcome == "refused"]
+    assert refused == [("order late/0: A3 A2", "MOBILE_ROBOT_NOT_AVAILABLE")]
