@@ -29,6 +29,7 @@ from flightd.site.site import Site
 from tests.rigs.event_loops import real
 from tests.rigs.ground_link import local
 from tests.sim.ideal.ideal_flight import Faults, IdealFlight
+from tests.sim.ideal.ideal_front import IdealFront
 from tests.sim.ideal.ideal_ports import HeldSetpoint, IdealVehicle, IdealVision
 
 _LOOK_S = 0.02
@@ -67,8 +68,10 @@ class _Mailbox(NoGround):
 class _PacedFlight(IdealFlight):
     """An ideal flight with people on the ground, `speed` times as fast as the clock at most."""
 
-    def __init__(self, site: Site, config: Config, mailbox: _Mailbox, speed: float) -> None:
-        super().__init__(site, config)
+    def __init__(
+        self, site: Site, config: Config, mailbox: _Mailbox, speed: float, front: IdealFront | None
+    ) -> None:
+        super().__init__(site, config, front=front)
         self._mailbox = mailbox
         self._speed = speed
         self._began = (time.monotonic(), self.now_ns())
@@ -106,9 +109,16 @@ class _PacedFlight(IdealFlight):
 class LiveFlight:
     """A context manager: entered, it waits for a start on loopback ports of its own."""
 
-    def __init__(self, site: Site, config: Config, speed: float = 2.0, **ground: Any) -> None:
+    def __init__(
+        self,
+        site: Site,
+        config: Config,
+        speed: float = 2.0,
+        front: IdealFront | None = None,
+        **ground: Any,
+    ) -> None:
         self._mailbox = _Mailbox()
-        self._flight = _PacedFlight(site, config, self._mailbox, speed)
+        self._flight = _PacedFlight(site, config, self._mailbox, speed, front)
         self._link = ZmqGround(local(picture_fps=5.0, **ground), site, self._flight)
         self._link.plan_by(self._flight.pilot.mission)
         camera = SimCamera(lens=config.camera.lens(), mount=config.camera.mount())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,12 @@ from flightd.ground.mqtt.broker_address import read_broker
 from flightd.ground.mqtt.fleet_link import FleetLink
 from flightd.ground.mqtt.managed_drone import OrderRules
 from flightd.site.site_file import load_site
-from tests.rigs.broker import mosquitto
+from tests.rigs.broker import Mosquitto, mosquitto
 from tests.rigs.event_loops import real
 from tests.rigs.waiting import until
+from tests.sim.ideal.ideal_front import IdealFront, Stock
 from tests.unit.fleet.vehicle_rig import instant, order, scan
+from tests.unit.mission.shelves import FITTED, SIGHT
 from tests.web.fleet_manager import Manager, and_a_turn
 from tests.web.live_flight import LiveFlight
 from tests.web.served import JSON, Station, served
@@ -25,6 +28,7 @@ from tests.web.served import JSON, Station, served
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
 CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission={"autostart": False, "start_countdown_s": 0.0})
+RACKS = load_site(CONFIGS / "site-racks-small.toml")
 V = Version.V3_0
 BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)
 
@@ -56,10 +60,35 @@ class Master(Manager):
         """Who is in control."""
         return str(self.last("state").get("operatingMode"))
 
+    @property
+    def errors(self) -> list[str]:
+        """Their types."""
+        return [one["errorType"] for one in self.last("state")["errors"]]
+
     def is_at(self, node: str) -> bool:
         """It was there last, and stands."""
         state = self.last("state")
         return state.get("lastNodeId") == node and not state["driving"]
+
+
+def managed(
+    folder: Path,
+    flight: LiveFlight,
+    go: Callable[[Station, Master], Coroutine[Any, Any, None]],
+    written: list[tuple[str, str, str, str]],
+) -> None:
+    """Let the drone `demo` be flown by orders, of a master who does `go`."""
+
+    async def whole(broker: Mosquitto) -> None:
+        rules = OrderRules(60.0, lambda *line: written.append(line))
+        fleet = FleetLink(["demo"], read_broker(broker.url), V, BODY, rules)
+        master = Master(V)
+        demo = ("demo", Address("127.0.0.1", *flight.ports))
+        async with master.watching(broker), served(demo, fleet=fleet) as station:
+            await go(station, master)
+
+    with mosquitto(folder) as broker:
+        real(and_a_turn(whole(broker)))
 
 
 def test_a_manager_flies_a_drone_until_a_person_stops_it(tmp_path: Path) -> None:
@@ -85,30 +114,36 @@ def test_a_manager_flies_a_drone_until_a_person_stops_it(tmp_path: Path) -> None
         assert (master.ahead, master.is_at("A5")) == ("", True)
 
         await master.order("A5 A4 A3", name="back", actions={"A4": [scan("shelf", side="left")]})
-        await until(lambda: master.actions.get("shelf") == "FINISHED", 60)
+        await until(lambda: master.actions.get("shelf") == "FAILED", 60)
+        (shelf,) = master.last("state")["actionStates"]
+        assert shelf["actionResult"] == "this drone counts no shelves"
         await until(lambda: flight.phase is Phase.FOLLOW, 60)
         assert (await station.act("demo", id="stop-0001", command="stop"))[0] == 200
         await until(lambda: master.mode == "MANUAL" and master.ahead == "")
         await master.order("A3 A2", name="late")
-        await until(lambda: master.last("state")["errors"])
-        assert master.last("state")["errors"][0]["errorType"] == "MOBILE_ROBOT_NOT_AVAILABLE"
+        await until(lambda: "MOBILE_ROBOT_NOT_AVAILABLE" in master.errors)
         assert flight.phase in {Phase.LAND, Phase.ABORTED}
         back = {"Origin": station.origin, **JSON}
         assert (await station.ask("POST", "/drones/demo/manager", back, b'{"flies": true}'))[0] == 200
         assert (await station.ask("POST", "/drones/other/manager", back, b'{"flies": true}'))[0] == 400
 
-    with mosquitto(tmp_path) as broker, LiveFlight(SITE, CONFIG, speed=4.0) as flight:
-
-        async def whole() -> None:
-            rules = OrderRules(60.0, lambda *line: written.append(line))
-            fleet = FleetLink(["demo"], read_broker(broker.url), V, BODY, rules)
-            master = Master(V)
-            demo = ("demo", Address("127.0.0.1", *flight.ports))
-            async with master.watching(broker), served(demo, fleet=fleet) as station:
-                await go(flight, station, master)
-
-        real(and_a_turn(whole()))
+    with LiveFlight(SITE, CONFIG, speed=4.0) as flight:
+        managed(tmp_path, flight, lambda station, master: go(flight, station, master), written)
     assert ("order o/1: A4 A5 A6", "demo", "accepted", "") in written
     assert ("goto A5", "demo", "accepted", "") in written
     refused = [(act, why.partition(":")[0]) for act, _, outcome, why in written if outcome == "refused"]
     assert refused == [("order late/0: A3 A2", "MOBILE_ROBOT_NOT_AVAILABLE")]
+
+
+def test_a_shelf_is_counted_where_the_manager_wants_it(tmp_path: Path) -> None:
+    async def go(flight: LiveFlight, master: Master) -> None:
+        await until(lambda: master.mode == "AUTOMATIC" and master.is_at("A1"))
+        await master.order("A1 A2 A3", 2, actions={"A2": [scan("shelf", levels=[1])]})
+        await until(lambda: master.actions["shelf"] == "RUNNING", 60)
+        await until(lambda: master.actions["shelf"] == "FINISHED", 60)
+        await until(lambda: flight.phase is Phase.HOLD, 60)
+        assert (master.last("state")["lastNodeId"], master.ahead) == ("A2", "(A3)")
+
+    config = CONFIG.with_values(front_camera=FITTED)
+    with LiveFlight(RACKS, config, speed=6.0, front=IdealFront(RACKS, SIGHT, Stock())) as flight:
+        managed(tmp_path, flight, lambda _, master: go(flight, master), [])
