@@ -139,8 +139,8 @@ def test_a_shelf_is_counted_where_the_manager_wants_it(tmp_path: Path) -> None:
     async def go(flight: LiveFlight, master: Master) -> None:
         await until(lambda: master.mode == "AUTOMATIC" and master.is_at("A1"))
         await master.order("A1 A2 A3", 2, actions={"A2": [scan("shelf", levels=[1])]})
-        await until(lambda: master.actions["shelf"] == "RUNNING", 60)
-        await until(lambda: master.actions["shelf"] == "FINISHED", 60)
+        await until(lambda: master.actions.get("shelf") == "RUNNING", 60)
+        await until(lambda: master.actions.get("shelf") == "FINISHED", 60)
         await until(lambda: flight.phase is Phase.HOLD, 60)
         assert (master.last("state")["lastNodeId"], master.ahead) == ("A2", "(A3)")
 
