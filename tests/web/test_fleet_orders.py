@@ -74,18 +74,19 @@ class Master(Manager):
 def managed(
     folder: Path,
     flight: LiveFlight,
-    go: Callable[[Station, Master], Coroutine[Any, Any, None]],
+    go: Callable[[Station, Master, Mosquitto], Coroutine[Any, Any, None]],
     written: list[tuple[str, str, str, str]],
+    hold_s: float = 60.0,
 ) -> None:
     """Let the drone `demo` be flown by orders, of a master who does `go`."""
 
     async def whole(broker: Mosquitto) -> None:
-        rules = OrderRules(60.0, lambda *line: written.append(line))
+        rules = OrderRules(hold_s, lambda *line: written.append(line))
         fleet = FleetLink(["demo"], read_broker(broker.url), V, BODY, rules)
         master = Master(V)
         demo = ("demo", Address("127.0.0.1", *flight.ports))
         async with master.watching(broker), served(demo, fleet=fleet) as station:
-            await go(station, master)
+            await go(station, master, broker)
 
     with mosquitto(folder) as broker:
         real(and_a_turn(whole(broker)))
@@ -128,22 +129,26 @@ def test_a_manager_flies_a_drone_until_a_person_stops_it(tmp_path: Path) -> None
         assert (await station.ask("POST", "/drones/other/manager", back, b'{"flies": true}'))[0] == 400
 
     with LiveFlight(SITE, CONFIG, speed=4.0) as flight:
-        managed(tmp_path, flight, lambda station, master: go(flight, station, master), written)
+        managed(tmp_path, flight, lambda station, master, _: go(flight, station, master), written)
     assert ("order o/1: A4 A5 A6", "demo", "accepted", "") in written
     assert ("goto A5", "demo", "accepted", "") in written
     refused = [(act, why.partition(":")[0]) for act, _, outcome, why in written if outcome == "refused"]
     assert refused == [("order late/0: A3 A2", "MOBILE_ROBOT_NOT_AVAILABLE")]
 
 
-def test_a_shelf_is_counted_where_the_manager_wants_it(tmp_path: Path) -> None:
-    async def go(flight: LiveFlight, master: Master) -> None:
+def test_a_shelf_is_counted_and_without_a_broker_the_drone_holds_and_comes_home(
+    tmp_path: Path,
+) -> None:
+    async def go(flight: LiveFlight, master: Master, broker: Mosquitto) -> None:
         await until(lambda: master.mode == "AUTOMATIC" and master.is_at("A1"))
         await master.order("A1 A2 A3", 2, actions={"A2": [scan("shelf", levels=[1])]})
         await until(lambda: master.actions.get("shelf") == "RUNNING", 60)
         await until(lambda: master.actions.get("shelf") == "FINISHED", 60)
         await until(lambda: flight.phase is Phase.HOLD, 60)
         assert (master.last("state")["lastNodeId"], master.ahead) == ("A2", "(A3)")
+        broker.kill()  # its base is flown: it holds, and then comes home
+        await until(lambda: flight.phase in {Phase.LAND, Phase.DONE}, 60)
 
     config = CONFIG.with_values(front_camera=FITTED)
     with LiveFlight(RACKS, config, speed=6.0, front=IdealFront(RACKS, SIGHT, Stock())) as flight:
-        managed(tmp_path, flight, lambda _, master: go(flight, master), [])
+        managed(tmp_path, flight, lambda _, master, broker: go(flight, master, broker), [], 2.0)

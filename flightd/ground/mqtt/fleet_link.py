@@ -116,12 +116,12 @@ class DroneAtBroker:
         loop = asyncio.get_running_loop()
         is_known = False
         while True:
-            heard = drone.is_heard_at_all
+            heard = drone.is_heard
             now_is = ConnectionState.ONLINE if heard else ConnectionState.CONNECTION_BROKEN
             if now_is is not state and (heard or state is not None):
                 state = now_is
                 await self._publish(client, drone.vehicle.connection(state, drone.now()))
-            if drone.is_heard:
+            if heard and drone.has_told:
                 if not is_known:
                     is_known = True
                     drone.say_again()

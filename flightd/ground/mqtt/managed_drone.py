@@ -23,9 +23,8 @@ from flightd.fleet.vda5050.codec import Version
 from flightd.fleet.vda5050.errors import ErrorType, level_of
 from flightd.fleet.vda5050.factsheet import Factsheet
 from flightd.fleet.vda5050.order import Node, Order
-from flightd.fleet.vda5050.parts import Action, Header
-from flightd.fleet.vda5050.state import ActionStatus, Error, OperatingMode, State
-from flightd.fleet.vehicle.abilities import ScanShelf, scan_shelf_of
+from flightd.fleet.vda5050.parts import Header
+from flightd.fleet.vda5050.state import Error, OperatingMode, State
 from flightd.fleet.vehicle.drone_factsheet import Measures, drone_factsheet
 from flightd.fleet.vehicle.floor import Floor
 from flightd.fleet.vehicle.machine import Identity, Vehicle
@@ -38,7 +37,6 @@ from flightd.fleet.vehicle.signals import (
     Input,
     Output,
     PauseAction,
-    Progress,
     Reached,
     ResumeAction,
 )
@@ -48,6 +46,7 @@ from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
 from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck, Wish, next_act, reached
 from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
 from flightd.ground.mqtt.safe_return import SafeReturn, Standing
+from flightd.ground.mqtt.shelf_counts import ShelfCounts, levels_of
 
 _LOG = logging.getLogger(__name__)
 MANUFACTURER: Final = "flightd"
@@ -71,19 +70,6 @@ class OrderRules:
 
     hold_s: float
     write_down: WriteDown
-
-
-@dataclass(slots=True)
-class _Work:
-    """An action that goes on: a count at the node where the drone is, since this time of its own clock."""
-
-    action: Action
-    scan: ScanShelf
-    node: str
-    since_ns: int
-    held: bool = False
-    seen: bool = False
-    """The visit is over; what was counted is being asked for."""
 
 
 class ManagedDrone:
@@ -121,7 +107,6 @@ class ManagedDrone:
         self._taken = False
         self._sent: Counter[str] = Counter()
         self._event_seq: int | None = None
-        self._visits: deque[EventReport] = deque(maxlen=_MOST_WAITING)
         self._standing: Standing | None = None
         self._asked_at_s = -_ASK_AGAIN_S
         self._return = SafeReturn()
@@ -129,11 +114,10 @@ class ManagedDrone:
         self._did: tuple[Next, float, int] = (None, 0.0, 0)
         """The last act, when, and the status by which it shows."""
         self._order: Order | None = None
-        self._ahead: list[tuple[str, int]] = []
-        self._works: dict[str, _Work] = {}
+        self._ahead: list[str] = []
+        self._counts = ShelfCounts()
         self._plans: deque[str] = deque(maxlen=_MOST_PLANS)
         self._planned: tuple[str, tuple[str, ...]] | None = None
-        self._levels: tuple[int, ...] = ()
         self._trouble: tuple[ErrorType, str] | None = None
         self._rests_since_s: float | None = None
 
@@ -141,13 +125,13 @@ class ManagedDrone:
 
     @property
     def is_heard(self) -> bool:
-        """The drone tells what it does."""
-        return self._heard and self._status is not None and self._welcome is not None
+        """The station hears the drone."""
+        return self._heard
 
     @property
-    def is_heard_at_all(self) -> bool:
-        """The station hears it."""
-        return self._heard
+    def has_told(self) -> bool:
+        """It has told how it is."""
+        return self._status is not None
 
     def tell(self, topic: str, value: Any) -> None:
         """What the hub says of the drone."""
@@ -197,7 +181,7 @@ class ManagedDrone:
 
     def _take_event(self, event: EventReport) -> None:
         if event.name == "visited":
-            self._visits.append(event)
+            self._counts.note_visit(event)
         is_command = event.name == "command" and event.level is EventLevel.INFO
         if is_command and event.text.split(" ")[0] in _COMMANDS:
             if self._sent[event.text]:
@@ -260,27 +244,26 @@ class ManagedDrone:
         node = reached(status, self._wish)
         if node is None:
             return []
-        while self._ahead and self._ahead.pop(0)[0] != node:
-            pass
+        del self._ahead[: self._ahead.index(node) + 1]
         return [Reached(node)]
 
     @property
     def _wish(self) -> Wish:
-        works = any(not work.held for work in self._works.values())
-        return Wish(tuple(node for node, _ in self._ahead), self.vehicle.last_node, works)
+        return Wish(tuple(self._ahead), self.vehicle.last_node, self._counts.go_on)
 
     def _take_output(self, one: Output, status: StatusReport) -> None:
         match one:
             case Fly(stops):
-                self._ahead = [(stop.node, stop.sequence_id) for stop in stops]
+                self._ahead = [stop.node for stop in stops]
             case Hold():
                 self._ahead = []
             case Begin(action):
-                self._begin(action, status)
+                failed = self._counts.begin(action, self.vehicle.last_node, status, self._standing)
+                self._asked.extend([failed] if failed is not None else [])
             case Abort(action_id):
-                self._works.pop(action_id, None)
-            case PauseAction(action_id) | ResumeAction(action_id) if action_id in self._works:
-                self._works[action_id].held = isinstance(one, PauseAction)
+                self._counts.abort(action_id)
+            case PauseAction(action_id) | ResumeAction(action_id):
+                self._counts.hold(action_id, isinstance(one, PauseAction))
             case Decided():
                 self._decided(one)
             case State() | Factsheet():
@@ -304,45 +287,6 @@ class ManagedDrone:
                 what[:300], self._name, "refused" if refused else "accepted", refused[:300]
             )
 
-    # actions
-
-    def _begin(self, action: Action, status: StatusReport) -> None:
-        scan = scan_shelf_of(action)
-        if self._standing is not None and not self._standing.counts:
-            self._asked.append(
-                Progress(action.action_id, ActionStatus.FAILED, "this drone counts no shelves")
-            )
-        elif status.phase is not Phase.PREFLIGHT and self._levels and not set(scan.levels) <= {*self._levels}:
-            levels = ", ".join(map(str, self._levels))
-            what = f"this flight began with level {levels} and counts no other"
-            self._asked.append(Progress(action.action_id, ActionStatus.FAILED, what))
-        else:
-            node = self.vehicle.last_node
-            self._works[action.action_id] = _Work(action, scan, node, status.stamp_ns)
-
-    def _visited(self) -> list[_Work]:
-        """The actions whose visit is over."""
-        over = [
-            work
-            for work in self._works.values()
-            if not work.seen
-            and any(one.text == work.node and one.stamp_ns > work.since_ns for one in self._visits)
-        ]
-        for work in over:
-            work.seen = True
-        return over
-
-    async def _finish(self, works: list[_Work], link: DroneLink) -> None:
-        """Tell what was counted, as far as the drone tells it."""
-        try:
-            rows = await link.inventory()
-        except FlightdError:
-            rows = ()
-        for work in works:
-            if self._works.pop(work.action.action_id, None) is not None:
-                result = counted_in_words(rows, work.node, work.scan.expected)
-                self._asked.append(Progress(work.action.action_id, ActionStatus.FINISHED, result))
-
     # acts
 
     def _reach(self, nodes: Sequence[Node]) -> int | None:
@@ -355,11 +299,11 @@ class ManagedDrone:
         """Begin what is to be done next, one thing after the other."""
         if self._acting is not None and not self._acting.done():
             return
-        done = self._visited()
+        over = self._counts.over()
         waits = status.phase is Phase.PREFLIGHT and CommandKind.PLAN in status.possible
         asks = waits and (self._standing is None or self._return.is_due(now_s))
-        if done:
-            self._acting = tasks.create_task(self._finish(done, link), name=f"{self._name} counted")
+        if over:
+            self._acting = tasks.create_task(self._ask_count(over, link), name=f"{self._name} counted")
         elif asks and now_s - self._asked_at_s >= _ASK_AGAIN_S:
             self._asked_at_s = now_s
             self._acting = tasks.create_task(self._ask(now_s, link), name=f"{self._name} is asked")
@@ -401,10 +345,14 @@ class ManagedDrone:
         except FlightdError as err:
             _LOG.info("%s: %s", self._name, err)
 
+    async def _ask_count(self, over: list[str], link: DroneLink) -> None:
+        """Tell what was counted."""
+        self._asked.extend(await self._counts.results(over, link))
+
     async def _do(self, act: PlanNext | CommandNext, status: StatusReport, link: DroneLink) -> None:
         act_id = f"vda5050-{uuid.uuid4().hex}"
         if isinstance(act, PlanNext):
-            text, levels = "plan", self._levels_of(act.nodes)
+            text, levels = "plan", levels_of(self._order, act.nodes)
             self._plans.append(act_id)
         else:
             text = f"{act.kind} {act.node}".rstrip()
@@ -420,7 +368,7 @@ class ManagedDrone:
                     seen_ns=status.stamp_ns,
                     by_person=False,
                 )
-                self._planned, self._levels = (act_id, act.nodes), levels
+                self._planned, self._counts.levels = (act_id, act.nodes), levels
             else:
                 plan = self._planned[0] if act.kind is CommandKind.START and self._planned else ""
                 order = Act(act_id, act.kind, act.node, plan, status.session, status.stamp_ns)
@@ -434,31 +382,8 @@ class ManagedDrone:
         detail = ", ".join(act.nodes) if isinstance(act, PlanNext) else ""
         self._write_down(f"{text} {detail}".rstrip(), refused)
 
-    def _levels_of(self, nodes: tuple[str, ...]) -> tuple[int, ...]:
-        """The levels that all counts of the order ask for, where one of them is at these nodes; none: all."""
-        scans = {
-            (node.node_id, tuple(sorted(scan_shelf_of(action).levels)))
-            for node in (self._order.nodes if self._order else ())
-            for action in node.actions
-        }
-        levels = {levels for _, levels in scans}
-        return next(iter(levels)) if len(levels) == 1 and any(node in nodes for node, _ in scans) else ()
-
     def _troubles(self) -> list[Error]:
         if self._trouble is None:
             return []
         kind, what = self._trouble
         return [Error(error_type=kind, error_level=level_of(kind), error_description=what)]
-
-
-def counted_in_words(
-    rows: Iterable[dict[str, str]], node: str, expected: tuple[str, ...] | None
-) -> str | None:
-    """What was counted at a node, for a scanShelf's result; None where the drone tells nothing."""
-    here = [row for row in rows if row.get("node") == node]
-    if not here:
-        return None
-    read = [row["texts"] for row in here if row.get("texts")]
-    told = f"{len(read)} of {len(here)} places with codes"
-    missing = [code for code in expected or () if not any(code in text.split(" ") for text in read)]
-    return f"{told}; not read: {', '.join(missing)}" if missing else told

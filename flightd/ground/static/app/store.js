@@ -11,6 +11,7 @@ const EMPTY_DRONE = {
   events: [],
   track: [], // [x_m, y_m], oldest first
   visited: new Set(),
+  manager: null, // {flies} where a fleet's manager may fly it; null: none may
   plan: null, // what is flown, or would be with the next start: the link's PlanAnswer
   trouble: {}, // why a camera shows nothing, by its name
 };

@@ -7,6 +7,7 @@ import { hasSingleKeys, SingleKeys } from "../single_keys.js";
 import { state, update } from "../store.js";
 import { capital, COMMANDS, isGrounded } from "../words.js";
 import { HoldButton } from "./hold_button.js";
+import { Manager } from "./manager.js";
 
 const SHOWN_MS = 20000;
 
@@ -38,6 +39,7 @@ export function Acts({ status, welcome }) {
         <${Order} command="land" may=${may("land") && !isGrounded(status)} />
       </div>
       <${GoTo} nodes=${welcome.floor.nodes} may=${may("goto")} />
+      <${Manager} />
       <${SingleKeys} />
       <${Outcome} />
     </section>

@@ -1,0 +1,179 @@
+"""What a drone is asked next for an order, and how far one may lead it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from flightd.adapters.ground_link.floor_status import floor_status
+from flightd.adapters.ground_link.messages.floor import FloorWay
+from flightd.adapters.ground_link.messages.published import EventReport, LinkReport, StatusReport
+from flightd.core.errors import InputError
+from flightd.core.types import CommandKind, EventLevel, Phase
+from flightd.fleet.vda5050.codec import Version
+from flightd.fleet.vehicle.drone_factsheet import Measures
+from flightd.fleet.vehicle.floor import floor_of
+from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
+from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
+from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck, Wish, next_act, reached
+from flightd.ground.mqtt.reported_drone import takes_orders
+from flightd.ground.mqtt.safe_return import SafeReturn, Standing
+from flightd.ground.mqtt.shelf_counts import counted_in_words
+from flightd.site.site_file import load_site
+from tests.rigs.event_loops import virtual
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+SITE = load_site(CONFIGS / "site-demo.toml")
+IN_AIR = (CommandKind.PAUSE, CommandKind.RESUME, CommandKind.GOTO, CommandKind.HOME)
+GOTO, PAUSE, RESUME = CommandKind.GOTO, CommandKind.PAUSE, CommandKind.RESUME
+
+
+def status(phase: Phase, way: str = "", **more: Any) -> StatusReport:
+    """A drone in this phase, with this way ahead."""
+    nodes = tuple(way.split())
+    waits = phase is Phase.PREFLIGHT
+    possible = (CommandKind.PLAN, CommandKind.START) if waits else IN_AIR
+    return StatusReport(
+        version=1, session="s", seq=1, stamp_ns=1, phase=phase, reason="", node="", goal=(nodes or ("",))[0],
+        nodes_done=0, nodes_planned=0, height_m=None, position=None, lines=(), lines_age_s=None, vehicle=None,
+        frames=0, frames_dropped=0, fps=0.0, latency_ms={}, link=LinkReport(0, 0, 0, 0, 0), way=nodes,
+        **{"possible": possible, "plan": "p", **more},
+    )  # fmt: skip
+
+
+def nodes(text: str) -> tuple[str, ...]:
+    return tuple(text.split())
+
+
+FLIGHTS: list[tuple[Phase, str, str, str, Next]] = [
+    # phase, way, ahead, last, what is asked
+    (Phase.FOLLOW, "A2 A3 A4 A1", "A2 A3 A4", "A1", None),
+    (Phase.FOLLOW, "A4 A1", "A4", "A3", CommandNext(GOTO, "A4")),  # before it is done with the last node
+    (Phase.FOLLOW, "A4 A4 A1", "A4", "A3", None),
+    (Phase.FOLLOW, "A4 A4 A1", "A4 A5", "A3", CommandNext(GOTO, "A5")),
+    (Phase.HOVER, "A4 A4 A1", "", "A4", CommandNext(PAUSE)),
+    (Phase.HOLD, "A4 A4 A1", "", "A4", None),
+    (Phase.HOLD, "A4 A4 A1", "A5", "A4", CommandNext(GOTO, "A5")),  # a base that is extended
+    (Phase.HOLD, "A4 A5 A1", "A5", "A4", CommandNext(RESUME)),
+    (Phase.FOLLOW, "A3 A4 A5 A1", "A3", "A2", CommandNext(GOTO, "A3")),  # cancelled
+    (Phase.FOLLOW, "A3 A4 A1", "", "A2", CommandNext(PAUSE)),  # paused on its way
+    (Phase.HOLD, "A3 A4 A1", "", "A2", None),
+    (Phase.HOLD, "A3 A4 A1", "A1", "A2", Stuck("A3")),
+    (Phase.HOVER, "A1 A1", "", "A1", CommandNext(GOTO, "A1")),  # the last one of a way is the pad
+    (Phase.RELOCATE, "A3 A1", "A2", "A1", None),
+    (Phase.LAND, "A1", "A2", "A1", None),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("phase", "way", "ahead", "last", "asked"), FLIGHTS)
+def test_a_drone_in_the_air_is_sent_on_before_it_turns_home(
+    phase: Phase, way: str, ahead: str, last: str, asked: Next
+) -> None:
+    possible = () if phase is Phase.LAND else IN_AIR
+    told = status(phase, way, possible=possible)
+    assert next_act(told, Wish(nodes(ahead), last), ("p", ())) == asked
+
+
+def test_a_count_is_not_paused_and_a_drone_on_its_way_home_is_not_sent_on() -> None:
+    counting = Wish((), "A4", works=True)
+    assert next_act(status(Phase.SCAN, "A4 A4 A1"), counting, None) is None
+    assert next_act(status(Phase.HOLD, "A4 A4 A1"), counting, None) == CommandNext(RESUME)
+    home = status(Phase.FOLLOW, "A1", possible=(PAUSE,))
+    assert next_act(home, Wish(("A2",), "A1"), None) is None
+    assert not takes_orders(home, ["p"])
+
+
+def test_on_the_ground_the_base_is_planned_and_then_started() -> None:
+    wish = Wish(("A2", "A3", "A2"), "A1")
+    stands = status(Phase.PREFLIGHT)
+    assert next_act(stands, wish, None) == PlanNext(("A2", "A3")), "a plan visits each node once"
+    assert next_act(stands, wish, ("p", ("A2",))) == PlanNext(("A2", "A3"))
+    assert next_act(stands, wish, ("p", ("A2", "A3"))) == CommandNext(CommandKind.START)
+    held = status(Phase.PREFLIGHT, possible=(CommandKind.PLAN,))
+    assert next_act(held, wish, ("p", ("A2", "A3"))) is None, "it is not ready"
+    starts = status(Phase.ARMING, possible=(PAUSE,))
+    assert next_act(starts, Wish((), "A1"), ("p", ("A2", "A3"))) == CommandNext(PAUSE)
+    assert next_act(starts, Wish((), "A1"), ("other", ())) is None
+
+
+def test_a_node_is_reached_once() -> None:
+    hovers = status(Phase.HOVER, "A2 A3 A1")
+    assert reached(hovers, Wish(("A2", "A3"), "A1")) == "A2"
+    assert reached(hovers, Wish(("A1", "A2"), "A2")) is None
+
+
+@pytest.mark.parametrize("name", ["demo", "racks", "racks-small"])
+def test_the_floor_of_the_link_is_that_of_the_site(name: str) -> None:
+    site = load_site(CONFIGS / f"site-{name}.toml")
+    assert floor_of_link(floor_status(site)) == floor_of(site)
+
+
+def test_a_closed_line_is_no_way_and_lengthens_the_way_home() -> None:
+    floor = floor_status(SITE)
+    shut = msgspec.structs.replace(floor, ways=(FloorWay("A1", "A2", closed=True),))
+    assert {("A1", "A2"), ("A2", "A1")}.isdisjoint(floor_of_link(shut).ways)
+    (there,) = WaysHome(floor).there_and_home_m("A1", ["A2"])
+    assert there == pytest.approx(3.0)
+    assert next(WaysHome(shut).there_and_home_m("A3", ["A2"])) > 15.0
+
+
+def test_a_base_leads_no_further_than_the_battery_brings_the_drone_home() -> None:
+    ways, back = WaysHome(floor_status(SITE)), SafeReturn()
+    standing = Standing("A1", counts=False, sweeps=False, pace_s=2.0)
+    ahead = ["A2", "A3", "A4"]  # 3.0, 5.4 and 9.0 m there and back
+    for left_s, reach in ((30.0, 3), (11.0, 2), (5.9, 0), (None, 3)):
+        told = status(Phase.FOLLOW, "A2 A1", battery_left_s=left_s)
+        assert back.reach(ahead, "A1", told, ways, standing) == reach, left_s
+    stands = status(Phase.PREFLIGHT)
+    assert back.reach(ahead, "A1", stands, ways, standing) is None
+    assert back.is_due(0.0)
+
+    class Link:
+        """Two nodes are flown on one battery, the fourth cannot be flown to."""
+
+        async def plan_flight(self, asked: tuple[str, ...], *_: Any, **__: Any) -> Any:
+            if len(asked) > 3:
+                raise InputError("a full battery does not reach it")
+            return type("Planned", (), {"batteries": 1 if len(asked) < 3 else 2})
+
+    virtual(back.ask(Link(), 0.0))  # type: ignore[arg-type]
+    assert back.reach(ahead, "A1", stands, ways, standing) == 2
+    assert not back.is_due(1.0)
+    assert back.is_due(60.0), "the battery drains"
+
+
+def test_a_command_that_is_not_the_managers_takes_the_drone_from_him() -> None:
+    drone = ManagedDrone("demo", Version.V2_1, Measures(3, 1, 1, 1, 1, 1), OrderRules(60, lambda *_: None))
+    taken: list[bool] = []
+    drone.on_taken = taken.append
+
+    def event(seq: int, text: str, level: EventLevel = EventLevel.INFO, name: str = "command") -> EventReport:
+        return EventReport(1, "s", seq, seq, level, name, text)
+
+    drone.tell("events", (event(7, "start"),))
+    assert taken == [], "what was before is past"
+    told = (
+        event(7, "start"),
+        event(8, "goto refused: no way", EventLevel.WARNING),
+        event(9, "A2", name="visited"),
+    )
+    drone.tell("events", told)
+    assert taken == []
+    drone.tell("events", (*told, event(10, "pause")))
+    assert taken == [True]
+    drone.taken_by_person(False)
+    assert taken == [True, False]
+
+
+def test_a_count_is_told_in_words() -> None:
+    rows = [
+        {"node": "A2", "texts": "PALLET-1 4006381333931"},
+        {"node": "A2", "texts": ""},
+        {"node": "A3", "texts": "X"},
+    ]
+    assert counted_in_words(rows, "A2", None) == "1 of 2 places with codes"
+    assert counted_in_words(rows, "A2", ("PALLET-1", "X")) == "1 of 2 places with codes; not read: X"
+    assert counted_in_words(rows, "B1", ("X",)) is None
