@@ -140,6 +140,11 @@ class Vehicle:
         """Whether no order is left to be flown or done."""
         return self._idle
 
+    @property
+    def is_known(self) -> bool:
+        """Whether the drone has told how it is."""
+        return self._situation is not None
+
     def change_floor(self, floor: Floor) -> None:
         """The drone was started anew, perhaps with another map; orders are checked by this one."""
         self._acceptance = replace(self._acceptance, floor=floor)

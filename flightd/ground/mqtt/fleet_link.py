@@ -121,7 +121,7 @@ class DroneAtBroker:
             if now_is is not state and (heard or state is not None):
                 state = now_is
                 await self._publish(client, drone.vehicle.connection(state, drone.now()))
-            if heard and drone.has_told:
+            if heard and drone.vehicle.is_known:
                 if not is_known:
                     is_known = True
                     drone.say_again()

@@ -128,11 +128,6 @@ class ManagedDrone:
         """The station hears the drone."""
         return self._heard
 
-    @property
-    def has_told(self) -> bool:
-        """It has told how it is."""
-        return self._status is not None
-
     def tell(self, topic: str, value: Any) -> None:
         """What the hub says of the drone."""
         match topic:
