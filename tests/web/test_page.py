@@ -61,6 +61,15 @@ def url(flight: LiveFlight) -> Iterator[str]:
         yield url
 
 
+@pytest.fixture
+def managed_url(flight: LiveFlight) -> Iterator[str]:
+    """Of a station whose drone a fleet's manager flies; he is not there."""
+    status, command = flight.ports
+    options = ("--mqtt", "mqtt://127.0.0.1:1", "--mqtt-orders")
+    with station([f"demo=127.0.0.1:{status}/{command}"], options=options) as url:
+        yield url
+
+
 def start(page: Page) -> None:
     """Hold the button, as a person does."""
     button = page.get_by_role("button", name="Start")
@@ -84,10 +93,11 @@ def until_phase(flight: LiveFlight, wanted: set[Phase]) -> None:
 
 
 def test_a_flight_is_started_watched_paused_sent_elsewhere_and_stopped_by_key(
-    browser: Browser, url: str, flight: LiveFlight
+    browser: Browser, managed_url: str, flight: LiveFlight
 ) -> None:
-    with opened(browser, url) as page:
+    with opened(browser, managed_url) as page:
         phase(page, "On the ground")
+        expect(page.get_by_text("manager flies this drone")).to_be_visible()
         expect(page.get_by_text("Ready to fly")).to_be_visible()
         expect(page.get_by_role("button", name="Fly home")).to_be_disabled()
         assert hindrances(page) == []
@@ -96,6 +106,10 @@ def test_a_flight_is_started_watched_paused_sent_elsewhere_and_stopped_by_key(
         assert flight.phase is Phase.PREFLIGHT, "a touch starts nothing"
         start(page)
         expect(page.get_by_text("Start: accepted")).to_be_visible()
+        expect(page.get_by_text("People fly this drone")).to_be_visible()
+        page.get_by_role("button", name="Give it to the fleet’s manager").click()
+        page.get_by_role("button", name="Take over").click()
+        expect(page.get_by_text("People fly this drone")).to_be_visible()
         phase(page, "Flying to A2")
         expect(page.get_by_role("img", name=re.compile(r"^Down camera: \d lines?$"))).to_be_visible()
         expect(page.get_by_role("img", name="The drone")).to_be_visible()
