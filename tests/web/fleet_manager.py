@@ -32,10 +32,10 @@ class Manager:
         """The newest message of a topic; empty before the first."""
         return (self.of(topic) or [{}])[-1]
 
-    async def say(self, topic: str, data: bytes) -> None:
+    async def say(self, topic: str, data: bytes, *, retain: bool = False) -> None:
         """To the drone."""
         assert self._client is not None
-        await self._client.publish(f"{self.top}/{topic}", data)
+        await self._client.publish(f"{self.top}/{topic}", data, retain=retain)
 
     @contextlib.asynccontextmanager
     async def watching(self, broker: Mosquitto) -> AsyncIterator[None]:

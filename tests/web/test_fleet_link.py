@@ -42,13 +42,14 @@ def test_a_manager_sees_the_drone_is_refused_and_loses_it_with_the_link(
             link = await drone.enter_async_context(serving(local()))
             fleet = FleetLink(["demo"], read_broker(broker.url), version, BODY)
             await stack.enter_async_context(manager.watching(broker))
+            await manager.say("order", encoded(order("A1 A2", name="of yesterday"), version), retain=True)
             await stack.enter_async_context(served(("demo", address_of(link)), fleet=fleet))
             async with telling(link):
                 await until(lambda: manager.last("visualization"))
                 assert manager.last("connection")["connectionState"] == "ONLINE"
                 assert manager.last("factsheet")["serialNumber"] == "demo"
                 state = manager.last("state")
-                assert (state["operatingMode"], state["orderId"]) == ("MANUAL", "")
+                assert (state["operatingMode"], state["orderId"], state["errors"]) == ("MANUAL", "", [])
                 at = manager.last("visualization")[position]
                 assert (at["x"], at["y"], at["mapId"]) == (1.0, -0.01, "demo")
                 # its own people fly it: orders are refused, questions are answered

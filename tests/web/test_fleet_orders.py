@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,13 @@ class Master(Manager):
         return state.get("lastNodeId") == node and not state["driving"]
 
 
+async def hand_over(station: Station, *, to_manager: bool, drone: str = "demo") -> None:
+    """By a person at the page."""
+    body = json.dumps({"flies": to_manager}).encode()
+    code, _ = await station.ask("POST", f"/drones/{drone}/manager", {"Origin": station.origin, **JSON}, body)
+    assert code == (200 if drone == "demo" else 400)
+
+
 def managed(
     folder: Path,
     flight: LiveFlight,
@@ -116,26 +124,29 @@ def test_a_manager_flies_a_drone_until_a_person_stops_it(tmp_path: Path) -> None
         await until(lambda: master.actions.get("cancelOrder") == "FINISHED", 60)
         assert (master.ahead, master.is_at("A5")) == ("", True)
 
-        await master.order("A5 A4", name="back", actions={"A5": [scan("shelf")]})
+        await master.order("A5 A4 A3", name="back", actions={"A5": [scan("shelf")]})
         await until(lambda: master.actions.get("shelf") == "FAILED", 60)
         (shelf,) = master.last("state")["actionStates"]
         assert shelf["actionResult"] == "this drone counts no shelves"
-        await until(lambda: flight.phase is Phase.FOLLOW, 60)
-        assert (await station.act("demo", id="stop-0001", command="stop"))[0] == 200
+        await until(lambda: flight.phase is Phase.FOLLOW and master.last("state")["driving"], 60)
+        await hand_over(station, to_manager=False)
         await until(lambda: master.mode == "MANUAL" and master.ahead == "")
-        await master.order("A5 A4", name="late")
-        await until(lambda: "MOBILE_ROBOT_NOT_AVAILABLE" in master.errors)
-        assert flight.phase in {Phase.LAND, Phase.ABORTED}
-        back = {"Origin": station.origin, **JSON}
-        assert (await station.ask("POST", "/drones/demo/manager", back, b'{"flies": true}'))[0] == 200
-        assert (await station.ask("POST", "/drones/other/manager", back, b'{"flies": true}'))[0] == 400
+        await master.order("A5 A4", name="refused")
+        await until(lambda: master.errors == ["MOBILE_ROBOT_NOT_AVAILABLE"])
+        await hand_over(station, to_manager=True, drone="other")
+        await hand_over(station, to_manager=True)
+        await until(lambda: master.mode == "AUTOMATIC" and flight.phase is Phase.HOLD, 60)
+
+        assert (await station.act("demo", id="stop-0001", command="stop"))[0] == 200
+        await until(lambda: master.mode == "MANUAL")
+        await until(lambda: flight.phase in {Phase.LAND, Phase.ABORTED}, 60)
 
     with LiveFlight(SITE, CONFIG, speed=4.0) as flight:
         managed(tmp_path, flight, lambda station, master, _: go(flight, station, master), written)
     assert ("order o/1: A4 A5 A6", "demo", "accepted", "") in written
     assert ("goto A5", "demo", "accepted", "") in written
     refused = [(act, why.partition(":")[0]) for act, _, outcome, why in written if outcome == "refused"]
-    assert refused == [("order late/0: A5 A4", "MOBILE_ROBOT_NOT_AVAILABLE")]
+    assert refused == [("order refused/0: A5 A4", "MOBILE_ROBOT_NOT_AVAILABLE")]
 
 
 def test_a_shelf_is_counted_and_without_a_broker_the_drone_holds_and_comes_home(

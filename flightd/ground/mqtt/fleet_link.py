@@ -100,7 +100,10 @@ class DroneAtBroker:
 
     async def _listen(self, client: aiomqtt.Client) -> None:
         async for message in client.messages:
-            self._drone.hear(self._read(str(message.topic), message.payload))
+            if message.retain:  # of whatever time, and nobody waits for it: nothing takes off by that
+                _LOG.warning("%s: %s: kept by the broker, left out", self._name, message.topic)
+            else:
+                self._drone.hear(self._read(str(message.topic), message.payload))
 
     def _read(self, topic: str, payload: Any) -> Input:
         data = bytes(payload) if isinstance(payload, bytes | bytearray) else str(payload).encode()

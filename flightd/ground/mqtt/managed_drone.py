@@ -99,6 +99,8 @@ class ManagedDrone:
         self._welcome: dict[str, Any] | None = None
         self._ways: WaysHome | None = None
         self._status: StatusReport | None = None
+        self._is_new = True
+        """It was started anew: what was ordered before is over."""
         self._heard = False
         self._asked: deque[Input] = deque(maxlen=_MOST_WAITING)
         self.dropped = 0
@@ -161,6 +163,7 @@ class ManagedDrone:
         self.vehicle.change_floor(floor_of_link(welcome["floor"]))
         self._ways = WaysHome(welcome["floor"])
         self._status = self._standing = self._event_seq = None
+        self._is_new = True
         self._asked_at_s = -_ASK_AGAIN_S
         self._return = SafeReturn()
         self._sent.clear()
@@ -219,12 +222,15 @@ class ManagedDrone:
         arrived = self._arrived(status)
         asked = [self._asked.popleft() for _ in range(len(self._asked))]
         stands_on = None if self._standing is None else self._standing.node
-        mode = self._mode(status)
+        mode = OperatingMode.MANUAL if self._is_new else self._mode(status)
+        self._is_new = False
         last, floor = self.vehicle.last_node, self._welcome["floor"]
         seen = situation_of(status, floor, mode, last, stands_on, self._troubles())
         for one in self.vehicle.step(self.now(), [seen, *arrived, *asked]):
             self._take_output(one, status)
-        if mode is OperatingMode.AUTOMATIC and self._link is not None:
+        if mode is not OperatingMode.AUTOMATIC:
+            self._ahead = []  # the order is over with it
+        elif self._link is not None:
             self._go_on(status, now_s, tasks, self._link)
 
     def _mode(self, status: StatusReport) -> OperatingMode:

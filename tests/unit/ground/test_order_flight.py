@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from flightd.core.types import CommandKind, EventLevel, Phase
 from flightd.fleet.vda5050.codec import Version
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.fleet.vehicle.floor import floor_of
+from flightd.ground.messages import LinkState
 from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
 from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
 from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck, Wish, next_act, reached
@@ -24,6 +26,7 @@ from flightd.ground.mqtt.safe_return import SafeReturn, Standing
 from flightd.ground.mqtt.shelf_counts import counted_in_words
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import virtual
+from tests.unit.fleet.vehicle_rig import order
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
@@ -166,6 +169,49 @@ def test_a_command_that_is_not_the_managers_takes_the_drone_from_him() -> None:
     assert taken == [True]
     drone.taken_by_person(False)
     assert taken == [True, False]
+
+
+class Link:
+    """A drone's link that takes everything, and notes it."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    async def plan_flight(self, asked: tuple[str, ...], *_: Any, dry: bool = False, **__: Any) -> Any:
+        self.asked += [] if dry else [f"plan {' '.join(asked)}"]
+        told = {"batteries": 1, "way": ("A1", "A2"), "places": 0, "sweeps": (), "seconds": 9.0, "way_m": 9.0}
+        return type("Planned", (), told)
+
+    async def act(self, act: Any, **_: Any) -> None:
+        self.asked.append(act.command.value)
+
+
+def test_no_order_outlives_the_drones_daemon() -> None:
+    drone = ManagedDrone("demo", Version.V3_0, Measures(3, 1, 1, 1, 1, 1), OrderRules(60, lambda *_: None))
+    link = Link()
+    heard = LinkState(True, 0.0, 1.0, 0, False, False, "")
+
+    def told(session: str, phase: Phase, plan: str) -> None:
+        welcome = {"session": session, "role": "operator", "floor": floor_status(SITE)}
+        for topic, value in (("link", heard), ("welcome", welcome), ("status", status(phase, plan=plan))):
+            drone.tell(topic, value)
+
+    async def go() -> None:
+        running = asyncio.create_task(drone.run(link))  # type: ignore[arg-type]
+        told("one", Phase.PREFLIGHT, "")
+        await asyncio.sleep(3.0)
+        drone.hear(order("A1 A2 A3"))
+        await asyncio.sleep(5.0)
+        assert link.asked[0] == "plan A2 A3"
+        del link.asked[:]
+        told("two", Phase.PREFLIGHT, "")
+        await asyncio.sleep(10.0)
+        assert link.asked == []
+        assert drone.vehicle.is_idle
+        running.cancel()
+        await asyncio.wait([running])
+
+    virtual(go())
 
 
 def test_a_count_is_told_in_words() -> None:
