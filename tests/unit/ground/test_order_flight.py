@@ -186,7 +186,8 @@ class Link:
         self.asked.append(act.command.value)
 
 
-def test_no_order_outlives_the_drones_daemon() -> None:
+@pytest.mark.parametrize("anew", [True, False])
+def test_no_order_outlives_the_drones_daemon_or_a_persons_command(anew: bool) -> None:
     drone = ManagedDrone("demo", Version.V3_0, Measures(3, 1, 1, 1, 1, 1), OrderRules(60, lambda *_: None))
     link = Link()
     heard = LinkState(True, 0.0, 1.0, 0, False, False, "")
@@ -203,8 +204,13 @@ def test_no_order_outlives_the_drones_daemon() -> None:
         drone.hear(order("A1 A2 A3"))
         await asyncio.sleep(5.0)
         assert link.asked[0] == "plan A2 A3"
+        if anew:
+            told("two", Phase.PREFLIGHT, "")
+        else:
+            drone.taken_by_person()
+            await asyncio.sleep(1.0)
+            drone.taken_by_person(False)
         del link.asked[:]
-        told("two", Phase.PREFLIGHT, "")
         await asyncio.sleep(10.0)
         assert link.asked == []
         assert drone.vehicle.is_idle
