@@ -251,7 +251,8 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.GROUND_LOST,
         "the last ground station that attends silent for `ground.lost_s`",
         Action.CONFIGURED,
-        "`ground.lost_action`: continue, hold, home or land",
+        "`ground.lost_action`: continue, hold, home or land; no hold outlasts the charge that the way back"
+        " needs",
         _FAST,
     ),
     Hazard(
@@ -260,7 +261,8 @@ HAZARDS: tuple[Hazard, ...] = (
         "where `interlock.file` is named (a site may demand that): it does not say any more that the aisles"
         " are closed, or cannot be read",
         Action.CONFIGURED,
-        "nothing arms; in flight `hazards.aisle_open`: continue, hold, home or land",
+        "nothing arms; in flight `hazards.aisle_open`: continue, hold, home or land; no hold outlasts the"
+        " charge that the way back needs",
         _FAST,
     ),
     Hazard(
@@ -399,7 +401,8 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.RECORD_LOST,
         "the disk refuses the flight log",
         Action.CONFIGURED,
-        "`hazards.record_lost`: continue, hold, home or land",
+        "`hazards.record_lost`: continue, hold, home or land; no hold outlasts the charge that the way back"
+        " needs",
         _FAST,
     ),
     Hazard(
