@@ -80,7 +80,7 @@ class DeviceClock:
         return max(one[2] for one in lately)
 
     def _first_doubted(self, crept: int, offset: int) -> int | None:
-        """The least offset of what followed the first message, once it is plain that this had a wrong stamp."""
+        """The least offset of what followed the first message, once that plainly had a wrong stamp."""
         if self._others is None:
             return None
         if offset <= crept + _LEAP_NS:
