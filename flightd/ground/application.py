@@ -41,7 +41,7 @@ from flightd.ground.messages import (
 )
 from flightd.ground.missions.routes import mission_routes
 from flightd.ground.packed_json import PackedJson
-from flightd.ground.page_person import PagePerson, Standing
+from flightd.ground.page_person import PagePeople, PagePerson, Standing
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.read_folders import ReadFolder
 from flightd.ground.reading_process import ReadingProcess
@@ -66,6 +66,7 @@ def application(
     hub: Hub,
     hosts: Hosts,
     access: Access,
+    people: PagePeople,
     folder: Path | None,
     flights: Flights,
     uploads: ReadingProcess,
@@ -75,12 +76,13 @@ def application(
     others: Sequence[ReadFolder] = (),
 ) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks,
-    inventories, site files and `flights` lie under `folder`, more inventories under the `others`, `uploads`
-    reads what people send, `maps` lays out maps, `studio` and `simulated` are None without a folder."""
+    `people` who sits at a page, inventories, site files and `flights` lie under `folder`, more inventories
+    under the `others`, `uploads` reads what people send, `maps` lays out maps, `studio` and `simulated` are
+    None without a folder."""
     orders = Orders(hub.drones, access)
     routes = [
         first_page(),
-        WebSocketRoute("/live", partial(_live, hub, orders)),
+        WebSocketRoute("/live", partial(_live, hub, orders, people)),
         Route("/drones/{drone}/acts", partial(_act, orders), methods=["POST"]),
         *stock_page(folder, hub.drones, uploads, others),
         *site_page(folder, maps, simulated),
@@ -92,7 +94,7 @@ def application(
         *session_routes(access),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    return Guard(PackedJson(Starlette(routes=gated(routes, access))), hosts)
+    return Guard(PackedJson(Starlette(routes=gated(routes, access, people.returning))), hosts)
 
 
 class _GoneError(Exception):
@@ -103,11 +105,14 @@ class _GoneError(Exception):
         self.code = code
 
 
-async def _live(hub: Hub, orders: Orders, socket: WebSocket) -> None:
+async def _live(hub: Hub, orders: Orders, people: PagePeople, socket: WebSocket) -> None:
     """One page, until it closes, says what no page of ours says, or its person is gone (`PagePerson`)."""
     who = identity_of(socket)
-    person = PagePerson(who, orders.access, hub.drones)
+    person = people.at(who)
     await socket.accept()
+    if person.standing() is Standing.GONE:
+        await _send_away(socket, _GoneError(SIGN_IN_FIRST, "the session is over"))
+        return
     if hub.is_full:
         await socket.close(_FULL, "too many pages are open")
         return
@@ -118,7 +123,7 @@ async def _live(hub: Hub, orders: Orders, socket: WebSocket) -> None:
             try:
                 async with asyncio.TaskGroup() as tasks:
                     sending = tasks.create_task(_send(browser, socket), name="page out")
-                    staying = tasks.create_task(_stay(hub, browser, person), name="page's person")
+                    staying = tasks.create_task(_stay(hub, browser, people, person), name="page's person")
                     try:
                         await _hear(hub, orders, browser, socket, person, acts)
                     finally:
@@ -131,13 +136,17 @@ async def _live(hub: Hub, orders: Orders, socket: WebSocket) -> None:
             except* _GoneError as group:
                 gone = group.exceptions[0]
                 assert isinstance(gone, _GoneError)
-                if gone.code == SIGN_IN_FIRST:
-                    with contextlib.suppress(WebSocketDisconnect):
-                        await _say(socket, session_message(SessionState(login=True)))
-                await _close(socket, gone.code, str(gone))
+                await _send_away(socket, gone)
 
 
-async def _stay(hub: Hub, browser: Browser, person: PagePerson) -> None:
+async def _send_away(socket: WebSocket, gone: _GoneError) -> None:
+    if gone.code == SIGN_IN_FIRST:
+        with contextlib.suppress(WebSocketDisconnect):
+            await _say(socket, session_message(SessionState(login=True)))
+    await _close(socket, gone.code, str(gone))
+
+
+async def _stay(hub: Hub, browser: Browser, people: PagePeople, person: PagePerson) -> None:
     """Tell the page when its person's session ends.  _GoneError once he is gone, or has another role."""
     before = Standing.SIGNED_IN
     for told in count(1):
@@ -147,6 +156,8 @@ async def _stay(hub: Hub, browser: Browser, person: PagePerson) -> None:
             raise _GoneError(SIGN_IN_FIRST, "the session is over")
         if now is Standing.CHANGED:
             raise _GoneError(_OTHER_ROLE, "another role")
+        if now is Standing.OVER:
+            people.keep(person)
         state = person.session_state()
         if now is not before or (state.ends_in_s is not None and told % _TOLD_EACH == 0):
             browser.offer(("", "session"), session_message(state))

@@ -11,6 +11,7 @@ from starlette.responses import Response
 
 from flightd.adapters.ground_link.protocol import DECODE_ERRORS
 from flightd.core.errors import FlightdError, InputError, TransientError, UnavailableError
+from flightd.ground.decode_words import decode_words
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
 from flightd.ground.shown_text import shown
 
@@ -72,7 +73,7 @@ def decoded(body: bytes, kind: type[_T], what: str) -> _T:
     try:
         return msgspec.json.decode(body, type=kind)
     except DECODE_ERRORS as err:
-        raise InputError(f"not {what}: {err}") from None
+        raise InputError(f"not {what}: {decode_words(err)}") from None
 
 
 async def said(request: Request, kind: type[_T], what: str, most: int = MAX_PAGE_MESSAGE_BYTES) -> _T:

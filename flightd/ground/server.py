@@ -23,6 +23,7 @@ from flightd.ground.flights.flights import Flights
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub, Viewer
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+from flightd.ground.page_person import PagePeople
 from flightd.ground.page_socket import PageSocket
 from flightd.ground.quiet_log import quiet_log
 from flightd.ground.read_folders import ReadFolder
@@ -171,13 +172,16 @@ async def serve(
     hub, flights, uploads = Hub(drones, viewers), Flights(folder, others=others), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
     simulated = None if folder is None else SimulatedFlight(hub, folder, where.is_beyond)
+    people = PagePeople(access, hub.drones)
     quiet_log()
     maps = ReadingProcess(refusal="too many maps are being checked")
     names = () if certificate is None else certificate.names
     hosts = own_hosts(where.host, where.port, certificate is not None, names, where.is_beyond)
     server = _Server(
         uvicorn.Config(
-            application(hub, hosts, access, folder, flights, uploads, maps, studio, simulated, others),
+            application(
+                hub, hosts, access, people, folder, flights, uploads, maps, studio, simulated, others
+            ),
             http="h11",
             ws=PageSocket,
             lifespan="off",
@@ -204,6 +208,7 @@ async def serve(
             tasks.create_task(simulated.run(), name="simulated flight")
         if access.login:
             tasks.create_task(access.run(), name="people")
+            tasks.create_task(people.run(), name="people whose session is over")
         serving = tasks.create_task(server.serve([listener]), name="pages")
         try:
             while not server.started:  # noqa: ASYNC110 - it tells nobody

@@ -27,6 +27,7 @@ SOURCES = (
     "adapters/vehicle/mavlink/refusal.py",
     "adapters/vehicle/mavlink/required_parameters.py",
     "app/maintenance",
+    "config/exposure_keys.py",
     "config/remote_change.py",
     "core/errors.py",
     "core/exposure.py",
@@ -75,6 +76,9 @@ STAYS_ENGLISH = {
     "flightd ground --folder out": "a command to type",
     "SELECT data FROM expected_stock WHERE store = ?": "a question to the book",
     "interlock = true": "a line of a site file",
+    "manual_exposure = true": "a line of the configuration",
+    "{} ({} cameras take it)": "the end of a refusal, which has its German as a whole",
+    "{}, and leave the key out": "the middle of that",
     "by {} ({})": "the end of what was done, which has its German as a whole",
     "by {}": "the end of what was done, which has its German as a whole",
     "settings changed: ": "the beginning of what was done, which has its German as a whole",
@@ -123,11 +127,11 @@ _CALLS = frozenset(
 )  # fmt: skip
 """What is called with texts for a person."""
 _NAMES = frozenset(
-    {"alone", "by_hand", "calibrate", "checks", "emergency_causes", "figure", "fixed_keys", "fixed_sections",
-     "form", "holds", "lamps", "left", "limit_words", "map_error", "missing", "most", "note", "notes",
-     "over", "place", "problem", "problems", "reason", "reasons", "refusal", "refused", "remedy",
-     "settings", "shown", "still", "text", "theirs", "told", "top", "trouble", "unshown", "what",
-     "where", "why", "words"}
+    {"alone", "by_hand", "calibrate", "cannot", "checks", "emergency_causes", "figure", "fixed_keys",
+     "fixed_sections", "form", "holds", "lamps", "left", "limit_words", "map_error", "missing", "most",
+     "needed", "note", "notes", "over", "place", "problem", "problems", "reason", "reasons", "refusal",
+     "refused", "remedy", "settings", "shown", "still", "text", "theirs", "told", "top", "trouble",
+     "unshown", "what", "where", "why", "words"}
 )  # fmt: skip
 """Names, arguments, attributes and keys that hold such texts."""
 _PLACED = frozenset({"file", "key", "source", "path"})

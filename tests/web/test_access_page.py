@@ -325,6 +325,8 @@ def test_whose_session_ends_in_flight_keeps_stop_and_the_ground_until_it_has_lan
         expect(page.get_by_role("link", name="Stock")).to_have_count(0)
         assert hindrances(page) == []
         assert page.evaluate("async () => (await fetch('/api/stock')).status") == 401
+        page.reload()  # as after a break of the network: the station still knows who comes
+        expect(soon.get_by_role("status")).to_have_text(re.compile("STOP and Pause stay yours"))
         refused = """async () => (await import("/static/app/connection.js")).sendAct("demo",
             {id: "12345678", command: "home"})"""
         assert page.evaluate(refused)["status"] == 401

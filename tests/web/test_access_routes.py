@@ -24,6 +24,7 @@ from flightd.ground.application import application
 from flightd.ground.flights.flights import Flights
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub
+from flightd.ground.page_person import PagePeople
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.studio.studio import Studio
 from tests.rigs.event_loops import in_real_time
@@ -46,10 +47,12 @@ ANYBODYS = {
 def routes_of(tmp_path: Path) -> list[str]:
     """Every route of a station, as the rules name them."""
     access, flights = Access(tmp_path, login=False, secure=False), Flights(tmp_path)
+    hub = Hub([])
     guard = application(
-        Hub([]),
+        hub,
         own_hosts("127.0.0.1", 1),
         access,
+        PagePeople(access, hub.drones),
         tmp_path,
         flights,
         ReadingProcess(),
@@ -123,7 +126,7 @@ async def test_signing_in_makes_a_cookie_that_no_script_and_no_other_site_has(tm
         assert session.pop("ends_in_s") == pytest.approx(43200, abs=30)
         assert session == {"login": True, "name": "otto", "role": "operator", "over": False}
         cookie = next(line for line in head.splitlines() if line.lower().startswith("set-cookie"))
-        for word in ("HttpOnly", "SameSite=strict", "Path=/", "Max-Age=43200"):
+        for word in ("HttpOnly", "SameSite=strict", "Path=/", "Max-Age=46800"):
             assert word.lower() in cookie.lower()
         assert "Domain" not in cookie
         has = {"Cookie": cookie.split(": ")[1].split(";")[0], "Origin": station.origin}

@@ -22,6 +22,7 @@ from flightd.ground.flights.flight_index import FlightIndex
 from flightd.ground.flights.flight_view import read_view
 from flightd.ground.flights.flights import Flights
 from flightd.ground.reading_process import MOST_WAITING, ReadingProcess
+from flightd.vision.shelf.evidence_jpeg import jpeg_size
 from tests.replay.synthetic_flight import write_flight
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.waiting import until
@@ -131,6 +132,10 @@ async def test_pictures_come_one_by_one_behind_their_heads(folder: Path) -> None
         assert head["seq"] == pictures[4]["seq"]
         assert len(head["lines"]) in {1, 2}
         assert body[4 + length :].startswith(b"\xff\xd8")
+        small = f"GET /api/flights/{flight}/thumbnail HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"
+        thumbnail = (await station.say(small.encode())).partition(b"\r\n\r\n")[2]
+        assert (jpeg_size(thumbnail) or (0,))[0] == 160
+        assert len(thumbnail) < 10_000
         for other in (str(len(pictures)), "-1", "x", "9" * 6000):
             assert (await station.ask("GET", f"/api/flights/{flight}/pictures/{other}"))[0] == 404
 

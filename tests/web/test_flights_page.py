@@ -95,6 +95,10 @@ def test_flights_are_listed_newest_first(
         assert "Bad" in rows(page)[0]
         assert "left aisle" in rows(page)[0]
         expect(page.get_by_text("Cut off before its end")).to_be_visible()
+        for row in page.get_by_role("row").all()[1:]:
+            row.scroll_into_view_if_needed()  # it is fetched only then
+            picture = row.get_by_role("img", name="The floor in the middle of the flight")
+            assert picture.evaluate("img => img.decode().then(() => img.naturalWidth)") == 160
         assert page.evaluate("document.documentElement.scrollWidth") == size[0]
         assert hindrances(page) == []
 
@@ -185,6 +189,14 @@ def test_time_is_moved_by_keys_wherever_nobody_types(browser: Browser, url: str)
         expect(page.get_by_role("button", name="Pause")).to_be_visible()
         page.keyboard.press("Space")
         expect(page.get_by_role("button", name="Play")).to_be_visible()
+        page.get_by_text("Keys", exact=True).click()
+        page.get_by_role("checkbox", name="Keys of one character").uncheck()
+        slider(page).focus()
+        before_s = now_s(page)
+        page.keyboard.press(".")
+        assert now_s(page) == before_s, "they are switched off"
+        page.keyboard.press("ArrowRight")
+        expect(slider(page)).not_to_have_value(str(before_s))
         page.get_by_role("combobox", name="Speed").focus()
         before_s = now_s(page)
         page.keyboard.press("Home")

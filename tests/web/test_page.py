@@ -119,6 +119,12 @@ def test_a_flight_is_started_watched_paused_sent_elsewhere_and_stopped_by_key(
         page.get_by_role("link", name="Live", exact=True).click()
         expect(page.get_by_text("Pause: accepted")).to_be_visible()
         until_phase(flight, {Phase.HOLD})  # a key on another page has resumed nothing
+        keys = page.get_by_role("checkbox", name="Keys of one character")
+        keys.uncheck()
+        page.keyboard.press("r")  # and none that is switched off does
+        page.wait_for_timeout(300)
+        until_phase(flight, {Phase.HOLD})
+        keys.check()
         page.get_by_role("button", name="Resume").click()
         expect(page.get_by_text("Resume: accepted")).to_be_visible()
         phase(page, "Flying to|Over")

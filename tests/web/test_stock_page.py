@@ -459,6 +459,11 @@ def test_the_address_says_which_inventory_and_who_goes_on_is_not_called_back(
             f"history.pushState(null, '', '{url}?store=tuesday'); dispatchEvent(new Event('popstate'))"
         )
         expect(chosen).to_have_value("store/tuesday")
+        page.goto(f"{url}?store=sunday&place=AL-01-1-1")
+        expect(page.get_by_role("alert").filter(has_text="there is no inventory sunday")).to_be_visible()
+        expect(page).to_have_url(re.compile("sunday"))  # and no other one's place is taken for it
+        page.goto(f"{url}?store=tuesday")
+        expect(chosen).to_have_value("store/tuesday")
         field = page.get_by_role("searchbox", name="Code or place")
         asked: list[Route] = []
         page.route("**/api/stock/find*", lambda route: asked.append(route))  # noqa: PLW0108 - it is marked

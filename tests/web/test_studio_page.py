@@ -25,6 +25,9 @@ from playwright.sync_api import expect
 expect.set_options(timeout=40_000.0)
 
 LOOKS = [(NARROW, "light"), (WIDE, "dark")]
+SIGNED_IN = """import("/static/app/store.js").then(({ update }) => update((s) => {
+  s.session = { login: true, name: "otto-of-the-first-shift", role: "operator" };
+}))"""
 
 
 @pytest.fixture(scope="module")
@@ -285,3 +288,10 @@ def test_a_cameras_exposure_is_seen_set_and_read_back(browser: Browser, url: str
         expect(says.get_by_text("gain was set to 200, the camera tells 100")).to_be_visible()
         expect(card.get_by_text(re.compile("the floor smears by 1.1 px"))).to_be_visible()
         serves_everybody(page)
+        page.get_by_role("button", name="DE, Deutsch").click()
+        for width in (360, 390, 561, 700, 1140, 1400):
+            page.set_viewport_size({"width": width, "height": 800})
+            page.evaluate(SIGNED_IN)
+            expect(page.locator("summary", has_text="otto-of-the-first-shift")).to_be_visible()
+            expect(page.get_by_role("button", name="STOP eye")).to_be_in_viewport(ratio=1.0)
+            assert page.evaluate("document.documentElement.scrollWidth") == width

@@ -19,7 +19,12 @@ _SENT = re.compile(rf"{PROFILE_NAME}-[0-9a-f]{{12}}\.npz")
 
 def sent_name(name: str, content: bytes) -> str:
     """The file's name of a profile of that name and content."""
-    return f"{name}-{hashlib.sha256(content).hexdigest()[:12]}.npz"
+    return sent_as(name, hashlib.sha256(content).hexdigest())
+
+
+def sent_as(name: str, file_hash: str) -> str:
+    """The same by the content's SHA-256, in hexadecimal digits."""
+    return f"{name}-{file_hash[:12]}.npz"
 
 
 class SentProfiles:

@@ -150,6 +150,12 @@ class Access:
             return None
         return self._people.get(found.person.casefold())
 
+    def ended(self, scope: Scope) -> Identity | None:
+        """Whose session, by the request's cookie, the clock has ended minutes ago at most."""
+        found = self._sessions.get(self.session_of(Headers(scope=scope)))
+        is_known = found is not None and found.person.casefold() in self._people
+        return self._signed_in(found) if found is not None and is_known else None
+
     def is_known(self, person: Person) -> bool:
         """The person is as before, with the same role and password."""
         return self._people.get(person.name.casefold()) == person

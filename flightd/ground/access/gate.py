@@ -5,7 +5,8 @@ What is not allowed is refused here, whatever the page has shown."""
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from typing import TypeAlias
 
 from starlette.requests import HTTPConnection
 from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
@@ -22,10 +23,15 @@ SIGN_IN_FIRST = 4401
 _WHO, _NOTE = "flightd.who", "flightd.note"
 _READING = frozenset({"GET", "HEAD"})
 
+Returning: TypeAlias = Callable[[Scope], Identity | None]
 
-def gated(routes: Iterable[BaseRoute], access: Access) -> list[BaseRoute]:
-    """The routes, each behind the rule for it.  LookupError for one without."""
-    return [_gated(route, access) for route in routes]
+
+def gated(
+    routes: Iterable[BaseRoute], access: Access, returning: Returning = lambda _: None
+) -> list[BaseRoute]:
+    """The routes, each behind the rule for it; `returning` says who opens a page's WebSocket after the end of
+    his session, of which that route lets through what is left.  LookupError for a route without a rule."""
+    return [_gated(route, access, returning) for route in routes]
 
 
 def identity_of(connection: HTTPConnection) -> Identity:
@@ -51,7 +57,7 @@ def address_of(scope: Scope) -> str:
     return str(client[0]) if client else ""
 
 
-def _gated(route: BaseRoute, access: Access) -> BaseRoute:
+def _gated(route: BaseRoute, access: Access, returning: Returning) -> BaseRoute:
     if isinstance(route, Route):
         methods = (route.methods or set()) - {"HEAD"}
         rules = {method: _rule(f"{method} {route.path}") for method in methods}
@@ -66,7 +72,7 @@ def _gated(route: BaseRoute, access: Access) -> BaseRoute:
         rules = dict.fromkeys(_READING, rule)
     else:
         raise TypeError(f"no role can be set for {route!r}")
-    route.app = _Gate(route.app, access, rules)
+    route.app = _Gate(route.app, access, rules, returning)
     return route
 
 
@@ -78,10 +84,11 @@ def _rule(of: str) -> Rule:
 
 
 class _Gate:
-    def __init__(self, app: ASGIApp, access: Access, rules: Mapping[str, Rule]) -> None:
+    def __init__(self, app: ASGIApp, access: Access, rules: Mapping[str, Rule], returning: Returning) -> None:
         self._app = app
         self._access = access
         self._rules = rules
+        self._returning = returning
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         is_socket = scope["type"] == "websocket"
@@ -94,6 +101,8 @@ class _Gate:
         except WrongKeyError as err:
             await _refuse(scope, receive, send, 401, str(err))
             return
+        if who is None and is_socket:
+            who = self._returning(scope)
         if rule.role is not None:
             if who is None:
                 await (_turn_away(receive, send) if is_socket else _ask_who(scope, receive, send))

@@ -85,6 +85,7 @@ RULES: Mapping[str, Rule] = {
     "GET /api/flights/{flight}": _LOOKS,
     "GET /api/flights/{flight}/series": _LOOKS,
     "GET /api/flights/{flight}/pictures/{place}": _LOOKS,
+    "GET /api/flights/{flight}/thumbnail": _LOOKS,
     "GET /api/flights/{flight}/report": _LOOKS,
     "GET /api/studio": _LOOKS,
     "GET /api/studio/sets/{set}": _LOOKS,

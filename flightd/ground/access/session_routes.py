@@ -25,6 +25,8 @@ from flightd.ground.json_http import as_json, is_json, json_body, status_of
 from flightd.ground.shown_text import shown
 
 _SHOWN = 500
+_COOKIE_S = int(ABSOLUTE_S) + 3600
+"""Beyond the session, whose end is the station's matter: by it is known who stops a flight beyond it."""
 
 
 class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -73,7 +75,7 @@ async def _sign_in(access: Access, request: Request) -> Response:
         await access.sign_out(access.session_of(request.headers))  # the one that this browser had before
     access.write_down(who, address, "sign in", name, outcome="accepted")
     answer = as_json(access.session_state(who))
-    _set_cookie(access, answer, token, int(ABSOLUTE_S))
+    _set_cookie(access, answer, token, _COOKIE_S)
     return answer
 
 

@@ -17,11 +17,12 @@ from flightd.ground.messages import framed_picture
 from flightd.replay.playback.decimation import TimeGrid, decimated
 from flightd.replay.playback.flight import Playback, PoseTrack
 from flightd.replay.playback.loader import load_playback
-from flightd.replay.playback.pictures import PicturePlace, find_pictures, read_picture
+from flightd.replay.playback.pictures import PicturePlace, find_pictures, middle_picture, read_picture
 
 MOST_STRETCHES = 2000
 _MOST_REPORT_BYTES = 48 << 20
 _DIGITS = 4
+_THUMBNAIL_PX = 160
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +70,24 @@ def read_framed_picture(root: Path, relative: str, place: PicturePlace, lens: Le
     """In the reading process: a picture as the page takes it (`messages.framed_picture`)."""
     picture = read_picture(path_of(root, relative), place, lens)
     return framed_picture({"seq": picture.seq, "lines": picture.lines, "areas": ()}, picture.jpeg)
+
+
+def read_thumbnail(root: Path, relative: str) -> bytes:
+    """In the reading process: a small JPEG of the middle of the flight, empty where there is no picture."""
+    import cv2  # noqa: PLC0415 - slow, and only that process needs it
+
+    from flightd.vision.shelf.evidence_jpeg import MOST_PIXELS, jpeg_size  # noqa: PLC0415
+
+    jpeg = middle_picture(path_of(root, relative))
+    size = jpeg_size(jpeg)
+    if size is None or size[0] * size[1] > MOST_PIXELS:
+        return b""
+    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    if picture is None:
+        return b""
+    height = max(1, min(_THUMBNAIL_PX, round(_THUMBNAIL_PX * picture.shape[0] / picture.shape[1])))
+    small = cv2.resize(picture, (_THUMBNAIL_PX, height), interpolation=cv2.INTER_AREA)
+    return bytes(cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1])
 
 
 def read_report(root: Path, relative: str) -> bytes:

@@ -13,7 +13,13 @@ from flightd.core.errors import InputError, RunError
 from flightd.ground.bounded import Threads
 from flightd.ground.flights.flight_index import FlightIndex
 from flightd.ground.flights.flight_row import FlightRow
-from flightd.ground.flights.flight_view import FlightView, read_framed_picture, read_report, read_view
+from flightd.ground.flights.flight_view import (
+    FlightView,
+    read_framed_picture,
+    read_report,
+    read_thumbnail,
+    read_view,
+)
 from flightd.ground.flights.log_folder import FoundLog
 from flightd.ground.flights.sized_cache import SizedCache
 from flightd.ground.read_folders import ReadFolder
@@ -24,6 +30,7 @@ _WITHIN_S = 180.0
 _PLOTS_AT_ONCE, _MOST_PLOTS = 2, 32
 _VIEWS_BYTES = 96 << 20
 _REPORTS_BYTES = 48 << 20
+_THUMBNAILS_BYTES = 8 << 20
 
 _NEWEST_KEPT = 64
 _SAME_START_S = 5.0
@@ -73,6 +80,7 @@ class Flights:
         self._views: SizedCache[_Key, FlightView] = SizedCache(_VIEWS_BYTES)
         self._newest: dict[str, _Newest] = {}
         self._reports: SizedCache[_Key, bytes] = SizedCache(_REPORTS_BYTES)
+        self._thumbnails: SizedCache[_Key, bytes] = SizedCache(_THUMBNAILS_BYTES)
 
     async def run(self) -> None:
         try:
@@ -115,6 +123,16 @@ class Flights:
             read_framed_picture, _WITHIN_S, log.root, log.relative, wanted, lens
         )
         return FlightPicture(tag, stays=stamp == seen.stamp, content=content)
+
+    async def thumbnail(self, log_id: str) -> bytes:
+        """A small picture for the list; empty where the log holds none."""
+        log = await self._log(log_id)
+        key = (log.id, log.stamp)
+        small = self._thumbnails.get(key)
+        if small is None:
+            small = await self._listing.run(read_thumbnail, _WITHIN_S, log.root, log.relative)
+            self._thumbnails.put(key, small, len(small) + 1)
+        return small
 
     async def where(self, log_id: str) -> tuple[Path, str]:
         """The folder in which a flight lies, and its log below it."""

@@ -49,6 +49,7 @@ def flight_routes(flights: Flights) -> list[BaseRoute]:
         at("/api/flights/{flight}", _head),
         at("/api/flights/{flight}/series", _series),
         at("/api/flights/{flight}/pictures/{place}", _picture),
+        at("/api/flights/{flight}/thumbnail", _thumbnail),
         at("/api/flights/{flight}/report", _report),
         *page("/flights"),
     ]
@@ -92,6 +93,10 @@ async def _picture(flights: Flights, request: Request) -> Response:
     if not picture.content:
         return Response(status_code=304, headers=headers)
     return Response(picture.content, media_type=_BINARY, headers=headers)
+
+
+async def _thumbnail(flights: Flights, request: Request) -> Response:
+    return Response(await flights.thumbnail(request.path_params["flight"]), media_type="image/jpeg")
 
 
 async def _report(flights: Flights, request: Request) -> Response:

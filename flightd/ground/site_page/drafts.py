@@ -10,6 +10,7 @@ from msgspec import Meta
 
 from flightd.adapters.ground_link.protocol import DECODE_ERRORS
 from flightd.core.errors import InputError
+from flightd.ground.decode_words import decode_words
 from flightd.site.site_draft import Element, SiteDraft, as_measures, keeps_comments
 from flightd.site.site_tables import LISTS
 
@@ -75,7 +76,7 @@ def reader(kind: type[_T], what: str) -> Callable[[bytes], _T]:
         try:
             return decode(body)
         except DECODE_ERRORS as err:
-            raise InputError(f"not {what}: {err}") from None
+            raise InputError(f"not {what}: {decode_words(err)}") from None
 
     return read
 

@@ -18,7 +18,6 @@ NAMED = {
     **{kind: (made.suffix, made.media_type) for kind, made in EXPORTS.items()},
 }
 """Of each kind of file: how its name ends, and its media type."""
-_NODES_NEEDED = f"a table of nodes has {', '.join(COLUMNS)}"
 
 
 def exported(kind: str, draft: SiteDraft) -> bytes:
@@ -39,7 +38,7 @@ def imported(kind: str, data: bytes) -> dict[str, Any]:
     if kind == "toml":
         return {**opened_document(read_draft(text_of(data), "the file")), "notes": []}
     if kind == "csv":
-        found = tables_of_rows(read_table(data, _NODES_NEEDED).rows)
+        found = tables_of_rows(read_table(data, needed=f"a table of nodes has {', '.join(COLUMNS)}").rows)
     elif kind == "lif":
         found = tables_of_lif_file(data)
     else:

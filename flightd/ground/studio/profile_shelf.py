@@ -12,6 +12,7 @@ from pathlib import Path
 
 import msgspec
 
+from flightd.adapters.store.sent_profiles import sent_as
 from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.ground.plain_files import is_plain_file, is_plain_folder, plain_file
 from flightd.runtime.durable_files import replace_file
@@ -37,13 +38,15 @@ class Version(msgspec.Struct, frozen=True):
 
 class Shelved(msgspec.Struct, frozen=True):
     """A profile's versions, oldest first; `current` is the number of the one to fly by, None where its file
-    is none of them.  `trouble`: why its versions cannot be read, nothing can be installed or taken back."""
+    is none of them.  `trouble`: why its versions cannot be read, nothing can be installed or taken back.
+    `sent_as`: how a drone names the file of each version that is sent to it."""
 
     name: str
     file: str
     current: int | None
     versions: tuple[Version, ...]
     trouble: str = ""
+    sent_as: tuple[str, ...] = ()
 
 
 class ProfileShelf:
@@ -74,7 +77,8 @@ class ProfileShelf:
         installed = plain_file(self._file(name), _MOST_PROFILE_BYTES)
         digest = None if installed is None else _hash(installed)
         current = next((one.number for one in reversed(versions) if one.file_hash == digest), None)
-        return Shelved(name, str(self._file(name).resolve()), current, versions)
+        sent = tuple(sent_as(name, one.file_hash) for one in versions)
+        return Shelved(name, str(self._file(name).resolve()), current, versions, sent_as=sent)
 
     def installed(self, name: str, file_hash: str) -> bytes:
         """The file to fly by.  InputError where there is none, RunError where it is another."""

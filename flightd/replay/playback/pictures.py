@@ -21,6 +21,7 @@ from flightd.replay.log_chunks import LogChunks
 
 MOST_PICTURES = 20_000
 """Of a longer flight the rest is left out: at one a second it is more than five hours."""
+_MOST_CHUNKS = 200
 
 
 HeadT = TypeVar("HeadT", bound=msgspec.Struct)
@@ -82,6 +83,19 @@ def read_picture(path: Path, place: PicturePlace, lens: Lens | None) -> Picture:
         raise InputError("the picture is in the log no more", file=path)
     lines = found_lines(seen, lens or _plain(seen)) if isinstance(seen, LineSet) else ()
     return Picture(frame.seq, frame.stamp_ns, frame.jpeg, lines)
+
+
+def middle_picture(path: Path) -> bytes:
+    """The JPEG nearest to the middle of a log, looked for in some of its chunks only; empty where there is
+    none.  InputError as `LogChunks`."""
+    with LogChunks(path) as log:
+        middle = len(log.chunks) // 2
+        near = sorted(range(len(log.chunks)), key=lambda place: abs(place - middle))[:_MOST_CHUNKS]
+        for found in log.messages((log.chunks[place] for place in near), {Topic.FRAME}):
+            frame = decoded_message(path, Topic.FRAME, found.payload)
+            if isinstance(frame, RecordedFrame):
+                return frame.jpeg
+    return b""
 
 
 def recorded_lens(documents: Sequence[Document], path: Path) -> Lens | None:

@@ -15,7 +15,7 @@ from flightd.ground.access.attempts import TooManyAttemptsError
 from flightd.ground.access.passwords import hashed_password, hashed_secret, new_key
 from flightd.ground.access.people_book import PeopleBook, Person
 from flightd.ground.access.roles import QUELLING, Identity, Role, may_order
-from flightd.ground.page_person import PagePerson, Standing
+from flightd.ground.page_person import PagePeople, PagePerson, Standing
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.waiting import until
 
@@ -53,12 +53,13 @@ def access(tmp_path: Path, book: PeopleBook, clock: Clock) -> Iterator[Access]:
 
 def asking(access: Access, token: str = "", **headers: str) -> Identity | None:
     """Who a request with this cookie is from."""
+    return access.identify(request(access, token, **headers))
+
+
+def request(access: Access, token: str = "", **headers: str) -> dict[str, Any]:
+    """Its scope."""
     sent = {**headers, **({"cookie": f"a=b; {access.cookie}={token}"} if token else {})}
-    scope: dict[str, Any] = {
-        "type": "http",
-        "headers": [(name.encode(), value.encode()) for name, value in sent.items()],
-    }
-    return access.identify(scope)
+    return {"type": "http", "headers": [(name.encode(), value.encode()) for name, value in sent.items()]}
 
 
 async def signed_in(access: Access, address: str = "10.0.0.1") -> str:
@@ -168,6 +169,39 @@ def test_a_session_that_the_clock_ends_in_flight_is_left_until_those_drones_have
         book.set_password("ann", hashed_password("another horse battery", "ann"))
         access._read()  # noqa: SLF001
         assert people[1].standing() is Standing.GONE
+
+    run()
+
+
+def test_whose_page_comes_again_after_the_sessions_end_has_what_is_left_of_it_until_they_have_landed(
+    access: Access, clock: Clock
+) -> None:
+    @in_real_time
+    async def run() -> None:
+        drone = Drone()
+        people = PagePeople(access, {"a": drone})
+        token, unseen = await signed_in(access), await signed_in(access)
+        who = asking(access, token)
+        assert who is not None
+        person = people.at(who)
+        clock.now_s += ABSOLUTE_S + 1
+        assert person.standing() is Standing.OVER
+        people.keep(person)
+        late = people.returning(request(access, unseen))
+        assert late is not None
+        assert people.at(late).standing() is Standing.OVER, "its socket broke before the station told it"
+        for _ in range(2):
+            access._tidy()  # noqa: SLF001 - as it does each minute
+        access._read()  # noqa: SLF001
+        assert people.returning(request(access, unseen)) is None
+        assert people.returning(request(access, "another")) is None
+        people.look()
+        assert people.returning(request(access, token)) == who
+        assert people.at(who) is person
+        drone.flies = False
+        people.look()
+        drone.flies = True
+        assert people.returning(request(access, token)) is None, "it took off since"
 
     run()
 

@@ -1,6 +1,8 @@
-// Escape stops, on every page and wherever the focus is; P and R are of the page Live, where nobody types.
+// Escape stops, on every page and wherever the focus is; P and R are of the page Live, where nobody types, and can be
+// switched off.
 import { act } from "./acts.js";
 import { isOver, mayOperate, mustSignIn } from "./access/session.js";
+import { hasSingleKeys } from "./single_keys.js";
 import { shown, state } from "./store.js";
 
 export function listenForKeys() {
@@ -13,7 +15,7 @@ export function listenForKeys() {
         act("stop");
         return;
       }
-      if (mustSignIn() || state.route.page?.path !== "/" || event.target.closest?.("input, textarea, select")) return;
+      if (!hasSingleKeys() || mustSignIn() || state.route.page?.path !== "/" || event.target.closest?.("input:not([type=checkbox]), textarea, select")) return;
       const command = { p: "pause", r: "resume" }[event.key.toLowerCase()];
       if (command === "resume" && !mayOperate()) return;
       if (command && shown().status?.possible.includes(command)) act(command);

@@ -65,6 +65,12 @@ export function quoted(text, shaped = (beginning) => beginning) {
   return parts.map((part) => (part.foreign ? html`<span lang="en">${part.text}</span>` : part.text));
 }
 
+// The same where half a translation would be none: as a whole in German, or as a whole in English.
+export function quotedWhole(text, shaped = (beginning) => beginning) {
+  const isForeign = text && current === "de" && translated(text).some(({ foreign }) => foreign);
+  return isForeign ? html`<span lang="en">${shaped(text)}</span>` : quoted(text, shaped);
+}
+
 // The same as a bare text, for titles and labels.
 export const quotedText = (text) => (text && current === "de" ? joined(translated(text)) : text);
 

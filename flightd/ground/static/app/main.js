@@ -6,6 +6,7 @@ import { listenForKeys } from "./keys.js";
 import { Page } from "./page.js";
 import { followLinks, retitle } from "./router.js";
 import { keepScreenOn } from "./screen.js";
+import { rememberSingleKeys } from "./single_keys.js";
 import { watch } from "./store.js";
 import { askBeforeLoss } from "./unsaved.js";
 
@@ -14,6 +15,7 @@ const draw = () => render(html`<${Page} />`, root);
 
 const SPOKEN_MS = 3000; // a station that gives no texts by then is read in English
 
+rememberSingleKeys();
 listenForKeys();
 keepScreenOn();
 followLinks();

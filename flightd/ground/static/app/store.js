@@ -30,6 +30,7 @@ export const state = {
   socket: { open: false, heardAt: 0, roundTripMs: null, dropped: 0, picturesDropped: 0 },
   chosenNode: "", // where "go to" leads
   screen: "", // "kept on" or "may lock" while a drone flies: see screen.js
+  singleKeys: true, // see single_keys.js
   followed: false, // the map shows the drone's surroundings, not the whole site
   acts: new Map(), // newest act of each drone: {command, state, text, at}
 };

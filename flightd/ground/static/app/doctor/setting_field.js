@@ -1,6 +1,6 @@
 // One key of the configuration: its value, unit, range, default and meaning, as its own documentation has them.
 import { html, useState } from "../html.js";
-import { quoted, say } from "../language.js";
+import { quoted, quotedWhole, say } from "../language.js";
 import { capital } from "../words.js";
 import { isSame, nameOf, readAs, typed, valueIn } from "./settings_keys.js";
 
@@ -25,7 +25,7 @@ export function SettingField({ about, table, change, complaint, locked, onChange
       <label for=${id}>${about.key}${about.unit && html` <span class="quiet">${quoted(about.unit)}</span>`}</label>
       ${about.fixed ? html`<output id=${id}>${text || bare(about.default) || say("not given")}</output>` : html`<${Field} about=${about} given=${given} />`}
       <p id=${`${id}-text`} class="quiet">
-        ${quoted(about.text, capital)}. ${about.range && !isChoice(about) && [quoted(about.range, capital), ". "]}${about.fixed
+        ${quotedWhole(about.text, capital)}. ${about.range && !isChoice(about) && [quotedWhole(about.range, capital), ". "]}${about.fixed
           ? html`<em>${quoted(about.fixed, capital)}.</em>`
           : `${isChanged && stands !== undefined ? `${say("In the file: {value}.", { value: typed(stands) })} ` : ""}${say("Default: {value}.", { value: defaultOf(about) })}`}
       </p>

@@ -1,7 +1,7 @@
 // The settings of a drone: a section's keys as a form, what was changed and sent, and the versions that are kept.
 import { mayChange } from "../access/session.js";
 import { html, useEffect, useRef, useState } from "../html.js";
-import { english, quoted, say, sayWith } from "../language.js";
+import { english, quoted, quotedWhole, say, sayWith } from "../language.js";
 import { goTo } from "../router.js";
 import { shown, state, update } from "../store.js";
 import { losesWork } from "../unsaved.js";
@@ -122,7 +122,7 @@ function SectionForm({ told, current, changes, complaint, onChange }) {
         complaint=${complaint.startsWith(`${name}:`) || complaint.startsWith(`${name}[`) ? complaint : ""} locked=${told.locked} />`;
     });
     const isExpert = table.includes(".expert");
-    const text = html`<p class="quiet">${quoted(told.sections[table])}</p>`;
+    const text = html`<p class="quiet">${quotedWhole(told.sections[table])}</p>`;
     return isExpert
       ? html`<details key=${table} class="card settings-table"><summary><h2>${table}</h2></summary>${text}${fields}</details>`
       : html`<section key=${table} class="card settings-table"><h2>${table}</h2>${text}${fields}</section>`;

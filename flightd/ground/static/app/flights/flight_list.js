@@ -3,9 +3,11 @@ import { HowFlightsCome } from "../how_flights_come.js";
 import { html, useEffect, useRef, useState } from "../html.js";
 import { quoted, say, sayWith } from "../language.js";
 import { goTo } from "../router.js";
+import { hasSingleKeys } from "../single_keys.js";
 import { capital } from "../words.js";
 import { date, faultWords, FIGURES, fullDate, outcomeWords, told, tone, verdictWords } from "./figures.js";
 import { flightsState, turnChosen, watchList } from "./flights_state.js";
+import { Thumbnail } from "./thumbnail.js";
 import { COLUMNS, readSelection, selectedBy, selectionHref, SHOWN } from "./selection.js";
 
 const AT_ONCE = 100;
@@ -48,8 +50,8 @@ function NoFolder() {
 
 function stateWords(list, rows) {
   if (!list.looked && !list.rows.length) return say("Looking through the folder …");
-  const flights = say("{n} flight|{n} flights", { n: list.rows.length });
-  const parts = [rows.length === list.rows.length ? flights : say("{shown} of {flights}", { shown: rows.length, flights })];
+  const n = list.rows.length;
+  const parts = [rows.length === n ? say("{n} flight|{n} flights", { n }) : say("{shown} of {n} flight|{shown} of {n} flights", { shown: rows.length, n })];
   if (list.unread) parts.push(say("{n} still to be read", { n: list.unread }));
   if (list.cut) parts.push(say("more lie there than are listed"));
   return parts.join(", ");
@@ -59,7 +61,7 @@ function Search({ selection, choose }) {
   const field = useRef(null);
   useEffect(() => {
     const onKey = (event) => {
-      if (event.key !== "/" || event.target.closest?.("input, textarea, select")) return;
+      if (event.key !== "/" || !hasSingleKeys() || event.target.closest?.("input, textarea, select")) return;
       event.preventDefault();
       field.current?.focus();
     };
@@ -70,7 +72,7 @@ function Search({ selection, choose }) {
     <div class="search" role="search">
       <label class="unseen" for="flight-words">${say("Search flights")}</label>
       <input
-        id="flight-words" type="search" ref=${field} placeholder=${say("Search: site, node, reason …  ( / )")} value=${selection.words}
+        id="flight-words" type="search" ref=${field} placeholder=${hasSingleKeys() ? say("Search: site, node, reason …  ( / )") : say("Search flights")} value=${selection.words}
         onInput=${(event) => choose({ words: event.target.value })}
       />
       <label class="unseen" for="flight-show">${say("Show")}</label>
@@ -96,6 +98,7 @@ function Table({ rows, selection, choose, chosen }) {
       <thead role="rowgroup">
         <tr role="row">
           <th role="columnheader" scope="col"><span class="unseen">${say("Compare")}</span></th>
+          <th role="columnheader" scope="col" class="thumbnail-cell"><span class="unseen">${say("Picture")}</span></th>
           ${COLUMNS.map((column) => html`<${Head} key=${column.key} column=${column} selection=${selection} choose=${choose} />`)}
         </tr>
       </thead>
@@ -146,10 +149,11 @@ function Row({ row, isChosen }) {
       <td role="cell" class="pick">
         <input type="checkbox" checked=${isChosen} aria-label=${say("Compare {name}", { name })} onChange=${() => turnChosen(row.id)} />
       </td>
+      <td role="cell" class="thumbnail-cell"><${Thumbnail} row=${row} /></td>
       <td role="cell" class="date-cell"><a class="open" href=${`/flights/${row.id}`} title=${fullDate(row)}>${date(row)}</a></td>
       <td role="cell" class="site-cell">${row.site || "–"}</td>
       <td role="cell" class="drone-cell">${row.drone || "–"}${row.world && html` <span class="quiet">${row.world}</span>`}</td>
-      <td role="cell" class="mission-cell">${row.mission || "–"}</td>
+      <td role="cell" class="mission-cell">${quoted(row.mission) || "–"}</td>
       <td role="cell" class="outcome-cell">
         <span class=${`how ${row.outcome === "completed" ? "good" : row.outcome === "aborted" ? "bad" : "open"}`}>${outcomeWords(row)}</span>
         ${row.reason && html`<span class="quiet reason">${quoted(row.reason)}</span>`}

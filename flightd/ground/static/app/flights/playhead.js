@@ -5,6 +5,7 @@ import { capital, phaseWords } from "../words.js";
 import { fineClock } from "./figures.js";
 import { flightsState } from "./flights_state.js";
 import { seek, setPlaying, SPEEDS, turnRunning } from "./playing.js";
+import { SingleKeys } from "../single_keys.js";
 import { toneOf } from "./tones.js";
 
 const SPANS = [[0, english("whole flight")], [120, "2 min"], [30, "30 s"], [10, "10 s"]];
@@ -44,6 +45,7 @@ export function Playhead({ span, lanes, says }) {
             <div><dt><kbd>+</kbd> <kbd>-</kbd></dt><dd>${say("faster, slower")}</dd></div>
             <div><dt><kbd>${say("Home")}</kbd> <kbd>${say("End")}</kbd></dt><dd>${say("start, end")}</dd></div>
           </dl>
+          <${SingleKeys} />
         </details>
       </div>
     </section>

@@ -1,10 +1,12 @@
 // The course of time of a playback: runs, stands, jumps, by button and by key.
 import { useEffect } from "../html.js";
+import { hasSingleKeys } from "../single_keys.js";
 import { flightsState, updateFlights } from "./flights_state.js";
 
 export const SPEEDS = [0.25, 0.5, 1, 2, 5, 10, 25];
 const STEP_S = 1;
 const LONG_STEP_S = 10;
+const SINGLE = /^[^ ]$/; // a character that one could speak or type
 
 export function setPlaying(change) {
   updateFlights(({ playing }) => ({ playing: { ...playing, ...change } }));
@@ -84,7 +86,7 @@ function act(event, span, pictures) {
     "+": () => changeSpeed(1),
     "-": () => changeSpeed(-1),
   };
-  if (!acts[event.key]) return false;
+  if (!acts[event.key] || (SINGLE.test(event.key) && !hasSingleKeys())) return false;
   acts[event.key]();
   return true;
 }

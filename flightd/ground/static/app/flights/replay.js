@@ -1,6 +1,6 @@
 // One flight played back: map, picture, plots and events at one time.
 import { html, useEffect, useMemo, useRef } from "../html.js";
-import { english, language, quoted, say, sayWith } from "../language.js";
+import { english, language, quoted, quotedText, say, sayWith } from "../language.js";
 import { useTitle } from "../router.js";
 import { capital, phaseWords } from "../words.js";
 import { isMark, lastBefore, momentAt, phaseSpans } from "./at_time.js";
@@ -74,7 +74,7 @@ function ReplayHead({ id, flight, row }) {
 }
 
 export const title = (row, flight) =>
-  [row?.site || flight.floor?.name || say("Flight"), row?.mission].filter(Boolean).join(", ");
+  [row?.site || flight.floor?.name || say("Flight"), quotedText(row?.mission)].filter(Boolean).join(", ");
 
 function Figures({ row, flight }) {
   const filled = withEstimates(row, flight);

@@ -1,6 +1,6 @@
 // Which flights the list shows, and in which order: read from the address, so that it can be kept and sent.
-import { english } from "../language.js";
-import { FIGURES, isBroken, outcomeWords, verdictWords } from "./figures.js";
+import { english, quotedText } from "../language.js";
+import { faultWords, FIGURES, isBroken, outcomeWords, verdictWords } from "./figures.js";
 
 const text = (value) => (a, b) => value(a).localeCompare(value(b), undefined, { numeric: true });
 
@@ -71,7 +71,11 @@ function isShown(row, shown) {
   return true;
 }
 
+// As the row says it, and as the log has it.
 const everything = (row) =>
-  [row.site, row.drone, row.mission, outcomeWords(row), row.reason, row.verdict, row.path, row.world, row.trouble, ...row.faults]
+  [
+    row.site, row.drone, row.mission, row.reason, row.verdict, row.path, row.world, row.trouble, ...row.faults,
+    outcomeWords(row), verdictWords(row), faultWords(row), ...[row.mission, row.reason, row.trouble].map(quotedText),
+  ]
     .join(" ")
     .toLocaleLowerCase();

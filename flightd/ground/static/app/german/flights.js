@@ -1,5 +1,6 @@
 // The page Flights: list, playback, comparison.
 export default {
+  "The floor in the middle of the flight": "Der Boden in der Mitte des Flugs",
   "first": "erster",
   "second": "zweiter",
   "The first flight's drone": "Die Drohne des ersten Fluges",
@@ -55,7 +56,7 @@ export default {
   "Start the station with one: {command} lists every flight log below {folder}.": "Starten Sie die Station mit einem: {command} listet jedes Flugprotokoll unter {folder} auf.",
   "Looking through the folder …": "Der Ordner wird durchgesehen …",
   "{n} flight|{n} flights": "{n} Flug|{n} Flüge",
-  "{shown} of {flights}": "{shown} von {flights}",
+  "{shown} of {n} flight|{shown} of {n} flights": "{shown} von {n} Flug|{shown} von {n} Flügen",
   "{n} still to be read": "{n} noch zu lesen",
   "more lie there than are listed": "dort liegen mehr, als aufgelistet sind",
   "Search flights": "Flüge suchen",

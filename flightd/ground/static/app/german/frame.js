@@ -9,6 +9,8 @@ export default {
   "It failed: {text}.": "Sie ist gescheitert: {text}.",
   "Try again": "Noch einmal versuchen",
   "Say who you are first.": "Sagen Sie zuerst, wer Sie sind.",
+  "Keys of one character": "Tasten mit einem Zeichen",
+  "Picture": "Bild",
   "Undo": "Zurücknehmen",
   "Who": "Wer",
   "Good": "Gut",

@@ -1,6 +1,7 @@
 // What drone, station and pages report: shown where it arrives, and matched against these with its figures in
 // it.  What is not here stays English.
 export default {
+  "{node} and {n} more": "{node} und {n} weitere",
   "camera delay": "Verzögerung der Kamera",
   "mount roll": "Einbau, Rollen",
   "mount pitch": "Einbau, Nicken",
@@ -98,6 +99,7 @@ export default {
   "waiting for the start command": "wartet auf den Startbefehl",
   "landed on the pad": "auf dem Landeplatz gelandet",
   "no telemetry from the vehicle": "keine Telemetrie vom Fluggerät",
+  "the vehicle is armed": "das Fluggerät ist scharf",
   "the vehicle is armed already: disarm it first": "das Fluggerät ist schon scharf: zuerst entschärfen",
   "no height from the vehicle's range finder": "keine Höhe vom Entfernungsmesser des Fluggeräts",
   "no climb rate from the vehicle": "keine Steigrate vom Fluggerät",

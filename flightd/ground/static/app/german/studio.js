@@ -30,7 +30,6 @@ export default {
   "Line": "Linie",
   "Stroke": "Strich",
   "Box": "Rechteck",
-  "Picture": "Bild",
   "Mark": "Markieren",
   "With": "Mit",
   "Width of the paint {width} px": "Breite der Farbe {width} px",

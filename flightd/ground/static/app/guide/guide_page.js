@@ -3,6 +3,7 @@ import { askJson } from "../fetching.js";
 import { html, useEffect, useRef, useState } from "../html.js";
 import { say } from "../language.js";
 import { goTo } from "../router.js";
+import { hasSingleKeys } from "../single_keys.js";
 import { GuideArticle } from "./guide_article.js";
 import { SearchHits } from "./search_hits.js";
 
@@ -25,7 +26,7 @@ function SearchField({ words }) {
   const field = useRef(null);
   useEffect(() => {
     const onKey = (event) => {
-      if (event.key !== "/" || event.target.closest?.("input, textarea, select")) return;
+      if (event.key !== "/" || !hasSingleKeys() || event.target.closest?.("input, textarea, select")) return;
       event.preventDefault();
       field.current.focus();
       field.current.select();
@@ -41,7 +42,7 @@ function SearchField({ words }) {
     <div role="search">
       <label class="unseen" for="guide-words">${say("Search the guide")}</label>
       <input
-        id="guide-words" type="search" ref=${field} placeholder=${say("Search the guide  ( / )")} value=${words}
+        id="guide-words" type="search" ref=${field} placeholder=${hasSingleKeys() ? say("Search the guide  ( / )") : say("Search the guide")} value=${words}
         onInput=${(event) => search(event.target.value)}
       />
     </div>

@@ -3,6 +3,7 @@ import { mayOperate } from "../access/session.js";
 import { act } from "../acts.js";
 import { html } from "../html.js";
 import { quoted, say, sayWith } from "../language.js";
+import { hasSingleKeys, SingleKeys } from "../single_keys.js";
 import { state, update } from "../store.js";
 import { capital, COMMANDS, isGrounded } from "../words.js";
 import { HoldButton } from "./hold_button.js";
@@ -19,6 +20,7 @@ export function Acts({ status, welcome }) {
     return html`<section class="card acts" aria-labelledby="acts"><h2 id="acts">${say("Only looking on")}</h2>
       <p class="quiet">${say("{name} is a viewer: what flies needs an operator. STOP and Pause are everybody’s.", { name: state.session.name })}</p>
       <div class="buttons"><${Order} command="pause" may=${may("pause")} key_="P" /></div>
+      <${SingleKeys} />
       <${Outcome} /></section>`;
   }
   const waits = status.phase === "preflight" || status.phase === "swap";
@@ -36,6 +38,7 @@ export function Acts({ status, welcome }) {
         <${Order} command="land" may=${may("land") && !isGrounded(status)} />
       </div>
       <${GoTo} nodes=${welcome.floor.nodes} may=${may("goto")} />
+      <${SingleKeys} />
       <${Outcome} />
     </section>
   `;
@@ -44,7 +47,7 @@ export function Acts({ status, welcome }) {
 function Order({ command, may, key_ }) {
   return html`
     <button class="order" disabled=${!may} onClick=${() => act(command)}>
-      ${say(COMMANDS[command])}${key_ && html` <kbd>${key_}</kbd>`}
+      ${say(COMMANDS[command])}${key_ && hasSingleKeys() && html` <kbd>${key_}</kbd>`}
     </button>
   `;
 }

@@ -38,6 +38,7 @@ export function NewSite() {
   };
   const draw = async (event) => {
     event.preventDefault();
+    if (site().busy) return; // the button keeps the focus meanwhile
     const { floor, racks, withRacks } = measures.current;
     const isPlaced = withRacks && floor.shelves !== "none";
     if (await makeNew({ ...floor, ...(isPlaced && { racks }) })) goTo("/site/edit");
@@ -54,7 +55,7 @@ export function NewSite() {
         <label class="check"><input type="checkbox" checked=${withRacks} onChange=${(event) => set({ withRacks: event.target.checked })} /> ${say("Racks along every aisle with shelves")}</label>
         ${withRacks && html`<div class="element-fields wide">${fields(RACKS, "racks")}</div>`}
       </section>
-      <div class="site-orders"><button class="order main-order" type="submit" disabled=${site().busy}>${site().busy ? say("Drawing …") : say("Draw it")}</button><a class="order" href="/site">${say("Cancel")}</a></div>
+      <div class="site-orders"><button class="order main-order" type="submit" aria-disabled=${site().busy}>${site().busy ? say("Drawing …") : say("Draw it")}</button><a class="order" href="/site">${say("Cancel")}</a></div>
     </form>
   `;
 }

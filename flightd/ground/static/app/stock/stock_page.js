@@ -81,7 +81,7 @@ function stay(route) {
     arrived = true;
     const place = route.query.get("place");
     const { chosen, looks } = stock();
-    if (place) choose(place);
+    if (place && !stock().troubles.named) choose(place);
     else if (chosen && !looks) loadLooks(chosen); // given up as the page was left
     loadDecisions();
   };

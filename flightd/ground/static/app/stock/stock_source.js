@@ -38,6 +38,7 @@ export async function loadSources(wanted) {
     change({ folder, stores, drones, picked: stock().picked || Boolean(named) });
     tellTrouble("sources", "");
     if (source ? !is(source)(stock().source) : stock().source) show(source);
+    if (wanted) tellTrouble("named", named ? "" : english("there is no inventory {name}", { name: wanted.name }));
   } catch (error) {
     if (!isGivenUp(error)) tellTrouble("sources", error.message);
   }

@@ -15,7 +15,7 @@ const EMPTY = {
   fronts: [],
   places: NOTHING, // code -> {state, texts, confidence, pending, seen_s}
   fresh: new Set(), // places that changed with the newest answer
-  troubles: {}, // of each thing that is asked for: sources, places, decisions, search
+  troubles: {}, // of each thing that is asked for: sources, named (by the address), places, decisions, search
   states: new Set(), // that are picked out; empty: all
   words: "", // that are looked for
   found: null, // codes of places that the words mean; null: none are looked for

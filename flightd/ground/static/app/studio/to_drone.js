@@ -7,8 +7,6 @@ import { english, quoted, say, sayWith } from "../language.js";
 import { setWho, who } from "../stock/decisions.js";
 import { shown, state } from "../store.js";
 
-const HASH_DIGITS = 12; // of the file's hash, which the drone names it by
-
 export function ToDrone({ profile }) {
   const [open, setOpen] = useState(false);
   const drone = state.selected;
@@ -54,7 +52,7 @@ function Sending({ drone, profile }) {
   const known = settings && forReader(settings);
   const version = profile.versions.find((one) => one.number === profile.current);
   const flown = known?.table.vision?.profile;
-  const isThere = flown === sentName(profile, version);
+  const isThere = versionOf(profile, flown) === version;
   const send = () =>
     asPerson("profile", { base: known.tag, profile: profile.name, file_hash: version.file_hash }, {
       meanwhile: english("The drone checks it with its settings …"),
@@ -78,11 +76,12 @@ function Sending({ drone, profile }) {
   `;
 }
 
-const sentName = (profile, { file_hash: hash }) => `${profile.name}-${hash.slice(0, HASH_DIGITS)}.npz`;
+// The version that a drone has under this name: the newest of those that are alike.
+const versionOf = ({ versions, sent_as: sentAs }, file) => (file ? versions[sentAs.lastIndexOf(file)] : undefined);
 
 function flightWords(drone, profile, flown) {
   if (!flown) return say("{drone} is set to the shipped profile of its floor's paint.", { drone });
-  const version = profile.versions.findLast((one) => sentName(profile, one) === flown);
+  const version = versionOf(profile, flown);
   if (version) return say("{drone} is set to version {number}.", { drone, number: version.number });
   return sayWith("{drone} is set to {file}.", { drone, file: html`<code>${flown}</code>` });
 }
