@@ -201,8 +201,8 @@ HAZARDS: tuple[Hazard, ...] = (
         "battery_unknown",
         Trigger.BATTERY_UNKNOWN,
         "nothing told of the battery for `battery.silent_s`, no charge for 3 s, one that stands still, or"
-        " flickers between two neighbouring per cents, while `battery.frozen` should have gone, or volts that its"
-        " cells cannot have",
+        " flickers between two neighbouring per cents, while `battery.frozen` should have gone, or volts that"
+        " its cells cannot have",
         Action.CONFIGURED,
         "`hazards.battery_unknown`: home or land",
         _FAST,
