@@ -200,8 +200,9 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "battery_unknown",
         Trigger.BATTERY_UNKNOWN,
-        "nothing told of the battery for `battery.silent_s`, no charge for 3 s, one that stands still while"
-        " `battery.frozen` should have gone, or volts that its cells cannot have",
+        "nothing told of the battery for `battery.silent_s`, no charge for 3 s, one that stands still, or"
+        " flickers between two neighbouring per cents, while `battery.frozen` should have gone, or volts that"
+        " its cells cannot have",
         Action.CONFIGURED,
         "`hazards.battery_unknown`: home or land",
         _FAST,
@@ -251,7 +252,8 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.GROUND_LOST,
         "the last ground station that attends silent for `ground.lost_s`",
         Action.CONFIGURED,
-        "`ground.lost_action`: continue, hold, home or land",
+        "`ground.lost_action`: continue, hold, home or land; no hold outlasts the charge that the way back"
+        " needs",
         _FAST,
     ),
     Hazard(
@@ -260,7 +262,8 @@ HAZARDS: tuple[Hazard, ...] = (
         "where `interlock.file` is named (a site may demand that): it does not say any more that the aisles"
         " are closed, or cannot be read",
         Action.CONFIGURED,
-        "nothing arms; in flight `hazards.aisle_open`: continue, hold, home or land",
+        "nothing arms; in flight `hazards.aisle_open`: continue, hold, home or land; no hold outlasts the"
+        " charge that the way back needs",
         _FAST,
     ),
     Hazard(
@@ -399,7 +402,8 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.RECORD_LOST,
         "the disk refuses the flight log",
         Action.CONFIGURED,
-        "`hazards.record_lost`: continue, hold, home or land",
+        "`hazards.record_lost`: continue, hold, home or land; no hold outlasts the charge that the way back"
+        " needs",
         _FAST,
     ),
     Hazard(
