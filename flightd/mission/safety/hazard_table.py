@@ -355,7 +355,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "clock_jump",
         Trigger.CLOCK_JUMP,
-        "attitudes whose time makes no sense, or a tick half a second late",
+        "attitudes whose time makes no sense, or a tick 0.3 s late",
         Action.HOLD,
         "times of arrival are used; on when the clocks agree again; wall time decides nothing",
         _FAST,
@@ -363,10 +363,11 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "loop_stalled",
         Trigger.CLOCK_JUMP,
-        "a tick half a second late: the daemon stood still",
+        "a tick 0.3 s late: the daemon stood still",
         Action.HOLD,
         "frames and attitudes that waited keep the time at which they were true, what is old is refused; on"
-        " when nothing is missing",
+        " when nothing is missing; if it stood still for longer than the autopilot's own failsafe bears"
+        " (`companion_dead`), that lands, and is left to it",
         "tests/sim/hazards/test_camera_times.py",
     ),
     Hazard(
