@@ -14,7 +14,7 @@ from flightd.config.schema import Config
 from flightd.core.learnt import LearntSensors
 from flightd.core.scanning import Place
 from flightd.core.tick import TICK_S, StepFailure, TickInput, TickOutput
-from flightd.core.types import AttitudeSetpoint, CommandKind, Demand, Phase
+from flightd.core.types import AttitudeSetpoint, Command, CommandKind, Demand, Phase
 from flightd.localisation.state_estimator import Estimate, StateEstimator
 from flightd.mission.flight.steering import Steering
 from flightd.mission.guidance import MissionInputs
@@ -94,6 +94,10 @@ class Pilot:
         """What an operator may order now; nothing once the mission is not stepped any more."""
         return frozenset() if self._last_resort.given_up else self._mission.possible_commands
 
+    def another_resort(self) -> LastResort:
+        """For whoever calls `step`: what catches there may fail, too."""
+        return LastResort(self._config.mission)
+
     @property
     def plan(self) -> FlightPlan:
         """The plan at the start of the flight: the order's, or what was ordered since, before it flew."""
@@ -117,6 +121,7 @@ class Pilot:
         next one, by the lines as long as that works, else by its autopilot."""
         resort = self._last_resort
         resort.failure = None
+        resort.seen = tick.vehicle or resort.seen
         if not resort.given_up:
             try:
                 self._answered = self._fly(tick)
@@ -132,8 +137,7 @@ class Pilot:
         now_ns = tick.now_ns
         dt_s = TICK_S if self._last_ns is None else max((now_ns - self._last_ns) * 1e-9, 1e-3)
         self._last_ns = now_ns
-        for command in tick.commands:
-            self._mission.command(command, now_ns)
+        self._take(tick.commands, now_ns)
         armed = tick.vehicle is not None and tick.vehicle.armed
         if armed is not self._estimator.armed:
             self._estimator.begin(self._mission.stand, armed=armed)
@@ -166,6 +170,17 @@ class Pilot:
             findings=findings,
             settled=settled,
         )
+
+    def _take(self, commands: Sequence[Command], now_ns: int) -> None:
+        """Give the mission all orders, also those behind one that fails; its error is raised then."""
+        failed: Exception | None = None
+        for command in commands:
+            try:
+                self._mission.command(command, now_ns)
+            except Exception as err:  # noqa: BLE001 - a stop may come behind it
+                failed = failed or err
+        if failed is not None:
+            raise failed
 
     def _scan(self, tick: TickInput) -> None:
         """Give each picture's codes to the scan, with the pose at its exposure, and the location labels

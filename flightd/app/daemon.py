@@ -129,7 +129,7 @@ class Daemon:
         """Look after a vehicle that flies; once one that only stands there is disarmed, the daemon ends."""
         await self._in_air_or(err)
         self._flight.publishers.trouble(str(err))
-        while self._flight.pilot.phase is Phase.PREFLIGHT:
+        while self._tick.output.phase is Phase.PREFLIGHT:
             state = self._flight.vehicle.state()
             if state is not None and not state.armed:
                 raise err
@@ -152,12 +152,12 @@ class Daemon:
 
     def result(self) -> FlightResult:
         """How the flight stands after the newest tick."""
-        flight, pilot = self._flight, self._flight.pilot
+        flight, pilot, output = self._flight, self._flight.pilot, self._tick.output
         return FlightResult(
-            phase=pilot.phase,
-            reason=pilot.reason,
+            phase=output.phase,
+            reason=output.reason,
             visited=tuple(pilot.mission.visited),
-            nodes_planned=flight.pilot.plan.nodes,
+            nodes_planned=pilot.plan.nodes,
             frames=flight.camera.frames,
             frames_dropped=sum(flight.vision.dropped.values()),
             latency_ms=flight.vision.latency_quantiles_ms(),

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from flightd.adapters.store.progress import LeftOver
 from flightd.app.flight import Flight
+from flightd.app.guarded_step import GuardedStep
+from flightd.app.last_answers import LastAnswers
 from flightd.core.outlook import NO_OUTLOOK
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
-from flightd.core.types import HEALTHY, Command, CommandKind, Health
+from flightd.core.types import Command, CommandKind, Health
 from flightd.ports import CountsDrops
 
 
@@ -18,6 +20,13 @@ class Tick:
         self._flight = flight
         self._orders: list[Command] = []
         self._call = flight.publishers.barrier.call
+        self._step = GuardedStep(flight.pilot)
+        self._last = LastAnswers()
+
+    @property
+    def output(self) -> TickOutput:
+        """What the newest tick answered."""
+        return self._step.output
 
     def order(self, command: Command) -> None:
         """Hand an operator's order to the next tick."""
@@ -26,7 +35,7 @@ class Tick:
     def run(self, now_ns: int, late_s: float = 0.0) -> TickOutput:
         """Tick once, `late_s` after the tick was due.  A part that fails loses its turn."""
         tick = self._gather(now_ns)
-        output = self._flight.pilot.step(tick)
+        output = self._step.step(tick)
         self._obey(output)
         self._call(
             "status", lambda: self._flight.publishers.publish(self._snapshot(tick, output, late_s)), None
@@ -34,25 +43,33 @@ class Tick:
         return output
 
     def _gather(self, now_ns: int) -> TickInput:
-        """What arrived since the last tick; nothing from a part that fails."""
-        flight, call = self._flight, self._call
+        """What arrived since the last tick; nothing from a part that fails, and nothing good of it."""
+        flight, call, last = self._flight, self._call, self._last
         return TickInput(
             now_ns,
             call("detection", lambda: flight.vision.fresh(now_ns), ()),
             call("vehicle", flight.vehicle.state, None),
             call("vehicle", lambda: tuple(flight.vehicle.attitudes()), ()),
             call("ground link", self._take_commands, ()),
-            call("ground link", lambda: flight.ground.silent_s(now_ns), 0.0),
+            last.ground_silent_s(now_ns, call("ground link", lambda: flight.ground.silent_s(now_ns), None)),
             call("count", flight.counting.take, ()),
             call("count", flight.counting.take_counted, ()),
-            call("health", lambda: self._health(now_ns), HEALTHY),
+            last.health(
+                now_ns,
+                call("detection", lambda: self._vision_health(now_ns), None),
+                call("recorder", self._recorder_health, None),
+            ),
             flight.unfit,
             call("interlock", lambda: flight.interlock.is_closed, False),
         )
 
-    def _health(self, now_ns: int) -> Health:
-        vision, recorder = self._flight.vision, self._flight.recorder
-        return Health(vision.latency_p99_s(now_ns), vision.replaced, recorder.restarts, recorder.error)
+    def _vision_health(self, now_ns: int) -> Health:
+        vision = self._flight.vision
+        return Health(vision.latency_p99_s(now_ns), vision.replaced)
+
+    def _recorder_health(self) -> Health:
+        recorder = self._flight.recorder
+        return Health(recorder_restarts=recorder.restarts, recorder_error=recorder.error)
 
     def _take_commands(self) -> tuple[Command, ...]:
         taken = self._flight.ground.take_commands()  # first: where it fails no order is lost
@@ -82,6 +99,9 @@ class Tick:
         if pilot.learnt is not None:
             self._flight.learnt.put(pilot.learnt)
 
+    def _possible_commands(self) -> frozenset[CommandKind]:
+        return frozenset() if self._step.escaped else self._flight.pilot.possible_commands
+
     def _snapshot(self, tick: TickInput, output: TickOutput, late_s: float) -> Snapshot:
         flight, pilot, call = self._flight, self._flight.pilot, self._call
         vision, dropped = flight.vision, dict(flight.vision.dropped)
@@ -103,10 +123,10 @@ class Tick:
             tick_late_s=(late_s,),
             latencies_ms=vision.drain_latencies_ms(),
             dropped=dropped,
-            restarts={"detector": vision.replaced, "recorder": flight.recorder.restarts},
+            restarts={"detector": tick.health.detectors_replaced, "recorder": tick.health.recorder_restarts},
             repeated_level=flight.setpoints.stale,
-            possible=call("mission", lambda: pilot.possible_commands, frozenset()),
-            failure=pilot.failure,
+            possible=call("mission", self._possible_commands, frozenset()),
+            failure=self._step.failure,
             height_goal_m=call("mission", lambda: pilot.mission.height_goal_m, 0.0),
             view_m=call("mission", lambda: pilot.mission.view_m, None),
             outlook=call("mission", lambda: pilot.mission.outlook(tick.now_ns), NO_OUTLOOK),

@@ -65,6 +65,6 @@ def _address(name: str, text: str, key: Path | None, server_key: Path | None) ->
             f" as in {name}={one['host'] or 'HOST'}:{_STATUS_PORT}/{_COMMAND_PORT}",
         )
     host = host.removeprefix("[").removesuffix("]")
-    if not (0 < status < 65536 and 0 < command < 65536) or re.search(r"[\s/@]", host):
+    if not (0 < status < 65536 and 0 < command < 65536) or re.search(r"[\s/@=]", host):
         raise InputError("expected NAME=HOST or NAME=HOST:STATUS/COMMAND", key=f"--drone {name}={text}")
     return Address.with_keys(host, (status, command), key, server_key)

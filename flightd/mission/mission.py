@@ -274,7 +274,7 @@ class Mission:
             found |= self._lost(self._losses.of_ground_link, Trigger.GROUND_LOST, s.now_ns)
         if self._orders.paused:
             found.add(Trigger.HOLD)
-        self._turn_back(self._charging.step(s, self.state))
+        self._heed_battery(s)
         if self._progress.timed_out(s, self.phase):
             found.add(Trigger.TIMED_OUT)
         if s.failed:
@@ -301,6 +301,15 @@ class Mission:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._progress.adopting(s, self.phase) else found
 
+    def _heed_battery(self, s: MissionInputs) -> None:
+        """Turn back, or end a pause on the way back, when the charge asks for it."""
+        pressed = self._charging.presses
+        self._turn_back(self._charging.step(s, self.state))
+        if self._charging.presses and not pressed and self._orders.paused and self.state.returning:
+            self._orders.paused = False
+            text = "pause ended: the charge only just suffices for the way back"
+            self._events.report(s.now_ns, EventLevel.WARNING, "battery", text)
+
     def _landed(self) -> set[Trigger]:
         """What a landing on the pad is more than its end."""
         if self._charging.swaps:
@@ -313,7 +322,8 @@ class Mission:
             self._events.hazard(now_ns, trigger, action.value)
         if action is LossAction.HOME and Trigger.HOME_IN_NEED in taken_in(self.state):
             self._go_home(Trigger.HOME_IN_NEED, Happened(trigger), now_ns)
-        return {LossAction.HOLD: {Trigger.HOLD}, LossAction.LAND: {trigger}}.get(action, set())
+        holds = set() if self._charging.presses else {Trigger.HOLD}
+        return {LossAction.HOLD: holds, LossAction.LAND: {trigger}}.get(action, set())
 
     def _report_hazards(self, triggers: set[Trigger], now_ns: int) -> None:
         reported = triggers & ACTIONS.keys()

@@ -17,7 +17,9 @@ _UNKNOWN_S = 3.0
 """A charge that is missing now and then in what is told is still known."""
 _LOW_S = 2.0
 """A cell may sag below its threshold for so long."""
-_STEP_FRAC = 0.01
+_BAND_FRAC, _BAND_SHARE = 0.015, 0.15
+"""A charge that stays within so much, and within so much of what should have gone, stands still: a gauge in
+whole percents may flicker between two."""
 _FROZEN_LEAST_S = 30.0
 _RISE_FRAC = 0.05
 """A gauge may rise again by so much when the load falls; in flight nothing charges a battery."""
@@ -58,7 +60,8 @@ class BatteryCharge:
         self._known_ns: int | None = None
         self._told_frac = math.nan
         self._least_frac = math.inf
-        self._moved: tuple[int, float] | None = None
+        self._band: tuple[int, float, float] | None = None
+        """Since when all charges have been within what limits."""
         self._volts_ns: int | None = None
         self._low_ns: int | None = None
         self._empty_ns: int | None = None
@@ -67,7 +70,7 @@ class BatteryCharge:
         if vehicle is None:
             return Charge(math.nan, doubt=ChargeDoubt.UNKNOWN)
         if not flying:
-            self._least_frac, self._moved, self._volts_ns = math.inf, None, None
+            self._least_frac, self._band, self._volts_ns = math.inf, None, None
         cell_v = self._cell_v(vehicle)
         self._volts_ns = now_ns if math.isfinite(cell_v) else self._volts_ns
         frac = self._frac(now_ns, vehicle.battery_frac)
@@ -119,12 +122,15 @@ class BatteryCharge:
         return None
 
     def _stands_still(self, now_ns: int, frac: float) -> bool:
-        """Whether the charge has not moved while much of it should have gone."""
-        if self._moved is None or abs(frac - self._moved[1]) >= _STEP_FRAC - 1e-6:
-            self._moved = now_ns, frac
-        still_s = (now_ns - self._moved[0]) * 1e-9
-        gone_frac = still_s / self._config.hover_s
-        return self._config.frozen < 1.0 and still_s > _FROZEN_LEAST_S and gone_frac > self._config.frozen
+        """Whether the charge has hardly moved while much of it should have gone."""
+        frozen = self._config.frozen
+        since_ns, low, high = self._band or (now_ns, frac, frac)
+        low, high = min(low, frac), max(high, frac)
+        if high - low >= min(_BAND_FRAC, _BAND_SHARE * frozen):
+            since_ns, low, high = now_ns, frac, frac
+        self._band = since_ns, low, high
+        still_s = (now_ns - since_ns) * 1e-9
+        return frozen < 1.0 and still_s > _FROZEN_LEAST_S and still_s / self._config.hover_s > frozen
 
 
 def told_charge(vehicle: VehicleState | None) -> Charge:

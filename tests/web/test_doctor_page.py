@@ -64,6 +64,7 @@ def is_set_right(page: Page) -> None:
             break
         again.click()
         expect(again).to_be_enabled(timeout=SLOW_MS)
+        expect(again).to_be_focused()  # also while it waited
     expect(page.get_by_role("heading", name=re.compile("Not fit to fly"))).to_be_visible()
     expect(page.get_by_text("stop the daemon and run flightd doctor on the drone").first).to_be_visible()
     mend.focus()

@@ -55,6 +55,7 @@ def ground(*words: str) -> tuple[int, str]:
         (["--login"], "--login: nobody could sign in; flightd ground people add NAME --role admin"),
         (["--tls-cert", "none.pem"], "--tls-cert, --tls-key: belong together"),
         (["--drone", "north"], "--drone north: expected NAME=HOST"),
+        (["--drone", "north=south=10.0.0.7"], "--drone north=south=10.0.0.7: expected NAME=HOST"),
         (["--drone", "a=h", "--drone", "a=k"], "--drone: the same name twice"),
         (["--key", "none.key_secret"], "--key, --server-key: belong together"),
         (["--drone", "a=127.0.0.1:5571"], "--drone a=127.0.0.1:5571: a drone has two ports, one"),

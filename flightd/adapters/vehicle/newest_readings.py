@@ -10,6 +10,11 @@ from flightd.adapters.vehicle.range_finders import RangeFinders, RangeSample
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
 
+REBOOT_MS = 1_000
+"""Boot times that go back by less were overtaken on their way."""
+_NS_PER_MS = 1_000_000
+_WRAP_MS, _WRAP_NEAR_MS = 2**32, 60_000
+"""Boot times count so far and begin anew; one that does so later or earlier than this was a reboot."""
 _ATTITUDES_MAX = 512
 _STAMP_AGE_MAX_NS = 500_000_000
 _RANGE_STALE_NS = 500_000_000
@@ -31,6 +36,12 @@ class VehicleClock(Protocol):
     def heard(self, theirs_ns: int, now_ns: int) -> None: ...
 
     def reset(self) -> None: ...
+
+
+def has_rebooted(boot_ms: int, before_ms: int) -> bool:
+    """Whether a boot time is that of an autopilot that began anew after the other."""
+    wrapped = before_ms > _WRAP_MS - _WRAP_NEAR_MS and boot_ms < _WRAP_NEAR_MS
+    return boot_ms + REBOOT_MS < before_ms and not wrapped
 
 
 class NewestReadings:
@@ -146,6 +157,12 @@ class NewestReadings:
         if not self.armed or self._range_m <= least_m + _NEAR_LEAST_M:
             return True
         return math.isnan(self._range_m) and self.landed(now_ns) is LandedState.ON_GROUND
+
+    def _boot_ns(self, boot_ms: int, now_ns: int) -> int:
+        """The autopilot's time of a stamp, whose 32 bits begin anew every 49.7 days: TIMESYNC's do not."""
+        theirs_ns = self._sync.to_theirs(now_ns)
+        wraps = 0 if theirs_ns is None else max(round((theirs_ns / _NS_PER_MS - boot_ms) / _WRAP_MS), 0)
+        return (boot_ms + wraps * _WRAP_MS) * _NS_PER_MS
 
     def _stamp(self, boot_ns: int, now_ns: int) -> int:
         """Our time of an autopilot's stamp; the arrival while the clocks are not yet compared or when the

@@ -12,11 +12,14 @@ from flightd.mission.machine import State
 from flightd.mission.plan.flight_plan import HeadingPolicy
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.plan.leg_times import Legs, Pace
-from flightd.mission.reasons import CellsLow, ChargeLow, Reason
+from flightd.mission.reasons import CellsLow, ChargeLow, ChargeShort, Reason
 from flightd.mission.safety.hazard_monitor import HazardMonitor
 from flightd.mission.scan.no_scan import AnyScanner
 from flightd.mission.triggers import Trigger
 from flightd.site.site import Site
+from flightd.site.ways import NoWayError
+
+_ON_LEG = frozenset({Phase.FOLLOW, Phase.HOLD})
 
 
 class BatterySwap:
@@ -39,6 +42,8 @@ class BatterySwap:
         self._short = False
         self._scanner = scanner
         self._done_before = 0
+        self.presses = False
+        """The charge allows no waiting any more on the way back: no hold for what was lost."""
 
     @property
     def _goes_on(self) -> bool:
@@ -73,17 +78,36 @@ class BatterySwap:
         turned back with this tick, None if it did not."""
         charge = s.charge.frac
         self._sorties.step(s.now_ns, charge, state.airborne)
-        if not state.airborne or state.returning or state.phase is Phase.LAND:
+        if not state.airborne or state.phase is Phase.LAND:
             return None
-        if self._monitor.battery_low(s):
+        is_low = self._monitor.battery_low(s)
+        if is_low or s.charge.doubt is not None:
+            self.presses = True
+        if state.returning:
+            self.presses = self.presses or self._short_of_way(s, state)
+            return None
+        if is_low:
             self._route.shorten(s.pose)
             low = CellsLow(s.charge.cell_v, self._cell_home_v) if s.charge.low else ChargeLow(charge)
             return self._go_charge(s.now_ns, low, in_need=True)
-        goal = self._route.goal
-        left_m = s.distance_m((goal.x_m, goal.y_m)) if state.phase is Phase.FOLLOW else 0.0
-        if math.isfinite(left_m) and (reason := self._sorties.must_return(goal.node, left_m, goal.speed_mps)):
+        if reason := self._must_return(s, state):
+            self.presses = True
             return self._go_charge(s.now_ns, reason, in_need=False)
         return None
+
+    def _must_return(self, s: MissionInputs, state: State) -> ChargeShort | None:
+        """Why it must turn back now by what is left of the leg, or of the one that a hold interrupted."""
+        goal = self._route.goal
+        left_m = s.distance_m((goal.x_m, goal.y_m)) if state.phase in _ON_LEG else 0.0
+        if math.isinf(left_m):  # no pose
+            left_m = 0.0
+        return self._sorties.must_return(goal.node, left_m, goal.speed_mps)
+
+    def _short_of_way(self, s: MissionInputs, state: State) -> bool:
+        try:
+            return self._must_return(s, state) is not None
+        except NoWayError:  # what leads nowhere ends by itself
+            return False
 
     def look_ahead(self, now_ns: int) -> Trigger | None:
         """Turn back here rather than half-way to a stop that the battery does not reach.  How it turned
@@ -101,7 +125,7 @@ class BatterySwap:
     def await_battery(self, now_ns: int) -> None:
         """Stand on the pad with the rest of the plan ahead."""
         self._done_before = self._done
-        self._short = False
+        self._short = self.presses = False
         self._route.resume_from_pad(now_ns)
 
     def _go_charge(self, now_ns: int, reason: Reason, *, in_need: bool) -> Trigger:

@@ -20,7 +20,8 @@ _HEARTBEAT_S = 2.0
 _GIVE_UP_S = 60.0
 """A vehicle that nobody heard for so long while it should land is not waited for."""
 _TICK_S = 0.06
-_GAP_S = 0.5
+_GAP_S = 0.3
+"""Shorter than what the autopilot's own failsafe for a silent computer takes."""
 _NEWS_S = 1.0
 """Something that was replaced is news for so long."""
 _CLOCK_S = 0.3

@@ -200,8 +200,9 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "battery_unknown",
         Trigger.BATTERY_UNKNOWN,
-        "nothing told of the battery for `battery.silent_s`, no charge for 3 s, one that stands still while"
-        " `battery.frozen` should have gone, or volts that its cells cannot have",
+        "nothing told of the battery for `battery.silent_s`, no charge for 3 s, one that stands still, or"
+        " flickers between two neighbouring per cents, while `battery.frozen` should have gone, or volts that"
+        " its cells cannot have",
         Action.CONFIGURED,
         "`hazards.battery_unknown`: home or land",
         _FAST,
@@ -251,7 +252,8 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.GROUND_LOST,
         "the last ground station that attends silent for `ground.lost_s`",
         Action.CONFIGURED,
-        "`ground.lost_action`: continue, hold, home or land",
+        "`ground.lost_action`: continue, hold, home or land; no hold outlasts the charge that the way back"
+        " needs",
         _FAST,
     ),
     Hazard(
@@ -260,7 +262,8 @@ HAZARDS: tuple[Hazard, ...] = (
         "where `interlock.file` is named (a site may demand that): it does not say any more that the aisles"
         " are closed, or cannot be read",
         Action.CONFIGURED,
-        "nothing arms; in flight `hazards.aisle_open`: continue, hold, home or land",
+        "nothing arms; in flight `hazards.aisle_open`: continue, hold, home or land; no hold outlasts the"
+        " charge that the way back needs",
         _FAST,
     ),
     Hazard(
@@ -352,7 +355,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "clock_jump",
         Trigger.CLOCK_JUMP,
-        "attitudes whose time makes no sense, or a tick half a second late",
+        "attitudes whose time makes no sense, or a tick 0.3 s late",
         Action.HOLD,
         "times of arrival are used; on when the clocks agree again; wall time decides nothing",
         _FAST,
@@ -360,10 +363,11 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "loop_stalled",
         Trigger.CLOCK_JUMP,
-        "a tick half a second late: the daemon stood still",
+        "a tick 0.3 s late: the daemon stood still",
         Action.HOLD,
         "frames and attitudes that waited keep the time at which they were true, what is old is refused; on"
-        " when nothing is missing",
+        " when nothing is missing; if it stood still for longer than the autopilot's own failsafe bears"
+        " (`companion_dead`), that lands, and is left to it",
         "tests/sim/hazards/test_camera_times.py",
     ),
     Hazard(
@@ -399,7 +403,8 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.RECORD_LOST,
         "the disk refuses the flight log",
         Action.CONFIGURED,
-        "`hazards.record_lost`: continue, hold, home or land",
+        "`hazards.record_lost`: continue, hold, home or land; no hold outlasts the charge that the way back"
+        " needs",
         _FAST,
     ),
     Hazard(

@@ -57,6 +57,8 @@ class LastResort:
         self._failures = 0
         self.failure: StepFailure | None = None
         """What the newest step raised, None where it raised nothing."""
+        self.seen: VehicleState | None = None
+        """What the vehicle told last, to be set at each tick at which it tells anything."""
 
     @property
     def failed(self) -> bool:
@@ -102,9 +104,11 @@ class LastResort:
         )
 
     def step(self, now_ns: int, vehicle: VehicleState | None, before: Phase) -> Fallback:
-        """Level and down; `before` is the phase answered last."""
+        """Level and down; `before` is the phase answered last.  A vehicle that tells nothing any more is
+        what it was, not heard."""
         if before in OVER:
             self._end = self._end or before
+        self.seen = vehicle = vehicle or self.seen
         silent_ns = _GIVE_UP_NS if vehicle is None else _silent_ns(now_ns, vehicle)
         heard = silent_ns <= self._hold_ns  # silence is no pilot
         if self._end is None and vehicle is not None:

@@ -108,6 +108,17 @@ def test_the_error_is_told_and_grows_when_nothing_answers() -> None:
     assert clocks.sync.error_s(clocks.now_ns) > max(0.02, 5 * before_s)
 
 
+@pytest.mark.parametrize("ahead_ms", [40, 300])
+def test_a_lone_message_stamped_ahead_of_its_time_moves_nothing(ahead_ms: int) -> None:
+    clocks = Compared(0.0)
+    clocks.run(10.0)
+    for _ in range(50):  # as many others as an autopilot sends
+        clocks.sync.heard(clocks.theirs_ns(clocks.now_ns), clocks.now_ns + MS)
+    clocks.sync.heard(clocks.theirs_ns(clocks.now_ns) + ahead_ms * MS, clocks.now_ns + MS)
+    assert clocks.run(8.0) < 2.0
+    assert clocks.sync.error_s(clocks.now_ns) < 0.003
+
+
 RIGS: dict[str, Callable[[PeerConfig], Any]] = {"ardupilot": ardupilot_rig, "px4": px4_rig}
 
 

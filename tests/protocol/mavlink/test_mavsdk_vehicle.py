@@ -193,6 +193,22 @@ def test_a_range_finder_whose_signal_is_none_tells_no_height() -> None:
     assert readings.height_m(8) == pytest.approx(0.3)
 
 
+def test_attitudes_keep_their_time_when_boot_times_begin_anew_after_49_days() -> None:
+    """They were taken for a reboot's, and had the time of their arrival from then on."""
+    sync, ms = ClockSync(), 1_000_000
+    wrap_ms, late_ns = 2**32, 30 * ms
+    boot_ns = -(wrap_ms - 3_000) * ms  # ours at their boot
+    readings = MavsdkTelemetry(sync)
+    for now_ns in range(0, 6_000 * ms, 100 * ms):
+        asked = sync.ask(now_ns)
+        assert sync.answered(asked, asked - boot_ns, asked + 2 * ms)
+        told_us = (now_ns - boot_ns) // ms % wrap_ms * 1000
+        angles = SimpleNamespace(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, timestamp_us=told_us)
+        readings.take_attitude(angles, now_ns + late_ns)
+        (attitude,) = readings.attitudes()
+        assert attitude.stamp_ns == pytest.approx(now_ns, abs=2 * ms)
+
+
 def test_whatever_the_library_hands_over_nothing_raises_and_nothing_absurd_is_believed() -> None:
     rng = random.Random(11)
     odd = [math.nan, math.inf, -math.inf, 1e30, -1.0, 0.0, 0.7, 90.0, 270.0, 2**63, -(2**40), 255, 3]

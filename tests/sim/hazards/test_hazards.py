@@ -119,7 +119,7 @@ TRIALS: dict[str, Trial] = {
     "overload": Trial(fault(health=Health(0.4)), found_s=3.2),
     "swings": Trial(slow_down, ends=Phase.DONE, found_s=20.0),
     "clock_jump": Trial(fault(stamps_refused=40), ends=Phase.DONE, found_s=0.05),
-    "loop_stalled": Trial(fault(stall_ns=700_000_000), ends=Phase.DONE, found_s=0.75),
+    "loop_stalled": Trial(fault(stall_ns=400_000_000), ends=Phase.DONE, found_s=0.45),
     "clock_unsure": Trial(
         fault(clock_error_s=0.1), fault(clock_error_s=0.0), 2.0, ends=Phase.DONE, found_s=1.1
     ),

@@ -253,6 +253,14 @@ def _full(flight: Flight) -> None:
     flight.set(battery_frac=0.95)
 
 
+def _hold(flight: Flight) -> None:
+    """What was lost holds nothing whose charge only just brings it back."""
+    if flight.mission.state.intent is Intent.RETURN:
+        flight.order(CommandKind.PAUSE)
+    else:
+        flight.set(ground_silent_s=9.0)
+
+
 def _stuck(flight: Flight) -> None:
     """Nothing that the phase waits for comes about."""
     if flight.phase is Phase.TAKE_OFF:
@@ -312,7 +320,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.SWINGS: warned(swings=True),
     Trigger.OVERLOAD: sick(latency_p99_s=9.0),
     Trigger.LINES_LOST: sensed(x_age_s=9.0, y_age_s=9.0),
-    Trigger.HOLD: replace(sensed(ground_silent_s=9.0), params=_HELD),
+    Trigger.HOLD: Stimulus(_hold, params=_HELD),
     Trigger.POSITION_DOUBTED: placed(integrity=0.5),
     Trigger.LINES_FOUND: Stimulus(_resume, 0.6, hold=False),
     Trigger.POSITION_SURE: placed(),

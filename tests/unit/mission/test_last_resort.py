@@ -59,6 +59,19 @@ def test_it_lands_what_flies_and_leaves_the_rest(
     assert answers(vehicle, before) == expected
 
 
+def test_a_vehicle_that_tells_nothing_any_more_is_landed_where_it_flew_when_it_last_did() -> None:
+    """It was asked to disarm."""
+    resort = LastResort(configured().mission)
+    resort.seen = FLYING
+    assert resort.step(NOW_NS, None, Phase.FOLLOW).demand is Demand.LAND
+    assert resort.step(NOW_NS + 10 * 10**9, None, Phase.LAND).demand is Demand.LAND
+    last = resort.step(NOW_NS + 70 * 10**9, None, Phase.LAND)
+    assert (last.phase, last.demand) == (Phase.ABORTED, Demand.LAND)
+    standing = LastResort(configured().mission)
+    standing.seen = VEHICLE
+    assert standing.step(NOW_NS, None, Phase.PREFLIGHT).demand is Demand.DISARM
+
+
 def test_the_mission_is_given_up_at_its_second_failure() -> None:
     resort, flying = LastResort(configured().mission), TickInput(NOW_NS, vehicle=FLYING)
     last = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, None, None)

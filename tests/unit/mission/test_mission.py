@@ -288,6 +288,50 @@ def test_low_battery_flies_home_even_when_paused_and_without_dwelling() -> None:
     assert flight.mission.goal.node == SITE.home.node
 
 
+@pytest.mark.parametrize("lost", ["ground", "aisle"])
+def test_a_hold_for_what_was_lost_ends_when_the_battery_needs_the_way_home(lost: str) -> None:
+    """It held until the battery was critical, and came down there."""
+    losses = {"ground": {"lost_action": LossAction.HOLD}, "hazards": {"aisle_open": LossAction.HOLD}}
+    flight = Flight(configured(dwell_s=1.0).with_values(**losses))
+    flight.to(Phase.FOLLOW)
+    flight.set(ground_silent_s=60.0 if lost == "ground" else 0.0, aisle_closed=lost == "ground")
+    flight.run(20.0)
+    assert flight.phase is Phase.HOLD
+    flight.set(battery_frac=0.18)
+    flight.to(Phase.LAND, 120)
+    assert (flight.mission.reason, flight.mission.goal.node) == ("route done", SITE.home.node)
+
+
+def test_on_an_ordered_way_home_too_no_hold_outlasts_what_the_way_needs() -> None:
+    """A pause that comes after that stands: somebody wants it so."""
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    flight.order(CommandKind.HOME)
+    flight.order(CommandKind.PAUSE)
+    flight.run(20.0)
+    assert flight.mission.state == State(Phase.HOLD, Intent.HOME)
+    flight.set(battery_frac=0.18)
+    flight.to(Phase.FOLLOW, 20)
+    flight.order(CommandKind.PAUSE)
+    flight.run(20.0)
+    assert flight.phase is Phase.HOLD
+    flight.order(CommandKind.RESUME)
+    flight.to(Phase.LAND, 120)
+    assert flight.mission.goal.node == SITE.home.node
+
+
+def test_a_charge_that_is_not_known_ends_a_hold() -> None:
+    losses = {"ground": {"lost_action": LossAction.HOLD}, "hazards": {"battery_unknown": LossAction.HOME}}
+    flight = Flight(configured(dwell_s=1.0).with_values(**losses))
+    flight.to(Phase.FOLLOW)
+    flight.set(ground_silent_s=60.0)
+    flight.run(5.0)
+    assert flight.phase is Phase.HOLD
+    flight.set(battery_frac=math.nan)
+    flight.to(Phase.LAND, 120)
+    assert flight.mission.goal.node == SITE.home.node
+
+
 def test_home_is_refused_on_the_floor() -> None:
     flight = Flight(configured(autostart=False))
     flight.run(0.1)

@@ -52,22 +52,55 @@ async def test_it_is_closed_only_while_the_file_says_so(tmp_path: Path) -> None:
     await until(lambda: not interlock.is_closed, 20.0)  # nobody reads it any more
 
 
-@in_real_time
-async def test_what_a_dead_controller_said_last_is_not_believed(tmp_path: Path) -> None:
-    path = tmp_path / "value"
-    interlock = FileInterlock(path, "1", LoopClock(), max_age_s=60.0)
-    reading = asyncio.ensure_future(interlock.run())
-    try:
+class Readings:
+    """A file that says that the aisles are closed, may be three seconds old, and is read by the second."""
+
+    def __init__(self, path: Path, *, written_ago_s: float = 0.0) -> None:
+        self._path = path
+        self.now_s = 100.0
+        self.interlock = FileInterlock(path, "1", self, max_age_s=3.0)
         path.write_text("1\n")
-        await until(lambda: interlock.is_closed, 20.0)
-        for apart_s in (-100.0, 100.0):  # of an hour ago, or of a clock that was set back since
-            os.utime(path, (time.time() + apart_s,) * 2)
-            await until(lambda: not interlock.is_closed, 20.0)
-            path.write_text("1\n")
-            await until(lambda: interlock.is_closed, 20.0)
-    finally:
-        reading.cancel()
-        await asyncio.wait([reading])
+        self._of_s = time.time() - written_ago_s
+        os.utime(path, (self._of_s,) * 2)
+
+    def now_ns(self) -> int:
+        """`ports.Clock`."""
+        return round(self.now_s * 1e9)
+
+    def write(self, step_s: float = 0.0) -> None:
+        """Again, by a time of day that was set by so much."""
+        self._of_s += 1.0 + step_s
+        self._path.write_text("1\n")
+        os.utime(self._path, (self._of_s,) * 2)
+
+    def is_closed(self) -> bool:
+        self.now_s += 1.0
+        return self.interlock.says_closed(self.now_ns())
+
+
+def test_what_a_dead_controller_said_last_is_not_believed(tmp_path: Path) -> None:
+    for ago_s in (-100.0, 100.0):  # by a clock that was set back since, or of an hour ago
+        assert not Readings(tmp_path / "value", written_ago_s=ago_s).is_closed()
+    readings = Readings(tmp_path / "value", written_ago_s=1.5)
+    assert [readings.is_closed() for _ in range(3)] == [True, True, False]
+    readings.write()
+    assert [readings.is_closed() for _ in range(5)] == [True] * 4 + [False]
+
+
+@pytest.mark.parametrize("step_s", [-3600.0, 3600.0])
+def test_a_time_of_day_that_is_set_opens_no_aisle(
+    step_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    readings = Readings(tmp_path / "value")
+    assert readings.is_closed()
+    now_ns = time.time_ns()
+    monkeypatch.setattr(time, "time_ns", lambda: now_ns + round(step_s * 1e9))
+    monkeypatch.setattr(time, "time", lambda: now_ns * 1e-9 + step_s)
+    assert readings.is_closed(), "what was written before is as old as it was"
+    readings.write(step_s)
+    assert readings.is_closed()
+    assert [readings.is_closed() for _ in range(3)] == [True, True, True]
+    assert not readings.is_closed(), "and dies all the same"
 
 
 def test_a_site_that_demands_one_is_not_flown_without() -> None:

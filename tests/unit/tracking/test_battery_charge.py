@@ -73,6 +73,27 @@ def test_a_charge_that_stands_still_in_flight_is_not_believed() -> None:
     assert judged(200, BatteryConfig(flight_s=3000.0), drains=False).doubt is None
 
 
+def test_a_charge_that_flickers_between_two_percents_stands_still_too() -> None:
+    judge = BatteryCharge(BatteryConfig())
+    doubts = []
+    for second in range(90):
+        state = replace(
+            STATE, battery_stamp_ns=START_NS + second * S, battery_frac=0.8 - second % 3 // 2 / 100
+        )
+        doubts.append(judge.step(START_NS + second * S, state, flying=True).doubt)
+    assert doubts[55] is None
+    assert set(doubts[62:]) == {ChargeDoubt.FROZEN}
+
+
+@pytest.mark.parametrize("flight_s", [600, 1800])
+def test_a_battery_that_lasts_three_times_as_long_as_believed_does_not_stand_still(flight_s: int) -> None:
+    judge = BatteryCharge(BatteryConfig(flight_s=600.0))
+    for second in range(flight_s // 2):
+        frac = round(0.9 - second / flight_s + 0.005 * (second % 2), 2)  # flickers, too
+        state = replace(STATE, battery_stamp_ns=START_NS + second * S, battery_frac=frac)
+        assert judge.step(START_NS + second * S, state, flying=True).doubt is None
+
+
 def test_a_charge_that_rises_in_flight_counts_for_little() -> None:
     judge = BatteryCharge(BatteryConfig())
     judge.step(START_NS, replace(STATE, battery_frac=0.3), flying=True)

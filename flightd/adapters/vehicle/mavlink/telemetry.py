@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link.codec import Message
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
-from flightd.adapters.vehicle.newest_readings import NewestReadings
+from flightd.adapters.vehicle.newest_readings import REBOOT_MS, NewestReadings, has_rebooted
 from flightd.adapters.vehicle.range_finders import RangeSample
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
@@ -21,9 +21,6 @@ _NS_PER_MS = 1_000_000
 _STAMP_AGE_MAX_NS = 500_000_000
 _AHEAD_NS = 50_000_000
 _CLIMB_STALE_NS = 1_000_000_000
-_REBOOT_MS = 1_000
-_WRAP_MS, _WRAP_NEAR_MS = 2**32, 60_000
-"""Boot times count so far and begin anew; one that does so later or earlier than this was a reboot."""
 _SLOPE_MS, _SLOPE_GAP_MS = 250, 500
 _SLOPE_LEAST_MS = 100
 """A slope over less than this, or of fewer than `_SLOPE_SAMPLES`, tells nothing."""
@@ -139,8 +136,7 @@ class MavlinkTelemetry(NewestReadings):
         if not all(abs(angle) <= math.tau for angle in angles):  # NaN fails too
             return False
         boot_ms = int(message.time_boot_ms)
-        wrapped = self._boot_ms > _WRAP_MS - _WRAP_NEAR_MS and boot_ms < _WRAP_NEAR_MS
-        rebooted = boot_ms + _REBOOT_MS < self._boot_ms and not wrapped
+        rebooted = has_rebooted(boot_ms, self._boot_ms)
         if rebooted:
             self._sync.reset()
         boot_ns = self._boot_ns(boot_ms, now_ns)
@@ -162,7 +158,7 @@ class MavlinkTelemetry(NewestReadings):
         """Climb from the velocity; ArduPilot sends all zeros when it estimates none, and then the
         height's own slope tells, over several samples without a gap or leap between them."""
         boot_ms, height_mm = message.time_boot_ms, message.relative_alt
-        if self._heights and 0 < self._heights[-1][0] - boot_ms < _REBOOT_MS:
+        if self._heights and 0 < self._heights[-1][0] - boot_ms < REBOOT_MS:
             return  # it was overtaken on its way
         if self._heights and not self._follows(boot_ms, height_mm):
             self._heights.clear()
@@ -204,12 +200,6 @@ class MavlinkTelemetry(NewestReadings):
             volts=0.0 if millivolt == _UNKNOWN_U16 else millivolt / 1000.0,
             amperes=math.nan if message.current_battery < 0 else message.current_battery / 100.0,
         )
-
-    def _boot_ns(self, boot_ms: int, now_ns: int) -> int:
-        """The autopilot's time of a stamp, whose 32 bits begin anew every 49.7 days: TIMESYNC's do not."""
-        theirs_ns = self._sync.to_theirs(now_ns)
-        wraps = 0 if theirs_ns is None else max(round((theirs_ns / _NS_PER_MS - boot_ms) / _WRAP_MS), 0)
-        return (boot_ms + wraps * _WRAP_MS) * _NS_PER_MS
 
     def _is_senseless(self, boot_ns: int, now_ns: int) -> bool:
         """By the clocks as they were compared, a stamp long past or yet to come."""

@@ -13,12 +13,11 @@ from mavsdk.plugins.telemetry import LandedState as SdkLanded
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavlink.telemetry import cells_of, range_sample
 from flightd.adapters.vehicle.mavsdk.library import whole_fields
-from flightd.adapters.vehicle.newest_readings import NewestReadings
+from flightd.adapters.vehicle.newest_readings import REBOOT_MS, NewestReadings, has_rebooted
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _CLIMB_STALE_NS = 500_000_000
-_REBOOT_US = 1_000_000
 _RANGE_FIELDS = ("id", "orientation", "current_distance", "min_distance", "max_distance")
 
 _MODES = {int(mode): mode for mode in FlightMode}
@@ -41,7 +40,7 @@ class MavsdkTelemetry(NewestReadings):
 
     def __init__(self, sync: ClockSync) -> None:
         super().__init__(sync)
-        self._boot_us = 0
+        self._boot_ms = 0
         self._cells = 0
         self.mode: FlightMode | None = None
 
@@ -59,13 +58,14 @@ class MavsdkTelemetry(NewestReadings):
         degrees = (angles.roll_deg, angles.pitch_deg, angles.yaw_deg)
         if not all(abs(angle) <= 360.0 for angle in degrees):  # NaN fails too
             return
-        boot_us = int(angles.timestamp_us)
-        rebooted = boot_us + _REBOOT_US < self._boot_us
+        boot_ms = int(angles.timestamp_us) // 1000
+        rebooted = has_rebooted(boot_ms, self._boot_ms)
         if rebooted:
             self._sync.reset()
-        stamp_ns = self._stamp(boot_us * 1000, now_ns)
-        in_order = rebooted or boot_us > self._boot_us
-        self._boot_us = boot_us
+        stamp_ns = self._stamp(self._boot_ns(boot_ms, now_ns), now_ns)
+        wrapped = boot_ms + REBOOT_MS < self._boot_ms
+        in_order = rebooted or wrapped or boot_ms > self._boot_ms
+        self._boot_ms = boot_ms
         if self._attitude is not None and not rebooted:
             in_order = in_order and stamp_ns > self._attitude.stamp_ns
         if in_order:

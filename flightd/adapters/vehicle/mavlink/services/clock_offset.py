@@ -36,6 +36,8 @@ _RATE_MOST, _RATES, _REFINED = 0.1, 41, 4
 """The rate is sought among so many within this, so often again around the best."""
 _CONTRADICTING = 3
 _SLACK_NS = 1_000_000.0
+_LEAP_NS = 15_000_000.0
+"""What comes faster by more than this may have a wrong stamp, and tells nothing until others confirm it."""
 _FEW = 4
 """The delays of so many of the fastest messages say how near to the least delay the very fastest is."""
 _SPREAD = sum(1.0 / n for n in range(1, _FEW + 1))
@@ -56,7 +58,8 @@ class _Way:
         self.side = side
         self.samples: deque[tuple[int, int]] = deque()
         """Time of ours and offset, ns; of each bucket the fastest."""
-        self._against: list[int] = []
+        self._against: list[tuple[int, int]] = []
+        """Of the messages that came faster than any can: time of ours and offset."""
 
     def clear(self) -> None:
         self.samples.clear()
@@ -75,16 +78,15 @@ class _Way:
         while self.samples and self.samples[0][0] < first_ns:
             self.samples.popleft()
 
-    def changed_ns(self, at_ns: int, faster_ns: float, told_ns: float) -> int | None:
-        """When messages began to come faster than any can, by more than `told_ns`; None while they do not.
-        This one came so much faster than the fastest."""
-        if faster_ns <= told_ns:
-            return None
-        self._against = [when for when in self._against if at_ns - when < _WINDOW_NS / 2]
-        self._against.append(at_ns)
+    def changed_ns(self, at_ns: int, offset_ns: int) -> int | None:
+        """When messages began to come faster than any can; None for a lone one.  This one did."""
+        self._against = [one for one in self._against if at_ns - one[0] < _WINDOW_NS / 2]
+        self._against.append((at_ns, offset_ns))
         if len(self._against) < _CONTRADICTING:
             return None
-        first_ns, self._against = self._against[0], []
+        # those that were kept back, too
+        self.samples = deque(sorted({*self.samples, *self._against}))
+        first_ns, self._against = self._against[0][0], []
         return first_ns
 
 
@@ -209,7 +211,10 @@ class ClockSync:
         fit = self._fit
         if fit is not None:
             told_ns = _SLACK_NS + 3.0 * fit.sigma_ns(at_ns)
-            changed_ns = way.changed_ns(at_ns, fit.faster_ns(way, at_ns, offset_ns), told_ns)
+            faster_ns = fit.faster_ns(way, at_ns, offset_ns)
+            changed_ns = way.changed_ns(at_ns, offset_ns) if faster_ns > told_ns else None
+            if changed_ns is None and faster_ns > told_ns + _LEAP_NS and self.is_settled:
+                return
             if changed_ns is not None:
                 self._down.since(changed_ns)
                 self._up.since(changed_ns)

@@ -95,6 +95,7 @@ export default {
   "start refused: {why}": "Start verweigert: {why}",
   "starts already: {why}": "startet schon: {why}",
   "plan refused: {why}": "Plan verweigert: {why}",
+  "pause ended: the charge only just suffices for the way back": "Pause beendet: Der Akku reicht nur noch knapp für den Rückweg",
   // why it waits
   "waiting for the start command": "wartet auf den Startbefehl",
   "landed on the pad": "auf dem Landeplatz gelandet",

@@ -46,6 +46,7 @@ function Head() {
   const asked = newName ?? (stamp ? null : suggested);
   const onSave = async (event) => {
     event?.preventDefault();
+    if (site().busy) return; // the button keeps the focus meanwhile
     const as = asked === null ? "" : asked.endsWith(".toml") ? asked : `${asked}.toml`;
     await save(as);
     if (!site().trouble) {
@@ -64,7 +65,7 @@ function Head() {
         <button type="button" class="order" disabled=${!past.length} title=${say("Ctrl Z")} onClick=${undo}>${say("Undo")}</button>
         <button type="button" class="order" disabled=${!future.length} title=${say("Ctrl Shift Z")} onClick=${redo}>${say("Redo")}</button>
         ${asked !== null && html`<label class="field">${say("File")} <input value=${asked} maxlength="85" onInput=${(event) => setNewName(event.target.value)} /></label>`}
-        <button class="order main-order" disabled=${busy || (asked === null && !isChanged())} title=${say("Ctrl S")}>${busy ? say("Wait …") : say("Save")}</button>
+        <button class="order main-order" disabled=${!busy && asked === null && !isChanged()} aria-disabled=${busy} title=${say("Ctrl S")}>${busy ? say("Wait …") : say("Save")}</button>
         ${stamp && html`<button type="button" class="order" aria-expanded=${asked !== null} onClick=${() => setNewName(asked === null ? suggested : null)}>${asked === null ? say("Save as") : say("Not as another")}</button>`}
         <${Menu} words=${say("Export")} options=${EXPORTS} onChoice=${download} />
         ${site().versions.length > 0 && html`<${Menu} words=${say("Old versions")} options=${site().versions.map((at) => [at, whenOf(at)])} onChoice=${showVersion} />`}

@@ -15,7 +15,7 @@ export function SimulationBar() {
   if (!told || (!mayFly && !told.site)) return null;
   return html`
     <div class="simulation">
-      ${mayFly && html`<button class="order" disabled=${busy || isChanged()} onClick=${() => fly(name)}>${told.site === name ? say("Fly again in simulation") : say("Fly it in simulation")}</button>`}
+      ${mayFly && html`<button class="order" disabled=${isChanged()} aria-disabled=${busy} onClick=${busy ? null : () => fly(name)}>${told.site === name ? say("Fly again in simulation") : say("Fly it in simulation")}</button>`}
       ${mayFly && isChanged() && html`<p class="quiet">${say("Save it first: the file is flown.")}</p>`}
       ${told.drone && html`<button class="order" onClick=${() => look(told.drone)}>${say("See it on Live")}</button>`}
       ${told.drone && may && html`<button class="order" onClick=${endFlight}>${say("End the flight")}</button>`}

@@ -83,7 +83,7 @@ function FromFlight() {
         </label>
         <div class="tools">
           <button class="order main-order" onClick=${() => taken(() => take(place))}>${say("Take this picture")}</button>
-          <button class="order" disabled=${busy} onClick=${several}>${busy ? say("Taking …") : say("Take {n} from all of the flight", { n: Math.min(AT_ONCE, pictures) })}</button>
+          <button class="order" aria-disabled=${busy} onClick=${busy ? null : several}>${busy ? say("Taking …") : say("Take {n} from all of the flight", { n: Math.min(AT_ONCE, pictures) })}</button>
         </div>
       `}
     </div>

@@ -50,7 +50,7 @@ function OfDrone({ drone }) {
       <div class="tools">
         ${report?.exposures?.length > 1 && report.exposures.map(({ camera: name }) => html`
           <button key=${name} class="tab" aria-pressed=${name === camera} onClick=${() => setCamera(name)}>${say(NAMES[name])}</button>`)}
-        <button class="order" disabled=${looking} onClick=${look}>${looking ? say("Looking …") : say("Look again")}</button>
+        <button class="order" aria-disabled=${looking} onClick=${looking ? null : look}>${looking ? say("Looking …") : say("Look again")}</button>
       </div>
     </div>
     ${trouble && html`<p class="obstacles" role="alert">${quoted(trouble)}</p>`}

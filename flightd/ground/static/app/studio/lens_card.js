@@ -16,6 +16,7 @@ export function LensCard() {
   const [busy, setBusy] = useState(false);
   const look = async (event) => {
     event.preventDefault();
+    if (busy) return; // the button keeps the focus meanwhile
     setBusy(true);
     await told(async () => setStudy(await asked(setPath(`/boards?columns=${columns}&rows=${rows}`), "GET", undefined, BOARDS_MS)));
     setBusy(false);
@@ -32,7 +33,7 @@ export function LensCard() {
       <p class="quiet">${say("Show a flat chessboard, all of it, tilted and turned, in every part of the picture; take 8 pictures or more into a set of their own.")}</p>
       <form class="tools" onSubmit=${look}>
         ${side(say("Inner corners across"), columns, setColumns)}${side(say("down"), rows, setRows)}
-        <button class="order" disabled=${busy || !studio().set.pictures.length}>${busy ? say("Looking …") : say("Look for the board")}</button>
+        <button class="order" disabled=${!studio().set.pictures.length} aria-disabled=${busy}>${busy ? say("Looking …") : say("Look for the board")}</button>
       </form>
       ${study && html`<${Study} study=${study} camera=${camera} />`}
       <h4>${say("By a flight")}</h4>

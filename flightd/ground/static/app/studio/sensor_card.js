@@ -19,6 +19,7 @@ export function ByFlight() {
   const chosen = flights.find(({ id }) => id === flight) ?? flights[0];
   const look = async (event) => {
     event.preventDefault();
+    if (busy) return; // the button keeps the focus meanwhile
     setBusy(true);
     setStudy(null);
     await told(async () => setStudy({ flight: chosen.id, ...(await asked(`/flights/${encodeURIComponent(chosen.id)}/sensors`, "GET", undefined, FITTING_MS)) }));
@@ -32,7 +33,7 @@ export function ByFlight() {
           ${flights.map((row) => html`<option key=${row.id} value=${row.id}>${siteWords(row.site)} · ${flightWords(row)}</option>`)}
         </select>
       </label>
-      <button class="order" disabled=${busy}>${busy ? say("Looking …") : say("Look what it found")}</button>
+      <button class="order" aria-disabled=${busy}>${busy ? say("Looking …") : say("Look what it found")}</button>
     </form>
     ${busy && html`<p class="quiet" role="status">${say("All of the flight is fitted at once: up to some minutes.")}</p>`}
     ${study?.flight === chosen.id && html`<${Found} study=${study} />`}
