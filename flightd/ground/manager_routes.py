@@ -19,8 +19,8 @@ _MOST_BYTES = 256
 class Managers(Protocol):
     """They fly drones for which no person of the station does."""
 
-    def hand_over(self, name: str, *, to_manager: bool) -> None:
-        """A person takes a drone, or gives it (back).  InputError where no manager flies it."""
+    def hand_over(self, name: str, *, to_manager: bool) -> bool:
+        """A person takes a drone, or gives it (back); False where no manager flies it."""
         ...
 
 
@@ -34,12 +34,11 @@ def manager_routes(managers: Managers | None) -> list[BaseRoute]:
     """The one route; without `managers` it refuses."""
 
     async def hand_over(request: Request) -> Response:
-        asked = await said(request, HandOver, "who flies", _MOST_BYTES)
+        asked = await said(request, HandOver, "an act", _MOST_BYTES)
         drone = request.path_params["drone"]
         note_act(request, "the fleet's manager flies" if asked.flies else "a person flies")
-        if managers is None:
-            raise InputError("no fleet's manager flies here", remedy="start the station with --mqtt-orders")
-        managers.hand_over(drone, to_manager=asked.flies)
+        if managers is None or not managers.hand_over(drone, to_manager=asked.flies):
+            raise InputError(f"no fleet's manager flies {drone}")
         return as_json({})
 
     return [Route("/drones/{drone}/manager", or_refused(hand_over), methods=["POST"])]

@@ -15,7 +15,6 @@ from typing import Any, Final
 
 import aiomqtt
 
-from flightd.core.errors import InputError
 from flightd.fleet.vda5050.codec import TOPICS, MalformedError, Version, decoded, encoded
 from flightd.fleet.vda5050.factsheet import Factsheet
 from flightd.fleet.vda5050.order import InstantActions, Order
@@ -178,14 +177,13 @@ class FleetLink:
             for one in self._at_broker:
                 tasks.create_task(one.run(), name="at the broker")
 
-    def hand_over(self, name: str, *, to_manager: bool) -> None:
-        """A person takes a drone, or gives it (back) to the manager.  InputError where none flies it."""
+    def hand_over(self, name: str, *, to_manager: bool) -> bool:
+        """As `Managers`."""
         drone = self._drones.get(name)
         if drone is None or not self._takes_orders:
-            raise InputError(
-                f"no fleet's manager flies {name}", remedy="start the station with --mqtt-orders"
-            )
+            return False
         drone.taken_by_person(not to_manager)
+        return True
 
     def attach(self, wake: Callable[[], object] | None) -> None:
         """No pictures are wanted here."""

@@ -6,7 +6,7 @@ export default {
   "Orders": "Befehle",
   "A start flies the {n} node handed over on {missions}.|A start flies the {n} nodes handed over on {missions}.": "Ein Start fliegt den {n} Knoten, der auf {missions} übergeben wurde.|Ein Start fliegt die {n} Knoten, die auf {missions} übergeben wurden.",
   "The fleet’s manager flies this drone. Whatever you order takes it over.": "Der Flottenmanager fliegt diese Drohne. Jeder Befehl von hier übernimmt sie.",
-  "People fly this drone; the fleet’s manager waits until it is given back.": "Menschen fliegen diese Drohne; der Flottenmanager wartet, bis sie zurückgegeben wird.",
+  "People fly this drone, the fleet’s manager waits.": "Menschen fliegen diese Drohne, der Flottenmanager wartet.",
   "Take over": "Übernehmen",
   "Give it to the fleet’s manager": "Dem Flottenmanager übergeben",
   "Ready to fly": "Flugbereit",

@@ -610,4 +610,5 @@ export default {
   "end that flight first": "beenden Sie zuerst diesen Flug",
   "no simulated flight is under way": "kein simulierter Flug läuft",
   "{folder} cannot be made: {why}": "{folder} lässt sich nicht anlegen: {why}",
+  "no fleet's manager flies {drone}": "kein Flottenmanager fliegt {drone}",
 };

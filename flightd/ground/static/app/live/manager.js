@@ -9,7 +9,7 @@ export function Manager() {
   if (!manager) return null;
   const words = manager.flies
     ? say("The fleet’s manager flies this drone. Whatever you order takes it over.")
-    : say("People fly this drone; the fleet’s manager waits until it is given back.");
+    : say("People fly this drone, the fleet’s manager waits.");
   return html`
     <p class="quiet" role="status">${words}</p>
     ${manager.refused && html`<p class="outcome refused" role="alert">${quoted(manager.refused)}</p>`}
