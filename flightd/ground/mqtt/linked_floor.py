@@ -17,7 +17,7 @@ _PADS = ""
 
 
 def floor_of_link(floor: FloorStatus) -> Floor:
-    """The floor that the vehicle's orders are checked by, as `floor_of` makes it of the site itself."""
+    """The floor that the vehicle's orders are checked by."""
     sides: dict[str, set[Side]] = {}
     for rack in floor.racks:
         sides.setdefault(rack.aisle, set()).add(Side(rack.side))

@@ -18,7 +18,7 @@ from flightd.fleet.vda5050.order import Edge, InstantActions, Node, Order
 from flightd.fleet.vda5050.parts import Action, ActionParameter, BlockingType, Header, MobileRobotPosition
 from flightd.fleet.vda5050.state import OperatingMode, PowerSupply, State
 from flightd.fleet.vehicle.drone_factsheet import Measures, drone_factsheet
-from flightd.fleet.vehicle.floor import floor_of
+from flightd.fleet.vehicle.floor import Floor
 from flightd.fleet.vehicle.machine import BaseReach, Identity, Vehicle
 from flightd.fleet.vehicle.signals import Decided, Input, Output, Situation
 from flightd.site.site import Site
@@ -51,6 +51,19 @@ def check(message: Header, version: Version) -> bytes:
 def site() -> Site:
     """Two aisles, A1 to A6 and B1 to B6, joined at both ends."""
     return load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
+
+
+def floor_of(site: Site) -> Floor:
+    """The floor of a site; its map is called as the site is, as in the site's LIF."""
+    ways = set()
+    for edge in site.edges:
+        if not site.is_closed(edge):
+            ways.add((edge.a, edge.b))
+            if not edge.one_way:
+                ways.add((edge.b, edge.a))
+    sides = {aisle.id: frozenset(aisle.shelves) for aisle in site.aisles}
+    shelves = {node.id: sides[node.aisle] for node in site.nodes.values()}
+    return Floor(site.name, frozenset(site.nodes), frozenset(ways), shelves)
 
 
 def scan(name: str, blocking: BlockingType = BlockingType.HARD, **more: Any) -> Action:

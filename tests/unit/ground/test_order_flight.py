@@ -16,7 +16,6 @@ from flightd.core.errors import InputError
 from flightd.core.types import CommandKind, EventLevel, Phase
 from flightd.fleet.vda5050.codec import Version
 from flightd.fleet.vehicle.drone_factsheet import Measures
-from flightd.fleet.vehicle.floor import floor_of
 from flightd.ground.messages import LinkState
 from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
 from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
@@ -26,7 +25,7 @@ from flightd.ground.mqtt.safe_return import SafeReturn, Standing
 from flightd.ground.mqtt.shelf_counts import counted_in_words
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import virtual
-from tests.unit.fleet.vehicle_rig import order
+from tests.unit.fleet.vehicle_rig import floor_of, order
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
