@@ -386,5 +386,5 @@ def test_other_programs_maps_come_in_and_go_out(
         expect(page.get_by_role("alert").filter(has_text="row 3: node 'A1' comes twice")).to_be_visible()
         page.locator("input[type=file]").set_input_files(saved["VDMA LIF"])
         expect(page.get_by_text(SOUND)).to_be_visible()
-        expect(page.get_by_text("48 stations are no chargers")).to_be_visible()
+        expect(page.get_by_text("no LIF tells how high shelves are")).to_be_visible()
         expect(entry(page, "Cross A4 to B4")).to_be_visible()
