@@ -22,7 +22,7 @@ class DeviceClock:
     The messages of a stream arrive late by a constant least delay plus jitter that is never negative.
     The smallest (arrival - stamp) is therefore the clocks' offset plus that delay, `latency_ns`, which
     has to be known; it may creep up again by the clocks' drift.  A lone stamp that is ahead of its time
-    moves nothing; the first message is believed until others contradict it.
+    moves nothing; each of the first messages is believed until others contradict it.
     """
 
     def __init__(self, latency_ns: int) -> None:
@@ -31,11 +31,11 @@ class DeviceClock:
         self._newest_ns = self._in_order_ns = 0
         self._anew_ns = 0
         self._anew = 0
-        self._count = 0
+        self._count = self._begun = 0
         self._sooner: list[tuple[int, int, int]] = []
         """Messages that came sooner by a leap: number, stamp, offset."""
         self._others: list[int] | None = None
-        """Offsets of what followed the first message, as long as none agrees with it."""
+        """Offsets of what followed the first message, or the soonest of the first, as long as none agrees."""
 
     def to_ours(self, device_ns: int, arrival_ns: int) -> int | None:
         """Our time of `device_ns`, heard of at `arrival_ns`.
@@ -50,11 +50,14 @@ class DeviceClock:
             device_ns <= self._newest_ns and self._counts_anew(device_ns, arrival_ns)
         ):
             self._offset_ns, self._sooner, self._others = offset, [], []
+            self._begun = self._count
         elif device_ns <= self._newest_ns:
             return None
         else:
             crept = self._offset_ns + round((device_ns - self._newest_ns) * _DRIFT)
-            if offset < crept - _LEAP_NS:
+            if offset < crept - _LEAP_NS and self._count - self._begun < _LATELY:
+                self._offset_ns, self._others = offset, []  # at first many come late
+            elif offset < crept - _LEAP_NS:
                 confirmed = self._confirmed(device_ns, offset)
                 if confirmed is None:
                     return None

@@ -173,18 +173,26 @@ def test_whatever_the_order_of_arrival_stamps_only_grow_and_are_true(order: list
 
 
 @pytest.mark.parametrize("ahead_ms", [20, 100, 300])
-@pytest.mark.parametrize("when", [0, 40])
+@pytest.mark.parametrize("when", [0, 5, 40])
 def test_a_lone_stamp_ahead_of_its_time_makes_no_later_frame_older(ahead_ms: int, when: int) -> None:
     clock, jitter = DeviceClock(latency_ns=60 * MS), np.random.default_rng(4).integers(0, 10 * MS, 90)
     for k, late_ns in enumerate(jitter.tolist()):
         taken = k * 33 * MS
         ahead, delay = (ahead_ms * MS, 0) if k == when else (0, late_ns)
         stamp = clock.to_ours(taken + ahead + 10**12, taken + 60 * MS + delay)
-        if k == when > 0:
+        if k == when > 10:
             assert stamp is None
         elif k > when + 20:
             assert stamp is not None
             assert abs(stamp - taken) < 10 * MS
+
+
+def test_where_the_first_messages_come_late_none_is_left_out() -> None:
+    clock = DeviceClock(latency_ns=0)
+    for k in range(12):
+        taken = k * 33 * MS
+        stamp = clock.to_ours(taken + 10**12, taken + max(80 - 20 * k, 0) * MS)
+        assert stamp == pytest.approx(taken + max(80 - 20 * k, 0) * MS, abs=MS)
 
 
 def test_a_path_that_grows_faster_is_followed_after_three_messages() -> None:
