@@ -91,10 +91,14 @@ def started(words: Sequence[str]) -> Iterator[str]:
     assert process.stderr is not None
     with process.stderr:
         try:
-            said = process.stderr.readline()
-            found = re.search(r"https?://[0-9.]+:\d+", said)
-            assert found is not None, said
-            yield found.group()
+            said: list[str] = []
+            for line in process.stderr:  # a broker may be missed before
+                said.append(line)
+                if found := re.search(r"the ground station is at (https?://[0-9.]+:\d+)", line):
+                    break
+            else:
+                raise AssertionError("".join(said))
+            yield found[1]
         finally:
             process.terminate()
             code, rest = process.wait(20), process.stderr.read()
