@@ -61,11 +61,11 @@ def together(told: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]
     """The evidence of two lots of flights of one kind: numbers of flights are added, of the figures the worse
     one stays."""
     both: dict[str, Any] = {}
-    for key in told.keys() | more.keys():
+    for key in {**told, **more}:
         values = [found[key] for found in (told, more) if found.get(key) is not None]
         worst = sum if key in _COUNTS else _WORST[key]
         both[key] = worst(values) if values else None
-    return {key: both[key] for key in (*told, *(more.keys() - told.keys()))}
+    return both
 
 
 def markdown() -> str:
@@ -125,7 +125,7 @@ def main(arguments: Sequence[str]) -> int:
             )
         hazards = {
             name: together(told["hazards"].get(name, {}), hazards.get(name, {}))
-            for name in (*told["hazards"], *(name for name in hazards if name not in told["hazards"]))
+            for name in told["hazards"] | hazards
         }
         of_pairs = together(told.get("pairs", {}), of_pairs)
     document = {"flown": f"{datetime.now(UTC):%Y-%m-%d}", "world": world, "hazards": hazards}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from flightd.core.tick import StepFailure, TickInput, TickOutput
 from flightd.core.types import AttitudeSetpoint, Demand, Event, EventLevel, Phase
 from flightd.mission.safety.last_resort import Fallback
@@ -55,15 +53,4 @@ class GuardedStep:
         if answer.phase is not last.phase:
             text = f"{last.phase} -> {answer.phase}: {_WHY}"
             events.append(Event(now_ns, EventLevel.WARNING, "phase", text))
-        return replace(
-            last,
-            setpoint=answer.setpoint,
-            demand=answer.demand,
-            phase=answer.phase,
-            reason=_WHY,
-            pose=None,
-            tracks=None,
-            events=tuple(events),
-            findings=(),
-            settled=(),
-        )
+        return answer.onto(last, tuple(events))

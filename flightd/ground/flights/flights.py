@@ -126,13 +126,7 @@ class Flights:
 
     async def thumbnail(self, log_id: str) -> bytes:
         """A small picture for the list; empty where the log holds none."""
-        log = await self._log(log_id)
-        key = (log.id, log.stamp)
-        small = self._thumbnails.get(key)
-        if small is None:
-            small = await self._listing.run(read_thumbnail, _WITHIN_S, log.root, log.relative)
-            self._thumbnails.put(key, small, len(small) + 1)
-        return small
+        return await self._made(log_id, self._thumbnails, read_thumbnail)
 
     async def where(self, log_id: str) -> tuple[Path, str]:
         """The folder in which a flight lies, and its log below it."""
@@ -154,13 +148,19 @@ class Flights:
 
     async def report(self, log_id: str) -> bytes:
         """Its HTML report."""
+        return await self._made(log_id, self._reports, read_report)
+
+    async def _made(
+        self, log_id: str, kept: SizedCache[_Key, bytes], read: Callable[[Path, str], bytes]
+    ) -> bytes:
+        """What is made of a log as it is now, and kept."""
         log = await self._log(log_id)
         key = (log.id, log.stamp)
-        page = self._reports.get(key)
-        if page is None:
-            page = await self._listing.run(read_report, _WITHIN_S, log.root, log.relative)
-            self._reports.put(key, page, len(page))
-        return page
+        made = kept.get(key)
+        if made is None:
+            made = await self._listing.run(read, _WITHIN_S, log.root, log.relative)
+            kept.put(key, made, len(made) + 1)  # one that is empty takes room, too
+        return made
 
     async def _view(self, log: FoundLog) -> _Seen:
         key = (log.id, log.stamp)

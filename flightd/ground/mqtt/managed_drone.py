@@ -285,7 +285,7 @@ class ManagedDrone:
     def _write_down(self, what: str, refused: str) -> None:
         if self._rules is not None:
             self._rules.write_down(
-                what[:300], self._name, "refused" if refused else "accepted", refused[:300]
+                what[:_MOST_WORDS], self._name, "refused" if refused else "accepted", refused[:_MOST_WORDS]
             )
 
     # acts

@@ -41,6 +41,27 @@ class Fallback:
     demand: Demand
     setpoint: AttitudeSetpoint | None
 
+    def onto(
+        self,
+        last: TickOutput,
+        events: tuple[Event, ...],
+        findings: tuple[Finding, ...] = (),
+        settled: tuple[Settled, ...] = (),
+    ) -> TickOutput:
+        """This in place of what went out last; where the drone is, nobody says any more."""
+        return replace(
+            last,
+            setpoint=self.setpoint,
+            demand=self.demand,
+            phase=self.phase,
+            reason=_WHY,
+            pose=None,
+            tracks=None,
+            events=events,
+            findings=findings,
+            settled=settled,
+        )
+
 
 class LastResort:
     """Answers a tick whose step has failed: tell it by `caught`, then ask for the `answer`.
@@ -90,18 +111,8 @@ class LastResort:
         no_events: tuple[Event, ...] = ()
         nothing: tuple[tuple[Finding, ...], tuple[Settled, ...]] = ((), ())
         findings, settled = _rescued(drain_findings, nothing)
-        return replace(
-            last,
-            setpoint=answer.setpoint,
-            demand=answer.demand,
-            phase=answer.phase,
-            reason=_WHY,
-            pose=None,
-            tracks=None,
-            events=(*_rescued(drain_events, no_events), *self._news(tick.now_ns, last.phase, answer.phase)),
-            findings=findings,
-            settled=settled,
-        )
+        news = self._news(tick.now_ns, last.phase, answer.phase)
+        return answer.onto(last, (*_rescued(drain_events, no_events), *news), findings, settled)
 
     def step(self, now_ns: int, vehicle: VehicleState | None, before: Phase) -> Fallback:
         """Level and down; `before` is the phase answered last.  A vehicle that tells nothing any more is

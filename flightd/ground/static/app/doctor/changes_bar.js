@@ -1,5 +1,6 @@
 // What was changed and not sent yet, who sends it, and what came of it.
 import { mayChange, signedInName } from "../access/session.js";
+import { unlessBusy } from "../busy.js";
 import { html, useState } from "../html.js";
 import { english, quoted, say } from "../language.js";
 import { setWho, who } from "../stock/decisions.js";
@@ -47,14 +48,14 @@ export function ChangesBar({ drone, told, changes, complaint, onTake, onDrop, on
         </label>`}
       ${names.length > 0 && html`
         <div class="changes-orders">
-          <button class="order" disabled=${Boolean(complaint) || Boolean(told.locked)} aria-disabled=${busy} onClick=${busy ? null : send}>${say("Send to {drone}", { drone })}</button>
-          <button class="order" aria-disabled=${busy} onClick=${busy ? null : onDrop}>${say("Drop")}</button>
+          <button class="order" disabled=${Boolean(complaint) || Boolean(told.locked)} ...${unlessBusy(busy, send)}>${say("Send to {drone}", { drone })}</button>
+          <button class="order" ...${unlessBusy(busy, onDrop)}>${say("Drop")}</button>
         </div>`}
       <p class=${outcome.good ? "quiet" : "refusal"} role="status">${quoted(outcome.text)}</p>
       ${told.pending && html`
         <div class="obstacles"><p>${say("flightd still runs by older settings: it takes these at its next start.")}</p>
           ${told.restarts && mayChange()
-            ? html`<button class="order" disabled=${names.length > 0} aria-disabled=${busy} onClick=${busy ? null : restart}>${say("Start flightd anew")}</button>`
+            ? html`<button class="order" disabled=${names.length > 0} ...${unlessBusy(busy, restart)}>${say("Start flightd anew")}</button>`
             : html`<p>${mayChange() ? say("Start it anew on the drone.") : say("An admin starts it anew.")}</p>`}
         </div>`}
     </section>

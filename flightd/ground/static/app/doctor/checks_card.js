@@ -1,5 +1,6 @@
 // What the drone finds of itself: what is wrong first, with what to do about it, and what it sets right itself.
 import { mayChange, signedInName } from "../access/session.js";
+import { unlessBusy } from "../busy.js";
 import { html, useState } from "../html.js";
 import { english, quoted, say } from "../language.js";
 import { who } from "../stock/decisions.js";
@@ -34,7 +35,7 @@ export function ChecksCard({ drone, known, look, take }) {
     <section class="card checks" aria-labelledby="checks-title" aria-busy=${looking}>
       <div class="checks-head">
         <h2 id="checks-title">${verdict(report, trouble)}</h2>
-        <button class="order" aria-disabled=${looking} onClick=${looking ? null : look}>${looking ? say("Looking …") : say("Look again")}</button>
+        <button class="order" ...${unlessBusy(looking, look)}>${looking ? say("Looking …") : say("Look again")}</button>
       </div>
       ${trouble && html`<p class="obstacles" role="alert">${quoted(trouble)}</p>`}
       <p class=${outcome.good ? "quiet" : "refusal"} role="status">${quoted(outcome.text)}</p>
@@ -55,7 +56,7 @@ export function CheckRow({ check, busy, isFixed, onFix }) {
         <p><strong>${quoted(name)}</strong> ${quoted(text)}</p>
         ${remedy && html`<p class="remedy">${quoted(remedy)}</p>`}
       </div>
-      ${fix && mayChange() && html`<button class="order" aria-label=${say("Set right: {fix}", { fix })} aria-disabled=${busy} onClick=${busy ? null : () => onFix(fix)}>
+      ${fix && mayChange() && html`<button class="order" aria-label=${say("Set right: {fix}", { fix })} ...${unlessBusy(busy, () => onFix(fix))}>
         ${isFixed ? say("Writing …") : say("Set right")}</button>`}
     </li>
   `;

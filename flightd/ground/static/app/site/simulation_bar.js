@@ -1,5 +1,6 @@
 // The site that is edited, flown in the simulator: begun here, seen on Live as a drone more, its end told here.
 import { mayChange, mayOperate } from "../access/session.js";
+import { unlessBusy } from "../busy.js";
 import { html } from "../html.js";
 import { quoted, say, sayWith } from "../language.js";
 import { goTo } from "../router.js";
@@ -15,7 +16,7 @@ export function SimulationBar() {
   if (!told || (!mayFly && !told.site)) return null;
   return html`
     <div class="simulation">
-      ${mayFly && html`<button class="order" disabled=${isChanged()} aria-disabled=${busy} onClick=${busy ? null : () => fly(name)}>${told.site === name ? say("Fly again in simulation") : say("Fly it in simulation")}</button>`}
+      ${mayFly && html`<button class="order" disabled=${isChanged()} ...${unlessBusy(busy, () => fly(name))}>${told.site === name ? say("Fly again in simulation") : say("Fly it in simulation")}</button>`}
       ${mayFly && isChanged() && html`<p class="quiet">${say("Save it first: the file is flown.")}</p>`}
       ${told.drone && html`<button class="order" onClick=${() => look(told.drone)}>${say("See it on Live")}</button>`}
       ${told.drone && may && html`<button class="order" onClick=${endFlight}>${say("End the flight")}</button>`}

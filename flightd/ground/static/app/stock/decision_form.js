@@ -6,7 +6,6 @@ import { dayAndTime } from "../words.js";
 import { DECISIONS, decide, needsALook, setWho, standing, who } from "./decisions.js";
 import { stock } from "./stock_state.js";
 
-
 export function DecisionForm() {
   const known = stock();
   const { chosen, source, decisions } = known;

@@ -1,4 +1,5 @@
 // Pictures into the set: from a recorded flight, live from the drone, from files.
+import { unlessBusy } from "../busy.js";
 import { showPictures } from "../connection.js";
 import { askJson, askStation } from "../fetching.js";
 import { flightsState, watchList } from "../flights/flights_state.js";
@@ -83,7 +84,7 @@ function FromFlight() {
         </label>
         <div class="tools">
           <button class="order main-order" onClick=${() => taken(() => take(place))}>${say("Take this picture")}</button>
-          <button class="order" aria-disabled=${busy} onClick=${busy ? null : several}>${busy ? say("Taking …") : say("Take {n} from all of the flight", { n: Math.min(AT_ONCE, pictures) })}</button>
+          <button class="order" ...${unlessBusy(busy, several)}>${busy ? say("Taking …") : say("Take {n} from all of the flight", { n: Math.min(AT_ONCE, pictures) })}</button>
         </div>
       `}
     </div>

@@ -1,4 +1,5 @@
 // How a camera exposes: its newest picture, what was set and read back, what the doctor says, and the keys to change.
+import { unlessBusy } from "../busy.js";
 import { askDrone } from "../doctor/asking.js";
 import { ChangesBar } from "../doctor/changes_bar.js";
 import { CheckRow, worstFirst } from "../doctor/checks_card.js";
@@ -50,7 +51,7 @@ function OfDrone({ drone }) {
       <div class="tools">
         ${report?.exposures?.length > 1 && report.exposures.map(({ camera: name }) => html`
           <button key=${name} class="tab" aria-pressed=${name === camera} onClick=${() => setCamera(name)}>${say(NAMES[name])}</button>`)}
-        <button class="order" aria-disabled=${looking} onClick=${looking ? null : look}>${looking ? say("Looking …") : say("Look again")}</button>
+        <button class="order" ...${unlessBusy(looking, look)}>${looking ? say("Looking …") : say("Look again")}</button>
       </div>
     </div>
     ${trouble && html`<p class="obstacles" role="alert">${quoted(trouble)}</p>`}

@@ -1,5 +1,6 @@
 // An installed profile on its way to the drone that is chosen: what that one flies by, sending, starting anew.
 import { mayChange, signedInName } from "../access/session.js";
+import { unlessBusy } from "../busy.js";
 import { askDrone, sendDrone } from "../doctor/asking.js";
 import { forReader } from "../doctor/settings_view.js";
 import { html, useEffect, useState } from "../html.js";
@@ -66,8 +67,8 @@ function Sending({ drone, profile }) {
       ${!signedInName() && (!isThere || known.pending) && html`
         <label class="field">${say("Who")} <input value=${person} maxlength="60" autocomplete="name" onInput=${(event) => setPerson(event.target.value)} /></label>`}
       <div class="tools">
-        ${!isThere && html`<button class="order main-order" aria-disabled=${busy} onClick=${busy ? null : send}>${say("Send version {number} to {drone}", { number: version.number, drone })}</button>`}
-        ${known.pending && known.restarts && html`<button class="order" aria-disabled=${busy} onClick=${busy ? null : restart}>${say("Start flightd anew")}</button>`}
+        ${!isThere && html`<button class="order main-order" ...${unlessBusy(busy, send)}>${say("Send version {number} to {drone}", { number: version.number, drone })}</button>`}
+        ${known.pending && known.restarts && html`<button class="order" ...${unlessBusy(busy, restart)}>${say("Start flightd anew")}</button>`}
       </div>
       ${known.pending && html`<p>${say("flightd still runs by older settings: it takes these at its next start.")}</p>`}
       <p class="quiet">${sayWith("Taken back as all settings are: on the page {page}.", { page: html`<a href="/doctor/settings">${say("Doctor")}</a>` })}</p>
