@@ -11,19 +11,23 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import jsonschema
+import msgspec
+import pytest
 
 from flightd.fleet.vda5050.codec import TOPICS, Version, encoded
 from flightd.fleet.vda5050.factsheet import Factsheet
-from flightd.fleet.vda5050.order import Edge, InstantActions, Node, Order
+from flightd.fleet.vda5050.order import Edge, InstantActions, Node, NodePosition, Order
 from flightd.fleet.vda5050.parts import Action, ActionParameter, BlockingType, Header, MobileRobotPosition
 from flightd.fleet.vda5050.state import OperatingMode, PowerSupply, State
 from flightd.fleet.vehicle.drone_factsheet import Measures, drone_factsheet
 from flightd.fleet.vehicle.floor import Floor
 from flightd.fleet.vehicle.machine import BaseReach, Identity, Vehicle
-from flightd.fleet.vehicle.signals import Decided, Input, Output, Situation
+from flightd.fleet.vehicle.signals import Decided, Fly, Input, Output, Situation
 from flightd.site.site import Site
 from flightd.site.site_file import load_site
 
+BOTH = pytest.mark.parametrize("version", list(Version))
+V2, V3 = Version.V2_1, Version.V3_0
 SCHEMAS = Path(__file__).parent / "schemas"
 FOLDERS = {Version.V2_1: "2.1.0", Version.V3_0: "3.0"}
 _O = TypeVar("_O")
@@ -199,3 +203,14 @@ def only(out: Sequence[Output], kind: type[_O]) -> list[_O]:
 def facts(out: Sequence[Output]) -> list[Factsheet]:
     """The factsheets among them."""
     return only(out, Factsheet)
+
+
+def flown(out: Sequence[Output]) -> str:
+    """The stops of the last way that was commanded."""
+    return " ".join(stop.node for stop in only(out, Fly)[-1].stops)
+
+
+def at(told: Order, **where: Any) -> Order:
+    """The order with a position of its first node."""
+    first = msgspec.structs.replace(told.nodes[0], node_position=NodePosition(**where))
+    return msgspec.structs.replace(told, nodes=[first, *told.nodes[1:]])
