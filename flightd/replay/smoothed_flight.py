@@ -5,8 +5,7 @@ where the drone was on the way there, too: the backward pass of Rauch, Tung and 
 1965) hands that back.  The recorded pose is the forward pass, its covariance included, so nothing is
 filtered twice.
 
-Pure but for the library, filterpy, which is of the extra `smooth`: it brings 150 MB and takes a second to
-import, too much for the drone.
+Pure.  The two axes of the map say nothing of each other: each is smoothed by itself, in closed form.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.core.extras import missing_extra
 from flightd.core.types import GridPose
 
 Array: TypeAlias = NDArray[np.float64]
@@ -58,26 +56,51 @@ class SmoothedFlight:
 def smooth(poses: Sequence[GridPose]) -> SmoothedFlight:
     """Smooth a flight's poses, which are in the order of their stamps.
 
-    Poses that are not numbers, or come no later than the one before, are left out.  UnavailableError where
-    the library is missing.
+    Poses that are not numbers, or come no later than the one before, are left out.
     """
-    try:
-        from filterpy.kalman import rts_smoother  # noqa: PLC0415 - of an extra, and slow to import
-    except ImportError:
-        raise missing_extra("smooth", "the smoothed track") from None
     chosen = _usable(poses)
-    states = np.array([(p.x_m, p.vx_mps, p.y_m, p.vy_mps) for p in chosen], np.float64).reshape(-1, 4, 1)
-    spreads = np.array([_spread(p) for p in chosen], np.float64).reshape(-1, 4, 4)
     stamps_ns = np.array([p.stamp_ns for p in chosen], np.int64)
-    live = np.diagonal(spreads, axis1=1, axis2=2).copy()
-    for part in _unbroken(stamps_ns, states, spreads):
-        steps_s = np.append(np.diff(stamps_ns[part]) * 1e-9, 0.0)
-        motions, noises = [_motion(dt_s) for dt_s in steps_s], [_noise(dt_s) for dt_s in steps_s]
-        states[part], spreads[part], *_ = rts_smoother(states[part], spreads[part], motions, noises)
+    places = np.array([((p.x_m, p.vx_mps), (p.y_m, p.vy_mps)) for p in chosen], np.float64).reshape(-1, 2, 2)
+    live = np.array([(p.covariance[0], p.covariance[4]) for p in chosen], np.float64).reshape(-1, 2)
+    smoothed, variances = places.copy(), live.copy()
+    for part in _unbroken(stamps_ns, places, live):
+        steps_s = (np.diff(stamps_ns[part]) * 1e-9).tolist()
+        for axis in range(2):
+            smoothed[part, axis], variances[part, axis] = backward(
+                steps_s, places[part, axis].tolist(), live[part, axis].tolist()
+            )
     # the live doubt may grow faster than this model's; what is known afterwards is never less than live
-    sigmas = np.sqrt(np.clip(np.diagonal(spreads, axis1=1, axis2=2), 0.0, live))
-    x, vx, y, vy = states[:, :, 0].T
-    return SmoothedFlight(stamps_ns, x, y, vx, vy, sigmas[:, 0], sigmas[:, 2])
+    sigmas = np.sqrt(np.clip(variances, 0.0, live))
+    (x, vx), (y, vy) = smoothed.transpose(1, 2, 0)
+    return SmoothedFlight(stamps_ns, x, y, vx, vy, sigmas[:, 0], sigmas[:, 1])
+
+
+def backward(
+    steps_s: Sequence[float], places: Sequence[tuple[float, float]], variances_m2: Sequence[float]
+) -> tuple[list[tuple[float, float]], list[float]]:
+    """Place and speed of one axis, and the place's variance, given what came after; each of `places` (m, m/s)
+    was known live with its variance and was `steps_s` before the next."""
+    x, v = places[-1]
+    p, c, s = variances_m2[-1], 0.0, _VELOCITY_SIGMA_MPS**2  # covariance of place and speed: p c, c s
+    found, left = [(x, v)], [p]
+    for dt_s, (x0, v0), p0 in zip(steps_s[::-1], places[-2::-1], variances_m2[-2::-1], strict=True):
+        s0 = _VELOCITY_SIGMA_MPS**2
+        foreseen_p, foreseen_c = p0 + s0 * dt_s**2 + _DRIFT_MPRTS**2 * dt_s, s0 * dt_s
+        foreseen_s = s0 + _ACCEL_MPS2**2 * dt_s
+        whole = foreseen_p * foreseen_s - foreseen_c**2
+        gain_xx = (p0 * foreseen_s) / whole
+        gain_xv = (-p0 * foreseen_c) / whole
+        gain_vx = (s0 * dt_s * foreseen_s - s0 * foreseen_c) / whole
+        gain_vv = (s0 * foreseen_p - s0 * dt_s * foreseen_c) / whole
+        off_m, off_mps = x - x0 - dt_s * v0, v - v0
+        dp, dc, ds = p - foreseen_p, c - foreseen_c, s - foreseen_s
+        x, v = x0 + gain_xx * off_m + gain_xv * off_mps, v0 + gain_vx * off_m + gain_vv * off_mps
+        p = p0 + gain_xx**2 * dp + 2.0 * gain_xx * gain_xv * dc + gain_xv**2 * ds
+        c = gain_vx * (gain_xx * dp + gain_xv * dc) + gain_vv * (gain_xx * dc + gain_xv * ds)
+        s = s0 + gain_vx**2 * dp + 2.0 * gain_vx * gain_vv * dc + gain_vv**2 * ds
+        found.append((x, v))
+        left.append(p)
+    return found[::-1], left[::-1]
 
 
 def _usable(poses: Sequence[GridPose]) -> list[GridPose]:
@@ -89,27 +112,12 @@ def _usable(poses: Sequence[GridPose]) -> list[GridPose]:
     return chosen
 
 
-def _spread(pose: GridPose) -> Array:
-    """Covariance of (x, vx, y, vy)."""
-    speed = _VELOCITY_SIGMA_MPS**2
-    return np.diag([pose.covariance[0], speed, pose.covariance[4], speed])
-
-
-def _motion(dt_s: float) -> Array:
-    axis = np.array([[1.0, dt_s], [0.0, 1.0]])
-    return np.kron(np.eye(2), axis)
-
-
-def _noise(dt_s: float) -> Array:
-    return np.diag([_DRIFT_MPRTS**2 * dt_s, _ACCEL_MPS2**2 * dt_s] * 2)
-
-
-def _unbroken(stamps_ns: NDArray[np.int64], states: Array, spreads: Array) -> Iterator[slice]:
+def _unbroken(stamps_ns: NDArray[np.int64], places: Array, variances_m2: Array) -> Iterator[slice]:
     """The stretches in which each pose follows from the one before, of two poses at least."""
     steps_s = np.diff(stamps_ns) * 1e-9
-    place, speed = states[:, ::2, 0], states[:, 1::2, 0]
+    place, speed = places[:, :, 0], places[:, :, 1]
     leap_m = np.abs(place[1:] - place[:-1] - speed[:-1] * steps_s[:, None])
-    sigma_m = np.sqrt(np.diagonal(spreads, axis1=1, axis2=2)[:-1, ::2] + _DRIFT_MPRTS**2 * steps_s[:, None])
+    sigma_m = np.sqrt(variances_m2[:-1] + _DRIFT_MPRTS**2 * steps_s[:, None])
     leaps = (leap_m > np.maximum(_LEAP_M, _LEAP_SIGMAS * sigma_m)).any(axis=1)
     ends = np.flatnonzero(leaps | (steps_s > _GAP_S)) + 1
     bounds = [0, *ends.tolist(), len(stamps_ns)]

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from flightd.config.schema import load_config
-from flightd.core.errors import UnavailableError
 from flightd.core.types import GridPose
 from flightd.replay.report.figures import key_figures
 from flightd.replay.report.flight import Track
 from flightd.replay.report.loader import load_flight
 from flightd.replay.report.page import render
-from flightd.replay.smoothed_flight import smooth
+from flightd.replay.smoothed_flight import backward, smooth
 from flightd.site.site_file import load_site
 from tests.replay.synthetic_flight import write_flight
 from tests.sim.ideal.ideal_flight import IdealFlight
@@ -39,7 +37,6 @@ def test_of_a_recorded_flight_it_is_nearer_to_the_truth_than_the_live_pose(tmp_p
     flight = load_flight(write_flight(tmp_path))
     truth = flight.truth
     assert truth is not None
-    assert isinstance(flight.smoothed, Track)
 
     def error_m(track: Track) -> float:
         x, y = truth.at(track.t_s)
@@ -123,14 +120,17 @@ def test_the_report_shows_it_and_says_how_far_the_live_pose_was_off(tmp_path: Pa
     assert 'class="curve smoothed"' in page
 
 
-def test_without_the_library_the_report_says_so_in_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "filterpy.kalman", None)
-    with pytest.raises(UnavailableError, match="extra smooth"):
-        smooth([pose(1, 0.0)])
-    log = write_flight(tmp_path)
-    assert "Live pose" not in {figure.label for figure in key_figures(load_flight(log))}
-    page = render(load_flight(log))
-    assert "the smoothed track needs what is not installed (extra smooth)" in page
-    assert "flown smoothed" not in page
+def test_it_is_step_for_step_the_smoother_of_the_library() -> None:
+    from filterpy.kalman import rts_smoother
+
+    rng = np.random.default_rng(4)
+    steps_s, variances = rng.uniform(0.01, 0.3, 59), rng.uniform(1e-5, 4e-3, 60)
+    places = np.column_stack([np.cumsum(rng.normal(0.01, 0.02, 60)), rng.normal(0.5, 0.1, 60)])
+    found, left = backward(steps_s.tolist(), places.tolist(), variances.tolist())
+    spreads = np.array([np.diag([p, 0.015**2]) for p in variances])
+    dts_s = [*steps_s, 0.0]
+    motions = [np.array([[1.0, dt_s], [0.0, 1.0]]) for dt_s in dts_s]
+    noises = [np.diag([0.03**2 * dt_s, 0.3**2 * dt_s]) for dt_s in dts_s]
+    states, spreads, *_ = rts_smoother(places[:, :, None], spreads, motions, noises)
+    assert np.array(found) == pytest.approx(states[:, :, 0], rel=1e-9)
+    assert np.array(left) == pytest.approx(spreads[:, 0, 0], rel=1e-9)

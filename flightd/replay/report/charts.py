@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.core.types import EventLevel, Phase
-from flightd.replay.report.flight import Array, RecordedFlight, Track
+from flightd.replay.report.flight import Array, RecordedFlight
 from flightd.replay.report.markup import MINUS, clock, element, number, path_data, text, thin, ticks
 
 PHASE_TONE: dict[Phase, str] = {
@@ -88,9 +88,8 @@ def strips(flight: RecordedFlight) -> tuple[ChartStrip, ...]:
     cross = [ChartLine("estimated", "estimate", estimate.t_s, flight.cross_track_m(estimate) * 100)]
     height = [ChartLine("measured", "estimate", vehicle.t_s, vehicle.height_m)]
     heading = [ChartLine("estimated", "estimate", estimate.t_s, np.degrees(np.unwrap(estimate.yaw_rad)))]
-    if isinstance(flight.smoothed, Track):
-        smoothed_m = flight.cross_track_m(flight.smoothed)
-        cross.append(ChartLine("smoothed", "smoothed", flight.smoothed.t_s, smoothed_m * 100))
+    smoothed_m = flight.cross_track_m(flight.smoothed)
+    cross.append(ChartLine("smoothed", "smoothed", flight.smoothed.t_s, smoothed_m * 100))
     if truth is not None:
         cross.append(ChartLine("true", "truth", truth.t_s, flight.cross_track_m(truth) * 100))
         height.append(ChartLine("true", "truth", truth.t_s, truth.height_m))

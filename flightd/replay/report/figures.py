@@ -136,17 +136,14 @@ def _position(flight: RecordedFlight) -> Figure | None:
     if not len(error_m):
         return None
     note = "p95, believed against true"
-    if isinstance(flight.smoothed, Track):
-        smoothed_m = _apart_m(flight, flight.smoothed, flight.truth)
-        if len(smoothed_m):
-            note += f"; smoothed {_centimetres(float(np.percentile(smoothed_m, 95)))} cm"
+    smoothed_m = _apart_m(flight, flight.smoothed, flight.truth)
+    if len(smoothed_m):
+        note += f"; smoothed {_centimetres(float(np.percentile(smoothed_m, 95)))} cm"
     return Figure("Position error", _centimetres(float(np.percentile(error_m, 95))), "cm", note)
 
 
 def _smoothing(flight: RecordedFlight) -> Figure | None:
     """How far the drone believed itself from where the whole flight says that it was."""
-    if not isinstance(flight.smoothed, Track):
-        return None
     apart_m = _apart_m(flight, flight.estimate, flight.smoothed)
     if not len(apart_m):
         return None

@@ -12,7 +12,6 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.core.errors import UnavailableError
 from flightd.core.tracks import SensorEstimate
 from flightd.core.types import Event, LineSet, Phase, Status
 from flightd.replay.log import FlightLog
@@ -116,7 +115,7 @@ class Latency:
 @dataclass(frozen=True, slots=True)
 class RecordedFlight:
     """A flight as the report shows it.  `truth` and `summary` are there if their files are; `smoothed` is the
-    estimate judged afterwards, or why there is none.  `sensors` is what the lines said last of the drone's
+    estimate judged afterwards.  `sensors` is what the lines said last of the drone's
     own sensors; `nodes` are those that were ordered, none: all of them."""
 
     log: FlightLog
@@ -128,7 +127,7 @@ class RecordedFlight:
     visits: tuple[Visit, ...]
     estimate: Track
     truth: Track | None
-    smoothed: Track | UnavailableError
+    smoothed: Track
     telemetry: TelemetrySeries
     setpoints: Setpoints
     latency: Latency

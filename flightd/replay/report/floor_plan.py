@@ -60,8 +60,7 @@ def floor_plan(flight: RecordedFlight) -> str:
     if flight.truth is not None:
         layers.append(_track(flight.truth, place, "truth", flight))
     layers.append(_track(flight.estimate, place, "estimate", flight))
-    if isinstance(flight.smoothed, Track):
-        layers.append(_track(flight.smoothed, place, "smoothed", flight))
+    layers.append(_track(flight.smoothed, place, "smoothed", flight))
     if flight.site is not None:
         layers += [_nodes(flight.site, flight, place), _visits(flight, flight.site, place)]
     layers.append(_scale_bar(place))
@@ -209,13 +208,10 @@ def _caption(flight: RecordedFlight) -> str:
     keys: Iterable[tuple[str, str]] = [("estimate", "where it thought it was")]
     if flight.truth is not None:
         keys = [("truth", "where it was"), *keys]
-    if isinstance(flight.smoothed, Track):
-        keys = [*keys, ("smoothed", "where the whole flight says it was (smoothed)")]
+    keys = [*keys, ("smoothed", "where the whole flight says it was (smoothed)")]
     shown = "".join(
         element("span", element("i", class_=role), text(name), class_="key") for role, name in keys
     )
-    if not isinstance(flight.smoothed, Track):
-        shown += element("span", text(f"no smoothed track: {flight.smoothed}"), class_="key")
     return element("figcaption", shown)
 
 

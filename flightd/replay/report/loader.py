@@ -15,7 +15,7 @@ from typing import TypeAlias
 import msgspec
 import numpy as np
 
-from flightd.core.errors import InputError, UnavailableError
+from flightd.core.errors import InputError
 from flightd.core.flight_order import FlightOrder
 from flightd.core.topics import FOR_PEOPLE, RETAINED, Document, Topic
 from flightd.core.tracks import last_known
@@ -161,14 +161,11 @@ def _estimate(poses: Sequence[GridPose], seconds: _Seconds) -> Track:
     )
 
 
-def _smoothed(poses: Sequence[GridPose], estimate: Track, seconds: _Seconds) -> Track | UnavailableError:
-    """The estimate with the positions that the whole flight speaks for, or why they cannot be had."""
+def _smoothed(poses: Sequence[GridPose], estimate: Track, seconds: _Seconds) -> Track:
+    """The estimate with the positions that the whole flight speaks for."""
     if not poses:
         return estimate
-    try:
-        found = smooth(poses)
-    except UnavailableError as err:
-        return err
+    found = smooth(poses)
     t_s = seconds(found.stamp_ns)
     height_m, yaw_rad = (np.interp(t_s, estimate.t_s, of) for of in (estimate.height_m, estimate.yaw_rad))
     return Track(t_s, found.x_m, found.y_m, height_m, yaw_rad)

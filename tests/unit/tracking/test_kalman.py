@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from filterpy.kalman import KalmanFilter as Reference
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -37,6 +36,8 @@ def test_the_covariance_stays_one_over_many_sharp_measurements() -> None:
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 4), st.integers(1, 3))
 def test_it_steps_as_the_usual_library_does(seed: int, n: int, m: int) -> None:
+    from filterpy.kalman import KalmanFilter as Reference  # it takes a second
+
     random = np.random.default_rng(seed)
     spread = random.normal(size=(n, n))
     usual = Reference(dim_x=n, dim_z=m)
