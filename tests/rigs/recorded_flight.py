@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -33,3 +34,4 @@ def _fly(out: Path, scenario: Path) -> None:
     command = [sys.executable, "-m", "flightd", "sim", *options]
     done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_S, check=False)
     assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == json.loads((out / "summary.json").read_text())

@@ -22,11 +22,10 @@ from flightd.core.snapshot import Snapshot
 from flightd.core.types import Phase
 from flightd.sim.scenario.scenario import Scenario
 from tests.command import Command
-from tests.rigs.small_camera import small_camera_file, with_small_camera
+from tests.rigs.recorded_flight import fly_once
+from tests.rigs.small_camera import with_small_camera
 
 ROOT = Path(__file__).parents[3]
-BRIEF = ("--set", 'mission.nodes=["A2"]', "--set", "mission.dwell_s=0.5")
-"""One leg; longer flights and other things are looked at elsewhere."""
 WALL = {"wall_time_s"}
 
 
@@ -35,29 +34,21 @@ def process(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=280, check=False)
 
 
-def flown(folder: Path, *options: str) -> dict[str, Any]:
-    folder.mkdir()
-    small = "--scenario", str(small_camera_file(folder))
-    done = process("sim", "--json", "--out", str(folder), *BRIEF, *small, *options)
-    assert done.returncode == 0, done.stderr
-    summary: dict[str, Any] = json.loads(done.stdout)
-    assert summary == json.loads((folder / "summary.json").read_text())
-    return summary
-
-
-def test_the_same_seed_flies_the_same_flight(tmp_path: Path) -> None:
-    first, second = (flown(tmp_path / name, "--seed", "5") for name in ("a", "b"))
+def test_the_same_seed_flies_the_same_flight(recorded_flight: Path, tmp_path: Path) -> None:
+    first, second = (
+        json.loads((folder / "summary.json").read_text()) for folder in (recorded_flight, fly_once(tmp_path))
+    )
     assert {k: v for k, v in first.items() if k not in WALL} == {
         k: v for k, v in second.items() if k not in WALL
     }
     assert first["mission"] == "completed"
-    assert (first["nodes_visited"], first["nodes_miscounted"]) == (1, 0)
+    assert (first["nodes_visited"], first["nodes_miscounted"]) == (2, 0)
     assert first["cross_track_rms_m"] <= 0.05
     assert first["hover_error_p95_m"] <= 0.10
     assert first["landed_error_m"] <= 0.15
     assert first["frames_dropped"] == 0
     for name in ("flight.mcap", "truth.mcap", "report.html", "inventory.csv"):
-        assert (tmp_path / "a" / name).stat().st_size > 0
+        assert (recorded_flight / name).stat().st_size > 0
 
 
 @pytest.mark.parametrize(
