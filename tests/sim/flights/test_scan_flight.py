@@ -12,22 +12,21 @@ from typing import Any
 import pytest
 
 from flightd.adapters.store.sqlite import SqliteStore
+from tests.command import Command
+from tests.rigs.small_camera import small_camera_file
 
 ROOT = Path(__file__).parents[3]
 
 pytestmark = pytest.mark.slow
 
 
-def flightd(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "flightd", *arguments]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=290, check=False)
-
-
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("scan")
-    where = ("--warehouse", "configs/site-racks-small.toml", "--set", 'mission.nodes=["A2"]')
-    done = flightd("sim", *where, "--seed", "3", "--out", str(out))
+    where = ("--warehouse", str(ROOT / "configs" / "site-racks-small.toml"), "--set", 'mission.nodes=["A2"]')
+    small = ("--scenario", str(small_camera_file(out)))  # below; the front camera is as it is shipped
+    command = [sys.executable, "-m", "flightd", "sim", *where, *small, "--seed", "3", "--out", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=290, check=False)
     assert done.returncode == 0, done.stderr
     return out
 
@@ -59,7 +58,7 @@ def test_the_inventory_says_so_with_evidence(flown: Path) -> None:
         assert rows[record.code]["state"] == record.state
 
 
-def test_its_record_flies_again_decision_for_decision(flown: Path) -> None:
-    replayed = flightd("replay", str(flown / "flight.mcap"))
+def test_its_record_flies_again_decision_for_decision(flightd: Command, flown: Path) -> None:
+    replayed = flightd("replay", flown / "flight.mcap")
     assert replayed.returncode == 0, replayed.stdout + replayed.stderr
     assert "every decision is the same" in replayed.stdout
