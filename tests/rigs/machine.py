@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-CALIBRATION_S = 1.0
+CALIBRATION_S = 0.5
 BEAT_S = 0.02
 _SAMPLE_BEATS = 20
 _TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")

@@ -15,6 +15,7 @@ from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.types import CommandKind, Phase
 from flightd.runtime.free_ports import free_ports
 from tests.rigs.event_loops import in_real_time
+from tests.rigs.small_camera import small_camera_file
 
 ROOT = Path(__file__).parents[3]
 
@@ -35,6 +36,7 @@ async def test_a_flight_is_started_watched_and_landed_from_the_ground(tmp_path: 
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         *("-m", "flightd", "sim", "--speed", "1", "--out", str(tmp_path), *options),
+        *("--scenario", str(small_camera_file(tmp_path))),
         cwd=ROOT,
         stderr=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.DEVNULL,
