@@ -25,11 +25,22 @@ settings.load_profile("flightd")
 
 _COSTLY = {
     "tests/bench/test_vision_cost.py",
+    "tests/replay/test_decisions.py",
+    "tests/replay/test_log_command.py",
+    "tests/replay/test_playback.py",
+    "tests/replay/test_report.py",
+    "tests/replay/test_report_inventory.py",
     "tests/sim/flights/test_scan_flight.py",
     "tests/sim/ideal/test_height_changes.py",
     "tests/sim/pictures/test_shelf_reading.py",
     "tests/unit/cli/test_vision_commands.py",
+    "tests/unit/foxglove/test_logged_for_viewers.py",
+    "tests/web/test_flight_folder.py",
+    "tests/web/test_flight_functions.py",
+    "tests/web/test_flight_fuzz.py",
+    "tests/web/test_flights_api.py",
     "tests/web/test_navigation.py",
+    "tests/web/test_studio_api.py",
 }
 _IN_BROWSER = re.compile(r"tests/web/test_(?:\w*page|language)\.py")
 """Each starts a Chromium, and a station for all its tests."""

@@ -16,6 +16,7 @@ from flightd.core.topics import Document, Topic
 from flightd.core.types import Event, EventLevel, GridPose, Phase, Status
 from flightd.replay.report.charts import ChartLine, ChartStrip
 from flightd.replay.report.figures import key_figures, outcome
+from flightd.replay.report.flight import RecordedFlight
 from flightd.replay.report.loader import load_flight
 from flightd.replay.report.markup import clock, number, path_data, thin, ticks
 from flightd.replay.report.page import render, write_report
@@ -39,8 +40,13 @@ def bare_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def page(log: Path) -> str:
-    return render(load_flight(log))
+def flight(log: Path) -> RecordedFlight:
+    return load_flight(log)
+
+
+@pytest.fixture(scope="module")
+def page(flight: RecordedFlight) -> str:
+    return render(flight)
 
 
 class _Outline(HTMLParser):
@@ -103,8 +109,7 @@ def test_the_page_shows_what_the_flight_was(page: str) -> None:
     assert 'class="flown estimate"' in page
 
 
-def test_every_stop_is_in_the_list_in_order(log: Path) -> None:
-    flight = load_flight(log)
+def test_every_stop_is_in_the_list_in_order(flight: RecordedFlight) -> None:
     planned = [leg.node for leg in legs(parse_site(SITE_TOML, "demo")) if leg.phase == Phase.HOVER]
     assert [visit.node for visit in flight.visits] == planned
     assert all(2.3 < visit.dwell_s < 2.7 for visit in flight.visits)
@@ -119,21 +124,20 @@ def test_a_stop_with_a_scan_is_one_visit_measured_while_it_hovers_over_the_node(
     assert all(visit.true_error_m < 0.15 for visit in flight.visits), "the view itself is 0.3 m aside"
 
 
-def test_time_starts_with_the_flight_not_with_its_papers(log: Path) -> None:
-    flight = load_flight(log)
+def test_time_starts_with_the_flight_not_with_its_papers(flight: RecordedFlight) -> None:
     assert flight.phases[0].start_s == 0.0
     assert flight.duration_s == pytest.approx(flight.phases[-1].end_s, abs=0.05)
 
 
-def test_phases_cover_the_flight_without_gaps(log: Path) -> None:
-    phases = load_flight(log).phases
+def test_phases_cover_the_flight_without_gaps(flight: RecordedFlight) -> None:
+    phases = flight.phases
     assert phases[0].phase == Phase.PREFLIGHT
     assert phases[-1].phase == Phase.DONE
     assert all(a.end_s == b.start_s for a, b in itertools.pairwise(phases))
 
 
-def test_the_summary_decides_the_key_figures(log: Path) -> None:
-    figures = {figure.label: figure for figure in key_figures(load_flight(log))}
+def test_the_summary_decides_the_key_figures(flight: RecordedFlight) -> None:
+    figures = {figure.label: figure for figure in key_figures(flight)}
     assert figures["Cross-track"].value == "2.1"
     assert figures["Landing error"].value == "6.1"
     assert 0.5 < float(figures["Position error"].value) < 3.0  # the noise of the made-up estimate
