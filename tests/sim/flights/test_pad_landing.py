@@ -35,7 +35,7 @@ def fly(world: Site, seed: int, **others: object) -> tuple[Flown, float]:
     return flown, math.hypot(last.x_m - x_m, last.y_m - y_m)
 
 
-@pytest.mark.parametrize("seed", [*range(1, 6), 23])
+@pytest.mark.parametrize("seed", [1, 3, 5, 23])
 def test_it_lands_within_a_decimetre_of_a_pad_that_was_pushed_away(seed: int) -> None:
     flown, error_m = fly(pushed(seed), seed)
     assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
@@ -51,12 +51,13 @@ def test_without_a_pad_in_sight_it_lands_on_the_node_of_the_map() -> None:
 
 def test_a_line_that_is_out_of_sight_at_the_start_is_found_while_climbing() -> None:
     world = pushed(4)
-    flown, _ = fly(world, 4)
+    flown, error_m = fly(world, 4)
     low = [o for o, (_, k) in zip(flown.outputs, flown.truth, strict=True) if 0.12 < k.height_m < 0.35]
     assert low[0].tracks is not None
     assert not (low[0].tracks.across_x and low[0].tracks.across_y), "not both lines are in sight low down"
     assert [o for o in flown.outputs if o.phase is Phase.ACQUIRE]
     assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
+    assert error_m <= 0.10
 
 
 def ending(overrun_m: float) -> Site:
