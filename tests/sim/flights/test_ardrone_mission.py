@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[3]
 
 def flown(folder: Path) -> dict[str, Any]:
     brief = ["--set", 'mission.nodes=["A2"]', "--set", "mission.dwell_s=0.5"]
+    brief += ["--set", "mission.autostart_countdown_s=0"]
     options = ["--json", "--out", str(folder), "--seed", "5", *brief]
     done = subprocess.run(
         [sys.executable, "-m", "flightd", "sim", "--vehicle", "ardrone", *options],
