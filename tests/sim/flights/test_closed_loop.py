@@ -106,7 +106,8 @@ def test_a_taken_camera_port_is_one_line(tmp_path: Path) -> None:
 
 def short_flight(folder: Path, speed: float, observer: Any) -> Simulation:
     scenario = with_small_camera(Scenario())
-    settings = 'mission.nodes=["A1", "A2"]', "mission.autostart_countdown_s=0", "vision.workers=2"
+    brief = 'mission.nodes=["A1", "A2"]', "mission.dwell_s=0.5", "mission.autostart_countdown_s=0"
+    settings = *brief, "vision.workers=2"
     config, site = simulator_config(None, None, scenario, settings)
     return Simulation(config, site, scenario, 2, speed, folder, observer)
 
