@@ -160,7 +160,7 @@ def _config(node: str, scenario: Scenario) -> Config:
     down, front = _lens_keys(scenario.camera.camera().lens), _lens_keys(scenario.front_camera.camera().lens)
     return config.model_copy(
         update={
-            "mission": config.mission.model_copy(update={"nodes": (node,)}),
+            "mission": config.with_values(mission={"nodes": (node,), "autostart_countdown_s": 0.0}).mission,
             "camera": config.camera.model_copy(update=down),
             "front_camera": config.front_camera.model_copy(update={"url": "udp://127.0.0.1:5601", **front}),
         }

@@ -31,7 +31,7 @@ def test_a_flight_shares_its_pose_at_thirty_hertz_and_the_pad_while_near(
 
     monkeypatch.setattr(AutopilotPeer, "received", listen)
     scenario = with_small_camera(Scenario())
-    mission = 'mission.nodes=["A2"]', "mission.dwell_s=0.5"
+    mission = 'mission.nodes=["A2"]', "mission.dwell_s=0.5", "mission.autostart_countdown_s=0"
     vehicle = "vehicle.pose_output=odometry", "vehicle.landing_target=true"
     config, site = simulator_config(None, None, scenario, [*mission, *vehicle])
     result = simulate.fly(Simulation(config, site, scenario, 2, None, tmp_path, lambda _: None))

@@ -26,7 +26,8 @@ PX4 = ("height_stuck", "climb_lost", "ceiling_left")
 )
 def test_it_is_found_and_ends_as_the_table_says(vehicle: str, hazard: str, tmp_path: Path) -> None:
     scenario = load_scenario(shipped_scenarios()[hazard])
-    options = SimOptions(seed=1 + len(hazard), vehicle=vehicle)
+    at_once = ("mission.autostart_countdown_s=0",)
+    options = SimOptions(seed=1 + len(hazard), vehicle=vehicle, settings=at_once)
     simulation = prepare(
         options,
         with_small_camera(scenario),
