@@ -52,7 +52,7 @@ def _mutated(content: bytes, mutations: list[tuple[str, int, bytes]]) -> bytes:
     return bytes(changed)
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(mutations=_MUTATIONS)
 def test_a_damaged_log_is_read_or_refused_but_never_crashes(
     small: Path, tmp_path: Path, mutations: list[tuple[str, int, bytes]]
