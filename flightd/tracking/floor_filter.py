@@ -45,6 +45,7 @@ from flightd.tracking.motion_model import (
     SCALE,
     VX,
     VY,
+    Carrier,
     Told,
     lean,
     moved,
@@ -146,6 +147,12 @@ class FloorFilter:
         """What is expected of the disturbance so much later: the gust in it fades."""
         steady = self._steady[axis]
         return steady + (self.mean(PUSH[axis]) - steady) * math.exp(-ahead_s / self._noise.gust_s)
+
+    def carrier(self) -> Carrier:
+        """What carries the drone on while nothing new is known."""
+        roll, pitch, psi = self.mean(ROLL), self.mean(PITCH), self.mean(PSI)
+        gusts = self.mean(PUSH_X) - self._steady[0], self.mean(PUSH_Y) - self._steady[1]
+        return Carrier(roll, pitch, psi, (self._steady[0], self._steady[1]), gusts, self._noise.gust_s)
 
     def sensors(self) -> SensorEstimate:
         """What is known of the sensors, for people."""

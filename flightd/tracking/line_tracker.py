@@ -291,16 +291,15 @@ class LineTracker:
         self, from_ns: int, to_ns: int, vx: float, vy: float
     ) -> tuple[float, float, float, float, float, float]:
         """Velocity, way and acceleration along both axes after flying on in the attitude told or assumed."""
-        held, drag = self._filter, self._params.noise.drag_per_s
+        pushed, drag = self._filter.carrier(), self._params.noise.drag_per_s
         moved_x = moved_y = ax = ay = 0.0
         stamp_ns = from_ns
         while stamp_ns < to_ns:
             step_ns = min(_STEP_NS, to_ns - stamp_ns)
-            ax, ay = self._accel(stamp_ns + step_ns // 2)
-            dt_s = step_ns * 1e-9
-            ahead_s = (stamp_ns + step_ns // 2 - self._stamp_ns) * 1e-9
-            ax += held.push_after(0, ahead_s) - drag * vx
-            ay += held.push_after(1, ahead_s) - drag * vy
+            middle_ns, dt_s = stamp_ns + step_ns // 2, step_ns * 1e-9
+            ax, ay = pushed.accel(self._attitude_at(middle_ns), (middle_ns - self._stamp_ns) * 1e-9)
+            ax -= drag * vx
+            ay -= drag * vy
             moved_x += vx * dt_s + 0.5 * ax * dt_s * dt_s
             moved_y += vy * dt_s + 0.5 * ay * dt_s * dt_s
             vx += ax * dt_s

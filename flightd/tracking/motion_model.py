@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flightd.core.geometry import GRAVITY_MPS2, Matrix
+from flightd.core.types import Attitude
 
 PSI, PSI_RATE, VX, VY, PUSH_X, PUSH_Y, HEIGHT = range(7)
 ROLL, PITCH, LEAK, MOUNT_ROLL, MOUNT_PITCH, MOUNT_YAW, DELAY, SCALE = range(7, 15)
@@ -47,6 +48,32 @@ class Step(NamedTuple):
     state: Matrix
     jacobian: Matrix
     by_accel: Matrix
+
+
+class Carrier(NamedTuple):
+    """What accelerates the drone by what is known at one moment: errors of the told attitude, the angle to
+    the grid, and for each grid axis the steady push of the air and what a gust adds, fading in `gust_s`."""
+
+    roll_rad: float
+    pitch_rad: float
+    psi_rad: float
+    steady_mps2: tuple[float, float]
+    gust_mps2: tuple[float, float]
+    gust_s: float
+
+    def accel(self, told: Attitude, ahead_s: float) -> tuple[float, float]:
+        """Acceleration along the grid axes (m/s2) so much later, in that attitude: as `lean` and the push
+        make it, for a hundred steps in each control tick while nothing is seen."""
+        yaw = told.yaw_rad + self.psi_rad
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        forward = -GRAVITY_MPS2 * math.tan(told.pitch_rad + self.pitch_rad)
+        right = GRAVITY_MPS2 * math.tan(told.roll_rad + self.roll_rad)
+        left = math.exp(-ahead_s / self.gust_s)
+        (steady_x, steady_y), (gust_x, gust_y) = self.steady_mps2, self.gust_mps2
+        return (
+            cos * forward - sin * right + (steady_x + gust_x * left),
+            sin * forward + cos * right + (steady_y + gust_y * left),
+        )
 
 
 def lean(x: Matrix, told: Told) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:

@@ -4,7 +4,8 @@ The first look is at the whole picture as it is.  Only where dense perpendicular
 be (`code_regions`) and none was read, the region is looked at again: inverted, enlarged, shrunk, with local
 contrast, sharpened, smoothed, turned.  A read is believed when error correction or a checksum vouches for
 it; a checksum of one digit found in an altered picture, and symbologies without any, need a second look
-that agrees.  Two believed texts at one place contradict each other, and then neither counts.
+that agrees.  Two believed texts at one place contradict each other, and then neither counts.  What is still
+not read and has bars one way is fitted as a blurred EAN-13 (`blurred_ean`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import zxingcpp
 
 from flightd.core.geometry import Matrix
 from flightd.core.types import CodeRead, Image
+from flightd.vision.shelf.blurred_ean import read_blurred_ean
 from flightd.vision.shelf.code_regions import CodeRegion, code_regions
 from flightd.vision.shelf.crease_flattening import flatten_qr
 from flightd.vision.shelf.digital_link import parse_digital_link
@@ -96,6 +98,9 @@ _LOOKS = (
 )
 """In the order in which they help most often on photographs; all are tried where nothing is read."""
 
+_FLATTENED = len(_LOOKS) + 1
+_BLURRED = _FLATTENED + 1
+"""The looks that follow those."""
 _LARGEST_LOOK_PX = 1000
 """Enlarged views longer than this would cost more than they show."""
 _MOST_PIXELS = 5_000_000
@@ -213,18 +218,37 @@ def _look_again(grey: Image, region: CodeRegion, found: list[_Candidate], budget
         damaged += [(view, picture_from_view, code) for code in codes if _is_damaged_qr(code)][:1]
         if _is_read(region, found):
             return budget
+    if not _flatten_damaged(damaged, found):
+        _read_blurred(crop, region, found)
+    return budget
+
+
+def _flatten_damaged(
+    damaged: Sequence[tuple[Image, Matrix, zxingcpp.Barcode]], found: list[_Candidate]
+) -> bool:
+    """Read one of the QR codes that were found and not read, flattened; says whether one was."""
     for view, picture_from_view, code in damaged[:_MOST_DAMAGED]:
         mended = flatten_qr(view, _corners(code), _version(code))
         if mended is not None:
-            number = len(_LOOKS) + 1
             placed = _transformed(_corners(code), picture_from_view)
             _add(
                 found,
-                _Candidate("QR Code", mended, _Proof.CORRECTION, False, placed, first_look=number),
-                number,
+                _Candidate("QR Code", mended, _Proof.CORRECTION, False, placed, first_look=_FLATTENED),
+                _FLATTENED,
             )
-            break
-    return budget
+            return True
+    return False
+
+
+def _read_blurred(crop: Image, region: CodeRegion, found: list[_Candidate]) -> None:
+    """Several bands agreed on what it says: that counts as two looks, and never as one that is sure."""
+    read = read_blurred_ean(crop)
+    if read is not None:
+        symbology, text = _retail_name("EAN-13", read.text)
+        corners = read.corners + np.array([region.x0, region.y0])
+        new = _Candidate(symbology, text, _Proof.CHECKSUM, False, corners, first_look=_BLURRED)
+        for look in (_BLURRED, _BLURRED + 1):
+            _add(found, new, look)
 
 
 def _is_damaged_qr(code: zxingcpp.Barcode) -> bool:
@@ -284,9 +308,12 @@ def _add(found: list[_Candidate], new: _Candidate, look: int) -> None:
 
 
 def _named(code: zxingcpp.Barcode) -> tuple[str, str]:
+    return _retail_name(str(code.format), str(code.text))
+
+
+def _retail_name(symbology: str, text: str) -> tuple[str, str]:
     """Symbology and text; an EAN-13 that starts with 0 is the UPC-A code it is printed as, and a UPC-E is
     told as the UPC-A that it abbreviates."""
-    symbology, text = str(code.format), str(code.text)
     if symbology in {"EAN-13", "UPC-E"} and len(text) == 13 and text[0] == "0":
         return "UPC-A" if symbology == "EAN-13" else symbology, text[1:]
     return symbology, text
@@ -345,7 +372,7 @@ def _code_read(candidate: _Candidate, width: int, height: int) -> CodeRead:
         corners_px=tuple((round(float(x), 1), round(float(y), 1)) for x, y in corners),
         sure=candidate.sure,
         agreeing=len(candidate.looks),
-        quality=round(1.0 - candidate.first_look / (len(_LOOKS) + 2), 3),
+        quality=round(1.0 - candidate.first_look / (_BLURRED + 1), 3),
         gs1=elements,
         gs1_problem=problem,
     )
